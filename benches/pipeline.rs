@@ -1,0 +1,2 @@
+//! Criterion benches of this stage.
+fn main() {}

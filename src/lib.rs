@@ -1,0 +1,8 @@
+//! Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
+#![forbid(unsafe_code)]
+pub use tactile_elasticity as elasticity;
+pub use tactile_force as force;
+pub use tactile_match as matching;
+pub use tactile_optics as optics;
+pub use tactile_sfs as sfs;
+pub use tactile_tps as tps;

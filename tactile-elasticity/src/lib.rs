@@ -1,0 +1,2 @@
+//! From deformation gradients to strain, and from stress and strain to Young modulus, with uncertainty.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! Surfaces from one image: shape from shading, slope integration, control points.
+#![forbid(unsafe_code)]
