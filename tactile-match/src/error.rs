@@ -1,0 +1,51 @@
+//! The crate's one error type.
+
+use thiserror::Error;
+
+/// One of the two point sets of a match.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PointSet {
+    /// The set that is warped.
+    Model,
+    /// The set it is warped onto.
+    Target,
+}
+
+impl std::fmt::Display for PointSet {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Model => "model",
+            Self::Target => "target",
+        })
+    }
+}
+
+/// Why a match could not be attempted. Not converging is no error: see [`StopReason`](crate::StopReason).
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MatchError {
+    /// A point set has no points.
+    #[error("the {set} has no points")]
+    Empty {
+        /// The empty set.
+        set: PointSet,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("point {row} of the {set} has a coordinate that is not finite")]
+    NotFinite {
+        /// The set the point belongs to.
+        set: PointSet,
+        /// Its row.
+        row: usize,
+    },
+    /// An option is outside its range (or NaN).
+    #[error("option {option} = {value} is outside {expected}")]
+    InvalidOption {
+        /// The option's name.
+        option: &'static str,
+        /// The value found.
+        value: f64,
+        /// The values it may take.
+        expected: &'static str,
+    },
+}

@@ -1,0 +1,103 @@
+//! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
+
+use crate::{MatchError, SoftMatches};
+use nalgebra::{Point, RealField, SMatrix};
+
+/// Finds which model point is which target point, and the warp that takes the model onto the target.
+///
+/// Object safe, so that a user picks the method at run time:
+/// `let matcher: Box<dyn PointMatcher<f64, 2>> = …`.
+pub trait PointMatcher<T: RealField + Copy, const D: usize> {
+    /// Matches `model` (I points) to `target` (J points); I and J may differ and either may be 1.
+    ///
+    /// # Errors
+    /// [`MatchError`] for empty sets, coordinates that are not finite and options out of range.
+    fn match_points(
+        &self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError>;
+}
+
+/// Why a matcher stopped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The warp and the assignment stand still.
+    #[default]
+    Converged,
+    /// Every pair fits exactly (to rounding) before the schedule ended.
+    Exact,
+    /// The iteration limit was reached.
+    IterationLimit,
+    /// The caller's callback asked to stop.
+    Callback,
+    /// Too few distinct points for more than a rigid or affine answer.
+    Degenerate,
+}
+
+/// How a match went.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MatchReport<T> {
+    /// Why it stopped.
+    pub stop: StopReason,
+    /// Outer iterations (match, then warp) of the start that won.
+    pub iterations: usize,
+    /// Starts that were tried.
+    pub starts: usize,
+    /// Root mean square distance between warped model points and their partners, in the units of the points.
+    pub residual: T,
+    /// Estimated standard deviation of the position noise along one axis, in the units of the points.
+    pub sigma: T,
+}
+
+/// The answer of a [`PointMatcher`].
+#[derive(Clone, Debug)]
+pub struct Matching<T: RealField + Copy, const D: usize> {
+    /// The warped model points.
+    pub warped: Vec<Point<T, D>>,
+    /// Target row of every model point; `None` for a point without a partner. No target row occurs twice.
+    pub assignment: Vec<Option<usize>>,
+    /// Probability that the assignment (or the lack of one) of each model point is right, in [0, 1].
+    pub confidence: Vec<T>,
+    /// The soft matches M the assignment was read from.
+    pub soft: SoftMatches<T>,
+    /// Model rows without a partner, ascending.
+    pub unmatched_model: Vec<usize>,
+    /// Target rows without a partner, ascending.
+    pub unmatched_target: Vec<usize>,
+    /// Covariance of each model point's displacement, in squared units of the points.
+    pub displacement_covariance: Vec<SMatrix<T, D, D>>,
+    /// The matcher's energy after every outer iteration.
+    pub energy: Vec<T>,
+    /// How it went.
+    pub report: MatchReport<T>,
+}
+
+/// Rows without a partner on both sides, `(model, target)`, ascending, for `target_len` target points.
+#[must_use]
+pub fn unmatched_rows(assignment: &[Option<usize>], target_len: usize) -> (Vec<usize>, Vec<usize>) {
+    let mut taken = vec![false; target_len];
+    for &row in assignment.iter().flatten() {
+        taken[row] = true;
+    }
+    let model = (0..assignment.len()).filter(|&i| assignment[i].is_none()).collect();
+    (model, (0..target_len).filter(|&j| !taken[j]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unmatched_rows_are_the_complement_of_the_assignment() {
+        assert_eq!(unmatched_rows(&[Some(2), None, Some(0)], 4), (vec![1], vec![1, 3]));
+        assert_eq!(unmatched_rows(&[], 1), (vec![], vec![0]));
+    }
+
+    /// Compiles only while the trait can be made into an object.
+    #[test]
+    fn matchers_are_objects() {
+        fn _takes(_: &dyn PointMatcher<f64, 3>) {}
+    }
+}

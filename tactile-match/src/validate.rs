@@ -1,0 +1,73 @@
+//! What every matcher asks of its input: at least one point in each set, every coordinate finite.
+
+use crate::{MatchError, PointSet};
+use nalgebra::{Point, RealField};
+
+/// Rejects empty sets and coordinates that are NaN or infinite; `O(I + J)`.
+///
+/// # Errors
+/// [`MatchError::Empty`] and [`MatchError::NotFinite`].
+pub(crate) fn point_sets<T: RealField + Copy, const D: usize>(
+    model: &[Point<T, D>],
+    target: &[Point<T, D>],
+) -> Result<(), MatchError> {
+    point_set(PointSet::Model, model)?;
+    point_set(PointSet::Target, target)
+}
+
+/// The same for one set.
+pub(crate) fn point_set<T: RealField + Copy, const D: usize>(
+    set: PointSet,
+    points: &[Point<T, D>],
+) -> Result<(), MatchError> {
+    if points.is_empty() {
+        return Err(MatchError::Empty { set });
+    }
+    match points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        Some(row) => Err(MatchError::NotFinite { set, row }),
+        None => Ok(()),
+    }
+}
+
+/// Rejects an option outside `[low, high]`, NaN included.
+pub(crate) fn option_within(
+    option: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+    expected: &'static str,
+) -> Result<(), MatchError> {
+    if value.is_finite() && (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(MatchError::InvalidOption { option, value, expected })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    #[test]
+    fn empty_and_not_finite_sets_are_typed_errors() {
+        let good = [Point2::new(0.0, 1.0)];
+        assert_eq!(point_sets(&[], &good), Err(MatchError::Empty { set: PointSet::Model }));
+        assert_eq!(point_sets(&good, &[]), Err(MatchError::Empty { set: PointSet::Target }));
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let set = [Point2::new(0.0, 1.0), Point2::new(bad, 0.0)];
+            let expected = |set| Err(MatchError::NotFinite { set, row: 1 });
+            assert_eq!(point_sets(&set, &good), expected(PointSet::Model));
+            assert_eq!(point_sets(&good, &set), expected(PointSet::Target));
+        }
+        assert_eq!(point_sets(&good, &good), Ok(()));
+    }
+
+    #[test]
+    fn options_outside_their_range_are_rejected() {
+        assert!(option_within("slack", 0.2, 0.0, 1.0, "[0, 1]").is_ok());
+        for bad in [f64::NAN, -0.1, 1.1, f64::INFINITY] {
+            assert!(option_within("slack", bad, 0.0, 1.0, "[0, 1]").is_err());
+        }
+    }
+}
