@@ -48,4 +48,22 @@ pub enum MatchError {
         /// The values it may take.
         expected: &'static str,
     },
+    /// A slice has not the length its shape says.
+    #[error("{what}: expected {expected} entries, found {found}")]
+    Shape {
+        /// What the slice holds.
+        what: &'static str,
+        /// Entries its shape asks for.
+        expected: usize,
+        /// Entries it has.
+        found: usize,
+    },
+    /// A cost is NaN or `−∞`.
+    #[error("the cost of row {row}, column {column} is NaN or minus infinity")]
+    Cost {
+        /// Its row.
+        row: usize,
+        /// Its column.
+        column: usize,
+    },
 }

@@ -1,0 +1,233 @@
+//! Linear assignment against brute force, against a slow Hungarian method and against its own proof of optimality.
+
+use proptest::prelude::*;
+use tactile_match::{AssignmentWorkspace, MatchError, linear_assignment};
+
+fn total(costs: &[f64], columns: usize, assignment: &[Option<usize>]) -> f64 {
+    assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| costs[i * columns + j])).sum()
+}
+
+/// Every row to every column left, recursively: (pairs, cost) with the most pairs and then the least cost.
+fn brute_force(
+    costs: &[f64],
+    rows: usize,
+    columns: usize,
+    row: usize,
+    taken: &mut Vec<bool>,
+) -> (usize, f64) {
+    if row == rows {
+        return (0, 0.0);
+    }
+    let mut best = brute_force(costs, rows, columns, row + 1, taken);
+    for j in 0..columns {
+        let cost = costs[row * columns + j];
+        if !taken[j] && cost.is_finite() {
+            taken[j] = true;
+            let rest = brute_force(costs, rows, columns, row + 1, taken);
+            taken[j] = false;
+            let found = (rest.0 + 1, rest.1 + cost);
+            if found.0 > best.0 || (found.0 == best.0 && found.1 < best.1) {
+                best = found;
+            }
+        }
+    }
+    best
+}
+
+/// Kuhn's Hungarian method on prices, `O(n² m)`, for `rows <= columns`: short and well known, nothing shared with the code under
+/// test. Returns the least cost.
+fn slow_hungarian(costs: &[f64], rows: usize, columns: usize) -> f64 {
+    let (mut u, mut v) = (vec![0.0; rows + 1], vec![0.0; columns + 1]);
+    let mut row_of = vec![0; columns + 1]; // counted from one; nought is none
+    for row in 1..=rows {
+        let (mut slack, mut used, mut way) =
+            (vec![f64::INFINITY; columns + 1], vec![false; columns + 1], vec![0; columns + 1]);
+        row_of[0] = row;
+        let mut at = 0;
+        while row_of[at] != 0 {
+            used[at] = true;
+            let (i, mut delta, mut next) = (row_of[at], f64::INFINITY, 0);
+            for j in (1..=columns).filter(|&j| !used[j]) {
+                let reduced = costs[(i - 1) * columns + j - 1] - u[i] - v[j];
+                if reduced < slack[j] {
+                    (slack[j], way[j]) = (reduced, at);
+                }
+                if slack[j] < delta {
+                    (delta, next) = (slack[j], j);
+                }
+            }
+            for j in 0..=columns {
+                if used[j] {
+                    u[row_of[j]] += delta;
+                    v[j] -= delta;
+                } else {
+                    slack[j] -= delta;
+                }
+            }
+            at = next;
+        }
+        while at != 0 {
+            row_of[at] = row_of[way[at]];
+            at = way[at];
+        }
+    }
+    (1..=columns).filter(|&j| row_of[j] != 0).map(|j| costs[(row_of[j] - 1) * columns + j - 1]).sum()
+}
+
+fn assert_distinct(assignment: &[Option<usize>], columns: usize) {
+    let mut taken = vec![false; columns];
+    for &j in assignment.iter().flatten() {
+        assert!(!std::mem::replace(&mut taken[j], true), "column {j} twice");
+    }
+}
+
+/// `u_i + v_j <= c_ij`, equal on the pairs chosen, no positive price on the longer side and none on what is left over: sufficient for
+/// optimality. Rounding: a price is a sum of up to `rows + columns` costs.
+fn assert_optimal(
+    costs: &[f64],
+    rows: usize,
+    columns: usize,
+    workspace: &AssignmentWorkspace<f64>,
+    assignment: &[Option<usize>],
+) {
+    let scale = costs.iter().filter(|c| c.is_finite()).fold(0.0_f64, |m, c| m.max(c.abs()));
+    let tolerance = f64::EPSILON * scale * (8 * (rows + columns)) as f64;
+    let (u, v) = (workspace.row_prices(), workspace.column_prices());
+    for i in 0..rows {
+        for j in 0..columns {
+            let reduced = costs[i * columns + j] - u[i] - v[j];
+            assert!(reduced >= -tolerance, "pair ({i}, {j}) is cheaper by {reduced:e}");
+            assert!(assignment[i] != Some(j) || reduced.abs() <= tolerance);
+        }
+        if assignment[i].is_none() {
+            assert_eq!(u[i], 0.0, "a row left over has no price");
+        }
+    }
+    for j in (0..columns).filter(|&j| !assignment.contains(&Some(j))) {
+        assert_eq!(v[j], 0.0, "a column left over has no price");
+    }
+    let longer = if rows <= columns { v } else { u };
+    assert!(rows == columns || longer.iter().all(|&p| p <= 0.0));
+}
+
+fn matrix(side: std::ops::RangeInclusive<usize>) -> impl Strategy<Value = (usize, usize, Vec<f64>)> {
+    // Few distinct values make ties, many make none.
+    let entry = prop_oneof![(0..4_i32).prop_map(f64::from), -1e3..1e3_f64];
+    (side.clone(), side)
+        .prop_flat_map(move |(n, m)| (Just(n), Just(m), prop::collection::vec(entry.clone(), n * m)))
+}
+
+proptest! {
+    #[test]
+    fn least_cost_by_brute_force((rows, columns, costs) in matrix(1..=6)) {
+        let found = linear_assignment(&costs, rows, columns).unwrap();
+        assert_distinct(&found, columns);
+        let (pairs, cost) = brute_force(&costs, rows, columns, 0, &mut vec![false; columns]);
+        prop_assert_eq!(found.iter().flatten().count(), pairs);
+        prop_assert!((total(&costs, columns, &found) - cost).abs() <= 1e-9, "sums of six terms below 1e3");
+    }
+
+    #[test]
+    fn least_cost_by_the_slow_hungarian_method((rows, columns, costs) in matrix(1..=40)) {
+        let mut workspace = AssignmentWorkspace::new();
+        let found = workspace.solve(&costs, rows, columns).unwrap().to_vec();
+        assert_distinct(&found, columns);
+        assert_optimal(&costs, rows, columns, &workspace, &found);
+        let turned: Vec<f64> = (0..columns).flat_map(|j| (0..rows).map(|i| costs[i * columns + j]).collect::<Vec<_>>()).collect();
+        let cost = if rows <= columns { slow_hungarian(&costs, rows, columns) } else { slow_hungarian(&turned, columns, rows) };
+        prop_assert!((total(&costs, columns, &found) - cost).abs() <= 1e-8, "sums of forty terms below 1e3");
+    }
+
+    #[test]
+    fn forbidden_pairs_are_never_chosen_and_the_most_pairs_are_found(
+        (rows, columns, costs) in matrix(1..=6), forbidden in prop::collection::vec(any::<bool>(), 36)
+    ) {
+        let costs: Vec<f64> = costs.iter().zip(forbidden).map(|(&c, no)| if no { f64::INFINITY } else { c }).collect();
+        let found = linear_assignment(&costs, rows, columns).unwrap();
+        assert_distinct(&found, columns);
+        prop_assert!(total(&costs, columns, &found).is_finite());
+        let (pairs, _) = brute_force(&costs, rows, columns, 0, &mut vec![false; columns]);
+        prop_assert_eq!(found.iter().flatten().count(), pairs);
+    }
+
+    #[test]
+    fn forbidden_pairs_leave_the_least_cost((n, costs, forbidden) in (1..=6_usize).prop_flat_map(|n| (
+        Just(n), prop::collection::vec(0.0..1.0_f64, n * n), prop::collection::vec(prop::bool::weighted(0.4), n * n)))
+    ) {
+        // The diagonal stays allowed, so that every row can be served and the least cost is well defined.
+        let costs: Vec<f64> = (0..n * n).map(|k| if forbidden[k] && k % (n + 1) != 0 { f64::INFINITY } else { costs[k] }).collect();
+        let found = linear_assignment(&costs, n, n).unwrap();
+        let (pairs, cost) = brute_force(&costs, n, n, 0, &mut vec![false; n]);
+        prop_assert_eq!(pairs, n);
+        prop_assert!((total(&costs, n, &found) - cost).abs() <= 1e-12);
+    }
+
+    #[test]
+    fn shifting_rows_and_columns_of_a_square_keeps_the_answer((n, costs) in (1..=12_usize).prop_flat_map(|n|
+        (Just(n), prop::collection::vec(0.0..1.0_f64, n * n)))
+    ) {
+        let shifted: Vec<f64> = (0..n * n).map(|k| costs[k] + (k / n) as f64 - 3.0 * (k % n) as f64).collect();
+        prop_assert_eq!(linear_assignment(&costs, n, n).unwrap(), linear_assignment(&shifted, n, n).unwrap());
+    }
+
+    #[test]
+    fn single_precision_finds_the_same_pairs((n, costs) in (1..=12_usize).prop_flat_map(|n|
+        (Just(n), prop::collection::vec(0..1_000_000_u32, n * n)))
+    ) {
+        // Integers below 2^24 / 16: sums are exact in f32, so the least costs agree exactly.
+        let double: Vec<f64> = costs.iter().map(|&c| f64::from(c)).collect();
+        let single: Vec<f32> = costs.iter().map(|&c| c as f32).collect();
+        let (a, b) = (linear_assignment(&double, n, n).unwrap(), linear_assignment(&single, n, n).unwrap());
+        prop_assert_eq!(total(&double, n, &a), total(&double, n, &b));
+    }
+}
+
+#[test]
+fn a_workspace_forgets_the_last_matrix() {
+    let mut workspace = AssignmentWorkspace::new();
+    let large: Vec<f64> = (0..30 * 20).map(|k| f64::from(k * 7919 % 1009)).collect();
+    for (rows, columns) in [(30, 20), (2, 3), (20, 30), (1, 1), (3, 2)] {
+        let costs = &large[..rows * columns];
+        let again = workspace.solve(costs, rows, columns).unwrap().to_vec();
+        assert_eq!(again, linear_assignment(costs, rows, columns).unwrap());
+    }
+}
+
+#[test]
+fn nothing_to_assign_is_an_answer() {
+    assert_eq!(linear_assignment::<f64>(&[], 0, 0), Ok(vec![]));
+    assert_eq!(linear_assignment::<f64>(&[], 3, 0), Ok(vec![None; 3]));
+    assert_eq!(linear_assignment::<f64>(&[], 0, 3), Ok(vec![]));
+    assert_eq!(linear_assignment(&[f64::INFINITY], 1, 1), Ok(vec![None]));
+}
+
+#[test]
+fn extreme_costs_are_answered() {
+    assert_eq!(linear_assignment(&[1e300, 1.0, 1.0, 1e300], 2, 2), Ok(vec![Some(1), Some(0)]));
+    assert_eq!(linear_assignment(&[-1e300, 1e-300, 1e-300, 0.0], 2, 2), Ok(vec![Some(0), Some(1)]));
+    assert_eq!(linear_assignment(&[5.0; 16], 4, 4).unwrap().iter().flatten().count(), 4);
+}
+
+#[test]
+fn unusable_costs_are_typed_errors() {
+    let shape = MatchError::Shape { what: "costs", expected: 6, found: 5 };
+    assert_eq!(linear_assignment(&[0.0; 5], 2, 3), Err(shape));
+    for bad in [f64::NAN, f64::NEG_INFINITY] {
+        let costs = [0.0, 1.0, 2.0, 3.0, bad, 5.0];
+        assert_eq!(linear_assignment(&costs, 2, 3), Err(MatchError::Cost { row: 1, column: 1 }));
+    }
+}
+
+#[test]
+fn no_allocation_after_the_first_call() {
+    let costs: Vec<f64> = (0..60 * 80).map(|k| f64::from(k * 7919 % 10007)).collect();
+    let mut workspace = AssignmentWorkspace::new();
+    workspace.solve(&costs, 80, 60).unwrap();
+    workspace.solve(&costs, 60, 80).unwrap();
+    let counted = allocation_counter::measure(|| {
+        for (rows, columns) in [(60, 80), (80, 60), (10, 10)] {
+            workspace.solve(&costs[..rows * columns], rows, columns).unwrap();
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+}
