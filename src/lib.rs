@@ -6,3 +6,5 @@ pub use tactile_match as matching;
 pub use tactile_optics as optics;
 pub use tactile_sfs as sfs;
 pub use tactile_tps as tps;
+#[cfg(feature = "simulate")]
+pub mod simulate;

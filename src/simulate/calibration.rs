@@ -1,0 +1,133 @@
+//! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and unloading (Fig. 9).
+
+use rand_distr::{Distribution, StandardNormal};
+
+use super::error::{SimulateError, not_negative, positive, within};
+use super::light::Illumination;
+use super::material::{Elastic, Sphere};
+use super::press::{Load, PressScene};
+use super::random::{Purpose, row_stream};
+
+/// How a calibration is run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CalibrationOptions {
+    /// What is pressed on the sensor.
+    pub indenter: Sphere,
+    /// The largest force in newton.
+    pub largest_force_n: f64,
+    /// Equal steps from 0 to the largest force; the way back takes as many.
+    pub steps: usize,
+    /// Standard deviation of the gauge's reading in newton.
+    pub gauge_noise_n: f64,
+    /// On the way back the light is that of a larger force F + 4·h·F_max·x(1 − x), x = F/F_max: h is the largest
+    /// difference between the branches as a share of the range. The paper saw none.
+    pub hysteresis: f64,
+}
+
+impl Default for CalibrationOptions {
+    /// A rigid sphere of 10 mm radius, 0 to 2 N in 20 steps and back, 2 mN of gauge noise, no hysteresis.
+    fn default() -> Self {
+        let indenter = Sphere { radius_m: 10e-3, material: Elastic::RIGID };
+        Self { indenter, largest_force_n: 2.0, steps: 20, gauge_noise_n: 2e-3, hysteresis: 0.0 }
+    }
+}
+
+/// Whether the force was rising or falling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Branch {
+    /// Rising force.
+    Loading,
+    /// Falling force.
+    Unloading,
+}
+
+/// One reading of camera and gauge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CalibrationPoint {
+    /// Rising or falling.
+    pub branch: Branch,
+    /// Sum over the pixels of frame minus reference, in 8-bit grey levels.
+    pub integrated_pixel_value: f64,
+    /// The gauge's reading in newton, with its noise.
+    pub force_n: f64,
+    /// The force itself.
+    pub true_force_n: f64,
+}
+
+/// A whole calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationSeries {
+    /// Readings in the order they were taken.
+    pub points: Vec<CalibrationPoint>,
+    /// Force over integrated pixel value in newton, without noise: exact for a linear response.
+    pub newton_per_grey: f64,
+}
+
+impl CalibrationSeries {
+    /// (integrated pixel value, gauge force) of every reading.
+    pub fn pairs(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.points.iter().map(|p| (p.integrated_pixel_value, p.force_n))
+    }
+}
+
+impl PressScene {
+    /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter; every reading is the sum
+    /// over a simulated frame. The reference frame is exposed once.
+    ///
+    /// # Errors
+    /// [`SimulateError::OutOfRange`] for an option without meaning.
+    pub fn calibrate(&self, options: &CalibrationOptions) -> Result<CalibrationSeries, SimulateError> {
+        options.validate()?;
+        let (camera, seed) = (self.options().camera, self.options().seed);
+        let dark = camera.compose(&[], &Illumination::default());
+        let exposure = |light: ndarray::ArrayView2<'_, f64>, k: usize| -> f64 {
+            let frame = camera.expose_for(Purpose::CalibrationFrames, light, seed, k as u64);
+            frame.iter().map(|&v| u64::from(v)).sum::<u64>() as f64
+        };
+        let reference = exposure(dark.view(), 0);
+        let mut gauge = row_stream(seed, Purpose::Gauge, 0, 0);
+        let mut points = Vec::with_capacity(2 * options.steps + 1);
+        for (k, (branch, true_force_n)) in options.forces().enumerate() {
+            let lit = options.lit_force_n(branch, true_force_n);
+            let press = self.with_object(options.indenter, vec![Load::normal(lit)])?;
+            let sum = exposure(press.expected_frame(0).view(), k + 1);
+            let normal: f64 = StandardNormal.sample(&mut gauge);
+            let force_n = true_force_n + options.gauge_noise_n * normal;
+            points.push(CalibrationPoint {
+                branch,
+                integrated_pixel_value: sum - reference,
+                force_n,
+                true_force_n,
+            });
+        }
+        Ok(CalibrationSeries { points, newton_per_grey: camera.pixel_area_m2() / self.grey_per_pascal() })
+    }
+}
+
+impl CalibrationOptions {
+    /// Up in equal steps from zero, and down again to zero.
+    fn forces(&self) -> impl Iterator<Item = (Branch, f64)> {
+        let (steps, largest) = (self.steps, self.largest_force_n);
+        let force = move |k: usize| largest * k as f64 / steps as f64;
+        let up = (0..=steps).map(move |k| (Branch::Loading, force(k)));
+        up.chain((0..steps).rev().map(move |k| (Branch::Unloading, force(k))))
+    }
+
+    /// The force whose light is seen.
+    fn lit_force_n(&self, branch: Branch, force_n: f64) -> f64 {
+        let x = force_n / self.largest_force_n;
+        match branch {
+            Branch::Loading => force_n,
+            Branch::Unloading => force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x),
+        }
+    }
+
+    fn validate(&self) -> Result<(), SimulateError> {
+        self.indenter.validate()?;
+        positive("largest_force_n", self.largest_force_n)?;
+        within("steps", self.steps as f64, 1.0, 1e6)?;
+        not_negative("gauge_noise_n", self.gauge_noise_n)?;
+        // Beyond 1/4 the unloading branch would not be monotone.
+        within("hysteresis", self.hysteresis, 0.0, 0.25)
+    }
+}

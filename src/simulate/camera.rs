@@ -1,0 +1,179 @@
+//! From light to an 8-bit frame: blur, vignetting, photon and read noise, quantisation and saturation.
+
+use ndarray::{Array2, ArrayView2, Axis};
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, Poisson, StandardNormal};
+
+use super::error::{SimulateError, at_least, not_negative, positive, within};
+use super::light::Illumination;
+use super::pixel_average::Patch;
+use super::random::{Purpose, row_stream};
+
+/// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 = 0.06).
+const NORMAL_FROM_ELECTRONS: f64 = 256.0;
+
+/// Camera, lens and stray light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Size of a pixel on the sensing surface in metres, x and y.
+    pub pixel_size_m: [f64; 2],
+    /// Stray light without contact, in grey levels.
+    pub background_grey: f64,
+    /// Share of the light lost in the frame's corners; it grows with the squared distance from the middle.
+    pub vignetting: f64,
+    /// Standard deviation of the Gaussian point-spread function in pixels; 0 for none.
+    pub blur_sigma_px: f64,
+    /// Electrons at grey level 255, which set the photon noise; infinite for none.
+    pub full_well_electrons: f64,
+    /// Standard deviation of the read noise in grey levels; 0 for none.
+    pub read_noise_grey: f64,
+}
+
+impl Default for Camera {
+    /// The paper's 1392×1042 pixels over 30 mm, 15 grey levels of stray light, 3 % vignetting, 0.8 px blur, a full well
+    /// of 15 000 electrons (a scientific CCD of that pitch) and half a grey level of read noise.
+    fn default() -> Self {
+        Self {
+            shape: [1042, 1392],
+            pixel_size_m: [30e-3 / 1392.0; 2],
+            background_grey: 15.0,
+            vignetting: 0.03,
+            blur_sigma_px: 0.8,
+            full_well_electrons: 15e3,
+            read_noise_grey: 0.5,
+        }
+    }
+}
+
+impl Camera {
+    /// The same camera without blur, vignetting and noise: what is left is rounding to grey levels.
+    pub fn ideal(self) -> Self {
+        Self {
+            vignetting: 0.0,
+            blur_sigma_px: 0.0,
+            full_well_electrons: f64::INFINITY,
+            read_noise_grey: 0.0,
+            ..self
+        }
+    }
+
+    /// Standard deviation of the noise, before rounding, of a pixel with `grey` expected grey levels.
+    pub fn noise_sd_grey(&self, grey: f64) -> f64 {
+        (grey / self.electrons_per_grey() + self.read_noise_grey * self.read_noise_grey).sqrt()
+    }
+
+    /// Area of a pixel on the sensing surface in square metres.
+    pub fn pixel_area_m2(&self) -> f64 {
+        self.pixel_size_m[0] * self.pixel_size_m[1]
+    }
+
+    /// The coordinates (x, y) of the frame's middle in pixels.
+    pub fn middle_px(&self) -> [f64; 2] {
+        [(self.shape[1] as f64 - 1.0) / 2.0, (self.shape[0] as f64 - 1.0) / 2.0]
+    }
+
+    /// Turns expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255. Each (`seed`, `frame`)
+    /// has its own noise. A caller may pass any image; O(pixels).
+    pub fn expose(&self, expected_grey: ArrayView2<'_, f64>, seed: u64, frame: u64) -> Array2<u8> {
+        self.expose_for(Purpose::Frames, expected_grey, seed, frame)
+    }
+
+    /// [`expose`](Self::expose) with the streams of another purpose.
+    pub(super) fn expose_for(
+        &self,
+        purpose: Purpose,
+        expected_grey: ArrayView2<'_, f64>,
+        seed: u64,
+        frame: u64,
+    ) -> Array2<u8> {
+        let mut image = Array2::zeros(expected_grey.dim());
+        for (row, (mut out, light)) in image.rows_mut().into_iter().zip(expected_grey.rows()).enumerate() {
+            let mut rng = row_stream(seed, purpose, frame, row);
+            for (pixel, &grey) in out.iter_mut().zip(light) {
+                // `as` saturates at 0 and 255.
+                *pixel = (self.noisy(grey, &mut rng) + 0.5).floor() as u8;
+            }
+        }
+        image
+    }
+
+    fn electrons_per_grey(&self) -> f64 {
+        self.full_well_electrons / 255.0
+    }
+
+    fn noisy(&self, grey: f64, rng: &mut ChaCha8Rng) -> f64 {
+        let electrons = grey * self.electrons_per_grey();
+        if electrons >= NORMAL_FROM_ELECTRONS {
+            let normal: f64 = StandardNormal.sample(rng);
+            return grey + self.noise_sd_grey(grey) * normal;
+        }
+        let normal: f64 = StandardNormal.sample(rng);
+        let photons = match Poisson::new(electrons) {
+            Ok(law) => law.sample(rng),
+            Err(_) => 0.0, // no light
+        };
+        photons / self.electrons_per_grey() + self.read_noise_grey * normal
+    }
+
+    /// Pixels that a patch must reach beyond the contact so that the blur has all its light.
+    pub(super) fn blur_reach(&self) -> usize {
+        (4.0 * self.blur_sigma_px).ceil() as usize
+    }
+
+    /// Blurs a patch in place; light that leaves the patch is lost.
+    pub(super) fn blur(&self, patch: &mut Patch) {
+        let reach = self.blur_reach();
+        if reach == 0 {
+            return;
+        }
+        let weight = |k: usize| (-0.5 * (k as f64 / self.blur_sigma_px).powi(2)).exp();
+        let total = 1.0 + 2.0 * (1..=reach).map(weight).sum::<f64>();
+        let kernel: Vec<f64> = (0..=reach).map(|k| weight(k) / total).collect();
+        for axis in [Axis(0), Axis(1)] {
+            let source = patch.values.clone();
+            patch.values.map_inplace(|v| *v *= kernel[0]);
+            let length = source.len_of(axis);
+            for (k, &w) in kernel.iter().enumerate().skip(1).filter(|(k, _)| *k < length) {
+                let head = ndarray::Slice::from(..length - k);
+                let tail = ndarray::Slice::from(k..);
+                patch.values.slice_axis_mut(axis, tail).scaled_add(w, &source.slice_axis(axis, head));
+                patch.values.slice_axis_mut(axis, head).scaled_add(w, &source.slice_axis(axis, tail));
+            }
+        }
+    }
+
+    /// Expected grey levels: background plus the patches of leaked light, times lamps and lens.
+    pub(super) fn compose(&self, leaked_grey: &[Patch], lamps: &Illumination) -> Array2<f64> {
+        let [rows, cols] = self.shape;
+        let mut frame = Array2::from_elem((rows, cols), self.background_grey);
+        for patch in leaked_grey {
+            patch.add_to(&mut frame);
+        }
+        let [cx, cy] = self.middle_px();
+        let fall = self.vignetting / (cx * cx + cy * cy).max(f64::MIN_POSITIVE);
+        let tilt = [lamps.tilt[0] / (2.0 * cx).max(1.0), lamps.tilt[1] / (2.0 * cy).max(1.0)];
+        for (r, mut line) in frame.rows_mut().into_iter().enumerate() {
+            let dy = r as f64 - cy;
+            for (c, value) in line.iter_mut().enumerate() {
+                let dx = c as f64 - cx;
+                let lens = 1.0 - fall * (dx * dx + dy * dy);
+                *value *= lens * (lamps.level + tilt[0] * dx + tilt[1] * dy).max(0.0);
+            }
+        }
+        frame
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+        at_least("shape", self.shape[0].min(self.shape[1]), 1)?;
+        within("shape", self.shape[0].max(self.shape[1]) as f64, 1.0, 65535.0)?;
+        positive("pixel_size_m", self.pixel_size_m[0])?;
+        positive("pixel_size_m", self.pixel_size_m[1])?;
+        not_negative("background_grey", self.background_grey)?;
+        within("vignetting", self.vignetting, 0.0, 1.0)?;
+        within("blur_sigma_px", self.blur_sigma_px, 0.0, 1000.0)?;
+        within("full_well_electrons", self.full_well_electrons, 1.0, f64::INFINITY)?;
+        not_negative("read_noise_grey", self.read_noise_grey)
+    }
+}

@@ -1,0 +1,109 @@
+//! A scene written as the files that the command line reads: images, calibration table and scene description.
+
+use std::path::{Path, PathBuf};
+
+use image::{ImageBuffer, Luma};
+use ndarray::ArrayView2;
+use toml::{Table, Value};
+
+use super::calibration::CalibrationOptions;
+use super::error::SimulateError;
+use super::press::PressScene;
+
+/// A scene could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FolderError {
+    /// A file could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// An image could not be encoded.
+    #[error("cannot write the image {}: {source}", path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: image::ImageError,
+    },
+    /// The calibration's options have no meaning.
+    #[error(transparent)]
+    Calibration(#[from] SimulateError),
+}
+
+/// Writes `reference.png`, `frame_1.png` …, `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml`
+/// to `folder`, which is made if need be. Returns the path of `scene.toml`.
+///
+/// # Errors
+/// [`FolderError`] naming the file that could not be written.
+pub fn write_folder(
+    scene: &PressScene,
+    calibration: &CalibrationOptions,
+    folder: &Path,
+) -> Result<PathBuf, FolderError> {
+    let series = scene.calibrate(calibration)?;
+    std::fs::create_dir_all(folder).map_err(|source| FolderError::Write { path: folder.into(), source })?;
+    let made = scene.simulate();
+    write_image(&folder.join("reference.png"), made.reference.view())?;
+    for (k, frame) in made.frames.iter().enumerate() {
+        write_image(&folder.join(format!("frame_{}.png", k + 1)), frame.view())?;
+    }
+    let mut table = String::from("integrated_pixel_value,force_N\n");
+    for (value, force) in series.pairs() {
+        table.push_str(&format!("{value},{force}\n"));
+    }
+    write_text(&folder.join("calibration.csv"), &table)?;
+    let path = folder.join("scene.toml");
+    write_text(&path, &description(scene).to_string())?;
+    Ok(path)
+}
+
+fn write_text(path: &Path, text: &str) -> Result<(), FolderError> {
+    std::fs::write(path, text).map_err(|source| FolderError::Write { path: path.into(), source })
+}
+
+fn write_image(path: &Path, frame: ArrayView2<'_, u8>) -> Result<(), FolderError> {
+    let (rows, cols) = frame.dim();
+    let image =
+        ImageBuffer::from_fn(cols as u32, rows as u32, |x, y| Luma([frame[[y as usize, x as usize]]]));
+    image.save(path).map_err(|source| FolderError::Image { path: path.into(), source })
+}
+
+/// The scene's description as the command line reads it.
+fn description(scene: &PressScene) -> Table {
+    let options = scene.options();
+    let pair = |v: [f64; 2]| Value::Array(v.map(Value::Float).to_vec());
+    let table = |entries: Vec<(&str, Value)>| -> Table {
+        entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    };
+    let frame = |(k, load): (usize, &super::press::Load)| {
+        let image = Value::String(format!("frame_{}.png", k + 1));
+        Value::Table(table(vec![("image", image), ("force_N", Value::Float(load.force_n))]))
+    };
+    let layer = |l: &super::material::WaveguideLayer| {
+        Value::Table(table(vec![
+            ("refractive_index", Value::Float(l.refractive_index)),
+            ("thickness_m", Value::Float(l.thickness_m)),
+            ("youngs_modulus_pa", Value::Float(l.material.youngs_modulus_pa)),
+            ("poisson_ratio", Value::Float(l.material.poisson_ratio)),
+        ]))
+    };
+    let object = vec![
+        ("shape", Value::String("sphere".to_owned())),
+        ("radius_m", Value::Float(options.object.radius_m)),
+        ("poisson_ratio", Value::Float(options.object.material.poisson_ratio)),
+    ];
+    let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
+    table(vec![
+        ("reference", Value::String("reference.png".to_owned())),
+        ("pixel_size_m", pair(options.camera.pixel_size_m)),
+        ("calibration", Value::Table(table(vec![("pairs", Value::String("calibration.csv".to_owned()))]))),
+        ("frames", Value::Array(options.loads.iter().enumerate().map(frame).collect())),
+        ("object", Value::Table(table(object))),
+        ("waveguide", Value::Table(table(vec![("layers", layers)]))),
+    ])
+}

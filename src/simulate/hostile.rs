@@ -1,0 +1,135 @@
+//! Scenes on which a measurement must fail in a civil way: with a flag, an error or a value, never a panic.
+
+use ndarray::Array2;
+
+use super::camera::Camera;
+use super::light::Illumination;
+use super::pixel_average::Patch;
+use super::press::{Gain, Load, PressOptions, PressScene, PressSimulation};
+
+/// What is wrong with the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Hostile {
+    /// Nothing touches the sensor.
+    NoiseOnly,
+    /// Every pixel of frame and reference is 255.
+    AllSaturated,
+    /// Every pixel of frame and reference is 0.
+    AllBlack,
+    /// The contact alone is saturated.
+    SaturatedContact,
+    /// Three contacts in one frame; the truth lists them, largest force first.
+    SeveralContacts,
+    /// Half of the contact lies beyond the frame's left edge.
+    CutByEdge,
+    /// Three quarters of the contact lie beyond a corner.
+    InCorner,
+    /// The contact is smaller than a pixel.
+    SubPixelContact,
+    /// The contact is larger than the frame.
+    FillsFrame,
+    /// The lamps have grown 5 % brighter since the reference.
+    BrighterLamps,
+    /// The lamps have moved: 10 % brighter on one side, darker on the other.
+    MovedLamps,
+    /// The object already touched when the reference was taken, and has gone since.
+    PressedReference,
+}
+
+impl Hostile {
+    /// All kinds.
+    pub const ALL: [Self; 12] = [
+        Self::NoiseOnly,
+        Self::AllSaturated,
+        Self::AllBlack,
+        Self::SaturatedContact,
+        Self::SeveralContacts,
+        Self::CutByEdge,
+        Self::InCorner,
+        Self::SubPixelContact,
+        Self::FillsFrame,
+        Self::BrighterLamps,
+        Self::MovedLamps,
+        Self::PressedReference,
+    ];
+
+    /// Reference, one frame and truth of the scene on `base` (camera, object, waveguide, seed), whose loads, gain and
+    /// centre are replaced.
+    ///
+    /// # Errors
+    /// As [`PressScene::new`] for a `base` without meaning.
+    pub fn simulate(self, base: &PressOptions) -> Result<PressSimulation, super::SimulateError> {
+        let camera = base.camera;
+        let middle = camera.middle_px();
+        // A force whose contact is a fifth of the frame's shorter side in radius: F = 4E*a³/(3R).
+        let side = (camera.shape[0] as f64 * camera.pixel_size_m[1])
+            .min(camera.shape[1] as f64 * camera.pixel_size_m[0]);
+        let unit = PressScene::new(PressOptions { loads: vec![Load::normal(1.0)], ..base.clone() })?;
+        let unit_radius = unit.contact(0).contact_radius_m;
+        let force = |radius_m: f64| (radius_m / unit_radius).powi(3);
+        let load = Load::normal(force(0.2 * side));
+        let mut options = PressOptions {
+            loads: vec![load],
+            centre_px: Some([middle[0] + 0.3, middle[1] - 0.2]),
+            gain: Gain::PeakGrey(200.0),
+            ..base.clone()
+        };
+        match self {
+            Self::SeveralContacts => return several(&options, load.force_n),
+            Self::NoiseOnly => options.loads = vec![Load::normal(0.0)],
+            Self::AllSaturated => options.camera.background_grey = 1000.0,
+            Self::AllBlack => options.loads[0].illumination.level = 0.0,
+            Self::SaturatedContact => options.gain = Gain::PeakGrey(2000.0),
+            Self::CutByEdge => options.centre_px = Some([-0.5, middle[1]]),
+            Self::InCorner => options.centre_px = Some([-0.5, -0.5]),
+            Self::SubPixelContact => {
+                options.loads = vec![Load::normal(force(0.3 * camera.pixel_size_m[0]))];
+            }
+            Self::FillsFrame => options.loads = vec![Load::normal(force(3.0 * side))],
+            Self::BrighterLamps => options.loads[0].illumination.level = 1.05,
+            Self::MovedLamps => options.loads[0].illumination.tilt = [0.2, 0.0],
+            Self::PressedReference => {}
+        }
+        let mut made = PressScene::new(options)?.simulate();
+        match self {
+            Self::AllBlack => made.reference.fill(0),
+            Self::PressedReference => std::mem::swap(&mut made.reference, &mut made.frames[0]),
+            _ => {}
+        }
+        if self == Self::AllBlack {
+            made.frames[0].fill(0);
+        }
+        Ok(made)
+    }
+}
+
+/// Three contacts of falling force, side by side along a diagonal.
+fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, super::SimulateError> {
+    let [rows, cols] = base.camera.shape.map(|n| n as f64);
+    let mut scenes = Vec::new();
+    let first = PressScene::new(base.clone())?;
+    for (share, at) in [(0.3, [0.25, 0.3]), (0.15, [0.7, 0.35]), (0.05, [0.45, 0.75])] {
+        let options = PressOptions {
+            loads: vec![Load::normal(share * force_n)],
+            centre_px: Some([at[0] * cols, at[1] * rows]),
+            gain: Gain::GreyPerPascal(first.grey_per_pascal()),
+            ..base.clone()
+        };
+        scenes.push(PressScene::new(options)?);
+    }
+    let light = superposed(&base.camera, &scenes);
+    Ok(PressSimulation {
+        reference: first.reference(0),
+        frames: vec![base.camera.expose(light.view(), base.seed, 1)],
+        truth: scenes.iter().map(|s| s.truth(0)).collect(),
+        pixel_size_m: base.camera.pixel_size_m,
+        youngs_modulus_pa: base.object.material.youngs_modulus_pa,
+    })
+}
+
+/// Expected grey levels of the first loads of several scenes seen in one frame.
+fn superposed(camera: &Camera, scenes: &[PressScene]) -> Array2<f64> {
+    let patches: Vec<Patch> = scenes.iter().filter_map(|s| s.leaked_light(0)).collect();
+    camera.compose(&patches, &Illumination::default())
+}

@@ -1,0 +1,115 @@
+//! A surface pattern of bumps whose pixel averages are exact.
+//!
+//! On a rectangular face the height is h(X, Y) = h₀ + h₁ Σₖ b((X − Xₖ)/w) b((Y − Yₖ)/w) with b(t) = cos²(πt/2) for |t| < 1,
+//! 0 beyond. It is continuous with its slope, each bump lies wholly on the face, and ∫b = (t + sin(πt)/π)/2 in closed
+//! form makes every pixel's average a product of two differences.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use rand_distr::{Distribution, Uniform};
+
+use super::error::{SimulateError, at_least, not_negative, positive};
+use super::random::{Purpose, row_stream};
+
+/// Bumps on a plain face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePattern {
+    /// Height of the plain face in metres.
+    pub base_height_m: f64,
+    /// Height of the bumps above it, the smallest and the largest, in metres.
+    pub bump_height_m: [f64; 2],
+    /// Columns and rows of bumps, one in each cell of a grid, at a random place in its cell.
+    pub bumps: [usize; 2],
+    /// Half width w of a bump as a share of the cell's shorter side, up to ½.
+    pub bump_share: f64,
+}
+
+impl Default for SurfacePattern {
+    /// A 0.5 mm base with 8×8 bumps of 0.3 to 0.6 mm.
+    fn default() -> Self {
+        Self { base_height_m: 0.5e-3, bump_height_m: [0.3e-3, 0.6e-3], bumps: [8, 8], bump_share: 0.4 }
+    }
+}
+
+impl SurfacePattern {
+    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+        positive("base_height_m", self.base_height_m)?;
+        not_negative("bump_height_m", self.bump_height_m[0])?;
+        super::error::within("bump_height_m", self.bump_height_m[1], self.bump_height_m[0], f64::MAX)?;
+        at_least("bumps", self.bumps[0].min(self.bumps[1]), 1)?;
+        super::error::within("bumps", self.bumps[0].max(self.bumps[1]) as f64, 1.0, 1000.0)?;
+        super::error::within("bump_share", self.bump_share, 1e-6, 0.5)
+    }
+
+    /// Places the bumps on a face of `size_m` centred on the origin.
+    pub(super) fn place(&self, size_m: [f64; 2], seed: u64) -> Relief {
+        let mut rng = row_stream(seed, Purpose::Pattern, 0, 0);
+        let cell: [f64; 2] = std::array::from_fn(|k| size_m[k] / self.bumps[k] as f64);
+        let half_width_m = self.bump_share * cell[0].min(cell[1]);
+        let mut uniform = |low: f64, high: f64| match Uniform::new_inclusive(low, high) {
+            Ok(law) => law.sample(&mut rng),
+            Err(_) => low, // an interval closed by rounding
+        };
+        let mut bumps = Vec::with_capacity(self.bumps[0] * self.bumps[1]);
+        for row in 0..self.bumps[1] {
+            for col in 0..self.bumps[0] {
+                let at = [col, row];
+                let centre_m = std::array::from_fn(|k| {
+                    let low = -0.5 * size_m[k] + at[k] as f64 * cell[k] + half_width_m;
+                    uniform(low, low + cell[k] - 2.0 * half_width_m)
+                });
+                bumps
+                    .push(Bump { centre_m, height_m: uniform(self.bump_height_m[0], self.bump_height_m[1]) });
+            }
+        }
+        Relief { size_m, base_height_m: self.base_height_m, half_width_m, bumps }
+    }
+}
+
+/// One bump.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bump {
+    pub(super) centre_m: [f64; 2],
+    pub(super) height_m: f64,
+}
+
+/// A pattern in its place: heights over the material coordinates (X, Y) of the undeformed face.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Relief {
+    pub(super) size_m: [f64; 2],
+    pub(super) base_height_m: f64,
+    pub(super) half_width_m: f64,
+    pub(super) bumps: Vec<Bump>,
+}
+
+impl Relief {
+    /// Height at a material point; 0 off the face.
+    pub(super) fn height_m(&self, at: [f64; 2]) -> f64 {
+        if (0..2).any(|k| at[k].abs() > 0.5 * self.size_m[k]) {
+            return 0.0;
+        }
+        let factor = |b: &Bump, k: usize| {
+            let t = (at[k] - b.centre_m[k]) / self.half_width_m;
+            if t.abs() < 1.0 { (FRAC_PI_2 * t).cos().powi(2) } else { 0.0 }
+        };
+        self.base_height_m + self.bumps.iter().map(|b| b.height_m * factor(b, 0) * factor(b, 1)).sum::<f64>()
+    }
+
+    /// Volume between the face's plane and its heights, in cubic metres.
+    pub(super) fn volume_m3(&self) -> f64 {
+        let bumps: f64 = self.bumps.iter().map(|b| b.height_m).sum();
+        self.base_height_m * self.size_m[0] * self.size_m[1] + bumps * self.half_width_m * self.half_width_m
+    }
+
+    /// ∫ of the plain face's indicator from −∞ to `x` along axis `k`, in metres.
+    pub(super) fn face_integral(&self, k: usize, x: f64) -> f64 {
+        let half = 0.5 * self.size_m[k];
+        x.clamp(-half, half) + half
+    }
+
+    /// ∫ of a bump's profile from −∞ to `x` along axis `k`, in metres.
+    pub(super) fn bump_integral(&self, bump: &Bump, k: usize, x: f64) -> f64 {
+        let t = ((x - bump.centre_m[k]) / self.half_width_m).clamp(-1.0, 1.0);
+        0.5 * self.half_width_m * (1.0 + t + (PI * t).sin() / PI)
+    }
+}

@@ -1,0 +1,132 @@
+//! Frames of loading–unloading cycles at camera rate.
+
+use std::f64::consts::PI;
+
+use ndarray::Array2;
+
+use super::error::{SimulateError, finite, not_negative, positive, within};
+use super::light::Illumination;
+use super::press::{Load, PressScene};
+use super::truth::PressTruth;
+
+/// How the load runs through time: rest, then cycles of F(t) = F_max sin²(πt/T).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadCycle {
+    /// Largest force F_max in newton.
+    pub largest_force_n: f64,
+    /// Largest shear force (x, y) in newton; it follows the normal force.
+    pub largest_shear_n: [f64; 2],
+    /// Time T of one cycle in seconds.
+    pub period_s: f64,
+    /// Cycles.
+    pub cycles: usize,
+    /// Time without contact before the first cycle, in seconds.
+    pub rest_s: f64,
+    /// Frames per second.
+    pub frame_rate_hz: f64,
+    /// Relative change of the lamps' brightness per second.
+    pub light_drift_per_s: f64,
+    /// Change per second of the lamps' tilt (x, y), see [`Illumination::tilt`].
+    pub light_tilt_per_s: [f64; 2],
+}
+
+impl Default for LoadCycle {
+    /// One cycle of one second to 1.2 N after a tenth of a second of rest, at the paper's 80 frames per second.
+    fn default() -> Self {
+        Self {
+            largest_force_n: 1.2,
+            largest_shear_n: [0.0; 2],
+            period_s: 1.0,
+            cycles: 1,
+            rest_s: 0.1,
+            frame_rate_hz: 80.0,
+            light_drift_per_s: 0.0,
+            light_tilt_per_s: [0.0; 2],
+        }
+    }
+}
+
+/// One frame of a stream.
+#[derive(Debug, Clone)]
+pub struct StreamedFrame {
+    /// When it was taken, in seconds.
+    pub time_s: f64,
+    /// The frame.
+    pub frame: Array2<u8>,
+    /// Its truth.
+    pub truth: PressTruth,
+}
+
+/// Iterator over the frames of a [`LoadCycle`], made one by one.
+#[derive(Debug, Clone)]
+pub struct FrameStream {
+    scene: PressScene,
+    cycle: LoadCycle,
+    next: usize,
+    count: usize,
+}
+
+impl PressScene {
+    /// The frames of `cycle` with this scene's object, sensor, light and gain (its own loads set the gain only).
+    ///
+    /// # Errors
+    /// [`SimulateError::OutOfRange`] for a cycle without meaning.
+    pub fn stream(&self, cycle: LoadCycle) -> Result<FrameStream, SimulateError> {
+        not_negative("largest_force_n", cycle.largest_force_n)?;
+        positive("period_s", cycle.period_s)?;
+        not_negative("rest_s", cycle.rest_s)?;
+        positive("frame_rate_hz", cycle.frame_rate_hz)?;
+        finite("light_drift_per_s", cycle.light_drift_per_s)?;
+        for k in 0..2 {
+            finite("largest_shear_n", cycle.largest_shear_n[k])?;
+            finite("light_tilt_per_s", cycle.light_tilt_per_s[k])?;
+        }
+        let frames = (cycle.rest_s + cycle.period_s * cycle.cycles as f64) * cycle.frame_rate_hz;
+        within("frames", frames, 0.0, 1e9)?;
+        Ok(FrameStream { scene: self.clone(), cycle, next: 0, count: frames.ceil() as usize })
+    }
+}
+
+impl FrameStream {
+    /// Load and lamps at a time.
+    pub fn load_at(&self, time_s: f64) -> Load {
+        let c = &self.cycle;
+        let phase = ((time_s - c.rest_s) / c.period_s).max(0.0);
+        let share = (PI * phase).sin().powi(2);
+        let level = (1.0 + c.light_drift_per_s * time_s).max(0.0);
+        let tilt = c.light_tilt_per_s.map(|rate| rate * time_s);
+        Load {
+            force_n: c.largest_force_n * share,
+            shear_n: c.largest_shear_n.map(|s| s * share),
+            illumination: Illumination { level, tilt },
+        }
+    }
+}
+
+impl Iterator for FrameStream {
+    type Item = StreamedFrame;
+
+    fn next(&mut self) -> Option<StreamedFrame> {
+        if self.next == self.count {
+            return None;
+        }
+        let k = self.next;
+        self.next += 1;
+        let time_s = k as f64 / self.cycle.frame_rate_hz;
+        let load = self.load_at(time_s);
+        let object = self.scene.options().object;
+        let scene = self.scene.with_object(object, vec![load]).ok()?;
+        let light = scene.expected_frame(0);
+        let camera = scene.options().camera;
+        // Above the frames a scene makes itself, whose numbers stay below 2⁴⁷.
+        let frame = camera.expose(light.view(), scene.options().seed, 1 << 47 | k as u64);
+        Some(StreamedFrame { time_s, frame, truth: scene.truth(0) })
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = self.count - self.next;
+        (left, Some(left))
+    }
+}
+
+impl ExactSizeIterator for FrameStream {}

@@ -1,0 +1,173 @@
+//! What a measurement of a simulated press should find, stage by stage.
+
+use nalgebra::{Matrix3, Point3};
+use ndarray::Array2;
+
+use super::contact::Contact;
+use super::pixel_average::{Disc, Profile};
+use super::press::{Load, PressScene};
+
+/// The truth of one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressTruth {
+    /// Force, contact radius, pressure, indentation.
+    pub contact: Contact,
+    /// The load that made it.
+    pub load: Load,
+    /// Centre (x, y) of the contact in pixels.
+    pub centre_px: [f64; 2],
+    /// Centroid (x, y) of the pressure that lies in the frame, by pixel averages: the centre to some 1e-5 px, unless
+    /// the contact is cut by the frame's edge. NaN when nothing is visible.
+    pub centroid_px: [f64; 2],
+    /// The force that acts inside the frame, in newton.
+    pub visible_force_n: f64,
+    /// Sum over the frame of leaked light in grey levels, without blur, lens, noise and clipping: (grey/Pa)·F/pixel area
+    /// for a linear response.
+    pub integrated_pixel_value: f64,
+    /// Grey levels per pascal (at small pressure).
+    pub grey_per_pascal: f64,
+    /// Pixels whose expected grey level exceeds 255.
+    pub saturated_pixels: usize,
+    /// Size of a pixel in metres, x and y.
+    pub pixel_size_m: [f64; 2],
+    shape: [usize; 2],
+}
+
+impl PressTruth {
+    pub(super) fn new(scene: &PressScene, load: usize) -> Self {
+        let (contact, options) = (*scene.contact(load), scene.options());
+        let disc = scene.disc(load);
+        let mut truth = Self {
+            contact,
+            load: options.loads[load],
+            centre_px: disc.centre_px,
+            centroid_px: [f64::NAN; 2],
+            visible_force_n: 0.0,
+            integrated_pixel_value: 0.0,
+            grey_per_pascal: scene.grey_per_pascal(),
+            saturated_pixels: scene.expected_frame(load).iter().filter(|&&v| v > 255.0).count(),
+            pixel_size_m: disc.pixel_size_m,
+            shape: options.camera.shape,
+        };
+        truth.add_moments(scene.droop_per_pascal());
+        truth
+    }
+
+    /// Pressure in pascal, averaged over each pixel; its sum times the pixel's area is the visible force.
+    pub fn pressure_pa(&self) -> Array2<f64> {
+        let mut field = self.averaged(Profile::Hemisphere);
+        field.map_inplace(|v| *v *= self.contact.peak_pressure_pa);
+        field
+    }
+
+    /// Height of the apparent surface in metres at pixel centres (see [`Contact::apparent_height_m`]).
+    pub fn apparent_height_m(&self) -> Array2<f64> {
+        Array2::from_shape_fn(self.shape, |(row, col)| {
+            let [x, y] = self.offset_m(row, col);
+            self.contact.apparent_height_m(x.hypot(y))
+        })
+    }
+
+    /// Vertical displacement in metres of the waveguide's surface at pixel centres, negative under the object.
+    pub fn waveguide_height_m(&self) -> Array2<f64> {
+        Array2::from_shape_fn(self.shape, |(row, col)| {
+            let [x, y] = self.offset_m(row, col);
+            self.contact.waveguide_displacement_m(x, y)[2]
+        })
+    }
+
+    /// Whether a pixel's centre lies in the contact.
+    pub fn contact_mask(&self) -> Array2<bool> {
+        Array2::from_shape_fn(self.shape, |(row, col)| {
+            let [x, y] = self.offset_m(row, col);
+            x.hypot(y) < self.contact.contact_radius_m
+        })
+    }
+
+    /// How the apparent surface moves from this load to a `later` one.
+    pub fn scaling_to(&self, later: &Self) -> SurfaceScaling {
+        SurfaceScaling {
+            from_centre_m: self.centre_m(),
+            to_centre_m: later.centre_m(),
+            scale: later.contact.contact_radius_m / self.contact.contact_radius_m,
+        }
+    }
+
+    /// The contact's centre (x, y) in metres from the first pixel's centre.
+    pub fn centre_m(&self) -> [f64; 2] {
+        std::array::from_fn(|k| self.centre_px[k] * self.pixel_size_m[k])
+    }
+
+    /// A pixel's centre relative to the contact's, in metres.
+    fn offset_m(&self, row: usize, col: usize) -> [f64; 2] {
+        let at = [col as f64, row as f64];
+        std::array::from_fn(|k| (at[k] - self.centre_px[k]) * self.pixel_size_m[k])
+    }
+
+    fn disc(&self) -> Disc {
+        let radius_m = self.contact.contact_radius_m;
+        Disc { centre_px: self.centre_px, radius_m, pixel_size_m: self.pixel_size_m }
+    }
+
+    fn averaged(&self, profile: Profile) -> Array2<f64> {
+        let mut field = Array2::zeros(self.shape);
+        if self.contact.contact_radius_m > 0.0 {
+            let disc = self.disc();
+            disc.average(profile, disc.window(self.shape, 0)).add_to(&mut field);
+        }
+        field
+    }
+
+    /// Force, centroid and integrated pixel value of what the frame shows.
+    fn add_moments(&mut self, droop_per_pascal: f64) {
+        if self.contact.contact_radius_m == 0.0 {
+            return;
+        }
+        let disc = self.disc();
+        let window = disc.window(self.shape, 0);
+        let pressure = disc.average(Profile::Hemisphere, window);
+        let peak = self.contact.peak_pressure_pa;
+        let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
+        for ((r, c), &v) in pressure.values.indexed_iter() {
+            sum += v;
+            sum_x += v * c as f64;
+            sum_y += v * r as f64;
+        }
+        if sum > 0.0 {
+            let [row0, col0] = pressure.origin;
+            self.centroid_px = [sum_x / sum + col0 as f64, sum_y / sum + row0 as f64];
+        }
+        let squared =
+            if droop_per_pascal > 0.0 { disc.average(Profile::Paraboloid, window).values.sum() } else { 0.0 };
+        self.visible_force_n = peak * sum * self.pixel_size_m[0] * self.pixel_size_m[1];
+        self.integrated_pixel_value = self.grey_per_pascal * peak * (sum - droop_per_pascal * peak * squared);
+    }
+}
+
+/// The map that takes the apparent surface of one load to that of another: it scales about the contact's centre.
+///
+/// The surface read from a press is a hemisphere of the contact's radius, which grows by (F₂/F₁)^⅓ whatever the object's
+/// modulus: the apparent strain says nothing about it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceScaling {
+    /// Centre (x, y) of the first contact in metres from the first pixel's centre.
+    pub from_centre_m: [f64; 2],
+    /// Centre (x, y) of the second contact.
+    pub to_centre_m: [f64; 2],
+    /// a₂/a₁ = (F₂/F₁)^⅓ under Hertz's law.
+    pub scale: f64,
+}
+
+impl SurfaceScaling {
+    /// Where a point of the first surface lies on the second.
+    pub fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
+        let [x, y] =
+            std::array::from_fn(|k| self.to_centre_m[k] + self.scale * (point[k] - self.from_centre_m[k]));
+        Point3::new(x, y, self.scale * point.z)
+    }
+
+    /// The Green–Lagrange strain of the map, ½(s² − 1) I.
+    pub fn green_lagrange_strain(&self) -> Matrix3<f64> {
+        Matrix3::from_diagonal_element(0.5 * (self.scale - 1.0) * (self.scale + 1.0))
+    }
+}

@@ -1,0 +1,351 @@
+//! A patterned block squeezed between two plates without friction: the case for which the paper's ratio (31),
+//! E = S_zz / mean e_zz, is exact.
+//!
+//! The deformation is homogeneous, x = λ_t X, y = λ_t Y, z = λ_z Z, and the material obeys S = E·e in uniaxial stress, with
+//! S the second Piola–Kirchhoff stress and e the Green–Lagrange strain (St. Venant–Kirchhoff):
+//!
+//! * e_zz = ½(λ_z² − 1), e_xx = e_yy = −ν e_zz, hence λ_t = √(1 − 2ν e_zz);
+//! * S_zz = E e_zz; force F = −λ_z S_zz A₀; Cauchy's stress σ = λ_z S_zz/λ_t².
+//!
+//! From state 1 to state 2, with state 1 as the reference, e₁₂ = (e₂ − e₁)/λ₁² and S₁₂ = (S₂ − S₁)/λ₁² have the ratio E again.
+//!
+//! In small strain all the stresses agree; at 10 % they differ by as much. The force has a greatest value,
+//! E A₀/(3√3) at λ_z = 1/√3, where this material law ends.
+//!
+//! The frame shows pressure in proportion to the pattern's height, normalised to carry the force.
+
+use nalgebra::{Matrix3, Point3};
+use ndarray::Array2;
+
+use super::camera::Camera;
+use super::error::{SimulateError, at_least, finite, not_negative, positive};
+use super::light::Illumination;
+use super::material::Elastic;
+use super::pixel_average::Patch;
+use super::press::Gain;
+use super::relief::{Relief, SurfacePattern};
+
+/// Everything that describes the squeezed block; [`UniaxialScene::new`] checks it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UniaxialOptions {
+    /// What the block is made of.
+    pub material: Elastic,
+    /// Sides of the undeformed face (x, y) in metres.
+    pub face_m: [f64; 2],
+    /// What its surface looks like.
+    pub pattern: SurfacePattern,
+    /// Forces in newton, a frame each; 0 shows no light.
+    pub forces_n: Vec<f64>,
+    /// Centre (x, y) of the face in pixels; the frame's middle if not given.
+    pub centre_px: Option<[f64; 2]>,
+    /// Camera, lens, stray light.
+    pub camera: Camera,
+    /// Grey levels per pascal.
+    pub gain: Gain,
+    /// Seed of noise and pattern.
+    pub seed: u64,
+}
+
+impl Default for UniaxialOptions {
+    /// A CL2000X block of 8 × 8 mm at 0.2, 0.7 and 1.2 N: compressed by 3, 12 and 25 %.
+    fn default() -> Self {
+        Self {
+            material: Elastic::CL2000X,
+            face_m: [8e-3; 2],
+            pattern: SurfacePattern::default(),
+            forces_n: vec![0.2, 0.7, 1.2],
+            centre_px: None,
+            camera: Camera::default(),
+            gain: Gain::PeakGrey(200.0),
+            seed: 1,
+        }
+    }
+}
+
+/// Stretch, strain and stress at one force. Compression is negative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UniaxialState {
+    /// Compressive force in newton.
+    pub force_n: f64,
+    /// λ_z.
+    pub stretch_z: f64,
+    /// λ_t.
+    pub stretch_lateral: f64,
+    /// Green–Lagrange strain e_zz.
+    pub strain_zz: f64,
+    /// Second Piola–Kirchhoff stress S_zz in pascal.
+    pub second_piola_zz_pa: f64,
+    /// Cauchy stress in pascal: the negative of force over the deformed face.
+    pub cauchy_zz_pa: f64,
+    /// Deformed face in square metres.
+    pub area_m2: f64,
+}
+
+/// From one state to another, the first being the reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UniaxialIncrement {
+    /// F₁₂ − I, the displacement gradient.
+    pub displacement_gradient: Matrix3<f64>,
+    /// Green–Lagrange strain e₁₂ in zz.
+    pub strain_zz: f64,
+    /// S₁₂ in pascal: over `strain_zz` it is Young's modulus exactly.
+    pub stress_zz_pa: f64,
+}
+
+/// A checked scene of uniaxial compression.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
+///
+/// let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+/// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
+/// let step = scene.increment(0, 1);
+/// assert!((step.stress_zz_pa / step.strain_zz / 103e3 - 1.0).abs() < 1e-12);
+/// let frame = scene.frame(1, 0);
+/// assert_eq!(frame.dim(), (260, 348));
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct UniaxialScene {
+    options: UniaxialOptions,
+    states: Vec<UniaxialState>,
+    relief: Relief,
+    grey_per_pascal: f64,
+}
+
+impl UniaxialScene {
+    /// Checks `options`, solves every state and places the pattern.
+    ///
+    /// # Errors
+    /// [`SimulateError::OutOfRange`], [`SimulateError::TooFew`], or [`SimulateError::Overload`] for a force beyond
+    /// E A₀/(3√3).
+    pub fn new(options: UniaxialOptions) -> Result<Self, SimulateError> {
+        validate(&options)?;
+        let area0 = options.face_m[0] * options.face_m[1];
+        let solve = |&f: &f64| UniaxialState::new(&options.material, area0, f);
+        let states = options.forces_n.iter().map(solve).collect::<Result<Vec<_>, _>>()?;
+        let relief = options.pattern.place(options.face_m, options.seed);
+        let mut scene = Self { options, states, relief, grey_per_pascal: 1.0 };
+        scene.grey_per_pascal = match scene.options.gain {
+            Gain::GreyPerPascal(gain) => gain,
+            Gain::PeakGrey(grey) => {
+                let loads = 0..scene.states.len();
+                let peak = loads.flat_map(|k| scene.pressure(k).values).fold(0.0, f64::max);
+                if peak > 0.0 { grey / peak } else { 0.0 }
+            }
+        };
+        Ok(scene)
+    }
+
+    /// What the scene was made from.
+    pub fn options(&self) -> &UniaxialOptions {
+        &self.options
+    }
+
+    /// Grey levels per pascal.
+    pub fn grey_per_pascal(&self) -> f64 {
+        self.grey_per_pascal
+    }
+
+    /// Stretch, strain and stress of every force.
+    pub fn states(&self) -> &[UniaxialState] {
+        &self.states
+    }
+
+    /// Strain and stress from state `from` to state `to`.
+    ///
+    /// # Panics
+    /// If there is no such state.
+    pub fn increment(&self, from: usize, to: usize) -> UniaxialIncrement {
+        let (a, b) = (&self.states[from], &self.states[to]);
+        let square = a.stretch_z * a.stretch_z;
+        let lateral = b.stretch_lateral / a.stretch_lateral - 1.0;
+        let axial = b.stretch_z / a.stretch_z - 1.0;
+        UniaxialIncrement {
+            displacement_gradient: Matrix3::from_diagonal(&[lateral, lateral, axial].into()),
+            strain_zz: (b.strain_zz - a.strain_zz) / square,
+            stress_zz_pa: (b.second_piola_zz_pa - a.second_piola_zz_pa) / square,
+        }
+    }
+
+    /// An exposure without contact; each `repeat` has its own noise.
+    pub fn reference(&self, repeat: u32) -> Array2<u8> {
+        let dark = self.options.camera.compose(&[], &Illumination::default());
+        self.options.camera.expose(dark.view(), self.options.seed, u64::from(repeat) << 16)
+    }
+
+    /// An exposure of state `load`; each `repeat` has its own noise.
+    ///
+    /// # Panics
+    /// If there is no such state.
+    pub fn frame(&self, load: usize, repeat: u32) -> Array2<u8> {
+        let light = self.expected_frame(load);
+        self.options.camera.expose(
+            light.view(),
+            self.options.seed,
+            u64::from(repeat) << 16 | (load as u64 + 1),
+        )
+    }
+
+    /// Expected grey levels of state `load`, before noise and rounding.
+    ///
+    /// # Panics
+    /// If there is no such state.
+    pub fn expected_frame(&self, load: usize) -> Array2<f64> {
+        let mut patch = self.pressure(load);
+        patch.values.map_inplace(|v| *v *= self.grey_per_pascal);
+        self.options.camera.blur(&mut patch);
+        self.options.camera.compose(&[patch], &Illumination::default())
+    }
+
+    /// Pressure in pascal averaged over each pixel; the sum times the pixel's area is the force.
+    ///
+    /// # Panics
+    /// If there is no such state.
+    pub fn pressure_pa(&self, load: usize) -> Array2<f64> {
+        let mut field = Array2::zeros(self.options.camera.shape);
+        self.pressure(load).add_to(&mut field);
+        field
+    }
+
+    /// Height in metres per pascal of light in state `load`: pressure times this is the deformed height.
+    ///
+    /// # Panics
+    /// If there is no such state.
+    pub fn height_per_pascal_m(&self, load: usize) -> f64 {
+        let s = &self.states[load];
+        s.stretch_z * s.stretch_lateral.powi(2) * self.relief.volume_m3() / s.force_n
+    }
+
+    /// Deformed heights in metres at pixel centres, 0 off the face.
+    ///
+    /// # Panics
+    /// If there is no such state.
+    pub fn height_m(&self, load: usize) -> Array2<f64> {
+        let (s, centre, size) = (&self.states[load], self.centre_px(), self.options.camera.pixel_size_m);
+        Array2::from_shape_fn(self.options.camera.shape, |(row, col)| {
+            let x = (col as f64 - centre[0]) * size[0] / s.stretch_lateral;
+            let y = (row as f64 - centre[1]) * size[1] / s.stretch_lateral;
+            s.stretch_z * self.relief.height_m([x, y])
+        })
+    }
+
+    /// Material points of the undeformed surface: a grid of `columns` × `rows` cell centres over the face, in metres from the
+    /// first pixel's centre, with the surface's height as z.
+    pub fn material_points(&self, columns: usize, rows: usize) -> Vec<Point3<f64>> {
+        let (size, centre) = (self.options.face_m, self.centre_m());
+        let at = |k: usize, n: usize, side: f64| ((k as f64 + 0.5) / n as f64 - 0.5) * side;
+        let mut points = Vec::with_capacity(columns * rows);
+        for row in 0..rows {
+            for col in 0..columns {
+                let p = [at(col, columns, size[0]), at(row, rows, size[1])];
+                points.push(Point3::new(p[0] + centre[0], p[1] + centre[1], self.relief.height_m(p)));
+            }
+        }
+        points
+    }
+
+    /// Where a material point of the undeformed surface lies in state `load`.
+    ///
+    /// # Panics
+    /// If there is no such state.
+    pub fn deform(&self, load: usize, point: &Point3<f64>) -> Point3<f64> {
+        let (s, c) = (&self.states[load], self.centre_m());
+        let lateral = |k: usize| c[k] + s.stretch_lateral * (point[k] - c[k]);
+        Point3::new(lateral(0), lateral(1), s.stretch_z * point.z)
+    }
+
+    fn centre_px(&self) -> [f64; 2] {
+        self.options.centre_px.unwrap_or_else(|| self.options.camera.middle_px())
+    }
+
+    fn centre_m(&self) -> [f64; 2] {
+        let (centre, size) = (self.centre_px(), self.options.camera.pixel_size_m);
+        [centre[0] * size[0], centre[1] * size[1]]
+    }
+
+    /// Pixel averages of the pressure over the face and the blur's reach.
+    fn pressure(&self, load: usize) -> Patch {
+        let (s, camera, relief) = (&self.states[load], &self.options.camera, &self.relief);
+        let (centre, reach) = (self.centre_px(), camera.blur_reach() as isize);
+        let pixel: [f64; 2] = std::array::from_fn(|k| camera.pixel_size_m[k] / s.stretch_lateral);
+        // First pixel and pixel edges in material coordinates, along x and y.
+        let span = |k: usize, length: usize| {
+            let half = 0.5 * self.options.face_m[k] / pixel[k];
+            let limit = length as isize + reach;
+            let first = ((centre[k] - half + 0.5).floor() as isize - reach).clamp(-reach, limit);
+            let last = ((centre[k] + half + 0.5).ceil() as isize + reach).clamp(first, limit);
+            let edges = (first..=last).map(|i| (i as f64 - 0.5 - centre[k]) * pixel[k]).collect::<Vec<_>>();
+            (first, edges)
+        };
+        let spans = [span(0, camera.shape[1]), span(1, camera.shape[0])];
+        let means = |k: usize, integral: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            spans[k].1.windows(2).map(|e| (integral(e[1]) - integral(e[0])) / pixel[k]).collect()
+        };
+        let mut values = Array2::zeros((spans[1].1.len() - 1, spans[0].1.len() - 1));
+        let face = |k: usize| means(k, &|x| relief.face_integral(k, x));
+        add_product(&mut values, relief.base_height_m, &face(1), &face(0));
+        for bump in &relief.bumps {
+            let profile = |k: usize| means(k, &|x| relief.bump_integral(bump, k, x));
+            add_product(&mut values, bump.height_m, &profile(1), &profile(0));
+        }
+        let scale = s.force_n / (relief.volume_m3() * s.stretch_lateral * s.stretch_lateral);
+        values.map_inplace(|v| *v *= scale);
+        Patch { origin: [spans[1].0, spans[0].0], values }
+    }
+}
+
+impl UniaxialState {
+    fn new(material: &Elastic, area0_m2: f64, force_n: f64) -> Result<Self, SimulateError> {
+        let e = material.youngs_modulus_pa;
+        // Nominal stress over modulus: λ(1 − λ²)/2, greatest at 1/√3.
+        let load = force_n / (e * area0_m2);
+        let limit = 1.0 / 27.0_f64.sqrt();
+        if load >= limit {
+            return Err(SimulateError::Overload { force_n, limit_n: limit * e * area0_m2 });
+        }
+        // λ³ − λ + 2·load = 0: the largest of three real roots by the cosine formula.
+        let stretch = 2.0 / 3.0_f64.sqrt() * ((-load / limit).acos() / 3.0).cos();
+        let strain_zz = 0.5 * (stretch - 1.0) * (stretch + 1.0);
+        let stretch_lateral = (1.0 - 2.0 * material.poisson_ratio * strain_zz).sqrt();
+        let area_m2 = area0_m2 * stretch_lateral * stretch_lateral;
+        Ok(Self {
+            force_n,
+            stretch_z: stretch,
+            stretch_lateral,
+            strain_zz,
+            second_piola_zz_pa: e * strain_zz,
+            cauchy_zz_pa: -force_n / area_m2,
+            area_m2,
+        })
+    }
+}
+
+/// values += height · column ⊗ line, where both differ from zero.
+fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f64]) {
+    let first = line.iter().position(|&v| v != 0.0).unwrap_or(line.len());
+    let last = line.iter().rposition(|&v| v != 0.0).map_or(first, |k| k + 1);
+    for (mut row, &c) in values.rows_mut().into_iter().zip(column) {
+        if c != 0.0 {
+            row.iter_mut().zip(line).take(last).skip(first).for_each(|(v, &l)| *v += height * c * l);
+        }
+    }
+}
+
+fn validate(options: &UniaxialOptions) -> Result<(), SimulateError> {
+    options.material.validate()?;
+    positive("youngs_modulus_pa", options.material.youngs_modulus_pa)?;
+    options.pattern.validate()?;
+    options.camera.validate()?;
+    at_least("forces_n", options.forces_n.len(), 1)?;
+    for &force in &options.forces_n {
+        not_negative("force_n", force)?;
+    }
+    for k in 0..2 {
+        positive("face_m", options.face_m[k])?;
+        finite("centre_px", options.centre_px.map_or(0.0, |c| c[k]))?;
+    }
+    match options.gain {
+        Gain::PeakGrey(value) | Gain::GreyPerPascal(value) => not_negative("gain", value),
+    }
+}

@@ -1,0 +1,253 @@
+//! The scene simulator against itself: its truth is consistent and its noise has the moments it states.
+use ndarray::Array2;
+use tactile_imaging::simulate::{
+    Camera, Elastic, Gain, Illumination, Load, PressOptions, PressScene, Response, SimulateError, Sphere,
+};
+
+/// The default scene on a quarter of the pixels a side.
+fn small() -> PressOptions {
+    let camera = Camera { shape: [260, 348], pixel_size_m: [30e-3 / 348.0; 2], ..Camera::default() };
+    PressOptions { camera, ..PressOptions::default() }
+}
+
+fn relative(found: f64, expected: f64) -> f64 {
+    (found / expected - 1.0).abs()
+}
+
+#[test]
+fn the_light_of_an_ideal_frame_sums_to_the_force() {
+    let mut options = small();
+    options.camera = Camera { pixel_size_m: [90e-6, 75e-6], ..options.camera.ideal() };
+    options.centre_px = Some([170.37, 131.8]);
+    let background = options.camera.background_grey;
+    let scene = PressScene::new(options).unwrap();
+    for (k, force) in [(0, 0.7), (1, 1.2)] {
+        let truth = scene.truth(k);
+        let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
+        let area = scene.options().camera.pixel_area_m2();
+        // 10⁵ pixels of up to 215 grey levels, each rounded to 1 ulp (3e-14), against a sum of 10⁶: below 1e-13.
+        assert!(relative(light * area / scene.grey_per_pascal(), force) < 1e-12);
+        assert!(relative(light, truth.integrated_pixel_value) < 1e-12);
+        assert!(relative(truth.visible_force_n, force) < 1e-12);
+        assert!(relative(truth.pressure_pa().sum() * area, force) < 1e-12);
+        for axis in 0..2 {
+            let error = truth.centroid_px[axis] - [170.37, 131.8][axis];
+            // Rim pixels are weighed at their centres, which shifts the centroid by some 1e-5 px.
+            assert!(error.abs() < 1e-4, "{error}");
+        }
+    }
+}
+
+#[test]
+fn the_bent_response_integrates_exactly() {
+    let mut options = small();
+    options.camera = options.camera.ideal();
+    options.response = Response::Quadratic { droop: 0.2 };
+    let (area, background) = (options.camera.pixel_area_m2(), options.camera.background_grey);
+    let scene = PressScene::new(options).unwrap();
+    for k in 0..2 {
+        let contact = scene.truth(k).contact;
+        let (p0, a) = (contact.peak_pressure_pa, contact.contact_radius_m);
+        // ∫ p² dS = π a² p₀²/2.
+        let squared = 0.5 * std::f64::consts::PI * a * a * p0 * p0;
+        let expected =
+            scene.grey_per_pascal() * (contact.force_n - scene.droop_per_pascal() * squared) / area;
+        let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
+        assert!(relative(light, expected) < 1e-12);
+        assert!(relative(scene.truth(k).integrated_pixel_value, expected) < 1e-12);
+    }
+    let brightest = scene.expected_frame(1).iter().copied().fold(0.0, f64::max);
+    // The largest load's peak is where the gain put it, less the curvature within one pixel.
+    assert!((brightest - 215.0).abs() < 0.1, "{brightest}");
+}
+
+#[test]
+fn blur_keeps_force_and_centroid_and_reaches_in_from_beyond_the_edge() {
+    let mut options = small();
+    options.camera = Camera { blur_sigma_px: 3.0, ..options.camera.ideal() };
+    options.centre_px = Some([171.3, 120.4]);
+    let background = options.camera.background_grey;
+    let blurred = PressScene::new(options.clone()).unwrap();
+    let moments = |image: &Array2<f64>| {
+        let (mut s, mut x) = (0.0, 0.0);
+        for ((_, c), v) in image.indexed_iter() {
+            s += v - background;
+            x += (v - background) * c as f64;
+        }
+        (s, x / s)
+    };
+    let (sum, x) = moments(&blurred.expected_frame(0));
+    assert!(relative(sum, blurred.truth(0).integrated_pixel_value) < 1e-12);
+    assert!((x - 171.3).abs() < 1e-4, "rim pixels shift the centroid of pixel averages by some 1e-5 px");
+    // A contact whose rim lies just left of the frame still lightens the first column.
+    let radius_px = blurred.truth(0).contact.contact_radius_m / options.camera.pixel_size_m[0];
+    options.centre_px = Some([-radius_px - 1.5, 120.4]);
+    let beyond = PressScene::new(options).unwrap();
+    assert_eq!(beyond.truth(0).visible_force_n, 0.0);
+    assert!(beyond.expected_frame(0)[[120, 0]] > background + 0.1);
+}
+
+#[test]
+fn noise_has_the_stated_mean_and_variance() {
+    let camera = Camera { shape: [400, 500], ..Camera::default() };
+    for grey in [0.3, 4.0, 15.0, 120.0, 200.0] {
+        let light = Array2::from_elem((400, 500), grey);
+        let image = camera.expose(light.view(), 7, 3);
+        let n = image.len() as f64;
+        let mean = image.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
+        let variance = image.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        // Rounding adds 1/12 where the noise spans a level or more; below that, and where noise is clipped at black,
+        // the moments are those of the rounded law, so only the brighter fields are checked.
+        if grey < 4.0 {
+            continue;
+        }
+        let expected = camera.noise_sd_grey(grey).powi(2) + 1.0 / 12.0;
+        // Five standard errors: a false alarm in 10⁶.
+        assert!((mean - grey).abs() < 5.0 * (expected / n).sqrt() + 0.02, "mean {mean} of {grey}");
+        assert!(
+            relative(variance, expected) < 5.0 * (2.0 / n).sqrt() + 0.02,
+            "variance {variance} {expected}"
+        );
+    }
+}
+
+#[test]
+fn faint_light_is_poisson() {
+    // 20 electrons a grey level and no read noise: at 2 grey levels the count is Poisson of mean 40.
+    let camera =
+        Camera { shape: [400, 500], full_well_electrons: 5100.0, read_noise_grey: 0.0, ..Camera::default() };
+    let image = camera.expose(Array2::from_elem((400, 500), 2.0).view(), 1, 1);
+    let zero = image.iter().filter(|&&v| v == 0).count() as f64 / image.len() as f64;
+    // Grey 0 is fewer than 10 electrons: P(X ≤ 9 | 40) = 9.2e-9; grey ≤ 1 is fewer than 30: 0.0374… by summation.
+    let at_most = |k: u32| {
+        let mut term = (-40.0_f64).exp();
+        let mut sum = term;
+        for i in 1..=k {
+            term *= 40.0 / f64::from(i);
+            sum += term;
+        }
+        sum
+    };
+    let dim = image.iter().filter(|&&v| v <= 1).count() as f64 / image.len() as f64;
+    let expected = at_most(29);
+    let error = (expected * (1.0 - expected) / image.len() as f64).sqrt();
+    assert!(zero < 1e-4);
+    assert!((dim - expected).abs() < 5.0 * error, "{dim} {expected}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_in_any_order_and_another_seed_others() {
+    let scene = PressScene::new(small()).unwrap();
+    let made = scene.simulate();
+    assert_eq!(scene.frame(1, 0), made.frames[1]);
+    assert_eq!(scene.frame(0, 0), made.frames[0]);
+    assert_eq!(scene.reference(0), made.reference);
+    assert_ne!(scene.reference(1), made.reference);
+    let other = PressScene::new(PressOptions { seed: 2, ..small() }).unwrap();
+    assert_ne!(other.reference(0), made.reference);
+}
+
+#[test]
+fn the_noise_stream_keeps_its_meaning_over_versions() {
+    // Changes when the generator, the ziggurat or their use changes: then say so in the change log.
+    let light = Array2::from_elem((2, 6), 100.0);
+    let image = Camera::default().expose(light.view(), 42, 5);
+    assert_eq!(image.as_slice().unwrap(), NOISE_OF_SEED_42);
+}
+const NOISE_OF_SEED_42: &[u8] = &[100, 102, 101, 102, 96, 101, 102, 101, 100, 101, 102, 98];
+
+#[test]
+fn shear_moves_the_contact_by_force_over_stiffness() {
+    let mut options = small();
+    options.loads = vec![Load::normal(0.7), Load { shear_n: [0.2, -0.1], ..Load::normal(0.7) }];
+    options.shear_stiffness_n_per_m = [400.0, 500.0];
+    let scene = PressScene::new(options).unwrap();
+    let (before, after) = (scene.truth(0).centre_m(), scene.truth(1).centre_m());
+    assert!(relative(after[0] - before[0], 0.2 / 400.0) < 1e-12);
+    assert!(relative(after[1] - before[1], -0.1 / 500.0) < 1e-12);
+}
+
+#[test]
+fn the_apparent_surface_scales_with_the_cube_root_of_the_force() {
+    let truth = PressScene::new(small()).unwrap().simulate().truth;
+    let map = truth[0].scaling_to(&truth[1]);
+    assert!(relative(map.scale, (1.2_f64 / 0.7).cbrt()) < 1e-14);
+    let (height0, height1) = (truth[0].apparent_height_m(), truth[1].apparent_height_m());
+    // The middle of the frame is the centre, half a pixel from the nearest pixel's.
+    assert!(relative(height1[[130, 174]] / height0[[130, 174]], map.scale) < 1e-3);
+    let strain = map.green_lagrange_strain()[(2, 2)];
+    assert!(relative(strain, 0.5 * ((1.2_f64 / 0.7).powf(2.0 / 3.0) - 1.0)) < 1e-13);
+}
+
+#[test]
+fn a_brighter_gain_saturates_and_the_truth_counts_it() {
+    let mut options = small();
+    options.gain = Gain::PeakGrey(400.0);
+    options.camera = options.camera.ideal();
+    let scene = PressScene::new(options).unwrap();
+    let frame = scene.frame(1, 0);
+    let truth = scene.truth(1);
+    assert!(truth.saturated_pixels > 1000);
+    // Rounding puts light from 254.5 on at 255 as well.
+    let bright = frame.iter().filter(|&&v| v == 255).count();
+    assert!(bright >= truth.saturated_pixels && bright < truth.saturated_pixels + 100);
+}
+
+#[test]
+fn no_force_is_no_light() {
+    let mut options = small();
+    options.loads = vec![Load::normal(0.0)];
+    options.camera = options.camera.ideal();
+    let made = PressScene::new(options).unwrap().simulate();
+    assert_eq!(made.frames[0], made.reference);
+    assert_eq!(made.truth[0].visible_force_n, 0.0);
+    assert!(made.truth[0].centroid_px[0].is_nan());
+}
+
+#[test]
+fn every_meaningless_value_is_named() {
+    type Spoil = fn(&mut PressOptions, f64);
+    let cases: [(&str, Spoil, &[f64]); 14] = [
+        ("radius_m", |o, v| o.object.radius_m = v, &[0.0, -1.0, f64::INFINITY]),
+        ("youngs_modulus_pa", |o, v| o.object.material.youngs_modulus_pa = v, &[0.0, -1.0]),
+        ("poisson_ratio", |o, v| o.object.material.poisson_ratio = v, &[-1.0, 0.6]),
+        ("thickness_m", |o, v| o.waveguide.layers[1].thickness_m = v, &[0.0, f64::INFINITY]),
+        ("refractive_index", |o, v| o.waveguide.layers[1].refractive_index = v, &[0.9]),
+        ("force_n", |o, v| o.loads[1].force_n = v, &[-0.1, f64::INFINITY]),
+        ("shear_n", |o, v| o.loads[0].shear_n[1] = v, &[f64::INFINITY]),
+        ("shear_stiffness_n_per_m", |o, v| o.shear_stiffness_n_per_m[0] = v, &[0.0]),
+        ("pixel_size_m", |o, v| o.camera.pixel_size_m[1] = v, &[0.0]),
+        ("background_grey", |o, v| o.camera.background_grey = v, &[-1.0]),
+        ("vignetting", |o, v| o.camera.vignetting = v, &[-0.1, 1.1]),
+        ("blur_sigma_px", |o, v| o.camera.blur_sigma_px = v, &[-0.1, 1e6]),
+        ("full_well_electrons", |o, v| o.camera.full_well_electrons = v, &[0.0]),
+        ("read_noise_grey", |o, v| o.camera.read_noise_grey = v, &[-1.0, f64::INFINITY]),
+    ];
+    for (name, spoil, values) in cases {
+        for &value in values.iter().chain(&[f64::NAN]) {
+            let mut options = small();
+            spoil(&mut options, value);
+            match PressScene::new(options) {
+                Err(SimulateError::OutOfRange { field, .. }) => assert_eq!(field, name),
+                other => panic!("{name} = {value} gave {other:?}"),
+            }
+        }
+    }
+    let spoiled = |spoil: fn(&mut PressOptions)| {
+        let mut options = small();
+        spoil(&mut options);
+        PressScene::new(options).err()
+    };
+    assert!(matches!(spoiled(|o| o.loads.clear()), Some(SimulateError::TooFew { field: "loads", .. })));
+    assert!(matches!(spoiled(|o| o.waveguide.layers.clear()), Some(SimulateError::TooFew { .. })));
+    assert!(matches!(spoiled(|o| o.camera.shape = [0, 3]), Some(SimulateError::TooFew { .. })));
+    assert!(spoiled(|o| o.gain = Gain::PeakGrey(f64::NAN)).is_some());
+    assert!(spoiled(|o| o.response = Response::Quadratic { droop: 0.51 }).is_some());
+    assert!(spoiled(|o| o.centre_px = Some([f64::NAN, 0.0])).is_some());
+    let bad = Illumination { level: -1.0, ..Illumination::default() };
+    let mut options = small();
+    options.loads[0].illumination = bad;
+    assert!(PressScene::new(options).is_err());
+    let rigid = Sphere { radius_m: 1e-3, material: Elastic::RIGID };
+    assert!(PressScene::new(PressOptions { object: rigid, ..small() }).is_ok());
+}
