@@ -47,11 +47,11 @@ pub struct UniaxialOptions {
 }
 
 impl Default for UniaxialOptions {
-    /// A CL2000X block of 8 × 8 mm at 0.2, 0.7 and 1.2 N: compressed by 3, 12 and 25 %.
+    /// A CL2000X block of 12 × 12 mm at 0.2, 0.7 and 1.2 N: compressed by 1, 5 and 9 %.
     fn default() -> Self {
         Self {
             material: Elastic::CL2000X,
-            face_m: [8e-3; 2],
+            face_m: [12e-3; 2],
             pattern: SurfacePattern::default(),
             forces_n: vec![0.2, 0.7, 1.2],
             centre_px: None,

@@ -1,0 +1,319 @@
+//! Calibration series, loading cycles, uniaxial compression, hostile scenes and scenes on disk.
+use proptest::prelude::*;
+use tactile_imaging::simulate::{
+    Branch, CalibrationOptions, Camera, Elastic, Gain, Hostile, LoadCycle, PressOptions, PressScene,
+    Response, SimulateError, Sphere, SurfacePattern, UniaxialOptions, UniaxialScene, write_folder,
+};
+
+fn camera(rows: usize, cols: usize) -> Camera {
+    Camera { shape: [rows, cols], pixel_size_m: [30e-3 / cols as f64; 2], ..Camera::default() }
+}
+
+fn press(rows: usize, cols: usize) -> PressOptions {
+    PressOptions { camera: camera(rows, cols), ..PressOptions::default() }
+}
+
+fn relative(found: f64, expected: f64) -> f64 {
+    (found / expected - 1.0).abs()
+}
+
+#[test]
+fn the_calibration_is_linear_and_holds_for_the_object_as_well() {
+    let mut options = press(261, 348);
+    options.camera.vignetting = 0.0;
+    let scene = PressScene::new(options).unwrap();
+    let quiet = CalibrationOptions { gauge_noise_n: 0.0, ..CalibrationOptions::default() };
+    let series = scene.calibrate(&quiet).unwrap();
+    assert_eq!(series.points.len(), 41);
+    assert_eq!(series.points[20].true_force_n, 2.0);
+    assert_eq!(series.points[21].branch, Branch::Unloading);
+    // 90 828 pixels of about 0.8 grey levels of noise, twice; five standard errors.
+    let noise = 5.0 * (2.0 * 90828.0_f64).sqrt() * 1.2 * series.newton_per_grey;
+    for point in &series.points {
+        let found = point.integrated_pixel_value * series.newton_per_grey;
+        assert!((found - point.true_force_n).abs() < noise, "{found} N of {}", point.true_force_n);
+    }
+    let made = scene.simulate();
+    let sum = |k: usize| {
+        let difference = |(a, b): (&u8, &u8)| f64::from(*a) - f64::from(*b);
+        made.frames[k].iter().zip(&made.reference).map(difference).sum::<f64>()
+    };
+    assert!((sum(0) * series.newton_per_grey - 0.7).abs() < noise);
+    assert!((sum(1) * series.newton_per_grey - 1.2).abs() < noise);
+}
+
+#[test]
+fn gauge_noise_and_hysteresis_are_as_asked() {
+    let scene = PressScene::new(press(66, 87)).unwrap();
+    let options = CalibrationOptions {
+        steps: 100,
+        gauge_noise_n: 0.02,
+        hysteresis: 0.1,
+        ..CalibrationOptions::default()
+    };
+    let series = scene.calibrate(&options).unwrap();
+    let errors: Vec<f64> = series.points.iter().map(|p| p.force_n - p.true_force_n).collect();
+    let n = errors.len() as f64;
+    let sd = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+    // Five standard errors of a standard deviation from 201 readings.
+    assert!(relative(sd, 0.02) < 5.0 / (2.0 * n).sqrt(), "{sd}");
+    // At half load the branches differ by the stated tenth of the range.
+    let (up, down) = (&series.points[50], &series.points[150]);
+    assert_eq!((up.true_force_n, down.true_force_n), (1.0, 1.0));
+    let gap = (down.integrated_pixel_value - up.integrated_pixel_value) * series.newton_per_grey;
+    assert!((gap - 0.2).abs() < 0.01, "{gap}");
+}
+
+#[test]
+fn a_bent_response_bends_the_calibration_below_the_line() {
+    let options = PressOptions { response: Response::Quadratic { droop: 0.3 }, ..press(130, 174) };
+    let scene = PressScene::new(options).unwrap();
+    let quiet = CalibrationOptions { gauge_noise_n: 0.0, ..CalibrationOptions::default() };
+    let series = scene.calibrate(&quiet).unwrap();
+    let value = |k: usize| series.points[k].integrated_pixel_value;
+    assert!(value(20) < 2.0 * value(10) * 0.99);
+    assert!(
+        series.points[..21].windows(2).all(|w| w[1].integrated_pixel_value > w[0].integrated_pixel_value)
+    );
+}
+
+#[test]
+fn a_stream_rests_rises_and_falls_at_the_frame_rate() {
+    let scene = PressScene::new(press(66, 87)).unwrap();
+    let cycle =
+        LoadCycle { light_drift_per_s: 0.5, largest_shear_n: [0.1, 0.0], cycles: 2, ..LoadCycle::default() };
+    let stream = scene.stream(cycle).unwrap();
+    assert_eq!(stream.len(), 168);
+    let frames: Vec<_> = stream.collect();
+    assert_eq!(frames.len(), 168);
+    let forces: Vec<f64> = frames.iter().map(|f| f.truth.contact.force_n).collect();
+    assert!(forces[..8].iter().all(|&f| f == 0.0));
+    // Frames fall on the middle of the cycles: rest 8 frames, period 80.
+    assert!(relative(forces[48], 1.2) < 1e-12 && relative(forces[128], 1.2) < 1e-12);
+    assert!(forces[88].abs() < 1e-12);
+    assert!(relative(frames[16].truth.load.illumination.level, 1.1) < 1e-12);
+    assert_eq!(frames[16].time_s, 0.2);
+    let moved = frames[48].truth.centre_m()[0] - frames[0].truth.centre_m()[0];
+    assert!(relative(moved, 0.1 / scene.options().shear_stiffness_n_per_m[0]) < 1e-9);
+    let again: Vec<_> = scene.stream(cycle).unwrap().map(|f| f.frame).collect();
+    assert!(frames.iter().zip(&again).all(|(a, b)| a.frame == *b));
+    assert_ne!(frames[0].frame, frames[1].frame);
+    let bad = LoadCycle { frame_rate_hz: f64::NAN, ..cycle };
+    assert!(matches!(scene.stream(bad), Err(SimulateError::OutOfRange { field: "frame_rate_hz", .. })));
+}
+
+#[test]
+fn uniaxial_states_obey_their_law_and_balance_the_force() {
+    let forces = vec![0.01, 0.3, 0.7, 1.1];
+    let scene = UniaxialScene::new(UniaxialOptions {
+        forces_n: forces.clone(),
+        material: Elastic { youngs_modulus_pa: 62e3, poisson_ratio: 0.45 },
+        face_m: [9e-3, 11e-3],
+        camera: camera(600, 700),
+        ..UniaxialOptions::default()
+    })
+    .unwrap();
+    for (s, force) in scene.states().iter().zip(forces) {
+        assert_eq!(s.force_n, force);
+        let close = |x: f64, y: f64| assert!(relative(x, y) < 1e-12, "{x} {y}");
+        close(-s.cauchy_zz_pa * s.area_m2, force);
+        // Cauchy from second Piola–Kirchhoff: σ = F S Fᵀ / det F.
+        close(s.cauchy_zz_pa, s.second_piola_zz_pa * s.stretch_z / s.stretch_lateral.powi(2));
+        close(s.second_piola_zz_pa, 62e3 * s.strain_zz);
+        close(0.5 * (s.stretch_lateral.powi(2) - 1.0), -0.45 * s.strain_zz);
+        assert!(s.stretch_z < 1.0 && s.stretch_lateral > 1.0);
+    }
+    for (i, j) in [(0, 1), (1, 3), (2, 3)] {
+        let step = scene.increment(i, j);
+        assert!(relative(step.stress_zz_pa / step.strain_zz, 62e3) < 1e-12);
+        let axial = 1.0 + step.displacement_gradient[(2, 2)];
+        assert!(relative(step.strain_zz, 0.5 * (axial * axial - 1.0)) < 1e-12);
+    }
+}
+
+#[test]
+fn uniaxial_frames_carry_the_force_and_the_points_deform_as_the_states_say() {
+    let mut options = UniaxialOptions { camera: camera(261, 348).ideal(), ..UniaxialOptions::default() };
+    options.centre_px = Some([170.2, 133.9]);
+    let background = options.camera.background_grey;
+    let scene = UniaxialScene::new(options).unwrap();
+    let area = scene.options().camera.pixel_area_m2();
+    let points = scene.material_points(15, 15);
+    for (k, force) in [(0, 0.2), (1, 0.7), (2, 1.2)] {
+        let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
+        assert!(relative(light * area / scene.grey_per_pascal(), force) < 1e-12);
+        assert!(relative(scene.pressure_pa(k).sum() * area, force) < 1e-12);
+        // Where the surface is flat over a pixel, the pressure is the height through the stated factor.
+        let heights = scene.height_m(k);
+        let from_light = scene.pressure_pa(k) * scene.height_per_pascal_m(k);
+        let inner = largest_inner_difference(&heights, &from_light);
+        // Bumps of 0.6 mm height and 0.6 mm half width curve by π²h/2w² = 8 per mm: over a pixel of 0.086 mm
+        // the mean and the centre differ by curvature·pixel²/12 = 5 µm. Border pixels are partly covered.
+        assert!(inner < 6e-6, "{inner}");
+        for p in &points {
+            let moved = scene.deform(k, p);
+            assert!((moved.z - scene.states()[k].stretch_z * p.z).abs() < 1e-18);
+        }
+    }
+    // Strain of the moved points is that of the increment: the map between two states is affine about the centre.
+    let (a, b) = (scene.deform(0, &points[3]), scene.deform(1, &points[3]));
+    let (c, d) = (scene.deform(0, &points[200]), scene.deform(1, &points[200]));
+    let gradient = scene.increment(0, 1).displacement_gradient;
+    let (before, after) = (c - a, d - b);
+    assert!((before + gradient * before - after).norm() < 1e-15);
+}
+
+/// Largest difference where the four neighbours lie on the face as well.
+fn largest_inner_difference(a: &ndarray::Array2<f64>, b: &ndarray::Array2<f64>) -> f64 {
+    let (rows, cols) = a.dim();
+    let mut worst = 0.0_f64;
+    for r in 1..rows - 1 {
+        for c in 1..cols - 1 {
+            let near = [a[[r - 1, c]], a[[r + 1, c]], a[[r, c - 1]], a[[r, c + 1]], a[[r, c]]];
+            if near.iter().all(|&h| h > 0.0) {
+                worst = worst.max((a[[r, c]] - b[[r, c]]).abs());
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn a_force_beyond_the_material_law_is_an_error_and_so_are_bad_patterns() {
+    let limit = 103e3 * 144e-6 / 27.0_f64.sqrt();
+    let at = |force: f64| {
+        UniaxialScene::new(UniaxialOptions {
+            forces_n: vec![force],
+            camera: camera(261, 348),
+            ..UniaxialOptions::default()
+        })
+    };
+    assert!(at(0.999 * limit).is_ok());
+    assert!(matches!(at(1.001 * limit), Err(SimulateError::Overload { .. })));
+    assert!(at(f64::NAN).is_err());
+    let pattern = SurfacePattern { bump_share: 0.6, ..SurfacePattern::default() };
+    assert!(UniaxialScene::new(UniaxialOptions { pattern, ..UniaxialOptions::default() }).is_err());
+    let pattern = SurfacePattern { bump_height_m: [2e-3, 1e-3], ..SurfacePattern::default() };
+    assert!(UniaxialScene::new(UniaxialOptions { pattern, ..UniaxialOptions::default() }).is_err());
+}
+
+#[test]
+fn a_scene_on_disk_has_the_files_its_description_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = PressScene::new(press(66, 87)).unwrap();
+    let path = write_folder(&scene, &CalibrationOptions::default(), &folder.path().join("scene")).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let table: toml::Table = text.parse().unwrap();
+    let home = path.parent().unwrap();
+    let made = scene.simulate();
+    let image = |name: &str| image::open(home.join(name)).unwrap().to_luma8().into_raw();
+    assert_eq!(image(table["reference"].as_str().unwrap()), made.reference.as_slice().unwrap());
+    for (entry, frame) in table["frames"].as_array().unwrap().iter().zip(&made.frames) {
+        assert_eq!(image(entry["image"].as_str().unwrap()), frame.as_slice().unwrap());
+    }
+    let pairs = std::fs::read_to_string(home.join(table["calibration"]["pairs"].as_str().unwrap())).unwrap();
+    assert!(pairs.starts_with("integrated_pixel_value,force_N\n"));
+    assert_eq!(pairs.lines().count(), 42);
+    assert_eq!(table["waveguide"]["layers"].as_array().unwrap().len(), 3);
+    assert_eq!(table["object"]["shape"].as_str(), Some("sphere"));
+    let blocked = home.join("reference.png").join("below_a_file");
+    assert!(write_folder(&scene, &CalibrationOptions::default(), &blocked).is_err());
+}
+
+#[test]
+fn hostile_scenes_are_what_they_say() {
+    let base = press(66, 87);
+    let made = |kind: Hostile| kind.simulate(&base).unwrap();
+    let count = |frame: &ndarray::Array2<u8>, value: u8| frame.iter().filter(|&&v| v == value).count();
+    let (saturated, black) = (made(Hostile::AllSaturated), made(Hostile::AllBlack));
+    assert_eq!(count(&saturated.frames[0], 255), 66 * 87);
+    assert_eq!(count(&saturated.reference, 255), 66 * 87);
+    assert_eq!(count(&black.frames[0], 0) + count(&black.reference, 0), 2 * 66 * 87);
+    assert_eq!(made(Hostile::NoiseOnly).truth[0].visible_force_n, 0.0);
+    assert!(count(&made(Hostile::SaturatedContact).frames[0], 255) > 100);
+    let several = made(Hostile::SeveralContacts);
+    assert_eq!(several.truth.len(), 3);
+    for pair in several.truth.windows(2) {
+        assert!(pair[0].contact.force_n > pair[1].contact.force_n);
+        let apart =
+            (pair[0].centre_px[0] - pair[1].centre_px[0]).hypot(pair[0].centre_px[1] - pair[1].centre_px[1]);
+        let radii = (pair[0].contact.contact_radius_m + pair[1].contact.contact_radius_m)
+            / base.camera.pixel_size_m[0];
+        assert!(apart > radii, "contacts must not touch");
+    }
+    let share = |kind: Hostile| {
+        let truth = &made(kind).truth[0];
+        truth.visible_force_n / truth.contact.force_n
+    };
+    assert!(relative(share(Hostile::CutByEdge), 0.5) < 1e-12);
+    assert!(relative(share(Hostile::InCorner), 0.25) < 1e-12);
+    assert!(share(Hostile::FillsFrame) < 0.5);
+    let sub = made(Hostile::SubPixelContact);
+    assert!(sub.truth[0].contact.contact_radius_m < 0.5 * sub.pixel_size_m[0]);
+    let pressed = made(Hostile::PressedReference);
+    assert!(pressed.reference[[33, 43]] > pressed.frames[0][[33, 43]] + 100);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    /// Any scene, however odd its frame, makes frames of the right size whose visible force lies between zero and the
+    /// force and, where nothing is clipped, whose light is that force.
+    #[test]
+    fn any_scene_keeps_its_books(
+        shape in (1_usize..60, 1_usize..60),
+        pixel in (1e-5_f64..1e-3, 1e-5_f64..1e-3),
+        centre in (-80.0_f64..140.0, -80.0_f64..140.0),
+        force in 0.0_f64..3.0,
+        radius in 1e-4_f64..2e-2,
+        modulus in 1e3_f64..1e9,
+        blur in 0.0_f64..3.0,
+        seed in any::<u64>(),
+    ) {
+        let camera = Camera {
+            shape: [shape.0, shape.1],
+            pixel_size_m: [pixel.0, pixel.1],
+            blur_sigma_px: blur,
+            vignetting: 0.0,
+            ..Camera::default()
+        };
+        let material = Elastic { youngs_modulus_pa: modulus, poisson_ratio: 0.4 };
+        let scene = PressScene::new(PressOptions {
+            object: Sphere { radius_m: radius, material },
+            loads: vec![tactile_imaging::simulate::Load::normal(force)],
+            centre_px: Some([centre.0, centre.1]),
+            camera,
+            seed,
+            ..PressOptions::default()
+        }).unwrap();
+        let made = scene.simulate();
+        prop_assert_eq!(made.frames[0].dim(), shape);
+        let truth = &made.truth[0];
+        prop_assert!(truth.visible_force_n >= 0.0 && truth.visible_force_n <= force * (1.0 + 1e-9));
+        let light: f64 = scene.expected_frame(0).iter().map(|v| v - camera.background_grey).sum();
+        let carried = light * camera.pixel_area_m2();
+        // Blur moves light over the edge, but makes none.
+        let most = force * scene.grey_per_pascal();
+        prop_assert!(carried >= -1e-9 * most.max(1e-12) && carried <= most * (1.0 + 1e-9) + 1e-12);
+        if blur == 0.0 {
+            prop_assert!((carried - truth.visible_force_n * scene.grey_per_pascal()).abs() <= 1e-9 * most);
+        }
+    }
+
+    /// Every hostile scene can be made on any camera.
+    #[test]
+    fn every_hostile_scene_exists_on_any_camera(
+        shape in (8_usize..50, 8_usize..50),
+        pixel in (2e-5_f64..4e-4, 2e-5_f64..4e-4),
+        seed in any::<u64>(),
+    ) {
+        let camera = Camera { shape: [shape.0, shape.1], pixel_size_m: [pixel.0, pixel.1], ..Camera::default() };
+        let base = PressOptions { camera, seed, gain: Gain::PeakGrey(100.0), ..PressOptions::default() };
+        for kind in Hostile::ALL {
+            let made = kind.simulate(&base).unwrap();
+            prop_assert_eq!(made.reference.dim(), shape);
+            prop_assert_eq!(made.frames[0].dim(), shape);
+            prop_assert!(!made.truth.is_empty());
+        }
+    }
+}
