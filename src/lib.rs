@@ -6,5 +6,10 @@ pub use tactile_match as matching;
 pub use tactile_optics as optics;
 pub use tactile_sfs as sfs;
 pub use tactile_tps as tps;
+
+#[cfg(feature = "scene")]
+pub mod io;
+#[cfg(feature = "plot")]
+pub mod plot;
 #[cfg(feature = "simulate")]
 pub mod simulate;

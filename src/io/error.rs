@@ -1,0 +1,150 @@
+//! The errors of reading and writing files.
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// What a reader wanted to find at the place that [`ReadError`] names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Expected {
+    /// A finite number.
+    FiniteNumber,
+    /// A number, or `nan`, or an empty cell.
+    NumberOrNan,
+    /// A count or index: a whole number that is not negative.
+    WholeNumber,
+    /// A row of exactly this many columns.
+    Columns(usize),
+    /// A row of two or three columns.
+    TwoOrThreeColumns,
+    /// At least one row of numbers.
+    Rows,
+    /// A line `case NAME D n_model n_target`.
+    CaseHeader,
+    /// One of the tags `case`, `m`, `t`, `g`, `p`.
+    CaseTag,
+    /// The dimension 2 or 3.
+    Dimension,
+    /// This many rows with this tag, as the case's header announced.
+    TaggedRows(char, usize),
+}
+
+impl fmt::Display for Expected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FiniteNumber => write!(f, "a finite number"),
+            Self::NumberOrNan => write!(f, "a number, `nan` or an empty cell"),
+            Self::WholeNumber => write!(f, "a whole number"),
+            Self::Columns(1) => write!(f, "1 column"),
+            Self::Columns(n) => write!(f, "{n} columns"),
+            Self::TwoOrThreeColumns => write!(f, "2 or 3 columns"),
+            Self::Rows => write!(f, "at least one row of numbers"),
+            Self::CaseHeader => write!(f, "`case NAME D n_model n_target`"),
+            Self::CaseTag => write!(f, "a row that starts with case, m, t, g or p"),
+            Self::Dimension => write!(f, "dimension 2 or 3"),
+            Self::TaggedRows(tag, n) => write!(f, "{n} rows tagged {tag}"),
+        }
+    }
+}
+
+/// Why a file could not be read or written. Every message names the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The operating system would not open or read the file.
+    #[error("cannot read {}: {source}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The operating system would not create or write the file.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// One field is not what it should be.
+    #[error("{}, line {line}, column {column}: expected {expected}, found `{found}`", path.display())]
+    Field {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: u64,
+        /// Column, counted from 1.
+        column: usize,
+        /// What belongs there.
+        expected: Expected,
+        /// The field as it stands in the file (shortened if long).
+        found: String,
+    },
+    /// A line has the wrong shape.
+    #[error("{}, line {line}: expected {expected}, found {found}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: u64,
+        /// What belongs there.
+        expected: Expected,
+        /// Number of columns (or rows) found.
+        found: usize,
+    },
+    /// A table without a needed column.
+    #[error("{}: expected a column named `{column}`, found {}", path.display(), list(found))]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// The name looked for.
+        column: String,
+        /// The names in the header (empty: there is no header).
+        found: Vec<String>,
+    },
+    /// The file is empty, or has a header alone.
+    #[error("{}: expected {expected}, found none", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// What belongs there.
+        expected: Expected,
+    },
+    /// The file is no image that can be decoded.
+    #[error("cannot decode the image {}: {source}", path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder said.
+        source: ::image::ImageError,
+    },
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() { "no header line".into() } else { format!("`{}`", names.join("`, `")) }
+}
+
+/// Reads a whole file; the error names it.
+pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+    std::fs::read(path).map_err(|source| ReadError::Open { path: path.into(), source })
+}
+
+/// Writes a whole file, creating its folder where needed.
+pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
+    let write = || {
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        std::fs::write(path, bytes)
+    };
+    write().map_err(|source| ReadError::Write { path: path.into(), source })
+}
+
+/// The field as it can stand in a message: at most 40 characters, no control characters.
+pub(crate) fn shorten(field: &str) -> String {
+    let clean: String = field.trim().chars().filter(|c| !c.is_control()).collect();
+    match clean.char_indices().nth(40) {
+        Some((end, _)) => format!("{}…", &clean[..end]),
+        None => clean,
+    }
+}

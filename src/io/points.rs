@@ -1,0 +1,93 @@
+//! Point sets in CSV: one point a row, two or three columns, header or none.
+use super::error::{Expected, ReadError, read_bytes, write_bytes};
+use super::table::parse_table;
+use nalgebra::{Point, Point2, Point3};
+use ndarray::Array2;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Points of a file whose number of columns is not known beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PointTable {
+    /// The file has two columns.
+    Plane(Vec<Point2<f64>>),
+    /// The file has three columns.
+    Space(Vec<Point3<f64>>),
+}
+
+/// Reads points with two or three coordinates, as many as the file has columns.
+///
+/// # Errors
+/// [`ReadError`], see the [module](super).
+pub fn read_point_table(path: impl AsRef<Path>) -> Result<PointTable, ReadError> {
+    let path = path.as_ref();
+    let values = parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)?.values;
+    match values.ncols() {
+        2 => Ok(PointTable::Plane(to_points(&values))),
+        3 => Ok(PointTable::Space(to_points(&values))),
+        found => {
+            Err(ReadError::Line { path: path.into(), line: 1, expected: Expected::TwoOrThreeColumns, found })
+        }
+    }
+}
+
+/// Reads points with `D` coordinates.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{read_points, write_points};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("points.csv");
+/// std::fs::write(&path, "x_m,y_m\n0.5,1.5\n2,3e-3\n")?;
+/// let points = read_points::<2>(&path)?;
+/// assert_eq!(points[1], [2.0, 0.003].into());
+/// write_points(&path, &["x_m", "y_m"], &points)?;
+/// assert_eq!(read_points::<2>(&path)?, points);
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// [`ReadError`], among others where the file has not `D` columns.
+pub fn read_points<const D: usize>(path: impl AsRef<Path>) -> Result<Vec<Point<f64, D>>, ReadError> {
+    let path = path.as_ref();
+    parse_points(&read_bytes(path)?, path)
+}
+
+/// Parses points from the bytes of a CSV file; `name` stands for the file in errors.
+///
+/// # Errors
+/// As [`read_points`].
+pub fn parse_points<const D: usize>(
+    bytes: &[u8],
+    name: impl AsRef<Path>,
+) -> Result<Vec<Point<f64, D>>, ReadError> {
+    let path = name.as_ref();
+    let values = parse_table(bytes, path, Expected::FiniteNumber)?.values;
+    if values.ncols() == D {
+        return Ok(to_points(&values));
+    }
+    Err(ReadError::Line { path: path.into(), line: 1, expected: Expected::Columns(D), found: values.ncols() })
+}
+
+/// Writes points with a header; reading them again gives the same bits.
+///
+/// # Errors
+/// [`ReadError::Write`].
+pub fn write_points<const D: usize>(
+    path: impl AsRef<Path>,
+    header: &[&str; D],
+    points: &[Point<f64, D>],
+) -> Result<(), ReadError> {
+    let mut text = header.join(",") + "\n";
+    for p in points {
+        for (i, v) in p.iter().enumerate() {
+            let _ = write!(text, "{}{v:?}", if i == 0 { "" } else { "," });
+        }
+        text.push('\n');
+    }
+    write_bytes(path.as_ref(), text.as_bytes())
+}
+
+fn to_points<const D: usize>(values: &Array2<f64>) -> Vec<Point<f64, D>> {
+    values.rows().into_iter().map(|row| Point::from(std::array::from_fn(|i| row[i]))).collect()
+}

@@ -1,0 +1,126 @@
+//! Drawing one panel: layout, axes, layers, colour bar, legend.
+use super::colour::Colour;
+use super::heat::HeatMap;
+use super::layer::Layer;
+use super::legend::draw_legend;
+use super::map::{draw_bar, draw_heat};
+use super::marks::draw_layer;
+use super::panel::{Panel, Scale};
+use super::ticks::label;
+use plotters::chart::ChartContext;
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Fail<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
+pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// Room in pixels for labels and title.
+const LEFT: i32 = 62;
+const BOTTOM: i32 = 46;
+const TOP: i32 = 34;
+const RIGHT: i32 = 18;
+const BAR: i32 = 86;
+
+pub(super) fn style(size: i32, colour: RGBColor) -> TextStyle<'static> {
+    ("sans-serif", size).into_font().color(&colour)
+}
+
+pub(super) fn rgb(c: Colour) -> RGBColor {
+    RGBColor(c.0, c.1, c.2)
+}
+
+pub(super) fn draw_panel<'a>(area: &Area<'a>, panel: &Panel) -> Result<(), Fail<'a>> {
+    let (width, height) = area.dim_in_pixel();
+    let middle = Pos::new(HPos::Center, VPos::Center);
+    area.draw_text(&panel.title, &style(16, BLACK).pos(middle), (width as i32 / 2, 17))?;
+    if !panel.text.is_empty() {
+        return draw_lines(area, &panel.text);
+    }
+    let bar = panel.layers.iter().find_map(Layer::bar);
+    let right = if bar.is_some() { BAR } else { RIGHT };
+    let [x, y] = panel.ranges();
+    let room = [width as i32 - LEFT - right, height as i32 - TOP - BOTTOM].map(|v| v.max(20));
+    let size = if panel.equal_aspect { fit(room, [x[1] - x[0], y[1] - y[0]]) } else { room };
+    let spare = [(room[0] - size[0]) / 2, (room[1] - size[1]) / 2];
+    let corner = [LEFT + spare[0], TOP + spare[1]];
+    let (bottom, top) = if panel.y_down { (y[1], y[0]) } else { (y[0], y[1]) };
+    let mut chart = ChartBuilder::on(area)
+        .margin_left(spare[0])
+        .margin_right(width as i32 - corner[0] - size[0])
+        .margin_top(corner[1])
+        .margin_bottom(height as i32 - corner[1] - size[1] - BOTTOM)
+        .x_label_area_size(BOTTOM)
+        .y_label_area_size(LEFT)
+        .build_cartesian_2d(x[0]..x[1], bottom..top)?;
+    let maps = panel.layers.iter().filter_map(|l| if let Layer::Heat(m) = l { Some(m) } else { None });
+    for map in maps {
+        draw_heat(&chart, map, panel.y_down)?;
+    }
+    draw_axes(&mut chart, panel, size, bar.is_some())?;
+    for layer in &panel.layers {
+        draw_layer(&mut chart, panel, layer)?;
+    }
+    if let Some((map, range, text)) = bar {
+        let strip = HeatMap {
+            values: ndarray::Array2::from_shape_fn((64, 1), |(i, _)| i as f64 / 63.0),
+            x: [0.0; 2],
+            y: [0.0; 2],
+            map,
+            range: [0.0, 1.0],
+            label: text.into(),
+        };
+        draw_bar(area, &strip, range, [corner[0] + size[0] + 12, corner[1]], size[1])?;
+    }
+    draw_legend(&mut chart, panel)
+}
+
+/// The largest box inside `room` with the proportions of the data.
+fn fit(room: [i32; 2], data: [f64; 2]) -> [i32; 2] {
+    let scale = (f64::from(room[0]) / data[0]).min(f64::from(room[1]) / data[1]);
+    data.map(|d| ((d * scale).round() as i32).max(8))
+}
+
+fn draw_lines<'a>(area: &Area<'a>, lines: &[String]) -> Result<(), Fail<'a>> {
+    let (width, _) = area.dim_in_pixel();
+    for (i, line) in lines.iter().enumerate() {
+        let y = TOP + 14 + 21 * i as i32;
+        for (part, x) in line.splitn(2, '\t').zip([24, 24 + width as i32 * 2 / 5]) {
+            area.draw_text(part, &style(14, BLACK), (x, y))?;
+        }
+    }
+    Ok(())
+}
+
+fn draw_axes<'a>(
+    chart: &mut Chart<'_, 'a>,
+    panel: &Panel,
+    size: [i32; 2],
+    map: bool,
+) -> Result<(), Fail<'a>> {
+    let tick = |scale: Scale| {
+        move |v: &f64| match scale {
+            Scale::Linear => label((v * 1e9).round() / 1e9 + 0.0),
+            Scale::Log10 => label(10f64.powf(*v)),
+        }
+    };
+    let (format_x, format_y) = (tick(panel.scales[0]), tick(panel.scales[1]));
+    let mut mesh = chart.configure_mesh();
+    mesh.x_labels((size[0] / 64).clamp(2, 9) as usize)
+        .y_labels((size[1] / 44).clamp(2, 9) as usize)
+        .x_desc(panel.x_label.as_str())
+        .y_desc(panel.y_label.as_str())
+        .x_label_formatter(&format_x)
+        .y_label_formatter(&format_y)
+        .label_style(style(13, RGBColor(40, 40, 40)))
+        .axis_desc_style(style(14, BLACK))
+        .axis_style(RGBColor(90, 90, 90))
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(RGBColor(228, 228, 228));
+    if map {
+        mesh.disable_mesh();
+    }
+    mesh.draw()
+}

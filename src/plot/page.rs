@@ -1,0 +1,113 @@
+//! A page of panels, written as one SVG file.
+use super::draw::{draw_panel, style};
+use super::panel::Panel;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::path::{Path, PathBuf};
+
+/// Why a page could not be drawn or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlotError {
+    /// The drawing library refused.
+    #[error("cannot draw the page `{title}`: {message}")]
+    Draw {
+        /// Title of the page.
+        title: String,
+        /// What the library said.
+        message: String,
+    },
+    /// The file could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// Panels in rows and columns under one title.
+#[derive(Clone, Debug)]
+pub struct Page {
+    title: String,
+    panels: Vec<Panel>,
+    columns: usize,
+    panel_size: (u32, u32),
+}
+
+impl Page {
+    /// An empty page, one column, panels of 560 × 420 pixels.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), panels: Vec::new(), columns: 1, panel_size: (560, 420) }
+    }
+
+    /// Sets the number of columns (at least one).
+    #[must_use]
+    pub fn columns(mut self, columns: usize) -> Self {
+        self.columns = columns.max(1);
+        self
+    }
+
+    /// Sets the size of every panel in pixels (at least 200 × 150).
+    #[must_use]
+    pub fn panel_size(mut self, width: u32, height: u32) -> Self {
+        self.panel_size = (width.max(200), height.max(150));
+        self
+    }
+
+    /// Adds a panel: panels fill the rows from left to right.
+    #[must_use]
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// The page as the text of an SVG file.
+    ///
+    /// # Errors
+    /// [`PlotError::Draw`].
+    pub fn to_svg(&self) -> Result<String, PlotError> {
+        let mut svg = String::new();
+        self.draw(&mut svg)
+            .map_err(|e| PlotError::Draw { title: self.title.clone(), message: e.to_string() })?;
+        // The back end leaves out the type's first half, which strict readers want.
+        Ok(svg.replace("\"data:png;base64,", "\"data:image/png;base64,"))
+    }
+
+    /// Writes the page to a file, creating its folder where needed.
+    ///
+    /// # Errors
+    /// [`PlotError`].
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
+        let (path, svg) = (path.as_ref(), self.to_svg()?);
+        let write = || {
+            if let Some(folder) = path.parent() {
+                std::fs::create_dir_all(folder)?;
+            }
+            std::fs::write(path, svg)
+        };
+        write().map_err(|source| PlotError::Write { path: path.into(), source })
+    }
+
+    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn std::error::Error + '_>> {
+        let rows = self.panels.len().div_ceil(self.columns).max(1);
+        let head = if self.title.is_empty() { 8 } else { 44 };
+        let (width, height) = self.panel_size;
+        let size = (width * self.columns as u32, head + height * rows as u32);
+        let root = SVGBackend::with_string(svg, size).into_drawing_area();
+        let fail = |e: &dyn std::fmt::Display| e.to_string();
+        root.fill(&WHITE).map_err(|e| fail(&e))?;
+        let (title, body) = root.split_vertically(head);
+        let anchor = Pos::new(HPos::Center, VPos::Center);
+        title
+            .draw_text(&self.title, &style(20, BLACK).pos(anchor), (size.0 as i32 / 2, 24))
+            .map_err(|e| fail(&e))?;
+        for (area, panel) in body.split_evenly((rows, self.columns)).iter().zip(&self.panels) {
+            draw_panel(area, panel).map_err(|e| fail(&e))?;
+        }
+        root.present().map_err(|e| fail(&e))?;
+        drop((title, body));
+        Ok(())
+    }
+}

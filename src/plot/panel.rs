@@ -1,0 +1,226 @@
+//! A panel: axes with layers in them, described as data.
+use super::colour::{ColorMap, Colour};
+use super::heat::HeatMap;
+use super::layer::{Layer, Marker};
+
+/// How an axis counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Scale {
+    /// Equal steps for equal differences.
+    #[default]
+    Linear,
+    /// Equal steps for equal ratios; positions that are not positive are left out.
+    Log10,
+}
+
+impl Scale {
+    pub(super) fn forward(self, v: f64) -> f64 {
+        match self {
+            Self::Linear => v,
+            Self::Log10 => v.log10(),
+        }
+    }
+}
+
+/// One set of axes and what is drawn in it.
+#[derive(Clone, Debug, Default)]
+pub struct Panel {
+    pub(super) title: String,
+    pub(super) x_label: String,
+    pub(super) y_label: String,
+    pub(super) layers: Vec<Layer>,
+    pub(super) equal_aspect: bool,
+    pub(super) y_down: bool,
+    pub(super) scales: [Scale; 2],
+    pub(super) x_range: Option<[f64; 2]>,
+    pub(super) y_range: Option<[f64; 2]>,
+    pub(super) text: Vec<String>,
+}
+
+impl Panel {
+    /// An empty panel.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), ..Self::default() }
+    }
+
+    /// Names the x axis; write the unit into it.
+    #[must_use]
+    pub fn x_label(mut self, label: impl Into<String>) -> Self {
+        self.x_label = label.into();
+        self
+    }
+
+    /// Names the y axis; write the unit into it.
+    #[must_use]
+    pub fn y_label(mut self, label: impl Into<String>) -> Self {
+        self.y_label = label.into();
+        self
+    }
+
+    /// Gives both axes the same scale on the page.
+    #[must_use]
+    pub fn equal_aspect(mut self) -> Self {
+        self.equal_aspect = true;
+        self
+    }
+
+    /// Draws like an image: y downwards, both axes with the same scale.
+    #[must_use]
+    pub fn image_axes(mut self) -> Self {
+        self.y_down = true;
+        self.equal_aspect()
+    }
+
+    /// Sets how the axes count.
+    #[must_use]
+    pub fn scales(mut self, x: Scale, y: Scale) -> Self {
+        self.scales = [x, y];
+        self
+    }
+
+    /// Sets the range of the x axis.
+    #[must_use]
+    pub fn x_range(mut self, range: [f64; 2]) -> Self {
+        self.x_range = Some(range);
+        self
+    }
+
+    /// Sets the range of the y axis.
+    #[must_use]
+    pub fn y_range(mut self, range: [f64; 2]) -> Self {
+        self.y_range = Some(range);
+        self
+    }
+
+    /// Adds any layer.
+    #[must_use]
+    pub fn layer(mut self, layer: Layer) -> Self {
+        self.layers.push(layer);
+        self
+    }
+
+    /// Adds discs.
+    #[must_use]
+    pub fn points(self, points: impl IntoIterator<Item = [f64; 2]>, colour: Colour, label: &str) -> Self {
+        self.marked(points, Marker::Disc, colour, label)
+    }
+
+    /// Adds points of a given shape.
+    #[must_use]
+    pub fn marked(
+        self,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        marker: Marker,
+        colour: Colour,
+        label: &str,
+    ) -> Self {
+        let points = points.into_iter().collect();
+        self.layer(Layer::Points { points, colour, marker, radius: 3.0, label: label.into() })
+    }
+
+    /// Adds points coloured by a value, with a colour bar.
+    #[must_use]
+    pub fn coloured_points(
+        self,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        values: impl IntoIterator<Item = f64>,
+        label: &str,
+    ) -> Self {
+        let (points, values) = (points.into_iter().collect(), values.into_iter().collect());
+        let map = ColorMap::Viridis;
+        self.layer(Layer::ColouredPoints { points, values, map, radius: 3.5, label: label.into() })
+    }
+
+    /// Adds a line.
+    #[must_use]
+    pub fn line(self, points: impl IntoIterator<Item = [f64; 2]>, colour: Colour, label: &str) -> Self {
+        let points = points.into_iter().collect();
+        self.layer(Layer::Line { points, colour, dashed: false, label: label.into() })
+    }
+
+    /// Adds a dashed line.
+    #[must_use]
+    pub fn dashed(self, points: impl IntoIterator<Item = [f64; 2]>, colour: Colour, label: &str) -> Self {
+        let points = points.into_iter().collect();
+        self.layer(Layer::Line { points, colour, dashed: true, label: label.into() })
+    }
+
+    /// Adds vertical error bars of plus and minus `errors`.
+    #[must_use]
+    pub fn error_bars(
+        self,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        errors: impl IntoIterator<Item = f64>,
+        colour: Colour,
+    ) -> Self {
+        let (points, errors) = (points.into_iter().collect(), errors.into_iter().collect());
+        self.layer(Layer::ErrorBars { points, errors, colour })
+    }
+
+    /// Adds arrows from the first to the second position of every pair.
+    #[must_use]
+    pub fn arrows(self, pairs: impl IntoIterator<Item = [[f64; 2]; 2]>, colour: Colour, label: &str) -> Self {
+        let pairs = pairs.into_iter().collect();
+        self.layer(Layer::Segments { pairs, colour, arrows: true, label: label.into() })
+    }
+
+    /// Adds plain segments, such as the matches between two point sets.
+    #[must_use]
+    pub fn segments(
+        self,
+        pairs: impl IntoIterator<Item = [[f64; 2]; 2]>,
+        colour: Colour,
+        label: &str,
+    ) -> Self {
+        let pairs = pairs.into_iter().collect();
+        self.layer(Layer::Segments { pairs, colour, arrows: false, label: label.into() })
+    }
+
+    /// Adds a heat map and draws the panel like an image.
+    #[must_use]
+    pub fn heat_map(self, map: HeatMap) -> Self {
+        self.layer(Layer::Heat(map)).image_axes()
+    }
+
+    /// Makes the panel a block of text lines instead of axes. A tab in a line starts the second column.
+    #[must_use]
+    pub fn text(mut self, lines: impl IntoIterator<Item = String>) -> Self {
+        self.text.extend(lines);
+        self
+    }
+
+    /// The ranges of both axes on their scales, a little wider than the data (not around heat maps).
+    pub(super) fn ranges(&self) -> [[f64; 2]; 2] {
+        let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for layer in &self.layers {
+            layer.visit(|p| {
+                let q = [self.scales[0].forward(p[0]), self.scales[1].forward(p[1])];
+                if q.iter().all(|v| v.is_finite()) {
+                    for (b, v) in bounds.iter_mut().zip(q) {
+                        *b = [b[0].min(v), b[1].max(v)];
+                    }
+                }
+            });
+        }
+        let tight = self.layers.iter().any(|l| matches!(l, Layer::Heat(_)));
+        let [x, y] = bounds.map(|b| widen(b, if tight { 0.0 } else { 0.04 }));
+        let fixed = |r: Option<[f64; 2]>, s: Scale| r.map(|r| widen(r.map(|v| s.forward(v)), 0.0));
+        [fixed(self.x_range, self.scales[0]).unwrap_or(x), fixed(self.y_range, self.scales[1]).unwrap_or(y)]
+    }
+}
+
+/// A range with a margin; never empty, never without bounds.
+fn widen([lo, hi]: [f64; 2], share: f64) -> [f64; 2] {
+    if !(lo.is_finite() && hi.is_finite()) {
+        return [0.0, 1.0];
+    }
+    let width = hi - lo;
+    let least = 1e-9 * lo.abs().max(hi.abs());
+    if width > least {
+        [lo - share * width, hi + share * width]
+    } else {
+        let half = if lo == 0.0 { 0.5 } else { 0.1 * lo.abs() };
+        [lo - half, hi + half]
+    }
+}
