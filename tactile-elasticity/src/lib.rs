@@ -1,2 +1,11 @@
 //! From deformation gradients to strain, and from stress and strain to Young modulus, with uncertainty.
 #![forbid(unsafe_code)]
+
+pub mod contact;
+mod error;
+pub mod field;
+pub mod modulus;
+mod scalar;
+pub mod strain;
+
+pub use error::{ElasticityError, Quantity};

@@ -1,0 +1,289 @@
+//! Hertz's contact of two elastic bodies with spherical surfaces.
+
+use crate::error::{ElasticityError, Quantity, finite, not_negative, poisson, positive};
+use crate::scalar::{narrow, widen};
+use nalgebra::RealField;
+
+/// An isotropic elastic body, or a rigid one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Body<T> {
+    compliance_per_pa: T,
+}
+
+impl<T: RealField + Copy> Body<T> {
+    /// From Young's modulus (Pa) and Poisson's ratio.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn elastic(youngs_modulus_pa: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        positive(widen(youngs_modulus_pa), Quantity::YoungsModulus)?;
+        poisson(widen(poisson_ratio))?;
+        Ok(Self {
+            compliance_per_pa: (T::one() - poisson_ratio) * (T::one() + poisson_ratio) / youngs_modulus_pa,
+        })
+    }
+
+    pub(crate) fn from_compliance(compliance_per_pa: T) -> Self {
+        Self { compliance_per_pa }
+    }
+
+    /// A body that does not yield.
+    pub fn rigid() -> Self {
+        Self { compliance_per_pa: T::zero() }
+    }
+
+    /// (1 − ν²)/E in 1/Pa, the inverse of the plane-strain modulus.
+    pub fn compliance_per_pa(&self) -> T {
+        self.compliance_per_pa
+    }
+}
+
+/// E* of two bodies, 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂, in Pa.
+///
+/// # Errors
+/// [`ElasticityError::NotPositive`] where both are rigid.
+///
+/// ```
+/// use tactile_elasticity::contact::{Body, reduced_modulus_pa};
+/// let gel = Body::elastic(20_000.0, 0.5)?;
+/// assert!((reduced_modulus_pa(Body::rigid(), gel)? - 20_000.0f64 / 0.75).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+pub fn reduced_modulus_pa<T: RealField + Copy>(one: Body<T>, other: Body<T>) -> Result<T, ElasticityError> {
+    let compliance = one.compliance_per_pa + other.compliance_per_pa;
+    positive(widen(compliance), Quantity::ReducedModulus)?;
+    Ok(T::one() / compliance)
+}
+
+/// R of two surfaces, 1/R = 1/R₁ + 1/R₂, in m; `None` is a flat surface, a negative radius a hollow one.
+///
+/// # Errors
+/// [`ElasticityError::Conforming`] where the relative curvature is zero or negative;
+/// [`ElasticityError::NotFinite`], or [`ElasticityError::NotPositive`] for a radius of zero.
+///
+/// ```
+/// use tactile_elasticity::{ElasticityError, contact::relative_radius_m};
+/// assert_eq!(relative_radius_m(Some(0.005), None)?, 0.005);
+/// assert!(matches!(relative_radius_m(Some(0.01), Some(-0.01)), Err(ElasticityError::Conforming { .. })));
+/// # Ok::<(), ElasticityError>(())
+/// ```
+pub fn relative_radius_m<T: RealField + Copy>(
+    one: Option<T>,
+    other: Option<T>,
+) -> Result<T, ElasticityError> {
+    for radius in [one, other].into_iter().flatten() {
+        let radius = finite(widen(radius), Quantity::Radius)?;
+        if radius == 0.0 {
+            return Err(ElasticityError::NotPositive { quantity: Quantity::Radius, found: radius });
+        }
+    }
+    let radius = match (one, other) {
+        (Some(a), Some(b)) => {
+            // The sum of the radii is exact where they nearly cancel; that of the curvatures is not.
+            let curvature = (a + b) / a / b;
+            if curvature <= T::zero() {
+                return Err(ElasticityError::Conforming { curvature_per_m: widen(curvature) });
+            }
+            a / (a + b) * b
+        }
+        (Some(radius), None) | (None, Some(radius)) => radius,
+        (None, None) => return Err(ElasticityError::Conforming { curvature_per_m: 0.0 }),
+    };
+    if radius > T::zero() {
+        Ok(radius)
+    } else {
+        Err(ElasticityError::Conforming { curvature_per_m: 1.0 / widen(radius) })
+    }
+}
+
+/// A sphere pressed with a known force (Johnson 1985, *Contact Mechanics*, §4.2).
+///
+/// a = (3FR/4E*)^⅓, δ = a²/R, p₀ = 3F/(2πa²), pressure p₀√(1 − r²/a²). Good for a/R up to about 0.3.
+///
+/// ```
+/// use tactile_elasticity::contact::HertzContact;
+/// let contact = HertzContact::from_force(0.05, 0.003, 26_666.7)?;
+/// assert!((contact.contact_radius_m - 1.6158e-3f64).abs() < 1e-7);
+/// assert!(contact.contact_ratio() > 0.5); // far too large for Hertz: squeezed, not touched
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct HertzContact<T> {
+    /// F.
+    pub force_n: T,
+    /// R, the relative radius of curvature.
+    pub radius_m: T,
+    /// E*.
+    pub reduced_modulus_pa: T,
+    /// a.
+    pub contact_radius_m: T,
+    /// δ, by which far points of the bodies approach.
+    pub indentation_m: T,
+    /// p₀, in the centre.
+    pub peak_pressure_pa: T,
+    /// F/(πa²) = ⅔ p₀.
+    pub mean_pressure_pa: T,
+    /// dF/dδ = 2 E* a.
+    pub stiffness_n_per_m: T,
+}
+
+impl<T: RealField + Copy> HertzContact<T> {
+    /// From force (N, zero allowed), relative radius (m) and reduced modulus (Pa).
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`] force, [`ElasticityError::NotPositive`] radius or modulus.
+    pub fn from_force(force_n: T, radius_m: T, reduced_modulus_pa: T) -> Result<Self, ElasticityError> {
+        not_negative(widen(force_n), Quantity::Force)?;
+        positive(widen(radius_m), Quantity::Radius)?;
+        positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
+        let three_quarters: T = narrow(0.75);
+        let a = (three_quarters * force_n / reduced_modulus_pa * radius_m).cbrt();
+        let mean = if a > T::zero() { force_n / a / a / T::pi() } else { T::zero() };
+        Ok(Self {
+            force_n,
+            radius_m,
+            reduced_modulus_pa,
+            contact_radius_m: a,
+            indentation_m: a / radius_m * a,
+            peak_pressure_pa: mean * narrow(1.5),
+            mean_pressure_pa: mean,
+            stiffness_n_per_m: reduced_modulus_pa * a * narrow(2.0),
+        })
+    }
+
+    /// a/R: the theory's small parameter.
+    pub fn contact_ratio(&self) -> T {
+        self.contact_radius_m / self.radius_m
+    }
+
+    /// Pressure at distance r (m) from the centre, p₀√(1 − r²/a²), zero outside.
+    pub fn pressure_pa(&self, r: T) -> T {
+        let a = self.contact_radius_m;
+        if r.abs() < a {
+            self.peak_pressure_pa * ((T::one() - r / a) * (T::one() + r / a)).sqrt()
+        } else {
+            T::zero()
+        }
+    }
+
+    /// Normal displacement of the surface at distance r (m), for the modulus E* taken as this body's own.
+    pub fn surface_displacement_m(&self, r: T) -> T {
+        hertz_surface_displacement_m(r, self.contact_radius_m, self.peak_pressure_pa, self.reduced_modulus_pa)
+    }
+}
+
+/// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq. 3.42).
+///
+/// Inside π p₀(2a² − r²)/(4aE*); outside p₀/(2aE*)·[(2a² − r²) asin(a/r) + a√(r² − a²)], which cancels as (r/a)²
+/// and is summed beyond r = 2a as ½ p₀ a/E* Σ 4 b_k (a/r)^(2k+1)/((2k+1)(2k+3)), b_k = (2k)!/(4ᵏ k!²): all terms positive.
+///
+/// ```
+/// use tactile_elasticity::contact::hertz_surface_displacement_m;
+/// // A distant point sees a point force: F/(π E* r), with F = ⅔ π a² p₀.
+/// let far = hertz_surface_displacement_m(1e8, 1.0, 1.0, 1.0);
+/// assert!((far * 1e8 - 2.0f64 / 3.0).abs() < 1e-15);
+/// ```
+pub fn hertz_surface_displacement_m<T: RealField + Copy>(
+    r: T,
+    a: T,
+    peak_pressure_pa: T,
+    reduced_modulus_pa: T,
+) -> T {
+    let r = r.abs();
+    if a <= T::zero() {
+        return T::zero();
+    }
+    let unit = peak_pressure_pa * a / reduced_modulus_pa;
+    let two: T = narrow(2.0);
+    if r <= a {
+        let x = r / a;
+        return unit * T::frac_pi_4() * (two - x * x);
+    }
+    let half: T = narrow(0.5);
+    let x = a / r;
+    if x > half {
+        let y = r / a;
+        let chord = ((r - a) / a * ((r + a) / a)).sqrt();
+        // asin(a/r) through its tangent: near the rim a/r has lost what r − a keeps.
+        return unit * half * ((two - y * y) * T::one().atan2(chord) + chord);
+    }
+    unit * half * far_series(x)
+}
+
+fn far_series<T: RealField + Copy>(x: T) -> T {
+    let (mut power, mut b, mut sum) = (x, T::one(), T::zero());
+    for k in 0..40 {
+        let k: T = narrow(f64::from(k));
+        let odd = k + k + T::one();
+        let term = b * power * narrow(4.0) / (odd * (odd + narrow(2.0)));
+        sum += term;
+        if term <= sum * T::default_epsilon() {
+            break;
+        }
+        b *= odd / (odd + T::one());
+        power *= x * x;
+    }
+    sum
+}
+
+/// E* = 3FR/(4a³) from a force (N) and the contact radius (m) it makes.
+///
+/// # Errors
+/// [`ElasticityError::NotPositive`].
+pub fn reduced_modulus_from_contact_radius<T: RealField + Copy>(
+    force_n: T,
+    radius_m: T,
+    contact_radius_m: T,
+) -> Result<T, ElasticityError> {
+    positive(widen(force_n), Quantity::Force)?;
+    positive(widen(radius_m), Quantity::Radius)?;
+    positive(widen(contact_radius_m), Quantity::ContactRadius)?;
+    let a = contact_radius_m;
+    Ok(narrow::<T>(0.75) * (force_n / a) / a * (radius_m / a))
+}
+
+/// E* = 3F/(4√R δ^{3⁄2}) from a force (N) and the indentation (m) it makes.
+///
+/// # Errors
+/// [`ElasticityError::NotPositive`].
+pub fn reduced_modulus_from_indentation<T: RealField + Copy>(
+    force_n: T,
+    radius_m: T,
+    indentation_m: T,
+) -> Result<T, ElasticityError> {
+    positive(widen(force_n), Quantity::Force)?;
+    positive(widen(radius_m), Quantity::Radius)?;
+    positive(widen(indentation_m), Quantity::Indentation)?;
+    Ok(narrow::<T>(0.75) * (force_n / indentation_m) / (radius_m * indentation_m).sqrt())
+}
+
+/// Young's modulus (Pa) of one body from E* and the other body: E = (1 − ν²)/(1/E* − (1 − ν₁²)/E₁).
+///
+/// # Errors
+/// [`ElasticityError::StifferThanResolvable`] where the other body alone is already softer than the contact;
+/// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+///
+/// ```
+/// use tactile_elasticity::{ElasticityError, contact::{Body, sample_modulus_pa}};
+/// let waveguide = Body::elastic(100e3, 0.48)?;
+/// let soft = sample_modulus_pa(50e3, 0.48, waveguide)?;
+/// assert!(soft > 50e3);
+/// assert!(matches!(sample_modulus_pa(150e3, 0.48, waveguide), Err(ElasticityError::StifferThanResolvable { .. })));
+/// # Ok::<(), ElasticityError>(())
+/// ```
+pub fn sample_modulus_pa<T: RealField + Copy>(
+    reduced_modulus_pa: T,
+    poisson_ratio: T,
+    other: Body<T>,
+) -> Result<T, ElasticityError> {
+    positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
+    poisson(widen(poisson_ratio))?;
+    // 1/E* − C = (1 − C E*)/E*, the product rounded once.
+    let left = (-other.compliance_per_pa).mul_add(reduced_modulus_pa, T::one());
+    if left <= T::zero() {
+        return Err(ElasticityError::StifferThanResolvable { lower_bound_pa: 0.0 });
+    }
+    Ok((T::one() - poisson_ratio) * (T::one() + poisson_ratio) * reduced_modulus_pa / left)
+}

@@ -1,0 +1,32 @@
+//! Contact mechanics: forces, contact radii and indentations of elastic bodies.
+//!
+//! | room | contact |
+//! |---|---|
+//! | [`HertzContact`] | two spheres, small contact |
+//! | [`flat_punch`], [`cone`] | rigid punch and cone on a half-space |
+//! | [`LayerSeries`], [`LayerEquation`] | sphere on a layer: series in χ = √(Rδ)/h, and the solution itself |
+//! | [`tatara_indentation_m`] | sphere squeezed between two plates, large deformation |
+//! | [`Waveguide`] | elastic layers in series |
+
+mod hertz;
+mod layer_equation;
+mod layer_kernel;
+mod layer_series;
+mod punch;
+mod quadrature;
+mod tatara;
+mod waveguide;
+
+pub use hertz::{
+    Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_from_contact_radius,
+    reduced_modulus_from_indentation, reduced_modulus_pa, relative_radius_m, sample_modulus_pa,
+};
+pub use layer_equation::{LayerContact, LayerEquation};
+pub use layer_kernel::{Bond, LayerKernel};
+pub use layer_series::LayerSeries;
+pub use punch::{ConeContact, PunchContact, cone, flat_punch, tangent_of_degrees};
+pub use tatara::tatara_indentation_m;
+pub use waveguide::{Layer, Waveguide};
+
+pub(crate) use layer_equation::LayerTable;
+pub(crate) use tatara::Squeeze;

@@ -1,0 +1,94 @@
+//! Rigid flat punch and cone on a half-space (Sneddon 1965).
+
+use crate::error::{ElasticityError, Quantity, not_negative, positive};
+use crate::scalar::{narrow, widen};
+use nalgebra::RealField;
+
+/// A flat circular punch: F = 2E*aδ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PunchContact<T> {
+    /// F.
+    pub force_n: T,
+    /// F/(πa²); the pressure at the edge is infinite.
+    pub mean_pressure_pa: T,
+}
+
+/// Of reduced modulus E* (Pa), punch radius a (m) and indentation δ (m, zero allowed).
+///
+/// # Errors
+/// [`ElasticityError::NotPositive`], [`ElasticityError::Negative`].
+///
+/// ```
+/// let contact = tactile_elasticity::contact::flat_punch(1e5, 2e-3, 1e-3)?;
+/// assert!((contact.force_n - 0.4f64).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+pub fn flat_punch<T: RealField + Copy>(
+    reduced_modulus_pa: T,
+    radius_m: T,
+    indentation_m: T,
+) -> Result<PunchContact<T>, ElasticityError> {
+    positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
+    positive(widen(radius_m), Quantity::Radius)?;
+    not_negative(widen(indentation_m), Quantity::Indentation)?;
+    let force_n = narrow::<T>(2.0) * reduced_modulus_pa * radius_m * indentation_m;
+    Ok(PunchContact { force_n, mean_pressure_pa: force_n / radius_m / radius_m / T::pi() })
+}
+
+/// A cone: F = (2/π)E* tan α δ².
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ConeContact<T> {
+    /// F.
+    pub force_n: T,
+    /// a = (2/π)δ tan α.
+    pub contact_radius_m: T,
+    /// E*/(2 tan α), whatever the load.
+    pub mean_pressure_pa: T,
+}
+
+/// Of reduced modulus E* (Pa), tangent of the half opening angle α from the axis, and indentation δ (m, zero allowed).
+///
+/// The tangent, because an angle near 90° has lost what makes it differ; see [`tangent_of_degrees`].
+///
+/// # Errors
+/// [`ElasticityError::NotPositive`], [`ElasticityError::Negative`].
+///
+/// ```
+/// use tactile_elasticity::contact::{cone, tangent_of_degrees};
+/// let contact = cone(1.0, tangent_of_degrees(45.0)?, 0.5)?;
+/// assert!((contact.mean_pressure_pa - 0.5f64).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+pub fn cone<T: RealField + Copy>(
+    reduced_modulus_pa: T,
+    half_angle_tangent: T,
+    indentation_m: T,
+) -> Result<ConeContact<T>, ElasticityError> {
+    positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
+    positive(widen(half_angle_tangent), Quantity::HalfAngle)?;
+    not_negative(widen(indentation_m), Quantity::Indentation)?;
+    let slope = half_angle_tangent * indentation_m * T::frac_2_pi();
+    Ok(ConeContact {
+        force_n: reduced_modulus_pa * slope * indentation_m,
+        contact_radius_m: slope,
+        mean_pressure_pa: reduced_modulus_pa / half_angle_tangent * narrow(0.5),
+    })
+}
+
+/// tan of an angle in degrees in (0, 90), accurate up to its last digit at both ends.
+///
+/// # Errors
+/// [`ElasticityError::OutOfRange`], [`ElasticityError::NotPositive`].
+pub fn tangent_of_degrees<T: RealField + Copy>(degrees: T) -> Result<T, ElasticityError> {
+    let found = positive(widen(degrees), Quantity::HalfAngle)?;
+    let right: T = narrow(90.0);
+    if degrees >= right {
+        return Err(ElasticityError::OutOfRange { quantity: Quantity::HalfAngle, found, limit: 90.0 });
+    }
+    let radian = T::pi() / narrow(180.0);
+    let half: T = narrow(45.0);
+    // 90° − α is exact from 45° on.
+    Ok(if degrees <= half { (degrees * radian).tan() } else { T::one() / ((right - degrees) * radian).tan() })
+}

@@ -1,0 +1,100 @@
+//! The sensor's layers, which yield with the sample.
+
+use super::Body;
+use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
+use crate::scalar::{narrow, widen};
+use nalgebra::RealField;
+
+/// One elastic layer of the waveguide.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Layer<T> {
+    /// Thickness in m; zero is allowed and counts for nothing.
+    pub thickness_m: T,
+    /// Young's modulus in Pa.
+    pub youngs_modulus_pa: T,
+    /// Poisson's ratio in (−1, ½].
+    pub poisson_ratio: T,
+}
+
+/// Elastic layers on a rigid base, the touched one first.
+///
+/// ```
+/// use tactile_elasticity::contact::{Layer, Waveguide};
+/// let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.48 };
+/// // Epidermis, dermis and subcutanea of the paper's sensor.
+/// let waveguide = Waveguide::new(vec![layer(2e-3, 1.36e5), layer(3e-3, 8.0e4), layer(5e-3, 3.4e4)])?;
+/// assert!((waveguide.thickness_m() - 10e-3f64).abs() < 1e-17);
+/// assert!((waveguide.series_modulus_pa() - 50_184.5f64).abs() < 0.1);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Waveguide<T> {
+    layers: Vec<Layer<T>>,
+}
+
+impl<T: RealField + Copy> Waveguide<T> {
+    /// From the touched layer down.
+    ///
+    /// # Errors
+    /// No layers or no thickness at all, a negative thickness, a modulus that is not above zero, a Poisson ratio out of range.
+    pub fn new(layers: Vec<Layer<T>>) -> Result<Self, ElasticityError> {
+        for layer in &layers {
+            not_negative(widen(layer.thickness_m), Quantity::Thickness)?;
+            positive(widen(layer.youngs_modulus_pa), Quantity::YoungsModulus)?;
+            poisson(widen(layer.poisson_ratio))?;
+        }
+        let waveguide = Self { layers };
+        positive(widen(waveguide.thickness_m()), Quantity::Thickness)?;
+        Ok(waveguide)
+    }
+
+    /// The layers, the touched one first.
+    pub fn layers(&self) -> &[Layer<T>] {
+        &self.layers
+    }
+
+    /// Σ h in m.
+    pub fn thickness_m(&self) -> T {
+        self.sum(|_| T::one())
+    }
+
+    /// Σh/Σ(h/E): the layers carry the same stress one after the other and are free to spread sideways (Reuss).
+    pub fn series_modulus_pa(&self) -> T {
+        self.thickness_m() / self.sum(|l| T::one() / l.youngs_modulus_pa)
+    }
+
+    /// Σhᵢ E/Σh: the layers carry the load side by side (Voigt), the upper bound.
+    pub fn parallel_modulus_pa(&self) -> T {
+        self.sum(|l| l.youngs_modulus_pa) / self.thickness_m()
+    }
+
+    /// Σh/Σ(h (1+ν)(1−2ν)/(E(1−ν))): in series and held sideways, as under a wide punch; infinite where every layer
+    /// is incompressible.
+    pub fn confined_modulus_pa(&self) -> T {
+        let compliance = self.sum(|l| {
+            let nu = l.poisson_ratio;
+            let (one, two) = (T::one(), narrow::<T>(2.0));
+            (one + nu) * (one - two * nu) / (l.youngs_modulus_pa * (one - nu))
+        });
+        self.thickness_m() / compliance
+    }
+
+    /// (1 − ν²)/E of the layers in series, Σ(h(1 − ν²)/E)/Σh in 1/Pa: the waveguide as one deep body.
+    ///
+    /// True while the contact is small beside every layer's thickness and the layers are alike.
+    pub fn compliance_per_pa(&self) -> T {
+        self.sum(|l| (T::one() - l.poisson_ratio) * (T::one() + l.poisson_ratio) / l.youngs_modulus_pa)
+            / self.thickness_m()
+    }
+
+    /// [`compliance_per_pa`](Self::compliance_per_pa) as a [`Body`].
+    pub fn as_body(&self) -> Body<T> {
+        Body::from_compliance(self.compliance_per_pa())
+    }
+
+    fn sum(&self, density: impl Fn(&Layer<T>) -> T) -> T {
+        self.layers.iter().fold(T::zero(), |sum, l| sum + l.thickness_m * density(l))
+    }
+}

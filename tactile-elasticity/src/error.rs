@@ -1,0 +1,200 @@
+//! What can be wrong with the input, one variant each.
+
+/// Why a strain, a stress or a modulus cannot be given.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum ElasticityError {
+    /// An input is NaN or infinite.
+    #[error("{quantity} is not a finite number")]
+    NotFinite {
+        /// Which input.
+        quantity: Quantity,
+    },
+    /// An input that must be greater than zero is not (NaN included).
+    #[error("{quantity} must be greater than zero and finite, found {found}")]
+    NotPositive {
+        /// Which input.
+        quantity: Quantity,
+        /// The value given.
+        found: f64,
+    },
+    /// An input that must not be negative is (NaN included).
+    #[error("{quantity} must not be negative, found {found}")]
+    Negative {
+        /// Which input.
+        quantity: Quantity,
+        /// The value given.
+        found: f64,
+    },
+    /// A Poisson ratio outside (−1, ½], where an isotropic solid is stable.
+    #[error("Poisson ratio must lie in (-1, 1/2], found {found}")]
+    PoissonRatio {
+        /// The value given.
+        found: f64,
+    },
+    /// det F = 0: the material has collapsed to a plane, a line or a point.
+    #[error("the deformation gradient is singular: this measure does not exist")]
+    SingularDeformation,
+    /// det F < 0: the material is turned inside out.
+    #[error("the deformation gradient turns the material inside out (det F = {determinant})")]
+    InvertedDeformation {
+        /// det F.
+        determinant: f64,
+    },
+    /// The relative curvature of the two surfaces is zero or negative: they touch
+    /// over an area from the first moment and Hertz's contact does not apply.
+    #[error("the surfaces conform (relative curvature {curvature_per_m} 1/m): no Hertzian contact")]
+    Conforming {
+        /// 1/R₁ + 1/R₂.
+        curvature_per_m: f64,
+    },
+    /// The contact is no softer than the known body alone, so that nothing is left
+    /// for the sample's own compliance.
+    #[error(
+        "the sample is stiffer than can be resolved through this waveguide or indenter (above {lower_bound_pa} Pa with 95 % confidence)"
+    )]
+    StifferThanResolvable {
+        /// The 95 % lower limit of the modulus (zero where nothing is known of the errors).
+        lower_bound_pa: f64,
+    },
+    /// Fewer usable loads than the estimator needs.
+    #[error("{found} usable loads, at least {expected} are needed")]
+    TooFewLoads {
+        /// How many the estimator needs.
+        expected: usize,
+        /// How many of those given carry what it needs.
+        found: usize,
+    },
+    /// All the loads are equal, so that no slope can be formed.
+    #[error("all loads are equal: a slope needs at least two different ones")]
+    EqualLoads,
+    /// The strain is zero: stress over strain is undefined.
+    #[error("the strain is zero: stress over strain is undefined")]
+    ZeroStrain,
+    /// Stress and strain have opposite signs.
+    #[error("stress ({stress_pa} Pa) and strain ({strain}) have opposite signs")]
+    OppositeSigns {
+        /// The stress.
+        stress_pa: f64,
+        /// The strain.
+        strain: f64,
+    },
+    /// A load lacks a quantity that this estimator needs.
+    #[error("load {load} has no {quantity}")]
+    Missing {
+        /// Its index among the loads given.
+        load: usize,
+        /// What is missing.
+        quantity: Quantity,
+    },
+    /// Two inputs that belong together differ in length.
+    #[error("{quantity}: expected {expected} entries, found {found}")]
+    LengthMismatch {
+        /// Which input.
+        quantity: Quantity,
+        /// The length the other input asks for.
+        expected: usize,
+        /// The length given.
+        found: usize,
+    },
+    /// A covariance matrix is not symmetric and positive semidefinite.
+    #[error("the covariance of {quantity} is not positive semidefinite")]
+    Covariance {
+        /// Of what.
+        quantity: Quantity,
+    },
+    /// The law does not reach this far (a contact radius beyond the sphere's own, say).
+    #[error("{quantity} = {found} is beyond the law's reach ({limit})")]
+    OutOfRange {
+        /// Which input.
+        quantity: Quantity,
+        /// The value given.
+        found: f64,
+        /// The limit.
+        limit: f64,
+    },
+}
+
+/// The quantities that errors speak of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum Quantity {
+    DeformationGradient,
+    DisplacementGradient,
+    Stress,
+    Strain,
+    Force,
+    ContactRadius,
+    ContactArea,
+    Indentation,
+    Radius,
+    HalfAngle,
+    Thickness,
+    YoungsModulus,
+    ReducedModulus,
+    Pressure,
+    Distance,
+    StandardError,
+    Weight,
+    Confidence,
+    Layers,
+    Samples,
+}
+
+impl core::fmt::Display for Quantity {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::DeformationGradient => "deformation gradient",
+            Self::DisplacementGradient => "displacement gradient",
+            Self::Stress => "stress",
+            Self::Strain => "strain",
+            Self::Force => "force",
+            Self::ContactRadius => "contact radius",
+            Self::ContactArea => "contact area",
+            Self::Indentation => "indentation",
+            Self::Radius => "radius",
+            Self::HalfAngle => "half angle",
+            Self::Thickness => "thickness",
+            Self::YoungsModulus => "Young's modulus",
+            Self::ReducedModulus => "reduced modulus",
+            Self::Pressure => "pressure",
+            Self::Distance => "distance",
+            Self::StandardError => "standard error",
+            Self::Weight => "weight",
+            Self::Confidence => "confidence level",
+            Self::Layers => "layers",
+            Self::Samples => "samples",
+        })
+    }
+}
+
+/// `value` if it is finite and above zero.
+pub(crate) fn positive(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(ElasticityError::NotPositive { quantity, found: value })
+    }
+}
+
+/// `value` if it is finite and not below zero.
+pub(crate) fn not_negative(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
+    if value >= 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(ElasticityError::Negative { quantity, found: value })
+    }
+}
+
+/// `value` if it is finite.
+pub(crate) fn finite(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
+    if value.is_finite() { Ok(value) } else { Err(ElasticityError::NotFinite { quantity }) }
+}
+
+/// `value` if it is a Poisson ratio in (−1, ½].
+pub(crate) fn poisson(value: f64) -> Result<f64, ElasticityError> {
+    if value > -1.0 && value <= 0.5 { Ok(value) } else { Err(ElasticityError::PoissonRatio { found: value }) }
+}

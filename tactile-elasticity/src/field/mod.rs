@@ -1,0 +1,5 @@
+//! Strain over points, grids and contacts.
+
+mod summary;
+
+pub use summary::{StrainField, StrainSummary};

@@ -1,0 +1,125 @@
+//! Mean, spread and standard error of a strain field.
+
+use crate::error::{ElasticityError, Quantity};
+use crate::strain::{Deformation, StrainMeasure};
+use nalgebra::{Matrix3, RealField};
+
+/// Averages of a strain field, component by component.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct StrainSummary<T> {
+    /// Weighted mean.
+    pub mean: Matrix3<T>,
+    /// Weighted standard deviation over the field.
+    pub spread: Matrix3<T>,
+    /// Standard error of the mean, as if the points were independent: spread/√n_eff, n_eff = (Σw)²/Σw².
+    pub standard_error: Matrix3<T>,
+    /// Points that count.
+    pub used: usize,
+    /// Indices of the points where det F ≤ 0, left out of the averages.
+    pub folded: Vec<usize>,
+}
+
+/// Strain at points, with the weight (area, volume) of each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StrainField<T> {
+    strains: Vec<Matrix3<T>>,
+    weights: Vec<T>,
+    folded: Vec<usize>,
+}
+
+impl<T: RealField + Copy> StrainField<T> {
+    /// Strain of every displacement gradient, equal weights.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`].
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::field::StrainField;
+    /// use tactile_elasticity::strain::GreenLagrange;
+    /// let mut gradients = vec![Matrix3::from_diagonal_element(0.01); 4];
+    /// gradients[2][(0, 0)] = -1.5; // turned inside out
+    /// let summary = StrainField::from_gradients(&gradients, None, &GreenLagrange)?.summary();
+    /// assert_eq!(summary.folded, [2]);
+    /// assert!((summary.mean[(0, 0)] - 0.01005f64).abs() < 1e-15);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn from_gradients(
+        gradients: &[Matrix3<T>],
+        weights: Option<&[T]>,
+        measure: &dyn StrainMeasure<T>,
+    ) -> Result<Self, ElasticityError> {
+        let weights = checked_weights(gradients.len(), weights)?;
+        let mut field = Self { strains: Vec::with_capacity(gradients.len()), weights, folded: Vec::new() };
+        for (i, h) in gradients.iter().enumerate() {
+            let deformation = Deformation::from_displacement_gradient(*h);
+            if deformation.is_finite() && deformation.jacobian() <= T::zero() {
+                field.folded.push(i);
+                field.strains.push(Matrix3::zeros());
+                field.weights[i] = T::zero();
+            } else {
+                field.strains.push(measure.of(&deformation)?);
+            }
+        }
+        Ok(field)
+    }
+
+    /// Strain at every point; zero where folded.
+    pub fn strains(&self) -> &[Matrix3<T>] {
+        &self.strains
+    }
+
+    /// Weight of every point; zero where folded.
+    pub fn weights(&self) -> &[T] {
+        &self.weights
+    }
+
+    /// Points where det F ≤ 0.
+    pub fn folded(&self) -> &[usize] {
+        &self.folded
+    }
+
+    /// Weighted mean, spread and standard error.
+    pub fn summary(&self) -> StrainSummary<T> {
+        let mut total = T::zero();
+        let (mut squares, mut mean) = (T::zero(), Matrix3::zeros());
+        for (e, &w) in self.strains.iter().zip(&self.weights) {
+            total += w;
+            squares += w * w;
+            if total > T::zero() {
+                mean += (e - mean) * (w / total);
+            }
+        }
+        let mut variance = Matrix3::zeros();
+        for (e, &w) in self.strains.iter().zip(&self.weights) {
+            let d = e - mean;
+            variance += d.component_mul(&d) * w;
+        }
+        let effective = if squares > T::zero() { total * total / squares } else { T::zero() };
+        let (spread, standard_error) = if effective > T::one() {
+            let unbiased = effective / (effective - T::one());
+            let variance = variance * (unbiased / total);
+            (variance.map(|v| v.sqrt()), variance.map(|v| (v / effective).sqrt()))
+        } else {
+            (Matrix3::zeros(), Matrix3::zeros())
+        };
+        let used = self.weights.iter().filter(|&&w| w > T::zero()).count();
+        StrainSummary { mean, spread, standard_error, used, folded: self.folded.clone() }
+    }
+}
+
+fn checked_weights<T: RealField + Copy>(n: usize, weights: Option<&[T]>) -> Result<Vec<T>, ElasticityError> {
+    let Some(weights) = weights else { return Ok(vec![T::one(); n]) };
+    if weights.len() != n {
+        return Err(ElasticityError::LengthMismatch {
+            quantity: Quantity::Weight,
+            expected: n,
+            found: weights.len(),
+        });
+    }
+    for &w in weights {
+        crate::error::not_negative(crate::scalar::widen(w), Quantity::Weight)?;
+    }
+    Ok(weights.to_vec())
+}

@@ -1,0 +1,339 @@
+//! Young's modulus from forces and the contacts they make.
+//!
+//! Every observation (F, x) gives one ln E* = ln F − ln f(x); their errors are relative, so that logarithms make the
+//! problem linear. The common mean is the generalised least squares one, with the covariance of forces (which share a calibration),
+//! of lengths (which share a pixel size) and of the indenter's size carried along. E of the sample follows from
+//! 1/E* = (1 − ν²)/E + C, C the compliance of the waveguide or indenter; the interval is carried through that curve, and is
+//! open above where it reaches C.
+
+use super::estimate::{
+    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+};
+use super::law::{ConeLaw, ContactLaw, LogForce, Punch, Sphere};
+use super::load::{Estimate, LoadState};
+use super::statistics::{CommonMean, common_mean, quantile_95};
+use super::warning::Warning;
+use crate::contact::{Body, Waveguide};
+use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
+use crate::scalar::{narrow, widen};
+use nalgebra::{DMatrix, RealField};
+
+/// Which of the observations a contact estimator uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Evidence {
+    /// Both, each where it was measured.
+    #[default]
+    All,
+    /// The contact radius alone.
+    ContactRadius,
+    /// The indentation alone.
+    Indentation,
+}
+
+/// Young's modulus by a law F = E* f(x); see [`HertzSphere`], [`FlatPunch`], [`Cone`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactEstimator<L> {
+    law: L,
+    poisson_ratio: f64,
+    other_compliance_per_pa: f64,
+    evidence: Evidence,
+    force_covariance: Option<DMatrix<f64>>,
+    force_scale_error: f64,
+    length_scale_error: f64,
+    size_error: f64,
+}
+
+/// Hertz's sphere: a = (3FR/4E*)^⅓, δ = a²/R. Right for a/R up to 0.3; beyond, the estimate carries a warning.
+pub type HertzSphere = ContactEstimator<Sphere>;
+/// A flat circular punch, F = 2E*aδ.
+pub type FlatPunch = ContactEstimator<Punch>;
+/// A cone, F = (2/π)E* tan α δ².
+pub type Cone = ContactEstimator<ConeLaw>;
+
+impl ContactEstimator<Sphere> {
+    /// A sphere of relative radius R (m); the sample, with Poisson ratio ν, is either the sphere or what it is pressed into.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        Self::from_law(Sphere::new(radius_m)?, poisson_ratio)
+    }
+}
+
+impl ContactEstimator<Punch> {
+    /// A rigid punch of radius a (m) on a sample with Poisson ratio ν.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        Self::from_law(Punch::new(radius_m)?, poisson_ratio)
+    }
+}
+
+impl ContactEstimator<ConeLaw> {
+    /// A cone of half opening angle α (rad, from the axis) on a sample with Poisson ratio ν.
+    ///
+    /// # Errors
+    /// [`ElasticityError::OutOfRange`] for an angle outside (0, π/2), [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(half_angle_rad: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        let (angle, limit) = (widen(half_angle_rad), std::f64::consts::FRAC_PI_2);
+        positive(angle, Quantity::HalfAngle)?;
+        if angle >= limit {
+            return Err(ElasticityError::OutOfRange { quantity: Quantity::HalfAngle, found: angle, limit });
+        }
+        Self::from_law(ConeLaw::new(angle.tan())?, poisson_ratio)
+    }
+}
+
+impl<L: ContactLaw> ContactEstimator<L> {
+    pub(crate) fn from_law<T: RealField + Copy>(law: L, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        Ok(Self {
+            law,
+            poisson_ratio: poisson(widen(poisson_ratio))?,
+            other_compliance_per_pa: 0.0,
+            evidence: Evidence::All,
+            force_covariance: None,
+            force_scale_error: 0.0,
+            length_scale_error: 0.0,
+            size_error: 0.0,
+        })
+    }
+
+    /// The law.
+    pub fn law(&self) -> &L {
+        &self.law
+    }
+
+    /// The other body of the contact yields too.
+    pub fn with_other_body<T: RealField + Copy>(mut self, body: Body<T>) -> Self {
+        self.other_compliance_per_pa = widen(body.compliance_per_pa());
+        self
+    }
+
+    /// The sample is pressed on a waveguide, its layers in series and deep beside the contact.
+    pub fn with_waveguide<T: RealField + Copy>(self, waveguide: &Waveguide<T>) -> Self {
+        self.with_other_body(waveguide.as_body())
+    }
+
+    /// Which observations to use.
+    pub fn with_evidence(mut self, evidence: Evidence) -> Self {
+        self.evidence = evidence;
+        self
+    }
+
+    /// Covariance of the forces (N²), one row per load; replaces their standard errors.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`]; the size is checked against the loads.
+    pub fn with_force_covariance<T: RealField + Copy>(
+        mut self,
+        covariance: &DMatrix<T>,
+    ) -> Result<Self, ElasticityError> {
+        let covariance = covariance.map(widen);
+        if !covariance.iter().all(|x| x.is_finite()) {
+            return Err(ElasticityError::NotFinite { quantity: Quantity::Force });
+        }
+        self.force_covariance = Some(covariance);
+        Ok(self)
+    }
+
+    /// Relative error that all forces share (the slope of one calibration).
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_force_scale_error<T: RealField + Copy>(
+        mut self,
+        relative: T,
+    ) -> Result<Self, ElasticityError> {
+        self.force_scale_error = not_negative(widen(relative), Quantity::StandardError)?;
+        Ok(self)
+    }
+
+    /// Relative error that all lengths share (the size of a pixel).
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_length_scale_error<T: RealField + Copy>(
+        mut self,
+        relative: T,
+    ) -> Result<Self, ElasticityError> {
+        self.length_scale_error = not_negative(widen(relative), Quantity::StandardError)?;
+        Ok(self)
+    }
+
+    /// Relative error of the indenter's size (radius, or tangent of the half angle).
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_size_error<T: RealField + Copy>(mut self, relative: T) -> Result<Self, ElasticityError> {
+        self.size_error = not_negative(widen(relative), Quantity::StandardError)?;
+        Ok(self)
+    }
+
+    fn observe(&self, loads: &[LoadState<f64>]) -> Result<Vec<Observation>, ElasticityError> {
+        let mut all = Vec::new();
+        for (load, state) in loads.iter().enumerate() {
+            let force = state.force_n.validated(Quantity::Force)?;
+            let mut push = |length: Option<Estimate<f64>>,
+                            wanted: bool,
+                            quantity,
+                            law: &dyn Fn(f64) -> Option<LogForce>| {
+                let Some(length) = length.filter(|_| wanted) else { return Ok(()) };
+                let length = length.validated(quantity)?;
+                positive(length.value, quantity)?;
+                positive(force.value, Quantity::Force)?;
+                if let Some(log_force) = law(length.value) {
+                    let log_modulus = force.value.ln() - log_force.value;
+                    all.push(Observation { load, force, length, log_force, log_modulus });
+                }
+                Ok(())
+            };
+            let (radius, depth) =
+                (self.evidence != Evidence::Indentation, self.evidence != Evidence::ContactRadius);
+            push(state.contact_radius_m, radius, Quantity::ContactRadius, &|a| {
+                self.law.of_contact_radius(a)
+            })?;
+            push(state.indentation_m, depth, Quantity::Indentation, &|d| self.law.of_indentation(d))?;
+        }
+        if all.is_empty() {
+            return Err(ElasticityError::TooFewLoads { expected: 1, found: 0 });
+        }
+        Ok(all)
+    }
+
+    /// Covariance of the ln E*.
+    fn covariance(&self, all: &[Observation], loads: usize) -> Result<DMatrix<f64>, ElasticityError> {
+        if let Some(c) = &self.force_covariance {
+            let (expected, found) = (loads, if c.nrows() == loads { c.ncols() } else { c.nrows() });
+            if found != expected {
+                return Err(ElasticityError::LengthMismatch { quantity: Quantity::Force, expected, found });
+            }
+        }
+        Ok(DMatrix::from_fn(all.len(), all.len(), |i, j| {
+            let (p, q) = (&all[i], &all[j]);
+            let force = match &self.force_covariance {
+                Some(c) => c[(p.load, q.load)] / (p.force.value * q.force.value),
+                None if p.load == q.load => p.force.relative_error().powi(2),
+                None => 0.0,
+            };
+            let own = if i == j { (p.log_force.slope * p.length.relative_error()).powi(2) } else { 0.0 };
+            let shared = self.force_scale_error.powi(2)
+                + p.log_force.slope * q.log_force.slope * self.length_scale_error.powi(2)
+                + p.log_force.size_slope * q.log_force.size_slope * self.size_error.powi(2);
+            force + own + shared
+        }))
+    }
+
+    /// E of the sample at a given ln E*; None where the other body leaves no compliance.
+    fn sample_modulus(&self, log_reduced: f64) -> Option<f64> {
+        let reduced = log_reduced.exp();
+        let left = 1.0 - self.other_compliance_per_pa * reduced;
+        (left > 0.0).then(|| (1.0 - self.poisson_ratio.powi(2)) * reduced / left)
+    }
+
+    fn answer<T: RealField + Copy>(
+        &self,
+        mean: &CommonMean,
+    ) -> Result<(f64, f64, Interval<T>), ElasticityError> {
+        let reach = quantile_95(mean.degrees) * mean.standard_error;
+        let lower = if reach.is_finite() { self.sample_modulus(mean.mean - reach) } else { Some(0.0) };
+        let lower = lower.unwrap_or(f64::INFINITY);
+        let Some(modulus) = self.sample_modulus(mean.mean) else {
+            let lower_bound_pa = if lower.is_finite() { lower } else { 0.0 };
+            return Err(ElasticityError::StifferThanResolvable { lower_bound_pa });
+        };
+        let upper = if reach.is_finite() { self.sample_modulus(mean.mean + reach) } else { None };
+        let left = 1.0 - self.other_compliance_per_pa * mean.mean.exp();
+        Ok((
+            modulus,
+            modulus / left * mean.standard_error,
+            Interval { lower: narrow(lower), upper: upper.map(narrow) },
+        ))
+    }
+
+    fn diagnose<T: RealField + Copy>(
+        &self,
+        loads: &[LoadState<f64>],
+        all: &[Observation],
+        mean: &CommonMean,
+    ) -> Vec<LoadDiagnostics<T>> {
+        let own = |i: usize| all.iter().enumerate().filter(move |(_, o)| o.load == i);
+        (0..loads.len())
+            .map(|i| {
+                let value = |e: Option<Estimate<f64>>| e.map(|e| e.value);
+                let ratio =
+                    self.law.contact_ratio(value(loads[i].contact_radius_m), value(loads[i].indentation_m));
+                let count = own(i).count();
+                let log_mean = own(i).map(|(_, o)| o.log_modulus).sum::<f64>() / count.max(1) as f64;
+                let worst = own(i)
+                    .map(|(k, _)| mean.standardized_residuals[k])
+                    .max_by(|a, b| a.abs().total_cmp(&b.abs()));
+                LoadDiagnostics {
+                    used: count > 0,
+                    contact_ratio: ratio.map(narrow),
+                    youngs_modulus_pa: if count > 0 {
+                        self.sample_modulus(log_mean).map(narrow)
+                    } else {
+                        None
+                    },
+                    standardized_residual: worst.map(narrow),
+                }
+            })
+            .collect()
+    }
+
+    fn warn<T: RealField + Copy>(
+        &self,
+        loads: &[LoadDiagnostics<T>],
+        mean: &CommonMean,
+        bounded: bool,
+    ) -> Vec<Warning<T>> {
+        let limit = self.law.contact_ratio_limit();
+        let mut warnings: Vec<Warning<T>> = (loads.iter().enumerate())
+            .filter_map(|(load, d)| d.contact_ratio.map(|ratio| (load, ratio)))
+            .filter(|&(_, ratio)| widen(ratio) > limit)
+            .map(|(load, ratio)| Warning::LargeContact { load, ratio, limit: narrow(limit) })
+            .collect();
+        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
+        if mean.standard_error.is_infinite() {
+            warnings.push(Warning::NoErrorEstimate);
+        } else if !bounded {
+            warnings.push(Warning::UnboundedAbove);
+        }
+        warnings
+    }
+}
+
+struct Observation {
+    load: usize,
+    force: Estimate<f64>,
+    length: Estimate<f64>,
+    log_force: LogForce,
+    log_modulus: f64,
+}
+
+impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimator<L> {
+    fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
+        let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
+        let all = self.observe(&loads)?;
+        let logs: Vec<f64> = all.iter().map(|o| o.log_modulus).collect();
+        let mean = common_mean(&logs, &self.covariance(&all, loads.len())?)?;
+        let (modulus, error, interval_95) = self.answer(&mean)?;
+        let diagnostics = self.diagnose(&loads, &all, &mean);
+        let warnings = self.warn(&diagnostics, &mean, interval_95.upper.is_some());
+        Ok(ModulusEstimate {
+            youngs_modulus_pa: narrow(modulus),
+            standard_error_pa: narrow(error),
+            interval_95,
+            estimator: self.law.kind(),
+            loads: diagnostics,
+            fit: FitStatistics::new(all.len(), 1, mean.chi_squared, mean.minus_two_log_likelihood),
+            warnings,
+        })
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        self.law.kind()
+    }
+}

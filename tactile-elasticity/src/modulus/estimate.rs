@@ -1,0 +1,162 @@
+//! What an estimator answers.
+
+use super::warning::Warning;
+use crate::error::ElasticityError;
+use crate::modulus::LoadState;
+use crate::scalar::narrow;
+use nalgebra::RealField;
+
+/// A way from loads to Young's modulus.
+///
+/// Object safe, so that a program can choose at run time.
+///
+/// ```
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+/// // A rigid ball of 5 mm on a sample of 30 kPa.
+/// let loads: Vec<_> = [0.01, 0.02, 0.04]
+///     .map(|f| {
+///         let a = (0.75 * f * 0.005 / (30e3 / 0.75f64)).cbrt();
+///         LoadState::new(Estimate::new(f, 1e-4)).with_contact_radius(Estimate::new(a, 1e-6))
+///     })
+///     .to_vec();
+/// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(HertzSphere::new(0.005, 0.5)?);
+/// let modulus = estimator.estimate(&loads)?;
+/// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
+/// assert!(modulus.interval_95.contains(30e3));
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+pub trait ModulusEstimator<T: RealField + Copy> {
+    /// Young's modulus of the sample with its error.
+    ///
+    /// # Errors
+    /// [`ElasticityError`] where the loads do not determine it.
+    fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError>;
+
+    /// Which estimator this is.
+    fn kind(&self) -> EstimatorKind;
+}
+
+/// The estimators, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum EstimatorKind {
+    PaperRatio,
+    StressStrainRegression,
+    HertzSphere,
+    FlatPunch,
+    Cone,
+    LayerPublishedSeries,
+    LayerCorrectedSeries,
+    LayerIntegralEquation,
+    TataraSphere,
+}
+
+impl core::fmt::Display for EstimatorKind {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::PaperRatio => "stress over mean strain",
+            Self::StressStrainRegression => "regression of stress on strain",
+            Self::HertzSphere => "Hertz sphere",
+            Self::FlatPunch => "flat punch",
+            Self::Cone => "cone",
+            Self::LayerPublishedSeries => "sphere on a layer, published series",
+            Self::LayerCorrectedSeries => "sphere on a layer, corrected series",
+            Self::LayerIntegralEquation => "sphere on a layer, integral equation",
+            Self::TataraSphere => "Tatara's sphere",
+        })
+    }
+}
+
+/// A range that holds the truth with a stated probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Interval<T> {
+    /// Lower limit.
+    pub lower: T,
+    /// Upper limit; None where the data cannot tell the sample from a rigid one.
+    pub upper: Option<T>,
+}
+
+impl<T: RealField + Copy> Interval<T> {
+    /// True when `x` lies within.
+    pub fn contains(&self, x: T) -> bool {
+        x >= self.lower && self.upper.is_none_or(|upper| x <= upper)
+    }
+}
+
+/// Young's modulus with its error and all that bears on trusting it.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ModulusEstimate<T> {
+    /// E of the sample.
+    pub youngs_modulus_pa: T,
+    /// Its standard error, to first order.
+    pub standard_error_pa: T,
+    /// 95 % confidence interval, not symmetric where E depends on the data non-linearly.
+    pub interval_95: Interval<T>,
+    /// Which estimator.
+    pub estimator: EstimatorKind,
+    /// Per load, in the order given.
+    pub loads: Vec<LoadDiagnostics<T>>,
+    /// How the data agree with the law.
+    pub fit: FitStatistics<T>,
+    /// Where the estimator's assumptions fail.
+    pub warnings: Vec<Warning<T>>,
+}
+
+/// How one load fared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct LoadDiagnostics<T> {
+    /// True when the load carried what the estimator needs.
+    pub used: bool,
+    /// a/R, measured, or by the law from what was measured.
+    pub contact_ratio: Option<T>,
+    /// The modulus this load alone would give.
+    pub youngs_modulus_pa: Option<T>,
+    /// Residual over its standard deviation.
+    pub standardized_residual: Option<T>,
+}
+
+impl<T: RealField + Copy> LoadDiagnostics<T> {
+    pub(crate) fn unused() -> Self {
+        Self { used: false, contact_ratio: None, youngs_modulus_pa: None, standardized_residual: None }
+    }
+}
+
+/// How a law fits the data. Smaller information criteria are better; they compare laws on the same data only.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct FitStatistics<T> {
+    /// Number of observations.
+    pub observations: usize,
+    /// Number of fitted parameters.
+    pub parameters: usize,
+    /// Σ (residual/σ)², or the residuals' own sum where no σ was given.
+    pub chi_squared: T,
+    /// Akaike's criterion with the small-sample correction; infinite with too few observations.
+    pub aicc: T,
+    /// Schwarz's criterion.
+    pub bic: T,
+}
+
+impl<T: RealField + Copy> FitStatistics<T> {
+    pub(crate) fn new(
+        observations: usize,
+        parameters: usize,
+        chi_squared: f64,
+        minus_two_log_likelihood: f64,
+    ) -> Self {
+        let (n, k) = (observations as f64, parameters as f64);
+        let correction = if n > k + 1.0 { 2.0 * k * (k + 1.0) / (n - k - 1.0) } else { f64::INFINITY };
+        Self {
+            observations,
+            parameters,
+            chi_squared: narrow(chi_squared),
+            aicc: narrow(minus_two_log_likelihood + 2.0 * k + correction),
+            bic: narrow(minus_two_log_likelihood + k * n.ln()),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! What was measured at one load.
+
+use crate::error::{ElasticityError, Quantity, not_negative};
+use crate::scalar::widen;
+use nalgebra::RealField;
+
+/// A number and the standard error of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Estimate<T> {
+    /// The best value.
+    pub value: T,
+    /// Its standard deviation over repetitions; zero where unknown.
+    pub standard_error: T,
+}
+
+impl<T: RealField + Copy> Estimate<T> {
+    /// A value with its standard error.
+    pub fn new(value: T, standard_error: T) -> Self {
+        Self { value, standard_error }
+    }
+
+    /// A value whose error is unknown or negligible.
+    pub fn exact(value: T) -> Self {
+        Self { value, standard_error: T::zero() }
+    }
+
+    pub(crate) fn widen(self) -> Estimate<f64> {
+        Estimate { value: widen(self.value), standard_error: widen(self.standard_error) }
+    }
+}
+
+impl Estimate<f64> {
+    /// The error as a share of the value.
+    pub(crate) fn relative_error(self) -> f64 {
+        self.standard_error / self.value.abs()
+    }
+
+    pub(crate) fn validated(self, quantity: Quantity) -> Result<Self, ElasticityError> {
+        crate::error::finite(self.value, quantity)?;
+        not_negative(self.standard_error, Quantity::StandardError)?;
+        Ok(self)
+    }
+}
+
+/// One load: the force and whatever else was seen of the contact.
+///
+/// Pressing forces are positive. Strain is that between the unloaded state (or the first load, see the estimators) and this
+/// load, positive where the object is squeezed.
+///
+/// ```
+/// use tactile_elasticity::modulus::{Estimate, LoadState};
+/// let load = LoadState::new(Estimate::new(0.7, 0.002))
+///     .with_contact_radius(Estimate::new(1.2e-3, 4e-6))
+///     .with_mean_strain(Estimate::exact(0.021));
+/// assert!((load.stress_pa().unwrap() - 0.7f64 / (std::f64::consts::PI * 1.44e-6)).abs() < 1e-6);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct LoadState<T> {
+    /// F.
+    pub force_n: Estimate<T>,
+    /// a, of a round contact.
+    pub contact_radius_m: Option<Estimate<T>>,
+    /// The contact's area, where it is not πa².
+    pub contact_area_m2: Option<Estimate<T>>,
+    /// δ, the approach of the two bodies.
+    pub indentation_m: Option<Estimate<T>>,
+    /// Mean e_zz, positive where the object is squeezed.
+    pub mean_strain: Option<Estimate<T>>,
+}
+
+impl<T: RealField + Copy> LoadState<T> {
+    /// A load of which only the force is known yet.
+    pub fn new(force_n: Estimate<T>) -> Self {
+        Self {
+            force_n,
+            contact_radius_m: None,
+            contact_area_m2: None,
+            indentation_m: None,
+            mean_strain: None,
+        }
+    }
+
+    /// With the contact radius (m).
+    pub fn with_contact_radius(mut self, radius_m: Estimate<T>) -> Self {
+        self.contact_radius_m = Some(radius_m);
+        self
+    }
+
+    /// With the contact's area (m²), where it is not a disc.
+    pub fn with_contact_area(mut self, area_m2: Estimate<T>) -> Self {
+        self.contact_area_m2 = Some(area_m2);
+        self
+    }
+
+    /// With the indentation (m).
+    pub fn with_indentation(mut self, indentation_m: Estimate<T>) -> Self {
+        self.indentation_m = Some(indentation_m);
+        self
+    }
+
+    /// With the mean strain e_zz.
+    pub fn with_mean_strain(mut self, strain: Estimate<T>) -> Self {
+        self.mean_strain = Some(strain);
+        self
+    }
+
+    /// F over the area given, or over πa²; None where neither is known or the area is zero.
+    pub fn stress_pa(&self) -> Option<T> {
+        let area = match (self.contact_area_m2, self.contact_radius_m) {
+            (Some(area), _) => area.value,
+            (None, Some(a)) => T::pi() * a.value * a.value,
+            (None, None) => return None,
+        };
+        (area > T::zero()).then(|| self.force_n.value / area)
+    }
+}
+
+impl<T: RealField + Copy> LoadState<T> {
+    pub(crate) fn widened(&self) -> LoadState<f64> {
+        LoadState {
+            force_n: self.force_n.widen(),
+            contact_radius_m: self.contact_radius_m.map(Estimate::widen),
+            contact_area_m2: self.contact_area_m2.map(Estimate::widen),
+            indentation_m: self.indentation_m.map(Estimate::widen),
+            mean_strain: self.mean_strain.map(Estimate::widen),
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! Young's modulus as the slope of stress over strain.
+
+use super::estimate::{
+    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+};
+use super::load::{Estimate, LoadState};
+use super::ratio::{strain_warnings, stress};
+use super::statistics::{chi_squared_tail, quantile_95, t_tail};
+use super::warning::Warning;
+use crate::error::{ElasticityError, Quantity, not_negative};
+use crate::scalar::{narrow, widen};
+use nalgebra::RealField;
+
+/// Whether the line may miss the origin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Intercept {
+    /// It may; whether it does is tested, and a significant intercept is warned of.
+    #[default]
+    Tested,
+    /// It goes through the origin.
+    Zero,
+}
+
+/// S_i = S₀ + E e_i over many loads, with errors in both.
+///
+/// Each load weighs 1/(σ_S² + E²σ_e²) (York's effective variance without correlation); without any
+/// standard errors all weigh the same and the scatter tells the error. At least two loads, three where neither errors nor a
+/// zero intercept are given.
+///
+/// ```
+/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, StressStrainRegression};
+/// let load = |stress: f64, strain: f64| {
+///     LoadState::new(Estimate::new(stress * 1e-6, 1e-5)) // on one square millimetre
+///         .with_contact_area(Estimate::exact(1e-6))
+///         .with_mean_strain(Estimate::new(strain, 1e-4))
+/// };
+/// let loads = [load(600.0, 0.01), load(1200.0, 0.02), load(2400.0, 0.04)];
+/// let modulus = StressStrainRegression::new().estimate(&loads)?;
+/// assert!((modulus.youngs_modulus_pa - 60e3).abs() < 1e-6);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StressStrainRegression {
+    intercept: Intercept,
+    stress_scale_error: f64,
+}
+
+/// A straight line with its errors.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    slope: f64,
+    intercept: f64,
+    slope_error: f64,
+    intercept_error: f64,
+    chi_squared: f64,
+    degrees: usize,
+    learnt: bool,
+    excess: Option<f64>,
+}
+
+struct Point {
+    load: usize,
+    strain: Estimate<f64>,
+    stress: Estimate<f64>,
+}
+
+impl StressStrainRegression {
+    /// With a tested intercept.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// How the intercept is treated.
+    pub fn with_intercept(mut self, intercept: Intercept) -> Self {
+        self.intercept = intercept;
+        self
+    }
+
+    /// Relative error that all stresses share (the slope of one calibration).
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_stress_scale_error<T: RealField + Copy>(
+        mut self,
+        relative: T,
+    ) -> Result<Self, ElasticityError> {
+        self.stress_scale_error = not_negative(widen(relative), Quantity::StandardError)?;
+        Ok(self)
+    }
+
+    fn points(loads: &[LoadState<f64>]) -> Result<Vec<Point>, ElasticityError> {
+        let mut points = Vec::new();
+        for (load, state) in loads.iter().enumerate() {
+            if let Some(strain) = state.mean_strain {
+                points.push(Point {
+                    load,
+                    strain: strain.validated(Quantity::Strain)?,
+                    stress: stress(load, state)?,
+                });
+            }
+        }
+        Ok(points)
+    }
+
+    fn check(&self, points: &[Point], known: bool) -> Result<(), ElasticityError> {
+        let through_origin = self.intercept == Intercept::Zero;
+        let expected = match (through_origin, known) {
+            (true, true) => 1,
+            (false, false) => 3,
+            _ => 2,
+        };
+        if points.len() < expected {
+            return Err(ElasticityError::TooFewLoads { expected, found: points.len() });
+        }
+        let same = |f: fn(&Point) -> f64| points.windows(2).all(|w| f(&w[0]) == f(&w[1]));
+        if through_origin && points.iter().all(|p| p.strain.value == 0.0) {
+            return Err(ElasticityError::ZeroStrain);
+        }
+        if !through_origin && same(|p| p.stress.value) {
+            return Err(ElasticityError::EqualLoads);
+        }
+        if !through_origin && same(|p| p.strain.value) {
+            return Err(ElasticityError::ZeroStrain);
+        }
+        Ok(())
+    }
+
+    fn fit(&self, points: &[Point], known: bool) -> Line {
+        let mut line = self.weighted(points, |_| 1.0, false);
+        if !known {
+            return line;
+        }
+        for _ in 0..50 {
+            let slope = line.slope;
+            let variance =
+                |p: &Point| p.stress.standard_error.powi(2) + (slope * p.strain.standard_error).powi(2);
+            let floor = points.iter().map(variance).fold(0.0, f64::max) * 1e-12;
+            line = self.weighted(points, |p| 1.0 / variance(p).max(floor), true);
+            if (line.slope - slope).abs() <= 1e-12 * slope.abs() {
+                break;
+            }
+        }
+        line
+    }
+
+    /// Weighted least squares about the weighted centre, which keeps the two parameters apart.
+    fn weighted(&self, points: &[Point], weight: impl Fn(&Point) -> f64, known: bool) -> Line {
+        let free = self.intercept == Intercept::Tested;
+        let sum = |f: &dyn Fn(&Point) -> f64| points.iter().map(|p| weight(p) * f(p)).sum::<f64>();
+        let total = sum(&|_| 1.0);
+        let (cx, cy) = if free {
+            (sum(&|p| p.strain.value) / total, sum(&|p| p.stress.value) / total)
+        } else {
+            (0.0, 0.0)
+        };
+        let sxx = sum(&|p| (p.strain.value - cx).powi(2));
+        let slope = sum(&|p| (p.strain.value - cx) * (p.stress.value - cy)) / sxx;
+        let intercept = cy - slope * cx;
+        let chi_squared = sum(&|p| (p.stress.value - intercept - slope * p.strain.value).powi(2));
+        let degrees = points.len() - if free { 2 } else { 1 };
+        let reduced = chi_squared / degrees.max(1) as f64;
+        let excess =
+            (known && degrees > 0 && chi_squared_tail(chi_squared, degrees) < 1e-3).then_some(reduced);
+        let learnt = !known || excess.is_some();
+        let unit = if learnt { reduced } else { 1.0 };
+        let intercept_variance = if free { unit * (1.0 / total + cx * cx / sxx) } else { 0.0 };
+        Line {
+            slope,
+            intercept,
+            slope_error: (unit / sxx).sqrt(),
+            intercept_error: intercept_variance.sqrt(),
+            chi_squared,
+            degrees,
+            learnt,
+            excess,
+        }
+    }
+
+    fn warnings<T: RealField + Copy>(&self, loads: &[LoadState<f64>], line: &Line) -> Vec<Warning<T>> {
+        let mut warnings = strain_warnings(loads);
+        warnings.extend(line.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
+        if line.intercept_error > 0.0 {
+            let t = line.intercept / line.intercept_error;
+            let p_value = t_tail(t, if line.learnt { line.degrees } else { usize::MAX >> 12 });
+            if p_value < 0.05 {
+                warnings.push(Warning::Intercept {
+                    intercept_pa: narrow(line.intercept),
+                    p_value: narrow(p_value),
+                });
+            }
+        }
+        warnings
+    }
+}
+
+impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
+    fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
+        let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
+        let points = Self::points(&loads)?;
+        let known = points.iter().any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0);
+        self.check(&points, known)?;
+        let line = self.fit(&points, known);
+        if line.slope <= 0.0 || !line.slope.is_finite() {
+            let p = points.last().map_or((0.0, 0.0), |p| (p.stress.value, p.strain.value));
+            return Err(ElasticityError::OppositeSigns { stress_pa: p.0, strain: p.1 });
+        }
+        let error = line.slope_error.hypot(line.slope * self.stress_scale_error);
+        let reach = error * quantile_95(line.learnt.then_some(line.degrees));
+        let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
+        for p in &points {
+            let residual = p.stress.value - line.intercept - line.slope * p.strain.value;
+            let spread = if known {
+                p.stress.standard_error.hypot(line.slope * p.strain.standard_error)
+            } else {
+                (line.chi_squared / line.degrees.max(1) as f64).sqrt()
+            };
+            diagnostics[p.load].used = true;
+            diagnostics[p.load].standardized_residual = (spread > 0.0).then(|| narrow(residual / spread));
+        }
+        let n = points.len() as f64;
+        let minus_two_log = if known { line.chi_squared } else { n * (line.chi_squared / n).ln() };
+        Ok(ModulusEstimate {
+            youngs_modulus_pa: narrow(line.slope),
+            standard_error_pa: narrow(error),
+            interval_95: Interval {
+                lower: narrow((line.slope - reach).max(0.0)),
+                upper: Some(narrow(line.slope + reach)),
+            },
+            estimator: EstimatorKind::StressStrainRegression,
+            loads: diagnostics,
+            fit: FitStatistics::new(
+                points.len(),
+                points.len() - line.degrees,
+                line.chi_squared,
+                minus_two_log,
+            ),
+            warnings: self.warnings(&loads, &line),
+        })
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        EstimatorKind::StressStrainRegression
+    }
+}

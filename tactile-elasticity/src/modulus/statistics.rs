@@ -1,0 +1,117 @@
+//! Quantiles, and the generalised least squares mean.
+
+use crate::error::{ElasticityError, Quantity};
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+
+/// Two-sided 95 % quantile of Student's t; of the normal distribution where `degrees` is None.
+pub(crate) fn quantile_95(degrees: Option<usize>) -> f64 {
+    const P: f64 = 0.975;
+    match degrees.and_then(|n| StudentsT::new(0.0, 1.0, n as f64).ok()) {
+        Some(t) => t.inverse_cdf(P),
+        None => Normal::standard().inverse_cdf(P),
+    }
+}
+
+/// P(χ²_degrees > x).
+pub(crate) fn chi_squared_tail(x: f64, degrees: usize) -> f64 {
+    ChiSquared::new(degrees as f64).map_or(1.0, |d| d.sf(x.max(0.0)))
+}
+
+/// P(|t| > |x|), two-sided.
+pub(crate) fn t_tail(x: f64, degrees: usize) -> f64 {
+    StudentsT::new(0.0, 1.0, degrees as f64).map_or(1.0, |d| 2.0 * d.sf(x.abs()))
+}
+
+/// The best common mean of correlated numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct CommonMean {
+    pub(crate) mean: f64,
+    /// Standard error, scaled up where the scatter exceeds the covariance.
+    pub(crate) standard_error: f64,
+    pub(crate) chi_squared: f64,
+    pub(crate) minus_two_log_likelihood: f64,
+    /// Degrees of freedom where the error was learnt from the scatter; None where it was given.
+    pub(crate) degrees: Option<usize>,
+    /// χ²/ν where it was used to scale the error up.
+    pub(crate) excess: Option<f64>,
+    pub(crate) standardized_residuals: Vec<f64>,
+}
+
+/// The scatter is believed over the stated errors when χ² is this improbable.
+const EXCESS_PROBABILITY: f64 = 1e-3;
+
+/// θ = (1ᵀΣ⁻¹z)/(1ᵀΣ⁻¹1). Σ = 0 means unknown: equal weights and the error from the scatter.
+pub(crate) fn common_mean(z: &[f64], covariance: &DMatrix<f64>) -> Result<CommonMean, ElasticityError> {
+    let n = z.len();
+    let known = covariance.diagonal().iter().any(|&v| v > 0.0);
+    let sigma = if known { covariance.clone() } else { DMatrix::identity(n, n) };
+    let factor = ridged_cholesky(sigma)?;
+    let z = DVector::from_column_slice(z);
+    let ones = DVector::from_element(n, 1.0);
+    let weights = factor.solve(&ones);
+    let information = weights.sum();
+    let mean = weights.dot(&z) / information;
+    let residual = &z - &ones * mean;
+    let chi_squared = residual.dot(&factor.solve(&residual));
+    let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+    let degrees = n - 1;
+    let scale = chi_squared / degrees.max(1) as f64;
+    let excess = degrees > 0 && known && chi_squared_tail(chi_squared, degrees) < EXCESS_PROBABILITY;
+    let learnt = !known || excess;
+    let variance = if learnt { scale / information } else { 1.0 / information };
+    let unit = if learnt { scale } else { 1.0 };
+    let spread = |i: usize| (if known { covariance[(i, i)] } else { 1.0 } * unit).sqrt();
+    let standardized_residuals =
+        (0..n).map(|i| if spread(i) > 0.0 { residual[i] / spread(i) } else { 0.0 }).collect();
+    let full = (2.0 * std::f64::consts::PI).ln() * n as f64;
+    Ok(CommonMean {
+        mean,
+        standard_error: if !known && degrees == 0 { f64::INFINITY } else { variance.sqrt() },
+        chi_squared,
+        minus_two_log_likelihood: if known {
+            full + log_determinant + chi_squared
+        } else {
+            full + n as f64 * (1.0 + (chi_squared / n as f64).ln())
+        },
+        degrees: (learnt && degrees > 0).then_some(degrees),
+        excess: excess.then_some(scale),
+        standardized_residuals,
+    })
+}
+
+/// Cholesky of a covariance; perfectly correlated parts get a ridge of 10⁻¹² of the mean variance.
+fn ridged_cholesky(sigma: DMatrix<f64>) -> Result<nalgebra::Cholesky<f64, nalgebra::Dyn>, ElasticityError> {
+    let ridge = 1e-12 * sigma.trace() / sigma.nrows() as f64;
+    if let Some(factor) = sigma.clone().cholesky() {
+        let d = factor.l_dirty().diagonal();
+        if d.min() * d.min() > ridge * 1e-3 {
+            return Ok(factor);
+        }
+    }
+    let n = sigma.nrows();
+    (sigma + DMatrix::identity(n, n) * ridge)
+        .cholesky()
+        .ok_or(ElasticityError::Covariance { quantity: Quantity::Force })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        assert_relative_eq!(quantile_95(None), 1.959_963_984_540_054, max_relative = 1e-9);
+        assert_relative_eq!(quantile_95(Some(1)), 12.706_204_736_174_7, max_relative = 1e-7);
+        assert_relative_eq!(quantile_95(Some(10)), 2.228_138_851_964_94, max_relative = 1e-7);
+    }
+
+    #[test]
+    fn a_shared_error_is_not_averaged_away() {
+        let shared = DMatrix::from_element(4, 4, 0.01) + DMatrix::identity(4, 4) * 0.04;
+        let mean = common_mean(&[1.0, 1.2, 0.9, 0.9], &shared).unwrap();
+        assert_relative_eq!(mean.mean, 1.0, epsilon = 1e-12);
+        assert_relative_eq!(mean.standard_error.powi(2), 0.01 + 0.04 / 4.0, max_relative = 1e-12);
+    }
+}

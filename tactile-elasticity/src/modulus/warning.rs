@@ -1,0 +1,96 @@
+//! Where an estimator's assumptions fail.
+
+/// A typed caution; the estimate stands, but not unconditionally.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum Warning<T> {
+    /// a/R is beyond the reach of small-contact theory.
+    LargeContact {
+        /// Index of the load.
+        load: usize,
+        /// a/R.
+        ratio: T,
+        /// The limit of the law.
+        limit: T,
+    },
+    /// The layer is thin beside the contact for this law.
+    ThinLayer {
+        /// Index of the load.
+        load: usize,
+        /// χ = √(Rδ)/h, or a/h.
+        ratio: T,
+        /// The limit of the law.
+        limit: T,
+    },
+    /// The strain is too large for a linear law.
+    LargeStrain {
+        /// Index of the load.
+        load: usize,
+        /// The strain.
+        strain: T,
+        /// The limit.
+        limit: T,
+    },
+    /// The residuals are larger than the standard errors say; these were scaled up by the square root of this.
+    ExcessScatter {
+        /// χ² over degrees of freedom.
+        reduced_chi_squared: T,
+    },
+    /// The data do not bound the modulus from above.
+    UnboundedAbove,
+    /// The intercept of the regression differs from zero at the 95 % level.
+    Intercept {
+        /// Stress at zero strain, Pa.
+        intercept_pa: T,
+        /// Its probability under a zero intercept.
+        p_value: T,
+    },
+    /// One load and no standard errors: the interval is not known.
+    NoErrorEstimate,
+    /// For a sphere the ratio of stress to strain is not the modulus: it depends on load and radius.
+    RatioOnSphere {
+        /// Index of the load.
+        load: usize,
+        /// a/R.
+        ratio: T,
+    },
+}
+
+impl<T: core::fmt::Display> core::fmt::Display for Warning<T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::LargeContact { load, ratio, limit } => {
+                write!(
+                    f,
+                    "load {load}: a/R = {ratio:.3} is beyond {limit:.2}, small-contact theory does not hold"
+                )
+            }
+            Self::ThinLayer { load, ratio, limit } => {
+                write!(
+                    f,
+                    "load {load}: contact over layer thickness = {ratio:.3} is beyond {limit:.2} for this law"
+                )
+            }
+            Self::LargeStrain { load, strain, limit } => {
+                write!(
+                    f,
+                    "load {load}: strain {strain:.3} is beyond {limit:.2}, the linear law does not hold"
+                )
+            }
+            Self::ExcessScatter { reduced_chi_squared } => {
+                write!(f, "scatter exceeds the stated errors (reduced chi-squared {reduced_chi_squared:.2})")
+            }
+            Self::UnboundedAbove => write!(f, "the data do not bound the modulus from above"),
+            Self::Intercept { intercept_pa, p_value } => {
+                write!(f, "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero")
+            }
+            Self::NoErrorEstimate => {
+                write!(f, "no standard errors and no repetition: the interval is unknown")
+            }
+            Self::RatioOnSphere { load, ratio } => {
+                write!(f, "load {load}: stress over strain is biased on a sphere (a/R = {ratio:.3})")
+            }
+        }
+    }
+}
