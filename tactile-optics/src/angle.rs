@@ -1,0 +1,144 @@
+//! Critical and acceptance angles of a layer, the paper's (1)–(4).
+//!
+//! Light in a layer of index nᵢ is totally reflected at the ambient of index n₀ < nᵢ beyond the critical angle
+//! θ_c = asin(n₀/nᵢ). Light entering through the layer's edge, perpendicular to its faces, meets them beyond θ_c while its
+//! angle in the ambient stays below the acceptance angle
+//!
+//! θᵢ = asin(√(nᵢ² − n₀²)/n₀),
+//!
+//! the paper's asin √(nᵢ² − 1) for air. At nᵢ² ≥ 2n₀² every ray is trapped, at nᵢ ≤ n₀ none: both are answers.
+//!
+//! The formulas used are θ_c = atan2(n₀, √((nᵢ − n₀)(nᵢ + n₀))) and θᵢ = atan2(√((nᵢ − n₀)(nᵢ + n₀)), √(2n₀² − nᵢ²)), which keep all
+//! digits where the textbook ones lose half of them: nᵢ near n₀ and near √2 n₀. Whether nᵢ² ≥ 2n₀² is decided exactly.
+
+use crate::error::OpticsError;
+use crate::real::{Real, index, real, twice_square_minus_square};
+
+/// An angle between 0 and π/2 together with its complement, both to full precision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Angle<T> {
+    radians: T,
+    complement: T,
+}
+
+impl<T: Real> Angle<T> {
+    /// The angle of the right-angled triangle with these two legs.
+    pub(crate) fn from_legs(opposite: T, adjacent: T) -> Self {
+        Self { radians: opposite.atan2(adjacent), complement: adjacent.atan2(opposite) }
+    }
+
+    /// π/2.
+    pub fn right() -> Self {
+        Self { radians: T::FRAC_PI_2(), complement: T::zero() }
+    }
+
+    /// In radians.
+    pub fn radians(&self) -> T {
+        self.radians
+    }
+
+    /// In degrees.
+    pub fn degrees(&self) -> T {
+        self.radians.to_degrees()
+    }
+
+    /// π/2 minus the angle, accurate also near a right angle.
+    pub fn complement(&self) -> T {
+        self.complement
+    }
+}
+
+/// From which angle of incidence on light is totally reflected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CriticalAngle<T> {
+    /// Beyond this angle.
+    Beyond(Angle<T>),
+    /// Never: the layer is no denser than its ambient.
+    Never,
+}
+
+/// Which rays entering through the layer's edge are trapped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AcceptanceAngle<T> {
+    /// None: the layer is no denser than its ambient.
+    NoneTrapped,
+    /// Those whose angle to the layer's plane, in the ambient, is below this one.
+    Below(Angle<T>),
+    /// Every one: nᵢ² ≥ 2n₀².
+    AllTrapped,
+}
+
+impl<T: Real> AcceptanceAngle<T> {
+    /// As a number: 0 for none, π/2 for all.
+    pub fn radians(&self) -> T {
+        match self {
+            Self::NoneTrapped => T::zero(),
+            Self::Below(angle) => angle.radians(),
+            Self::AllTrapped => T::FRAC_PI_2(),
+        }
+    }
+}
+
+/// The critical angle of light in a layer of index `n` against an ambient of index `ambient`.
+///
+/// # Errors
+/// [`OpticsError::OutOfRange`] for an index that is not positive and finite.
+///
+/// ```
+/// use tactile_optics::{CriticalAngle, critical_angle};
+/// let CriticalAngle::Beyond(angle) = critical_angle(1.40_f64, 1.0)? else { unreachable!() };
+/// assert!((angle.degrees() - 45.5847).abs() < 1e-4);
+/// assert_eq!(critical_angle(1.0, 1.33)?, CriticalAngle::Never);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
+pub fn critical_angle<T: Real>(n: T, ambient: T) -> Result<CriticalAngle<T>, OpticsError> {
+    let (n, n0) = (index(n)?, index(ambient)?);
+    Ok(match excess(n, n0) {
+        None => CriticalAngle::Never,
+        Some(excess) => CriticalAngle::Beyond(Angle::from_legs(n0, excess)),
+    })
+}
+
+/// The acceptance angle of a layer of index `n` in an ambient of index `ambient`, (1)–(4).
+///
+/// # Errors
+/// [`OpticsError::OutOfRange`] for an index that is not positive and finite.
+///
+/// ```
+/// use tactile_optics::{AcceptanceAngle, acceptance_angle};
+/// // The paper's 71.98°, truncated from 71.9894°.
+/// let AcceptanceAngle::Below(angle) = acceptance_angle(1.38_f64, 1.0)? else { unreachable!() };
+/// assert!((angle.degrees() - 71.9894).abs() < 1e-4);
+/// assert_eq!(acceptance_angle(1.5, 1.0)?, AcceptanceAngle::AllTrapped);
+/// assert_eq!(acceptance_angle(1.3, 1.33)?, AcceptanceAngle::NoneTrapped);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
+pub fn acceptance_angle<T: Real>(n: T, ambient: T) -> Result<AcceptanceAngle<T>, OpticsError> {
+    let (n, n0) = (index(n)?, index(ambient)?);
+    let Some(excess) = excess(n, n0) else { return Ok(AcceptanceAngle::NoneTrapped) };
+    // Squares of very small or large indices would leave the scalar's range.
+    if n >= n0 + n0 {
+        return Ok(AcceptanceAngle::AllTrapped);
+    }
+    let scale = power_of_two_near(n0).recip();
+    let room = twice_square_minus_square(n0 * scale, n * scale);
+    Ok(if room > T::zero() {
+        AcceptanceAngle::Below(Angle::from_legs(excess * scale, room.sqrt()))
+    } else {
+        AcceptanceAngle::AllTrapped
+    })
+}
+
+/// √(n² − n₀²), or nothing unless n > n₀.
+fn excess<T: Real>(n: T, n0: T) -> Option<T> {
+    (n > n0).then(|| (n - n0).sqrt() * (n + n0).sqrt())
+}
+
+/// A power of two near `x`, for scaling without rounding; 1 in the range where nothing needs it.
+fn power_of_two_near<T: Real>(x: T) -> T {
+    if x > real(1e-3) && x < real(1e3) {
+        return T::one();
+    }
+    let exponent = x.log2().round().to_i32().unwrap_or(0);
+    real::<T>(2.0).powi(exponent)
+}

@@ -1,0 +1,25 @@
+//! What can be wrong with the input.
+
+/// An input was rejected. Values are reported as `f64` whatever the scalar in use.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OpticsError {
+    /// A quantity lies outside the range that has a meaning (NaN always does).
+    #[error("{quantity} is {found}, expected a number from {minimum} to {maximum}")]
+    OutOfRange {
+        /// Name of the quantity.
+        quantity: &'static str,
+        /// Smallest value allowed.
+        minimum: f64,
+        /// Largest value allowed.
+        maximum: f64,
+        /// The value given.
+        found: f64,
+    },
+    /// A list that must not be empty is.
+    #[error("{quantity} is empty")]
+    Empty {
+        /// Name of the list.
+        quantity: &'static str,
+    },
+}

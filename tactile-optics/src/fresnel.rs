@@ -1,0 +1,107 @@
+//! Reflectance and transmittance of an interface between lossless media.
+//!
+//! With c₁, c₂ the cosines and s₁ the sine of incidence,
+//!
+//! * r_s = (n₁c₁ − n₂c₂)/(n₁c₁ + n₂c₂) = (n₁ − n₂)(n₁ + n₂)/(n₁c₁ + n₂c₂)²,
+//! * r_p = (n₂c₁ − n₁c₂)/(n₂c₁ + n₁c₂) = (n₂ − n₁)(n₂ + n₁)(n₂c₁ − n₁s₁)(n₂c₁ + n₁s₁)/(n₂(n₂c₁ + n₁c₂))²,
+//! * T = 4 n₁c₁ n₂c₂/(…)² with the same denominators, never 1 − R.
+//!
+//! The right-hand forms have no cancellation but the one at Brewster's angle, which is the answer's own. n₂c₂ is
+//! √((n₂ − n₁s₁)(n₂ + n₁s₁)); towards grazing, where s₁ has rounded to 1, n₂ − n₁s₁ is taken as (n₂ − n₁) + n₁c₁²/(1 + s₁).
+
+use crate::angle::Angle;
+use crate::error::OpticsError;
+use crate::real::{Real, difference_of_products, index, real, within};
+
+/// What an interface does to incident light, by polarisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fresnel<T> {
+    /// Angle of refraction; none when reflection is total.
+    pub refraction: Option<Angle<T>>,
+    /// Reflectance of light polarised perpendicular to the plane of incidence.
+    pub reflectance_s: T,
+    /// Reflectance of light polarised in the plane of incidence.
+    pub reflectance_p: T,
+    /// Transmittance, perpendicular.
+    pub transmittance_s: T,
+    /// Transmittance, in the plane.
+    pub transmittance_p: T,
+}
+
+impl<T: Real> Fresnel<T> {
+    /// Reflectance of unpolarised light.
+    pub fn reflectance(&self) -> T {
+        (self.reflectance_s + self.reflectance_p) * real(0.5)
+    }
+
+    /// Transmittance of unpolarised light.
+    pub fn transmittance(&self) -> T {
+        (self.transmittance_s + self.transmittance_p) * real(0.5)
+    }
+
+    /// Whether reflection is total.
+    pub fn is_total(&self) -> bool {
+        self.refraction.is_none()
+    }
+
+    fn total() -> Self {
+        Self {
+            refraction: None,
+            reflectance_s: T::one(),
+            reflectance_p: T::one(),
+            transmittance_s: T::zero(),
+            transmittance_p: T::zero(),
+        }
+    }
+}
+
+/// Light in a medium of index `n1` meeting one of index `n2` at the angle of incidence `incidence` (radians, 0 to π/2).
+///
+/// # Errors
+/// [`OpticsError::OutOfRange`] for an index that is not positive and finite, or an angle outside 0 to π/2.
+///
+/// ```
+/// use tactile_optics::fresnel;
+/// let glass = fresnel(1.0_f64, 1.5, 0.0)?;
+/// assert!((glass.reflectance() - 0.04).abs() < 1e-15);
+/// let trapped = fresnel(1.40, 1.0, 0.9)?;
+/// assert!(trapped.is_total() && trapped.reflectance() == 1.0);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
+pub fn fresnel<T: Real>(n1: T, n2: T, incidence: T) -> Result<Fresnel<T>, OpticsError> {
+    // A scalar's π/2 may lie above the true one by rounding.
+    within("angle of incidence", incidence, 0.0, core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7))?;
+    let (sine, cosine) = incidence.sin_cos();
+    Ok(from_sine_and_cosine(index(n1)?, index(n2)?, sine, cosine.max(T::zero())))
+}
+
+/// [`fresnel`] for an incidence given by sine and cosine, as a ray tracer has it.
+pub(crate) fn from_sine_and_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Fresnel<T> {
+    let Some(b) = refracted_normal(n1, n2, sine, cosine) else { return Fresnel::total() };
+    let a = n1 * cosine;
+    let across = n1 * sine;
+    // Amplitudes over the common factor: s uses n₁c₁ and n₂c₂, p uses n₂c₁ and n₁c₂ = n₁(n₂c₂)/n₂.
+    let (c, d) = (n2 * cosine, n1 * (b / n2));
+    let step = (n1 - n2) * (n1 + n2);
+    let r_s = step / ((a + b) * (a + b));
+    let brewster = difference_of_products(n2, cosine, n1, sine) * (c + across);
+    let r_p = step / (n2 * (c + d)) * (brewster / (n2 * (c + d)));
+    let flow = real::<T>(4.0) * a;
+    Fresnel {
+        refraction: Some(Angle::from_legs(across, b)),
+        reflectance_s: r_s * r_s,
+        reflectance_p: r_p * r_p,
+        transmittance_s: flow / (a + b) * (b / (a + b)),
+        transmittance_p: flow / (c + d) * (b / (c + d)),
+    }
+}
+
+/// n₂ cos θ₂, or nothing when reflection is total.
+pub(crate) fn refracted_normal<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<T> {
+    let room = if sine > real(0.8) {
+        (n2 - n1) + n1 * (cosine / (T::one() + sine)) * cosine
+    } else {
+        (-n1).mul_add(sine, n2)
+    };
+    (room >= T::zero()).then(|| room.sqrt() * n1.mul_add(sine, n2).sqrt())
+}

@@ -1,0 +1,174 @@
+//! Agreement with reference numbers computed to 80 digits. Skipped, with a line that says so, where they are absent.
+use std::path::PathBuf;
+
+use serde_json::Value;
+use tactile_optics::{
+    AcceptanceAngle, Angle, CriticalAngle, LayerStack, Propagation, acceptance_angle, critical_angle,
+    fresnel, propagation,
+};
+
+const EPS: f64 = f64::EPSILON;
+
+fn reference() -> Option<Value> {
+    let home = std::env::var_os("TACTILE_DATA").map(PathBuf::from);
+    let home = home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data").into());
+    let path = home.join("reference/optics.json");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        eprintln!("skipped: no reference numbers at {}", path.display());
+        return None;
+    };
+    let data: Value = serde_json::from_str(&text).unwrap();
+    for check in data["header"]["parse_check"].as_array().unwrap() {
+        let bits = u64::from_str_radix(&check["bits"].as_str().unwrap()[2..], 16).unwrap();
+        assert_eq!(number(&check["value"]).to_bits(), bits, "numbers must parse to the nearest double");
+    }
+    Some(data)
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(number).collect()
+}
+
+/// Relative error; against zero, the absolute one.
+fn error(found: f64, expected: f64) -> f64 {
+    if expected == 0.0 { found.abs() } else { ((found - expected) / expected).abs() }
+}
+
+/// Largest error seen and number of values compared.
+#[derive(Default)]
+struct Score {
+    worst: f64,
+    values: usize,
+}
+
+impl Score {
+    fn check(&mut self, found: f64, expected: f64, tolerance: f64, what: &str) {
+        let error = error(found, expected);
+        assert!(error <= tolerance, "{what}: {found} against {expected}, error {error:e} > {tolerance:e}");
+        self.values += 1;
+        self.worst = self.worst.max(error / tolerance);
+    }
+
+    fn angle(&mut self, found: &Angle<f64>, expected: &Value, name: &str, what: &str) {
+        let at = |suffix: &str| number(&expected[format!("{name}_{suffix}")]);
+        self.check(found.radians(), at("rad"), 1e-13, what);
+        self.check(found.degrees(), at("deg"), 1e-13, what);
+        self.check(found.complement(), at("complement_rad"), 1e-13, what);
+    }
+}
+
+fn check_stack(case: &Value, score: &mut Score) {
+    let (n0, indices) = (number(&case["n0"]), numbers(&case["indices"]));
+    let what = case["id"].as_str().unwrap();
+    for (&n, layer) in indices.iter().zip(case["layers"].as_array().unwrap()) {
+        match (critical_angle(n, n0).unwrap(), layer["critical_status"].as_str().unwrap()) {
+            (CriticalAngle::Beyond(angle), "ok") => score.angle(&angle, layer, "critical", what),
+            (CriticalAngle::Never, "undefined") => {}
+            other => panic!("{what}: {other:?}"),
+        }
+        match (acceptance_angle(n, n0).unwrap(), layer["acceptance_status"].as_str().unwrap()) {
+            (AcceptanceAngle::Below(angle), "ok") => score.angle(&angle, layer, "acceptance", what),
+            (AcceptanceAngle::AllTrapped, "unlimited") | (AcceptanceAngle::NoneTrapped, "undefined") => {}
+            other => panic!("{what}: {other:?}"),
+        }
+    }
+    let normal = LayerStack::new(&indices, n0).unwrap().normal_incidence();
+    score.check(normal.single_pass, number(&case["normal_T_single_pass"]), 1e-13, what);
+    score.check(normal.transmittance, number(&case["normal_T_incoherent"]), 1e-13, what);
+    score.check(normal.reflectance, number(&case["normal_R_incoherent"]), 1e-13, what);
+}
+
+fn check_snell(case: &Value, score: &mut Score) {
+    let (n0, indices) = (number(&case["n0"]), numbers(&case["indices"]));
+    let (invariant, what) = (number(&case["invariant"]), case["id"].as_str().unwrap());
+    let expected = case["layers"].as_array().unwrap().iter().chain(std::iter::once(&case["ambient"]));
+    let found: Vec<_> = LayerStack::new(&indices, n0).unwrap().propagation(invariant).unwrap().collect();
+    let ambient = propagation(n0, invariant).unwrap();
+    for (found, expected) in found.iter().chain(std::iter::once(&ambient)).zip(expected) {
+        match (found, expected["status"].as_str().unwrap()) {
+            (Propagation::At { angle, cosine }, "ok") => {
+                score.check(angle.radians(), number(&expected["theta_rad"]), 1e-13, what);
+                score.check(*cosine, number(&expected["cos"]), 1e-13, what);
+            }
+            (Propagation::Evanescent, "evanescent") => {}
+            other => panic!("{what}: {other:?}"),
+        }
+    }
+}
+
+fn check_fresnel(case: &Value, score: &mut Score) {
+    let at = |name: &str| number(&case[name]);
+    let (n1, n2, theta, what) = (at("n1"), at("n2"), at("theta_rad"), case["id"].as_str().unwrap());
+    let expected = &case["expected"];
+    let found = fresnel(n1, n2, theta).unwrap();
+    let total = expected["status"].as_str() == Some("total");
+    let (sine, cosine) = theta.sin_cos();
+    if found.is_total() != total {
+        // One ulp of the angle on either side of the critical one decides; the sine carries half an ulp of its own.
+        assert!(
+            (n1 * sine - n2).abs() < 2.0 * EPS * n2,
+            "{what}: total {} against {total}",
+            found.is_total()
+        );
+        assert!(found.transmittance() < 1e-6, "{what}");
+        score.values += 1;
+        return;
+    }
+    if total {
+        assert_eq!((found.reflectance_s, found.reflectance_p), (1.0, 1.0), "{what}");
+        assert_eq!((found.transmittance_s, found.transmittance_p), (0.0, 0.0), "{what}");
+        score.values += 1;
+        return;
+    }
+    let value = |name: &str| number(&expected[name]);
+    // Relative condition with respect to the angle: of n₂ cos θ₂ near the critical angle, of n₂ c₁ − n₁ s₁ near Brewster's.
+    let refracted = ((n2 - n1 * sine) * (n2 + n1 * sine)).max(n2 * n2 * EPS);
+    let grazing = theta * n1 * n1 * sine * cosine / refracted;
+    let brewster = theta * (n2 * sine + n1 * cosine) / (n2 * cosine - n1 * sine).abs().max(EPS);
+    let tolerance = |cond: f64| f64::max(1e-13, 10.0 * EPS * cond);
+    score.check(
+        found.refraction.unwrap().radians(),
+        value("theta_t"),
+        tolerance(grazing * refracted.sqrt()),
+        what,
+    );
+    score.check(found.transmittance_s, value("Ts"), tolerance(grazing), what);
+    score.check(found.transmittance_p, value("Tp"), tolerance(grazing), what);
+    if n1 == n2 {
+        // No interface: the reference has the rounding of its own 80 digits.
+        assert_eq!((found.reflectance_s, found.reflectance_p), (0.0, 0.0), "{what}");
+        return;
+    }
+    // R = 1 − T: where T is small, its error is an absolute one of R.
+    let of_reflectance = |t: f64| tolerance(2.0 * grazing * t.min(1.0));
+    score.check(found.reflectance_s, value("Rs"), of_reflectance(value("Ts")), what);
+    score.check(found.reflectance(), value("R"), of_reflectance(value("Tp")), what);
+    if brewster < 1e6 {
+        let cond = tolerance(2.0 * brewster).max(of_reflectance(value("Tp")));
+        score.check(found.reflectance_p, value("Rp"), cond, what);
+    } else {
+        assert!((found.reflectance_p - value("Rp")).abs() < 1e-15, "{what}: Rp at Brewster's angle");
+        score.values += 1;
+    }
+}
+
+#[test]
+fn every_reference_case_agrees() {
+    let Some(data) = reference() else { return };
+    let (mut score, mut cases) = (Score::default(), 0);
+    for case in data["cases"].as_array().unwrap() {
+        match case["kind"].as_str().unwrap() {
+            "stack" => check_stack(case, &mut score),
+            "snell" => check_snell(case, &mut score),
+            "fresnel" => check_fresnel(case, &mut score),
+            other => panic!("unknown kind {other}"),
+        }
+        cases += 1;
+    }
+    println!("{cases} cases, {} values, worst error {:.3} of its tolerance", score.values, score.worst);
+    assert_eq!(cases, data["header"]["case_count"].as_u64().unwrap());
+}
