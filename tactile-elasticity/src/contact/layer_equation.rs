@@ -47,8 +47,10 @@ impl LayerEquation {
     }
 
     /// Of a sphere that yields too: `share` is the layer's part of 1/E*, in [0, 1].
-    pub(crate) fn with_share(mut self, share: f64) -> Self {
-        self.share = share;
+    ///
+    /// A share outside is taken as its nearer end.
+    pub fn with_share(mut self, share: f64) -> Self {
+        self.share = share.clamp(0.0, 1.0);
         self
     }
 

@@ -81,6 +81,11 @@ impl<T: RealField + Copy> Waveguide<T> {
         self.thickness_m() / compliance
     }
 
+    /// Poisson's ratio averaged over the thickness.
+    pub fn poisson_ratio(&self) -> T {
+        self.sum(|l| l.poisson_ratio) / self.thickness_m()
+    }
+
     /// (1 − ν²)/E of the layers in series, Σ(h(1 − ν²)/E)/Σh in 1/Pa: the waveguide as one deep body.
     ///
     /// True while the contact is small beside every layer's thickness and the layers are alike.

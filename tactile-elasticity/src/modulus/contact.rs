@@ -9,11 +9,13 @@
 use super::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-use super::law::{ConeLaw, ContactLaw, LogForce, Punch, Sphere};
+use super::law::{
+    ConeLaw, ContactLaw, LayerLaw, LayerTheory, LogForce, Punch, Sphere, TataraLaw, WaveguideLaw,
+};
 use super::load::{Estimate, LoadState};
 use super::statistics::{CommonMean, common_mean, quantile_95};
 use super::warning::Warning;
-use crate::contact::{Body, Waveguide};
+use crate::contact::{Body, Bond, Waveguide};
 use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
 use crate::scalar::{narrow, widen};
 use nalgebra::{DMatrix, RealField};
@@ -50,6 +52,12 @@ pub type HertzSphere = ContactEstimator<Sphere>;
 pub type FlatPunch = ContactEstimator<Punch>;
 /// A cone, F = (2/π)E* tan α δ².
 pub type Cone = ContactEstimator<ConeLaw>;
+/// A sphere pressed into a thin sample on a rigid base.
+pub type BondedLayer = ContactEstimator<LayerLaw>;
+/// A soft sphere squeezed beyond Hertz's reach.
+pub type TataraSphere = ContactEstimator<TataraLaw>;
+/// A soft sphere on a waveguide that is not deep beside the contact: the integral equation with both bodies yielding.
+pub type SphereOnWaveguide = ContactEstimator<WaveguideLaw>;
 
 impl ContactEstimator<Sphere> {
     /// A sphere of relative radius R (m); the sample, with Poisson ratio ν, is either the sphere or what it is pressed into.
@@ -83,6 +91,49 @@ impl ContactEstimator<ConeLaw> {
             return Err(ElasticityError::OutOfRange { quantity: Quantity::HalfAngle, found: angle, limit });
         }
         Self::from_law(ConeLaw::new(angle.tan())?, poisson_ratio)
+    }
+}
+
+impl ContactEstimator<LayerLaw> {
+    /// A sphere of radius R (m) on a sample of thickness h (m) and Poisson ratio ν, glued to or sliding on its rigid base.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(
+        radius_m: T,
+        thickness_m: T,
+        poisson_ratio: T,
+        bond: Bond,
+        theory: LayerTheory,
+    ) -> Result<Self, ElasticityError> {
+        Self::from_law(LayerLaw::new(radius_m, thickness_m, poisson_ratio, bond, theory)?, poisson_ratio)
+    }
+}
+
+impl ContactEstimator<TataraLaw> {
+    /// A soft sphere of radius R (m) and Poisson ratio ν.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        Self::from_law(TataraLaw::new(radius_m, poisson_ratio)?, poisson_ratio)
+    }
+}
+
+impl ContactEstimator<WaveguideLaw> {
+    /// A soft sphere of radius R (m) and Poisson ratio ν on a waveguide whose layers, taken in series, are one layer of their
+    /// whole thickness.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(
+        radius_m: T,
+        poisson_ratio: T,
+        waveguide: &Waveguide<T>,
+        bond: Bond,
+    ) -> Result<Self, ElasticityError> {
+        let law = WaveguideLaw::new(radius_m, waveguide, bond)?;
+        Ok(Self::from_law(law, poisson_ratio)?.with_waveguide(waveguide))
     }
 }
 
@@ -171,7 +222,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
         Ok(self)
     }
 
-    fn observe(&self, loads: &[LoadState<f64>]) -> Result<Vec<Observation>, ElasticityError> {
+    fn observe(&self, loads: &[LoadState<f64>], share: f64) -> Result<Vec<Observation>, ElasticityError> {
         let mut all = Vec::new();
         for (load, state) in loads.iter().enumerate() {
             let force = state.force_n.validated(Quantity::Force)?;
@@ -192,9 +243,9 @@ impl<L: ContactLaw> ContactEstimator<L> {
             let (radius, depth) =
                 (self.evidence != Evidence::Indentation, self.evidence != Evidence::ContactRadius);
             push(state.contact_radius_m, radius, Quantity::ContactRadius, &|a| {
-                self.law.of_contact_radius(a)
+                self.law.of_contact_radius(a, share)
             })?;
-            push(state.indentation_m, depth, Quantity::Indentation, &|d| self.law.of_indentation(d))?;
+            push(state.indentation_m, depth, Quantity::Indentation, &|d| self.law.of_indentation(d, share))?;
         }
         if all.is_empty() {
             return Err(ElasticityError::TooFewLoads { expected: 1, found: 0 });
@@ -232,24 +283,58 @@ impl<L: ContactLaw> ContactEstimator<L> {
         (left > 0.0).then(|| (1.0 - self.poisson_ratio.powi(2)) * reduced / left)
     }
 
+    /// The mean at a given share of the other body.
+    fn mean(
+        &self,
+        loads: &[LoadState<f64>],
+        share: f64,
+    ) -> Result<(Vec<Observation>, CommonMean), ElasticityError> {
+        let all = self.observe(loads, share)?;
+        let logs: Vec<f64> = all.iter().map(|o| o.log_modulus).collect();
+        let mean = common_mean(&logs, &self.covariance(&all, loads.len())?)?;
+        Ok((all, mean))
+    }
+
+    /// The mean at the share that belongs to the modulus it gives, `reach` standard errors away.
+    ///
+    /// The share moves ln E* by less than it is moved itself, so that the plain iteration converges.
+    fn consistent(&self, loads: &[LoadState<f64>], reach: f64) -> Result<Consistent, ElasticityError> {
+        let share_at = |log_reduced: f64| (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0);
+        let mut share = 0.0;
+        for _ in 0..60 {
+            let (observations, mean) = self.mean(loads, share)?;
+            let steps =
+                if reach == 0.0 { 0.0 } else { reach * quantile_95(mean.degrees) * mean.standard_error };
+            let log_reduced = mean.mean + steps;
+            let next = share_at(log_reduced);
+            if !self.law.depends_on_share() || (next - share).abs() < 1e-10 {
+                return Ok(Consistent { observations, mean, log_reduced });
+            }
+            share = next;
+        }
+        let (observations, mean) = self.mean(loads, share)?;
+        let log_reduced = mean.mean;
+        Ok(Consistent { observations, mean, log_reduced })
+    }
+
     fn answer<T: RealField + Copy>(
         &self,
-        mean: &CommonMean,
+        loads: &[LoadState<f64>],
+        centre: &Consistent,
     ) -> Result<(f64, f64, Interval<T>), ElasticityError> {
-        let reach = quantile_95(mean.degrees) * mean.standard_error;
-        let lower = if reach.is_finite() { self.sample_modulus(mean.mean - reach) } else { Some(0.0) };
-        let lower = lower.unwrap_or(f64::INFINITY);
-        let Some(modulus) = self.sample_modulus(mean.mean) else {
+        let known = centre.mean.standard_error.is_finite();
+        let limit = |reach: f64| -> Option<f64> {
+            self.sample_modulus(self.consistent(loads, reach).ok()?.log_reduced)
+        };
+        let lower = if known { limit(-1.0).unwrap_or(f64::INFINITY) } else { 0.0 };
+        let Some(modulus) = self.sample_modulus(centre.log_reduced) else {
             let lower_bound_pa = if lower.is_finite() { lower } else { 0.0 };
             return Err(ElasticityError::StifferThanResolvable { lower_bound_pa });
         };
-        let upper = if reach.is_finite() { self.sample_modulus(mean.mean + reach) } else { None };
-        let left = 1.0 - self.other_compliance_per_pa * mean.mean.exp();
-        Ok((
-            modulus,
-            modulus / left * mean.standard_error,
-            Interval { lower: narrow(lower), upper: upper.map(narrow) },
-        ))
+        let upper = if known { limit(1.0) } else { None };
+        let left = 1.0 - self.other_compliance_per_pa * centre.log_reduced.exp();
+        let error = modulus / left * centre.mean.standard_error;
+        Ok((modulus, error, Interval { lower: narrow(lower), upper: upper.map(narrow) }))
     }
 
     fn diagnose<T: RealField + Copy>(
@@ -283,6 +368,21 @@ impl<L: ContactLaw> ContactEstimator<L> {
             .collect()
     }
 
+    fn layer_warnings<T: RealField + Copy>(&self, loads: &[LoadState<f64>]) -> Vec<Warning<T>> {
+        let value = |e: Option<Estimate<f64>>| e.map(|e| e.value);
+        (loads.iter().enumerate())
+            .filter_map(|(i, l)| {
+                Some((i, self.law.layer_ratio(value(l.contact_radius_m), value(l.indentation_m))?))
+            })
+            .filter(|(_, (ratio, limit))| ratio > limit)
+            .map(|(load, (ratio, limit))| Warning::ThinLayer {
+                load,
+                ratio: narrow(ratio),
+                limit: narrow(limit),
+            })
+            .collect()
+    }
+
     fn warn<T: RealField + Copy>(
         &self,
         loads: &[LoadDiagnostics<T>],
@@ -305,6 +405,13 @@ impl<L: ContactLaw> ContactEstimator<L> {
     }
 }
 
+/// A mean whose share of compliance is its own.
+struct Consistent {
+    observations: Vec<Observation>,
+    mean: CommonMean,
+    log_reduced: f64,
+}
+
 struct Observation {
     load: usize,
     force: Estimate<f64>,
@@ -316,12 +423,12 @@ struct Observation {
 impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimator<L> {
     fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
         let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
-        let all = self.observe(&loads)?;
-        let logs: Vec<f64> = all.iter().map(|o| o.log_modulus).collect();
-        let mean = common_mean(&logs, &self.covariance(&all, loads.len())?)?;
-        let (modulus, error, interval_95) = self.answer(&mean)?;
-        let diagnostics = self.diagnose(&loads, &all, &mean);
-        let warnings = self.warn(&diagnostics, &mean, interval_95.upper.is_some());
+        let centre = self.consistent(&loads, 0.0)?;
+        let (modulus, error, interval_95) = self.answer(&loads, &centre)?;
+        let Consistent { observations: all, mean, .. } = &centre;
+        let diagnostics = self.diagnose(&loads, all, mean);
+        let mut warnings = self.warn(&diagnostics, mean, interval_95.upper.is_some());
+        warnings.extend(self.layer_warnings(&loads));
         Ok(ModulusEstimate {
             youngs_modulus_pa: narrow(modulus),
             standard_error_pa: narrow(error),

@@ -9,11 +9,13 @@ mod regression;
 mod statistics;
 mod warning;
 
-pub use contact::{Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere};
+pub use contact::{
+    BondedLayer, Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere, SphereOnWaveguide, TataraSphere,
+};
 pub use estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-pub use law::{ConeLaw, ContactLaw, Punch, Sphere};
+pub use law::{ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, WaveguideLaw};
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::{Intercept, StressStrainRegression};

@@ -1,41 +1,10 @@
-//! Contact laws of the form F = E* f(x), x the contact radius or the indentation.
+//! Sphere, punch and cone on bodies that are deep beside the contact.
 
+use super::{ContactLaw, LogForce};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::EstimatorKind;
 use crate::scalar::widen;
 use nalgebra::RealField;
-
-/// ln(F/E*) at one x, with its slopes in ln x and in the logarithm of the indenter's size.
-#[derive(Debug, Clone, Copy)]
-pub struct LogForce {
-    pub(crate) value: f64,
-    pub(crate) slope: f64,
-    pub(crate) size_slope: f64,
-}
-
-/// A law F = E* f(x). Implemented by this crate's indenters.
-pub trait ContactLaw {
-    /// Which estimator the law makes.
-    fn kind(&self) -> EstimatorKind;
-
-    /// ln f of a contact radius (m); None where the radius says nothing.
-    #[doc(hidden)]
-    fn of_contact_radius(&self, a: f64) -> Option<LogForce>;
-
-    /// ln f of an indentation (m); None where it says nothing.
-    #[doc(hidden)]
-    fn of_indentation(&self, d: f64) -> Option<LogForce>;
-
-    /// a/R of an indentation, for laws with a radius.
-    #[doc(hidden)]
-    fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64>;
-
-    /// The largest a/R for which the law is meant.
-    #[doc(hidden)]
-    fn contact_ratio_limit(&self) -> f64 {
-        f64::INFINITY
-    }
-}
 
 /// Hertz's sphere of (relative) radius R: F = 4E*a³/(3R) = 4⁄3 E*√R δ^{3⁄2}.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +13,10 @@ pub struct Sphere {
 }
 
 impl Sphere {
+    pub(crate) fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
     /// From the relative radius in m.
     pub(crate) fn new<T: RealField + Copy>(radius_m: T) -> Result<Self, ElasticityError> {
         Ok(Self { radius_m: positive(widen(radius_m), Quantity::Radius)? })
@@ -55,12 +28,12 @@ impl ContactLaw for Sphere {
         EstimatorKind::HertzSphere
     }
 
-    fn of_contact_radius(&self, a: f64) -> Option<LogForce> {
+    fn of_contact_radius(&self, a: f64, _: f64) -> Option<LogForce> {
         let value = (4.0 / 3.0f64).ln() - self.radius_m.ln() + 3.0 * a.ln();
         Some(LogForce { value, slope: 3.0, size_slope: -1.0 })
     }
 
-    fn of_indentation(&self, d: f64) -> Option<LogForce> {
+    fn of_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         let value = (4.0 / 3.0f64).ln() + 0.5 * self.radius_m.ln() + 1.5 * d.ln();
         Some(LogForce { value, slope: 1.5, size_slope: 0.5 })
     }
@@ -91,11 +64,11 @@ impl ContactLaw for Punch {
         EstimatorKind::FlatPunch
     }
 
-    fn of_contact_radius(&self, _: f64) -> Option<LogForce> {
+    fn of_contact_radius(&self, _: f64, _: f64) -> Option<LogForce> {
         None
     }
 
-    fn of_indentation(&self, d: f64) -> Option<LogForce> {
+    fn of_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         Some(LogForce { value: (2.0 * self.radius_m).ln() + d.ln(), slope: 1.0, size_slope: 1.0 })
     }
 
@@ -121,12 +94,12 @@ impl ContactLaw for ConeLaw {
         EstimatorKind::Cone
     }
 
-    fn of_contact_radius(&self, a: f64) -> Option<LogForce> {
+    fn of_contact_radius(&self, a: f64, _: f64) -> Option<LogForce> {
         let value = (std::f64::consts::FRAC_PI_2 / self.tangent).ln() + 2.0 * a.ln();
         Some(LogForce { value, slope: 2.0, size_slope: -1.0 })
     }
 
-    fn of_indentation(&self, d: f64) -> Option<LogForce> {
+    fn of_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         let value = (std::f64::consts::FRAC_2_PI * self.tangent).ln() + 2.0 * d.ln();
         Some(LogForce { value, slope: 2.0, size_slope: 1.0 })
     }

@@ -1,0 +1,235 @@
+//! A sphere on a layer with a rigid base.
+
+use super::{ContactLaw, LogForce, Sphere};
+use crate::contact::{Bond, LayerContact, LayerEquation, LayerKernel, LayerSeries, LayerTable, Waveguide};
+use crate::error::{ElasticityError, Quantity, positive};
+use crate::modulus::EstimatorKind;
+use crate::scalar::widen;
+use nalgebra::RealField;
+
+/// Which theory of the layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum LayerTheory {
+    /// The series in χ as published in 2002: wrong beyond its linear term, kept for comparison.
+    PublishedSeries,
+    /// The true solution's series: χ up to 0.5.
+    CorrectedSeries,
+    /// The true solution, a/h up to 20.
+    #[default]
+    IntegralEquation,
+}
+
+/// The layer is the sample and the sphere presses it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayerLaw {
+    sphere: Sphere,
+    radius_m: f64,
+    thickness_m: f64,
+    theory: LayerTheory,
+    series: LayerSeries,
+    kernel: LayerKernel,
+    table: Option<LayerTable>,
+}
+
+impl LayerLaw {
+    pub(crate) fn new<T: RealField + Copy>(
+        radius_m: T,
+        thickness_m: T,
+        poisson_ratio: T,
+        bond: Bond,
+        theory: LayerTheory,
+    ) -> Result<Self, ElasticityError> {
+        let radius_m = positive(widen(radius_m), Quantity::Radius)?;
+        let thickness_m = positive(widen(thickness_m), Quantity::Thickness)?;
+        let kernel = LayerKernel::new(bond, poisson_ratio)?;
+        let series = match theory {
+            LayerTheory::PublishedSeries => LayerSeries::published(bond, poisson_ratio)?,
+            _ => LayerSeries::corrected(&kernel, 1.0),
+        };
+        Ok(Self {
+            sphere: Sphere::new(radius_m)?,
+            radius_m,
+            thickness_m,
+            theory,
+            series,
+            kernel,
+            table: None,
+        })
+    }
+
+    /// With the solution tabulated, for many evaluations against a rigid sphere.
+    pub(crate) fn tabulated(mut self) -> Self {
+        if self.theory == LayerTheory::IntegralEquation {
+            self.table = Some(LayerTable::new(&LayerEquation::new(&self.kernel)));
+        }
+        self
+    }
+
+    fn chi(&self, d: f64) -> f64 {
+        (self.radius_m * d).sqrt() / self.thickness_m
+    }
+
+    /// ln(F/F_Hertz) at χ and its slope in ln χ.
+    fn correction(&self, chi: f64, share: f64) -> Option<(f64, f64)> {
+        match (self.theory, &self.table) {
+            (LayerTheory::IntegralEquation, Some(table)) if share == 0.0 => {
+                table.of_chi(chi).map(|(v, s, _)| (v, s))
+            }
+            (LayerTheory::IntegralEquation, _) => {
+                at_chi(&LayerEquation::new(&self.kernel).with_share(1.0 - share), chi)
+            }
+            (LayerTheory::CorrectedSeries, _) if share > 0.0 => {
+                let series = LayerSeries::corrected(&self.kernel, 1.0 - share);
+                Some((series.force_ratio(chi).ln(), series.log_slope(chi)))
+            }
+            _ => Some((self.series.force_ratio(chi).ln(), self.series.log_slope(chi))),
+        }
+        .filter(|c| c.0.is_finite())
+    }
+}
+
+impl ContactLaw for LayerLaw {
+    fn kind(&self) -> EstimatorKind {
+        match self.theory {
+            LayerTheory::PublishedSeries => EstimatorKind::LayerPublishedSeries,
+            LayerTheory::CorrectedSeries => EstimatorKind::LayerCorrectedSeries,
+            LayerTheory::IntegralEquation => EstimatorKind::LayerIntegralEquation,
+        }
+    }
+
+    fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce> {
+        if self.theory != LayerTheory::IntegralEquation {
+            return None;
+        }
+        let equation = LayerEquation::new(&self.kernel).with_share(1.0 - share);
+        of_radius(&self.sphere, &equation, a, self.thickness_m)
+    }
+
+    fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce> {
+        let hertz = self.sphere.of_indentation(d, share)?;
+        let (value, slope) = self.correction(self.chi(d), share)?;
+        Some(corrected(hertz, value, 0.5 * slope, 0.5 * slope))
+    }
+
+    fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
+        self.sphere.contact_ratio(contact_radius, indentation)
+    }
+
+    fn contact_ratio_limit(&self) -> f64 {
+        self.sphere.contact_ratio_limit()
+    }
+
+    fn layer_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<(f64, f64)> {
+        // Where each theory has erred by about 1 % in the force.
+        let limit = match self.theory {
+            LayerTheory::PublishedSeries => 0.2,
+            LayerTheory::CorrectedSeries => 0.5,
+            LayerTheory::IntegralEquation => return None,
+        };
+        let ratio =
+            indentation.map(|d| self.chi(d)).or_else(|| contact_radius.map(|a| a / self.thickness_m))?;
+        Some((ratio, limit))
+    }
+
+    fn depends_on_share(&self) -> bool {
+        self.theory != LayerTheory::PublishedSeries
+    }
+}
+
+/// The sphere is the sample, and the waveguide it presses is a layer of known modulus on a rigid base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WaveguideLaw {
+    sphere: Sphere,
+    thickness_m: f64,
+    kernel: LayerKernel,
+}
+
+impl WaveguideLaw {
+    pub(crate) fn new<T: RealField + Copy>(
+        radius_m: T,
+        waveguide: &Waveguide<T>,
+        bond: Bond,
+    ) -> Result<Self, ElasticityError> {
+        Ok(Self {
+            sphere: Sphere::new(radius_m)?,
+            thickness_m: widen(waveguide.thickness_m()),
+            kernel: LayerKernel::new(bond, waveguide.poisson_ratio())?,
+        })
+    }
+
+    fn equation(&self, share: f64) -> LayerEquation {
+        LayerEquation::new(&self.kernel).with_share(share)
+    }
+}
+
+impl ContactLaw for WaveguideLaw {
+    fn kind(&self) -> EstimatorKind {
+        EstimatorKind::SphereOnWaveguide
+    }
+
+    fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce> {
+        of_radius(&self.sphere, &self.equation(share), a, self.thickness_m)
+    }
+
+    fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce> {
+        let hertz = self.sphere.of_indentation(d, share)?;
+        let chi = (self.sphere.radius_m() * d).sqrt() / self.thickness_m;
+        let (value, slope) = at_chi(&self.equation(share), chi)?;
+        Some(corrected(hertz, value, 0.5 * slope, 0.5 * slope))
+    }
+
+    fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
+        self.sphere.contact_ratio(contact_radius, indentation)
+    }
+
+    fn contact_ratio_limit(&self) -> f64 {
+        self.sphere.contact_ratio_limit()
+    }
+
+    fn depends_on_share(&self) -> bool {
+        true
+    }
+}
+
+/// Hertz's ln f with a correction and what it adds to the slopes.
+fn corrected(hertz: LogForce, value: f64, slope: f64, size_slope: f64) -> LogForce {
+    LogForce {
+        value: hertz.value + value,
+        slope: hertz.slope + slope,
+        size_slope: hertz.size_slope + size_slope,
+    }
+}
+
+fn of_radius(sphere: &Sphere, equation: &LayerEquation, a: f64, thickness: f64) -> Option<LogForce> {
+    const STEP: f64 = 1e-4;
+    let at = |x: f64| equation.solve(x).ok().map(|c| c.force_ratio_same_radius.ln());
+    let ratio = a / thickness;
+    let slope = (at(ratio * STEP.exp())? - at(ratio * (-STEP).exp())?) / (2.0 * STEP);
+    Some(corrected(sphere.of_contact_radius(a, 0.0)?, at(ratio)?, slope, 0.0))
+}
+
+/// ln(F/F_Hertz) at χ and its slope in ln χ, by the secant method on ln(a/h).
+fn at_chi(equation: &LayerEquation, chi: f64) -> Option<(f64, f64)> {
+    const STEP: f64 = 1e-4;
+    let at = |log_a: f64| -> Option<LayerContact> { equation.solve(log_a.exp()).ok() };
+    let target = chi.ln();
+    let mut x = target;
+    let mut slope = 1.0;
+    let mut contact = at(x.min(2.9))?;
+    for _ in 0..40 {
+        let gap = contact.chi.ln() - target;
+        if gap.abs() < 1e-13 {
+            break;
+        }
+        let next = x - gap / slope;
+        let after = at(next)?;
+        if next != x {
+            slope = ((after.chi / contact.chi).ln() / (next - x)).clamp(0.1, 2.0);
+        }
+        (x, contact) = (next, after);
+    }
+    let (high, low) = (at(x + STEP)?, at(x - STEP)?);
+    let derivative = (high.force_ratio / low.force_ratio).ln() / (high.chi / low.chi).ln();
+    Some((contact.force_ratio.ln(), derivative))
+}

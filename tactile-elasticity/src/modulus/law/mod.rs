@@ -1,0 +1,87 @@
+//! Contact laws of the form F = E* f(x), x the contact radius or the indentation.
+
+mod half_space;
+mod layer;
+mod tatara;
+
+pub use half_space::{ConeLaw, Punch, Sphere};
+pub use layer::{LayerLaw, LayerTheory, WaveguideLaw};
+pub use tatara::TataraLaw;
+
+use crate::modulus::EstimatorKind;
+
+/// ln f = ln(F/E*) at one x, with its slopes in ln x and in the logarithm of the indenter's size.
+#[derive(Debug, Clone, Copy)]
+pub struct LogForce {
+    pub(crate) value: f64,
+    pub(crate) slope: f64,
+    pub(crate) size_slope: f64,
+}
+
+/// A law F = E* f(x), implemented by this crate's indenters.
+///
+/// `share` is the other body's part of 1/E*, in [0, 1): 0 where it is rigid. Most laws do not depend on it.
+pub trait ContactLaw {
+    /// Which estimator the law makes.
+    fn kind(&self) -> EstimatorKind;
+
+    /// ln f of a contact radius (m); None where the radius says nothing or the law does not reach so far.
+    #[doc(hidden)]
+    fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce>;
+
+    /// ln f of an indentation (m); None where it says nothing or the law does not reach so far.
+    #[doc(hidden)]
+    fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce>;
+
+    /// a/R of what was measured, for laws with a radius.
+    #[doc(hidden)]
+    fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64>;
+
+    /// The largest a/R for which the law is meant.
+    #[doc(hidden)]
+    fn contact_ratio_limit(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Contact over layer thickness and its limit, for laws with a layer.
+    #[doc(hidden)]
+    fn layer_ratio(&self, _contact_radius: Option<f64>, _indentation: Option<f64>) -> Option<(f64, f64)> {
+        None
+    }
+
+    /// Whether f depends on the share.
+    #[doc(hidden)]
+    fn depends_on_share(&self) -> bool {
+        false
+    }
+}
+
+impl<L: ContactLaw + ?Sized> ContactLaw for Box<L> {
+    fn kind(&self) -> EstimatorKind {
+        (**self).kind()
+    }
+
+    fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce> {
+        (**self).of_contact_radius(a, share)
+    }
+
+    fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce> {
+        (**self).of_indentation(d, share)
+    }
+
+    fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
+        (**self).contact_ratio(contact_radius, indentation)
+    }
+
+    fn contact_ratio_limit(&self) -> f64 {
+        (**self).contact_ratio_limit()
+    }
+
+    fn layer_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<(f64, f64)> {
+        (**self).layer_ratio(contact_radius, indentation)
+    }
+
+    fn depends_on_share(&self) -> bool {
+        (**self).depends_on_share()
+    }
+}
