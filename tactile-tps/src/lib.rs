@@ -1,2 +1,29 @@
 //! Thin-plate splines in two and three dimensions: fit, evaluate, differentiate, smooth.
 #![forbid(unsafe_code)]
+// Several arrays share one index in dense linear algebra; zipping them hides it.
+#![allow(clippy::needless_range_loop)]
+
+mod affine;
+mod cholesky;
+mod error;
+mod factorization;
+mod kernel;
+mod null_space;
+mod options;
+mod real;
+mod report;
+mod sites;
+mod span;
+mod spline;
+mod system;
+mod warp;
+
+pub use affine::{Affine, AffineModel, Rigid, RigidModel};
+pub use error::{Input, TpsError};
+pub use factorization::{Factorization, Workspace};
+pub use kernel::{Jet, Kernel, NegR, R2LogR, R3};
+pub use options::{FitOptions, Smoothing};
+pub use real::{Real, Scalar};
+pub use report::FitReport;
+pub use spline::{Spline, ThinPlateSpline};
+pub use warp::{Warp, WarpModel};

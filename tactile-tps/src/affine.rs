@@ -1,0 +1,193 @@
+//! Affine maps and rigid motions, fitted by weighted least squares.
+
+use nalgebra::{Point, SMatrix, SVector};
+
+use crate::{Scalar, TpsError, Warp, WarpModel, error::Input, options::validate_weights, sites::finite};
+
+/// The affine map f(x) = A x + b.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned"))]
+pub struct Affine<T: Scalar, const D: usize> {
+    /// The Jacobian A.
+    pub linear: SMatrix<T, D, D>,
+    /// The image b of the origin.
+    pub offset: SVector<T, D>,
+}
+
+impl<T: Scalar, const D: usize> Affine<T, D> {
+    /// The map x ↦ `linear` x + `offset`.
+    pub fn new(linear: SMatrix<T, D, D>, offset: SVector<T, D>) -> Self {
+        Self { linear, offset }
+    }
+
+    /// The map that leaves every point where it is.
+    pub fn identity() -> Self {
+        Self::new(SMatrix::identity(), SVector::zeros())
+    }
+}
+
+impl<T: Scalar, const D: usize> Warp<T, D> for Affine<T, D> {
+    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+        Point::from(self.linear * point.coords + self.offset)
+    }
+    fn jacobian(&self, _: &Point<T, D>) -> SMatrix<T, D, D> {
+        self.linear
+    }
+}
+
+/// The rigid motion f(x) = R x + b with R a rotation (no reflection).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned"))]
+pub struct Rigid<T: Scalar, const D: usize> {
+    /// The rotation R.
+    pub rotation: SMatrix<T, D, D>,
+    /// The image b of the origin.
+    pub translation: SVector<T, D>,
+}
+
+impl<T: Scalar, const D: usize> Rigid<T, D> {
+    /// The motion that leaves every point where it is.
+    pub fn identity() -> Self {
+        Self { rotation: SMatrix::identity(), translation: SVector::zeros() }
+    }
+}
+
+impl<T: Scalar, const D: usize> Warp<T, D> for Rigid<T, D> {
+    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+        Point::from(self.rotation * point.coords + self.translation)
+    }
+    fn jacobian(&self, _: &Point<T, D>) -> SMatrix<T, D, D> {
+        self.rotation
+    }
+}
+
+/// Fits an [`Affine`] map: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
+///
+/// Along directions the points do not span the map moves points with their mean (the pseudo-inverse S⁺).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct AffineModel;
+
+/// Fits a [`Rigid`] motion: the rotation nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RigidModel;
+
+/// Weighted moments of pairs about their means, in `f64`.
+struct Moments<const D: usize> {
+    source_mean: SVector<f64, D>,
+    target_mean: SVector<f64, D>,
+    cross: SMatrix<f64, D, D>,
+    scatter: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> Moments<D> {
+    fn new<T: Scalar>(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self, TpsError> {
+        validate(sources, targets, weights)?;
+        let weight = |i: usize| weights.map_or(1.0, |w| w[i].widen());
+        let vector = |p: &Point<T, D>| p.coords.map(Scalar::widen);
+        let total: f64 = (0..sources.len()).map(weight).sum();
+        let mean = |points: &[Point<T, D>]| {
+            let origin = vector(&points[0]);
+            let sum = |sum: SVector<f64, D>, (i, p)| sum + (vector(p) - origin) * (weight(i) / total);
+            origin + points.iter().enumerate().fold(SVector::zeros(), sum)
+        };
+        let (source_mean, target_mean) = (mean(sources), mean(targets));
+        let (mut cross, mut scatter) = (SMatrix::zeros(), SMatrix::zeros());
+        for (i, (x, y)) in sources.iter().zip(targets).enumerate() {
+            let (x, y) = (vector(x) - source_mean, vector(y) - target_mean);
+            cross += y * x.transpose() * (weight(i) / total);
+            scatter += x * x.transpose() * (weight(i) / total);
+        }
+        Ok(Self { source_mean, target_mean, cross, scatter })
+    }
+
+    fn offset<T: Scalar>(&self, linear: &SMatrix<f64, D, D>) -> SVector<T, D> {
+        (self.target_mean - linear * self.source_mean).map(T::narrow)
+    }
+}
+
+fn validate<T: Scalar, const D: usize>(
+    sources: &[Point<T, D>],
+    targets: &[Point<T, D>],
+    weights: Option<&[T]>,
+) -> Result<(), TpsError> {
+    if sources.is_empty() {
+        return Err(TpsError::Empty(Input::Sources));
+    }
+    if targets.len() != sources.len() {
+        return Err(TpsError::Length {
+            input: Input::Targets,
+            expected: sources.len(),
+            found: targets.len(),
+        });
+    }
+    finite(sources, Input::Sources)?;
+    finite(targets, Input::Targets)?;
+    weights.map_or(Ok(()), |weights| validate_weights(weights, sources.len()))
+}
+
+/// Eigenvalues and vectors of a symmetric `D` × `D` matrix.
+fn symmetric_eigen<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (Vec<f64>, nalgebra::DMatrix<f64>) {
+    let dynamic = nalgebra::DMatrix::from_fn(D, D, |i, j| matrix[(i, j)]);
+    let eigen = dynamic.symmetric_eigen();
+    (eigen.eigenvalues.iter().copied().collect(), eigen.eigenvectors)
+}
+
+impl<T: Scalar, const D: usize> WarpModel<T, D> for AffineModel {
+    type Warp = Affine<T, D>;
+
+    fn fit(
+        &self,
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Affine<T, D>, TpsError> {
+        let moments = Moments::new(sources, targets, weights)?;
+        let (values, vectors) = symmetric_eigen(&moments.scatter);
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let mut linear = SMatrix::<f64, D, D>::zeros();
+        for (k, &value) in values.iter().enumerate() {
+            if value > largest * 1e-13 {
+                let axis = SVector::<f64, D>::from_fn(|i, _| vectors[(i, k)]);
+                linear += moments.cross * axis * axis.transpose() / value;
+            }
+        }
+        Ok(Affine::new(linear.map(T::narrow), moments.offset(&linear)))
+    }
+}
+
+impl<T: Scalar, const D: usize> WarpModel<T, D> for RigidModel {
+    type Warp = Rigid<T, D>;
+
+    fn fit(
+        &self,
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Rigid<T, D>, TpsError> {
+        let moments = Moments::new(sources, targets, weights)?;
+        let rotation = nearest_rotation(&moments.cross);
+        Ok(Rigid { rotation: rotation.map(T::narrow), translation: moments.offset(&rotation) })
+    }
+}
+
+/// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value decomposition.
+fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let svd = nalgebra::DMatrix::from_fn(D, D, |i, j| cross[(i, j)]).svd(true, true);
+    let (Some(mut u), Some(vt)) = (svd.u, svd.v_t) else {
+        return SMatrix::identity();
+    };
+    if (&u * &vt).determinant() < 0.0 {
+        let smallest = svd.singular_values.imin();
+        u.column_mut(smallest).neg_mut();
+    }
+    let rotation = u * vt;
+    SMatrix::from_fn(|i, j| rotation[(i, j)])
+}

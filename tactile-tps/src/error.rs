@@ -1,0 +1,100 @@
+//! What can be wrong with the input, each case with the numbers that say where.
+
+use thiserror::Error;
+
+/// The argument an error speaks of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Input {
+    /// The source points, where the spline is pinned.
+    Sources,
+    /// The target points, the values taken there.
+    Targets,
+    /// The weights, one a point.
+    Weights,
+    /// The places a spline is evaluated at.
+    Queries,
+    /// The caller's memory that takes the results.
+    Output,
+}
+
+impl core::fmt::Display for Input {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Sources => "source points",
+            Self::Targets => "target points",
+            Self::Weights => "weights",
+            Self::Queries => "query points",
+            Self::Output => "output slice",
+        })
+    }
+}
+
+/// Everything that can go wrong in this crate.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum TpsError {
+    /// There is nothing to fit: no point at all, or none with a weight above zero.
+    #[error("no {0} to fit")]
+    Empty(Input),
+    /// Two arguments that belong together differ in length.
+    #[error("{input}: expected {expected} of them, found {found}")]
+    Length {
+        /// The argument of the wrong length.
+        input: Input,
+        /// How many there should be.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("{input}: number {index} (from zero) is not finite")]
+    NotFinite {
+        /// The argument with the bad number.
+        input: Input,
+        /// Its position, counted from zero.
+        index: usize,
+    },
+    /// A weight is negative, NaN or infinite.
+    #[error("weight {index} (from zero) is {value}, expected a finite number of at least zero")]
+    Weight {
+        /// Its position, counted from zero.
+        index: usize,
+        /// What was found there.
+        value: f64,
+    },
+    /// The smoothing parameter is negative, NaN or infinite.
+    #[error("smoothing parameter {value}, expected a finite number of at least zero")]
+    Lambda {
+        /// What was given.
+        value: f64,
+    },
+    /// The tolerance below which a direction counts as not spanned is outside `[0, 1)`.
+    #[error("rank tolerance {value}, expected a number from 0 to below 1")]
+    RankTolerance {
+        /// What was given.
+        value: f64,
+    },
+    /// Two source points coincide, their targets differ, and no smoothing was asked for.
+    #[error("source points {first} and {second} coincide but their targets differ: smooth, or drop one")]
+    Conflict {
+        /// The earlier of the two.
+        first: usize,
+        /// The later of the two.
+        second: usize,
+    },
+    /// Cross-validation needs more points than the polynomial has coefficients.
+    #[error("cross-validation needs more than {needed} distinct points, found {found}")]
+    TooFewForValidation {
+        /// Coefficients of the polynomial.
+        needed: usize,
+        /// Distinct points of positive weight.
+        found: usize,
+    },
+    /// The kernel's matrix is not positive definite on the complement of the affine functions.
+    #[error("kernel is not conditionally positive definite on these points (column {column})")]
+    NotDefinite {
+        /// Column of the projected matrix whose pivot failed.
+        column: usize,
+    },
+}

@@ -1,0 +1,114 @@
+//! Radial kernels: what a spline is made of.
+
+use crate::real::Real;
+
+/// A kernel's value and derivatives with respect to the **squared** distance s = r².
+///
+/// With d = x − xᵢ the term U(|d|) has the gradient `2 first d` and the Hessian `2 first I + 4 second d dᵀ`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jet<R> {
+    /// U.
+    pub value: R,
+    /// dU/ds.
+    pub first: R,
+    /// d²U/ds².
+    pub second: R,
+}
+
+/// A radial function U(r) that is conditionally positive definite of order at most two.
+///
+/// That is: Σᵢⱼ wᵢ wⱼ U(|xᵢ − xⱼ|) > 0 for distinct points and any w ≠ 0 with Σ wᵢ = 0 and Σ wᵢ xᵢ = 0. The three
+/// kernels of the crate are; a kernel of your own needs [`jet`](Self::jet) alone.
+///
+/// ```
+/// use tactile_tps::{Jet, Kernel, Real};
+///
+/// /// −√(r² + c²), Hardy's multiquadric.
+/// #[derive(Clone, Copy, Debug)]
+/// struct Multiquadric(f64);
+///
+/// impl Kernel for Multiquadric {
+///     fn jet<R: Real>(&self, s: R) -> Jet<R> {
+///         let root = (s + R::from_f64(self.0 * self.0)).sqrt();
+///         let first = R::from_f64(-0.5) / root;
+///         Jet { value: -root, first, second: -first * R::from_f64(0.5) / (root * root) }
+///     }
+/// }
+/// ```
+pub trait Kernel: Clone + Send + Sync {
+    /// U and its derivatives with respect to s = r² ≥ 0. At s = 0 give the limit of U; a derivative without a
+    /// limit is given as 0, which leaves the point's own term out.
+    fn jet<R: Real>(&self, s: R) -> Jet<R>;
+
+    /// U alone.
+    #[inline(always)]
+    fn value<R: Real>(&self, s: R) -> R {
+        self.jet(s).value
+    }
+
+    /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0; `None` if there is none.
+    ///
+    /// Points are scaled to unit size inside when there is one. A kernel with a length of its own has none.
+    fn degree(&self) -> Option<i32> {
+        None
+    }
+}
+
+/// U(r) = r² ln r with U(0) = 0: the thin plate of the plane (m = 2, D = 2).
+///
+/// Bookstein's r² ln r² is twice this: with it the weights halve, and λ must be doubled for the same spline.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct R2LogR;
+
+/// U(r) = −r: the same energy in space (m = 2, D = 3). Its gradient has a cusp at each source point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct NegR;
+
+/// U(r) = r³: one derivative smoother than −r (m = 3 in space, with an affine polynomial).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct R3;
+
+/// `x` where s > 0, else zero.
+#[inline(always)]
+fn off_centre<R: Real>(s: R, x: R) -> R {
+    if s > R::zero() { x } else { R::zero() }
+}
+
+impl Kernel for R2LogR {
+    #[inline(always)]
+    fn jet<R: Real>(&self, s: R) -> Jet<R> {
+        let half = R::from_f64(0.5);
+        let log = off_centre(s, s.ln());
+        let half_log = half * log;
+        Jet { value: s * half_log, first: off_centre(s, half_log + half), second: off_centre(s, half / s) }
+    }
+    fn degree(&self) -> Option<i32> {
+        Some(2)
+    }
+}
+
+impl Kernel for NegR {
+    #[inline(always)]
+    fn jet<R: Real>(&self, s: R) -> Jet<R> {
+        let r = s.sqrt();
+        let first = off_centre(s, R::from_f64(-0.5) / r);
+        Jet { value: -r, first, second: off_centre(s, R::from_f64(-0.5) * first / s) }
+    }
+    fn degree(&self) -> Option<i32> {
+        Some(1)
+    }
+}
+
+impl Kernel for R3 {
+    #[inline(always)]
+    fn jet<R: Real>(&self, s: R) -> Jet<R> {
+        let r = s.sqrt();
+        Jet { value: s * r, first: R::from_f64(1.5) * r, second: off_centre(s, R::from_f64(0.75) / r) }
+    }
+    fn degree(&self) -> Option<i32> {
+        Some(3)
+    }
+}

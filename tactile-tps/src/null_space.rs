@@ -1,0 +1,183 @@
+//! The affine functions at the sites, and the orthogonal complement the kernel is definite on.
+//!
+//! P = [1 X] (rows scaled by √weight) is factored P Π = Q [R; 0] by Householder reflectors with column pivoting. With
+//! Q = [Q₁ Q₂] the side condition Pᵀw = 0 reads w = Q₂z, and Q₂ᵀKQ₂ is positive definite. Q is kept in the
+//! compact form I − V T Vᵀ (Schreiber & Van Loan 1989), so that one pass over K projects it.
+
+/// At most D + 1 columns.
+pub(crate) const MAX: usize = 4;
+
+/// Householder factorisation of the n × q matrix of affine functions.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NullSpace {
+    /// Number of sites.
+    pub(crate) n: usize,
+    /// Number of affine functions, the rank of [1 X].
+    pub(crate) q: usize,
+    /// Reflectors, column by column.
+    v: Vec<f64>,
+    /// Upper triangle of the compact form.
+    t: [[f64; MAX]; MAX],
+    /// `r[i][j]`, upper triangle in pivoted order.
+    r: [[f64; MAX]; MAX],
+    /// Original column of each pivoted one.
+    order: [usize; MAX],
+}
+
+impl NullSpace {
+    /// Factors the columns in `v` (n × q, column by column), which it keeps as its own.
+    pub(crate) fn factor(&mut self, n: usize, q: usize, fill: impl FnOnce(&mut [f64])) {
+        (self.n, self.q) = (n, q);
+        self.v.clear();
+        self.v.resize(n * q, 0.0);
+        fill(&mut self.v);
+        self.order = core::array::from_fn(|k| k);
+        let mut tau = [0.0; MAX];
+        for k in 0..q {
+            self.pivot(k);
+            tau[k] = self.reflect(k);
+        }
+        self.compact(&tau);
+    }
+
+    /// Entry of the triangle R Πᵀ, columns in their original order.
+    pub(crate) fn triangle(&self, row: usize, column: usize) -> f64 {
+        let place = self.order[..self.q].iter().position(|&c| c == column);
+        place.filter(|&place| place >= row).map_or(0.0, |place| self.r[row][place])
+    }
+
+    fn column(&self, k: usize) -> &[f64] {
+        &self.v[k * self.n..(k + 1) * self.n]
+    }
+
+    /// Brings the column of largest remaining norm to place `k`.
+    fn pivot(&mut self, k: usize) {
+        let norm = |j: usize| self.column(j)[k..].iter().map(|x| x * x).sum::<f64>();
+        let best =
+            (k..self.q).fold((k, -1.0), |best, j| if norm(j) > best.1 { (j, norm(j)) } else { best }).0;
+        if best != k {
+            let (left, right) = self.v.split_at_mut(best * self.n);
+            left[k * self.n..(k + 1) * self.n].swap_with_slice(&mut right[..self.n]);
+            self.order.swap(k, best);
+            for row in &mut self.r[..k] {
+                row.swap(k, best);
+            }
+        }
+    }
+
+    /// Makes column `k` a reflector with unit head, applies it to the later columns and returns its factor.
+    fn reflect(&mut self, k: usize) -> f64 {
+        let n = self.n;
+        let (left, right) = self.v.split_at_mut((k + 1) * n);
+        let column = &mut left[k * n..];
+        let norm = column[k..].iter().map(|x| x * x).sum::<f64>().sqrt();
+        let head = column[k];
+        let beta = if head > 0.0 { -norm } else { norm };
+        self.r[k][k] = beta;
+        if norm == 0.0 {
+            column.fill(0.0);
+            return 0.0;
+        }
+        column[..k].fill(0.0);
+        column[k] = 1.0;
+        column[k + 1..].iter_mut().for_each(|x| *x /= head - beta);
+        let tau = (beta - head) / beta;
+        for (j, other) in right.chunks_exact_mut(n).enumerate() {
+            let dot = tau * column[k..].iter().zip(&other[k..]).map(|(a, b)| a * b).sum::<f64>();
+            other[k..].iter_mut().zip(&column[k..]).for_each(|(o, v)| *o -= dot * v);
+            self.r[k][k + 1 + j] = other[k];
+        }
+        tau
+    }
+
+    fn compact(&mut self, tau: &[f64; MAX]) {
+        let mut t = [[0.0; MAX]; MAX];
+        for k in 0..self.q {
+            t[k][k] = tau[k];
+            let mut z = [0.0; MAX];
+            for (i, z) in z.iter_mut().enumerate().take(k) {
+                *z = dot(self.column(i), self.column(k));
+            }
+            for i in 0..k {
+                t[i][k] = -tau[k] * (i..k).map(|j| t[i][j] * z[j]).sum::<f64>();
+            }
+        }
+        self.t = t;
+    }
+
+    /// b ← Qᵀb for one column.
+    pub(crate) fn apply_transpose(&self, b: &mut [f64]) {
+        self.apply_compact(b, true);
+    }
+
+    /// b ← Qb for one column.
+    pub(crate) fn apply(&self, b: &mut [f64]) {
+        self.apply_compact(b, false);
+    }
+
+    fn apply_compact(&self, b: &mut [f64], transpose: bool) {
+        let q = self.q;
+        let mut s = [0.0; MAX];
+        (0..q).for_each(|k| s[k] = dot(self.column(k), b));
+        let mut u = [0.0; MAX];
+        for i in 0..q {
+            for j in 0..q {
+                u[i] += if transpose { self.t[j][i] } else { self.t[i][j] } * s[j];
+            }
+        }
+        for k in 0..q {
+            b.iter_mut().zip(self.column(k)).for_each(|(b, v)| *b -= u[k] * v);
+        }
+    }
+
+    /// QᵀKQ of the symmetric n × n matrix `k` (column by column, all of it) in place, with `x` as scratch (n · q).
+    ///
+    /// Y = KVT, X = Y − ½ V(TᵀVᵀY), and QᵀKQ = K − VXᵀ − XVᵀ.
+    pub(crate) fn project(&self, k: &mut [f64], x: &mut Vec<f64>) {
+        let (n, q) = (self.n, self.q);
+        x.clear();
+        x.resize(n * q, 0.0);
+        for (j, column) in k.chunks_exact(n).enumerate() {
+            let mut s = [0.0; MAX];
+            (0..q).for_each(|c| s[c] = dot(self.column(c), column));
+            for c in 0..q {
+                x[c * n + j] = (0..q).map(|i| s[i] * self.t[i][c]).sum();
+            }
+        }
+        let mut s = [[0.0; MAX]; MAX];
+        for (c, y) in x.chunks_exact(n).enumerate() {
+            let z: [f64; MAX] = core::array::from_fn(|i| if i < q { dot(self.column(i), y) } else { 0.0 });
+            for i in 0..q {
+                s[i][c] = 0.5 * (0..q).map(|l| self.t[l][i] * z[l]).sum::<f64>();
+            }
+        }
+        for (c, y) in x.chunks_exact_mut(n).enumerate() {
+            for i in 0..q {
+                y.iter_mut().zip(self.column(i)).for_each(|(y, v)| *y -= s[i][c] * v);
+            }
+        }
+        for (j, column) in k.chunks_exact_mut(n).enumerate() {
+            for c in 0..q {
+                let (vj, xj) = (self.v[c * n + j], x[c * n + j]);
+                let pairs = self.column(c).iter().zip(&x[c * n..(c + 1) * n]);
+                column.iter_mut().zip(pairs).for_each(|(k, (v, x))| *k -= v * xj + x * vj);
+            }
+        }
+    }
+
+    /// Solves R Πᵀ a = b: the coefficients of the columns in their original order.
+    pub(crate) fn solve_upper(&self, b: &[f64]) -> [f64; MAX] {
+        let mut pivoted = [0.0; MAX];
+        for i in (0..self.q).rev() {
+            let rest: f64 = (i + 1..self.q).map(|j| self.r[i][j] * pivoted[j]).sum();
+            pivoted[i] = (b[i] - rest) / self.r[i][i];
+        }
+        let mut a = [0.0; MAX];
+        (0..self.q).for_each(|i| a[self.order[i]] = pivoted[i]);
+        a
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

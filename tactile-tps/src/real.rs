@@ -1,0 +1,193 @@
+//! The arithmetic a kernel may use, and the scalars a spline works in.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+use nalgebra::RealField;
+
+/// What a [`Kernel`](crate::Kernel) may do with a number.
+///
+/// Kernels are written once against this trait and run in every arithmetic the crate needs: `f32`, `f64`, their
+/// vectorised forms, and twice the working precision where digits would be lost.
+///
+/// Comparison is allowed; keep both branches free of side effects and the compiler turns them into a select.
+pub trait Real:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The nearest number to `x`.
+    fn from_f64(x: f64) -> Self;
+    /// The nearest `f64`.
+    fn to_f64(self) -> f64;
+    /// √x.
+    fn sqrt(self) -> Self;
+    /// Natural logarithm of a positive, finite number; anything (but no panic) elsewhere.
+    fn ln(self) -> Self;
+    /// eˣ.
+    fn exp(self) -> Self;
+    /// `self · a + b`, rounded once where that costs nothing extra.
+    fn mul_add(self, a: Self, b: Self) -> Self;
+    /// The number zero.
+    #[inline(always)]
+    fn zero() -> Self {
+        Self::from_f64(0.0)
+    }
+}
+
+/// A [`Real`] that stands for the scalar `T` in a vectorised loop.
+pub trait Lane<T>: Real {
+    /// Wraps the scalar.
+    fn new(x: T) -> Self;
+    /// Unwraps it.
+    fn get(self) -> T;
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
+}
+
+/// The scalar type of points: `f32` or `f64`.
+///
+/// Fits are always computed in `f64`; the type decides in which precision the spline is kept and evaluated.
+pub trait Scalar: RealField + Copy + Default + sealed::Sealed {
+    /// Arithmetic without a hardware fused multiply-add.
+    #[doc(hidden)]
+    type Plain: Lane<Self>;
+    /// Arithmetic with it.
+    #[doc(hidden)]
+    type Fused: Lane<Self>;
+    /// Unit roundoff, half the distance from one to the next number.
+    const UNIT_ROUNDOFF: f64;
+    /// The nearest number to `x`.
+    fn narrow(x: f64) -> Self;
+    /// The same number as `f64`.
+    fn widen(self) -> f64;
+}
+
+/// `f32` or `f64` whose `mul_add` is one hardware instruction.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct Fused<T>(T);
+
+macro_rules! real {
+    ($t:ident, $unit:expr, $ln:path, $ln_fused:path) => {
+        impl Scalar for $t {
+            type Plain = $t;
+            type Fused = Fused<$t>;
+            const UNIT_ROUNDOFF: f64 = $unit;
+            #[inline(always)]
+            fn narrow(x: f64) -> Self {
+                x as $t
+            }
+            #[inline(always)]
+            fn widen(self) -> f64 {
+                self as f64
+            }
+        }
+
+        impl Lane<$t> for $t {
+            #[inline(always)]
+            fn new(x: $t) -> Self {
+                x
+            }
+            #[inline(always)]
+            fn get(self) -> $t {
+                self
+            }
+        }
+
+        impl Real for $t {
+            #[inline(always)]
+            fn from_f64(x: f64) -> Self {
+                x as $t
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                <$t>::sqrt(self)
+            }
+            #[inline(always)]
+            fn ln(self) -> Self {
+                $ln(self)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                <$t>::exp(self)
+            }
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                self * a + b
+            }
+        }
+
+        impl Lane<$t> for Fused<$t> {
+            #[inline(always)]
+            fn new(x: $t) -> Self {
+                Self(x)
+            }
+            #[inline(always)]
+            fn get(self) -> $t {
+                self.0
+            }
+        }
+
+        impl Real for Fused<$t> {
+            #[inline(always)]
+            fn from_f64(x: f64) -> Self {
+                Self(x as $t)
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                self.0 as f64
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(self.0.sqrt())
+            }
+            #[inline(always)]
+            fn ln(self) -> Self {
+                Self($ln_fused(self.0))
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                Self(self.0.exp())
+            }
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                Self(self.0.mul_add(a.0, b.0))
+            }
+        }
+    };
+}
+
+real!(f32, 5.960_464_477_539_063e-8, f32::ln, f32::ln);
+real!(f64, 1.110_223_024_625_156_5e-16, f64::ln, f64::ln);
+
+macro_rules! operator {
+    ($($trait:ident $method:ident),*) => {$(
+        impl<T: $trait<Output = T>> $trait for Fused<T> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0))
+            }
+        }
+    )*};
+}
+operator!(Add add, Sub sub, Mul mul, Div div);
+
+impl<T: Neg<Output = T>> Neg for Fused<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}

@@ -1,0 +1,31 @@
+//! What a fit has to say about itself.
+
+/// How a spline was fitted and how far it can be trusted.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct FitReport {
+    /// Points given.
+    pub points: usize,
+    /// Points merged into an earlier one at the same place.
+    pub merged: usize,
+    /// Points left out because their weight is zero.
+    pub ignored: usize,
+    /// Rank of [1 X]: one more than the number of directions the points span; D + 1 when they span space.
+    pub rank: usize,
+    /// Root mean square extent of the points along their principal directions relative to the largest, falling.
+    ///
+    /// A tiny last entry says that the gradient along that direction is noise over thickness.
+    pub extents: Vec<f64>,
+    /// The smoothing parameter λ used, in the units of the points and the kernel; 0 for interpolation.
+    pub lambda: f64,
+    /// Estimated 2-norm condition number of the matrix solved with, in the inner units; 1 if there was none.
+    pub condition: f64,
+    /// Largest difference between the spline's own equations and what they should be, relative to the targets.
+    pub residual: f64,
+    /// Steps of iterative refinement taken.
+    pub refinements: usize,
+    /// Decimal digits left in a plain sum of the spline's terms near the points: −log₁₀ of its rounding error
+    /// relative to the targets' size.
+    pub digits: f64,
+}

@@ -1,0 +1,289 @@
+//! The fitted spline: values, derivatives, energy.
+
+use nalgebra::{Point, SMatrix, SVector};
+
+use crate::{
+    Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
+    sites::{Frame, Sites},
+    span::Span,
+    warp::same_length,
+};
+
+/// A thin-plate spline from `D`-space to `M`-space: f(x) = a₀ + A x + Σᵢ wᵢ U(|x − xᵢ|).
+///
+/// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw (Wahba 1990).
+#[derive(Clone, Debug)]
+pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
+    kernel: K,
+    frame: Frame<D>,
+    /// Centres in the frame, axis by axis.
+    centres: Vec<T>,
+    /// Weights in the frame, output by output.
+    weights: Vec<T>,
+    constant: [T; M],
+    linear: [[T; D]; M],
+    report: FitReport,
+}
+
+/// A spline that maps space onto itself.
+pub type ThinPlateSpline<T, const D: usize, K = R2LogR> = Spline<T, D, D, K>;
+
+/// Geometry a spline copies from its factorisation.
+pub(crate) struct Shape<'a, const D: usize> {
+    pub(crate) sites: &'a Sites<D>,
+    pub(crate) span: &'a Span<D>,
+}
+
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
+    /// The spline that takes `sources` to `targets`.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for bad input, coinciding points with different targets, or a kernel that is not definite.
+    pub fn fit(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, M>],
+        options: &FitOptions<T, K>,
+    ) -> Result<Self, TpsError> {
+        Factorization::new(sources, options)?.fit(targets)
+    }
+
+    /// A spline that is zero everywhere, for a refit to fill.
+    pub fn empty(kernel: K) -> Self {
+        Self {
+            kernel,
+            frame: Frame { centre: [0.0; D], scale: 1.0 },
+            centres: Vec::new(),
+            weights: Vec::new(),
+            constant: [T::zero(); M],
+            linear: [[T::zero(); D]; M],
+            report: FitReport {
+                points: 0,
+                merged: 0,
+                ignored: 0,
+                rank: 0,
+                extents: Vec::new(),
+                lambda: 0.0,
+                condition: 1.0,
+                residual: 0.0,
+                refinements: 0,
+                digits: 0.0,
+            },
+        }
+    }
+
+    pub(crate) fn assign(
+        &mut self,
+        factorization: &Factorization<T, D, K>,
+        weights: &[f64],
+        origin: &[f64; M],
+        affine: &[[f64; 4]; M],
+        report: FitReport,
+        _size: f64,
+    ) {
+        let Shape { sites, span } = factorization.shape();
+        self.frame = sites.frame;
+        self.centres.clear();
+        sites.axes.iter().for_each(|axis| self.centres.extend(axis.iter().map(|&x| T::narrow(x))));
+        self.weights.clear();
+        self.weights.extend(weights.iter().map(|&w| T::narrow(w)));
+        for k in 0..M {
+            self.constant[k] = T::narrow(origin[k] + affine[k][0]);
+            self.linear[k] = span.gradient(&affine[k][1..]).map(T::narrow);
+        }
+        self.report = report;
+    }
+
+    /// How the fit went.
+    pub fn report(&self) -> &FitReport {
+        &self.report
+    }
+
+    /// Number of distinct centres.
+    fn count(&self) -> usize {
+        self.centres.len() / D
+    }
+
+    /// The distinct centres, in the order of the source points.
+    pub fn centres(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + '_ {
+        let n = self.count();
+        (0..n).map(move |j| {
+            let inside = |k: usize| self.centres[k * n + j].widen();
+            Point::from(SVector::from_fn(|k, _| {
+                T::narrow(inside(k) * self.frame.scale + self.frame.centre[k])
+            }))
+        })
+    }
+
+    /// The weight wᵢ of every centre, in the kernel's own units.
+    pub fn weights(&self) -> impl ExactSizeIterator<Item = SVector<f64, M>> + '_ {
+        let (n, unit) = (self.count(), self.unit());
+        (0..n).map(move |j| SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit))
+    }
+
+    /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' own units.
+    ///
+    /// Kernels are scaled to unit size inside; what that leaves of a kernel like r² ln r, a multiple of r², is
+    /// affine by the side conditions and is accounted for here.
+    pub fn affine(&self) -> (SMatrix<f64, M, D>, SVector<f64, M>) {
+        let Frame { centre, scale } = self.frame;
+        let linear = SMatrix::from_fn(|i, j| self.linear[i][j].widen() / scale);
+        let kernel = |s: f64| self.kernel.value(s);
+        let square = kernel(scale * scale) / self.unit() - kernel(1.0);
+        let n = self.count();
+        let offset = SVector::from_fn(|i, _| {
+            let norm = |j: usize| (0..D).map(|k| self.centres[k * n + j].widen().powi(2)).sum::<f64>();
+            let second: f64 = (0..n).map(|j| self.weights[i * n + j].widen() * norm(j)).sum();
+            let shift: f64 = (0..D).map(|k| self.linear[i][k].widen() * (centre[k] / scale)).sum();
+            self.constant[i].widen() - shift - square * second
+        });
+        (linear, offset)
+    }
+
+    /// How much larger the kernel is outside than in the frame.
+    fn unit(&self) -> f64 {
+        self.frame.scale.powi(self.kernel.degree().unwrap_or(0))
+    }
+
+    /// Value, first and second derivatives in the frame's units of length.
+    fn jet(&self, point: &Point<T, D>) -> ([T; M], [[T; D]; M], [[[T; D]; D]; M]) {
+        let x = self.frame.inside(point).map(T::narrow);
+        let n = self.count();
+        let mut value = self.constant;
+        let mut gradient = self.linear;
+        let mut hessian = [[[T::zero(); D]; D]; M];
+        for k in 0..M {
+            for i in 0..D {
+                value[k] += self.linear[k][i] * x[i];
+            }
+        }
+        let two = T::one() + T::one();
+        for j in 0..n {
+            let d: [T; D] = core::array::from_fn(|i| x[i] - self.centres[i * n + j]);
+            let s = d.iter().fold(T::zero(), |s, &d| s + d * d);
+            let jet = self.kernel.jet(<T::Plain as crate::real::Lane<T>>::new(s));
+            let [u, first, second] = [jet.value, jet.first, jet.second].map(crate::real::Lane::get);
+            for k in 0..M {
+                let w = self.weights[k * n + j];
+                value[k] += w * u;
+                for i in 0..D {
+                    gradient[k][i] += two * w * first * d[i];
+                    hessian[k][i][i] += two * w * first;
+                    for l in 0..D {
+                        hessian[k][i][l] += two * two * w * second * d[i] * d[l];
+                    }
+                }
+            }
+        }
+        (value, gradient, hessian)
+    }
+
+    /// f(x).
+    pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
+        Point::from(SVector::from(self.jet(point).0))
+    }
+
+    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own term is left out.
+    pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
+        let gradient = self.jet(point).1;
+        let scale = T::narrow(self.frame.scale);
+        SMatrix::from_fn(|i, j| gradient[i][j] / scale)
+    }
+
+    /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
+    pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
+        let hessian = self.jet(point).2;
+        let scale = T::narrow(self.frame.scale);
+        hessian.map(|h| SMatrix::from_fn(|i, j| h[i][j] / scale / scale))
+    }
+
+    /// f at many points, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn apply_into(&self, points: &[Point<T, D>], values: &mut [Point<T, M>]) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        points.iter().zip(values).for_each(|(point, value)| *value = self.apply(point));
+        Ok(())
+    }
+
+    /// Jacobians at many points, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        jacobians: &mut [SMatrix<T, M, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), jacobians.len())?;
+        points.iter().zip(jacobians).for_each(|(point, jacobian)| *jacobian = self.jacobian(point));
+        Ok(())
+    }
+
+    /// wᵀKw, summed over the outputs, in the kernel's own units; O(n²).
+    ///
+    /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second derivatives is 8π times this.
+    pub fn bending_energy(&self) -> f64 {
+        let n = self.count();
+        let mut energy = 0.0;
+        for i in 0..n {
+            for j in 0..n {
+                let difference = |k: usize| (self.centres[k * n + i] - self.centres[k * n + j]).widen();
+                let s: f64 = (0..D).map(|k| difference(k) * difference(k)).sum();
+                let u = self.kernel.value(s);
+                let products =
+                    (0..M).map(|k| self.weights[k * n + i].widen() * self.weights[k * n + j].widen());
+                energy += u * products.sum::<f64>();
+            }
+        }
+        energy / self.unit()
+    }
+}
+
+impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
+    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+        Spline::apply(self, point)
+    }
+    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
+        Spline::jacobian(self, point)
+    }
+    fn apply_into(&self, points: &[Point<T, D>], images: &mut [Point<T, D>]) -> Result<(), TpsError> {
+        Spline::apply_into(self, points, images)
+    }
+    fn jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        jacobians: &mut [SMatrix<T, D, D>],
+    ) -> Result<(), TpsError> {
+        Spline::jacobian_into(self, points, jacobians)
+    }
+}
+
+impl<T: Scalar, const D: usize, K: Kernel> crate::WarpModel<T, D> for FitOptions<T, K> {
+    type Warp = ThinPlateSpline<T, D, K>;
+
+    /// The options' own weights are replaced by `weights` where these are given.
+    fn fit(
+        &self,
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self::Warp, TpsError> {
+        match weights {
+            None => Spline::fit(sources, targets, self),
+            Some(weights) => Spline::fit(sources, targets, &self.clone().weights(weights.to_vec())),
+        }
+    }
+}
