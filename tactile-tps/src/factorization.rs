@@ -42,7 +42,6 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
 pub struct Workspace {
     values: Vec<f64>,
     scratch: Vec<f64>,
-    site_weights: Vec<f64>,
     system: System,
 }
 

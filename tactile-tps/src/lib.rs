@@ -6,12 +6,16 @@
 mod affine;
 mod cholesky;
 mod error;
+mod evaluate;
 mod factorization;
 mod kernel;
+mod logarithm;
 mod null_space;
 mod options;
 mod real;
 mod report;
+mod sample;
+mod simd;
 mod sites;
 mod span;
 mod spline;

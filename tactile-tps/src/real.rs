@@ -4,6 +4,8 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use nalgebra::RealField;
 
+use crate::logarithm::{ln_f32, ln_f64};
+
 /// What a [`Kernel`](crate::Kernel) may do with a number.
 ///
 /// Kernels are written once against this trait and run in every arithmetic the crate needs: `f32`, `f64`, their
@@ -75,7 +77,7 @@ pub trait Scalar: RealField + Copy + Default + sealed::Sealed {
 pub struct Fused<T>(T);
 
 macro_rules! real {
-    ($t:ident, $unit:expr, $ln:path, $ln_fused:path) => {
+    ($t:ident, $unit:expr, $ln:path) => {
         impl Scalar for $t {
             type Plain = $t;
             type Fused = Fused<$t>;
@@ -116,7 +118,7 @@ macro_rules! real {
             }
             #[inline(always)]
             fn ln(self) -> Self {
-                $ln(self)
+                $ln(self, |a, b, c| a * b + c)
             }
             #[inline(always)]
             fn exp(self) -> Self {
@@ -154,7 +156,7 @@ macro_rules! real {
             }
             #[inline(always)]
             fn ln(self) -> Self {
-                Self($ln_fused(self.0))
+                Self($ln(self.0, <$t>::mul_add))
             }
             #[inline(always)]
             fn exp(self) -> Self {
@@ -168,8 +170,8 @@ macro_rules! real {
     };
 }
 
-real!(f32, 5.960_464_477_539_063e-8, f32::ln, f32::ln);
-real!(f64, 1.110_223_024_625_156_5e-16, f64::ln, f64::ln);
+real!(f32, 5.960_464_477_539_063e-8, ln_f32);
+real!(f64, 1.110_223_024_625_156_5e-16, ln_f64);
 
 macro_rules! operator {
     ($($trait:ident $method:ident),*) => {$(

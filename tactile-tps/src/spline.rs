@@ -4,6 +4,9 @@ use nalgebra::{Point, SMatrix, SVector};
 
 use crate::{
     Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
+    evaluate::Sum,
+    sample::{Each, Linear, Sample},
+    simd::dispatch,
     sites::{Frame, Sites},
     span::Span,
     warp::same_length,
@@ -20,8 +23,7 @@ pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     centres: Vec<T>,
     /// Weights in the frame, output by output.
     weights: Vec<T>,
-    constant: [T; M],
-    linear: [[T; D]; M],
+    affine: Linear<T, D, M>,
     report: FitReport,
 }
 
@@ -66,8 +68,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
             frame: Frame { centre: [0.0; D], scale: 1.0 },
             centres: Vec::new(),
             weights: Vec::new(),
-            constant: [T::zero(); M],
-            linear: [[T::zero(); D]; M],
+            affine: Linear { constant: [T::zero(); M], gradient: [[T::zero(); D]; M] },
             report: FitReport {
                 points: 0,
                 merged: 0,
@@ -99,8 +100,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.weights.clear();
         self.weights.extend(weights.iter().map(|&w| T::narrow(w)));
         for k in 0..M {
-            self.constant[k] = T::narrow(origin[k] + affine[k][0]);
-            self.linear[k] = span.gradient(&affine[k][1..]).map(T::narrow);
+            self.affine.constant[k] = T::narrow(origin[k] + affine[k][0]);
+            self.affine.gradient[k] = span.gradient(&affine[k][1..]).map(T::narrow);
         }
         self.report = report;
     }
@@ -138,15 +139,15 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// affine by the side conditions and is accounted for here.
     pub fn affine(&self) -> (SMatrix<f64, M, D>, SVector<f64, M>) {
         let Frame { centre, scale } = self.frame;
-        let linear = SMatrix::from_fn(|i, j| self.linear[i][j].widen() / scale);
+        let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j].widen() / scale);
         let kernel = |s: f64| self.kernel.value(s);
         let square = kernel(scale * scale) / self.unit() - kernel(1.0);
         let n = self.count();
         let offset = SVector::from_fn(|i, _| {
             let norm = |j: usize| (0..D).map(|k| self.centres[k * n + j].widen().powi(2)).sum::<f64>();
             let second: f64 = (0..n).map(|j| self.weights[i * n + j].widen() * norm(j)).sum();
-            let shift: f64 = (0..D).map(|k| self.linear[i][k].widen() * (centre[k] / scale)).sum();
-            self.constant[i].widen() - shift - square * second
+            let shift: f64 = (0..D).map(|k| self.affine.gradient[i][k].widen() * (centre[k] / scale)).sum();
+            self.affine.constant[i].widen() - shift - square * second
         });
         (linear, offset)
     }
@@ -156,56 +157,25 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.frame.scale.powi(self.kernel.degree().unwrap_or(0))
     }
 
-    /// Value, first and second derivatives in the frame's units of length.
-    fn jet(&self, point: &Point<T, D>) -> ([T; M], [[T; D]; M], [[[T; D]; D]; M]) {
-        let x = self.frame.inside(point).map(T::narrow);
-        let n = self.count();
-        let mut value = self.constant;
-        let mut gradient = self.linear;
-        let mut hessian = [[[T::zero(); D]; D]; M];
-        for k in 0..M {
-            for i in 0..D {
-                value[k] += self.linear[k][i] * x[i];
-            }
-        }
-        let two = T::one() + T::one();
-        for j in 0..n {
-            let d: [T; D] = core::array::from_fn(|i| x[i] - self.centres[i * n + j]);
-            let s = d.iter().fold(T::zero(), |s, &d| s + d * d);
-            let jet = self.kernel.jet(<T::Plain as crate::real::Lane<T>>::new(s));
-            let [u, first, second] = [jet.value, jet.first, jet.second].map(crate::real::Lane::get);
-            for k in 0..M {
-                let w = self.weights[k * n + j];
-                value[k] += w * u;
-                for i in 0..D {
-                    gradient[k][i] += two * w * first * d[i];
-                    hessian[k][i][i] += two * w * first;
-                    for l in 0..D {
-                        hessian[k][i][l] += two * two * w * second * d[i] * d[l];
-                    }
-                }
-            }
-        }
-        (value, gradient, hessian)
-    }
-
     /// f(x).
     pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
-        Point::from(SVector::from(self.jet(point).0))
+        let mut value = [Point::origin()];
+        self.each::<0>(core::slice::from_ref(point), |_, sample| value[0] = sample.point());
+        value[0]
     }
 
     /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own term is left out.
     pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
-        let gradient = self.jet(point).1;
-        let scale = T::narrow(self.frame.scale);
-        SMatrix::from_fn(|i, j| gradient[i][j] / scale)
+        let mut jacobian = SMatrix::zeros();
+        self.each::<1>(core::slice::from_ref(point), |_, sample| jacobian = sample.jacobian());
+        jacobian
     }
 
     /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
     pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
-        let hessian = self.jet(point).2;
-        let scale = T::narrow(self.frame.scale);
-        hessian.map(|h| SMatrix::from_fn(|i, j| h[i][j] / scale / scale))
+        let mut hessian = [SMatrix::zeros(); M];
+        self.each::<2>(core::slice::from_ref(point), |_, sample| hessian = sample.hessian());
+        hessian
     }
 
     /// f at many points, into the caller's memory.
@@ -214,7 +184,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`TpsError::Length`] if the slices differ in length.
     pub fn apply_into(&self, points: &[Point<T, D>], values: &mut [Point<T, M>]) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
-        points.iter().zip(values).for_each(|(point, value)| *value = self.apply(point));
+        self.each::<0>(points, |i, sample| values[i] = sample.point());
         Ok(())
     }
 
@@ -228,8 +198,48 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         jacobians: &mut [SMatrix<T, M, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), jacobians.len())?;
-        points.iter().zip(jacobians).for_each(|(point, jacobian)| *jacobian = self.jacobian(point));
+        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
         Ok(())
+    }
+
+    /// Values and Jacobians at many points in one pass, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn apply_and_jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+        jacobians: &mut [SMatrix<T, M, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        same_length(points.len(), jacobians.len())?;
+        self.each::<1>(points, |i, sample| {
+            values[i] = sample.point();
+            jacobians[i] = sample.jacobian();
+        });
+        Ok(())
+    }
+
+    /// Hessians of every output at many points, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn hessian_into(
+        &self,
+        points: &[Point<T, D>],
+        hessians: &mut [[SMatrix<T, D, D>; M]],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), hessians.len())?;
+        self.each::<2>(points, |i, sample| hessians[i] = sample.hessian());
+        Ok(())
+    }
+
+    /// Hands the sample at every point to `sink`, with derivatives up to `ORDER`.
+    fn each<const ORDER: usize>(&self, points: &[Point<T, D>], sink: impl FnMut(usize, Sample<T, D, M>)) {
+        let sum =
+            Sum { kernel: &self.kernel, centres: &self.centres, weights: &self.weights, count: self.count() };
+        dispatch(Each::<_, _, _, D, M, ORDER> { sum, affine: &self.affine, frame: self.frame, points, sink });
     }
 
     /// wᵀKw, summed over the outputs, in the kernel's own units; O(n²).

@@ -1,0 +1,104 @@
+//! Sums of kernels over all centres, for blocks of query points at once.
+//!
+//! Queries are the lanes and centres the outer loop: every query's sum runs over the centres in the same order,
+//! whether it comes alone or among thousands, so the bits are the same.
+
+use crate::{
+    Kernel,
+    real::{Lane, Scalar},
+};
+
+/// Queries in a full block; long enough for the compiler to vectorise, short enough for the first-level cache.
+pub(crate) const BLOCK: usize = 64;
+/// Queries in the blocks that take what is left.
+pub(crate) const TAIL: usize = 8;
+
+/// The kernel sum of a spline, in its frame: centres axis by axis, weights output by output.
+pub(crate) struct Sum<'a, T, K> {
+    pub(crate) kernel: &'a K,
+    pub(crate) centres: &'a [T],
+    pub(crate) weights: &'a [T],
+    pub(crate) count: usize,
+}
+
+impl<T, K> Clone for Sum<'_, T, K> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<T, K> Copy for Sum<'_, T, K> {}
+
+/// Sums for `W` queries: U, its gradient and its Hessian, as far as the order asked for.
+pub(crate) struct Lanes<T, const D: usize, const M: usize, const W: usize> {
+    pub(crate) value: [[T; W]; M],
+    pub(crate) gradient: [[[T; W]; D]; M],
+    pub(crate) hessian: [[[[T; W]; D]; D]; M],
+}
+
+impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W> {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        let zero = [T::zero(); W];
+        Self { value: [zero; M], gradient: [[zero; D]; M], hessian: [[[zero; D]; D]; M] }
+    }
+}
+
+/// An accumulator's next value.
+#[inline(always)]
+fn add<T: Scalar, L: Lane<T>>(sum: &mut T, a: L, b: L) {
+    *sum = a.mul_add(b, L::new(*sum)).get();
+}
+
+impl<T: Scalar, K: Kernel> Sum<'_, T, K> {
+    /// Sums up to derivatives of the given `ORDER` (0, 1 or 2) at the queries `x`, axis by axis.
+    #[inline(always)]
+    pub(crate) fn block<L: Lane<T>, const D: usize, const M: usize, const W: usize, const ORDER: usize>(
+        &self,
+        x: &[[T; W]; D],
+        sums: &mut Lanes<T, D, M, W>,
+    ) {
+        let n = self.count;
+        let (two, four) = (L::from_f64(2.0), L::from_f64(4.0));
+        for j in 0..n {
+            let centre: [L; D] = core::array::from_fn(|k| L::new(self.centres[k * n + j]));
+            let weight: [L; M] = core::array::from_fn(|m| L::new(self.weights[m * n + j]));
+            for l in 0..W {
+                let d: [L; D] = core::array::from_fn(|k| L::new(x[k][l]) - centre[k]);
+                let mut s = d[0] * d[0];
+                for k in 1..D {
+                    s = d[k].mul_add(d[k], s);
+                }
+                if ORDER == 0 {
+                    let value = self.kernel.value(s);
+                    for m in 0..M {
+                        add(&mut sums.value[m][l], weight[m], value);
+                    }
+                    continue;
+                }
+                let jet = self.kernel.jet(s);
+                for m in 0..M {
+                    add(&mut sums.value[m][l], weight[m], jet.value);
+                }
+                let slope = two * jet.first;
+                for k in 0..D {
+                    let slope = slope * d[k];
+                    for m in 0..M {
+                        add(&mut sums.gradient[m][k][l], weight[m], slope);
+                    }
+                }
+                if ORDER == 2 {
+                    let bend = four * jet.second;
+                    for k in 0..D {
+                        for i in 0..=k {
+                            let own = if i == k { slope } else { L::zero() };
+                            let curve = (bend * d[k]).mul_add(d[i], own);
+                            for m in 0..M {
+                                add(&mut sums.hessian[m][k][i][l], weight[m], curve);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

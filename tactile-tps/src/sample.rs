@@ -1,0 +1,130 @@
+//! From points to samples of a spline: into the frame, through the kernel sum, out again.
+
+use nalgebra::{Point, SMatrix, SVector};
+
+use crate::{
+    Kernel,
+    evaluate::{BLOCK, Lanes, Sum, TAIL},
+    real::{Lane, Scalar},
+    simd::Job,
+    sites::Frame,
+};
+
+/// The affine part of a spline in its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Linear<T, const D: usize, const M: usize> {
+    pub(crate) constant: [T; M],
+    pub(crate) gradient: [[T; D]; M],
+}
+
+/// A spline's value and derivatives at one point.
+#[derive(Clone, Copy)]
+pub(crate) struct Sample<T, const D: usize, const M: usize> {
+    value: [T; M],
+    gradient: [[T; D]; M],
+    hessian: [[[T; D]; D]; M],
+}
+
+impl<T: Scalar, const D: usize, const M: usize> Sample<T, D, M> {
+    #[inline(always)]
+    pub(crate) fn point(&self) -> Point<T, M> {
+        Point::from(SVector::from(self.value))
+    }
+
+    #[inline(always)]
+    pub(crate) fn jacobian(&self) -> SMatrix<T, M, D> {
+        SMatrix::from_fn(|i, j| self.gradient[i][j])
+    }
+
+    #[inline(always)]
+    pub(crate) fn hessian(&self) -> [SMatrix<T, D, D>; M] {
+        self.hessian.map(|h| SMatrix::from_fn(|i, j| if i >= j { h[i][j] } else { h[j][i] }))
+    }
+}
+
+/// Samples at all points, block by block.
+pub(crate) struct Each<'a, T: Scalar, K, F, const D: usize, const M: usize, const ORDER: usize> {
+    pub(crate) sum: Sum<'a, T, K>,
+    pub(crate) affine: &'a Linear<T, D, M>,
+    pub(crate) frame: Frame<D>,
+    pub(crate) points: &'a [Point<T, D>],
+    pub(crate) sink: F,
+}
+
+impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Job<T> for Each<'_, T, K, F, D, M, ORDER>
+where
+    T: Scalar,
+    K: Kernel,
+    F: FnMut(usize, Sample<T, D, M>),
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<T>>(mut self) {
+        let full = self.points.len() / BLOCK * BLOCK;
+        for start in (0..full).step_by(BLOCK) {
+            self.chunk::<L, BLOCK>(start, BLOCK);
+        }
+        for start in (full..self.points.len()).step_by(TAIL) {
+            self.chunk::<L, TAIL>(start, TAIL.min(self.points.len() - start));
+        }
+    }
+}
+
+impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Each<'_, T, K, F, D, M, ORDER>
+where
+    T: Scalar,
+    K: Kernel,
+    F: FnMut(usize, Sample<T, D, M>),
+{
+    /// Samples `used` ≤ `W` points from `start` on.
+    #[inline(always)]
+    fn chunk<L: Lane<T>, const W: usize>(&mut self, start: usize, used: usize) {
+        let mut x = [[T::zero(); W]; D];
+        for l in 0..W {
+            let inside = self.frame.inside(&self.points[start + l.min(used - 1)]);
+            (0..D).for_each(|k| x[k][l] = T::narrow(inside[k]));
+        }
+        let mut sums = Lanes::<T, D, M, W>::new();
+        self.sum.block::<L, D, M, W, ORDER>(&x, &mut sums);
+        for l in 0..used {
+            let point = core::array::from_fn(|k| x[k][l]);
+            let sample = self.finish::<L, W>(&point, &sums, l);
+            (self.sink)(start + l, sample);
+        }
+    }
+
+    /// Adds the affine part and returns to the units of the points.
+    #[inline(always)]
+    fn finish<L: Lane<T>, const W: usize>(
+        &self,
+        x: &[T; D],
+        sums: &Lanes<T, D, M, W>,
+        l: usize,
+    ) -> Sample<T, D, M> {
+        let scale = T::narrow(self.frame.scale);
+        let affine = self.affine;
+        let value = core::array::from_fn(|m| {
+            let mut value = L::new(sums.value[m][l]) + L::new(affine.constant[m]);
+            for k in 0..D {
+                value = L::new(affine.gradient[m][k]).mul_add(L::new(x[k]), value);
+            }
+            value.get()
+        });
+        let mut gradient = [[T::zero(); D]; M];
+        let mut hessian = [[[T::zero(); D]; D]; M];
+        for m in 0..M {
+            for k in 0..D {
+                if ORDER > 0 {
+                    gradient[m][k] = (affine.gradient[m][k] + sums.gradient[m][k][l]) / scale;
+                }
+                for i in 0..=k {
+                    if ORDER > 1 {
+                        hessian[m][k][i] = sums.hessian[m][k][i][l] / scale / scale;
+                    }
+                }
+            }
+        }
+        Sample { value, gradient, hessian }
+    }
+}
