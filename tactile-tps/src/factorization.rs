@@ -4,8 +4,11 @@ use nalgebra::Point;
 
 use crate::{
     FitOptions, FitReport, Kernel, R2LogR, Scalar, Smoothing, Spline, TpsError,
+    cholesky::padded,
     error::Input,
     options::{validate_smoothing, validate_weights},
+    real::Lane,
+    simd::{Job, dispatch},
     sites::{Sites, finite},
     span::Span,
     spline::Shape,
@@ -62,7 +65,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let kernel = options.kernel.clone();
         let sites = Sites::new(sources, kernel.degree().is_some())?;
         let span = Span::new(&sites, options.rank_tolerance.widen());
-        let matrix = kernel_matrix(&kernel, &sites);
+        let matrix = dispatch(Pairs { kernel: &kernel, sites: &sites });
         let (weights, smoothing) = (options.weights.clone(), options.smoothing);
         let mut this = Self { kernel, sites, span, matrix, system: System::default(), weights, smoothing };
         let weights = this.site_weights(this.weights.as_deref());
@@ -177,15 +180,12 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
         let n = self.sites.len();
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
-        let mut affine = [[0.0; 4]; M];
         let Workspace { values, scratch, .. } = workspace;
         values.clear();
         values.resize(n * M, 0.0);
         self.gather(targets, weight, &origin, values);
         let size = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        for (k, column) in values.chunks_exact_mut(n).enumerate() {
-            affine[k] = system.solve(column, scratch);
-        }
+        let affine = system.solve::<M>(values, n, scratch);
         spline.assign(self, values, &origin, &affine, self.report(system), size);
         Ok(())
     }
@@ -250,15 +250,32 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 }
 
-/// U between all pairs of sites, column by column.
-fn kernel_matrix<const D: usize, K: Kernel>(kernel: &K, sites: &Sites<D>) -> Vec<f64> {
-    let n = sites.len();
-    let mut matrix = Vec::with_capacity(n * n);
-    for j in 0..n {
-        matrix.extend((0..n).map(|i| {
-            let s: f64 = (0..D).map(|k| (sites.axes[k][i] - sites.axes[k][j]).powi(2)).sum();
-            kernel.value(s)
-        }));
+/// Lower triangle of U between all pairs of sites, column by column, each padded with zeros to whole vectors.
+struct Pairs<'a, K, const D: usize> {
+    kernel: &'a K,
+    sites: &'a Sites<D>,
+}
+
+impl<K: Kernel, const D: usize> Job<f64> for Pairs<'_, K, D> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) -> Vec<f64> {
+        let n = self.sites.len();
+        let stride = padded(n);
+        let mut matrix = vec![0.0; n * stride];
+        for (j, column) in matrix.chunks_exact_mut(stride).enumerate() {
+            let own: [L; D] = core::array::from_fn(|k| L::new(self.sites.axes[k][j]));
+            let axes: [&[f64]; D] = core::array::from_fn(|k| &self.sites.axes[k][j..n]);
+            for (i, value) in column[j..n].iter_mut().enumerate() {
+                let mut s = L::zero();
+                for k in 0..D {
+                    let d = L::new(axes[k][i]) - own[k];
+                    s = d.mul_add(d, s);
+                }
+                *value = self.kernel.value(s).get();
+            }
+        }
+        matrix
     }
-    matrix
 }

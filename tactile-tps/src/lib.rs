@@ -19,6 +19,7 @@ mod simd;
 mod sites;
 mod span;
 mod spline;
+mod symmetric;
 mod system;
 mod warp;
 

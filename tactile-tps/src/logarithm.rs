@@ -34,8 +34,8 @@ pub(crate) fn ln_f32(x: f32, fma: impl Fn(f32, f32, f32) -> f32) -> f32 {
     const ONE: u32 = 0x3f80_0000;
     const MANTISSA: u32 = 0x007f_ffff;
     const TWO_23: u32 = 0x4b00_0000;
-    const LN2_HIGH: f32 = 6.931_381_2e-1;
-    const LN2_LOW: f32 = 9.058_000_6e-6;
+    const LN2_HIGH: f32 = 6.931_381e-1;
+    const LN2_LOW: f32 = 9.058_001e-6;
     let shifted = x.to_bits().wrapping_add(ONE - ROOT_HALF);
     let k = f32::from_bits(TWO_23 | (shifted >> 23)) - (8_388_608.0 + 127.0);
     let f = f32::from_bits((shifted & MANTISSA).wrapping_add(ROOT_HALF)) - 1.0;
@@ -43,7 +43,7 @@ pub(crate) fn ln_f32(x: f32, fma: impl Fn(f32, f32, f32) -> f32) -> f32 {
     let z = t * t;
     let w = z * z;
     let even = fma(w, 0.242_790_79, 0.400_009_72) * w;
-    let odd = fma(w, 0.284_987_87, 0.666_666_63) * z;
+    let odd = fma(w, 0.284_987_87, 0.666_666_6) * z;
     let half_square = 0.5 * f * f;
     let tail = fma(t, half_square + (odd + even), k * LN2_LOW);
     fma(k, LN2_HIGH, f - (half_square - tail))

@@ -4,6 +4,11 @@
 //! Q = [Q₁ Q₂] the side condition Pᵀw = 0 reads w = Q₂z, and Q₂ᵀKQ₂ is positive definite. Q is kept in the
 //! compact form I − V T Vᵀ (Schreiber & Van Loan 1989), so that one pass over K projects it.
 
+use crate::{
+    cholesky::padded,
+    symmetric::{Split, Update, multiply},
+};
+
 /// At most D + 1 columns.
 pub(crate) const MAX: usize = 4;
 
@@ -14,7 +19,9 @@ pub(crate) struct NullSpace {
     pub(crate) n: usize,
     /// Number of affine functions, the rank of [1 X].
     pub(crate) q: usize,
-    /// Reflectors, column by column.
+    /// Rows of a column, padded with zeros to whole vectors.
+    pub(crate) stride: usize,
+    /// Reflectors, column by column; zero beyond the q-th.
     v: Vec<f64>,
     /// Upper triangle of the compact form.
     t: [[f64; MAX]; MAX],
@@ -25,12 +32,14 @@ pub(crate) struct NullSpace {
 }
 
 impl NullSpace {
-    /// Factors the columns in `v` (n × q, column by column), which it keeps as its own.
-    pub(crate) fn factor(&mut self, n: usize, q: usize, fill: impl FnOnce(&mut [f64])) {
-        (self.n, self.q) = (n, q);
+    /// Factors the q columns of length n, n ≥ q, that `fill` writes one by one.
+    pub(crate) fn factor(&mut self, n: usize, q: usize, fill: impl Fn(usize, &mut [f64])) {
+        (self.n, self.q, self.stride) = (n, q, padded(n));
         self.v.clear();
-        self.v.resize(n * q, 0.0);
-        fill(&mut self.v);
+        self.v.resize(self.stride * MAX, 0.0);
+        for (c, column) in self.v.chunks_exact_mut(self.stride).enumerate().take(q) {
+            fill(c, &mut column[..n]);
+        }
         self.order = core::array::from_fn(|k| k);
         let mut tau = [0.0; MAX];
         for k in 0..q {
@@ -47,17 +56,17 @@ impl NullSpace {
     }
 
     fn column(&self, k: usize) -> &[f64] {
-        &self.v[k * self.n..(k + 1) * self.n]
+        &self.v[k * self.stride..(k + 1) * self.stride]
     }
 
     /// Brings the column of largest remaining norm to place `k`.
     fn pivot(&mut self, k: usize) {
-        let norm = |j: usize| self.column(j)[k..].iter().map(|x| x * x).sum::<f64>();
+        let norm = |j: usize| dot(&self.column(j)[k..], &self.column(j)[k..]);
         let best =
             (k..self.q).fold((k, -1.0), |best, j| if norm(j) > best.1 { (j, norm(j)) } else { best }).0;
         if best != k {
-            let (left, right) = self.v.split_at_mut(best * self.n);
-            left[k * self.n..(k + 1) * self.n].swap_with_slice(&mut right[..self.n]);
+            let (left, right) = self.v.split_at_mut(best * self.stride);
+            left[k * self.stride..(k + 1) * self.stride].swap_with_slice(&mut right[..self.stride]);
             self.order.swap(k, best);
             for row in &mut self.r[..k] {
                 row.swap(k, best);
@@ -67,10 +76,10 @@ impl NullSpace {
 
     /// Makes column `k` a reflector with unit head, applies it to the later columns and returns its factor.
     fn reflect(&mut self, k: usize) -> f64 {
-        let n = self.n;
+        let (n, later) = (self.stride, self.q - k - 1);
         let (left, right) = self.v.split_at_mut((k + 1) * n);
         let column = &mut left[k * n..];
-        let norm = column[k..].iter().map(|x| x * x).sum::<f64>().sqrt();
+        let norm = dot(&column[k..], &column[k..]).sqrt();
         let head = column[k];
         let beta = if head > 0.0 { -norm } else { norm };
         self.r[k][k] = beta;
@@ -82,8 +91,8 @@ impl NullSpace {
         column[k] = 1.0;
         column[k + 1..].iter_mut().for_each(|x| *x /= head - beta);
         let tau = (beta - head) / beta;
-        for (j, other) in right.chunks_exact_mut(n).enumerate() {
-            let dot = tau * column[k..].iter().zip(&other[k..]).map(|(a, b)| a * b).sum::<f64>();
+        for (j, other) in right.chunks_exact_mut(n).take(later).enumerate() {
+            let dot = tau * dot(&column[k..], &other[k..]);
             other[k..].iter_mut().zip(&column[k..]).for_each(|(o, v)| *o -= dot * v);
             self.r[k][k + 1 + j] = other[k];
         }
@@ -130,37 +139,46 @@ impl NullSpace {
         }
     }
 
-    /// QᵀKQ of the symmetric n × n matrix `k` (column by column, all of it) in place, with `x` as scratch (n · q).
+    /// QᵀKQ of the symmetric matrix whose lower triangle is `k` (column by column, `stride` apart): rows q.. of the
+    /// first q columns go to `coupling`, the lower triangle of the rest to `rest`. `x` is scratch.
     ///
     /// Y = KVT, X = Y − ½ V(TᵀVᵀY), and QᵀKQ = K − VXᵀ − XVᵀ.
-    pub(crate) fn project(&self, k: &mut [f64], x: &mut Vec<f64>) {
-        let (n, q) = (self.n, self.q);
-        x.clear();
-        x.resize(n * q, 0.0);
-        for (j, column) in k.chunks_exact(n).enumerate() {
-            let mut s = [0.0; MAX];
-            (0..q).for_each(|c| s[c] = dot(self.column(c), column));
-            for c in 0..q {
-                x[c * n + j] = (0..q).map(|i| s[i] * self.t[i][c]).sum();
-            }
-        }
+    pub(crate) fn project(
+        &self,
+        k: &[f64],
+        coupling: &mut [f64],
+        (rest, rest_stride): (&mut [f64], usize),
+        scratch: &mut Vec<f64>,
+    ) {
+        let (n, q, stride) = (self.n, self.q, self.stride);
+        scratch.clear();
+        scratch.resize((MAX + 1) * stride, 0.0);
+        let (x, column) = scratch.split_at_mut(MAX * stride);
+        multiply::<MAX>(k, stride, &self.v, x);
+        self.times_compact(x);
         let mut s = [[0.0; MAX]; MAX];
-        for (c, y) in x.chunks_exact(n).enumerate() {
-            let z: [f64; MAX] = core::array::from_fn(|i| if i < q { dot(self.column(i), y) } else { 0.0 });
+        for (c, y) in x.chunks_exact(stride).enumerate() {
+            let z: [f64; MAX] = core::array::from_fn(|i| dot(self.column(i), y));
             for i in 0..q {
                 s[i][c] = 0.5 * (0..q).map(|l| self.t[l][i] * z[l]).sum::<f64>();
             }
         }
-        for (c, y) in x.chunks_exact_mut(n).enumerate() {
+        for (c, y) in x.chunks_exact_mut(stride).enumerate() {
             for i in 0..q {
                 y.iter_mut().zip(self.column(i)).for_each(|(y, v)| *y -= s[i][c] * v);
             }
         }
-        for (j, column) in k.chunks_exact_mut(n).enumerate() {
-            for c in 0..q {
-                let (vj, xj) = (self.v[c * n + j], x[c * n + j]);
-                let pairs = self.column(c).iter().zip(&x[c * n..(c + 1) * n]);
-                column.iter_mut().zip(pairs).for_each(|(k, (v, x))| *k -= v * xj + x * vj);
+        let update = Update::<MAX> { v: &self.v, x, stride, n };
+        Split { update, k, q, coupling, rest, rest_stride, scratch: column }.run();
+    }
+
+    /// x ← x T for the columns x.
+    fn times_compact(&self, x: &mut [f64]) {
+        let stride = self.stride;
+        for i in 0..stride {
+            let row: [f64; MAX] = core::array::from_fn(|c| x[c * stride + i]);
+            for c in 0..MAX {
+                x[c * stride + i] = (0..=c).map(|l| row[l] * self.t[l][c]).sum();
             }
         }
     }
@@ -178,6 +196,15 @@ impl NullSpace {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// Inner product in eight partial sums, which the compiler turns into vectors.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (lanes, others) = (a.chunks_exact(8), b.chunks_exact(8));
+    let tail: f64 = lanes.remainder().iter().zip(others.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in lanes.zip(others) {
+        for l in 0..8 {
+            sums[l] += a[l] * b[l];
+        }
+    }
+    sums.iter().sum::<f64>() + tail
 }

@@ -21,10 +21,8 @@ impl<const D: usize> Span<D> {
         let n = sites.len();
         let means: [f64; D] = core::array::from_fn(|k| sites.axes[k].iter().sum::<f64>() / n as f64);
         let mut columns = NullSpace::default();
-        columns.factor(n, D.min(n), |v| {
-            for (k, column) in v.chunks_exact_mut(n).enumerate() {
-                column.iter_mut().zip(&sites.axes[k]).for_each(|(v, x)| *v = x - means[k]);
-            }
+        columns.factor(n, D.min(n), |k, column| {
+            column.iter_mut().zip(&sites.axes[k]).for_each(|(v, x)| *v = x - means[k]);
         });
         if n < D {
             return Self::of_few(sites, &means, tolerance);
@@ -54,20 +52,23 @@ impl<const D: usize> Span<D> {
         Self { directions, basis: (directions < D).then_some(basis), extents }
     }
 
-    /// Writes the affine functions [1, x·b₁, …] at the sites `active`, each row times its `scale`.
-    pub(crate) fn fill(&self, sites: &Sites<D>, active: &[usize], scales: &[f64], v: &mut [f64]) {
-        let n = active.len();
-        let scale = |i: usize| if scales.is_empty() { 1.0 } else { scales[i] };
-        for (c, column) in v.chunks_exact_mut(n).enumerate() {
-            for (i, (value, &site)) in column.iter_mut().zip(active).enumerate() {
-                let x = match (c, &self.basis) {
-                    (0, _) => 1.0,
-                    (c, None) => sites.axes[c - 1][site],
-                    (c, Some(basis)) => (0..D).map(|k| basis[c - 1][k] * sites.axes[k][site]).sum(),
-                };
-                *value = x * scale(i);
-            }
+    /// Writes affine function `c` of [1, x·b₁, …] at the sites `active`, each value times its `scale`.
+    pub(crate) fn fill(
+        &self,
+        sites: &Sites<D>,
+        active: &[usize],
+        scales: &[f64],
+        c: usize,
+        column: &mut [f64],
+    ) {
+        for (value, &site) in column.iter_mut().zip(active) {
+            *value = match (c, &self.basis) {
+                (0, _) => 1.0,
+                (c, None) => sites.axes[c - 1][site],
+                (c, Some(basis)) => (0..D).map(|k| basis[c - 1][k] * sites.axes[k][site]).sum(),
+            };
         }
+        column.iter_mut().zip(scales).for_each(|(value, scale)| *value *= scale);
     }
 
     /// The gradient in coordinates of one along the directions.

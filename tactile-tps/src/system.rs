@@ -1,6 +1,12 @@
 //! The linear system of a spline for given weights and λ, factored.
 
-use crate::{TpsError, cholesky::Cholesky, null_space::NullSpace, sites::Sites, span::Span};
+use crate::{
+    TpsError,
+    cholesky::{Cholesky, padded},
+    null_space::{MAX, NullSpace, dot},
+    sites::Sites,
+    span::Span,
+};
 
 /// QᵀSQ factored, S = W^½ K W^½ + λI over the sites of positive weight.
 ///
@@ -24,7 +30,7 @@ pub(crate) struct System {
 }
 
 impl System {
-    /// Factors for site weights (empty: all one) and λ ≥ 0. `kernel` is the full matrix over all sites.
+    /// Factors for site weights (empty: all one) and λ ≥ 0. `kernel` is the lower triangle over all sites.
     pub(crate) fn factor<const D: usize>(
         &mut self,
         sites: &Sites<D>,
@@ -37,18 +43,18 @@ impl System {
         self.choose(sites.len(), weights);
         let (n, q) = (self.active.len(), 1 + span.directions);
         let (active, scales) = (&self.active, &self.scales);
-        self.null.factor(n, q.min(n), |v| span.fill(sites, active, scales, v));
-        self.gather(sites.len(), kernel);
-        self.null.project(&mut self.work, &mut self.scratch);
-        let q = self.null.q;
+        self.null.factor(n, q.min(n), |c, column| span.fill(sites, active, scales, c, column));
+        let plain = self.scales.is_empty() && n == sites.len();
+        if !plain {
+            self.gather(kernel, padded(sites.len()));
+        }
+        let (q, work) = (self.null.q, if plain { kernel } else { &self.work });
         self.coupling.clear();
-        (0..q).for_each(|c| self.coupling.extend_from_slice(&self.work[c * n + q..(c + 1) * n]));
-        let work = &self.work;
-        let fill = |l: &mut [f64]| {
-            for (j, column) in l.chunks_exact_mut((n - q).max(1)).enumerate() {
-                column.copy_from_slice(&work[(j + q) * n + q..(j + q + 1) * n]);
-                column[j] += lambda;
-            }
+        self.coupling.resize(q * (n - q), 0.0);
+        let Self { null, coupling, scratch, .. } = self;
+        let fill = |rest: &mut [f64], stride: usize| {
+            null.project(work, coupling, (rest, stride), scratch);
+            (0..n - q).for_each(|j| rest[j * stride + j] += lambda);
         };
         self.cholesky.factor(n - q, fill).map_err(|column| TpsError::NotDefinite { column })?;
         self.condition = self.cholesky.condition(&mut self.scratch);
@@ -70,37 +76,63 @@ impl System {
         }
     }
 
-    fn gather(&mut self, sites: usize, kernel: &[f64]) {
+    /// Lower triangle of the kernel matrix over the active sites, scaled.
+    fn gather(&mut self, kernel: &[f64], from: usize) {
+        let n = self.active.len();
+        let stride = padded(n);
         self.work.clear();
-        for (j, &column) in self.active.iter().enumerate() {
-            let column = &kernel[column * sites..(column + 1) * sites];
-            if self.scales.is_empty() {
-                self.work.extend(self.active.iter().map(|&i| column[i]));
-            } else {
-                let scaled =
-                    self.active.iter().zip(&self.scales).map(|(&i, s)| column[i] * s * self.scales[j]);
-                self.work.extend(scaled);
+        self.work.resize(n * stride, 0.0);
+        for (j, column) in self.work.chunks_exact_mut(stride).enumerate() {
+            let own = self.active[j];
+            for (value, &i) in column[j..n].iter_mut().zip(&self.active[j..]) {
+                *value = kernel[own.min(i) * from + own.max(i)];
+            }
+            if !self.scales.is_empty() {
+                let scale = self.scales[j];
+                column[j..n].iter_mut().zip(&self.scales[j..]).for_each(|(value, s)| *value *= s * scale);
             }
         }
     }
 
-    /// Solves for one output: `y` holds the values at all sites and receives the weights w; returns the affine part.
-    pub(crate) fn solve(&self, y: &mut [f64], scratch: &mut Vec<f64>) -> [f64; 4] {
-        let (n, q) = (self.active.len(), self.null.q);
-        let scale = |i: usize| if self.scales.is_empty() { 1.0 } else { self.scales[i] };
-        scratch.clear();
-        scratch.extend(self.active.iter().enumerate().map(|(i, &site)| y[site] * scale(i)));
-        self.null.apply_transpose(scratch);
-        let mut head = [0.0; 4];
-        head[..q].copy_from_slice(&scratch[..q]);
-        self.cholesky.solve(&mut scratch[q..]);
-        for (head, coupling) in head.iter_mut().zip(self.coupling.chunks_exact((n - q).max(1))) {
-            *head -= coupling.iter().zip(&scratch[q..]).map(|(c, z)| c * z).sum::<f64>();
+    /// Solves for `M` outputs: `y` holds the values at the `sites` and receives the weights w; returns the affine parts.
+    pub(crate) fn solve<const M: usize>(
+        &self,
+        y: &mut [f64],
+        sites: usize,
+        work: &mut Vec<f64>,
+    ) -> [[f64; MAX]; M] {
+        let (n, q, rows, stride) = (self.active.len(), self.null.q, self.cholesky.rows(), self.null.stride);
+        work.clear();
+        work.resize(M * rows + stride, 0.0);
+        let (inner, column) = work.split_at_mut(M * rows);
+        let mut heads = [[0.0; MAX]; M];
+        for (m, head) in heads.iter_mut().enumerate() {
+            self.scaled(&y[m * sites..(m + 1) * sites], column);
+            self.null.apply_transpose(column);
+            head[..q].copy_from_slice(&column[..q]);
+            inner[m * rows..m * rows + n - q].copy_from_slice(&column[q..n]);
         }
-        scratch[..q].fill(0.0);
-        self.null.apply(scratch);
+        self.cholesky.solve::<M>(inner);
         y.fill(0.0);
-        self.active.iter().enumerate().for_each(|(i, &site)| y[site] = scratch[i] * scale(i));
-        self.null.solve_upper(&head[..q])
+        for (m, head) in heads.iter_mut().enumerate() {
+            let z = &inner[m * rows..m * rows + n - q];
+            for (head, coupling) in head.iter_mut().zip(self.coupling.chunks_exact((n - q).max(1))) {
+                *head -= dot(coupling, z);
+            }
+            column.fill(0.0);
+            column[q..n].copy_from_slice(z);
+            self.null.apply(column);
+            let scale = |i: usize| if self.scales.is_empty() { 1.0 } else { self.scales[i] };
+            self.active.iter().enumerate().for_each(|(i, &site)| y[m * sites + site] = column[i] * scale(i));
+            *head = self.null.solve_upper(&head[..q]);
+        }
+        heads
+    }
+
+    /// The values at the active sites, each times its scale.
+    fn scaled(&self, y: &[f64], column: &mut [f64]) {
+        column.fill(0.0);
+        self.active.iter().zip(column.iter_mut()).for_each(|(&site, value)| *value = y[site]);
+        column.iter_mut().zip(&self.scales).for_each(|(value, scale)| *value *= scale);
     }
 }
