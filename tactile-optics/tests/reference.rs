@@ -1,4 +1,5 @@
 //! Agreement with reference numbers computed to 80 digits. Skipped, with a line that says so, where they are absent.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 use std::path::PathBuf;
 
 use serde_json::Value;

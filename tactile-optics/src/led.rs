@@ -1,0 +1,128 @@
+//! The lamp at the slab's edge: its radiation pattern, and the share of its light that a layer traps.
+
+use crate::angle::AcceptanceAngle;
+use crate::error::OpticsError;
+use crate::real::{Real, real, within};
+
+/// Whether light stays in one plane or fills space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Geometry {
+    /// A section: rays in the plane of the LED's axis and the slab's normal.
+    Section,
+    /// All of space.
+    #[default]
+    Volume,
+}
+
+/// An LED facing the slab's edge: intensity ∝ cosᵐ θ up to a half angle, θ from its axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Led<T> {
+    exponent: T,
+    half_angle: T,
+}
+
+impl<T: Real> Led<T> {
+    /// Intensity ∝ cosᵐ θ for θ below `half_angle`; m = 1 is Lambertian, m = 0 even.
+    ///
+    /// # Errors
+    /// [`OpticsError::OutOfRange`] for an exponent outside 0 to 1000 or a half angle outside (0, π/2].
+    pub fn new(exponent: T, half_angle: T) -> Result<Self, OpticsError> {
+        within("exponent of the radiation pattern", exponent, 0.0, 1000.0)?;
+        within("half angle of the LED", half_angle, 1e-6, core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7))?;
+        Ok(Self { exponent, half_angle: half_angle.min(T::FRAC_PI_2()) })
+    }
+
+    /// A Lambertian LED: m = 1 up to a right angle.
+    pub fn lambertian() -> Self {
+        Self { exponent: T::one(), half_angle: T::FRAC_PI_2() }
+    }
+
+    /// The pattern whose intensity has halved at `angle`, as data sheets state it: m = ln ½ / ln cos(angle).
+    ///
+    /// # Errors
+    /// [`OpticsError::OutOfRange`] for an angle outside 0.04 to 1.57 (beyond which m leaves 0 to 1000).
+    pub fn from_half_intensity_angle(angle: T) -> Result<Self, OpticsError> {
+        within("half-intensity angle", angle, 0.04, 1.57)?;
+        Self::new(real::<T>(0.5).ln() / angle.cos().ln(), T::FRAC_PI_2())
+    }
+
+    /// m of cosᵐ θ.
+    pub fn exponent(&self) -> T {
+        self.exponent
+    }
+
+    /// The largest angle at which there is light.
+    pub fn half_angle(&self) -> T {
+        self.half_angle
+    }
+
+    /// The share of the LED's light that a layer of this acceptance angle traps for good (before losses at the entry).
+    ///
+    /// In a section, ∫₀^θᵢ cosᵐ / ∫₀^h cosᵐ. In space a ray is trapped while its slope out of the layer's plane is below
+    /// S = sin θᵢ: of the directions at θ from the axis that is the part (2/π) asin(min(1, S/sin θ)). Gauss–Legendre
+    /// quadrature, some 10⁻¹² in `f64`.
+    ///
+    /// ```
+    /// use tactile_optics::{AcceptanceAngle, acceptance_angle, led::{Geometry, Led}};
+    /// let share = Led::lambertian().trapped_share(acceptance_angle(1.38_f64, 1.0)?, Geometry::Section);
+    /// assert!((share - (1.38_f64 * 1.38 - 1.0).sqrt()).abs() < 1e-12);
+    /// # Ok::<(), tactile_optics::OpticsError>(())
+    /// ```
+    pub fn trapped_share(&self, acceptance: AcceptanceAngle<T>, geometry: Geometry) -> T {
+        let limit = acceptance.radians().min(self.half_angle);
+        if geometry == Geometry::Section {
+            let intensity = |t: T| t.cos().max(T::zero()).powf(self.exponent);
+            return integral(T::zero(), limit, intensity) / integral(T::zero(), self.half_angle, intensity);
+        }
+        let flux = |t: T| t.cos().max(T::zero()).powf(self.exponent) * t.sin();
+        let slope = acceptance.radians().sin();
+        // Beyond θᵢ the part falls with an infinite slope: θ = θᵢ + t² takes it away.
+        let outer = |t: T| {
+            let theta = limit + t * t;
+            let part = (slope / theta.sin()).min(T::one()).asin() * T::FRAC_2_PI();
+            flux(theta) * part * (t + t)
+        };
+        let trapped = integral(T::zero(), limit, flux)
+            + integral(T::zero(), (self.half_angle - limit).max(T::zero()).sqrt(), outer);
+        trapped / integral(T::zero(), self.half_angle, flux)
+    }
+
+    /// A direction by two numbers in [0, 1): components along the axis, across it in the slab's plane, and along the
+    /// slab's normal; and the weight of the direction, 1 on average.
+    pub(crate) fn direction(&self, u: T, v: T, geometry: Geometry) -> ([T; 3], T) {
+        let one = T::one();
+        if geometry == Geometry::Section {
+            let theta = (u + u - one) * self.half_angle;
+            return ([theta.cos(), T::zero(), theta.sin()], theta.cos().max(T::zero()).powf(self.exponent));
+        }
+        let power = self.exponent + one;
+        let rim = self.half_angle.cos().max(T::zero()).powf(power);
+        let cosine = (one - u * (one - rim)).powf(power.recip());
+        let sine = ((one - cosine) * (one + cosine)).max(T::zero()).sqrt();
+        let (across, up) = ((v + v) * T::PI()).sin_cos();
+        ([cosine, sine * across, sine * up], one)
+    }
+}
+
+/// ∫ f from `a` to `b` by the five-point Gauss–Legendre rule on 32 panels.
+fn integral<T: Real>(a: T, b: T, f: impl Fn(T) -> T) -> T {
+    const NODES: [(f64, f64); 3] = [
+        (0.0, 0.568_888_888_888_888_9),
+        (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+        (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    ];
+    const PANELS: usize = 32;
+    let half = (b - a) / real(2.0 * PANELS as f64);
+    let mut sum = T::zero();
+    for panel in 0..PANELS {
+        let middle = a + half * real((2 * panel + 1) as f64);
+        for (k, (node, weight)) in NODES.iter().enumerate() {
+            let (offset, weight) = (half * real(*node), real::<T>(*weight));
+            sum = sum + weight * f(middle + offset);
+            if k > 0 {
+                sum = sum + weight * f(middle - offset);
+            }
+        }
+    }
+    sum * half
+}

@@ -1,0 +1,236 @@
+//! The top of the slab: its shape under load and what touches it.
+
+use crate::error::OpticsError;
+use crate::real::{Real, real, within};
+
+/// An object in optical contact with the slab: light that enters it is scattered back evenly or lost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TouchingObject<T> {
+    /// Refractive index of the object.
+    pub index: T,
+    /// Share of the light entering the object that it gives back, as a Lambertian emitter in the slab's top layer.
+    pub albedo: T,
+}
+
+/// The shape of the slab's top. Coordinates in metres: x along the LED's axis from the lit edge, y across, z up from
+/// the undeformed top.
+pub trait TopSurface<T> {
+    /// Height above the undeformed top, in metres; negative under load.
+    fn height(&self, x: T, y: T) -> T;
+    /// Its slopes along x and y.
+    fn gradient(&self, x: T, y: T) -> [T; 2];
+    /// A bound on the slope's size anywhere: rays step towards the surface no faster than it allows, so none is missed.
+    fn steepest(&self) -> T;
+    /// The deepest point below the undeformed top, in metres, as a positive number.
+    fn deepest(&self) -> T;
+    /// The range of x outside which the top is flat and untouched.
+    fn support(&self) -> [T; 2];
+    /// What touches the slab at a point, if not the ambient.
+    fn touching(&self, _x: T, _y: T) -> Option<TouchingObject<T>> {
+        None
+    }
+}
+
+/// The undeformed top.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Flat;
+
+impl<T: Real> TopSurface<T> for Flat {
+    fn height(&self, _x: T, _y: T) -> T {
+        T::zero()
+    }
+    fn gradient(&self, _x: T, _y: T) -> [T; 2] {
+        [T::zero(); 2]
+    }
+    fn steepest(&self) -> T {
+        T::zero()
+    }
+    fn deepest(&self) -> T {
+        T::zero()
+    }
+    fn support(&self) -> [T; 2] {
+        [T::zero(); 2]
+    }
+}
+
+/// A round dimple z = −d cos²(πr/2w) for r < w, flat beyond; its steepest slope is πd/2w, halfway down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dimple<T> {
+    centre: [T; 2],
+    half_width: T,
+    depth: T,
+}
+
+impl<T: Real> Dimple<T> {
+    /// A dimple around `centre_m` (x, y) of half width w and depth d in metres.
+    ///
+    /// # Errors
+    /// [`OpticsError::OutOfRange`] for a centre that is not finite, a half width that is not positive or a depth that is
+    /// negative.
+    pub fn new(centre_m: [T; 2], half_width_m: T, depth_m: T) -> Result<Self, OpticsError> {
+        for c in centre_m {
+            within("centre of the dimple", c, -1e6, 1e6)?;
+        }
+        within("half width of the dimple", half_width_m, 1e-9, 1e6)?;
+        within("depth of the dimple", depth_m, 0.0, 1e6)?;
+        Ok(Self { centre: centre_m, half_width: half_width_m, depth: depth_m })
+    }
+
+    /// The dimple of half width w whose steepest slope is `slope`.
+    ///
+    /// # Errors
+    /// As [`Dimple::new`].
+    pub fn of_slope(centre_m: [T; 2], half_width_m: T, slope: T) -> Result<Self, OpticsError> {
+        Self::new(centre_m, half_width_m, slope * half_width_m * T::FRAC_2_PI())
+    }
+
+    /// πr/2w, and r.
+    fn phase(&self, x: T, y: T) -> Option<(T, T)> {
+        let r = (x - self.centre[0]).hypot(y - self.centre[1]);
+        (r < self.half_width).then(|| (T::FRAC_PI_2() * r / self.half_width, r))
+    }
+}
+
+impl<T: Real> TopSurface<T> for Dimple<T> {
+    fn height(&self, x: T, y: T) -> T {
+        self.phase(x, y).map_or(T::zero(), |(phase, _)| -self.depth * phase.cos().powi(2))
+    }
+
+    fn gradient(&self, x: T, y: T) -> [T; 2] {
+        let Some((phase, r)) = self.phase(x, y) else { return [T::zero(); 2] };
+        if r == T::zero() {
+            return [T::zero(); 2];
+        }
+        let radial = self.depth * T::FRAC_PI_2() / self.half_width * (phase + phase).sin() / r;
+        [radial * (x - self.centre[0]), radial * (y - self.centre[1])]
+    }
+
+    fn steepest(&self) -> T {
+        self.depth * T::FRAC_PI_2() / self.half_width
+    }
+
+    fn deepest(&self) -> T {
+        self.depth
+    }
+
+    fn support(&self) -> [T; 2] {
+        [self.centre[0] - self.half_width, self.centre[0] + self.half_width]
+    }
+}
+
+/// A surface with an object in optical contact inside a circle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touched<S, T> {
+    surface: S,
+    object: TouchingObject<T>,
+    centre: [T; 2],
+    radius: T,
+}
+
+impl<T: Real, S: TopSurface<T>> Touched<S, T> {
+    /// `surface` with `object` touching it within `radius_m` of `centre_m`.
+    ///
+    /// # Errors
+    /// [`OpticsError::OutOfRange`] for an index that is not positive, an albedo outside 0 to 1, or a circle without meaning.
+    pub fn new(
+        surface: S,
+        object: TouchingObject<T>,
+        centre_m: [T; 2],
+        radius_m: T,
+    ) -> Result<Self, OpticsError> {
+        within("refractive index of the object", object.index, f64::MIN_POSITIVE, 1e6)?;
+        within("albedo of the object", object.albedo, 0.0, 1.0)?;
+        for c in centre_m {
+            within("centre of the contact", c, -1e6, 1e6)?;
+        }
+        within("radius of the contact", radius_m, 0.0, 1e6)?;
+        Ok(Self { surface, object, centre: centre_m, radius: radius_m })
+    }
+}
+
+impl<T: Real, S: TopSurface<T>> TopSurface<T> for Touched<S, T> {
+    fn height(&self, x: T, y: T) -> T {
+        self.surface.height(x, y)
+    }
+    fn gradient(&self, x: T, y: T) -> [T; 2] {
+        self.surface.gradient(x, y)
+    }
+    fn steepest(&self) -> T {
+        self.surface.steepest()
+    }
+    fn deepest(&self) -> T {
+        self.surface.deepest()
+    }
+    fn support(&self) -> [T; 2] {
+        let [a, b] = self.surface.support();
+        let (left, right) = (self.centre[0] - self.radius, self.centre[0] + self.radius);
+        // An empty support (a flat top) must not stretch to the contact.
+        if a < b { [a.min(left), b.max(right)] } else { [left, right] }
+    }
+    fn touching(&self, x: T, y: T) -> Option<TouchingObject<T>> {
+        let inside = (x - self.centre[0]).hypot(y - self.centre[1]) < self.radius;
+        if inside { Some(self.object) } else { self.surface.touching(x, y) }
+    }
+}
+
+/// Where a ray meets the surface inside its support: the way along the ray from `from`, none before `to`.
+///
+/// g = height − z is the gap above the ray. It closes no faster than u_z + L·√(u_x² + u_y²) with L the steepest slope, so
+/// a step of gap over that rate never jumps a crossing; steps are taken until the gap is below `tolerance`.
+pub(crate) fn march<T: Real, S: TopSurface<T> + ?Sized>(
+    surface: &S,
+    position: &[T; 3],
+    direction: &[T; 3],
+    [from, to]: [T; 2],
+    tolerance: T,
+) -> Meeting<T> {
+    let at = |t: T| -> [T; 3] { core::array::from_fn(|k| position[k] + t * direction[k]) };
+    let gap = |p: [T; 3]| surface.height(p[0], p[1]) - p[2];
+    let closing = direction[2] + surface.steepest() * direction[0].hypot(direction[1]);
+    if closing <= T::zero() {
+        return Meeting::Missed;
+    }
+    let mut t = from;
+    let start = at(t);
+    let mut g = gap(start);
+    if g <= tolerance {
+        // On the surface: it has just been left, or is met here unless the gap opens.
+        let [gx, gy] = surface.gradient(start[0], start[1]);
+        let opening = gx * direction[0] + gy * direction[1] - direction[2];
+        if opening <= T::zero() {
+            return Meeting::At(t);
+        }
+        t = t + (tolerance + tolerance) / opening;
+        g = gap(at(t));
+    }
+    for _ in 0..MAX_STEPS {
+        if t > to {
+            return Meeting::Missed;
+        }
+        if g <= tolerance {
+            return Meeting::At(t);
+        }
+        t = t + g / closing;
+        g = gap(at(t));
+    }
+    Meeting::Undecided
+}
+
+/// Steps after which a ray creeping along the surface is given up.
+const MAX_STEPS: usize = 20_000;
+
+/// Outcome of [`march`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Meeting<T> {
+    /// The ray meets the surface here.
+    At(T),
+    /// It does not.
+    Missed,
+    /// Still creeping along it.
+    Undecided,
+}
+
+/// Gap taken for contact: far below any length that matters, far above rounding.
+pub(crate) fn contact_gap<T: Real>(thickness: T) -> T {
+    thickness * T::epsilon().powf(real(0.6))
+}

@@ -1,0 +1,93 @@
+//! Where the light went.
+
+use crate::real::Real;
+
+/// Shares of the LED's light by where it ended; they add up to 1 to rounding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightBudget<T> {
+    /// Reflected at the lit edge, never entering.
+    pub entry: T,
+    /// Reached the far edge: trapped on the way.
+    pub guided: T,
+    /// Came back to the lit edge.
+    pub returned: T,
+    /// Left through the top into the ambient.
+    pub above: T,
+    /// Left through the bottom at an angle the camera does not see.
+    pub below: T,
+    /// Left through the bottom towards the camera.
+    pub camera: T,
+    /// Lost in the touching object.
+    pub absorbed: T,
+    /// Not followed to its end: branches below the cut-off, rays with too many events.
+    pub unresolved: T,
+}
+
+impl<T: Real> LightBudget<T> {
+    /// Sum of all shares: 1 to rounding.
+    pub fn total(&self) -> T {
+        [self.entry, self.returned, self.above, self.below, self.camera, self.absorbed, self.unresolved]
+            .iter()
+            .fold(self.guided, |sum, &share| sum + share)
+    }
+
+    /// Share that left through top or bottom.
+    pub fn leaked(&self) -> T {
+        self.above + self.below + self.camera
+    }
+
+    /// Share of the light that entered the slab which reached the far edge.
+    pub fn guided_of_entered(&self) -> T {
+        self.guided / (T::one() - self.entry)
+    }
+}
+
+/// Destinations, in the order of [`LightBudget`]'s fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(usize)]
+pub(crate) enum Fate {
+    Entry,
+    Guided,
+    Returned,
+    Above,
+    Below,
+    Camera,
+    Absorbed,
+    Unresolved,
+}
+
+/// Compensated sums (Neumaier), one for each fate: a million rays add up without loss.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tally<T> {
+    sums: [T; 8],
+    errors: [T; 8],
+}
+
+impl<T: Real> Tally<T> {
+    pub(crate) fn new() -> Self {
+        Self { sums: [T::zero(); 8], errors: [T::zero(); 8] }
+    }
+
+    pub(crate) fn add(&mut self, fate: Fate, power: T) {
+        let k = fate as usize;
+        let (old, new) = (self.sums[k], self.sums[k] + power);
+        let lost = if old.abs() >= power.abs() { (old - new) + power } else { (power - new) + old };
+        self.sums[k] = new;
+        self.errors[k] = self.errors[k] + lost;
+    }
+
+    /// Shares of `total`.
+    pub(crate) fn budget(&self, total: T) -> LightBudget<T> {
+        let share = |fate: Fate| (self.sums[fate as usize] + self.errors[fate as usize]) / total;
+        LightBudget {
+            entry: share(Fate::Entry),
+            guided: share(Fate::Guided),
+            returned: share(Fate::Returned),
+            above: share(Fate::Above),
+            below: share(Fate::Below),
+            camera: share(Fate::Camera),
+            absorbed: share(Fate::Absorbed),
+            unresolved: share(Fate::Unresolved),
+        }
+    }
+}

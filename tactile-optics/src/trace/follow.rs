@@ -1,0 +1,237 @@
+//! One ray from interface to interface until its light has gone.
+
+use super::budget::{Fate, Tally};
+use super::ray::{Branches, Ray, dot, normalised, sine_between};
+use super::sampling::{hash, unit};
+use super::{Slab, TraceOptions};
+use crate::fresnel::{from_sine_and_cosine, refracted_normal};
+use crate::led::Geometry;
+use crate::real::{Real, real};
+use crate::surface::{Meeting, TopSurface, march};
+
+/// Reflections after which a ray is given up: a guided ray in a long slab needs thousands at most.
+const MAX_EVENTS: u32 = 20_000;
+
+/// What a trace needs along the way.
+pub(super) struct Tracer<'a, 's, T, S: ?Sized> {
+    pub(super) slab: &'a Slab<'s, T>,
+    pub(super) surface: &'a S,
+    pub(super) options: &'a TraceOptions<T>,
+    /// Gap that counts as contact with the surface.
+    pub(super) tolerance: T,
+    pub(super) camera_sine: T,
+    pub(super) cutoff: T,
+    pub(super) tally: Tally<T>,
+    pub(super) camera_profile: &'a mut [T],
+    /// State of the random numbers of the current ray.
+    pub(super) stream: u64,
+}
+
+/// What a ray meets next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Next {
+    /// The slab's top.
+    Top,
+    /// The upper face of its layer, an interface inside the slab.
+    Up,
+    /// The lower face of its layer.
+    Down,
+    /// The edge it travels to.
+    Edge,
+    /// It creeps along the surface.
+    Nothing,
+}
+
+impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
+    /// Follows a ray and all its branches.
+    pub(super) fn follow(&mut self, first: Ray<T>) {
+        let smallest = first.power * self.cutoff;
+        let mut branches = Branches::new();
+        let mut current = Some(first);
+        while let Some(ray) = current {
+            current = if ray.power <= smallest || ray.events >= MAX_EVENTS {
+                self.tally.add(Fate::Unresolved, ray.power);
+                None
+            } else {
+                self.advance(ray, &mut branches)
+            }
+            .or_else(|| branches.pop());
+        }
+    }
+
+    /// Moves the ray to what it meets next; returns what goes on.
+    fn advance(&mut self, ray: Ray<T>, branches: &mut Branches<T>) -> Option<Ray<T>> {
+        let (way, next) = self.next(&ray);
+        let mut ray = Ray { position: ray.at(way), events: ray.events + 1, ..ray };
+        match next {
+            Next::Nothing => self.tally.add(Fate::Unresolved, ray.power),
+            Next::Edge => {
+                let fate = if ray.direction[0] > T::zero() { Fate::Guided } else { Fate::Returned };
+                self.tally.add(fate, ray.power);
+            }
+            Next::Top => return self.top(ray, branches),
+            Next::Up => {
+                ray.position[2] = self.slab.face(ray.layer);
+                return self.inside(ray, ray.layer - 1, branches);
+            }
+            Next::Down => {
+                ray.position[2] = self.slab.face(ray.layer + 1);
+                let below = ray.layer + 1;
+                if below < self.slab.layers.len() {
+                    return self.inside(ray, below, branches);
+                }
+                return Some(self.bottom(ray));
+            }
+        }
+        None
+    }
+
+    /// The nearest of edge, faces and top.
+    fn next(&self, ray: &Ray<T>) -> (T, Next) {
+        let (zero, [ux, _, uz]) = (T::zero(), ray.direction);
+        let edge = match ux {
+            u if u > zero => (self.slab.length - ray.position[0]) / u,
+            u if u < zero => ray.position[0] / -u,
+            _ => T::infinity(),
+        };
+        let mut nearest = (edge.max(zero), Next::Edge);
+        let mut offer = |way: T, next: Next| {
+            if way < nearest.0 {
+                nearest = (way.max(zero), next);
+            }
+        };
+        if uz < zero {
+            offer((self.slab.face(ray.layer + 1) - ray.position[2]) / uz, Next::Down);
+        } else if uz > zero && ray.layer > 0 {
+            offer((self.slab.face(ray.layer) - ray.position[2]) / uz, Next::Up);
+        }
+        if ray.layer > 0 {
+            return nearest;
+        }
+        match self.meet_top(ray, nearest.0) {
+            Meeting::At(way) => (way, Next::Top),
+            Meeting::Missed => nearest,
+            Meeting::Undecided => (zero, Next::Nothing),
+        }
+    }
+
+    /// Where the ray meets the top before the way `limit`: the plane z = 0 outside the surface's support, the surface
+    /// itself inside.
+    fn meet_top(&self, ray: &Ray<T>, limit: T) -> Meeting<T> {
+        let zero = T::zero();
+        let ([x, _, z], [ux, _, uz]) = (ray.position, ray.direction);
+        let [left, right] = self.surface.support();
+        let plane = if uz > zero { ((-z) / uz).max(zero) } else { T::infinity() };
+        // The part of the way inside the support.
+        let (enter, leave) = if ux == zero {
+            if x >= left && x <= right { (zero, limit) } else { (T::infinity(), T::infinity()) }
+        } else {
+            let (a, b) = ((left - x) / ux, (right - x) / ux);
+            (a.min(b).max(zero), a.max(b))
+        };
+        let meets_plane = |way: T| if way <= limit { Meeting::At(way) } else { Meeting::Missed };
+        if left >= right || leave <= zero || plane < enter {
+            return meets_plane(plane);
+        }
+        if enter > limit {
+            return Meeting::Missed;
+        }
+        match march(self.surface, &ray.position, &ray.direction, [enter, leave.min(limit)], self.tolerance) {
+            Meeting::Missed => meets_plane(plane.max(leave)),
+            met => met,
+        }
+    }
+
+    /// At the top: what is transmitted leaves, or enters the touching object and is scattered back or lost.
+    fn top(&mut self, mut ray: Ray<T>, branches: &mut Branches<T>) -> Option<Ray<T>> {
+        let [x, y, _] = ray.position;
+        let [left, right] = self.surface.support();
+        let deformed = x > left && x < right;
+        let [gx, gy] = if deformed { self.surface.gradient(x, y) } else { [T::zero(); 2] };
+        ray.position[2] = if deformed { self.surface.height(x, y) } else { T::zero() };
+        let normal = normalised([-gx, -gy, T::one()]);
+        let object = if deformed { self.surface.touching(x, y) } else { None };
+        let outside = object.map_or(self.slab.ambient, |o| o.index);
+        let transmitted = ray.power * self.transmittance(&ray, &normal, outside);
+        match object {
+            None => self.tally.add(Fate::Above, transmitted),
+            Some(object) => {
+                let scattered = transmitted * object.albedo;
+                self.tally.add(Fate::Absorbed, transmitted - scattered);
+                let direction = self.scatter(&normal);
+                self.keep(Ray { direction, power: scattered, ..ray }, branches);
+            }
+        }
+        Some(ray.mirrored(&normal, ray.power - transmitted))
+    }
+
+    /// At the bottom: what is transmitted leaves, towards the camera or past it.
+    fn bottom(&mut self, ray: Ray<T>) -> Ray<T> {
+        let normal = [T::zero(), T::zero(), T::one()];
+        let transmitted = ray.power * self.transmittance(&ray, &normal, self.slab.ambient);
+        let sine = ray.direction[0].hypot(ray.direction[1]);
+        let seen = self.slab.layers[ray.layer].index * sine <= self.slab.ambient * self.camera_sine;
+        self.tally.add(if seen { Fate::Camera } else { Fate::Below }, transmitted);
+        if seen && !self.camera_profile.is_empty() {
+            let bins = self.camera_profile.len();
+            let share = ray.position[0] / self.slab.length * real(bins as f64);
+            let bin = share.to_usize().unwrap_or(0).min(bins - 1);
+            self.camera_profile[bin] = self.camera_profile[bin] + transmitted;
+        }
+        ray.mirrored(&normal, ray.power - transmitted)
+    }
+
+    /// At an interface inside the slab: the refracted part goes on, the reflected part waits as a branch.
+    fn inside(&mut self, ray: Ray<T>, beyond: usize, branches: &mut Branches<T>) -> Option<Ray<T>> {
+        let normal = [T::zero(), T::zero(), T::one()];
+        let (n1, n2) = (self.slab.layers[ray.layer].index, self.slab.layers[beyond].index);
+        let [ux, uy, uz] = ray.direction;
+        let (sine, cosine) = (ux.hypot(uy), uz.abs());
+        let transmitted = ray.power * from_sine_and_cosine(n1, n2, sine, cosine).transmittance();
+        let mirrored = ray.mirrored(&normal, ray.power - transmitted);
+        let Some(along) = refracted_normal(n1, n2, sine, cosine) else { return Some(mirrored) };
+        self.keep(mirrored, branches);
+        let ratio = n1 / n2;
+        let direction = normalised([ux * ratio, uy * ratio, (along / n2).copysign(uz)]);
+        Some(Ray { direction, layer: beyond, power: transmitted, ..ray })
+    }
+
+    fn transmittance(&self, ray: &Ray<T>, normal: &[T; 3], outside: T) -> T {
+        let inside = self.slab.layers[ray.layer].index;
+        let cosine = dot(&ray.direction, normal).abs().min(T::one());
+        from_sine_and_cosine(inside, outside, sine_between(&ray.direction, normal), cosine).transmittance()
+    }
+
+    /// Puts a branch aside, or counts it as unresolved when there is no room.
+    fn keep(&mut self, ray: Ray<T>, branches: &mut Branches<T>) {
+        if ray.power > T::zero() && !branches.push(ray) {
+            self.tally.add(Fate::Unresolved, ray.power);
+        }
+    }
+
+    /// A direction into the slab by Lambert's law about the surface's inward normal.
+    fn scatter(&mut self, normal: &[T; 3]) -> [T; 3] {
+        self.stream = hash(self.stream);
+        let u = unit::<T>(self.stream);
+        if self.options.geometry == Geometry::Section {
+            let across = u + u - T::one();
+            let inward = ((T::one() - across) * (T::one() + across)).sqrt();
+            return normalised([
+                -inward * normal[0] + across * normal[2],
+                T::zero(),
+                -inward * normal[2] - across * normal[0],
+            ]);
+        }
+        self.stream = hash(self.stream);
+        let (sin, cos) = (unit::<T>(self.stream) * (T::PI() + T::PI())).sin_cos();
+        let (radius, inward) = (u.sqrt(), (T::one() - u).sqrt());
+        // Two directions in the tangent plane; the normal is never along x.
+        let first = normalised([normal[2], T::zero(), -normal[0]]);
+        let second = [
+            normal[1] * first[2] - normal[2] * first[1],
+            normal[2] * first[0] - normal[0] * first[2],
+            normal[0] * first[1] - normal[1] * first[0],
+        ];
+        normalised(core::array::from_fn(|k| radius * (cos * first[k] + sin * second[k]) - inward * normal[k]))
+    }
+}

@@ -1,0 +1,199 @@
+//! Rays through the slab: where an LED's light goes.
+//!
+//! Light enters through the edge x = 0 and travels along x between the top (deformed, possibly touched by an object) and
+//! the bottom, beyond which the camera looks up. At every interface its power is split by Fresnel's coefficients for
+//! unpolarised light and both parts are followed; what leaves the slab is counted. In the undeformed slab light within
+//! the acceptance angle is totally reflected for ever. A press breaks this twice: the top's slope turns rays towards the
+//! normal, by twice the slope at each reflection, until they leave; and a touching object lets light out of the top
+//! whatever its angle and scatters it back in all directions, some of them towards the camera.
+//!
+//! Ray optics only: no interference, no polarisation kept from one interface to the next, no absorption in the layers.
+//!
+//! Rays start on evenly spread points, so the budget converges much faster than with random ones (nearly as the inverse
+//! of the number of rays for a flat slab). Cost: O(rays × events), events being reflections until the light has left or
+//! falls below the cut-off.
+
+mod budget;
+mod follow;
+mod ray;
+pub(crate) mod sampling;
+
+pub use budget::LightBudget;
+
+use crate::error::OpticsError;
+use crate::fresnel::from_sine_and_cosine;
+use crate::led::{Geometry, Led};
+use crate::real::{Real, real, within};
+use crate::surface::{TopSurface, contact_gap};
+use budget::{Fate, Tally};
+use follow::Tracer;
+use ray::Ray;
+use sampling::Points;
+
+/// One layer of the slab.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlabLayer<T> {
+    /// Refractive index.
+    pub index: T,
+    /// Thickness in metres.
+    pub thickness_m: T,
+}
+
+/// The slab: layers from the top (the object's side) down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slab<'a, T> {
+    layers: &'a [SlabLayer<T>],
+    ambient: T,
+    length: T,
+}
+
+impl<'a, T: Real> Slab<'a, T> {
+    /// `layers` from the top down, in an `ambient` index, `length_m` from the lit edge to the far one.
+    ///
+    /// # Errors
+    /// [`OpticsError::Empty`] without layers; [`OpticsError::OutOfRange`] for an index, thickness or length that is not
+    /// positive and finite.
+    pub fn new(layers: &'a [SlabLayer<T>], ambient: T, length_m: T) -> Result<Self, OpticsError> {
+        if layers.is_empty() {
+            return Err(OpticsError::Empty { quantity: "slab" });
+        }
+        for layer in layers {
+            within("refractive index", layer.index, 1e-6, 1e6)?;
+            within("thickness of a layer", layer.thickness_m, 1e-9, 1e6)?;
+        }
+        within("refractive index of the ambient", ambient, 1e-6, 1e6)?;
+        within("length of the slab", length_m, 1e-9, 1e6)?;
+        Ok(Self { layers, ambient, length: length_m })
+    }
+
+    /// Thickness of the whole slab in metres.
+    pub fn thickness_m(&self) -> T {
+        self.layers.iter().fold(T::zero(), |sum, l| sum + l.thickness_m)
+    }
+
+    /// z of the upper face of layer `k` (of the bottom for `k` = number of layers).
+    fn face(&self, k: usize) -> T {
+        self.layers[..k].iter().fold(T::zero(), |z, l| z - l.thickness_m)
+    }
+}
+
+/// How rays are shot and counted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TraceOptions<T> {
+    /// Section or space.
+    pub geometry: Geometry,
+    /// Number of rays from the LED.
+    pub rays: u32,
+    /// Shifts the starting points and draws the directions of scattered light.
+    pub seed: u64,
+    /// A branch is given up when it carries less than this share of a ray.
+    pub cutoff: T,
+    /// Rays leaving the bottom within this angle of its normal reach the camera; radians.
+    pub camera_half_angle: T,
+    /// Half the LED's width across the slab in metres; a point by default. No effect in a section.
+    pub emitter_half_width_m: T,
+}
+
+impl<T: Real> Default for TraceOptions<T> {
+    /// 4096 rays in space, cut off at 10⁻⁶, a camera that sees 30° around its axis.
+    fn default() -> Self {
+        Self {
+            geometry: Geometry::Volume,
+            rays: 4096,
+            seed: 1,
+            cutoff: real(1e-6),
+            camera_half_angle: T::FRAC_PI_6(),
+            emitter_half_width_m: T::zero(),
+        }
+    }
+}
+
+/// Shoots the LED's rays through the slab under `surface` and returns where the light went.
+///
+/// `camera_profile`, if not empty, receives the light reaching the camera by where along the slab it left, in equal bins
+/// from x = 0 to the length; it is overwritten, and its sum is [`LightBudget::camera`].
+///
+/// # Errors
+/// [`OpticsError::OutOfRange`] for an option without meaning, or a surface deeper than the top layer.
+///
+/// ```
+/// use tactile_optics::led::Led;
+/// use tactile_optics::surface::{Dimple, Flat};
+/// use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, trace};
+///
+/// let layers = [SlabLayer { index: 1.41_f64, thickness_m: 2e-3 }, SlabLayer { index: 1.40, thickness_m: 8e-3 }];
+/// let slab = Slab::new(&layers, 1.0, 30e-3)?;
+/// let (led, options) = (Led::lambertian(), TraceOptions::default());
+/// let at_rest = trace(&slab, &led, &Flat, &options, &mut [])?;
+/// let dimple = Dimple::new([15e-3, 0.0], 4e-3, 1.5e-3)?;
+/// let pressed = trace(&slab, &led, &dimple, &options, &mut [])?;
+/// assert!(pressed.camera > at_rest.camera);
+/// assert!((pressed.total() - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
+pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
+    slab: &Slab<'_, T>,
+    led: &Led<T>,
+    surface: &S,
+    options: &TraceOptions<T>,
+    camera_profile: &mut [T],
+) -> Result<LightBudget<T>, OpticsError> {
+    within("number of rays", real::<T>(f64::from(options.rays)), 1.0, 4.3e9)?;
+    within("cut-off", options.cutoff, 0.0, 1.0)?;
+    let right = core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7);
+    within("half angle of the camera", options.camera_half_angle, 0.0, right)?;
+    within("half width of the emitter", options.emitter_half_width_m, 0.0, 1e6)?;
+    let top = slab.layers[0].thickness_m;
+    within("depth of the surface", surface.deepest(), 0.0, crate::real::as_f64(top) * (1.0 - 1e-6))?;
+    camera_profile.fill(T::zero());
+    let mut tracer = Tracer {
+        slab,
+        surface,
+        options,
+        tolerance: contact_gap(slab.thickness_m()),
+        camera_sine: options.camera_half_angle.sin(),
+        cutoff: options.cutoff,
+        tally: Tally::new(),
+        camera_profile,
+        stream: 0,
+    };
+    let points = Points::new(options.geometry == Geometry::Volume, options.seed);
+    let mut total = Tally::new();
+    for i in 0..u64::from(options.rays) {
+        let [z, u, v, y] = points.point::<T>(i);
+        let (outside, weight) = led.direction(u, v, options.geometry);
+        total.add(Fate::Entry, weight);
+        let entry = launch(slab, z, (y + y - T::one()) * options.emitter_half_width_m, outside);
+        let transmitted = weight * entry.1;
+        tracer.tally.add(Fate::Entry, weight - transmitted);
+        tracer.stream = sampling::hash(options.seed ^ sampling::hash(i));
+        tracer.follow(Ray { power: transmitted, ..entry.0 });
+    }
+    let total = total.budget(T::one()).entry;
+    camera_profile_share(tracer.camera_profile, total);
+    Ok(tracer.tally.budget(total))
+}
+
+/// The ray inside the slab, at the share `z` of its thickness from the top, and the edge's transmittance.
+fn launch<T: Real>(slab: &Slab<'_, T>, z: T, y: T, outside: [T; 3]) -> (Ray<T>, T) {
+    let mut depth = z * slab.thickness_m();
+    let mut layer = 0;
+    while layer + 1 < slab.layers.len() && depth > slab.layers[layer].thickness_m {
+        depth = depth - slab.layers[layer].thickness_m;
+        layer += 1;
+    }
+    let n = slab.layers[layer].index;
+    let across = outside[1].hypot(outside[2]);
+    let edge = from_sine_and_cosine(slab.ambient, n, across, outside[0].max(T::zero()));
+    // n sin θ is kept; a denser ambient can turn light back at the edge altogether.
+    let ratio = slab.ambient / n;
+    let (uy, uz) = (outside[1] * ratio, outside[2] * ratio);
+    let along = (T::one() - uy * uy - uz * uz).max(T::zero()).sqrt();
+    let position = [T::zero(), y, slab.face(layer) - depth];
+    let ray = Ray { position, direction: [along, uy, uz], layer, power: T::zero(), events: 0 };
+    (ray, edge.transmittance())
+}
+
+fn camera_profile_share<T: Real>(profile: &mut [T], total: T) {
+    profile.iter_mut().for_each(|v| *v = *v / total);
+}

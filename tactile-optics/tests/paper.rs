@@ -1,0 +1,86 @@
+//! The paper's numbers (§2.2, §3.4, Table 1), and published indices of the materials.
+use tactile_optics::sensor::{FINGERTIP_FORCE_SENSITIVITY_N, PAPER_FORCE_SENSITIVITY_N};
+use tactile_optics::{AcceptanceAngle, Dispersion, LayerStack, OpticsError, SensorSpecification};
+
+#[test]
+fn acceptance_angles_and_the_led_cone() {
+    let stack = LayerStack::new(&[1.38_f64, 1.39, 1.40, 1.41], 1.0).unwrap();
+    let printed = [71.98, 74.89, 78.46, 83.73];
+    for (answer, printed) in stack.acceptance_angles().zip(printed) {
+        let AcceptanceAngle::Below(angle) = answer else { panic!("{answer:?}") };
+        // The paper truncates to two decimals.
+        assert_eq!((angle.degrees() * 100.0).floor() / 100.0, printed);
+    }
+    let cone = stack.led_cone(143.96_f64.to_radians()).unwrap();
+    assert!(cone.is_trapped());
+    // 2 × 71.9894 = 143.9789 untruncated.
+    assert!((cone.margin.to_degrees() - 0.0189).abs() < 1e-3);
+    assert!(!stack.led_cone(144.0_f64.to_radians()).unwrap().is_trapped());
+}
+
+#[test]
+fn cones_at_the_extremes() {
+    let dense = LayerStack::new(&[1.5, 1.6], 1.0).unwrap();
+    assert!(dense.led_cone(core::f64::consts::PI).unwrap().is_trapped());
+    let thin = LayerStack::new(&[1.4, 1.0], 1.0).unwrap();
+    assert!(!thin.led_cone(0.0).unwrap().is_trapped());
+    assert!(dense.led_cone(3.2).is_err() && dense.led_cone(f64::NAN).is_err());
+    assert_eq!(LayerStack::<f64>::new(&[], 1.0), Err(OpticsError::Empty { quantity: "stack of layers" }));
+    assert!(LayerStack::new(&[1.4, -1.0], 1.0).is_err() && LayerStack::new(&[1.4], f64::INFINITY).is_err());
+}
+
+#[test]
+fn the_specification() {
+    let sensor = SensorSpecification {
+        side_m: 30e-3_f64,
+        pixel_m: 4.65e-6,
+        frame_rate_hz: 80.0,
+        largest_force_n: 2.0,
+        newton_per_grey: 8.7e-8,
+        pixel_noise_grey: 0.76,
+        summed_pixels: 1392.0 * 1042.0,
+    }
+    .validated()
+    .unwrap();
+    assert_eq!(sensor.grid_elements().round(), 6452.0);
+    assert_eq!(sensor.temporal_resolution_s(), 12.5e-3);
+    // 0.76 grey levels over 1.45 million pixels and a reference as noisy: 1300 grey levels, 0.11 mN.
+    let one_sigma = 0.76 * (2.0 * 1392.0 * 1042.0_f64).sqrt() * 8.7e-8;
+    assert!((sensor.force_resolution_n(3.0) - 3.0 * one_sigma).abs() < 1e-18);
+    assert!((sensor.force_levels(3.0) * 3.0 * one_sigma - 2.0).abs() < 1e-12);
+    assert_eq!(2.0 / PAPER_FORCE_SENSITIVITY_N, 800.0);
+    assert!(PAPER_FORCE_SENSITIVITY_N < FINGERTIP_FORCE_SENSITIVITY_N, "the sensor beats the finger");
+    assert!(SensorSpecification { side_m: 0.0, ..sensor }.validated().is_err());
+    assert!(SensorSpecification { pixel_noise_grey: f64::NAN, ..sensor }.validated().is_err());
+    assert!(SensorSpecification { pixel_noise_grey: 0.0, ..sensor }.validated().is_ok());
+}
+
+#[test]
+fn indices_and_abbe_numbers_of_the_materials() {
+    let d = 587.56e-9_f64;
+    for (material, index, abbe, tolerance) in
+        [(Dispersion::N_BK7, 1.5168, 64.17, 2e-5), (Dispersion::BOROFLOAT_33, 1.471, 65.41, 6e-4)]
+    {
+        assert!((material.index(d).unwrap() - index).abs() < tolerance);
+        assert!((material.abbe_number::<f64>().unwrap() / abbe - 1.0).abs() < 0.02);
+    }
+    // Tabulated values at 0.5 and 0.6 µm; the fits' residuals stay below 5.6e-4.
+    for (material, at_500, at_600) in [
+        (Dispersion::PDMS_5_1, 1.40675, 1.40202),
+        (Dispersion::PDMS_10_1, 1.39951, 1.39456),
+        (Dispersion::PDMS_20_1, 1.41189, 1.40715),
+    ] {
+        assert!((material.index(0.5e-6_f64).unwrap() - at_500).abs() < 5.6e-4);
+        assert!((material.index(0.6e-6_f64).unwrap() - at_600).abs() < 5.6e-4);
+    }
+    assert!((Dispersion::PDMS_RTV615.index(0.6e-6_f32).unwrap() - 1.4297).abs() < 1e-3);
+    assert!(Dispersion::PDMS_10_1.index(0.3e-6_f64).is_err());
+    assert!(Dispersion::N_BK7.index(f64::NAN).is_err());
+    // Normal dispersion: the index falls with the wavelength.
+    let falling = |m: Dispersion| {
+        (400..700).all(|nm| m.index(nm as f64 * 1e-9).unwrap() > m.index((nm + 1) as f64 * 1e-9).unwrap())
+    };
+    assert!(
+        falling(Dispersion::N_BK7) && falling(Dispersion::BOROFLOAT_33) && falling(Dispersion::PDMS_20_1)
+    );
+}

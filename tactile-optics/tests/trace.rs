@@ -1,0 +1,240 @@
+//! The ray tracer against closed forms, against slow obvious code, and against itself.
+#![allow(clippy::print_stdout)]
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use tactile_optics::led::{Geometry, Led};
+use tactile_optics::surface::{Dimple, Flat, TopSurface, Touched, TouchingObject};
+use tactile_optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, trace};
+use tactile_optics::{OpticsError, Real, acceptance_angle, fresnel};
+
+const PAPER: [SlabLayer<f64>; 4] = [
+    SlabLayer { index: 1.41, thickness_m: 2e-3 },
+    SlabLayer { index: 1.40, thickness_m: 3e-3 },
+    SlabLayer { index: 1.39, thickness_m: 5e-3 },
+    SlabLayer { index: 1.4715, thickness_m: 2e-3 },
+];
+
+fn section(rays: u32) -> TraceOptions<f64> {
+    TraceOptions { geometry: Geometry::Section, rays, ..TraceOptions::default() }
+}
+
+fn flat(layers: &[SlabLayer<f64>], length: f64, options: &TraceOptions<f64>) -> LightBudget<f64> {
+    let slab = Slab::new(layers, 1.0, length).unwrap();
+    trace(&slab, &Led::lambertian(), &Flat, options, &mut []).unwrap()
+}
+
+/// Energy is conserved to rounding: a ray splits by `transmitted` and `power − transmitted`, the sums are compensated.
+fn assert_conserved(budget: &LightBudget<f64>) {
+    assert!((budget.total() - 1.0).abs() < 1e-13, "{budget:?}");
+}
+
+/// Guided share of one flat layer in a section by unfolding: a ray at angle θ outside makes ⌊…⌋ reflections, each
+/// keeping the share R. Midpoints over start and angle.
+fn guided_by_unfolding(n: f64, thickness: f64, length: f64, steps: usize) -> f64 {
+    let (mut guided, mut total) = (0.0, 0.0);
+    for i in 0..steps {
+        let theta = ((i as f64 + 0.5) / steps as f64 - 0.5) * PI;
+        let inside = (theta.sin() / n).asin();
+        let entry = fresnel(1.0, n, theta.abs()).unwrap().transmittance();
+        let kept = fresnel(n, 1.0, FRAC_PI_2 - inside.abs()).unwrap().reflectance();
+        for k in 0..64 {
+            let start = (f64::from(k) + 0.5) / 64.0 * thickness;
+            let unfolded = start + length * inside.abs().tan();
+            guided += theta.cos() * entry * kept.powf((unfolded / thickness).floor());
+        }
+        total += 64.0 * theta.cos();
+    }
+    guided / total
+}
+
+#[test]
+fn a_flat_layer_guides_what_unfolding_says() {
+    let layer = [SlabLayer { index: 1.38, thickness_m: 10e-3 }];
+    let expected = guided_by_unfolding(1.38, 10e-3, 30e-3, 20_000);
+    let found = flat(&layer, 30e-3, &section(1 << 16));
+    assert_conserved(&found);
+    // 65 536 even points against jumps in the number of reflections: the next test shows the rate.
+    assert!((found.guided - expected).abs() < 2e-5, "{} against {expected}", found.guided);
+}
+
+#[test]
+fn the_error_falls_faster_than_with_random_rays() {
+    let layer = [SlabLayer { index: 1.38, thickness_m: 10e-3 }];
+    let expected = guided_by_unfolding(1.38, 10e-3, 30e-3, 40_000);
+    // Root mean square over shifts of the starting points.
+    let error = |rays: u32| {
+        let of_seed = |seed| flat(&layer, 30e-3, &TraceOptions { seed, ..section(rays) }).guided - expected;
+        ((0..16).map(|s| of_seed(s).powi(2)).sum::<f64>() / 16.0).sqrt()
+    };
+    let errors = [256, 4096, 65536].map(error);
+    println!("rms error of the guided share at 256, 4096, 65536 rays: {errors:?}");
+    // Random rays would gain a factor of 16 in all; even points gain more in each of the two steps.
+    assert!(errors[0] / errors[2] > 64.0, "{errors:?}");
+}
+
+#[test]
+fn a_long_slab_keeps_the_trapped_share() {
+    // What enters within the acceptance angle stays for ever; of the rest, only rays within 1e-4 rad of it are still on
+    // their way after 40 000 thicknesses.
+    let layer = [SlabLayer { index: 1.35, thickness_m: 1e-3 }];
+    let acceptance = acceptance_angle(1.35, 1.0).unwrap();
+    let led = Led::new(1.0, FRAC_PI_2).unwrap();
+    for geometry in [Geometry::Section, Geometry::Volume] {
+        let options = TraceOptions { geometry, rays: 20_000, cutoff: 1e-12, ..TraceOptions::default() };
+        let slab = Slab::new(&layer, 1.0, 1.0).unwrap();
+        let found = trace(&slab, &led, &Flat, &options, &mut []).unwrap();
+        assert_conserved(&found);
+        // The trapped rays' own losses at the entry differ from the mean: compare shares of lossless entry by an LED
+        // narrow enough that all of it is trapped, and the general one by its bound.
+        let share = led.trapped_share(acceptance, geometry);
+        assert!(
+            found.guided < share && found.guided > share * (1.0 - found.entry * 1.5),
+            "{found:?} {share}"
+        );
+        let narrow = Led::new(1.0, acceptance.radians() * 0.99).unwrap();
+        assert!((narrow.trapped_share(acceptance, Geometry::Section) - 1.0).abs() < 1e-12);
+        let all = trace(&slab, &narrow, &Flat, &options, &mut []).unwrap();
+        assert!(all.leaked() == 0.0 && (all.guided_of_entered() - 1.0).abs() < 1e-12, "{all:?}");
+    }
+}
+
+#[test]
+fn closed_forms_of_the_trapped_share() {
+    let acceptance = acceptance_angle(1.3, 1.0).unwrap();
+    let s = (1.3_f64 * 1.3 - 1.0).sqrt();
+    let led = Led::lambertian();
+    assert!((led.trapped_share(acceptance, Geometry::Section) - s).abs() < 1e-12);
+    // The projected solid angle of a strip of the unit disc.
+    let disc = 2.0 / PI * (s.asin() + s * (1.0 - s * s).sqrt());
+    assert!((led.trapped_share(acceptance, Geometry::Volume) - disc).abs() < 1e-11);
+    // An even LED in space: the zone of a sphere.
+    let even = Led::new(0.0, FRAC_PI_2).unwrap();
+    assert!((even.trapped_share(acceptance, Geometry::Volume) - s).abs() < 1e-10);
+    let dense = acceptance_angle(1.5, 1.0).unwrap();
+    assert!((led.trapped_share(dense, Geometry::Volume) - 1.0).abs() < 1e-12);
+    assert_eq!(led.trapped_share(acceptance_angle(1.0, 1.2).unwrap(), Geometry::Volume), 0.0);
+}
+
+#[test]
+fn energy_is_conserved_whatever_the_scene() {
+    let object = TouchingObject { index: 1.45, albedo: 0.7 };
+    let dimple = Dimple::new([12e-3, 1e-3], 5e-3, 1.9e-3).unwrap();
+    let touched = Touched::new(dimple, object, [12e-3, 1e-3], 2e-3).unwrap();
+    for geometry in [Geometry::Section, Geometry::Volume] {
+        for layers in [&PAPER[..], &PAPER[..1], &PAPER[1..3]] {
+            let options = TraceOptions { geometry, rays: 3000, cutoff: 1e-7, ..TraceOptions::default() };
+            let slab = Slab::new(layers, 1.0, 30e-3).unwrap();
+            let mut profile = [0.0; 30];
+            let budget = trace(&slab, &Led::lambertian(), &touched, &options, &mut profile).unwrap();
+            assert_conserved(&budget);
+            assert!(budget.unresolved < 1e-4, "{budget:?}");
+            assert!((profile.iter().sum::<f64>() - budget.camera).abs() < 1e-13);
+            let again = trace(&slab, &Led::lambertian(), &touched, &options, &mut profile).unwrap();
+            assert_eq!(budget, again);
+        }
+    }
+}
+
+#[test]
+fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_touches() {
+    let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
+    let led = Led::new(1.0, 70_f64.to_radians()).unwrap();
+    let centre = [15e-3, 0.0];
+    let camera = |surface: &dyn TopSurface<f64>| {
+        let options = TraceOptions { camera_half_angle: 1.0, ..section(20_000) };
+        trace(&slab, &led, surface, &options, &mut []).unwrap().camera
+    };
+    let mut before = camera(&Flat);
+    for slope in [0.1, 0.2, 0.4] {
+        let lit = camera(&Dimple::of_slope(centre, 5e-3, slope).unwrap());
+        assert!(lit > before, "slope {slope}: {lit} after {before}");
+        before = lit;
+    }
+    let flat = camera(&Flat);
+    let touch = |index: f64| {
+        let object = TouchingObject { index, albedo: 0.8 };
+        camera(&Touched::new(Flat, object, centre, 3e-3).unwrap())
+    };
+    // An object of the ambient's index frees no trapped ray; the denser, the more light enters it and comes back.
+    assert!(touch(1.0) < flat + 0.02);
+    assert!(
+        touch(1.2) > touch(1.0) && touch(1.45) > touch(1.2),
+        "{} {} {}",
+        touch(1.0),
+        touch(1.2),
+        touch(1.45)
+    );
+    assert!(touch(1.45) > flat + 0.01);
+}
+
+#[test]
+fn mirror_images_shine_alike() {
+    // Mirroring y leaves the budget of a symmetric LED alone, to the sampling's error.
+    let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
+    let options = TraceOptions { rays: 40_000, ..TraceOptions::default() };
+    let camera = |y: f64| {
+        let dimple = Dimple::new([10e-3, y], 4e-3, 1.5e-3).unwrap();
+        trace(&slab, &Led::lambertian(), &dimple, &options, &mut []).unwrap().camera
+    };
+    let (left, right) = (camera(-2e-3), camera(2e-3));
+    assert!((left - right).abs() < 0.02 * left, "{left} {right}");
+}
+
+#[test]
+fn light_leaves_where_the_press_is() {
+    let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
+    let object = TouchingObject { index: 1.45, albedo: 0.9 };
+    let touched = Touched::new(Flat, object, [18e-3, 0.0], 2e-3).unwrap();
+    let mut profile = [0.0; 30];
+    let led = Led::new(1.0, 70_f64.to_radians()).unwrap();
+    trace(&slab, &led, &touched, &section(20_000), &mut profile).unwrap();
+    let brightest = (0..30).max_by(|&a, &b| profile[a].total_cmp(&profile[b])).unwrap();
+    // Scattered 12 mm above the bottom within the camera's cone, light leaves some millimetres around the contact.
+    assert!((14..=22).contains(&brightest), "{profile:?}");
+}
+
+fn conserved_in<T: Real>(tolerance: f64) -> f64 {
+    let r = |v: f64| T::from(v).unwrap();
+    let layers = [
+        SlabLayer { index: r(1.41), thickness_m: r(2e-3) },
+        SlabLayer { index: r(1.40), thickness_m: r(8e-3) },
+    ];
+    let slab = Slab::new(&layers, r(1.0), r(30e-3)).unwrap();
+    let dimple = Dimple::new([r(15e-3), r(0.0)], r(4e-3), r(1.5e-3)).unwrap();
+    let options = TraceOptions { rays: 20_000, cutoff: r(1e-5), ..TraceOptions::default() };
+    let budget = trace(&slab, &Led::lambertian(), &dimple, &options, &mut []).unwrap();
+    assert!((budget.total() - T::one()).abs().to_f64().unwrap() < tolerance, "{budget:?}");
+    budget.camera.to_f64().unwrap()
+}
+
+#[test]
+fn single_precision_tells_the_same_story() {
+    let (single, double) = (conserved_in::<f32>(1e-6), conserved_in::<f64>(1e-13));
+    // Rays near a threshold end elsewhere in the shorter scalar: as good as another draw of a few of them.
+    assert!((single / double - 1.0).abs() < 0.02, "{single} {double}");
+}
+
+#[test]
+fn options_without_meaning_are_named() {
+    let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
+    let bad = |options: TraceOptions<f64>| {
+        matches!(
+            trace(&slab, &Led::lambertian(), &Flat, &options, &mut []),
+            Err(OpticsError::OutOfRange { .. })
+        )
+    };
+    assert!(bad(section(0)));
+    assert!(bad(TraceOptions { cutoff: f64::NAN, ..section(10) }));
+    assert!(bad(TraceOptions { cutoff: -1.0, ..section(10) }));
+    assert!(bad(TraceOptions { camera_half_angle: 2.0, ..section(10) }));
+    assert!(bad(TraceOptions { emitter_half_width_m: f64::INFINITY, ..section(10) }));
+    let deep = Dimple::new([15e-3, 0.0], 4e-3, 2e-3).unwrap();
+    assert!(trace(&slab, &Led::lambertian(), &deep, &section(10), &mut []).is_err());
+    assert!(Led::new(f64::NAN, 1.0).is_err() && Led::new(1.0, 0.0).is_err() && Led::new(1.0, 1.6).is_err());
+    assert!(Led::from_half_intensity_angle(1.6).is_err());
+    assert!(Dimple::new([0.0, f64::NAN], 1.0, 0.1).is_err() && Dimple::new([0.0, 0.0], 1.0, -0.1).is_err());
+    assert!(Slab::<f64>::new(&[], 1.0, 1.0).is_err() && Slab::new(&PAPER, 0.0, 1.0).is_err());
+    assert!(Slab::new(&[SlabLayer { index: f64::NAN, thickness_m: 1.0 }], 1.0, 1.0).is_err());
+    let object = TouchingObject { index: 1.4, albedo: 1.1 };
+    assert!(Touched::new(Flat, object, [0.0, 0.0], 1.0).is_err());
+}
