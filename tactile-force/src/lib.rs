@@ -1,2 +1,27 @@
 //! From grey levels to stress, force, contact and shear.
+//!
+//! The easy call is [`measure_force`]; [`ForceMeter`] with a [`ForceWorkspace`] is the same without allocation.
+//!
+//! Images are indexed `[row, column]`; x is the column, y the row, and (0, 0) is the centre of the first pixel.
 #![forbid(unsafe_code)]
+
+mod calibration;
+mod contact;
+mod error;
+mod estimate;
+mod frame;
+mod hertz;
+mod measure;
+mod shear;
+
+pub use calibration::{
+    Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, Hysteresis,
+    LinearCalibration, Robustness, StopReason, StressCalibration,
+};
+pub use contact::{Contact, ContactDetector, ContactOptions, DetectorWorkspace, Polarity};
+pub use error::{ForceError, Requirement};
+pub use estimate::{Estimate, Real};
+pub use frame::{BoundingBox, FrameStatistics, NoiseModel, ReferenceFrame};
+pub use hertz::{HertzFit, HertzFitOptions, HertzFitter};
+pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
+pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};

@@ -1,0 +1,123 @@
+//! F = b + s V.
+
+use nalgebra::DMatrix;
+
+use super::report::{self, Shape};
+use super::{
+    CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs, least_squares,
+};
+use crate::{Estimate, ForceError, Real};
+
+/// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the origin.
+///
+/// ```
+/// use tactile_force::{CalibrationPair, LinearCalibration, StressCalibration};
+/// let pairs: Vec<_> = (0..5).map(|k| CalibrationPair::loading(1e5 * k as f64, 0.5 * k as f64)).collect();
+/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+/// assert!((line.force_n(2.5e5) - 1.25).abs() < 1e-12);
+/// assert!((line.integrated_pixel_value(1.25).unwrap() - 2.5e5).abs() < 1e-6);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct LinearCalibration<T> {
+    /// Pixel value about which the line is held: there level and slope are (nearly) uncorrelated.
+    centre: T,
+    level_n: Estimate<T>,
+    slope_n: Estimate<T>,
+    covariance: T,
+    range: [T; 2],
+    report: CalibrationReport<T>,
+}
+
+impl<T: Real> LinearCalibration<T> {
+    /// Fits the line to pairs of integrated pixel value and force.
+    ///
+    /// # Errors
+    /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value only.
+    pub fn fit(pairs: &[CalibrationPair<T>], options: &CalibrationOptions) -> Result<Self, ForceError> {
+        check_pairs(pairs, if options.through_origin { 1 } else { 2 })?;
+        let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value.as_f64()).collect();
+        let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
+        let n = values.len() as f64;
+        let centre = if options.through_origin { 0.0 } else { values.iter().sum::<f64>() / n };
+        let scale = values.iter().map(|v| (v - centre).abs()).fold(0.0, f64::max);
+        let reach = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        if scale <= 4.0 * f64::EPSILON * reach || scale == 0.0 {
+            return Err(ForceError::DegeneratePairs { span: scale });
+        }
+        let columns = if options.through_origin { 1 } else { 2 };
+        let entry = |i: usize, j: usize| if j + 1 == columns { (values[i] - centre) / scale } else { 1.0 };
+        let design = DMatrix::from_fn(values.len(), columns, entry);
+        let fit = least_squares::solve(&design, &forces, options.robustness)?;
+        let last = columns - 1;
+        let slope = fit.coefficients[last] / scale;
+        let level = if columns == 2 { fit.coefficients[0] } else { 0.0 };
+        let shape = Shape {
+            linearity_error: nonlinearity(&values, &forces, &fit.residuals),
+            sensitivity: slope,
+            monotone: slope > 0.0,
+        };
+        let (variance, covariance) =
+            if columns == 2 { (fit.covariance[(0, 0)], fit.covariance[(0, 1)] / scale) } else { (0.0, 0.0) };
+        Ok(Self {
+            centre: T::nearest(centre),
+            level_n: Estimate::nearest(level, variance),
+            slope_n: Estimate::nearest(slope, fit.covariance[(last, last)] / (scale * scale)),
+            covariance: T::nearest(covariance),
+            range: bounds(&values),
+            report: report::build(pairs, &fit, shape),
+        })
+    }
+
+    /// Newtons per grey level, with its standard error.
+    pub fn slope_n(&self) -> Estimate<T> {
+        self.slope_n
+    }
+
+    /// Force at zero pixel value, in newtons, with its standard error.
+    pub fn offset_n(&self) -> Estimate<T> {
+        Estimate { value: self.force_n(T::zero()), standard_error: self.standard_error_n(T::zero()) }
+    }
+}
+
+/// The line's own linearity error is that of its data: the greatest residual as a share of the full scale.
+fn nonlinearity(_values: &[f64], forces: &[f64], residuals: &[f64]) -> f64 {
+    residuals.iter().fold(0.0_f64, |m, r| m.max(r.abs())) / report::full_scale(forces)
+}
+
+fn bounds<T: Real>(values: &[f64]) -> [T; 2] {
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    [T::nearest(least), T::nearest(greatest)]
+}
+
+impl<T: Real> StressCalibration<T> for LinearCalibration<T> {
+    fn force_n(&self, integrated_pixel_value: T) -> T {
+        self.level_n.value + self.slope_n.value * (integrated_pixel_value - self.centre)
+    }
+
+    fn sensitivity_n(&self, _integrated_pixel_value: T) -> T {
+        self.slope_n.value
+    }
+
+    fn standard_error_n(&self, integrated_pixel_value: T) -> T {
+        let d = integrated_pixel_value - self.centre;
+        let (level, slope) = (self.level_n.standard_error, self.slope_n.standard_error * d);
+        let two = T::one() + T::one();
+        (level * level + slope * slope + two * self.covariance * d).max(T::zero()).sqrt()
+    }
+
+    fn integrated_pixel_value(&self, force_n: T) -> Option<T> {
+        let v = self.centre + (force_n - self.level_n.value) / self.slope_n.value;
+        v.is_finite().then_some(v)
+    }
+
+    fn range(&self) -> [T; 2] {
+        self.range
+    }
+
+    fn report(&self) -> &CalibrationReport<T> {
+        &self.report
+    }
+}

@@ -1,0 +1,155 @@
+//! From pixel values to force and stress: P = f(I), F_z = ∫P dS (equations (5) and (6)).
+//!
+//! A calibration is fitted from pairs of integrated pixel value V = Σ (I − I_ref) over the contact and known force F,
+//! taken while loading and unloading. It gives F(V), its standard error and, shared out over the pixels in proportion
+//! to their grey level, the stress
+//!
+//! ```text
+//! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V)  exactly.
+//! ```
+
+mod least_squares;
+mod linear;
+mod report;
+
+pub use linear::LinearCalibration;
+pub use report::{CalibrationReport, Hysteresis, StopReason};
+
+use crate::{Estimate, ForceError, Real};
+
+/// Whether the force was rising or falling when a pair was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Branch {
+    /// The force was rising.
+    #[default]
+    Loading,
+    /// The force was falling.
+    Unloading,
+}
+
+/// One calibration measurement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CalibrationPair<T> {
+    /// Sum of the grey-level differences over the contact.
+    pub integrated_pixel_value: T,
+    /// Force from a reference instrument, in newtons.
+    pub force_n: T,
+    /// Whether the force was rising or falling.
+    pub branch: Branch,
+}
+
+impl<T> CalibrationPair<T> {
+    /// A pair taken while the force was rising.
+    pub fn loading(integrated_pixel_value: T, force_n: T) -> Self {
+        Self { integrated_pixel_value, force_n, branch: Branch::Loading }
+    }
+
+    /// A pair taken while the force was falling.
+    pub fn unloading(integrated_pixel_value: T, force_n: T) -> Self {
+        Self { integrated_pixel_value, force_n, branch: Branch::Unloading }
+    }
+}
+
+/// How much a pair far from the curve may pull on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Robustness {
+    /// Least squares: every pair counts alike.
+    #[default]
+    None,
+    /// Huber's weights, min(1, k/|u|) with k = 1.345: 95 % efficient on normal errors.
+    Huber,
+    /// Tukey's biweight, (1 − u²/k²)² with k = 4.685, after Huber's: gross outliers count nothing.
+    Tukey,
+}
+
+/// What all calibration fits have in common.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CalibrationOptions {
+    /// Force the curve through zero force at zero pixel value.
+    pub through_origin: bool,
+    /// What to do about outliers.
+    pub robustness: Robustness,
+}
+
+/// A force read from a calibration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ForceReading<T> {
+    /// Force and its standard error from all sources, in newtons.
+    pub force_n: Estimate<T>,
+    /// The part of the standard error that comes from noise in the frames, in newtons.
+    pub noise_n: T,
+    /// The part of the standard error that comes from the calibration's parameters, in newtons: it is the same for
+    /// every frame read with one calibration.
+    pub calibration_n: T,
+    /// The pixel value lies outside the range the calibration was fitted on.
+    pub out_of_range: bool,
+}
+
+/// Pixel value to force and stress, equations (5) and (6).
+///
+/// V is the integrated pixel value: the sum of the grey-level differences over the contact.
+pub trait StressCalibration<T: Real>: Send + Sync {
+    /// Force at an integrated pixel value, in newtons.
+    fn force_n(&self, integrated_pixel_value: T) -> T;
+
+    /// dF/dV, in newtons per grey level.
+    fn sensitivity_n(&self, integrated_pixel_value: T) -> T;
+
+    /// Standard error of the force due to the uncertainty of the calibration's own parameters, in newtons.
+    fn standard_error_n(&self, integrated_pixel_value: T) -> T;
+
+    /// The integrated pixel value of a force, or `None` where the curve does not take it exactly once.
+    fn integrated_pixel_value(&self, force_n: T) -> Option<T>;
+
+    /// The least and the greatest integrated pixel value of the fit.
+    fn range(&self) -> [T; 2];
+
+    /// How well the calibration fits its pairs.
+    fn report(&self) -> &CalibrationReport<T>;
+
+    /// Force with its standard error: √((dF/dV)² σ_V² + σ_cal²).
+    fn read(&self, integrated_pixel_value: Estimate<T>) -> ForceReading<T> {
+        let v = integrated_pixel_value.value;
+        let noise_n = (self.sensitivity_n(v) * integrated_pixel_value.standard_error).abs();
+        let calibration_n = self.standard_error_n(v);
+        let [low, high] = self.range();
+        ForceReading {
+            force_n: Estimate { value: self.force_n(v), standard_error: noise_n.hypot(calibration_n) },
+            noise_n,
+            calibration_n,
+            out_of_range: !(v >= low && v <= high),
+        }
+    }
+
+    /// Stress per grey level of difference, in pascals, in a contact of the given integrated pixel value:
+    /// F(V)/(V A). Where V is zero, its limit along the curve, (dF/dV)/A.
+    fn stress_per_grey_level_pa(&self, integrated_pixel_value: T, pixel_area_m2: T) -> T {
+        let v = integrated_pixel_value;
+        let secant = if v == T::zero() { self.sensitivity_n(v) } else { self.force_n(v) / v };
+        secant / pixel_area_m2
+    }
+
+    /// The stress of every difference 0..=255 of an 8-bit frame, in pascals; entry k belongs to a difference of k.
+    fn stress_table_pa(&self, integrated_pixel_value: T, pixel_area_m2: T) -> [T; 256] {
+        let step = self.stress_per_grey_level_pa(integrated_pixel_value, pixel_area_m2);
+        std::array::from_fn(|k| step * T::nearest(k as f64))
+    }
+}
+
+/// Rejects what no fit can use.
+fn check_pairs<T: Real>(pairs: &[CalibrationPair<T>], parameters: usize) -> Result<(), ForceError> {
+    let finite = |p: &CalibrationPair<T>| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
+    if let Some(index) = pairs.iter().position(|p| !finite(p)) {
+        return Err(ForceError::NonFinitePair { index });
+    }
+    if pairs.len() <= parameters {
+        return Err(ForceError::TooFewPairs { required: parameters + 1, found: pairs.len() });
+    }
+    Ok(())
+}

@@ -1,0 +1,125 @@
+//! What can go wrong, with the numbers that say why.
+
+use thiserror::Error;
+
+/// What an option's value has to satisfy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Requirement {
+    /// Finite and greater than zero.
+    Positive,
+    /// Finite and not negative.
+    NonNegative,
+    /// Strictly between zero and one.
+    OpenUnitInterval,
+    /// Between zero and one, both included.
+    UnitInterval,
+    /// Finite.
+    Finite,
+    /// An odd whole number, at least one.
+    Odd,
+    /// A whole number, at least one.
+    AtLeastOne,
+}
+
+/// Every way in which this crate rejects its input.
+///
+/// No contact is a value, a fit that does not converge is a report, and a calibration used outside its range is a
+/// flag: none of them is an error.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ForceError {
+    /// Two images that belong together differ in size.
+    #[error("image of {found:?} (rows, columns) where {expected:?} was expected")]
+    SizeMismatch {
+        /// Rows and columns of the first image.
+        expected: (usize, usize),
+        /// Rows and columns of the second.
+        found: (usize, usize),
+    },
+    /// An image without pixels, or no image at all.
+    #[error("an image needs at least one row and one column, found {rows} x {columns}")]
+    EmptyImage {
+        /// Rows found.
+        rows: usize,
+        /// Columns found.
+        columns: usize,
+    },
+    /// An image with more rows or columns than the exact integer sums have room for.
+    #[error("image side of {found} pixels exceeds the limit of {limit}")]
+    ImageTooLarge {
+        /// The longer side found.
+        found: usize,
+        /// The longest side allowed.
+        limit: usize,
+    },
+    /// Too much of the contact is saturated for its force to be known.
+    #[error("{share} of the contact is saturated, more than the stated {limit}")]
+    SaturatedContact {
+        /// Saturated share of the contact's pixels.
+        share: f64,
+        /// The share stated in the options.
+        limit: f64,
+    },
+    /// Fewer observations than parameters.
+    #[error("{found} observations cannot determine {required} parameters with an error estimate")]
+    TooFewPairs {
+        /// The least number that can.
+        required: usize,
+        /// The number given.
+        found: usize,
+    },
+    /// A calibration or shear observation with a NaN or an infinity in it.
+    #[error("observation {index} is not finite")]
+    NonFinitePair {
+        /// Its place in the slice.
+        index: usize,
+    },
+    /// All observations were taken at (nearly) the same input: the slope is unknown.
+    #[error("the observations span too little ({span}) to determine a slope")]
+    DegeneratePairs {
+        /// Spread of the input.
+        span: f64,
+    },
+    /// The fitted force falls where the pixel value rises, and a monotone calibration was asked for.
+    #[error("the force falls from pixel value {from} to {to}")]
+    NotMonotone {
+        /// Pixel value at which the force starts to fall.
+        from: f64,
+        /// Pixel value at which it is lower.
+        to: f64,
+    },
+    /// An option outside its domain.
+    #[error("option `{name}` is {value}, must be {requirement:?}")]
+    InvalidOption {
+        /// The option's name.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// What it must satisfy.
+        requirement: Requirement,
+    },
+    /// A pixel of a floating-point image is NaN or infinite.
+    #[error("pixel (row {row}, column {column}) is not finite")]
+    NonFinitePixel {
+        /// Its row.
+        row: usize,
+        /// Its column.
+        column: usize,
+    },
+}
+
+impl Requirement {
+    pub(crate) fn check(self, name: &'static str, value: f64) -> Result<(), ForceError> {
+        let holds = match self {
+            Self::Positive => value > 0.0 && value.is_finite(),
+            Self::NonNegative => value >= 0.0 && value.is_finite(),
+            Self::OpenUnitInterval => value > 0.0 && value < 1.0,
+            Self::UnitInterval => (0.0..=1.0).contains(&value),
+            Self::Finite => value.is_finite(),
+            Self::Odd => value >= 1.0 && value % 2.0 == 1.0,
+            Self::AtLeastOne => value >= 1.0 && value.is_finite(),
+        };
+        if holds { Ok(()) } else { Err(ForceError::InvalidOption { name, value, requirement: self }) }
+    }
+}

@@ -1,0 +1,57 @@
+//! A number with its standard error, and the scalar all of the crate is generic over.
+
+use std::fmt::{self, Debug, Display};
+
+use num_traits::{Float, FromPrimitive};
+
+/// The scalar of results and calibrations: `f32` or `f64`.
+///
+/// Sums over 8-bit frames are exact integers and fits run in `f64`, so `f32` results are `f64` results rounded once.
+pub trait Real: Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static {
+    /// The nearest value to an `f64`.
+    fn nearest(value: f64) -> Self {
+        Self::from_f64(value).unwrap_or_else(Self::nan)
+    }
+
+    /// The value as an `f64`.
+    fn as_f64(self) -> f64 {
+        self.to_f64().unwrap_or(f64::NAN)
+    }
+}
+
+impl<T> Real for T where T: Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static {}
+
+/// A value and its standard error (one standard deviation), both in the unit the field's name states.
+///
+/// ```
+/// use tactile_force::Estimate;
+/// let force_n = Estimate { value: 1.2, standard_error: 0.003 };
+/// assert_eq!(format!("{force_n} N"), "1.2 ± 0.003 N");
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Estimate<T> {
+    /// The value.
+    pub value: T,
+    /// One standard deviation of its error.
+    pub standard_error: T,
+}
+
+impl<T: Real> Estimate<T> {
+    pub(crate) fn nearest(value: f64, variance: f64) -> Self {
+        Self { value: T::nearest(value), standard_error: T::nearest(variance.max(0.0).sqrt()) }
+    }
+
+    /// The value and its error in another unit.
+    pub fn scaled(self, factor: T) -> Self {
+        Self { value: self.value * factor, standard_error: self.standard_error * factor.abs() }
+    }
+}
+
+impl<T: Display> Display for Estimate<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Display::fmt(&self.value, f)?;
+        f.write_str(" ± ")?;
+        Display::fmt(&self.standard_error, f)
+    }
+}

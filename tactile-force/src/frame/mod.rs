@@ -1,0 +1,15 @@
+//! The one pass over a frame, the reference it is compared with, and the noise of both.
+
+mod noise;
+mod pass;
+mod reference;
+mod statistics;
+mod strip;
+
+pub use noise::NoiseModel;
+pub use reference::ReferenceFrame;
+pub use statistics::{BoundingBox, FrameStatistics};
+
+pub(crate) use pass::Tiles;
+pub(crate) use reference::PassWorkspace;
+pub(crate) use strip::{TILE_COLUMNS, TILE_ROWS};

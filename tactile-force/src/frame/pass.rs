@@ -1,0 +1,211 @@
+//! The pass: every pixel of a frame once.
+
+use ndarray::{ArrayView2, Axis, Zip};
+
+use super::strip::{Kernel, Rows, STRIP_TILES, Strip};
+use super::{BoundingBox, FrameStatistics, TILE_COLUMNS, TILE_ROWS};
+
+/// Sums over tiles of 8 rows by 32 columns, for what is fainter than the noise of one pixel.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tiles {
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
+    pub(crate) sums: Vec<i32>,
+}
+
+impl Tiles {
+    fn reset(&mut self, (rows, columns): (usize, usize)) {
+        self.rows = rows.div_ceil(TILE_ROWS);
+        self.columns = columns.div_ceil(TILE_COLUMNS);
+        self.sums.clear();
+        self.sums.resize(self.rows * self.columns, 0);
+    }
+
+    /// The pixels of a tile.
+    pub(crate) fn pixels(&self, tile: usize, (rows, columns): (usize, usize)) -> BoundingBox {
+        let (row, column) = (tile / self.columns, tile % self.columns);
+        BoundingBox {
+            row_start: row * TILE_ROWS,
+            row_end: ((row + 1) * TILE_ROWS).min(rows),
+            column_start: column * TILE_COLUMNS,
+            column_end: ((column + 1) * TILE_COLUMNS).min(columns),
+        }
+    }
+}
+
+const ZEROS: [u8; STRIP_TILES * TILE_COLUMNS] = [0; STRIP_TILES * TILE_COLUMNS];
+
+/// Sums of the frame itself, extremes and the box of |frame − reference| > threshold. Both images are in standard layout
+/// and have the same, nonzero size; without a reference it counts as black. With the reference come the brightest
+/// pixels of its bands of eight rows: only where they leave room for 255 are saturated pixels counted one by one.
+pub(super) fn scan(
+    frame: &[u8],
+    reference: Option<(&[u8], &[u8])>,
+    size: (usize, usize),
+    threshold: u8,
+    tiles: &mut Tiles,
+) -> FrameStatistics {
+    tiles.reset(size);
+    let kernel = Kernel::best();
+    let mut s = FrameStatistics::empty(size);
+    let whole = size.1 / TILE_COLUMNS;
+    let brightest = reference.map(|(_, b)| b);
+    let reference = reference.map(|(r, _)| r);
+    for band in 0..tiles.rows {
+        let mut above = 0;
+        let sums = &mut tiles.sums[band * tiles.columns..(band + 1) * tiles.columns];
+        for first in (0..whole).step_by(STRIP_TILES) {
+            let last = (first + STRIP_TILES).min(whole);
+            let columns = first * TILE_COLUMNS..last * TILE_COLUMNS;
+            let f = rows(frame, size, band, columns.clone());
+            let r = reference
+                .map_or([&ZEROS[..columns.len()]; TILE_ROWS], |r| rows(r, size, band, columns.clone()));
+            let strip = kernel.run(&f, &r, threshold, &mut sums[first..last]);
+            above = above.max(strip.above);
+            s.add(&strip, band, first);
+        }
+        if whole < tiles.columns {
+            let columns = whole * TILE_COLUMNS..size.1;
+            let f = padded(rows(frame, size, band, columns.clone()));
+            let r = padded(reference.map_or([&[]; TILE_ROWS], |r| rows(r, size, band, columns.clone())));
+            let (f, r) = (f.each_ref().map(|p| &p[..]), r.each_ref().map(|p| &p[..]));
+            let strip = kernel.run(&f, &r, threshold, &mut sums[whole..]);
+            above = above.max(strip.above);
+            s.add(&strip, band, whole);
+        }
+        if above >= u8::MAX - brightest.map_or(0, |b| b[band]) {
+            s.saturated +=
+                pixels_of(band, frame, size.1).iter().map(|&p| usize::from(p == u8::MAX)).sum::<usize>();
+        }
+    }
+    s
+}
+
+/// The pixels of a band of eight rows.
+pub(super) fn pixels_of(band: usize, image: &[u8], columns: usize) -> &[u8] {
+    let length = TILE_ROWS * columns;
+    &image[band * length..((band + 1) * length).min(image.len())]
+}
+
+/// Part of the eight rows of a band; rows below the image are black.
+fn rows(
+    image: &[u8],
+    (height, width): (usize, usize),
+    band: usize,
+    columns: std::ops::Range<usize>,
+) -> Rows<'_> {
+    std::array::from_fn(|k| {
+        let y = band * TILE_ROWS + k;
+        if y < height {
+            &image[y * width + columns.start..y * width + columns.end]
+        } else {
+            &ZEROS[..columns.len()]
+        }
+    })
+}
+
+/// The image's last columns, filled up with black to a whole tile.
+fn padded(rows: Rows<'_>) -> [[u8; TILE_COLUMNS]; TILE_ROWS] {
+    rows.map(|row| {
+        let mut tile = [0; TILE_COLUMNS];
+        tile[..row.len()].copy_from_slice(row);
+        tile
+    })
+}
+
+impl FrameStatistics {
+    fn empty((rows, columns): (usize, usize)) -> Self {
+        Self {
+            rows,
+            columns,
+            sum: 0,
+            sum_x: 0,
+            sum_y: 0,
+            sum_xx: 0,
+            sum_xy: 0,
+            sum_yy: 0,
+            least: 0,
+            greatest: 0,
+            saturated: 0,
+            bounding_box: None,
+        }
+    }
+
+    /// Adds a strip whose first pixel is that of tile (band, first); the box grows by whole tiles.
+    fn add(&mut self, strip: &Strip, band: usize, first: usize) {
+        let x0 = (first * TILE_COLUMNS) as i64;
+        let y0 = (band * TILE_ROWS) as i64 + 4;
+        let s = strip;
+        let x = s.x + x0 * s.sum;
+        self.sum += s.sum;
+        self.sum_x += x;
+        self.sum_xx += s.xx + 2 * x0 * s.x + x0 * x0 * s.sum;
+        self.sum_y += s.k + y0 * s.sum;
+        self.sum_yy += s.kk + 2 * y0 * s.k + y0 * y0 * s.sum;
+        self.sum_xy += s.xk + x0 * s.k + y0 * x;
+        self.greatest = self.greatest.max(i16::from(s.above));
+        self.least = self.least.min(-i16::from(s.below));
+        if s.hits[1] > s.hits[0] {
+            let here = BoundingBox {
+                row_start: band * TILE_ROWS,
+                row_end: ((band + 1) * TILE_ROWS).min(self.rows),
+                column_start: (first + s.hits[0]) * TILE_COLUMNS,
+                column_end: ((first + s.hits[1]) * TILE_COLUMNS).min(self.columns),
+            };
+            self.bounding_box = Some(self.bounding_box.map_or(here, |b| b.union(here)));
+        }
+    }
+}
+
+impl FrameStatistics {
+    /// Turns sums over the frame into sums over the difference.
+    pub(super) fn subtract(&mut self, reference: &Self) {
+        self.sum -= reference.sum;
+        self.sum_x -= reference.sum_x;
+        self.sum_y -= reference.sum_y;
+        self.sum_xx -= reference.sum_xx;
+        self.sum_xy -= reference.sum_xy;
+        self.sum_yy -= reference.sum_yy;
+    }
+
+    /// The strips know extremes on their own side of zero only; where every difference is on one side, look again.
+    pub(super) fn correct_extremes(&mut self, frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) {
+        let all_equal = self.least == 0 && self.greatest == 0;
+        if all_equal || (self.least < 0 && self.greatest > 0) {
+            return;
+        }
+        (self.least, self.greatest) = (i16::MAX, i16::MIN);
+        Zip::from(frame).and(reference).for_each(|&f, &r| {
+            let d = i16::from(f) - i16::from(r);
+            self.least = self.least.min(d);
+            self.greatest = self.greatest.max(d);
+        });
+    }
+}
+
+/// Shrinks a box of whole tiles to the pixels with |frame − reference| > threshold, side by side.
+pub(super) fn tighten(
+    mut tight: BoundingBox,
+    frame: ArrayView2<'_, u8>,
+    reference: ArrayView2<'_, u8>,
+    threshold: u8,
+) -> BoundingBox {
+    let over = |(f, r): (&u8, &u8)| f.abs_diff(*r) > threshold;
+    let line = |within: BoundingBox, axis: usize, at: usize| {
+        let (f, r) = (within.of(frame), within.of(reference));
+        f.index_axis(Axis(axis), at).iter().zip(r.index_axis(Axis(axis), at)).any(over)
+    };
+    while tight.rows() > 1 && !line(tight, 0, 0) {
+        tight.row_start += 1;
+    }
+    while tight.rows() > 1 && !line(tight, 0, tight.rows() - 1) {
+        tight.row_end -= 1;
+    }
+    while tight.columns() > 1 && !line(tight, 1, 0) {
+        tight.column_start += 1;
+    }
+    while tight.columns() > 1 && !line(tight, 1, tight.columns() - 1) {
+        tight.column_end -= 1;
+    }
+    tight
+}

@@ -1,0 +1,229 @@
+//! Levenberg–Marquardt on the rings.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::edge::BlurredEdge;
+use super::profile::{Shape, level};
+use super::{HertzFit, HertzFitOptions, Rings};
+use crate::contact::Aperture;
+use crate::{Estimate, ForceError, Real, StopReason};
+
+type Normal = SMatrix<f64, 6, 6>;
+type Step = SVector<f64, 6>;
+
+/// Variance along one axis of a position spread evenly over a pixel.
+const PIXEL: f64 = 1.0 / 12.0;
+
+/// Fits Hertz profiles; holds the table of the blurred edge.
+#[derive(Clone, Debug)]
+pub struct HertzFitter {
+    options: HertzFitOptions,
+    edge: BlurredEdge,
+}
+
+/// Where a fit starts: the contact's centroid, equivalent radius and integral, in pixels of its region.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Start {
+    pub(crate) centre: [f64; 2],
+    pub(crate) radius: f64,
+    pub(crate) integral: f64,
+}
+
+/// Variance of a difference: background + gain × level.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DifferenceNoise {
+    pub(crate) background: f64,
+    pub(crate) gain: f64,
+}
+
+struct State {
+    shape: Shape,
+    centre: [f64; 2],
+    iterations: usize,
+    stop: StopReason,
+}
+
+struct Equations {
+    normal: Normal,
+    gradient: Step,
+    chi2: f64,
+    pixels: f64,
+}
+
+impl HertzFitter {
+    /// A fitter with validated options.
+    ///
+    /// # Errors
+    /// An option outside its domain.
+    pub fn new(options: HertzFitOptions) -> Result<Self, ForceError> {
+        options.validate()?;
+        Ok(Self { options, edge: BlurredEdge::new() })
+    }
+
+    /// Fits the aperture's pixels. `None` if they do not determine the parameters.
+    pub(crate) fn fit_with<T: Real>(
+        &self,
+        rings: &mut Rings,
+        aperture: &Aperture,
+        start: Start,
+        noise: DifferenceNoise,
+        pixel_size_m: [f64; 2],
+    ) -> Option<HertzFit<T>> {
+        let region = aperture.region?;
+        let aspect = pixel_size_m[1] / pixel_size_m[0];
+        let blur = self.options.blur_px.map_or(0.5, |b| b * b) + PIXEL;
+        let peak = 1.5 * start.integral * aspect / (std::f64::consts::PI * start.radius * start.radius);
+        let mut state = State {
+            shape: Shape { peak, background: 0.0, radius: start.radius, blur },
+            centre: start.centre,
+            iterations: 0,
+            stop: StopReason::IterationLimit,
+        };
+        for _ in 0..5 {
+            rings.gather(&aperture.difference, &aperture.grown, region.columns(), state.centre, aspect);
+            let moved = self.descend(rings, &mut state, noise, aspect)?;
+            if moved < 0.02 {
+                break;
+            }
+        }
+        let equations = self.assemble(rings, &state.shape, noise);
+        let origin = [region.column_start as f64, region.row_start as f64];
+        self.report(&state, &equations, origin, pixel_size_m)
+    }
+
+    /// Steps until nothing moves; returns how far the centre went, in pixels.
+    fn descend(&self, rings: &Rings, state: &mut State, noise: DifferenceNoise, aspect: f64) -> Option<f64> {
+        let mut damping = 1e-4;
+        let mut shift = [0.0; 2];
+        let mut here = self.assemble(rings, &state.shape, noise);
+        state.stop = StopReason::IterationLimit;
+        while state.iterations < self.options.max_iterations {
+            state.iterations += 1;
+            let mut damped = here.normal;
+            for k in 0..6 {
+                damped[(k, k)] *= 1.0 + damping;
+            }
+            let step = damped.cholesky()?.solve(&here.gradient);
+            // The centre enters linearly on fixed rings: its best shift belongs to the final shape.
+            shift = [step[4], step[5]];
+            let trial = self.stepped(&state.shape, &step);
+            let there = self.assemble(rings, &trial, noise);
+            let small = step[2].abs() < 1e-7 * trial.radius && step[0].abs() < 1e-7 * trial.peak.abs();
+            if there.chi2 <= here.chi2 * (1.0 + 1e-14) {
+                (state.shape, here) = (trial, there);
+                damping *= 0.1;
+            } else {
+                damping *= 10.0;
+            }
+            if small {
+                state.stop = StopReason::Converged;
+                break;
+            }
+        }
+        state.centre[0] += shift[0];
+        state.centre[1] += shift[1] / aspect;
+        Some(shift[0].hypot(shift[1]))
+    }
+
+    fn stepped(&self, shape: &Shape, step: &Step) -> Shape {
+        Shape {
+            peak: shape.peak + step[0],
+            background: shape.background + step[1],
+            radius: (shape.radius + step[2]).clamp(0.5 * shape.radius, 2.0 * shape.radius),
+            blur: if self.options.blur_px.is_some() {
+                shape.blur
+            } else {
+                (shape.blur + step[3]).clamp(PIXEL, 4.0 * shape.blur)
+            },
+        }
+    }
+
+    /// Normal equations over all pixels of the rings; rows of parameters that are not fitted are those of the identity.
+    fn assemble(&self, rings: &Rings, shape: &Shape, noise: DifferenceNoise) -> Equations {
+        let mut e = Equations { normal: Normal::zeros(), gradient: Step::zeros(), chi2: 0.0, pixels: 0.0 };
+        for ring in rings.rings.iter().filter(|r| r.n > 0.0) {
+            let r2 = ring.r2 / ring.n;
+            let spread = (ring.r4 / ring.n - r2 * r2).max(0.0);
+            let l = level(&self.edge, shape, r2, spread);
+            let weight = 1.0 / (noise.background + noise.gain * l.value.max(0.0));
+            let radial = [l.by_peak, 1.0, l.by_radius, l.by_blur];
+            let residual =
+                [ring.d - ring.n * l.value, ring.dc - l.value * ring.c, ring.ds - l.value * ring.s];
+            let slope = -l.by_distance;
+            for (i, a) in radial.iter().enumerate() {
+                for (j, b) in radial.iter().enumerate() {
+                    e.normal[(i, j)] += weight * ring.n * a * b;
+                }
+                for (j, sum) in [(4, ring.c), (5, ring.s)] {
+                    e.normal[(i, j)] += weight * a * slope * sum;
+                    e.normal[(j, i)] += weight * a * slope * sum;
+                }
+                e.gradient[i] += weight * a * residual[0];
+            }
+            let square = weight * slope * slope;
+            e.normal[(4, 4)] += square * ring.cc;
+            e.normal[(4, 5)] += square * ring.cs;
+            e.normal[(5, 4)] += square * ring.cs;
+            e.normal[(5, 5)] += square * (ring.n - ring.cc);
+            e.gradient[4] += weight * slope * residual[1];
+            e.gradient[5] += weight * slope * residual[2];
+            e.chi2 += weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value);
+            e.pixels += ring.n;
+        }
+        let fixed = [(1, !self.options.fit_background), (3, self.options.blur_px.is_some())];
+        for (k, _) in fixed.into_iter().filter(|(_, fixed)| *fixed) {
+            e.normal.fill_row(k, 0.0);
+            e.normal.fill_column(k, 0.0);
+            e.normal[(k, k)] = 1.0;
+            e.gradient[k] = 0.0;
+        }
+        e
+    }
+
+    fn report<T: Real>(
+        &self,
+        state: &State,
+        equations: &Equations,
+        origin: [f64; 2],
+        pixel_size_m: [f64; 2],
+    ) -> Option<HertzFit<T>> {
+        let mut covariance = equations.normal.cholesky()?.inverse();
+        for (k, fixed) in [(1, !self.options.fit_background), (3, self.options.blur_px.is_some())] {
+            if fixed {
+                covariance[(k, k)] = 0.0;
+            }
+        }
+        let fitted =
+            6 - usize::from(!self.options.fit_background) - usize::from(self.options.blur_px.is_some());
+        let reduced = equations.chi2 / (equations.pixels - fitted as f64).max(1.0);
+        covariance *= reduced;
+        let aspect = pixel_size_m[1] / pixel_size_m[0];
+        for k in 0..6 {
+            covariance[(k, 5)] /= aspect;
+            covariance[(5, k)] /= aspect;
+        }
+        let s = &state.shape;
+        let volume = 2.0 / 3.0 * std::f64::consts::PI / aspect * s.radius;
+        let (by_peak, by_radius) = (volume * s.radius, 2.0 * volume * s.peak);
+        let volume_variance = by_peak * by_peak * covariance[(0, 0)]
+            + 2.0 * by_peak * by_radius * covariance[(0, 2)]
+            + by_radius * by_radius * covariance[(2, 2)];
+        let radius_px = Estimate::<T>::nearest(s.radius, covariance[(2, 2)]);
+        Some(HertzFit {
+            centre_px: [
+                Estimate::nearest(origin[0] + state.centre[0], covariance[(4, 4)]),
+                Estimate::nearest(origin[1] + state.centre[1], covariance[(5, 5)]),
+            ],
+            radius_px,
+            radius_m: radius_px.scaled(T::nearest(pixel_size_m[0])),
+            peak: Estimate::nearest(s.peak, covariance[(0, 0)]),
+            background: Estimate::nearest(s.background, covariance[(1, 1)]),
+            blur_px: T::nearest((s.blur - PIXEL).max(0.0).sqrt()),
+            integrated_pixel_value: Estimate::nearest(volume * s.radius * s.peak, volume_variance),
+            covariance: std::array::from_fn(|i| std::array::from_fn(|j| T::nearest(covariance[(i, j)]))),
+            reduced_chi_squared: T::nearest(reduced),
+            iterations: state.iterations,
+            stop: state.stop,
+        })
+    }
+}

@@ -1,0 +1,18 @@
+//! The contact radius, from the shape of the pressure: p(r) = p₀ √(1 − r²/a²) (Hertz).
+//!
+//! The grey levels of the contact are fitted with that profile averaged over a pixel and blurred by the optics, so that
+//! radius and centre come out far below a pixel. Pixels are first gathered into thin rings about the centre, with the
+//! sums that keep the least-squares problem of the pixels exact to first order in the centre's shift; the rings are then
+//! fitted in microseconds.
+
+mod edge;
+mod fit;
+mod options;
+mod profile;
+mod rings;
+
+pub use fit::HertzFitter;
+pub use options::{HertzFit, HertzFitOptions};
+
+pub(crate) use fit::{DifferenceNoise, Start};
+pub(crate) use rings::Rings;

@@ -1,0 +1,214 @@
+//! One frame in, force and contact out.
+
+use ndarray::ArrayView2;
+
+use crate::contact::{Contact, ContactDetector, ContactOptions, DetectorWorkspace};
+use crate::hertz::{DifferenceNoise, HertzFit, HertzFitOptions, HertzFitter, Rings, Start};
+use crate::{
+    BoundingBox, Estimate, ForceError, ForceReading, FrameStatistics, Real, ReferenceFrame,
+    StressCalibration, error::Requirement,
+};
+
+/// How a force is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ForceOptions {
+    /// How the contact is found.
+    pub contact: ContactOptions,
+    /// How its profile is fitted.
+    pub hertz: HertzFitOptions,
+    /// Leave the profile out: radius and peak stress then come from the mask.
+    pub skip_profile: bool,
+}
+
+/// What one frame says of the contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ForceMeasurement<T> {
+    /// Normal force in newtons, equation (6); zero without contact.
+    pub force_n: Estimate<T>,
+    /// The parts of the force's error, and whether the calibration was used outside its range; `None` without contact.
+    pub reading: Option<ForceReading<T>>,
+    /// The contact; `None` if the frame shows none.
+    pub contact: Option<Contact<T>>,
+    /// The fitted Hertz profile, if it was asked for and could be fitted.
+    pub profile: Option<HertzFit<T>>,
+    /// Centroid [x, y] in metres from the centre of the first pixel, equations (7) and (8).
+    pub centroid_m: Option<[Estimate<T>; 2]>,
+    /// Area of the mask in square metres.
+    pub contact_area_m2: Option<T>,
+    /// Contact radius in metres: the profile's, else the mask's equivalent radius with half a pixel as its error.
+    pub contact_radius_m: Option<Estimate<T>>,
+    /// F/(π a²) in pascals.
+    pub mean_stress_pa: Option<Estimate<T>>,
+    /// Stress at the centre in pascals: the profile's peak, else the greatest difference, through the calibration.
+    pub peak_stress_pa: Option<Estimate<T>>,
+    /// Sums over the whole frame.
+    pub statistics: FrameStatistics,
+}
+
+/// Everything a measurement reuses from frame to frame. After the first frames nothing is allocated.
+#[derive(Clone, Debug, Default)]
+pub struct ForceWorkspace {
+    detector: DetectorWorkspace,
+    rings: Rings,
+}
+
+impl ForceWorkspace {
+    /// The last contact's mask (1 inside) over its region, and the region's place in the frame.
+    pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
+        self.detector.mask()
+    }
+}
+
+/// Measures forces with one sensor: options checked and tables built once.
+#[derive(Clone, Debug)]
+pub struct ForceMeter<T> {
+    detector: ContactDetector,
+    fitter: HertzFitter,
+    skip_profile: bool,
+    pixel_size_m: [T; 2],
+}
+
+impl<T: Real> ForceMeter<T> {
+    /// A meter for pixels of the given size [x, y].
+    ///
+    /// # Errors
+    /// A pixel size or an option outside its domain.
+    pub fn new(pixel_size_m: [T; 2], options: &ForceOptions) -> Result<Self, ForceError> {
+        for size in pixel_size_m {
+            Requirement::Positive.check("pixel_size_m", size.as_f64())?;
+        }
+        Ok(Self {
+            detector: ContactDetector::new(options.contact)?,
+            fitter: HertzFitter::new(options.hertz)?,
+            skip_profile: options.skip_profile,
+            pixel_size_m,
+        })
+    }
+
+    /// Measures one frame.
+    ///
+    /// # Errors
+    /// The frame has not the reference's size, or too much of the contact is saturated.
+    pub fn measure_with(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        calibration: &(impl StressCalibration<T> + ?Sized),
+    ) -> Result<ForceMeasurement<T>, ForceError> {
+        let (statistics, contact) = self.detector.detect_with(&mut workspace.detector, frame, reference)?;
+        let Some(contact) = contact else { return Ok(ForceMeasurement::without_contact(statistics)) };
+        let profile = if self.skip_profile { None } else { self.profile(workspace, &contact, reference) };
+        Ok(self.combine(statistics, contact, profile, calibration))
+    }
+
+    fn profile(
+        &self,
+        workspace: &mut ForceWorkspace,
+        contact: &Contact<T>,
+        reference: &ReferenceFrame,
+    ) -> Option<HertzFit<T>> {
+        let region = workspace.detector.aperture.region?;
+        let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
+        let [hx, hy] = self.pixel_size_m.map(T::as_f64);
+        let start = Start {
+            centre: [x - region.column_start as f64, y - region.row_start as f64],
+            radius: contact.equivalent_radius_px.as_f64() * (hy / hx).sqrt(),
+            integral: contact.integrated_pixel_value.value.as_f64(),
+        };
+        let noise =
+            DifferenceNoise { background: reference.difference_variance(), gain: reference.noise().gain };
+        self.fitter.fit_with(&mut workspace.rings, &workspace.detector.aperture, start, noise, [hx, hy])
+    }
+
+    fn combine(
+        &self,
+        statistics: FrameStatistics,
+        contact: Contact<T>,
+        profile: Option<HertzFit<T>>,
+        calibration: &(impl StressCalibration<T> + ?Sized),
+    ) -> ForceMeasurement<T> {
+        let [hx, hy] = self.pixel_size_m;
+        let pixel_area = hx * hy;
+        let reading = calibration.read(contact.integrated_pixel_value);
+        let side = pixel_area.sqrt();
+        let half = T::nearest(0.5) * side;
+        let radius = profile
+            .map_or(Estimate { value: contact.equivalent_radius_px * side, standard_error: half }, |p| {
+                p.radius_m
+            });
+        let pi = T::nearest(std::f64::consts::PI);
+        let mean = reading.force_n.value / (pi * radius.value * radius.value);
+        let two = T::one() + T::one();
+        let relative = |e: Estimate<T>| e.standard_error / e.value;
+        let mean_error = mean * relative(reading.force_n).hypot(two * relative(radius));
+        let step = calibration.stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel_area);
+        let peak = profile.map_or(Estimate { value: contact.peak, standard_error: T::one() }, |p| p.peak);
+        ForceMeasurement {
+            force_n: reading.force_n,
+            reading: Some(reading),
+            centroid_m: Some([contact.centroid_px[0].scaled(hx), contact.centroid_px[1].scaled(hy)]),
+            contact_area_m2: Some(T::nearest(contact.area_px as f64) * pixel_area),
+            contact_radius_m: Some(radius),
+            mean_stress_pa: Some(Estimate { value: mean, standard_error: mean_error }),
+            peak_stress_pa: Some(peak.scaled(step)),
+            contact: Some(contact),
+            profile,
+            statistics,
+        }
+    }
+}
+
+impl<T: Real> ForceMeasurement<T> {
+    fn without_contact(statistics: FrameStatistics) -> Self {
+        Self {
+            force_n: Estimate::default(),
+            reading: None,
+            contact: None,
+            profile: None,
+            centroid_m: None,
+            contact_area_m2: None,
+            contact_radius_m: None,
+            mean_stress_pa: None,
+            peak_stress_pa: None,
+            statistics,
+        }
+    }
+}
+
+/// Measures the force of one frame against one reference frame. For many frames keep a [`ForceMeter`], a
+/// [`ReferenceFrame`] and a [`ForceWorkspace`].
+///
+/// # Errors
+/// Images of different size or without pixels, options outside their domain, too much of the contact saturated.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, LinearCalibration, measure_force};
+///
+/// let pairs: Vec<_> = (0..5).map(|k| CalibrationPair::loading(1e5 * k as f64, 0.5 * k as f64)).collect();
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let reference = Array2::from_elem((200, 200), 12_u8);
+/// let frame = Array2::from_shape_fn((200, 200), |(y, x)| {
+///     let r2 = (x as f64 - 90.3).powi(2) + (y as f64 - 104.8).powi(2);
+///     12 + (150.0 * (1.0 - r2 / 1600.0).max(0.0).sqrt()).round() as u8
+/// });
+/// let measured = measure_force(frame.view(), reference.view(), [20e-6, 20e-6], &calibration, &Default::default())?;
+/// let radius = measured.contact_radius_m.expect("contact");
+/// assert!((radius.value / 800e-6 - 1.0).abs() < 1e-3);
+/// assert!((measured.force_n.value - 2.51).abs() < 0.01);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+pub fn measure_force<T: Real>(
+    frame: ArrayView2<'_, u8>,
+    reference: ArrayView2<'_, u8>,
+    pixel_size_m: [T; 2],
+    calibration: &(impl StressCalibration<T> + ?Sized),
+    options: &ForceOptions,
+) -> Result<ForceMeasurement<T>, ForceError> {
+    let meter = ForceMeter::new(pixel_size_m, options)?;
+    let reference = ReferenceFrame::new(reference)?;
+    meter.measure_with(&mut ForceWorkspace::default(), frame, &reference, calibration)
+}

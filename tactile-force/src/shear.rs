@@ -1,0 +1,126 @@
+//! Shear from the step of the centroid: F_x = K_x u_x, F_y = K_y u_y (equations (9)–(12)).
+
+use crate::{Estimate, ForceError, ForceMeasurement, Real};
+
+/// One measurement for the shear calibration: how far the centroid went under a known shear force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ShearPair<T> {
+    /// Step [x, y] of the centroid, in metres.
+    pub centroid_step_m: [T; 2],
+    /// Shear force [x, y], in newtons.
+    pub force_n: [T; 2],
+}
+
+/// The stiffnesses K_x and K_y, in newtons per metre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ShearCalibration<T> {
+    /// [K_x, K_y] in newtons per metre.
+    pub stiffness_n_per_m: [Estimate<T>; 2],
+    /// Standard deviation of the residuals along each axis, in newtons.
+    pub residual_sd_n: [T; 2],
+}
+
+impl<T: Real> ShearCalibration<T> {
+    /// Least squares through the origin, each axis on its own: K = Σ u F / Σ u².
+    ///
+    /// # Errors
+    /// Fewer than two pairs, a pair that is not finite, or an axis along which nothing moved.
+    pub fn fit(pairs: &[ShearPair<T>]) -> Result<Self, ForceError> {
+        if pairs.len() < 2 {
+            return Err(ForceError::TooFewPairs { required: 2, found: pairs.len() });
+        }
+        let finite = |p: &ShearPair<T>| p.centroid_step_m.iter().chain(&p.force_n).all(|v| v.is_finite());
+        if let Some(index) = pairs.iter().position(|p| !finite(p)) {
+            return Err(ForceError::NonFinitePair { index });
+        }
+        let x = axis(pairs, 0)?;
+        let y = axis(pairs, 1)?;
+        Ok(Self {
+            stiffness_n_per_m: [Estimate::nearest(x.0, x.1), Estimate::nearest(y.0, y.1)],
+            residual_sd_n: [T::nearest(x.2), T::nearest(y.2)],
+        })
+    }
+
+    /// Shear force [x, y] of a centroid step, in newtons.
+    pub fn force_n(&self, centroid_step_m: [Estimate<T>; 2]) -> [Estimate<T>; 2] {
+        std::array::from_fn(|k| {
+            let (stiffness, step) = (self.stiffness_n_per_m[k], centroid_step_m[k]);
+            Estimate {
+                value: stiffness.value * step.value,
+                standard_error: (stiffness.value * step.standard_error)
+                    .hypot(stiffness.standard_error * step.value),
+            }
+        })
+    }
+}
+
+/// Stiffness, its variance, and the residual standard deviation along one axis.
+fn axis<T: Real>(pairs: &[ShearPair<T>], k: usize) -> Result<(f64, f64, f64), ForceError> {
+    let (mut uu, mut uf) = (0.0, 0.0);
+    for p in pairs {
+        let (u, f) = (p.centroid_step_m[k].as_f64(), p.force_n[k].as_f64());
+        uu += u * u;
+        uf += u * f;
+    }
+    if uu == 0.0 {
+        return Err(ForceError::DegeneratePairs { span: 0.0 });
+    }
+    let stiffness = uf / uu;
+    let residual = |p: &ShearPair<T>| p.force_n[k].as_f64() - stiffness * p.centroid_step_m[k].as_f64();
+    let variance = pairs.iter().map(|p| residual(p).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
+    Ok((stiffness, variance / uu, variance.sqrt()))
+}
+
+/// Shear of one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ShearMeasurement<T> {
+    /// Centroid now minus centroid when contact began, [x, y] in metres.
+    pub displacement_m: [Estimate<T>; 2],
+    /// Centroid now minus centroid of the frame before, [x, y] in metres: u of equations (9) and (10).
+    pub step_m: [Estimate<T>; 2],
+    /// Shear force since contact began, [x, y] in newtons, equations (11) and (12).
+    pub force_n: [Estimate<T>; 2],
+}
+
+/// Follows the centroid from frame to frame.
+///
+/// The shear force belongs to the displacement since contact began. Taking each step from the frame before and adding up
+/// would add up the noise of every frame; here it is that of two.
+#[derive(Clone, Debug)]
+pub struct ShearTracker<T> {
+    calibration: ShearCalibration<T>,
+    first: Option<[Estimate<T>; 2]>,
+    last: Option<[Estimate<T>; 2]>,
+}
+
+impl<T: Real> ShearTracker<T> {
+    /// A tracker that waits for contact.
+    pub fn new(calibration: ShearCalibration<T>) -> Self {
+        Self { calibration, first: None, last: None }
+    }
+
+    /// Takes the next frame. The first frame of a contact has zero shear by definition; without contact there is none, and
+    /// the next contact starts anew.
+    pub fn update(&mut self, measurement: &ForceMeasurement<T>) -> Option<ShearMeasurement<T>> {
+        let Some(now) = measurement.centroid_m else {
+            (self.first, self.last) = (None, None);
+            return None;
+        };
+        let zero = [Estimate::default(); 2];
+        let displacement_m = self.first.map_or(zero, |from| difference(now, from));
+        let step_m = self.last.map_or(zero, |from| difference(now, from));
+        self.first.get_or_insert(now);
+        self.last = Some(now);
+        Some(ShearMeasurement { displacement_m, step_m, force_n: self.calibration.force_n(displacement_m) })
+    }
+}
+
+fn difference<T: Real>(to: [Estimate<T>; 2], from: [Estimate<T>; 2]) -> [Estimate<T>; 2] {
+    std::array::from_fn(|k| Estimate {
+        value: to[k].value - from[k].value,
+        standard_error: to[k].standard_error.hypot(from[k].standard_error),
+    })
+}

@@ -1,0 +1,107 @@
+//! The pass against the obvious loop: integers, so equality is exact.
+
+use ndarray::{Array2, ArrayView2, Axis, ShapeBuilder, Slice};
+use proptest::prelude::*;
+use tactile_force::{BoundingBox, FrameStatistics, ReferenceFrame};
+
+fn slow(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>, threshold: u8) -> FrameStatistics {
+    let (rows, columns) = frame.dim();
+    let mut s = FrameStatistics {
+        rows,
+        columns,
+        sum: 0,
+        sum_x: 0,
+        sum_y: 0,
+        sum_xx: 0,
+        sum_xy: 0,
+        sum_yy: 0,
+        least: i16::MAX,
+        greatest: i16::MIN,
+        saturated: 0,
+        bounding_box: None,
+    };
+    for ((y, x), &f) in frame.indexed_iter() {
+        let d = i16::from(f) - i16::from(reference[[y, x]]);
+        let (wide, u, v) = (i64::from(d), x as i64, y as i64);
+        s.sum += wide;
+        s.sum_x += u * wide;
+        s.sum_y += v * wide;
+        s.sum_xx += u * u * wide;
+        s.sum_xy += u * v * wide;
+        s.sum_yy += v * v * wide;
+        s.least = s.least.min(d);
+        s.greatest = s.greatest.max(d);
+        s.saturated += usize::from(f == 255);
+        if d.unsigned_abs() > u16::from(threshold) {
+            let here = BoundingBox { row_start: y, row_end: y + 1, column_start: x, column_end: x + 1 };
+            s.bounding_box = Some(s.bounding_box.map_or(here, |b| b.union(here)));
+        }
+    }
+    s
+}
+
+/// A pair of images: noise of any amplitude on any level, and perhaps one bright rectangle.
+fn images() -> impl Strategy<Value = (Array2<u8>, Array2<u8>)> {
+    let size = (1_usize..90, 1_usize..2200);
+    (size, any::<u64>(), 0_u8..=255, 0_u8..=255, any::<bool>()).prop_map(
+        |((h, w), seed, level, spread, bright)| {
+            let mut state = seed | 1;
+            let mut next = move || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 56) as u8
+            };
+            let mut image = || {
+                Array2::from_shape_simple_fn((h, w), || {
+                    level.saturating_add((u16::from(next()) * u16::from(spread) >> 8) as u8)
+                })
+            };
+            let (mut frame, reference) = (image(), image());
+            if bright {
+                let mut part = frame.slice_axis_mut(Axis(0), Slice::from(h / 3..h / 2 + 1));
+                part.slice_axis_mut(Axis(1), Slice::from(w / 4..w / 3 + 1)).fill(255);
+            }
+            (frame, reference)
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn equals_the_obvious_loop((frame, reference) in images(), threshold in 0_u8..=255) {
+        let prepared = ReferenceFrame::new(reference.view()).unwrap();
+        let found = prepared.compare(frame.view(), threshold).unwrap();
+        prop_assert_eq!(found, slow(frame.view(), reference.view(), threshold));
+    }
+}
+
+#[test]
+fn strides_do_not_matter() {
+    let value = |(y, x): (usize, usize)| ((y * 31 + x * 17) % 251) as u8;
+    let reference = Array2::from_shape_fn((70, 90), |(y, x)| ((y + x) % 7) as u8);
+    let prepared = ReferenceFrame::new(reference.view()).unwrap();
+    let rows_first = Array2::from_shape_fn((70, 90), value);
+    let columns_first = Array2::from_shape_fn((70, 90).f(), value);
+    let wider = Array2::from_shape_fn((70, 200), |(y, x)| value((y, x.saturating_sub(20))));
+    let cropped = wider.slice_axis(Axis(1), Slice::from(20..110));
+    let expected = slow(rows_first.view(), reference.view(), 9);
+    for view in [rows_first.view(), columns_first.view(), cropped] {
+        assert_eq!(prepared.compare(view, 9).unwrap(), expected);
+    }
+    let from_columns =
+        ReferenceFrame::new(Array2::from_shape_fn((70, 90).f(), |i| reference[i]).view()).unwrap();
+    assert_eq!(from_columns.compare(rows_first.view(), 9).unwrap(), expected);
+}
+
+#[test]
+fn moments_of_a_far_away_point_are_exact() {
+    // Uncentred moments are 1e9 times the central ones here; in integers nothing cancels.
+    let reference = Array2::zeros((3000, 4000));
+    let mut frame: Array2<u8> = Array2::zeros((3000, 4000));
+    for (y, x, v) in [(2990, 3990, 9), (2992, 3990, 9), (2991, 3991, 18)] {
+        frame[[y, x]] = v;
+    }
+    let s = ReferenceFrame::new(reference.view()).unwrap().compare(frame.view(), 1).unwrap();
+    assert_eq!(s.centroid_px(), Some([3990.5, 2991.0]));
+    assert_eq!(s.central_moments_px2(), Some([0.25, 0.0, 0.5]));
+}
