@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod contact;
+pub mod curve;
 mod error;
 pub mod field;
 pub mod modulus;

@@ -116,11 +116,10 @@ impl LayerEquation {
     }
 }
 
-/// ln(F/F_Hertz) and its kin over a/h, tabulated once and interpolated.
+/// ln(F/F_Hertz) over ln χ, tabulated once and interpolated.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LayerTable {
-    /// x = ln χ, the logarithms of the force ratios, and ln a/h.
-    rows: Vec<[f64; 4]>,
+    rows: Vec<(f64, f64)>,
 }
 
 const NODES: usize = 81;
@@ -130,50 +129,33 @@ impl LayerTable {
     pub(crate) fn new(equation: &LayerEquation) -> Self {
         let span = (LARGEST_A_OVER_H / SMALLEST_A_OVER_H).ln();
         let at = |k: usize| SMALLEST_A_OVER_H * (span * k as f64 / (NODES - 1) as f64).exp();
-        let rows = (0..NODES)
-            .filter_map(|k| equation.solve(at(k).min(LARGEST_A_OVER_H)).ok())
-            .map(|c| [c.chi.ln(), c.force_ratio.ln(), c.force_ratio_same_radius.ln(), c.a_over_h.ln()])
-            .collect();
-        Self { rows }
+        let solved = (0..NODES).filter_map(|k| equation.solve(at(k).min(LARGEST_A_OVER_H)).ok());
+        Self { rows: solved.map(|c| (c.chi.ln(), c.force_ratio.ln())).collect() }
     }
 
-    /// ln(F/F_Hertz) at χ, its slope in ln χ, and a/h; None beyond the table.
-    pub(crate) fn of_chi(&self, chi: f64) -> Option<(f64, f64, f64)> {
-        let (value, slope) = self.interpolate(0, 1, chi)?;
-        let (log_a, _) = self.interpolate(0, 3, chi)?;
-        Some((value, slope, log_a.exp()))
-    }
-
-    /// ln of F over Hertz's at the same radius, at a/h, and its slope in ln a; None beyond the table.
-    pub(crate) fn of_radius(&self, a_over_h: f64) -> Option<(f64, f64)> {
-        self.interpolate(3, 2, a_over_h)
-    }
-
-    /// Four-point Lagrange interpolation of column `y` over column `x` in logarithms, with its derivative.
-    fn interpolate(&self, x: usize, y: usize, at: f64) -> Option<(f64, f64)> {
-        let at = at.ln();
-        let rows = &self.rows;
-        if at > rows.last()?[x] {
+    /// ln(F/F_Hertz) at χ and its slope in ln χ, by four-point Lagrange interpolation; None beyond the table.
+    pub(crate) fn of_chi(&self, chi: f64) -> Option<(f64, f64)> {
+        let (at, rows) = (chi.ln(), &self.rows);
+        if at > rows.last()?.0 {
             return None;
         }
-        if at < rows[0][x] {
-            // ln(1 + c χ) ≈ c χ: exponential in ln χ; the a/h column is linear there.
-            let value =
-                if y == 3 { rows[0][3] + at - rows[0][x] } else { rows[0][y] * (at - rows[0][x]).exp() };
-            return Some((value, if y == 3 { 1.0 } else { value }));
+        if at < rows[0].0 {
+            // ln(1 + c χ) ≈ c χ.
+            let value = rows[0].1 * (at - rows[0].0).exp();
+            return Some((value, value));
         }
-        let next = rows.partition_point(|r| r[x] < at).clamp(2, rows.len() - 2);
+        let next = rows.partition_point(|r| r.0 < at).clamp(2, rows.len() - 2);
         let window = &rows[next - 2..next + 2];
         let (mut value, mut slope) = (0.0, 0.0);
         for (i, row) in window.iter().enumerate() {
             let (mut basis, mut derivative) = (1.0, 0.0);
             for (_, other) in window.iter().enumerate().filter(|&(j, _)| j != i) {
-                let width = row[x] - other[x];
-                derivative = (derivative * (at - other[x]) + basis) / width;
-                basis *= (at - other[x]) / width;
+                let width = row.0 - other.0;
+                derivative = (derivative * (at - other.0) + basis) / width;
+                basis *= (at - other.0) / width;
             }
-            value += row[y] * basis;
-            slope += row[y] * derivative;
+            value += row.1 * basis;
+            slope += row.1 * derivative;
         }
         Some((value, slope))
     }
@@ -205,18 +187,15 @@ mod tests {
         let table = LayerTable::new(&equation);
         for a in [3e-6, 0.0123, 0.3, 0.77, 2.3, 11.0] {
             let exact = equation.solve(a).unwrap();
-            let (value, _, a_over_h) = table.of_chi(exact.chi).unwrap();
+            let (value, _) = table.of_chi(exact.chi).unwrap();
             // Cubic interpolation with nodes 0.18 apart in ln a.
             assert!(
                 (value - exact.force_ratio.ln()).abs() < 2e-5,
                 "{a}: {:e}",
                 value - exact.force_ratio.ln()
             );
-            assert!((a_over_h / a - 1.0).abs() < 2e-5);
-            let (same, _) = table.of_radius(a).unwrap();
-            assert!((same - exact.force_ratio_same_radius.ln()).abs() < 2e-5);
         }
-        assert!(table.of_chi(1e3).is_none() && table.of_radius(21.0).is_none());
+        assert!(table.of_chi(1e3).is_none());
     }
 
     #[test]

@@ -19,4 +19,5 @@ pub use law::{ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraL
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::{Intercept, StressStrainRegression};
+pub(crate) use statistics::quantile_95;
 pub use warning::Warning;

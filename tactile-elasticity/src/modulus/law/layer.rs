@@ -73,9 +73,7 @@ impl LayerLaw {
     /// ln(F/F_Hertz) at χ and its slope in ln χ.
     fn correction(&self, chi: f64, share: f64) -> Option<(f64, f64)> {
         match (self.theory, &self.table) {
-            (LayerTheory::IntegralEquation, Some(table)) if share == 0.0 => {
-                table.of_chi(chi).map(|(v, s, _)| (v, s))
-            }
+            (LayerTheory::IntegralEquation, Some(table)) if share == 0.0 => table.of_chi(chi),
             (LayerTheory::IntegralEquation, _) => {
                 at_chi(&LayerEquation::new(&self.kernel).with_share(1.0 - share), chi)
             }

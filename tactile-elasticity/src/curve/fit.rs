@@ -1,0 +1,234 @@
+//! Fitting one law to a curve.
+
+use super::profile::{Problem, Profile};
+use super::{IndentationCurve, Indenter};
+use crate::error::{ElasticityError, Quantity, finite, poisson};
+use crate::modulus::{ContactLaw, EstimatorKind, FitStatistics, Interval, Warning, quantile_95};
+
+/// Whether the force before contact is zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Baseline {
+    /// Whichever Schwarz's criterion prefers.
+    #[default]
+    Auto,
+    /// Zero: the gauge was tared.
+    Zero,
+    /// A constant, fitted.
+    Offset,
+}
+
+/// Where contact begins.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum ContactPoint {
+    /// Where the fit is best.
+    #[default]
+    Search,
+    /// Known (m).
+    At(f64),
+}
+
+/// How a curve is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CurveOptions {
+    /// Force before contact.
+    pub baseline: Baseline,
+    /// Contact point.
+    pub contact_point: ContactPoint,
+}
+
+/// A law fitted to a curve.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct CurveFit {
+    /// Which law.
+    pub model: EstimatorKind,
+    /// Young's modulus of the sample.
+    pub youngs_modulus_pa: f64,
+    /// Its standard error, from the 95 % interval's width.
+    pub standard_error_pa: f64,
+    /// 95 % interval by profile likelihood.
+    pub interval_95: Interval<f64>,
+    /// Position where contact begins.
+    pub contact_point_m: f64,
+    /// Force before contact.
+    pub offset_n: f64,
+    /// Standard deviation of the residuals.
+    pub residual_sd_n: f64,
+    /// Correlation of each residual with the next; near zero where the law is right.
+    pub residual_autocorrelation: f64,
+    /// Fitted force at every position.
+    pub fitted_n: Vec<f64>,
+    /// Largest a/R, for spheres.
+    pub contact_ratio: Option<f64>,
+    /// Information criteria.
+    pub statistics: FitStatistics<f64>,
+    /// Where the law's assumptions fail; their load is the curve's last point.
+    pub warnings: Vec<Warning<f64>>,
+}
+
+/// Fits one law of a rigid `indenter` on a sample with Poisson ratio `nu`.
+///
+/// # Errors
+/// [`ElasticityError::OutOfRange`] where the law does not reach as far as the curve or does not belong to the indenter;
+/// [`ElasticityError::PoissonRatio`] and the indenter's own.
+///
+/// ```
+/// use tactile_elasticity::curve::{CurveOptions, IndentationCurve, Indenter, fit_curve};
+/// use tactile_elasticity::modulus::EstimatorKind;
+/// // A 1 mm punch on 20 kPa, contact at 0.2 mm.
+/// let z: Vec<f64> = (0..50).map(|i| i as f64 * 2e-5).collect();
+/// let f: Vec<f64> = z.iter().map(|z| 2.0 * 20e3 / 0.75 * 1e-3 * (z - 2e-4).max(0.0)).collect();
+/// let curve = IndentationCurve::new(&z, &f)?;
+/// let punch = Indenter::Punch { radius_m: 1e-3 };
+/// let fit = fit_curve(&curve, &punch, 0.5, EstimatorKind::FlatPunch, &CurveOptions::default())?;
+/// assert!((fit.youngs_modulus_pa - 20e3).abs() < 1e-3 && (fit.contact_point_m - 2e-4).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+pub fn fit_curve(
+    curve: &IndentationCurve,
+    indenter: &Indenter,
+    nu: f64,
+    model: EstimatorKind,
+    options: &CurveOptions,
+) -> Result<CurveFit, ElasticityError> {
+    let unreachable = ElasticityError::OutOfRange {
+        quantity: Quantity::Indentation,
+        found: curve.span().1 - curve.span().0,
+        limit: 0.0,
+    };
+    let law = indenter.law(model, poisson(nu)?)?.ok_or(unreachable)?;
+    let solve = |offset: bool| {
+        let problem = Problem { curve, law: &*law, offset };
+        solve(&problem, options.contact_point).map(|p| (problem, p))
+    };
+    let (problem, best) = match options.baseline {
+        Baseline::Zero => solve(false)?,
+        Baseline::Offset => solve(true)?,
+        Baseline::Auto => {
+            let (plain, shifted) = (solve(false), solve(true)?);
+            match plain {
+                Ok(plain) if !worth_an_offset(&plain.1, &shifted.1, curve.force_n().len()) => plain,
+                _ => shifted,
+            }
+        }
+    };
+    Ok(report(&problem, &best, nu, options))
+}
+
+fn solve(problem: &Problem<'_>, contact: ContactPoint) -> Result<Profile, ElasticityError> {
+    let best = match contact {
+        ContactPoint::Search => problem.best(),
+        ContactPoint::At(z) => problem.at(finite(z, Quantity::Indentation)?),
+    };
+    let (first, last) = problem.curve.span();
+    best.ok_or(ElasticityError::OutOfRange {
+        quantity: Quantity::Indentation,
+        found: last - first,
+        limit: 0.0,
+    })
+}
+
+/// n ln(S₀/S₁) > ln n.
+fn worth_an_offset(plain: &Profile, shifted: &Profile, n: usize) -> bool {
+    let n = n as f64;
+    n * (plain.squares / shifted.squares).ln() > n.ln()
+}
+
+fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions) -> CurveFit {
+    let (curve, law) = (problem.curve, problem.law);
+    let n = curve.force_n().len();
+    let parameters =
+        1 + usize::from(problem.offset) + usize::from(options.contact_point == ContactPoint::Search);
+    let fitted_n: Vec<f64> = curve.position_m().iter().map(|&z| force(law, best, z)).collect();
+    let residuals: Vec<f64> = curve.force_n().iter().zip(&fitted_n).map(|(f, g)| f - g).collect();
+    let correlation = autocorrelation(&residuals);
+    // n points that follow one another say as much as n(1 − ρ)/(1 + ρ) that do not.
+    let inflation = ((1.0 + correlation.max(0.0)) / (1.0 - correlation.max(0.0))).max(1.0);
+    let degrees = n - parameters;
+    let limits = interval(problem, best, degrees, inflation, options.contact_point);
+    let to_modulus = 1.0 - nu * nu;
+    let (lower, upper) = (limits.0 * to_modulus, limits.1 * to_modulus);
+    let depth = curve.span().1 - best.contact_m;
+    let contact_ratio = law.contact_ratio(None, Some(depth));
+    CurveFit {
+        model: law.kind(),
+        youngs_modulus_pa: best.modulus * to_modulus,
+        standard_error_pa: (upper - lower) / (2.0 * quantile_95(Some(degrees))),
+        interval_95: Interval { lower, upper: Some(upper) },
+        contact_point_m: best.contact_m,
+        offset_n: best.offset,
+        residual_sd_n: (best.squares / degrees as f64).sqrt(),
+        residual_autocorrelation: correlation,
+        fitted_n,
+        contact_ratio,
+        // The variance is a parameter too.
+        statistics: FitStatistics::new(
+            n,
+            parameters + 1,
+            best.squares,
+            n as f64 * (best.squares / n as f64).ln(),
+        ),
+        warnings: warnings(law, depth, contact_ratio, n - 1),
+    }
+}
+
+fn force(law: &dyn ContactLaw, p: &Profile, z: f64) -> f64 {
+    let d = z - p.contact_m;
+    let pressed = if d > 0.0 { law.of_indentation(d, 0.0).map_or(f64::NAN, |l| l.value.exp()) } else { 0.0 };
+    p.offset + p.modulus * pressed
+}
+
+/// Lag-one autocorrelation.
+fn autocorrelation(r: &[f64]) -> f64 {
+    let total: f64 = r.iter().map(|x| x * x).sum();
+    if total > 0.0 { r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / total } else { 0.0 }
+}
+
+/// Moduli between which S ≤ S_min (1 + t² inflation/ν), by bisection of the profile on either side.
+fn interval(
+    p: &Problem<'_>,
+    best: &Profile,
+    degrees: usize,
+    inflation: f64,
+    contact: ContactPoint,
+) -> (f64, f64) {
+    let t = quantile_95(Some(degrees));
+    let bound = best.squares * (1.0 + t * t * inflation / degrees as f64);
+    let reach = 0.5 * (p.curve.span().1 - best.contact_m);
+    let inside = |ln_ratio: f64| {
+        let modulus = best.modulus * ln_ratio.exp();
+        let profile = match contact {
+            ContactPoint::Search => p.best_at_modulus(best.contact_m, reach, modulus),
+            ContactPoint::At(z) => p.at_modulus(z, modulus),
+        };
+        profile.is_some_and(|q| q.squares <= bound)
+    };
+    let limit = |sign: f64| {
+        let mut step = 1e-6;
+        while step < 20.0 && inside(sign * step) {
+            step *= 2.0;
+        }
+        let (mut low, mut high) = (0.5 * step, step);
+        for _ in 0..20 {
+            let middle = 0.5 * (low + high);
+            if inside(sign * middle) { low = middle } else { high = middle }
+        }
+        best.modulus * (sign * 0.5 * (low + high)).exp()
+    };
+    (limit(-1.0), limit(1.0))
+}
+
+fn warnings(law: &dyn ContactLaw, depth: f64, ratio: Option<f64>, load: usize) -> Vec<Warning<f64>> {
+    let limit = law.contact_ratio_limit();
+    let mut all = Vec::new();
+    if let Some(ratio) = ratio.filter(|&r| r > limit) {
+        all.push(Warning::LargeContact { load, ratio, limit });
+    }
+    if let Some((ratio, limit)) = law.layer_ratio(None, Some(depth)).filter(|(r, l)| r > l) {
+        all.push(Warning::ThinLayer { load, ratio, limit });
+    }
+    all
+}

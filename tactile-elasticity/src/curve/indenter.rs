@@ -1,0 +1,94 @@
+//! What presses on what, and the laws that may describe it.
+
+use crate::contact::Bond;
+use crate::error::ElasticityError;
+use crate::modulus::{ConeLaw, ContactLaw, EstimatorKind, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw};
+
+/// A rigid indenter and its sample. Lengths in m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Indenter {
+    /// A sphere on a sample, which may be a layer.
+    Sphere {
+        /// Relative radius of curvature.
+        radius_m: f64,
+        /// Thickness of the sample on its rigid base, where it is not deep.
+        thickness_m: Option<f64>,
+        /// How the sample sits on its base.
+        bond: Bond,
+    },
+    /// A flat plate on a soft ball that lies on another; the indentation is that of one contact.
+    Ball {
+        /// The ball's radius.
+        radius_m: f64,
+    },
+    /// A flat circular punch.
+    Punch {
+        /// The punch's radius.
+        radius_m: f64,
+    },
+    /// A cone.
+    Cone {
+        /// Tangent of the half opening angle from the axis.
+        half_angle_tangent: f64,
+    },
+}
+
+/// Which law to fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Model {
+    /// The information criterion's choice among those that apply.
+    #[default]
+    Auto,
+    /// This one.
+    Named(EstimatorKind),
+}
+
+impl Indenter {
+    /// The laws that apply, the most general theory first; the published layer series only where it is asked for by name.
+    pub fn candidates(&self) -> Vec<EstimatorKind> {
+        use EstimatorKind as K;
+        match self {
+            Self::Sphere { thickness_m: Some(_), .. } => {
+                vec![K::LayerIntegralEquation, K::LayerCorrectedSeries, K::HertzSphere]
+            }
+            Self::Sphere { thickness_m: None, .. } => vec![K::HertzSphere],
+            Self::Ball { .. } => vec![K::TataraSphere, K::HertzSphere],
+            Self::Punch { .. } => vec![K::FlatPunch],
+            Self::Cone { .. } => vec![K::Cone],
+        }
+    }
+
+    /// The law of a kind for this indenter; None where it does not apply.
+    pub(crate) fn law(
+        &self,
+        kind: EstimatorKind,
+        nu: f64,
+    ) -> Result<Option<Box<dyn ContactLaw>>, ElasticityError> {
+        use EstimatorKind as K;
+        let layer =
+            |radius, thickness, bond, theory| -> Result<Option<Box<dyn ContactLaw>>, ElasticityError> {
+                Ok(Some(Box::new(LayerLaw::new(radius, thickness, nu, bond, theory)?.tabulated())))
+            };
+        match (*self, kind) {
+            (Self::Sphere { radius_m, .. } | Self::Ball { radius_m }, K::HertzSphere) => {
+                Ok(Some(Box::new(Sphere::new(radius_m)?)))
+            }
+            (Self::Ball { radius_m }, K::TataraSphere) => Ok(Some(Box::new(TataraLaw::new(radius_m, nu)?))),
+            (Self::Punch { radius_m }, K::FlatPunch) => Ok(Some(Box::new(Punch::new(radius_m)?))),
+            (Self::Cone { half_angle_tangent }, K::Cone) => {
+                Ok(Some(Box::new(ConeLaw::new(half_angle_tangent)?)))
+            }
+            (Self::Sphere { radius_m, thickness_m: Some(h), bond }, K::LayerIntegralEquation) => {
+                layer(radius_m, h, bond, LayerTheory::IntegralEquation)
+            }
+            (Self::Sphere { radius_m, thickness_m: Some(h), bond }, K::LayerCorrectedSeries) => {
+                layer(radius_m, h, bond, LayerTheory::CorrectedSeries)
+            }
+            (Self::Sphere { radius_m, thickness_m: Some(h), bond }, K::LayerPublishedSeries) => {
+                layer(radius_m, h, bond, LayerTheory::PublishedSeries)
+            }
+            _ => Ok(None),
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Curves with a known modulus: contact point, interval and choice of law.
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::StandardNormal;
+use tactile_elasticity::ElasticityError;
+use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
+use tactile_elasticity::curve::*;
+use tactile_elasticity::modulus::{EstimatorKind, Warning};
+
+const E: f64 = 25e3;
+const NU: f64 = 0.5;
+const R: f64 = 2e-3;
+
+fn sphere(thickness_m: Option<f64>) -> Indenter {
+    Indenter::Sphere { radius_m: R, thickness_m, bond: Bond::Bonded }
+}
+
+/// Force of the law `f` beyond contact at 0.3 mm, 200 positions up to 0.3 mm deep, offset and noise added.
+fn curve(f: impl Fn(f64) -> f64, offset: f64, noise: f64, seed: u64) -> IndentationCurve {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let z: Vec<f64> = (0..200).map(|i| f64::from(i) * 3e-6).collect();
+    let largest = f(z[199] - 3e-4);
+    let force: Vec<f64> = z
+        .iter()
+        .map(|z| {
+            let normal: f64 = rng.sample(StandardNormal);
+            offset + noise * largest * normal + if *z > 3e-4 { f(z - 3e-4) } else { 0.0 }
+        })
+        .collect();
+    IndentationCurve::new(&z, &force).unwrap()
+}
+
+fn hertz(d: f64) -> f64 {
+    4.0 / 3.0 * E / (1.0 - NU * NU) * R.sqrt() * d.powf(1.5)
+}
+
+fn layer(d: f64) -> f64 {
+    // The series is within 10⁻³ at the χ ≤ 0.26 used here.
+    let chi = (R * d).sqrt() / 3e-3;
+    let kernel = LayerKernel::new(Bond::Bonded, NU).unwrap();
+    hertz(d) * tactile_elasticity::contact::LayerSeries::corrected(&kernel, 1.0).force_ratio(chi)
+}
+
+#[test]
+fn clean_curves_are_found_exactly() {
+    for offset in [0.0, 0.01] {
+        let c = curve(hertz, offset, 0.0, 0);
+        let fit =
+            fit_curve(&c, &sphere(None), NU, EstimatorKind::HertzSphere, &CurveOptions::default()).unwrap();
+        assert!((fit.youngs_modulus_pa / E - 1.0).abs() < 1e-6, "{}", fit.youngs_modulus_pa);
+        assert!((fit.contact_point_m - 3e-4).abs() < 1e-9 && (fit.offset_n - offset).abs() < 1e-8);
+    }
+}
+
+/// 200 noisy curves; 95 % ± 3.5 standard deviations of the count.
+#[test]
+fn intervals_cover() {
+    let covered = (0..200)
+        .filter(|&seed| {
+            let c = curve(hertz, 0.002, 0.01, seed);
+            let fit = fit_curve(&c, &sphere(None), NU, EstimatorKind::HertzSphere, &CurveOptions::default())
+                .unwrap();
+            fit.interval_95.contains(E)
+        })
+        .count();
+    assert!((179..=200).contains(&covered), "{covered} of 200");
+}
+
+#[test]
+fn the_law_is_chosen_that_made_the_curve() {
+    let thick = sphere(Some(3e-3));
+    let auto = |c: &IndentationCurve, i: &Indenter| {
+        select_model(c, i, NU, Model::Auto, &CurveOptions::default()).unwrap()
+    };
+    let chosen = auto(&curve(layer, 0.0, 0.002, 1), &thick);
+    assert_eq!(chosen.chosen().model, EstimatorKind::LayerIntegralEquation);
+    assert!(
+        (chosen.chosen().youngs_modulus_pa / E - 1.0).abs() < 0.02,
+        "{}",
+        chosen.chosen().youngs_modulus_pa
+    );
+    let half_space = chosen.fits.iter().find(|f| f.model == EstimatorKind::HertzSphere).unwrap();
+    assert!(half_space.youngs_modulus_pa > 1.1 * E);
+    let only = auto(&curve(hertz, 0.0, 0.002, 2), &sphere(None));
+    assert_eq!(only.reason, SelectionReason::OnlyCandidate);
+    let asked = select_model(
+        &curve(hertz, 0.0, 0.002, 2),
+        &thick,
+        NU,
+        Model::Named(EstimatorKind::LayerPublishedSeries),
+        &CurveOptions::default(),
+    );
+    assert_eq!(asked.unwrap().reason, SelectionReason::Asked);
+}
+
+#[test]
+fn a_thin_layer_needs_the_integral_equation() {
+    let h = 0.3e-3;
+    let equation = LayerEquation::new(&LayerKernel::new(Bond::Bonded, NU).unwrap());
+    // Positions by contact radius, so that no law has to be inverted.
+    let points: Vec<_> = (1..120)
+        .map(|i| {
+            let contact = equation.solve(0.02 * f64::from(i)).unwrap();
+            let d = (contact.chi * h).powi(2) / R;
+            (d, hertz(d) * contact.force_ratio)
+        })
+        .collect();
+    let z: Vec<f64> = points.iter().map(|p| p.0).collect();
+    let f: Vec<f64> = points.iter().map(|p| p.1).collect();
+    let c = IndentationCurve::new(&z, &f).unwrap();
+    let found = select_model(&c, &sphere(Some(h)), NU, Model::Auto, &CurveOptions::default()).unwrap();
+    assert_eq!(found.chosen().model, EstimatorKind::LayerIntegralEquation);
+    assert!(matches!(found.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
+    assert!(
+        (found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-3,
+        "{}",
+        found.chosen().youngs_modulus_pa
+    );
+    let published =
+        fit_curve(&c, &sphere(Some(h)), NU, EstimatorKind::LayerPublishedSeries, &CurveOptions::default());
+    let published = published.unwrap();
+    assert!(published.warnings.iter().any(|w| matches!(w, Warning::ThinLayer { .. })));
+    assert!(published.residual_autocorrelation > 0.5);
+}
+
+#[test]
+fn squeezed_balls_are_tataras() {
+    let e = E / (1.0 - NU * NU);
+    let points: Vec<_> = (1..80)
+        .map(|i| {
+            let a = R * 0.55 * f64::from(i) / 79.0;
+            (
+                tactile_elasticity::contact::tatara_indentation_m(a, R, NU).unwrap(),
+                4.0 / 3.0 * e * a.powi(3) / R,
+            )
+        })
+        .collect();
+    let z: Vec<f64> = points.iter().map(|p| p.0).collect();
+    let f: Vec<f64> = points.iter().map(|p| p.1).collect();
+    let c = IndentationCurve::new(&z, &f).unwrap();
+    let ball = Indenter::Ball { radius_m: R };
+    let found = select_model(&c, &ball, NU, Model::Auto, &CurveOptions::default()).unwrap();
+    assert_eq!(found.chosen().model, EstimatorKind::TataraSphere);
+    assert!((found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-4);
+    assert!(found.chosen().warnings.is_empty());
+}
+
+#[test]
+fn bad_curves_are_named() {
+    use ElasticityError as Bad;
+    assert!(matches!(IndentationCurve::new(&[0.0; 3], &[0.0; 4]), Err(Bad::LengthMismatch { .. })));
+    assert!(matches!(
+        IndentationCurve::new(&[0.0; 3], &[0.0; 3]),
+        Err(Bad::TooFewLoads { expected: 6, found: 3 })
+    ));
+    let z = [0.0, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 6e-4, 7e-4];
+    assert!(matches!(IndentationCurve::new(&z, &[1.0; 8]), Err(Bad::EqualLoads)));
+    let mut f = z.map(|z| z * 10.0);
+    f[3] = f64::NAN;
+    assert!(matches!(IndentationCurve::new(&z, &f), Err(Bad::NotFinite { .. })));
+    // Force that falls with depth has no modulus.
+    let falling = IndentationCurve::new(&z, &z.map(|z| -z)).unwrap();
+    let options = CurveOptions { baseline: Baseline::Zero, ..CurveOptions::default() };
+    assert!(fit_curve(&falling, &sphere(None), NU, EstimatorKind::HertzSphere, &options).is_err());
+    let rising = IndentationCurve::new(&z, &z).unwrap();
+    assert!(matches!(
+        fit_curve(&rising, &sphere(None), 0.7, EstimatorKind::HertzSphere, &options),
+        Err(Bad::PoissonRatio { .. })
+    ));
+    assert!(fit_curve(&rising, &sphere(None), NU, EstimatorKind::Cone, &options).is_err());
+}
