@@ -5,10 +5,12 @@ mod assignment;
 pub mod dense;
 mod error;
 mod matching;
+mod relaxation;
 mod soft;
 mod validate;
 
 pub use assignment::{AssignmentWorkspace, linear_assignment};
 pub use error::{MatchError, PointSet};
 pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
+pub use relaxation::{Outliers, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace, Rotation};
 pub use soft::SoftMatches;

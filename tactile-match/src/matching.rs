@@ -1,13 +1,14 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
 use crate::{MatchError, SoftMatches};
-use nalgebra::{Point, RealField, SMatrix};
+use nalgebra::{Point, SMatrix};
+use tactile_tps::{Scalar, Warp};
 
 /// Finds which model point is which target point, and the warp that takes the model onto the target.
 ///
 /// Object safe, so that a user picks the method at run time:
 /// `let matcher: Box<dyn PointMatcher<f64, 2>> = …`.
-pub trait PointMatcher<T: RealField + Copy, const D: usize> {
+pub trait PointMatcher<T: Scalar, const D: usize> {
     /// Matches `model` (I points) to `target` (J points); I and J may differ and either may be 1.
     ///
     /// # Errors
@@ -52,8 +53,9 @@ pub struct MatchReport<T> {
 }
 
 /// The answer of a [`PointMatcher`].
-#[derive(Clone, Debug)]
-pub struct Matching<T: RealField + Copy, const D: usize> {
+pub struct Matching<T: Scalar, const D: usize> {
+    /// The warp; it takes the model points to [`warped`](Self::warped).
+    pub warp: Box<dyn Warp<T, D> + Send + Sync>,
     /// The warped model points.
     pub warped: Vec<Point<T, D>>,
     /// Target row of every model point; `None` for a point without a partner. No target row occurs twice.

@@ -1,0 +1,111 @@
+//! From the last soft assignment to the answer: hard matches, confidences, positions, covariances.
+
+use super::anneal::{Annealer, State};
+use super::soft_assign::SoftAssignment;
+
+/// Residuals below this (radii of the model) are what the prior's factor leaves out: the data are clean.
+pub(crate) const CLEAN: f64 = 3e-3;
+/// Soft matches below this are not reported.
+const FAINT: f64 = 1e-3;
+
+/// The answer in the frame's units.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Answer<const D: usize> {
+    pub(crate) warped: Vec<[f64; D]>,
+    pub(crate) assignment: Vec<Option<usize>>,
+    pub(crate) confidence: Vec<f64>,
+    pub(crate) covariance: Vec<[[f64; D]; D]>,
+    pub(crate) residual: f64,
+    column_best: Vec<(f64, usize)>,
+}
+
+impl<const D: usize> Answer<D> {
+    /// Reads the answer from the run's final state; `exact` asks for interpolation where the data are clean.
+    pub(crate) fn read(
+        &mut self,
+        annealer: &mut Annealer<D>,
+        state: &State<D>,
+        targets: &[[f64; D]],
+        share: f64,
+    ) {
+        let n = state.warped.len();
+        let variance = state.sigma.powi(2);
+        let slack = annealer.slack(share, n, variance).max(1e-30) as f32;
+        annealer.soft.affinities(&state.warped, variance);
+        annealer.soft.normalise(20, slack, slack);
+        annealer.soft.moments(&state.warped);
+        self.assign(&annealer.soft, n, targets.len());
+        self.place(state, targets);
+        self.covariance.clear();
+        for i in 0..n {
+            let variance = annealer.regression.variance(&annealer.prior, i);
+            self.covariance.push(covariance(&annealer.soft, targets, &self.warped[i], i, variance));
+        }
+    }
+
+    /// Pairs that prefer each other to every rival and to having no partner.
+    fn assign(&mut self, soft: &SoftAssignment<D>, n: usize, m: usize) {
+        self.column_best.clear();
+        self.column_best.resize(m, (0.0, usize::MAX));
+        self.assignment.clear();
+        self.confidence.clear();
+        for i in 0..n {
+            let mut best = (0.0, usize::MAX);
+            for j in 0..m {
+                let p = soft.entry(i, j);
+                best = if p > best.0 { (p, j) } else { best };
+                if p > self.column_best[j].0 {
+                    self.column_best[j] = (p, i);
+                }
+            }
+            let free = (1.0 - soft.weight[i]).max(0.0);
+            let matched = best.1 != usize::MAX && soft.weight[i] > 0.5;
+            self.assignment.push(matched.then_some(best.1));
+            self.confidence.push(if matched { best.0.min(1.0) } else { free });
+        }
+        for i in 0..n {
+            if self.assignment[i].is_some_and(|j| self.column_best[j].1 != i) {
+                self.assignment[i] = None;
+            }
+        }
+    }
+
+    fn place(&mut self, state: &State<D>, targets: &[[f64; D]]) {
+        self.warped.clone_from(&state.warped);
+        let (mut squares, mut pairs) = (0.0, 0);
+        for (i, j) in self.assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))) {
+            squares += (0..D).map(|k| (state.warped[i][k] - targets[j][k]).powi(2)).sum::<f64>();
+            pairs += 1;
+            if state.sigma <= CLEAN {
+                self.warped[i] = targets[j];
+            }
+        }
+        self.residual = if pairs > 0 { (squares / f64::from(pairs)).sqrt() } else { 0.0 };
+    }
+}
+
+/// Soft matches of row i worth reporting.
+pub(crate) fn soft_row<const D: usize>(
+    soft: &SoftAssignment<D>,
+    i: usize,
+) -> impl Iterator<Item = (usize, f64)> + '_ {
+    (0..soft.targets()).map(move |j| (j, soft.entry(i, j))).filter(|&(_, p)| p > FAINT)
+}
+
+/// Spread of the soft partners about the answer, and what the warp itself leaves open.
+fn covariance<const D: usize>(
+    soft: &SoftAssignment<D>,
+    targets: &[[f64; D]],
+    warped: &[f64; D],
+    i: usize,
+    variance: f64,
+) -> [[f64; D]; D] {
+    let mut sum = [[0.0; D]; D];
+    let weight = soft.weight[i].max(FAINT);
+    for (j, p) in soft_row(soft, i) {
+        let d: [f64; D] = std::array::from_fn(|k| targets[j][k] - warped[k]);
+        (0..D).for_each(|a| (0..D).for_each(|b| sum[a][b] += p / weight * d[a] * d[b]));
+    }
+    (0..D).for_each(|k| sum[k][k] += variance);
+    sum
+}

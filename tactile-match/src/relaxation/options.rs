@@ -1,0 +1,78 @@
+//! What a caller may say about a scene.
+
+use crate::{MatchError, validate::option_within};
+
+/// How far the target may be turned against the model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rotation {
+    /// By up to about half a right angle.
+    #[default]
+    Limited,
+    /// By any angle.
+    Any,
+}
+
+/// On which side points without a partner are expected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Outliers {
+    /// Every point may lack its partner.
+    #[default]
+    Both,
+    /// Only model points: parts of the object are out of sight.
+    Model,
+    /// Only target points: clutter.
+    Target,
+    /// The sets are the same points.
+    None,
+}
+
+/// Options of [`RelaxationMatcher`](crate::RelaxationMatcher); all of them have defaults that suit every scene tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelaxationOptions {
+    pub(crate) rotation: Rotation,
+    pub(crate) outliers: Outliers,
+    pub(crate) slack: f64,
+    pub(crate) max_iterations: usize,
+}
+
+impl Default for RelaxationOptions {
+    fn default() -> Self {
+        Self { rotation: Rotation::Limited, outliers: Outliers::Both, slack: 0.1, max_iterations: 200 }
+    }
+}
+
+impl RelaxationOptions {
+    /// Says how far the target may be turned.
+    #[must_use]
+    pub fn rotation(mut self, rotation: Rotation) -> Self {
+        self.rotation = rotation;
+        self
+    }
+
+    /// Says where points without a partner are expected.
+    #[must_use]
+    pub fn outliers(mut self, outliers: Outliers) -> Self {
+        self.outliers = outliers;
+        self
+    }
+
+    /// Sets the expected share of points without a partner, in [10⁻⁶, 0.9] (default 0.1).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] outside that range.
+    pub fn slack(mut self, share: f64) -> Result<Self, MatchError> {
+        option_within("slack", share, 1e-6, 0.9, "[1e-6, 0.9]")?;
+        self.slack = share;
+        Ok(self)
+    }
+
+    /// Sets the most outer iterations of one start, at least 1 (default 200).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn max_iterations(mut self, limit: usize) -> Result<Self, MatchError> {
+        option_within("max_iterations", limit as f64, 1.0, f64::MAX, "[1, ∞)")?;
+        self.max_iterations = limit;
+        Ok(self)
+    }
+}
