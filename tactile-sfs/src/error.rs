@@ -1,0 +1,153 @@
+//! Everything that can be refused, with what was expected and what was found.
+
+use thiserror::Error;
+
+/// Which input an error speaks of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Input {
+    /// The mask of a [`Domain`](crate::Domain).
+    Mask,
+    /// The known heights of a [`Domain`](crate::Domain).
+    KnownHeights,
+    /// Slopes along y, whose shape must be that of the slopes along x.
+    SlopeY,
+    /// The image of the unpressed sensor.
+    Reference,
+    /// Per-pixel weights.
+    Weights,
+    /// Heights compared with other heights.
+    Truth,
+    /// An image compared with a rendered one.
+    Image,
+}
+
+impl core::fmt::Display for Input {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Input::Mask => "mask",
+            Input::KnownHeights => "known heights",
+            Input::SlopeY => "slopes along y",
+            Input::Reference => "reference image",
+            Input::Weights => "weights",
+            Input::Truth => "true heights",
+            Input::Image => "image",
+        })
+    }
+}
+
+/// Why a surface, a slope field or a set of control points could not be computed.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SfsError {
+    /// The image has no pixel.
+    #[error("the image has no pixels ({rows} rows, {columns} columns)")]
+    EmptyImage {
+        /// Rows of the image.
+        rows: usize,
+        /// Columns of the image.
+        columns: usize,
+    },
+    /// The mask selects no pixel, or no pixel that carries data.
+    #[error("the mask selects no usable pixel")]
+    EmptyMask,
+    /// Two inputs of one call differ in shape.
+    #[error("the {input} has shape {found:?} but {expected:?} (rows, columns) is needed")]
+    ShapeMismatch {
+        /// The input whose shape is wrong.
+        input: Input,
+        /// Rows and columns needed.
+        expected: [usize; 2],
+        /// Rows and columns found.
+        found: [usize; 2],
+    },
+    /// An option is NaN, infinite or out of its range.
+    #[error("{option} is {found}, which is not {expected}")]
+    InvalidOption {
+        /// Name of the option.
+        option: &'static str,
+        /// The range the option must lie in.
+        expected: &'static str,
+        /// The value found.
+        found: f64,
+    },
+    /// The light comes from behind the surface or grazes it (z ≤ 0): no shading carries shape then.
+    #[error("the light direction ({x}, {y}, {z}) does not come from the viewer's side (z must be positive)")]
+    LightFromBelow {
+        /// x of the direction found.
+        x: f64,
+        /// y of the direction found.
+        y: f64,
+        /// z of the direction found.
+        z: f64,
+    },
+    /// The method is defined for frontal or for oblique light alone.
+    #[error("{method} needs an oblique light (x or y not zero): under frontal light it is undefined")]
+    FrontalLight {
+        /// Name of the method.
+        method: &'static str,
+    },
+    /// The eikonal equation needs at least one height to start from.
+    #[error("no height is known: give known heights or a rim height")]
+    NoKnownHeight,
+    /// A slope is NaN or infinite where the integrator cannot skip it.
+    #[error("the slope at row {row}, column {column} is not finite; a masked integrator can leave it out")]
+    NonFiniteSlope {
+        /// Row of the slope.
+        row: usize,
+        /// Column of the slope.
+        column: usize,
+    },
+    /// A calibration table is shorter than two entries.
+    #[error("a calibration table needs at least 2 entries, found {found}")]
+    TableTooShort {
+        /// Entries found.
+        found: usize,
+    },
+    /// A calibration table is not sorted or not finite.
+    #[error("entry {index} of the calibration table is not finite or does not increase")]
+    TableNotIncreasing {
+        /// Index of the offending entry.
+        index: usize,
+    },
+    /// More control points were asked for than the surface has pixels.
+    #[error("{requested} control points asked for, but the surface has only {available} usable pixels")]
+    TooManyPoints {
+        /// Points asked for.
+        requested: usize,
+        /// Pixels available.
+        available: usize,
+    },
+    /// Too little data to estimate a parameter.
+    #[error("{available} usable pixels are too few, {needed} are needed")]
+    TooFewPixels {
+        /// Pixels needed.
+        needed: usize,
+        /// Pixels found.
+        available: usize,
+    },
+}
+
+/// `Ok` if `value` is finite and positive.
+pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), SfsError> {
+    in_range(option, "a positive finite number", value, value > 0.0)
+}
+
+/// `Ok` if `value` is finite and not negative.
+pub(crate) fn non_negative(option: &'static str, value: f64) -> Result<(), SfsError> {
+    in_range(option, "a finite number of at least zero", value, value >= 0.0)
+}
+
+/// `Ok` if `value` is finite and `inside` holds.
+pub(crate) fn in_range(
+    option: &'static str,
+    expected: &'static str,
+    value: f64,
+    inside: bool,
+) -> Result<(), SfsError> {
+    if inside && value.is_finite() {
+        Ok(())
+    } else {
+        Err(SfsError::InvalidOption { option, expected, found: value })
+    }
+}

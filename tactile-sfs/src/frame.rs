@@ -1,0 +1,48 @@
+//! Image input: floats, or the bytes of an 8-bit camera read in place.
+
+use ndarray::ArrayView2;
+
+use crate::Scalar;
+
+/// An image as the reconstructions take it: real intensities or 8-bit grey levels (0 … 255, not rescaled).
+#[derive(Clone, Copy, Debug)]
+pub enum Frame<'a, T> {
+    /// Intensities in the unit of [`Lighting`](crate::Lighting).
+    Real(ArrayView2<'a, T>),
+    /// Grey levels of an 8-bit camera.
+    Bytes(ArrayView2<'a, u8>),
+}
+
+impl<'a, T: Scalar> From<ArrayView2<'a, T>> for Frame<'a, T> {
+    fn from(view: ArrayView2<'a, T>) -> Self {
+        Frame::Real(view)
+    }
+}
+
+impl<'a, T: Scalar> From<ArrayView2<'a, u8>> for Frame<'a, T> {
+    fn from(view: ArrayView2<'a, u8>) -> Self {
+        Frame::Bytes(view)
+    }
+}
+
+impl<T: Scalar> Frame<'_, T> {
+    /// Rows and columns.
+    pub fn dim(&self) -> (usize, usize) {
+        match self {
+            Frame::Real(view) => view.dim(),
+            Frame::Bytes(view) => view.dim(),
+        }
+    }
+
+    /// Intensity of one pixel.
+    ///
+    /// # Panics
+    /// If the pixel lies outside the image.
+    #[inline]
+    pub fn at(&self, row: usize, column: usize) -> T {
+        match self {
+            Frame::Real(view) => view[[row, column]],
+            Frame::Bytes(view) => T::from_u8(view[[row, column]]).unwrap_or_else(T::nan),
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Light, albedo and ambient: what stands between slopes and grey levels.
+
+use crate::error::{non_negative, positive};
+use crate::{Scalar, SfsError};
+
+/// Distant light on a Lambertian surface: I = ambient + albedo · I₀ · max(0, n·s).
+///
+/// # Convention
+///
+/// x is the column, y the row (so y points *down* the image), z points from the surface to the viewer. A surface
+/// z(x, y) with slopes p = ∂z/∂x and q = ∂z/∂y has the normal n = (−p, −q, 1)/√(1 + p² + q²). `direction` points
+/// *from the surface to the light*: (1, 0, 1) is a light to the right of the image, 45° above the surface, and it
+/// brightens slopes that fall to the right. Texts whose y points up need the sign of y changed.
+///
+/// ```
+/// use tactile_sfs::Lighting;
+/// let light = Lighting::new([1.0, 0.0, 1.0])?.with_normal_intensity(255.0)?;
+/// assert!(light.shade(-0.5, 0.0) > light.shade(0.5, 0.0)); // falling to the right is bright
+/// assert_eq!(Lighting::<f64>::frontal().shade(0.0, 0.0), 1.0);
+/// assert!(Lighting::new([1.0, 0.0, -1.0]).is_err());       // light from below
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lighting<T> {
+    direction: [T; 3],
+    albedo: T,
+    ambient: T,
+    normal_intensity: T,
+}
+
+impl<T: Scalar> Lighting<T> {
+    /// Light from `direction` (any length), albedo 1, ambient 0 and intensity 1 at normal incidence.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] for a direction that is zero or not finite, [`SfsError::LightFromBelow`] for z ≤ 0.
+    pub fn new(direction: [T; 3]) -> Result<Self, SfsError> {
+        let [x, y, z] = direction.map(Scalar::as_f64);
+        let length = (x * x + y * y + z * z).sqrt();
+        positive("length of the light direction", length)?;
+        if z <= 0.0 {
+            return Err(SfsError::LightFromBelow { x, y, z });
+        }
+        let unit = |v: f64| T::of(v / length);
+        Ok(Self { direction: [unit(x), unit(y), unit(z)], ..Self::frontal() })
+    }
+
+    /// Light from the viewer, albedo 1, ambient 0 and intensity 1 at normal incidence.
+    pub fn frontal() -> Self {
+        let (zero, one) = (T::zero(), T::one());
+        Self { direction: [zero, zero, one], albedo: one, ambient: zero, normal_intensity: one }
+    }
+
+    /// The share of light the surface reflects, in the unit the caller likes: only albedo · I₀ matters.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless positive and finite.
+    pub fn with_albedo(self, albedo: T) -> Result<Self, SfsError> {
+        positive("albedo", albedo.as_f64())?;
+        Ok(Self { albedo, ..self })
+    }
+
+    /// The intensity that every pixel has without the light.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless finite and not negative.
+    pub fn with_ambient(self, ambient: T) -> Result<Self, SfsError> {
+        non_negative("ambient", ambient.as_f64())?;
+        Ok(Self { ambient, ..self })
+    }
+
+    /// I₀, what a white surface facing the light adds to the ambient: 255 for a full-range 8-bit frame.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless positive and finite.
+    pub fn with_normal_intensity(self, normal_intensity: T) -> Result<Self, SfsError> {
+        positive("intensity at normal incidence", normal_intensity.as_f64())?;
+        Ok(Self { normal_intensity, ..self })
+    }
+
+    /// Unit vector from the surface to the light.
+    pub fn direction(&self) -> [T; 3] {
+        self.direction
+    }
+
+    /// Albedo.
+    pub fn albedo(&self) -> T {
+        self.albedo
+    }
+
+    /// Ambient intensity.
+    pub fn ambient(&self) -> T {
+        self.ambient
+    }
+
+    /// Intensity a white surface facing the light adds to the ambient.
+    pub fn normal_intensity(&self) -> T {
+        self.normal_intensity
+    }
+
+    /// Whether the light comes exactly from the viewer.
+    pub fn is_frontal(&self) -> bool {
+        self.direction[0] == T::zero() && self.direction[1] == T::zero()
+    }
+
+    /// Reflectance n·s of an intensity, (I − ambient)/(albedo · I₀): in [0, 1] for a pixel the model explains.
+    pub fn reflectance(&self, intensity: T) -> T {
+        (intensity - self.ambient) / (self.albedo * self.normal_intensity)
+    }
+
+    /// Intensity of a surface element with slopes p = ∂z/∂x and q = ∂z/∂y; attached shadows get the ambient.
+    pub fn shade(&self, p: T, q: T) -> T {
+        let [x, y, z] = self.direction;
+        let cosine = (z - p * x - q * y) / (T::one() + p * p + q * q).sqrt();
+        self.ambient + self.albedo * self.normal_intensity * cosine.max(T::zero())
+    }
+}

@@ -1,0 +1,30 @@
+//! Which of the two branches the image supports: the wrong one has folds, and folds shade differently.
+
+use super::grid::{EikonalBuffers, Node};
+use crate::{Lighting, Scalar};
+
+impl<T: Scalar> EikonalBuffers<T> {
+    /// Whether the kept rising branch, shaded again, is at least as near to the image as the falling one in `value`.
+    pub(super) fn kept_is_better(&self, lighting: &Lighting<T>) -> bool {
+        let light = lighting.direction();
+        self.misfit(&self.kept, T::one(), light) <= self.misfit(&self.value, -T::one(), light)
+    }
+
+    /// Sum of squared differences of reflectance over the nodes with four neighbours; unreached nodes count fully.
+    fn misfit(&self, value: &[T], sign: T, [x, y, z]: [T; 3]) -> T {
+        let (width, half) = (self.width, T::of(0.5) * sign);
+        let mut sum = T::zero();
+        for i in width..value.len() - width {
+            let near = [i - 1, i + 1, i - width, i + width];
+            if self.node[i] == Node::Outside || near.iter().any(|&j| self.node[j] == Node::Outside) {
+                continue;
+            }
+            let p = half * (value[i + 1] - value[i - 1]);
+            let q = half * (value[i + width] - value[i - width]) / self.aspect;
+            let shade = (z - x * p - y * q) / (T::one() + p * p + q * q).sqrt();
+            let difference = shade.max(T::zero()) - self.cosine[i];
+            sum += if difference.is_finite() { difference * difference } else { T::one() };
+        }
+        sum
+    }
+}

@@ -1,0 +1,232 @@
+//! The eikonal equation of shading, by fast sweeping.
+//!
+//! Under frontal light a Lambertian surface obeys |∇z| = √(1/R² − 1), R the reflectance. Its viscosity solutions are
+//! shortest-path distances: from known heights z_k upwards, z(x) = min_k (z_k + d(x, k)), or downwards,
+//! z(x) = max_k (z_k − d(x, k)), d the least integral of the slope along a path. A smooth surface is the *rising* one if
+//! its minima and rim are known (from any point the steepest descent ends there), and the *falling* one if its maxima
+//! are known. No sign structure is needed: further known heights never hurt either.
+//!
+//! Two things make it accurate where textbook sweeping (first order in the slope at the pixel) is not:
+//!
+//! - *Chord rule.* Between neighbours with normal angles θ₁, θ₂ the slope is tan((θ₁ + θ₂)/2) =
+//!   (sin θ₁ + sin θ₂)/(cos θ₁ + cos θ₂): second order, exact on a circular profile, and finite up to a vertical rim.
+//! - *Sub-pixel rim.* Between the last pixel of the mask and the next lies the rim. Where sin θ, continued outwards,
+//!   reaches 1 within that pixel the contour is occluding, and the last pixel is cos θ/|∇ sin θ| above it (the
+//!   radius of curvature is 1/|∇ sin θ|); else the rim is taken half a pixel away.
+//!
+//! Oblique light makes the equation anisotropic: R √(1 + |∇z|²) + s·∇z = s_z. Each of the four triangles around a pixel
+//! is solved with its causality condition (Kao, Osher & Qian 2004; Qian, Zhang & Zhao 2007).
+//!
+//! References: Rouy & Tourin 1992 (viscosity), Zhao 2005 (fast sweeping), Bak, McLaughlin & Renzi 2010 (locking),
+//! Prados & Faugeras 2005 (oblique light).
+
+mod branch;
+mod frontal;
+mod grid;
+mod oblique;
+mod rim;
+
+pub(crate) use grid::EikonalBuffers;
+
+use crate::error::{in_range, positive};
+use crate::{Domain, Frame, Lighting, PixelFlags, Scalar, SfsError, StopReason, Surface};
+use crate::{SurfaceReconstruction, Workspace};
+use grid::Slopes;
+
+/// The height at the border of the mask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Rim<T> {
+    /// Nothing is known there but what the domain's known heights say.
+    Free,
+    /// The surface meets this height at the border of the mask (not where the frame cuts it off).
+    Height(T),
+}
+
+/// Which way heights run from the known ones: convex or concave is a choice the image does not make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Branch {
+    /// Rising if no height inside the mask is known; else both are computed and the one whose shading is nearer to the
+    /// image is returned (its false folds betray the wrong one).
+    Auto,
+    /// Heights rise from the known ones (a bump on its rim): right if all minima and the rim are known.
+    Rising,
+    /// Heights fall from the known ones (a bump from its top): right if all maxima are known.
+    Falling,
+}
+
+/// Shape from shading by the eikonal equation, for frontal and oblique light.
+///
+/// Known heights inside the mask hold at the pixel's centre; those outside, next to the mask, are the height the
+/// surface reaches at the mask's border. Pixels no known height reaches are flagged `UNREACHED`.
+///
+/// Cost: a few sweeps over the bounding box, O(pixels); `report.iterations` counts them, `report.residual` is the last
+/// change of height. Error on smooth surfaces: at least first order in the pixel, under frontal light nearly second.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Domain, Eikonal, Lighting, Rim, SurfaceReconstruction};
+/// // A hemisphere of radius 20 px: R = z/20, vertical at its rim.
+/// let z = Array2::from_shape_fn((45, 45), |(r, c)| {
+///     (400.0 - (r as f64 - 22.0).powi(2) - (c as f64 - 22.0).powi(2)).max(0.0).sqrt()
+/// });
+/// let (image, mask) = (z.mapv(|z| z / 20.0), z.mapv(|z| z > 0.0));
+/// let method = Eikonal::new(Lighting::frontal()).with_rim(Rim::Height(0.0))?;
+/// let surface = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?;
+/// assert!((surface.heights[[22, 22]] - 20.0).abs() < 0.3);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eikonal<T> {
+    lighting: Lighting<T>,
+    rim: Rim<T>,
+    branch: Branch,
+    max_slope: T,
+    tolerance: T,
+    max_sweeps: usize,
+}
+
+impl<T: Scalar> Eikonal<T> {
+    /// The method with a free rim, [`Branch::Auto`], slopes up to 100, a tolerance of 10⁻⁵ pixels and at most 400 sweeps.
+    pub fn new(lighting: Lighting<T>) -> Self {
+        Self {
+            lighting,
+            rim: Rim::Free,
+            branch: Branch::Auto,
+            max_slope: T::of(100.0),
+            tolerance: T::of(1e-5),
+            max_sweeps: 400,
+        }
+    }
+
+    /// The height at the border of the mask.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] for a height that is not finite.
+    pub fn with_rim(self, rim: Rim<T>) -> Result<Self, SfsError> {
+        if let Rim::Height(height) = rim {
+            in_range("rim height", "a finite height", height.as_f64(), true)?;
+        }
+        Ok(Self { rim, ..self })
+    }
+
+    /// Which way heights run from the known ones.
+    pub fn with_branch(self, branch: Branch) -> Self {
+        Self { branch, ..self }
+    }
+
+    /// Steepest slope: pixels darker than 1/√(1 + slope²) are cut to it and flagged `DARK`.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless positive and finite.
+    pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
+        positive("steepest slope", max_slope.as_f64())?;
+        Ok(Self { max_slope, ..self })
+    }
+
+    /// Sweeping ends when no height changes by more than `tolerance` pixels (widths of a pixel).
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless positive and finite.
+    pub fn with_tolerance(self, tolerance: T) -> Result<Self, SfsError> {
+        positive("tolerance", tolerance.as_f64())?;
+        Ok(Self { tolerance, ..self })
+    }
+
+    /// Most sweeps (four directions are four sweeps).
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] for 0.
+    pub fn with_max_sweeps(self, max_sweeps: usize) -> Result<Self, SfsError> {
+        positive("most sweeps", max_sweeps as f64)?;
+        Ok(Self { max_sweeps, ..self })
+    }
+
+    /// Solves one branch into the buffers' values.
+    fn solve(&self, workspace: &mut Workspace<T>, rising: bool) -> Outcome<T> {
+        workspace.eikonal.start(rising);
+        let light = self.lighting.direction();
+        let mut outcome = Outcome { stop: StopReason::IterationLimit, sweeps: 0, change: T::infinity() };
+        while outcome.sweeps < self.max_sweeps {
+            let buffers = &mut workspace.eikonal;
+            outcome.change = T::zero();
+            for order in 0..4 {
+                let change = if self.lighting.is_frontal() {
+                    frontal::sweep(buffers, order, self.tolerance)
+                } else {
+                    oblique::sweep(buffers, light, rising, order, self.tolerance)
+                };
+                outcome.change = outcome.change.max(change);
+            }
+            outcome.sweeps += 4;
+            if outcome.change <= self.tolerance {
+                outcome.stop = StopReason::Converged;
+                break;
+            }
+            if let Some(stop) = workspace.report(outcome.sweeps, self.max_sweeps, outcome.change) {
+                outcome.stop = stop;
+                break;
+            }
+        }
+        outcome
+    }
+}
+
+/// How one branch was solved.
+#[derive(Clone, Copy)]
+struct Outcome<T> {
+    stop: StopReason,
+    sweeps: usize,
+    change: T,
+}
+
+impl<T: Scalar> SurfaceReconstruction<T> for Eikonal<T> {
+    fn reconstruct_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        let (rows, columns) = frame.dim();
+        let area = domain.validate(rows, columns)?;
+        surface.prepare(rows, columns, area);
+        let rim = if let Rim::Height(height) = self.rim { Some(height) } else { None };
+        let slopes = Slopes { lighting: &self.lighting, max_slope: self.max_slope };
+        let known = workspace.eikonal.load(&frame, domain, &slopes, rim, surface)?;
+        let first = self.solve(workspace, self.branch != Branch::Falling);
+        let mut rising = self.branch != Branch::Falling;
+        let mut outcome = first;
+        if self.branch == Branch::Auto && known.inside > 0 && first.stop != StopReason::Cancelled {
+            workspace.eikonal.keep();
+            let second = self.solve(workspace, false);
+            outcome = Outcome { sweeps: first.sweeps + second.sweeps, ..second };
+            rising = workspace.eikonal.kept_is_better(&self.lighting);
+            if rising {
+                workspace.eikonal.restore();
+                outcome = Outcome { sweeps: outcome.sweeps, ..first };
+            }
+        }
+        let width = domain.pixel_size_m[0];
+        surface.report.stop = outcome.stop;
+        surface.report.iterations = outcome.sweeps;
+        surface.report.residual = outcome.change * width;
+        workspace.eikonal.store(if rising { width } else { -width }, domain, surface);
+        surface.finish(domain);
+        Ok(())
+    }
+}
+
+/// Flags of a reflectance outside what the model explains.
+fn flags_of<T: Scalar>(reflectance: T, least: T) -> PixelFlags {
+    if !reflectance.is_finite() {
+        PixelFlags::NON_FINITE
+    } else if reflectance > T::one() {
+        PixelFlags::SATURATED
+    } else if reflectance < least {
+        PixelFlags::DARK
+    } else {
+        PixelFlags::NONE
+    }
+}

@@ -1,0 +1,69 @@
+//! One image to heights: the trait and its implementations.
+
+mod depth_table;
+mod eikonal;
+
+use ndarray::ArrayView2;
+
+pub use depth_table::{DepthTable, Signal};
+pub(crate) use eikonal::EikonalBuffers;
+pub use eikonal::{Branch, Eikonal, Rim};
+
+use crate::{Domain, Frame, Scalar, SfsError, Surface, Workspace};
+
+/// A way from one image to a surface.
+///
+/// Object safe: `Box<dyn SurfaceReconstruction<f32>>` lets a user pick at run time. An implementor writes
+/// [`reconstruct_with`](Self::reconstruct_with) alone.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Domain, Eikonal, Lighting, Rim, SurfaceReconstruction};
+///
+/// // A cone of slope 1 has n·s = 1/√2 everywhere.
+/// let (size, radius) = (41, 15.0_f64);
+/// let distance = |r: usize, c: usize| (r as f64 - 20.0).hypot(c as f64 - 20.0);
+/// let mask = Array2::from_shape_fn((size, size), |(r, c)| distance(r, c) < radius);
+/// let image = Array2::from_elem((size, size), 0.5_f64.sqrt());
+/// let method = Eikonal::new(Lighting::frontal()).with_rim(Rim::Height(0.0))?;
+/// let surface = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?;
+/// assert!((surface.heights[[20, 20]] - radius).abs() < 1.5);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+pub trait SurfaceReconstruction<T: Scalar> {
+    /// Reconstructs into `surface`, reusing its arrays and the buffers of `workspace`.
+    ///
+    /// # Errors
+    /// What the method documents: mostly shapes that differ, an empty mask, or invalid options.
+    fn reconstruct_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError>;
+
+    /// Reconstructs from real intensities.
+    ///
+    /// # Errors
+    /// As [`reconstruct_with`](Self::reconstruct_with).
+    fn reconstruct(&self, image: ArrayView2<'_, T>, domain: &Domain<'_, T>) -> Result<Surface<T>, SfsError> {
+        let mut surface = Surface::new();
+        self.reconstruct_with(&mut Workspace::new(), Frame::Real(image), domain, &mut surface)?;
+        Ok(surface)
+    }
+
+    /// Reconstructs from the grey levels of an 8-bit camera.
+    ///
+    /// # Errors
+    /// As [`reconstruct_with`](Self::reconstruct_with).
+    fn reconstruct_u8(
+        &self,
+        image: ArrayView2<'_, u8>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        let mut surface = Surface::new();
+        self.reconstruct_with(&mut Workspace::new(), Frame::Bytes(image), domain, &mut surface)?;
+        Ok(surface)
+    }
+}

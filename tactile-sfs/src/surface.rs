@@ -1,0 +1,163 @@
+//! What a reconstruction returns: heights, which of them to trust, and how they were found.
+
+use core::ops::{BitOr, BitOrAssign};
+
+use ndarray::Array2;
+
+use crate::{BoundingBox, Domain, Scalar};
+
+/// Why a computation ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The method has no iterations: the answer is exact up to rounding.
+    #[default]
+    Direct,
+    /// The change or the residual fell below the tolerance.
+    Converged,
+    /// The limit of iterations came first; the residual tells how far it got.
+    IterationLimit,
+    /// Further iterations no longer improved the residual.
+    Stagnated,
+    /// The progress callback asked to stop.
+    Cancelled,
+}
+
+/// What happened at one pixel: a set of the constants below.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PixelFlags(u8);
+
+impl PixelFlags {
+    /// Nothing to report.
+    pub const NONE: Self = Self(0);
+    /// Brighter than the model allows (reflectance above 1); taken as 1.
+    pub const SATURATED: Self = Self(1);
+    /// At or below the ambient: the slope is unbounded; it was cut to the method's limit.
+    pub const DARK: Self = Self(2);
+    /// The input was NaN or infinite; the pixel was filled in from its neighbours.
+    pub const NON_FINITE: Self = Self(4);
+    /// No known height reaches the pixel; its height is NaN.
+    pub const UNREACHED: Self = Self(8);
+    /// Outside the range of a calibration; the nearest end was taken.
+    pub const OUT_OF_RANGE: Self = Self(16);
+
+    /// Whether every flag of `other` is set here.
+    pub fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Whether no flag is set.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+impl BitOr for PixelFlags {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl BitOrAssign for PixelFlags {
+    fn bitor_assign(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+}
+
+/// One connected part of the solved pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Component<T> {
+    /// Number of pixels.
+    pub pixels: usize,
+    /// Row and column of its first pixel in reading order.
+    pub first: [usize; 2],
+    /// Mean height it was given: 0, or what its known heights demand.
+    pub mean_height: T,
+}
+
+/// How a surface was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report<T> {
+    /// Why the method stopped.
+    pub stop: StopReason,
+    /// Iterations (sweeps, conjugate-gradient steps, …) done; 0 for direct methods.
+    pub iterations: usize,
+    /// Last residual or change, in the unit each method documents.
+    pub residual: T,
+    /// Pixels with a height.
+    pub solved: usize,
+    /// Pixels with at least one flag.
+    pub flagged: usize,
+    /// Connected parts, where the method determines them (masked least squares).
+    pub components: Vec<Component<T>>,
+}
+
+/// Heights over the frame, in the unit of the pixel size.
+///
+/// `heights` is NaN outside `mask`. When a surface is used again as output, only the rectangle written last is
+/// cleared, so that a small contact in a large frame stays cheap; heights edited by hand outside of it stay.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface<T> {
+    /// Heights z(row, column), NaN where there is none.
+    pub heights: Array2<T>,
+    /// Pixels that have a height.
+    pub mask: Array2<bool>,
+    /// What happened at each pixel.
+    pub flags: Array2<PixelFlags>,
+    /// How the heights were found.
+    pub report: Report<T>,
+    /// The rectangle that holds every pixel with a height or a flag.
+    pub bounding_box: BoundingBox,
+}
+
+impl<T: Scalar> Surface<T> {
+    /// An empty surface, to be filled by one of the `*_with` calls.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Heights with `value` where there is none.
+    pub fn filled(&self, value: T) -> Array2<T> {
+        self.heights.mapv(|height| if height.is_nan() { value } else { height })
+    }
+
+    /// Makes the surface `rows` × `columns` and empty, at the cost of the rectangles concerned.
+    pub(crate) fn prepare(&mut self, rows: usize, columns: usize, bounding_box: BoundingBox) {
+        if self.heights.dim() == (rows, columns) {
+            let old = self.bounding_box;
+            old.view_mut(self.heights.view_mut()).fill(T::nan());
+            old.view_mut(self.mask.view_mut()).fill(false);
+            old.view_mut(self.flags.view_mut()).fill(PixelFlags::NONE);
+        } else {
+            self.heights = Array2::from_elem((rows, columns), T::nan());
+            self.mask = Array2::from_elem((rows, columns), false);
+            self.flags = Array2::from_elem((rows, columns), PixelFlags::NONE);
+        }
+        self.bounding_box = bounding_box;
+        self.report.components.clear();
+        self.report =
+            Report { components: core::mem::take(&mut self.report.components), ..Report::default() };
+    }
+
+    /// Writes one height and marks the pixel as solved (unless the height is not finite).
+    #[inline]
+    pub(crate) fn set(&mut self, row: usize, column: usize, height: T) {
+        self.heights[[row, column]] = height;
+        self.mask[[row, column]] = height.is_finite();
+    }
+
+    /// Counts solved and flagged pixels.
+    pub(crate) fn finish(&mut self, domain: &Domain<'_, T>) {
+        let BoundingBox { top, left, rows, columns } = self.bounding_box;
+        let (mut solved, mut flagged) = (0, 0);
+        for row in top..top + rows {
+            for column in left..left + columns {
+                solved += usize::from(self.mask[[row, column]]);
+                flagged += usize::from(!self.flags[[row, column]].is_empty() && domain.contains(row, column));
+            }
+        }
+        self.report.solved = solved;
+        self.report.flagged = flagged;
+    }
+}

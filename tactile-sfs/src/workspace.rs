@@ -1,0 +1,70 @@
+//! Buffers that outlive a call, and the progress callback of long solves.
+
+use core::ops::ControlFlow;
+
+use crate::{Scalar, StopReason};
+
+/// How far a long solve has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Iterations done.
+    pub iterations: usize,
+    /// Most iterations the solve may take.
+    pub limit: usize,
+    /// Residual or change of the last iteration.
+    pub residual: f64,
+}
+
+type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send>;
+
+/// Buffers of every method, kept between calls: a second call of the same size does not allocate.
+///
+/// One workspace serves any of the methods; it may also carry a callback that hears of the progress of iterative
+/// solves and may stop them.
+///
+/// ```
+/// use core::ops::ControlFlow;
+/// use tactile_sfs::Workspace;
+/// let mut workspace = Workspace::<f32>::new();
+/// workspace.on_progress(|progress| {
+///     eprintln!("{} of at most {}", progress.iterations, progress.limit);
+///     ControlFlow::Continue(())
+/// });
+/// ```
+#[derive(Default)]
+pub struct Workspace<T> {
+    pub(crate) eikonal: crate::reconstruct::EikonalBuffers<T>,
+    pub(crate) poisson: crate::integrate::PoissonBuffers<T>,
+    callback: Option<Callback>,
+}
+
+impl<T> core::fmt::Debug for Workspace<T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Workspace").finish_non_exhaustive()
+    }
+}
+
+impl<T: Scalar> Workspace<T> {
+    /// An empty workspace; buffers grow at the first call.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Calls `callback` from time to time during iterative solves; `Break` ends the solve with
+    /// [`StopReason::Cancelled`] and the best answer so far.
+    pub fn on_progress(&mut self, callback: impl FnMut(Progress) -> ControlFlow<()> + Send + 'static) {
+        self.callback = Some(Box::new(callback));
+    }
+
+    /// Removes the callback.
+    pub fn clear_progress(&mut self) {
+        self.callback = None;
+    }
+
+    /// Tells the callback; `Some(Cancelled)` if it wants to stop.
+    pub(crate) fn report(&mut self, iterations: usize, limit: usize, residual: T) -> Option<StopReason> {
+        let callback = self.callback.as_mut()?;
+        let progress = Progress { iterations, limit, residual: residual.as_f64() };
+        callback(progress).is_break().then_some(StopReason::Cancelled)
+    }
+}
