@@ -2,15 +2,23 @@
 #![forbid(unsafe_code)]
 
 mod assignment;
+mod assignment_matcher;
+mod cpd;
 pub mod dense;
 mod error;
+mod frame;
+mod hard;
 mod matching;
+mod nearest;
 mod relaxation;
 mod soft;
 mod validate;
 
 pub use assignment::{AssignmentWorkspace, linear_assignment};
+pub use assignment_matcher::LinearAssignment;
+pub use cpd::{CoherentPointDrift, DriftOptions, DriftWarp, DriftWorkspace, Motion, Normalization};
 pub use error::{MatchError, PointSet};
 pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
+pub use nearest::NearestNeighbour;
 pub use relaxation::{Outliers, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace, Rotation};
 pub use soft::SoftMatches;

@@ -1,0 +1,207 @@
+//! Coherent point drift: rigid, similarity, affine and non-rigid registration by maximum likelihood.
+//!
+//! The model points `y_m` (`M` of them) are the centres of a Gaussian mixture of one variance `σ²`, with a uniform component of
+//! weight `w` for outliers; the target points `x_n` (`N`) are its sample. Expectation maximisation alternates (Myronenko & Song,
+//! Point set registration: coherent point drift, IEEE PAMI 32, 2262–2275, 2010):
+//!
+//! ```text
+//! P_mn = exp(−|x_n − T(y_m)|²/2σ²) / (Σ_k exp(−|x_n − T(y_k)|²/2σ²) + (2πσ²)^{D/2} w M / ((1−w) N))
+//! T    = the rigid, similarity, affine or non-rigid motion that minimises Σ P_mn |x_n − T(y_m)|² / 2σ² (+ ½ λ |T|²)
+//! σ²   = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)
+//! ```
+//!
+//! Non-rigid motion is `T(y) = y + Σ_k w_k exp(−|y − y_k|²/2β²)`, neighbours moving coherently. All parameters refer to sets of root mean
+//! square radius one ([`Normalization`]): the same settings mean the same in every unit. Two things differ from the usual
+//! programs, neither in the answer: `P` is never stored while iterating, and the Gaussian kernel is factorised once, to the rank it
+//! numerically has, instead of solving an `M × M` system in every iteration.
+
+mod exp;
+mod expectation;
+mod global;
+mod kernel;
+mod non_rigid;
+mod outcome;
+mod registration;
+mod simd;
+mod warp;
+
+pub use registration::DriftWorkspace;
+pub use warp::DriftWarp;
+
+use crate::validate::{option_within, point_sets};
+use crate::{MatchError, Matching, PointMatcher, StopReason};
+use nalgebra::Point;
+use tactile_tps::Scalar;
+
+/// How the model may move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Motion {
+    /// Rotation and translation.
+    Rigid,
+    /// Rotation, translation and one scale.
+    Similarity,
+    /// Any affine map.
+    Affine,
+    /// Smooth displacement.
+    NonRigid {
+        /// Width β of the Gaussian kernel, in root mean square radii: how far neighbours move together.
+        beta: f64,
+        /// Weight λ of smoothness against likelihood.
+        lambda: f64,
+        /// Greatest rank of the kernel; `None` for the rank it numerically has. Thirty is customary for speed.
+        rank: Option<usize>,
+    },
+}
+
+impl Motion {
+    /// Non-rigid with the customary β = 2, λ = 3, and no bound on the rank.
+    pub const NON_RIGID: Self = Self::NonRigid { beta: 2.0, lambda: 3.0, rank: None };
+}
+
+/// How the two sets are brought to size one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Normalization {
+    /// Each set by its own centre and root mean square radius: customary in coherent point drift, and right whatever lies between
+    /// the sets.
+    ///
+    /// [`Rigid`](Motion::Rigid) motion, which has no scale to give back, takes the model's radius for both.
+    #[default]
+    Each,
+    /// Both by the centre and the root mean square radius of the model: for sets that nearly lie on one another, where points
+    /// without a partner would shift the centre of one of them.
+    Model,
+    /// None: the parameters are in the units of the points.
+    Off,
+}
+
+/// Options of [`CoherentPointDrift`]; all are independent of the units of the points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriftOptions {
+    /// How the model may move.
+    pub motion: Motion,
+    /// Weight `w` of the uniform component, in `[0, 1)`: about the share of target points that are outliers.
+    pub outlier_weight: f64,
+    /// Stop when `σ²` changes by no more than this.
+    pub tolerance: f64,
+    /// Stop after this many iterations.
+    pub max_iterations: usize,
+    /// The frame of the registration.
+    pub normalization: Normalization,
+}
+
+impl Default for DriftOptions {
+    fn default() -> Self {
+        Self {
+            motion: Motion::NON_RIGID,
+            outlier_weight: 0.1,
+            tolerance: 1e-5,
+            max_iterations: 150,
+            normalization: Normalization::Each,
+        }
+    }
+}
+
+/// Coherent point drift as a [`PointMatcher`].
+///
+/// Where the sets are far apart in rotation it finds a local optimum, as every method of its kind does. The time is
+/// `O((M N + M r²) · iterations)`, with `r` the rank of the kernel.
+///
+/// ```
+/// use nalgebra::{Point2, Rotation2, Vector2};
+/// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, PointMatcher};
+///
+/// let model: Vec<_> = (0..40).map(|k| f64::from(k)).map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k)).collect();
+/// let motion = Rotation2::new(0.2);
+/// let target: Vec<_> = model.iter().rev().map(|p| motion * p + Vector2::new(7.0, -2.0)).collect();
+///
+/// let matcher = CoherentPointDrift::new(DriftOptions { motion: Motion::Rigid, ..Default::default() })?;
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!((0..40).all(|m| matching.assignment[m] == Some(39 - m)));
+/// assert!(matching.warped.iter().zip(target.iter().rev()).all(|(w, t)| (w - t).norm() < 1e-6));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CoherentPointDrift {
+    options: DriftOptions,
+}
+
+impl CoherentPointDrift {
+    /// With these options.
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for an option out of its range.
+    pub fn new(options: DriftOptions) -> Result<Self, MatchError> {
+        const POSITIVE: &str = "(0, ∞)";
+        option_within("outlier_weight", options.outlier_weight, 0.0, 1.0 - f64::EPSILON, "[0, 1)")?;
+        option_within("tolerance", options.tolerance, 0.0, f64::MAX, "[0, ∞)")?;
+        option_within("max_iterations", options.max_iterations as f64, 1.0, f64::MAX, "[1, ∞)")?;
+        if let Motion::NonRigid { beta, lambda, rank } = options.motion {
+            option_within("beta", beta, f64::MIN_POSITIVE, f64::MAX, POSITIVE)?;
+            option_within("lambda", lambda, f64::MIN_POSITIVE, f64::MAX, POSITIVE)?;
+            option_within("rank", rank.unwrap_or(1) as f64, 1.0, f64::MAX, "[1, ∞)")?;
+        }
+        Ok(Self { options })
+    }
+
+    /// The options it was made with.
+    #[must_use]
+    pub fn options(&self) -> &DriftOptions {
+        &self.options
+    }
+
+    /// [`PointMatcher::match_points`] with the memory of the iterations kept between calls.
+    ///
+    /// # Errors
+    /// As [`PointMatcher::match_points`].
+    pub fn match_with<T: Scalar, const D: usize>(
+        &self,
+        workspace: &mut DriftWorkspace<D>,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
+        self.register_with(workspace, model, target)?;
+        Ok(outcome::matching(&self.options, workspace, model.len(), target.len()))
+    }
+
+    /// The registration alone, without pairs and covariances: what it found stays in the workspace.
+    ///
+    /// Non-rigid motion allocates nothing once the workspace has seen sets as large.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{CoherentPointDrift, DriftWorkspace};
+    /// let model = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(Point2::from);
+    /// let target = model.map(|p| Point2::new(p.x + 0.1 * p.y, p.y + 3.0));
+    /// let mut workspace = DriftWorkspace::new();
+    /// CoherentPointDrift::default().register_with(&mut workspace, &model, &target)?;
+    /// let mut warped = model;
+    /// workspace.warped_into(&mut warped)?;
+    /// assert!(warped.iter().zip(&target).all(|(w, t)| (w - t).norm() < 0.01));
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`PointMatcher::match_points`].
+    pub fn register_with<T: Scalar, const D: usize>(
+        &self,
+        workspace: &mut DriftWorkspace<D>,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<StopReason, MatchError> {
+        point_sets(model, target)?;
+        workspace.register(&self.options, model, target);
+        Ok(workspace.stop)
+    }
+}
+
+impl<T: Scalar, const D: usize> PointMatcher<T, D> for CoherentPointDrift {
+    fn match_points(
+        &self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
+        self.match_with(&mut DriftWorkspace::new(), model, target)
+    }
+}

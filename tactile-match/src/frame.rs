@@ -1,0 +1,63 @@
+//! A frame to work in: centre and size taken out, so that no parameter depends on the units of the points and no square
+//! under- or overflows.
+
+use nalgebra::{Point, RealField, SVector};
+
+/// `x ↦ (x − centre) / scale`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Frame<const D: usize> {
+    pub(crate) centre: SVector<f64, D>,
+    pub(crate) scale: f64,
+}
+
+impl<const D: usize> Default for Frame<D> {
+    fn default() -> Self {
+        Self { centre: SVector::zeros(), scale: 1.0 }
+    }
+}
+
+/// The point in double precision.
+pub(crate) fn widened<T: RealField + Copy, const D: usize>(point: &Point<T, D>) -> SVector<f64, D> {
+    point.coords.map(|c| nalgebra::convert_unchecked(c))
+}
+
+impl<const D: usize> Frame<D> {
+    /// Centre and root mean square radius of a set; scale one where all points coincide.
+    pub(crate) fn of<T: RealField + Copy>(points: &[Point<T, D>]) -> Self {
+        let n = points.len() as f64;
+        let origin = widened(&points[0]); // sums of differences keep the digits of sets far from the origin
+        let centre = origin + points.iter().map(|p| widened(p) - origin).sum::<SVector<f64, D>>() / n;
+        // The largest radius taken out first: no square under- or overflows.
+        let largest = points.iter().map(|p| (widened(p) - centre).amax()).fold(0.0, f64::max);
+        if !(largest > 0.0 && largest.is_finite()) {
+            return Self { centre, scale: 1.0 };
+        }
+        let squares: f64 = points.iter().map(|p| ((widened(p) - centre) / largest).norm_squared()).sum();
+        Self { centre, scale: largest * (squares / n).sqrt() }
+    }
+
+    /// The model's centre and the largest distance from it along an axis in either set: for sets compared as they lie.
+    pub(crate) fn of_both<T: RealField + Copy>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
+        let centre = Self::of(model).centre;
+        let largest = model.iter().chain(target).map(|p| (widened(p) - centre).amax()).fold(0.0, f64::max);
+        Self { centre, scale: if largest > 0.0 { largest } else { 1.0 } }
+    }
+
+    /// A point in this frame.
+    pub(crate) fn inside<T: RealField + Copy>(&self, point: &Point<T, D>) -> SVector<f64, D> {
+        (widened(point) - self.centre) / self.scale
+    }
+
+    /// All points in this frame.
+    pub(crate) fn enter<T: RealField + Copy>(&self, points: &[Point<T, D>], columns: &mut [Vec<f64>; D]) {
+        columns.iter_mut().for_each(Vec::clear);
+        for point in points {
+            columns.iter_mut().zip(self.inside(point).iter()).for_each(|(column, &c)| column.push(c));
+        }
+    }
+
+    /// A point of this frame in the units of the caller.
+    pub(crate) fn leave<T: RealField + Copy>(&self, inside: SVector<f64, D>) -> Point<T, D> {
+        Point::from((inside * self.scale + self.centre).map(nalgebra::convert))
+    }
+}

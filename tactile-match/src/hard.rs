@@ -1,0 +1,126 @@
+//! From pairs alone to a [`Matching`]: what nearest neighbours and linear assignment have in common.
+
+use crate::frame::Frame;
+use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
+use nalgebra::{DMatrix, Point, SMatrix, SVector};
+use tactile_tps::{AffineModel, FitOptions, NegR, R2LogR, Scalar, Spline, Warp, WarpModel};
+
+/// Soft matches below this weight are left out.
+const NEGLIGIBLE: f64 = 1e-4;
+
+/// Both sets in one frame, with all squared distances between them.
+pub(crate) struct Distances<const D: usize> {
+    /// The frame, for lengths.
+    pub(crate) frame: Frame<D>,
+    target: Vec<SVector<f64, D>>,
+    /// `|x_i − y_j|²`, `I × J`, in the units of the frame.
+    pub(crate) squared: DMatrix<f64>,
+}
+
+impl<const D: usize> Distances<D> {
+    pub(crate) fn new<T: Scalar>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
+        let frame = Frame::of_both(model, target);
+        let inside = |points: &[Point<T, D>]| points.iter().map(|p| frame.inside(p)).collect::<Vec<_>>();
+        let (model, target) = (inside(model), inside(target));
+        let squared =
+            DMatrix::from_fn(model.len(), target.len(), |i, j| (model[i] - target[j]).norm_squared());
+        Self { frame, target, squared }
+    }
+
+    /// The square of a length of the caller, in the units of the frame; infinite for none.
+    pub(crate) fn limit(&self, length: Option<f64>) -> f64 {
+        length.map_or(f64::INFINITY, |l| (l / self.frame.scale).powi(2))
+    }
+
+    /// Probabilities of the targets for model point `i`, its displacement being drawn from a normal distribution of variance
+    /// `variance` along each axis.
+    fn posterior(&self, i: usize, variance: f64) -> Vec<f64> {
+        let row = self.squared.row(i);
+        let least = row.iter().copied().fold(f64::INFINITY, f64::min);
+        let mut p: Vec<f64> =
+            row.iter()
+                .map(|&s| {
+                    if s > least { (-0.5 * (s - least) / variance.max(f64::MIN_POSITIVE)).exp() } else { 1.0 }
+                })
+                .collect();
+        let sum: f64 = p.iter().sum();
+        p.iter_mut().for_each(|p| *p /= sum);
+        p
+    }
+
+    fn spread(&self, p: &[f64]) -> SMatrix<f64, D, D> {
+        let mean: SVector<f64, D> = self.target.iter().zip(p).map(|(y, &p)| y * p).sum();
+        let sum = self
+            .target
+            .iter()
+            .zip(p)
+            .fold(SMatrix::zeros(), |sum, (y, &p)| sum + (y - mean) * (y - mean).transpose() * p);
+        sum * (self.frame.scale * self.frame.scale)
+    }
+}
+
+/// The result for these pairs: the warp interpolates them, confidences and covariances come from how the displacements are
+/// distributed.
+pub(crate) fn matching<T: Scalar, const D: usize>(
+    model: &[Point<T, D>],
+    target: &[Point<T, D>],
+    distances: &Distances<D>,
+    assignment: Vec<Option<usize>>,
+) -> Matching<T, D> {
+    let pairs: Vec<(usize, usize)> =
+        assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect();
+    let total: f64 = pairs.iter().map(|&(i, j)| distances.squared[(i, j)]).sum();
+    let variance = total / (pairs.len().max(1) * D) as f64;
+    let (mut soft, mut confidence, mut covariance) = (SoftMatches::new(), Vec::new(), Vec::new());
+    for (i, partner) in assignment.iter().enumerate() {
+        let p = distances.posterior(i, variance);
+        confidence.push(partner.map_or_else(T::zero, |j| nalgebra::convert(p[j])));
+        covariance.push(distances.spread(&p).map(nalgebra::convert));
+        let kept = p.iter().enumerate().filter(|(_, p)| partner.is_some() && **p > NEGLIGIBLE);
+        soft.push_row(kept.map(|(j, &p)| (j, nalgebra::convert::<f64, T>(p))));
+    }
+    let warp = warp_through(model, target, &pairs);
+    let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
+    let residual =
+        pairs.iter().map(|&(i, j)| (warped[i] - target[j]).norm_squared()).fold(T::zero(), |s, r| s + r);
+    let count: T = nalgebra::convert(pairs.len().max(1) as f64);
+    let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
+    let scale = distances.frame.scale;
+    Matching {
+        warp,
+        warped,
+        assignment,
+        confidence,
+        soft,
+        unmatched_model,
+        unmatched_target,
+        displacement_covariance: covariance,
+        energy: vec![nalgebra::convert(total * scale * scale)],
+        report: MatchReport {
+            stop: StopReason::Converged,
+            iterations: 1,
+            starts: 1,
+            residual: (residual / count).sqrt(),
+            sigma: T::zero(),
+        },
+    }
+}
+
+/// The thin-plate spline that interpolates the pairs; an affine map where they do not determine one, the identity where there
+/// are none.
+fn warp_through<T: Scalar, const D: usize>(
+    model: &[Point<T, D>],
+    target: &[Point<T, D>],
+    pairs: &[(usize, usize)],
+) -> Box<dyn Warp<T, D> + Send + Sync> {
+    let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
+    let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
+    if D == 2 {
+        if let Ok(spline) = Spline::<T, D, D, R2LogR>::fit(&sources, &images, &FitOptions::new(R2LogR)) {
+            return Box::new(spline);
+        }
+    } else if let Ok(spline) = Spline::<T, D, D, NegR>::fit(&sources, &images, &FitOptions::new(NegR)) {
+        return Box::new(spline);
+    }
+    Box::new(AffineModel.fit(&sources, &images, None).unwrap_or_else(|_| tactile_tps::Affine::identity()))
+}
