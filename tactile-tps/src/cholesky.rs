@@ -7,81 +7,91 @@
 use pulp::{Arch, Simd, WithSimd};
 
 /// Columns of a panel, and the multiple the matrix is padded to.
-pub(crate) const PANEL: usize = 8;
+const PANEL: usize = 8;
 /// Columns of a block.
 const BLOCK: usize = 64;
+/// Depth to which tiles gather before they are written back, so that a strip stays in the first-level cache.
+const DEPTH: usize = 128;
 
-/// The factor L of A = L Lᵀ, column by column.
+/// Rows and columns before the matrix proper, which the caller may use.
+pub(crate) const HEAD: usize = 8;
+
+/// Places in a column for n rows of which the first q stand before the matrix proper.
+///
+/// Not a multiple of 512 bytes: columns that far apart would crowd into the same few sets of the cache.
+pub(crate) fn layout(n: usize, q: usize) -> usize {
+    let stride = HEAD + (n - q).div_ceil(PANEL) * PANEL;
+    if stride.is_multiple_of(64) { stride + PANEL } else { stride }
+}
+
+/// The factor L of A = L Lᵀ, column by column, behind `HEAD` rows and columns.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cholesky {
-    m: usize,
-    stride: usize,
-    l: Vec<f64>,
+    /// Order of the matrix proper.
+    pub(crate) m: usize,
+    /// Places in a column.
+    pub(crate) stride: usize,
+    /// `stride` columns of `stride` places, and `HEAD` more.
+    pub(crate) l: Vec<f64>,
     /// Reciprocals of the diagonal.
     reciprocal: Vec<f64>,
 }
 
-/// `m` rounded up to whole panels.
-pub(crate) fn padded(m: usize) -> usize {
-    m.div_ceil(PANEL) * PANEL
-}
-
 impl Cholesky {
-    /// Rows of a right-hand side, padding included.
-    pub(crate) fn rows(&self) -> usize {
-        self.stride
-    }
-
-    /// Factors the m × m matrix whose lower triangle `fill` writes, given its columns and their stride.
-    ///
-    /// Fails with the column whose pivot is not positive.
-    pub(crate) fn factor(&mut self, m: usize, fill: impl FnOnce(&mut [f64], usize)) -> Result<(), usize> {
-        (self.m, self.stride) = (m, padded(m));
-        self.l.clear();
-        self.l.resize(self.stride * self.stride, 0.0);
-        self.reciprocal.clear();
-        self.reciprocal.resize(self.stride, 1.0);
-        fill(&mut self.l, self.stride);
-        (m..self.stride).for_each(|k| self.l[k * self.stride + k] = 1.0);
-        Arch::new().dispatch(Factor { l: &mut self.l, stride: self.stride, reciprocal: &mut self.reciprocal })
-    }
-
-    /// b ← A⁻¹b for the `R` columns of b, each padded with zeros to [`rows`](Self::rows).
-    pub(crate) fn solve<const R: usize>(&self, b: &mut [f64]) {
-        Arch::new().dispatch(Solve::<R> { l: &self.l, stride: self.stride, reciprocal: &self.reciprocal, b });
-    }
-
-    /// An estimate of the 2-norm condition number: a few steps of power and inverse iteration.
-    pub(crate) fn condition(&self, scratch: &mut Vec<f64>) -> f64 {
-        if self.m == 0 {
-            return 1.0;
+    /// Makes room for a matrix of order `m`; what lies below the diagonal is then the caller's to write.
+    pub(crate) fn prepare(&mut self, m: usize, stride: usize) {
+        if (self.m, self.stride) != (m, stride) || self.l.is_empty() {
+            (self.m, self.stride) = (m, stride);
+            // A new allocation comes zeroed from the system, page by page as it is touched.
+            let length = stride * stride + HEAD;
+            if self.l.capacity() < length {
+                self.l = vec![0.0; length];
+            } else {
+                self.l.clear();
+                self.l.resize(length, 0.0);
+            }
+            self.reciprocal.clear();
+            self.reciprocal.resize(stride, 1.0);
         }
-        let pivot = |i: &usize| self.l[i * self.stride + i];
-        let extreme = |better: fn(f64, f64) -> bool| {
-            (1..self.m).fold(0, |best, i| if better(pivot(&i), pivot(&best)) { i } else { best })
-        };
-        let largest = self.iterate(extreme(|a, b| a > b), scratch, |this, x| this.multiply(x));
-        let smallest = self.iterate(extreme(|a, b| a < b), scratch, |this, x| this.solve::<1>(x));
-        f64::max(largest * smallest, 1.0)
+        (HEAD + m..stride).for_each(|k| self.l[k * stride + k] = 1.0);
     }
 
-    /// Norm growth of an operator after three steps from the `start`-th unit vector.
-    fn iterate(&self, start: usize, x: &mut Vec<f64>, step: impl Fn(&Self, &mut [f64])) -> f64 {
+    /// Factors the matrix in place. Fails with the column whose pivot is not positive.
+    pub(crate) fn factor(&mut self) -> Result<(), usize> {
+        let stride = self.stride;
+        let l = &mut self.l[HEAD * stride + HEAD..];
+        Arch::new().dispatch(Factor { l, stride, order: stride - HEAD, reciprocal: &mut self.reciprocal })
+    }
+
+    /// b ← A⁻¹b for `R` columns of `stride` places each, of which those from `HEAD` on count.
+    pub(crate) fn solve<const R: usize>(&self, b: &mut [f64]) {
+        if self.m > 0 {
+            let (l, b) = (&self.l[HEAD * self.stride + HEAD..], &mut b[HEAD..]);
+            let order = self.stride - HEAD;
+            Arch::new().dispatch(Solve::<R> {
+                l,
+                stride: self.stride,
+                order,
+                reciprocal: &self.reciprocal,
+                b,
+            });
+        }
+    }
+
+    /// An estimate of the 2-norm of A⁻¹: two steps of inverse iteration from the column of the least pivot.
+    pub(crate) fn inverse_norm(&self, x: &mut Vec<f64>) -> f64 {
+        let pivot = |i: usize| self.reciprocal[i];
+        let start = (1..self.m).fold(0, |best, i| if pivot(i) > pivot(best) { i } else { best });
         x.clear();
         x.resize(self.stride, 0.0);
-        x[start] = 1.0;
+        x[HEAD + start] = 1.0;
         let mut norm = 1.0;
-        for _ in 0..3 {
-            step(self, x);
-            norm = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        for _ in 0..2 {
+            self.solve::<1>(x);
+            norm = x[HEAD..].iter().map(|x| x * x).sum::<f64>().sqrt();
             x.iter_mut().for_each(|x| *x /= norm);
         }
         norm
-    }
-
-    /// b ← A b for one column.
-    fn multiply(&self, b: &mut [f64]) {
-        Arch::new().dispatch(Multiply { l: &self.l, stride: self.stride, m: self.m, b });
     }
 }
 
@@ -95,6 +105,7 @@ fn load<S: Simd, const V: usize>(column: &[f64], row: usize) -> [S::f64s; V] {
 struct Factor<'a> {
     l: &'a mut [f64],
     stride: usize,
+    order: usize,
     reciprocal: &'a mut [f64],
 }
 
@@ -103,40 +114,52 @@ impl WithSimd for Factor<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { l, stride, reciprocal } = self;
-        for block in (0..stride).step_by(BLOCK) {
-            let end = stride.min(block + BLOCK);
-            for column in (block..end).step_by(PANEL) {
-                update(simd, l, stride, 0..block, column);
+        let Self { l, stride, order, reciprocal } = self;
+        for block in (0..order).step_by(BLOCK) {
+            let end = order.min(block + BLOCK);
+            for depth in (0..block).step_by(DEPTH) {
+                update(simd, l, stride, order, depth..block.min(depth + DEPTH), block..end);
             }
             for column in (block..end).step_by(PANEL) {
-                update(simd, l, stride, block..column, column);
+                update(simd, l, stride, order, block..column, column..column + PANEL);
                 diagonal(&mut l[column * stride..], stride, column, reciprocal).map_err(|k| column + k)?;
-                panel(simd, &mut l[column * stride..], stride, column, reciprocal);
+                panel(simd, &mut l[column * stride..], stride, column..order, reciprocal);
             }
         }
         Ok(())
     }
 }
 
-/// Subtracts what the columns `earlier` contribute to the panel at `column`.
+/// Subtracts what the columns `earlier` contribute to the `columns`, strip of rows by strip of rows.
 #[inline(always)]
-fn update<S: Simd>(simd: S, l: &mut [f64], stride: usize, earlier: core::ops::Range<usize>, column: usize) {
-    let (left, right) = l.split_at_mut(column * stride);
+fn update<S: Simd>(
+    simd: S,
+    l: &mut [f64],
+    stride: usize,
+    order: usize,
+    earlier: core::ops::Range<usize>,
+    columns: core::ops::Range<usize>,
+) {
+    let (left, right) = l.split_at_mut(columns.start * stride);
     let left = &left[earlier.start * stride..earlier.end * stride];
     if left.is_empty() {
         return;
     }
-    let right = &mut right[..PANEL * stride];
     let tall = 3 * S::F64_LANES;
-    let mut row = column;
-    while row + tall <= stride {
-        strip::<S, 3>(simd, left, right, stride, row, column);
-        row += tall;
-    }
-    while row < stride {
-        strip::<S, 1>(simd, left, right, stride, row, column);
-        row += S::F64_LANES;
+    let mut row = columns.start;
+    while row < order {
+        let whole = row + tall <= order;
+        let height = if whole { tall } else { S::F64_LANES };
+        // Panels that begin below the strip's last row lie above the diagonal.
+        for column in columns.clone().step_by(PANEL).take_while(|&column| column < row + height) {
+            let panel = &mut right[(column - columns.start) * stride..];
+            if whole {
+                strip::<S, 3>(simd, left, panel, stride, row, column);
+            } else {
+                strip::<S, 1>(simd, left, panel, stride, row, column);
+            }
+        }
+        row += height;
     }
 }
 
@@ -145,17 +168,16 @@ fn update<S: Simd>(simd: S, l: &mut [f64], stride: usize, earlier: core::ops::Ra
 fn strip<S: Simd, const V: usize>(
     simd: S,
     left: &[f64],
-    right: &mut [f64],
+    panel: &mut [f64],
     stride: usize,
     row: usize,
     column: usize,
 ) {
     if S::F64_LANES >= 8 {
-        tile::<S, V, 8>(simd, left, right, stride, row, column);
+        tile::<S, V, 8>(simd, left, panel, stride, row, column);
     } else {
-        let (first, second) = right.split_at_mut(4 * stride);
-        tile::<S, V, 4>(simd, left, first, stride, row, column);
-        tile::<S, V, 4>(simd, left, second, stride, row, column + 4);
+        tile::<S, V, 4>(simd, left, panel, stride, row, column);
+        tile::<S, V, 4>(simd, left, &mut panel[4 * stride..], stride, row, column + 4);
     }
 }
 
@@ -163,7 +185,7 @@ fn strip<S: Simd, const V: usize>(
 fn tile<S: Simd, const V: usize, const N: usize>(
     simd: S,
     left: &[f64],
-    right: &mut [f64],
+    panel: &mut [f64],
     stride: usize,
     row: usize,
     column: usize,
@@ -179,8 +201,9 @@ fn tile<S: Simd, const V: usize, const N: usize>(
             }
         }
     }
-    for (j, target) in right.chunks_exact_mut(stride).enumerate().take(N) {
-        let target = S::as_mut_simd_f64s(&mut target[row..row + V * S::F64_LANES]).0;
+    for j in 0..N {
+        let at = j * stride + row;
+        let target = S::as_mut_simd_f64s(&mut panel[at..at + V * S::F64_LANES]).0;
         for v in 0..V {
             target[v] = simd.sub_f64s(target[v], sum[j][v]);
         }
@@ -218,13 +241,20 @@ fn diagonal(columns: &mut [f64], stride: usize, start: usize, reciprocal: &mut [
 
 /// Divides the rows below the diagonal block by its factor.
 #[inline(always)]
-fn panel<S: Simd>(simd: S, columns: &mut [f64], stride: usize, start: usize, reciprocal: &[f64]) {
+fn panel<S: Simd>(
+    simd: S,
+    columns: &mut [f64],
+    stride: usize,
+    rows: core::ops::Range<usize>,
+    reciprocal: &[f64],
+) {
+    let start = rows.start;
     let mut factor = [[0.0; PANEL]; PANEL];
     for d in 0..PANEL {
         factor[d].copy_from_slice(&columns[d * stride + start..d * stride + start + PANEL]);
         factor[d][d] = reciprocal[start + d];
     }
-    for row in (start + PANEL..stride).step_by(S::F64_LANES) {
+    for row in (start + PANEL..rows.end).step_by(S::F64_LANES) {
         let mut x = [simd.splat_f64s(0.0); PANEL];
         for c in 0..PANEL {
             let mut sum = load::<S, 1>(&columns[c * stride..], row)[0];
@@ -240,6 +270,7 @@ fn panel<S: Simd>(simd: S, columns: &mut [f64], stride: usize, start: usize, rec
 struct Solve<'a, const R: usize> {
     l: &'a [f64],
     stride: usize,
+    order: usize,
     reciprocal: &'a [f64],
     b: &'a mut [f64],
 }
@@ -249,10 +280,10 @@ impl<const R: usize> WithSimd for Solve<'_, R> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        for start in (0..self.stride).step_by(PANEL) {
+        for start in (0..self.order).step_by(PANEL) {
             self.forward(simd, start);
         }
-        for start in (0..self.stride).step_by(PANEL).rev() {
+        for start in (0..self.order).step_by(PANEL).rev() {
             self.backward(simd, start);
         }
     }
@@ -262,10 +293,11 @@ impl<const R: usize> Solve<'_, R> {
     /// Solves one panel of L z = b and subtracts it from the rows below.
     #[inline(always)]
     fn forward<S: Simd>(&mut self, simd: S, start: usize) {
-        let Self { l, stride, reciprocal, .. } = *self;
-        let columns = &l[start * stride..(start + PANEL) * stride];
+        let Self { l, stride, order, reciprocal, .. } = *self;
+        let columns = &l[start * stride..];
         let mut x = [[0.0; PANEL]; R];
-        for (r, b) in self.b.chunks_exact_mut(stride).enumerate().take(R) {
+        for r in 0..R {
+            let b = &mut self.b[r * stride..];
             for c in 0..PANEL {
                 let done: f64 =
                     (0..c).fold(b[start + c], |sum, d| sum - columns[d * stride + start + c] * x[r][d]);
@@ -274,10 +306,11 @@ impl<const R: usize> Solve<'_, R> {
             b[start..start + PANEL].copy_from_slice(&x[r]);
         }
         let x: [[S::f64s; PANEL]; R] = x.map(|x| x.map(|x| simd.splat_f64s(-x)));
-        for row in (start + PANEL..stride).step_by(S::F64_LANES) {
+        for row in (start + PANEL..order).step_by(S::F64_LANES) {
             let l: [S::f64s; PANEL] = core::array::from_fn(|c| load::<S, 1>(&columns[c * stride..], row)[0]);
-            for (r, b) in self.b.chunks_exact_mut(stride).enumerate().take(R) {
-                let b = &mut S::as_mut_simd_f64s(&mut b[row..row + S::F64_LANES]).0[0];
+            for r in 0..R {
+                let at = r * stride + row;
+                let b = &mut S::as_mut_simd_f64s(&mut self.b[at..at + S::F64_LANES]).0[0];
                 for c in 0..PANEL {
                     *b = simd.mul_add_e_f64s(l[c], x[r][c], *b);
                 }
@@ -288,16 +321,16 @@ impl<const R: usize> Solve<'_, R> {
     /// Solves one panel of Lᵀx = z from the rows below.
     #[inline(always)]
     fn backward<S: Simd>(&mut self, simd: S, start: usize) {
-        let Self { l, stride, reciprocal, .. } = *self;
-        let columns = &l[start * stride..(start + PANEL) * stride];
+        let Self { l, stride, order, reciprocal, .. } = *self;
+        let columns = &l[start * stride..];
         let mut known = [[0.0; PANEL]; R];
         for half in [0, PANEL / 2] {
             let mut sum = [[simd.splat_f64s(0.0); PANEL / 2]; R];
-            for row in (start + PANEL..stride).step_by(S::F64_LANES) {
+            for row in (start + PANEL..order).step_by(S::F64_LANES) {
                 let l: [S::f64s; PANEL / 2] =
                     core::array::from_fn(|c| load::<S, 1>(&columns[(half + c) * stride..], row)[0]);
-                for (r, b) in self.b.chunks_exact(stride).enumerate().take(R) {
-                    let b = load::<S, 1>(b, row)[0];
+                for r in 0..R {
+                    let b = load::<S, 1>(self.b, r * stride + row)[0];
                     for c in 0..PANEL / 2 {
                         sum[r][c] = simd.mul_add_e_f64s(l[c], b, sum[r][c]);
                     }
@@ -309,42 +342,14 @@ impl<const R: usize> Solve<'_, R> {
                 }
             }
         }
-        for (r, b) in self.b.chunks_exact_mut(stride).enumerate().take(R) {
+        for r in 0..R {
+            let b = &mut self.b[r * stride..];
             for c in (0..PANEL).rev() {
                 let own = &columns[c * stride + start..c * stride + start + PANEL];
                 let rest =
                     (c + 1..PANEL).fold(b[start + c] - known[r][c], |sum, d| sum - own[d] * b[start + d]);
                 b[start + c] = rest * reciprocal[start + c];
             }
-        }
-    }
-}
-
-struct Multiply<'a> {
-    l: &'a [f64],
-    stride: usize,
-    m: usize,
-    b: &'a mut [f64],
-}
-
-impl WithSimd for Multiply<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self { l, stride, m, b } = self;
-        let columns = || l.chunks_exact(stride).enumerate().take(m);
-        for (k, column) in columns() {
-            let (lanes, tail) = S::as_simd_f64s(&column[k..]);
-            let (others, rest) = S::as_simd_f64s(&b[k..]);
-            let add = |sum, (l, b): (&S::f64s, &S::f64s)| simd.mul_add_e_f64s(*l, *b, sum);
-            let sum = lanes.iter().zip(others).fold(simd.splat_f64s(0.0), add);
-            b[k] = simd.reduce_sum_f64s(sum) + tail.iter().zip(rest).map(|(l, b)| l * b).sum::<f64>();
-        }
-        for (k, column) in columns().rev() {
-            let x = b[k];
-            b[k + 1..].iter_mut().zip(&column[k + 1..]).for_each(|(b, l)| *b += l * x);
-            b[k] = column[k] * x;
         }
     }
 }

@@ -13,20 +13,15 @@ pub(crate) const BLOCK: usize = 64;
 /// Queries in the blocks that take what is left.
 pub(crate) const TAIL: usize = 8;
 
-/// The kernel sum of a spline, in its frame: centres axis by axis, weights output by output.
-pub(crate) struct Sum<'a, T, K> {
+/// The kernel sum of a spline, in its frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Sum<'a, T, K, const D: usize, const M: usize> {
     pub(crate) kernel: &'a K,
-    pub(crate) centres: &'a [T],
-    pub(crate) weights: &'a [T],
-    pub(crate) count: usize,
+    /// Coordinates of the centres, axis by axis.
+    pub(crate) centres: [&'a [T]; D],
+    /// Weights of the centres, output by output.
+    pub(crate) weights: [&'a [T]; M],
 }
-
-impl<T, K> Clone for Sum<'_, T, K> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<T, K> Copy for Sum<'_, T, K> {}
 
 /// Sums for `W` queries: U, its gradient and its Hessian, as far as the order asked for.
 pub(crate) struct Lanes<T, const D: usize, const M: usize, const W: usize> {
@@ -49,19 +44,21 @@ fn add<T: Scalar, L: Lane<T>>(sum: &mut T, a: L, b: L) {
     *sum = a.mul_add(b, L::new(*sum)).get();
 }
 
-impl<T: Scalar, K: Kernel> Sum<'_, T, K> {
+impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Sum<'_, T, K, D, M> {
     /// Sums up to derivatives of the given `ORDER` (0, 1 or 2) at the queries `x`, axis by axis.
     #[inline(always)]
-    pub(crate) fn block<L: Lane<T>, const D: usize, const M: usize, const W: usize, const ORDER: usize>(
+    pub(crate) fn block<L: Lane<T>, const W: usize, const ORDER: usize>(
         &self,
         x: &[[T; W]; D],
         sums: &mut Lanes<T, D, M, W>,
     ) {
-        let n = self.count;
+        let n = self.centres[0].len();
+        let centres = self.centres.map(|axis| &axis[..n]);
+        let weights = self.weights.map(|output| &output[..n]);
         let (two, four) = (L::from_f64(2.0), L::from_f64(4.0));
         for j in 0..n {
-            let centre: [L; D] = core::array::from_fn(|k| L::new(self.centres[k * n + j]));
-            let weight: [L; M] = core::array::from_fn(|m| L::new(self.weights[m * n + j]));
+            let centre: [L; D] = core::array::from_fn(|k| L::new(centres[k][j]));
+            let weight: [L; M] = core::array::from_fn(|m| L::new(weights[m][j]));
             for l in 0..W {
                 let d: [L; D] = core::array::from_fn(|k| L::new(x[k][l]) - centre[k]);
                 let mut s = d[0] * d[0];

@@ -4,11 +4,9 @@ use nalgebra::Point;
 
 use crate::{
     FitOptions, FitReport, Kernel, R2LogR, Scalar, Smoothing, Spline, TpsError,
-    cholesky::padded,
     error::Input,
     options::{validate_smoothing, validate_weights},
-    real::Lane,
-    simd::{Job, dispatch},
+    refine::{Buffers, Equations, Solution},
     sites::{Sites, finite},
     span::Span,
     spline::Shape,
@@ -34,7 +32,6 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
     pub(crate) kernel: K,
     pub(crate) sites: Sites<D>,
     pub(crate) span: Span<D>,
-    pub(crate) matrix: Vec<f64>,
     pub(crate) system: System,
     weights: Option<Vec<T>>,
     smoothing: Smoothing<T>,
@@ -43,8 +40,7 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
 /// Memory that refits use again and again.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
-    values: Vec<f64>,
-    scratch: Vec<f64>,
+    buffers: Buffers,
     system: System,
 }
 
@@ -65,12 +61,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let kernel = options.kernel.clone();
         let sites = Sites::new(sources, kernel.degree().is_some())?;
         let span = Span::new(&sites, options.rank_tolerance.widen());
-        let matrix = dispatch(Pairs { kernel: &kernel, sites: &sites });
         let (weights, smoothing) = (options.weights.clone(), options.smoothing);
-        let mut this = Self { kernel, sites, span, matrix, system: System::default(), weights, smoothing };
+        let mut this = Self { kernel, sites, span, system: System::default(), weights, smoothing };
         let weights = this.site_weights(this.weights.as_deref());
         let lambda = this.inner_lambda(this.smoothing);
-        this.system.factor(&this.sites, &this.span, &this.matrix, &weights, lambda)?;
+        this.system.factor(&this.kernel, &this.sites, &this.span, &weights, lambda)?;
         Ok(this)
     }
 
@@ -90,7 +85,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// [`TpsError`] for bad targets.
     pub fn fit<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<Spline<T, D, M, K>, TpsError> {
         let mut spline = Spline::empty(self.kernel.clone());
-        self.fit_with(&mut Workspace::new(), targets, &mut spline)?;
+        let workspace = &mut Workspace::new();
+        self.finish(&self.system, self.weights.as_deref(), workspace, targets, &mut spline, true)?;
         Ok(spline)
     }
 
@@ -104,7 +100,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
     ) -> Result<(), TpsError> {
-        self.finish(&self.system, self.weights.as_deref(), workspace, targets, spline)
+        self.finish(&self.system, self.weights.as_deref(), workspace, targets, spline, false)
     }
 
     /// New targets, weights (none: all one) and smoothing for the same sources, into a spline that is already there.
@@ -127,8 +123,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let site_weights = self.site_weights(weights);
         let lambda = self.inner_lambda(smoothing);
         let done = system
-            .factor(&self.sites, &self.span, &self.matrix, &site_weights, lambda)
-            .and_then(|()| self.finish(&system, weights, workspace, targets, spline));
+            .factor(&self.kernel, &self.sites, &self.span, &site_weights, lambda)
+            .and_then(|()| self.finish(&system, weights, workspace, targets, spline, false));
         workspace.system = system;
         done
     }
@@ -165,6 +161,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         workspace: &mut Workspace,
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
+        careful: bool,
     ) -> Result<(), TpsError> {
         if targets.len() != self.len() {
             return Err(TpsError::Length {
@@ -180,13 +177,14 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
         let n = self.sites.len();
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
-        let Workspace { values, scratch, .. } = workspace;
-        values.clear();
-        values.resize(n * M, 0.0);
-        self.gather(targets, weight, &origin, values);
-        let size = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let affine = system.solve::<M>(values, n, scratch);
-        spline.assign(self, values, &origin, &affine, self.report(system), size);
+        let buffers = &mut workspace.buffers;
+        buffers.targets.clear();
+        buffers.targets.resize(n * M, 0.0);
+        self.gather(targets, weight, &origin, &mut buffers.targets);
+        let equations = Equations { kernel: &self.kernel, sites: &self.sites, span: &self.span, system };
+        let solution: Solution<M> =
+            equations.solve(buffers, careful).ok_or(TpsError::NotDefinite { column: system.null.q })?;
+        spline.assign(self, &buffers.weights, &origin, &solution.affine, self.report(system, &solution));
         Ok(())
     }
 
@@ -230,7 +228,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
     }
 
-    fn report(&self, system: &System) -> FitReport {
+    fn report<const M: usize>(&self, system: &System, solution: &Solution<M>) -> FitReport {
         FitReport {
             points: self.len(),
             merged: self.len() - self.sites.len(),
@@ -239,43 +237,14 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             extents: self.span.extents.to_vec(),
             lambda: system.lambda * self.unit(),
             condition: system.condition,
-            residual: 0.0,
-            refinements: 0,
+            residual: solution.residual,
+            refinements: solution.refinements,
+            precise: solution.precise,
             digits: 0.0,
         }
     }
 
     pub(crate) fn shape(&self) -> Shape<'_, D> {
         Shape { sites: &self.sites, span: &self.span }
-    }
-}
-
-/// Lower triangle of U between all pairs of sites, column by column, each padded with zeros to whole vectors.
-struct Pairs<'a, K, const D: usize> {
-    kernel: &'a K,
-    sites: &'a Sites<D>,
-}
-
-impl<K: Kernel, const D: usize> Job<f64> for Pairs<'_, K, D> {
-    type Output = Vec<f64>;
-
-    #[inline(always)]
-    fn run<L: Lane<f64>>(self) -> Vec<f64> {
-        let n = self.sites.len();
-        let stride = padded(n);
-        let mut matrix = vec![0.0; n * stride];
-        for (j, column) in matrix.chunks_exact_mut(stride).enumerate() {
-            let own: [L; D] = core::array::from_fn(|k| L::new(self.sites.axes[k][j]));
-            let axes: [&[f64]; D] = core::array::from_fn(|k| &self.sites.axes[k][j..n]);
-            for (i, value) in column[j..n].iter_mut().enumerate() {
-                let mut s = L::zero();
-                for k in 0..D {
-                    let d = L::new(axes[k][i]) - own[k];
-                    s = d.mul_add(d, s);
-                }
-                *value = self.kernel.value(s).get();
-            }
-        }
-        matrix
     }
 }

@@ -12,7 +12,9 @@ mod kernel;
 mod logarithm;
 mod null_space;
 mod options;
+mod precise;
 mod real;
+mod refine;
 mod report;
 mod sample;
 mod simd;
@@ -21,6 +23,7 @@ mod span;
 mod spline;
 mod symmetric;
 mod system;
+mod twofold;
 mod warp;
 
 pub use affine::{Affine, AffineModel, Rigid, RigidModel};

@@ -3,10 +3,13 @@
 //! P = [1 X] (rows scaled by √weight) is factored P Π = Q [R; 0] by Householder reflectors with column pivoting. With
 //! Q = [Q₁ Q₂] the side condition Pᵀw = 0 reads w = Q₂z, and Q₂ᵀKQ₂ is positive definite. Q is kept in the
 //! compact form I − V T Vᵀ (Schreiber & Van Loan 1989), so that one pass over K projects it.
+//!
+//! Columns are laid out so that the complement starts on a vector: row i of n stands at place HEAD − q + i, and the
+//! places around the n rows are zero.
 
 use crate::{
-    cholesky::padded,
-    symmetric::{Split, Update, multiply},
+    cholesky::HEAD,
+    symmetric::{Columns, Update},
 };
 
 /// At most D + 1 columns.
@@ -19,7 +22,7 @@ pub(crate) struct NullSpace {
     pub(crate) n: usize,
     /// Number of affine functions, the rank of [1 X].
     pub(crate) q: usize,
-    /// Rows of a column, padded with zeros to whole vectors.
+    /// Places of a column.
     pub(crate) stride: usize,
     /// Reflectors, column by column; zero beyond the q-th.
     v: Vec<f64>,
@@ -33,12 +36,13 @@ pub(crate) struct NullSpace {
 
 impl NullSpace {
     /// Factors the q columns of length n, n ≥ q, that `fill` writes one by one.
-    pub(crate) fn factor(&mut self, n: usize, q: usize, fill: impl Fn(usize, &mut [f64])) {
-        (self.n, self.q, self.stride) = (n, q, padded(n));
+    pub(crate) fn factor(&mut self, n: usize, q: usize, stride: usize, fill: impl Fn(usize, &mut [f64])) {
+        (self.n, self.q, self.stride) = (n, q, stride);
         self.v.clear();
-        self.v.resize(self.stride * MAX, 0.0);
-        for (c, column) in self.v.chunks_exact_mut(self.stride).enumerate().take(q) {
-            fill(c, &mut column[..n]);
+        self.v.resize(stride * MAX, 0.0);
+        let rows = self.rows();
+        for (c, column) in self.v.chunks_exact_mut(stride).enumerate().take(q) {
+            fill(c, &mut column[rows.clone()]);
         }
         self.order = core::array::from_fn(|k| k);
         let mut tau = [0.0; MAX];
@@ -49,10 +53,20 @@ impl NullSpace {
         self.compact(&tau);
     }
 
+    /// The places of the n rows.
+    pub(crate) fn rows(&self) -> core::ops::Range<usize> {
+        HEAD - self.q..HEAD - self.q + self.n
+    }
+
     /// Entry of the triangle R Πᵀ, columns in their original order.
     pub(crate) fn triangle(&self, row: usize, column: usize) -> f64 {
         let place = self.order[..self.q].iter().position(|&c| c == column);
         place.filter(|&place| place >= row).map_or(0.0, |place| self.r[row][place])
+    }
+
+    /// The reflectors, padded to `MAX` columns.
+    pub(crate) fn reflectors(&self) -> Columns<'_, MAX> {
+        Columns { data: &self.v, stride: self.stride }
     }
 
     fn column(&self, k: usize) -> &[f64] {
@@ -61,7 +75,8 @@ impl NullSpace {
 
     /// Brings the column of largest remaining norm to place `k`.
     fn pivot(&mut self, k: usize) {
-        let norm = |j: usize| dot(&self.column(j)[k..], &self.column(j)[k..]);
+        let head = self.rows().start + k;
+        let norm = |j: usize| dot(&self.column(j)[head..], &self.column(j)[head..]);
         let best =
             (k..self.q).fold((k, -1.0), |best, j| if norm(j) > best.1 { (j, norm(j)) } else { best }).0;
         if best != k {
@@ -76,25 +91,25 @@ impl NullSpace {
 
     /// Makes column `k` a reflector with unit head, applies it to the later columns and returns its factor.
     fn reflect(&mut self, k: usize) -> f64 {
-        let (n, later) = (self.stride, self.q - k - 1);
-        let (left, right) = self.v.split_at_mut((k + 1) * n);
-        let column = &mut left[k * n..];
-        let norm = dot(&column[k..], &column[k..]).sqrt();
-        let head = column[k];
-        let beta = if head > 0.0 { -norm } else { norm };
+        let (stride, head, later) = (self.stride, self.rows().start + k, self.q - k - 1);
+        let (left, right) = self.v.split_at_mut((k + 1) * stride);
+        let column = &mut left[k * stride..];
+        let norm = dot(&column[head..], &column[head..]).sqrt();
+        let top = column[head];
+        let beta = if top > 0.0 { -norm } else { norm };
         self.r[k][k] = beta;
         if norm == 0.0 {
             column.fill(0.0);
             return 0.0;
         }
-        column[..k].fill(0.0);
-        column[k] = 1.0;
-        column[k + 1..].iter_mut().for_each(|x| *x /= head - beta);
-        let tau = (beta - head) / beta;
-        for (j, other) in right.chunks_exact_mut(n).take(later).enumerate() {
-            let dot = tau * dot(&column[k..], &other[k..]);
-            other[k..].iter_mut().zip(&column[k..]).for_each(|(o, v)| *o -= dot * v);
-            self.r[k][k + 1 + j] = other[k];
+        column[..head].fill(0.0);
+        column[head] = 1.0;
+        column[head + 1..].iter_mut().for_each(|x| *x /= top - beta);
+        let tau = (beta - top) / beta;
+        for (j, other) in right.chunks_exact_mut(stride).take(later).enumerate() {
+            let dot = tau * dot(&column[head..], &other[head..]);
+            other[head..].iter_mut().zip(&column[head..]).for_each(|(o, v)| *o -= dot * v);
+            self.r[k][k + 1 + j] = other[head];
         }
         tau
     }
@@ -139,22 +154,12 @@ impl NullSpace {
         }
     }
 
-    /// QᵀKQ of the symmetric matrix whose lower triangle is `k` (column by column, `stride` apart): rows q.. of the
-    /// first q columns go to `coupling`, the lower triangle of the rest to `rest`. `x` is scratch.
+    /// Turns the lower triangle of K into that of QᵀKQ, given Y = K V for the reflectors V in `x`; returns the
+    /// Frobenius norm of the part below and right of the first q rows.
     ///
-    /// Y = KVT, X = Y − ½ V(TᵀVᵀY), and QᵀKQ = K − VXᵀ − XVᵀ.
-    pub(crate) fn project(
-        &self,
-        k: &[f64],
-        coupling: &mut [f64],
-        (rest, rest_stride): (&mut [f64], usize),
-        scratch: &mut Vec<f64>,
-    ) {
-        let (n, q, stride) = (self.n, self.q, self.stride);
-        scratch.clear();
-        scratch.resize((MAX + 1) * stride, 0.0);
-        let (x, column) = scratch.split_at_mut(MAX * stride);
-        multiply::<MAX>(k, stride, &self.v, x);
+    /// With Y = KVT and X = Y − ½ V(TᵀVᵀY): QᵀKQ = K − VXᵀ − XVᵀ.
+    pub(crate) fn project(&self, k: &mut [f64], x: &mut [f64]) -> f64 {
+        let (q, stride) = (self.q, self.stride);
         self.times_compact(x);
         let mut s = [[0.0; MAX]; MAX];
         for (c, y) in x.chunks_exact(stride).enumerate() {
@@ -168,8 +173,15 @@ impl NullSpace {
                 y.iter_mut().zip(self.column(i)).for_each(|(y, v)| *y -= s[i][c] * v);
             }
         }
-        let update = Update::<MAX> { v: &self.v, x, stride, n };
-        Split { update, k, q, coupling, rest, rest_stride, scratch: column }.run();
+        let mut squares = 0.0;
+        for j in self.rows() {
+            let column = &mut k[j * stride..(j + 1) * stride];
+            let below = Update { column, j, v: self.reflectors(), x: Columns { data: x, stride } }.subtract();
+            if j >= HEAD {
+                squares += 2.0 * below + k[j * stride + j].powi(2);
+            }
+        }
+        squares.sqrt()
     }
 
     /// x ← x T for the columns x.

@@ -21,10 +21,13 @@ pub struct FitReport {
     pub lambda: f64,
     /// Estimated 2-norm condition number of the matrix solved with, in the inner units; 1 if there was none.
     pub condition: f64,
-    /// Largest difference between the spline's own equations and what they should be, relative to the targets.
-    pub residual: f64,
+    /// Largest residual of the spline's equations relative to the largest target; `None` after a quick refit, which
+    /// does not spend the time to measure it.
+    pub residual: Option<f64>,
     /// Steps of iterative refinement taken.
     pub refinements: usize,
+    /// Whether the equations were solved in twice the working precision because plain arithmetic had no digits left.
+    pub precise: bool,
     /// Decimal digits left in a plain sum of the spline's terms near the points: −log₁₀ of its rounding error
     /// relative to the targets' size.
     pub digits: f64,

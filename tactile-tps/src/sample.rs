@@ -44,7 +44,7 @@ impl<T: Scalar, const D: usize, const M: usize> Sample<T, D, M> {
 
 /// Samples at all points, block by block.
 pub(crate) struct Each<'a, T: Scalar, K, F, const D: usize, const M: usize, const ORDER: usize> {
-    pub(crate) sum: Sum<'a, T, K>,
+    pub(crate) sum: Sum<'a, T, K, D, M>,
     pub(crate) affine: &'a Linear<T, D, M>,
     pub(crate) frame: Frame<D>,
     pub(crate) points: &'a [Point<T, D>],
@@ -86,7 +86,7 @@ where
             (0..D).for_each(|k| x[k][l] = T::narrow(inside[k]));
         }
         let mut sums = Lanes::<T, D, M, W>::new();
-        self.sum.block::<L, D, M, W, ORDER>(&x, &mut sums);
+        self.sum.block::<L, W, ORDER>(&x, &mut sums);
         for l in 0..used {
             let point = core::array::from_fn(|k| x[k][l]);
             let sample = self.finish::<L, W>(&point, &sums, l);

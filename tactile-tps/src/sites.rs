@@ -2,7 +2,11 @@
 
 use nalgebra::Point;
 
-use crate::{Scalar, TpsError, error::Input};
+use crate::{
+    Scalar, TpsError,
+    error::Input,
+    twofold::{Twofold, two_sum},
+};
 
 /// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power of two.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +50,8 @@ pub(crate) struct Sites<const D: usize> {
     pub(crate) frame: Frame<D>,
     /// Coordinates in the frame, axis by axis.
     pub(crate) axes: [Vec<f64>; D],
+    /// What rounding took from them.
+    low: [Vec<f64>; D],
     /// First input point of every site, ascending.
     pub(crate) first: Vec<usize>,
     /// Site of every input point; empty if they are the same.
@@ -63,13 +69,14 @@ impl<const D: usize> Sites<D> {
         finite(points, Input::Sources)?;
         let frame = Frame::around(points, rescale);
         let (first, site_of) = merge(points);
-        let axes = core::array::from_fn(|k| {
-            first.iter().map(|&i| (points[i][k].widen() - frame.centre[k]) / frame.scale).collect()
-        });
+        let exact = |i: usize, k: usize| two_sum(points[i][k].widen(), -frame.centre[k]);
+        let axes = core::array::from_fn(|k| first.iter().map(|&i| exact(i, k).high / frame.scale).collect());
+        let low = core::array::from_fn(|k| first.iter().map(|&i| exact(i, k).low / frame.scale).collect());
         let largest = points.iter().flat_map(|p| p.iter()).fold(0.0, |m, x| f64::max(m, x.widen().abs()));
         Ok(Self {
             frame,
             axes,
+            low,
             first,
             site_of,
             grain: largest / frame.scale * T::UNIT_ROUNDOFF,
@@ -80,6 +87,11 @@ impl<const D: usize> Sites<D> {
     /// Number of distinct points.
     pub(crate) fn len(&self) -> usize {
         self.first.len()
+    }
+
+    /// A site's coordinates without rounding.
+    pub(crate) fn precise(&self, site: usize) -> [Twofold; D] {
+        core::array::from_fn(|k| Twofold { high: self.axes[k][site], low: self.low[k][site] })
     }
 
     /// Number of points given.

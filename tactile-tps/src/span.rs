@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::{null_space::NullSpace, sites::Sites};
+use crate::{cholesky::layout, null_space::NullSpace, real::Real, sites::Sites, twofold::Twofold};
 
 /// The directions points extend in, decided by the singular values of their centred coordinates.
 #[derive(Clone, Debug)]
@@ -21,7 +21,7 @@ impl<const D: usize> Span<D> {
         let n = sites.len();
         let means: [f64; D] = core::array::from_fn(|k| sites.axes[k].iter().sum::<f64>() / n as f64);
         let mut columns = NullSpace::default();
-        columns.factor(n, D.min(n), |k, column| {
+        columns.factor(n, D.min(n), layout(n, D.min(n)), |k, column| {
             column.iter_mut().zip(&sites.axes[k]).for_each(|(v, x)| *v = x - means[k]);
         });
         if n < D {
@@ -69,6 +69,26 @@ impl<const D: usize> Span<D> {
             };
         }
         column.iter_mut().zip(scales).for_each(|(value, scale)| *value *= scale);
+    }
+
+    /// Σ aₖ pₖ(x) for the coordinates `x`.
+    pub(crate) fn polynomial(&self, a: &[f64], x: impl Fn(usize) -> f64) -> f64 {
+        let along = |c: usize| match &self.basis {
+            None => x(c),
+            Some(basis) => (0..D).map(|k| basis[c][k] * x(k)).sum(),
+        };
+        a[0] + (0..self.directions).map(|c| a[c + 1] * along(c)).sum::<f64>()
+    }
+
+    /// Affine function `c` at a point.
+    pub(crate) fn precise(&self, c: usize, point: &[Twofold; D]) -> Twofold {
+        match (c, &self.basis) {
+            (0, _) => Twofold::from_f64(1.0),
+            (c, None) => point[c - 1],
+            (c, Some(basis)) => {
+                (0..D).fold(Twofold::ZERO, |sum, k| sum + point[k] * Twofold::from_f64(basis[c - 1][k]))
+            }
+        }
     }
 
     /// The gradient in coordinates of one along the directions.

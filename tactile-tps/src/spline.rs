@@ -77,8 +77,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
                 extents: Vec::new(),
                 lambda: 0.0,
                 condition: 1.0,
-                residual: 0.0,
+                residual: None,
                 refinements: 0,
+                precise: false,
                 digits: 0.0,
             },
         }
@@ -91,7 +92,6 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         origin: &[f64; M],
         affine: &[[f64; 4]; M],
         report: FitReport,
-        _size: f64,
     ) {
         let Shape { sites, span } = factorization.shape();
         self.frame = sites.frame;
@@ -237,8 +237,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// Hands the sample at every point to `sink`, with derivatives up to `ORDER`.
     fn each<const ORDER: usize>(&self, points: &[Point<T, D>], sink: impl FnMut(usize, Sample<T, D, M>)) {
-        let sum =
-            Sum { kernel: &self.kernel, centres: &self.centres, weights: &self.weights, count: self.count() };
+        let n = self.count();
+        let sum = Sum {
+            kernel: &self.kernel,
+            centres: core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
+            weights: core::array::from_fn(|m| &self.weights[m * n..(m + 1) * n]),
+        };
         dispatch(Each::<_, _, _, D, M, ORDER> { sum, affine: &self.affine, frame: self.frame, points, sink });
     }
 

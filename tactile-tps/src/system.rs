@@ -1,11 +1,15 @@
 //! The linear system of a spline for given weights and λ, factored.
 
 use crate::{
-    TpsError,
-    cholesky::{Cholesky, padded},
+    Kernel, TpsError,
+    cholesky::{Cholesky, HEAD, layout},
     null_space::{MAX, NullSpace, dot},
+    real::Lane,
+    refine::PRECISE_POINTS,
+    simd::{Job, dispatch},
     sites::Sites,
     span::Span,
+    symmetric::Product,
 };
 
 /// QᵀSQ factored, S = W^½ K W^½ + λI over the sites of positive weight.
@@ -21,43 +25,47 @@ pub(crate) struct System {
     /// √weight of each; empty if all are one.
     pub(crate) scales: Vec<f64>,
     pub(crate) null: NullSpace,
-    pub(crate) cholesky: Cholesky,
-    /// First q columns of QᵀSQ, the rows below q.
-    coupling: Vec<f64>,
+    /// QᵀSQ: first q columns as they are, the rest factored.
+    cholesky: Cholesky,
     pub(crate) condition: f64,
-    work: Vec<f64>,
+    /// Rounding left no definite matrix: the factor is of no use.
+    pub(crate) indefinite: bool,
     scratch: Vec<f64>,
 }
 
 impl System {
-    /// Factors for site weights (empty: all one) and λ ≥ 0. `kernel` is the lower triangle over all sites.
-    pub(crate) fn factor<const D: usize>(
+    /// Factors for site weights (empty: all one) and λ ≥ 0: n³/3 multiplications and additions.
+    pub(crate) fn factor<const D: usize, K: Kernel>(
         &mut self,
+        kernel: &K,
         sites: &Sites<D>,
         span: &Span<D>,
-        kernel: &[f64],
         weights: &[f64],
         lambda: f64,
     ) -> Result<(), TpsError> {
         self.lambda = lambda;
         self.choose(sites.len(), weights);
-        let (n, q) = (self.active.len(), 1 + span.directions);
-        let (active, scales) = (&self.active, &self.scales);
-        self.null.factor(n, q.min(n), |c, column| span.fill(sites, active, scales, c, column));
-        let plain = self.scales.is_empty() && n == sites.len();
-        if !plain {
-            self.gather(kernel, padded(sites.len()));
+        let n = self.active.len();
+        let q = n.min(1 + span.directions);
+        let stride = layout(n, q);
+        let Self { active, scales, null, cholesky, scratch, .. } = self;
+        null.factor(n, q, stride, |c, column| span.fill(sites, active, scales, c, column));
+        cholesky.prepare(n - q, stride);
+        scratch.clear();
+        scratch.resize((MAX + D + 1) * stride, 0.0);
+        let (product, places) = scratch.split_at_mut(MAX * stride);
+        gather(sites, active, scales, null.rows(), places);
+        dispatch(Assemble::<_, D> { kernel, places, null, matrix: &mut cholesky.l, product });
+        let size = null.project(&mut cholesky.l, product);
+        (HEAD..HEAD + n - q).for_each(|j| cholesky.l[j * stride + j] += lambda);
+        let factored = cholesky.factor();
+        self.indefinite = factored.is_err();
+        if let Err(column) = factored {
+            self.condition = f64::INFINITY;
+            return if n <= PRECISE_POINTS { Ok(()) } else { Err(TpsError::NotDefinite { column }) };
         }
-        let (q, work) = (self.null.q, if plain { kernel } else { &self.work });
-        self.coupling.clear();
-        self.coupling.resize(q * (n - q), 0.0);
-        let Self { null, coupling, scratch, .. } = self;
-        let fill = |rest: &mut [f64], stride: usize| {
-            null.project(work, coupling, (rest, stride), scratch);
-            (0..n - q).for_each(|j| rest[j * stride + j] += lambda);
-        };
-        self.cholesky.factor(n - q, fill).map_err(|column| TpsError::NotDefinite { column })?;
-        self.condition = self.cholesky.condition(&mut self.scratch);
+        let inverse = if n > q { cholesky.inverse_norm(scratch) } else { 0.0 };
+        self.condition = f64::max(1.0, (size + lambda) * inverse);
         Ok(())
     }
 
@@ -71,68 +79,104 @@ impl System {
         }
         self.active.extend((0..n).filter(|&i| weights[i] > 0.0));
         if self.lambda > 0.0 {
-            self.active.sort_by(|&i, &j| weights[j].total_cmp(&weights[i]));
+            self.active.sort_unstable_by(|&i, &j| weights[j].total_cmp(&weights[i]).then(i.cmp(&j)));
             self.scales.extend(self.active.iter().map(|&i| weights[i].sqrt()));
         }
     }
 
-    /// Lower triangle of the kernel matrix over the active sites, scaled.
-    fn gather(&mut self, kernel: &[f64], from: usize) {
-        let n = self.active.len();
-        let stride = padded(n);
-        self.work.clear();
-        self.work.resize(n * stride, 0.0);
-        for (j, column) in self.work.chunks_exact_mut(stride).enumerate() {
-            let own = self.active[j];
-            for (value, &i) in column[j..n].iter_mut().zip(&self.active[j..]) {
-                *value = kernel[own.min(i) * from + own.max(i)];
-            }
-            if !self.scales.is_empty() {
-                let scale = self.scales[j];
-                column[j..n].iter_mut().zip(&self.scales[j..]).for_each(|(value, s)| *value *= s * scale);
-            }
-        }
-    }
-
-    /// Solves for `M` outputs: `y` holds the values at the `sites` and receives the weights w; returns the affine parts.
+    /// Solves for `M` outputs: `y` holds the values at all sites and receives the weights w; returns the affine parts.
     pub(crate) fn solve<const M: usize>(
         &self,
         y: &mut [f64],
         sites: usize,
         work: &mut Vec<f64>,
     ) -> [[f64; MAX]; M] {
-        let (n, q, rows, stride) = (self.active.len(), self.null.q, self.cholesky.rows(), self.null.stride);
+        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
         work.clear();
-        work.resize(M * rows + stride, 0.0);
-        let (inner, column) = work.split_at_mut(M * rows);
+        work.resize(M * stride, 0.0);
         let mut heads = [[0.0; MAX]; M];
-        for (m, head) in heads.iter_mut().enumerate() {
-            self.scaled(&y[m * sites..(m + 1) * sites], column);
+        for (m, column) in work.chunks_exact_mut(stride).enumerate() {
+            self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
             self.null.apply_transpose(column);
-            head[..q].copy_from_slice(&column[..q]);
-            inner[m * rows..m * rows + n - q].copy_from_slice(&column[q..n]);
+            heads[m][..q].copy_from_slice(&column[HEAD - q..HEAD]);
         }
-        self.cholesky.solve::<M>(inner);
+        self.cholesky.solve::<M>(work);
         y.fill(0.0);
-        for (m, head) in heads.iter_mut().enumerate() {
-            let z = &inner[m * rows..m * rows + n - q];
-            for (head, coupling) in head.iter_mut().zip(self.coupling.chunks_exact((n - q).max(1))) {
-                *head -= dot(coupling, z);
+        for (m, column) in work.chunks_exact_mut(stride).enumerate() {
+            column[..HEAD].fill(0.0);
+            for (k, head) in heads[m].iter_mut().enumerate().take(q) {
+                let coupling = &self.cholesky.l[(HEAD - q + k) * stride..][..stride];
+                *head -= dot(&coupling[HEAD..HEAD + n - q], &column[HEAD..HEAD + n - q]);
             }
-            column.fill(0.0);
-            column[q..n].copy_from_slice(z);
             self.null.apply(column);
+            let values = &column[self.null.rows()];
             let scale = |i: usize| if self.scales.is_empty() { 1.0 } else { self.scales[i] };
-            self.active.iter().enumerate().for_each(|(i, &site)| y[m * sites + site] = column[i] * scale(i));
-            *head = self.null.solve_upper(&head[..q]);
+            self.active.iter().enumerate().for_each(|(i, &site)| y[m * sites + site] = values[i] * scale(i));
+            heads[m] = self.null.solve_upper(&heads[m][..q]);
         }
         heads
     }
 
     /// The values at the active sites, each times its scale.
     fn scaled(&self, y: &[f64], column: &mut [f64]) {
-        column.fill(0.0);
         self.active.iter().zip(column.iter_mut()).for_each(|(&site, value)| *value = y[site]);
         column.iter_mut().zip(&self.scales).for_each(|(value, scale)| *value *= scale);
+    }
+}
+
+/// Coordinates of the active sites at their places, axis by axis, and their scales after them.
+fn gather<const D: usize>(
+    sites: &Sites<D>,
+    active: &[usize],
+    scales: &[f64],
+    rows: core::ops::Range<usize>,
+    places: &mut [f64],
+) {
+    let stride = places.len() / (D + 1);
+    for (k, column) in places.chunks_exact_mut(stride).enumerate() {
+        let column = &mut column[rows.clone()];
+        if k < D {
+            column.iter_mut().zip(active).for_each(|(x, &site)| *x = sites.axes[k][site]);
+        } else if scales.is_empty() {
+            column.fill(1.0);
+        } else {
+            column.copy_from_slice(scales);
+        }
+    }
+}
+
+/// Writes the lower triangle of W^½ K W^½, and its product with the reflectors while each column is at hand.
+struct Assemble<'a, K, const D: usize> {
+    kernel: &'a K,
+    places: &'a [f64],
+    null: &'a NullSpace,
+    matrix: &'a mut [f64],
+    product: &'a mut [f64],
+}
+
+impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) {
+        let (stride, rows) = (self.null.stride, self.null.rows());
+        for j in rows.clone() {
+            let column = &mut self.matrix[j * stride..(j + 1) * stride];
+            column[j / HEAD * HEAD..j].fill(0.0);
+            let own: [L; D] = core::array::from_fn(|k| L::new(self.places[k * stride + j]));
+            let own_scale = L::new(self.places[D * stride + j]);
+            let axes: [&[f64]; D] =
+                core::array::from_fn(|k| &self.places[k * stride + j..k * stride + rows.end]);
+            let scales = &self.places[D * stride + j..D * stride + rows.end];
+            for (i, value) in column[j..rows.end].iter_mut().enumerate() {
+                let mut s = L::zero();
+                for k in 0..D {
+                    let d = L::new(axes[k][i]) - own[k];
+                    s = d.mul_add(d, s);
+                }
+                *value = (self.kernel.value(s) * (L::new(scales[i]) * own_scale)).get();
+            }
+            Product { column, j, x: self.null.reflectors(), y: self.product }.add();
+        }
     }
 }

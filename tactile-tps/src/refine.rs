@@ -1,0 +1,171 @@
+//! Residuals of the spline's equations and iterative refinement.
+
+use crate::{
+    Kernel,
+    evaluate::{BLOCK, Lanes, Sum},
+    null_space::MAX,
+    precise,
+    real::Lane,
+    simd::{Job, dispatch},
+    sites::Sites,
+    span::Span,
+    system::System,
+};
+
+/// Points up to which twice the working precision is affordable.
+pub(crate) const PRECISE_POINTS: usize = 400;
+/// Condition number from which plain arithmetic, refined, no longer keeps enough digits.
+const PRECISE_CONDITION: f64 = 1e10;
+/// For so few points twice the working precision costs a few milliseconds, and is used sooner.
+const FEW_POINTS: usize = 64;
+const FEW_CONDITION: f64 = 1e8;
+/// Steps of refinement at most.
+const STEPS: usize = 4;
+
+/// A spline's equations: everything but the targets.
+pub(crate) struct Equations<'a, K, const D: usize> {
+    pub(crate) kernel: &'a K,
+    pub(crate) sites: &'a Sites<D>,
+    pub(crate) span: &'a Span<D>,
+    pub(crate) system: &'a System,
+}
+
+/// Memory of a solve.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Buffers {
+    /// Targets at the sites, output by output; the caller fills it.
+    pub(crate) targets: Vec<f64>,
+    /// Weights at the sites, output by output: the answer.
+    pub(crate) weights: Vec<f64>,
+    residuals: Vec<f64>,
+    work: Vec<f64>,
+}
+
+/// What a solve found beside the weights.
+pub(crate) struct Solution<const M: usize> {
+    pub(crate) affine: [[f64; MAX]; M],
+    /// Largest residual relative to the largest target, where it was measured.
+    pub(crate) residual: Option<f64>,
+    pub(crate) refinements: usize,
+    pub(crate) precise: bool,
+}
+
+impl<K: Kernel, const D: usize> Equations<'_, K, D> {
+    /// Solves for the targets in `buffers`, `None` if the kernel is not definite on the sites; `careful` measures the residual and refines from a lower condition number on.
+    pub(crate) fn solve<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Option<Solution<M>> {
+        let (n, system) = (self.sites.len(), self.system);
+        buffers.weights.clone_from(&buffers.targets);
+        if system.indefinite || self.needs_precision(careful) {
+            if let Some(affine) =
+                precise::solve(self.kernel, self.sites, self.span, system, &mut buffers.weights)
+            {
+                let residual = careful.then(|| self.residual(&affine, buffers));
+                return Some(Solution { affine, residual, refinements: 0, precise: true });
+            }
+            if system.indefinite {
+                return None;
+            }
+            buffers.weights.clone_from(&buffers.targets);
+        }
+        let affine = system.solve(&mut buffers.weights, n, &mut buffers.work);
+        let mut solution = Solution { affine, residual: None, refinements: 0, precise: false };
+        let threshold = if careful { 10.0 * n as f64 } else { 1e8 };
+        if system.condition > threshold {
+            self.refine(buffers, &mut solution);
+        }
+        if careful {
+            solution.residual = Some(self.residual(&solution.affine, buffers));
+        }
+        Some(solution)
+    }
+
+    /// Whether plain arithmetic would leave too few digits, and the points are few enough to do something about it.
+    ///
+    /// Points that are nearly flat lose digits in the gradient across, besides those the matrix costs.
+    fn needs_precision(&self, careful: bool) -> bool {
+        let (n, condition) = (self.sites.len(), self.system.condition);
+        let stretch = 1.0 / self.span.extents[..self.span.directions].last().copied().unwrap_or(1.0);
+        (n <= PRECISE_POINTS && condition > PRECISE_CONDITION)
+            || (careful && n <= FEW_POINTS && condition * stretch > FEW_CONDITION)
+    }
+
+    fn refine<const M: usize>(&self, buffers: &mut Buffers, solution: &mut Solution<M>) {
+        let mut last = f64::INFINITY;
+        for _ in 0..STEPS {
+            self.residual(&solution.affine, buffers);
+            let Buffers { weights, residuals, work, .. } = buffers;
+            let affine: [[f64; MAX]; M] = self.system.solve(residuals, self.sites.len(), work);
+            let step = largest(residuals) / largest(weights).max(f64::MIN_POSITIVE);
+            // A step that is no shorter than half the last is rounding.
+            if step.is_nan() || step > 0.5 * last {
+                return;
+            }
+            weights.iter_mut().zip(residuals.iter()).for_each(|(w, r)| *w += r);
+            solution.affine.iter_mut().flatten().zip(affine.iter().flatten()).for_each(|(a, d)| *a += d);
+            solution.refinements += 1;
+            if step < 1e-8 {
+                return;
+            }
+            last = step;
+        }
+    }
+
+    /// y − K w − λ W⁻¹ w − P a at the sites, and its largest entry relative to the largest target.
+    fn residual<const M: usize>(&self, affine: &[[f64; MAX]; M], buffers: &mut Buffers) -> f64 {
+        let Self { kernel, sites, span, system } = self;
+        let n = sites.len();
+        let Buffers { targets, weights, residuals, .. } = buffers;
+        residuals.clone_from(targets);
+        let sum = Sum::<f64, K, D, M> {
+            kernel,
+            centres: core::array::from_fn(|k| &sites.axes[k][..]),
+            weights: core::array::from_fn(|m| &weights[m * n..(m + 1) * n]),
+        };
+        dispatch(Subtract { sum, residuals });
+        let mut size = 0.0;
+        for m in 0..M {
+            for (i, &site) in system.active.iter().enumerate() {
+                let scale = system.scales.get(i).copied().unwrap_or(1.0);
+                let smooth = system.lambda * (weights[m * n + site] / scale / scale);
+                let polynomial = span.polynomial(&affine[m], |k| sites.axes[k][site]);
+                let residual = &mut residuals[m * n + site];
+                *residual -= smooth + polynomial;
+                size = f64::max(size, residual.abs());
+            }
+        }
+        let target = largest(targets);
+        if target > 0.0 { size / target } else { size }
+    }
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, x| f64::max(m, x.abs()))
+}
+
+/// Subtracts the kernel sum at every centre.
+struct Subtract<'a, K, const D: usize, const M: usize> {
+    sum: Sum<'a, f64, K, D, M>,
+    residuals: &'a mut [f64],
+}
+
+impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) {
+        let n = self.sum.centres[0].len();
+        for start in (0..n).step_by(BLOCK) {
+            let used = BLOCK.min(n - start);
+            let mut x = [[0.0; BLOCK]; D];
+            for k in 0..D {
+                x[k][..used].copy_from_slice(&self.sum.centres[k][start..start + used]);
+            }
+            let mut sums = Lanes::<f64, D, M, BLOCK>::new();
+            self.sum.block::<L, BLOCK, 0>(&x, &mut sums);
+            for m in 0..M {
+                let residuals = &mut self.residuals[m * n + start..m * n + start + used];
+                residuals.iter_mut().zip(&sums.value[m]).for_each(|(r, sum)| *r -= sum);
+            }
+        }
+    }
+}

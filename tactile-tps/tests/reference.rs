@@ -1,0 +1,202 @@
+//! Agreement with splines computed in 110-digit arithmetic, case by case, to the tolerance their authors state.
+//!
+//! The numbers lie outside the repository, in the folder named by `TACTILE_DATA` or in `../shared/data`.
+#![allow(clippy::print_stdout)]
+
+use std::collections::BTreeMap;
+
+use nalgebra::Point;
+use serde_json::Value;
+use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError};
+
+type Fitted<const D: usize, K> = Result<Spline<f64, D, D, K>, TpsError>;
+
+/// Worst error over tolerance, by category and quantity.
+#[derive(Default)]
+struct Table {
+    rows: BTreeMap<(String, &'static str), (f64, String)>,
+    cases: usize,
+}
+
+impl Table {
+    fn enter(&mut self, case: &Value, quantity: &'static str, error: f64, tolerance: f64) {
+        let ratio = error / tolerance;
+        let row = self.rows.entry((text(case, "category"), quantity)).or_insert((-1.0, String::new()));
+        if !(ratio <= row.0) {
+            *row = (ratio, text(case, "id"));
+        }
+    }
+}
+
+fn text(case: &Value, key: &str) -> String {
+    case[key].as_str().unwrap_or_default().to_owned()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("an array").iter().map(number).collect()
+}
+
+/// Rows of numbers as points, short rows padded with zero.
+fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
+    let point = |row: &Value| {
+        let row = numbers(row);
+        Point::from(nalgebra::SVector::from_fn(|k, _| row.get(k).copied().unwrap_or(0.0)))
+    };
+    value.as_array().expect("rows").iter().map(point).collect()
+}
+
+fn options<K: Kernel>(case: &Value, kernel: K) -> FitOptions<f64, K> {
+    let lambda = number(&case["lambda"]);
+    let smoothing = if lambda > 0.0 { Smoothing::Lambda(lambda) } else { Smoothing::None };
+    let options = FitOptions::new(kernel).smoothing(smoothing);
+    if case["weights"].is_null() { options } else { options.weights(numbers(&case["weights"])) }
+}
+
+/// The tolerance the reference states: never below 1e-13, growing with conditioning and cancellation.
+fn tolerance(n: usize, sensitivity: f64, summation: f64) -> f64 {
+    f64::max(1e-13, 0.5f64.powi(53) * 50.0 * n as f64 * (1.0 + sensitivity) * (1.0 + summation))
+}
+
+fn optional(case: &Value, group: &str, quantity: &str, query: usize) -> f64 {
+    case[group][quantity][query].as_f64().unwrap_or(0.0)
+}
+
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |m, x| f64::max(m, x.abs()))
+}
+
+fn check<const D: usize, K: Kernel>(table: &mut Table, case: &Value, kernel: K) {
+    table.cases += 1;
+    let (sources, targets) = (points::<D>(&case["points"]), points::<D>(&case["values"]));
+    let fitted: Fitted<D, K> = Spline::fit(&sources, &targets, &options(case, kernel));
+    if text(case, "status") == "singular" {
+        return singular(case, &sources, &targets, fitted);
+    }
+    let spline = fitted.unwrap_or_else(|error| panic!("{}: {error}", text(case, "id")));
+    let rank = case["affine_rank"].as_u64().expect("a rank") as usize;
+    assert_eq!(spline.report().rank, rank, "{}", text(case, "id"));
+    queries(table, case, &spline, &sources, &targets);
+    coefficients(table, case, &spline, &targets);
+}
+
+/// Two points in one place: an error where their values differ, the spline of the others where they agree.
+fn singular<const D: usize, K: Kernel>(
+    case: &Value,
+    sources: &[Point<f64, D>],
+    targets: &[Point<f64, D>],
+    fitted: Fitted<D, K>,
+) {
+    let pairs = (0..sources.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    let (i, j) = pairs.filter(|&(i, j)| sources[i] == sources[j]).next().expect("a pair");
+    match fitted {
+        Err(TpsError::Conflict { first, second }) => {
+            assert_eq!((first, second, true), (i, j, targets[i] != targets[j]))
+        }
+        Err(error) => panic!("{}: {error}", text(case, "id")),
+        Ok(spline) => {
+            assert_eq!((spline.report().merged, targets[i]), (1, targets[j]));
+            for (x, y) in sources.iter().zip(targets) {
+                // Interpolation of values of order one, well conditioned: 1e-10 is generous.
+                assert!((spline.apply(x) - y).norm() < 1e-10, "{}", text(case, "id"));
+            }
+        }
+    }
+}
+
+fn queries<const D: usize, K: Kernel>(
+    table: &mut Table,
+    case: &Value,
+    spline: &Spline<f64, D, D, K>,
+    sources: &[Point<f64, D>],
+    targets: &[Point<f64, D>],
+) {
+    let (n, outputs) = (sources.len(), case["outputs"].as_u64().expect("outputs") as usize);
+    let scale = largest(targets.iter().flat_map(|p| p.iter().copied()));
+    let side = |k: usize| {
+        let axis = || sources.iter().map(|p| p[k]);
+        axis().fold(f64::MIN, f64::max) - axis().fold(f64::MAX, f64::min)
+    };
+    let diameter = (0..D).map(|k| side(k).powi(2)).sum::<f64>().sqrt();
+    for (i, query) in points::<D>(&case["queries"]).iter().enumerate() {
+        let group = |name, what| optional(case, name, what, i);
+        let expected = numbers(&case["expected"]["values"][i]);
+        let size = f64::max(largest(expected.iter().copied()), scale);
+        let value = spline.apply(query);
+        let error = largest((0..outputs).map(|k| value[k] - expected[k]));
+        let bound = size * tolerance(n, group("sensitivity", "values"), group("summation", "values"));
+        table.enter(case, if i < 8 { "value near" } else { "value far" }, error, bound);
+
+        let rows = case["expected"]["jacobian"][i].as_array().expect("rows");
+        let rows: Vec<Vec<f64>> = rows.iter().map(numbers).collect();
+        let slope = if diameter > 0.0 { scale / diameter } else { 0.0 };
+        let size = f64::max(largest(rows.iter().flatten().copied()), slope);
+        let jacobian = spline.jacobian(query);
+        let entries = (0..outputs).flat_map(|k| (0..D).map(move |l| (k, l)));
+        let error = largest(entries.map(|(k, l)| jacobian[(k, l)] - rows[k][l]));
+        let bound = size * tolerance(n, group("sensitivity", "jacobian"), group("summation", "jacobian"));
+        table.enter(
+            case,
+            if i < 8 { "jacobian near" } else { "jacobian far" },
+            error,
+            f64::max(bound, 1e-300),
+        );
+    }
+}
+
+fn coefficients<const D: usize, K: Kernel>(
+    table: &mut Table,
+    case: &Value,
+    spline: &Spline<f64, D, D, K>,
+    targets: &[Point<f64, D>],
+) {
+    let sensitivity = &case["sensitivity"]["w"];
+    if sensitivity.is_null() || spline.report().merged > 0 {
+        return;
+    }
+    let rows: Vec<Vec<f64>> = case["expected"]["w"].as_array().expect("rows").iter().map(numbers).collect();
+    let errors = spline.weights().zip(&rows).flat_map(|(w, row)| (0..row.len()).map(move |k| w[k] - row[k]));
+    let (error, size) = (largest(errors), largest(rows.iter().flatten().copied()));
+    if size > 0.0 {
+        table.enter(case, "weights", error, size * tolerance(targets.len(), number(sensitivity), 0.0));
+    }
+}
+
+fn run<const D: usize>(table: &mut Table, folder: &str) {
+    let path = format!("{folder}/reference/tps{D}.json");
+    let file = std::fs::read_to_string(&path).expect("readable");
+    let file: Value = serde_json::from_str(&file).expect("JSON");
+    for check in file["header"]["parse_check"].as_array().expect("rows") {
+        let bits = check["bits"].as_str().expect("bits").trim_start_matches("0x");
+        assert_eq!(number(&check["value"]).to_bits(), u64::from_str_radix(bits, 16).expect("hexadecimal"));
+    }
+    for case in file["cases"].as_array().expect("cases") {
+        match text(case, "kernel").as_str() {
+            "r2logr" => check::<D, _>(table, case, R2LogR),
+            "minus_r" => check::<D, _>(table, case, NegR),
+            "r3" => check::<D, _>(table, case, R3),
+            other => panic!("unknown kernel {other}"),
+        }
+    }
+}
+
+#[test]
+fn every_case_is_within_its_stated_tolerance() {
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
+    let folder = std::env::var("TACTILE_DATA").unwrap_or_else(|_| default.to_owned());
+    if !std::path::Path::new(&folder).join("reference/tps2.json").exists() {
+        println!("skipped: no reference numbers in {folder}");
+        return;
+    }
+    let mut table = Table::default();
+    run::<2>(&mut table, &folder);
+    run::<3>(&mut table, &folder);
+    println!("{} cases; worst error over tolerance:", table.cases);
+    for ((category, quantity), (ratio, id)) in &table.rows {
+        println!("{category:22} {quantity:14} {ratio:9.2e}  {id}");
+    }
+    assert!(table.rows.values().all(|(ratio, _)| *ratio <= 1.0));
+}
