@@ -7,6 +7,7 @@
 
 mod calibration;
 mod contact;
+mod drift;
 mod error;
 mod estimate;
 mod frame;
@@ -18,10 +19,11 @@ pub use calibration::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, Hysteresis,
     LinearCalibration, Robustness, StopReason, StressCalibration,
 };
-pub use contact::{Contact, ContactDetector, ContactOptions, DetectorWorkspace, Polarity};
+pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity};
+pub use drift::{Drift, DriftCorrection};
 pub use error::{ForceError, Requirement};
 pub use estimate::{Estimate, Real};
-pub use frame::{BoundingBox, FrameStatistics, NoiseModel, ReferenceFrame};
+pub use frame::{BoundingBox, DifferenceNoise, FrameStatistics, NoiseModel, ReferenceFrame};
 pub use hertz::{HertzFit, HertzFitOptions, HertzFitter};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};

@@ -2,11 +2,11 @@
 
 use ndarray::ArrayView2;
 
-use crate::contact::{Contact, ContactDetector, ContactOptions, DetectorWorkspace};
-use crate::hertz::{DifferenceNoise, HertzFit, HertzFitOptions, HertzFitter, Rings, Start};
+use crate::contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
+use crate::hertz::{HertzFit, HertzFitOptions, HertzFitter, Rings, Start};
 use crate::{
-    BoundingBox, Estimate, ForceError, ForceReading, FrameStatistics, Real, ReferenceFrame,
-    StressCalibration, error::Requirement,
+    BoundingBox, DifferenceNoise, Drift, Estimate, ForceError, ForceReading, FrameStatistics, Real,
+    ReferenceFrame, StressCalibration, error::Requirement,
 };
 
 /// How a force is measured.
@@ -45,6 +45,10 @@ pub struct ForceMeasurement<T> {
     pub peak_stress_pa: Option<Estimate<T>>,
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
+    /// The correction of lamps and background.
+    pub drift: Drift,
+    /// The noise that the errors are computed from; `None` without contact.
+    pub noise: Option<DifferenceNoise>,
 }
 
 /// Everything a measurement reuses from frame to frame. After the first frames nothing is allocated.
@@ -98,34 +102,34 @@ impl<T: Real> ForceMeter<T> {
         reference: &ReferenceFrame,
         calibration: &(impl StressCalibration<T> + ?Sized),
     ) -> Result<ForceMeasurement<T>, ForceError> {
-        let (statistics, contact) = self.detector.detect_with(&mut workspace.detector, frame, reference)?;
-        let Some(contact) = contact else { return Ok(ForceMeasurement::without_contact(statistics)) };
-        let profile = if self.skip_profile { None } else { self.profile(workspace, &contact, reference) };
-        Ok(self.combine(statistics, contact, profile, calibration))
+        let found = self.detector.detect_with(&mut workspace.detector, frame, reference)?;
+        let (Some(contact), Some(noise)) = (found.contact, found.noise) else {
+            return Ok(ForceMeasurement::without_contact(found));
+        };
+        let profile = if self.skip_profile { None } else { self.profile(workspace, &contact, noise) };
+        Ok(self.combine(found, contact, profile, calibration))
     }
 
     fn profile(
         &self,
         workspace: &mut ForceWorkspace,
         contact: &Contact<T>,
-        reference: &ReferenceFrame,
+        noise: DifferenceNoise,
     ) -> Option<HertzFit<T>> {
-        let region = workspace.detector.aperture.region?;
+        let place = workspace.detector.region.place?;
         let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
         let [hx, hy] = self.pixel_size_m.map(T::as_f64);
         let start = Start {
-            centre: [x - region.column_start as f64, y - region.row_start as f64],
+            centre: [x - place.column_start as f64, y - place.row_start as f64],
             radius: contact.equivalent_radius_px.as_f64() * (hy / hx).sqrt(),
             integral: contact.integrated_pixel_value.value.as_f64(),
         };
-        let noise =
-            DifferenceNoise { background: reference.difference_variance(), gain: reference.noise().gain };
-        self.fitter.fit_with(&mut workspace.rings, &workspace.detector.aperture, start, noise, [hx, hy])
+        self.fitter.fit_with(&mut workspace.rings, &workspace.detector.region, start, noise, [hx, hy])
     }
 
     fn combine(
         &self,
-        statistics: FrameStatistics,
+        found: Detection<T>,
         contact: Contact<T>,
         profile: Option<HertzFit<T>>,
         calibration: &(impl StressCalibration<T> + ?Sized),
@@ -156,13 +160,15 @@ impl<T: Real> ForceMeter<T> {
             peak_stress_pa: Some(peak.scaled(step)),
             contact: Some(contact),
             profile,
-            statistics,
+            statistics: found.statistics,
+            drift: found.drift,
+            noise: found.noise,
         }
     }
 }
 
 impl<T: Real> ForceMeasurement<T> {
-    fn without_contact(statistics: FrameStatistics) -> Self {
+    fn without_contact(found: Detection<T>) -> Self {
         Self {
             force_n: Estimate::default(),
             reading: None,
@@ -173,7 +179,9 @@ impl<T: Real> ForceMeasurement<T> {
             contact_radius_m: None,
             mean_stress_pa: None,
             peak_stress_pa: None,
-            statistics,
+            statistics: found.statistics,
+            drift: found.drift,
+            noise: None,
         }
     }
 }

@@ -52,7 +52,7 @@ fn images() -> impl Strategy<Value = (Array2<u8>, Array2<u8>)> {
             };
             let mut image = || {
                 Array2::from_shape_simple_fn((h, w), || {
-                    level.saturating_add((u16::from(next()) * u16::from(spread) >> 8) as u8)
+                    level.saturating_add(((u16::from(next()) * u16::from(spread)) >> 8) as u8)
                 })
             };
             let (mut frame, reference) = (image(), image());

@@ -2,9 +2,15 @@
 
 use ndarray::ArrayView2;
 
-use super::{Aperture, Contact, ContactOptions, component::Components, threshold::quantile};
-use crate::frame::{PassWorkspace, TILE_COLUMNS, TILE_ROWS, Tiles};
-use crate::{BoundingBox, Estimate, ForceError, FrameStatistics, Real, ReferenceFrame};
+use super::noise;
+use super::region::{Extent, Region};
+use super::runs::Run;
+use super::summary::Sums;
+use super::threshold::quantile;
+use super::{Contact, ContactOptions, Detection};
+use crate::drift::{self, Drift};
+use crate::frame::{DifferenceNoise, PassWorkspace, TILE_COLUMNS};
+use crate::{BoundingBox, DriftCorrection, Estimate, ForceError, FrameStatistics, Real, ReferenceFrame};
 
 /// Finds the contact in frames of one sensor.
 ///
@@ -17,8 +23,8 @@ use crate::{BoundingBox, Estimate, ForceError, FrameStatistics, Real, ReferenceF
 /// frame.slice_mut(ndarray::s![20..30, 30..44]).fill(90);
 /// let detector = ContactDetector::new(ContactOptions::default())?;
 /// let mut workspace = DetectorWorkspace::default();
-/// let (_, contact) = detector.detect_with::<f64>(&mut workspace, frame.view(), &reference)?;
-/// let contact = contact.expect("a bright patch");
+/// let found = detector.detect_with::<f64>(&mut workspace, frame.view(), &reference)?;
+/// let contact = found.contact.expect("a bright patch");
 /// assert_eq!(contact.area_px, 140);
 /// assert_eq!(contact.centroid_px[0].value, 36.5);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -31,19 +37,19 @@ pub struct ContactDetector {
 /// Buffers that detection reuses from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub struct DetectorWorkspace {
-    pub(crate) pass: PassWorkspace,
-    pub(crate) aperture: Aperture,
-    components: Components,
-    smooth: Vec<i32>,
-    column_sums: Vec<i32>,
+    pass: PassWorkspace,
+    pub(crate) region: Region,
+    histogram: Vec<u64>,
+    scratch: Vec<f64>,
 }
 
 impl DetectorWorkspace {
-    /// The mask of the last contact found, one row per row of its region, and the region's place in the frame.
+    /// The mask of the last frame's contact (1 inside, 0 outside) over a region, and the region's place in the frame; `None`
+    /// if there was no contact.
     pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
-        let region = self.aperture.region?;
-        let view = ArrayView2::from_shape((region.rows(), region.columns()), &self.aperture.mask).ok()?;
-        Some((region, view))
+        let place = self.region.place?;
+        let view = ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
+        Some((place, view))
     }
 }
 
@@ -71,130 +77,171 @@ impl ContactDetector {
         workspace: &mut DetectorWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-    ) -> Result<(FrameStatistics, Option<Contact<T>>), ForceError> {
+    ) -> Result<Detection<T>, ForceError> {
         reference.check(frame)?;
+        workspace.region.place = None;
         let sd = reference.difference_variance().sqrt();
-        let pixels = frame.len();
-        // Half of the false alarms go to single pixels, half to tiles.
-        let pixel_limit = quantile(0.25 * self.options.false_alarm_rate, pixels) * sd;
-        let statistics = reference.compare_with(&mut workspace.pass, frame, pixel_limit.min(255.0) as u8);
-        workspace.aperture.region = None;
-        let Some(suspect) = self.suspect(&workspace.pass.tiles, &statistics, sd) else {
-            return Ok((statistics, None));
+        // Half of the false alarms go to single pixels (either sign), half to tiles.
+        let pixel_limit = (quantile(0.25 * self.options.false_alarm_rate, frame.len()) * sd).min(255.0);
+        let statistics = reference.compare_with(&mut workspace.pass, frame, pixel_limit as u8);
+        let drift = self.drift(workspace, reference, frame.dim(), sd);
+        let none = Detection { statistics, drift, noise: None, contact: None };
+        let Some(suspect) = self.suspect(workspace, reference, &statistics, &drift, sd, pixel_limit) else {
+            return Ok(none);
         };
-        let region = suspect.grown(TILE_COLUMNS, frame.dim());
-        let area = self.segment(workspace, frame, reference, region, sd);
-        if area < self.options.minimum_area_px {
-            workspace.aperture.region = None;
-            return Ok((statistics, None));
+        let Some(extent) = self.segment(&mut workspace.region, frame, reference, &drift, suspect, sd) else {
+            workspace.region.place = None;
+            return Ok(none);
+        };
+        let noise = self.noise(workspace, reference, &drift);
+        let contact = self.summarise(&workspace.region, extent, frame, &noise)?;
+        Ok(Detection { statistics, drift, noise: Some(noise), contact: Some(contact) })
+    }
+
+    fn drift(
+        &self,
+        workspace: &mut DetectorWorkspace,
+        reference: &ReferenceFrame,
+        size: (usize, usize),
+        sd: f64,
+    ) -> Drift {
+        if self.options.drift == DriftCorrection::None {
+            return Drift::none();
         }
-        workspace.aperture.grow(self.options.margin_px);
-        let contact = self.summarise(&workspace.aperture, area, frame, reference)?;
-        Ok((statistics, Some(contact)))
+        let tiles = reference.tile_sums(&workspace.pass.tiles);
+        drift::fit(self.options.drift, size, tiles, sd, &mut workspace.scratch)
     }
 
     /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.
-    fn suspect(&self, tiles: &Tiles, statistics: &FrameStatistics, sd: f64) -> Option<BoundingBox> {
-        let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len());
-        let limit = (z * sd * ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt()).ceil() as i32;
-        let sign = self.options.polarity.sign();
+    fn suspect(
+        &self,
+        workspace: &DetectorWorkspace,
+        reference: &ReferenceFrame,
+        statistics: &FrameStatistics,
+        drift: &Drift,
+        sd: f64,
+        pixel_limit: f64,
+    ) -> Option<BoundingBox> {
+        let tiles = &workspace.pass.tiles;
+        let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
         let size = (statistics.rows, statistics.columns);
-        let bright = tiles
-            .sums
-            .iter()
+        let sign = f64::from(self.options.polarity.sign());
+        let bright = reference
+            .tile_sums(tiles)
             .enumerate()
-            .filter(|(_, s)| sign * **s > limit)
-            .map(|(at, _)| tiles.pixels(at, size));
-        bright.chain(statistics.bounding_box).reduce(BoundingBox::union)
+            .filter(|(_, t)| sign * drift.residual(t) > z * t.pixels.sqrt())
+            .map(|(k, _)| tiles.pixels(k, size));
+        // Pixels were judged before the drift was known: their verdict stands while the drift is small beside it.
+        let pixels = statistics
+            .bounding_box
+            .filter(|_| drift.greatest_grey(statistics, reference) < 0.3 * pixel_limit);
+        bright.chain(pixels).reduce(BoundingBox::union)
     }
 
-    /// Differences, mask and area inside a region.
+    /// The mask in a region around the suspect pixels, which grows while the aperture meets its border.
     fn segment(
         &self,
-        workspace: &mut DetectorWorkspace,
+        region: &mut Region,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        region: BoundingBox,
+        drift: &Drift,
+        suspect: BoundingBox,
         sd: f64,
-    ) -> usize {
-        let sign = self.options.polarity.sign() as i16;
-        let aperture = &mut workspace.aperture;
-        aperture.region = Some(region);
-        aperture.difference.clear();
-        let image = reference.image();
-        let pairs = region.of(frame).into_iter().zip(region.of(image));
-        aperture.difference.extend(pairs.map(|(&f, &r)| sign * (i16::from(f) - i16::from(r))));
-        let z = quantile(self.options.false_alarm_rate, region.rows() * region.columns());
-        let signal = f64::from(*aperture.difference.iter().max().unwrap_or(&0));
-        let width = self.options.smoothing_px.unwrap_or_else(|| smoothing_width(z * sd, signal));
-        box_sums(
-            &aperture.difference,
-            region.columns(),
-            width,
-            &mut workspace.column_sums,
-            &mut workspace.smooth,
-        );
-        let limit = z * sd * width as f64;
-        aperture.mask.clear();
-        aperture.mask.extend(workspace.smooth.iter().map(|&s| u8::from(f64::from(s) > limit)));
-        workspace.components.keep_largest(&mut aperture.mask, region.columns())
+    ) -> Option<Extent> {
+        let sign = self.options.polarity.sign() as f32;
+        let mut place = suspect.grown(TILE_COLUMNS, frame.dim());
+        loop {
+            region.load(frame, reference.mean(), place, drift, sign);
+            let z = quantile(self.options.false_alarm_rate, region.difference.len());
+            let signal = region.difference.iter().copied().fold(0.0, f32::max);
+            let width =
+                self.options.smoothing_px.unwrap_or_else(|| smoothing_width(z * sd, f64::from(signal)));
+            let limit = z * sd / width as f64;
+            let extent = region.segment(width, limit as f32, self.options.minimum_area_px);
+            if extent.area < self.options.minimum_area_px {
+                return None;
+            }
+            region.finish(self.options.margin_px);
+            let needed = region.bounds(&region.mask)?.grown(self.options.margin_px + 1, frame.dim());
+            if needed.union(place) == place {
+                return Some(extent);
+            }
+            place = needed.union(place).grown(TILE_COLUMNS, frame.dim());
+        }
+    }
+
+    fn noise(
+        &self,
+        workspace: &mut DetectorWorkspace,
+        reference: &ReferenceFrame,
+        drift: &Drift,
+    ) -> DifferenceNoise {
+        let background = reference.difference_variance();
+        let peak = peak(&workspace.region);
+        let gain = reference
+            .known_gain()
+            .unwrap_or_else(|| noise::gain(&workspace.region, &mut workspace.histogram, background, peak));
+        DifferenceNoise { background, gain, common: drift.standard_error * drift.standard_error }
     }
 
     fn summarise<T: Real>(
         &self,
-        aperture: &Aperture,
-        area: usize,
+        region: &Region,
+        extent: Extent,
         frame: ArrayView2<'_, u8>,
-        reference: &ReferenceFrame,
+        noise: &DifferenceNoise,
     ) -> Result<Contact<T>, ForceError> {
-        let region = aperture.region.unwrap_or(BoundingBox {
-            row_start: 0,
-            row_end: 1,
-            column_start: 0,
-            column_end: 1,
-        });
-        let sums = aperture.sums();
-        let total = sums.sum as f64;
-        let local = [sums.sum_x as f64 / total, sums.sum_y as f64 / total];
-        let noise = reference.noise();
-        let background = reference.difference_variance();
-        let variance = background * sums.count as f64 + noise.gain * total.max(0.0);
-        let spread = aperture.spread(local);
-        let centroid_variance = |plain: f64, weighted: f64| {
-            (background * plain + noise.gain * weighted.max(0.0)) / (total * total)
-        };
-        let saturated_px = self.saturated(aperture, frame, region);
-        let share = saturated_px as f64 / area as f64;
+        let whole =
+            BoundingBox { row_start: 0, row_end: frame.nrows(), column_start: 0, column_end: frame.ncols() };
+        let place = region.place.unwrap_or(whole);
+        let saturated_px = self.saturated(region, place.of(frame));
+        let share = saturated_px as f64 / extent.area as f64;
         if share > self.options.saturation_limit {
             return Err(ForceError::SaturatedContact { share, limit: self.options.saturation_limit });
         }
-        let peak =
-            aperture.difference.iter().zip(&aperture.mask).filter(|(_, m)| **m == 1).map(|(d, _)| *d).max();
+        let sums = Sums::over(region);
+        let local = sums.centroid();
+        let origin = [place.column_start as f64, place.row_start as f64];
+        let centroid = |k: usize| Estimate::nearest(origin[k] + local[k], sums.centroid_variance(k, noise));
+        let aperture = region.bounds(&region.aperture).unwrap_or(place);
         Ok(Contact {
-            bounding_box: mask_box(aperture, region),
-            area_px: area,
-            equivalent_radius_px: T::nearest((area as f64 / std::f64::consts::PI).sqrt()),
-            integrated_pixel_value: Estimate::nearest(total, variance),
-            centroid_px: [
-                Estimate::nearest(
-                    region.column_start as f64 + local[0],
-                    centroid_variance(spread.xx, spread.xx_d),
-                ),
-                Estimate::nearest(
-                    region.row_start as f64 + local[1],
-                    centroid_variance(spread.yy, spread.yy_d),
-                ),
-            ],
-            peak: T::nearest(f64::from(peak.unwrap_or(0))),
-            aperture_px: sums.count,
+            bounding_box: region.bounds(&region.mask).unwrap_or(place),
+            area_px: extent.area,
+            equivalent_radius_px: T::nearest((extent.area as f64 / std::f64::consts::PI).sqrt()),
+            integrated_pixel_value: Estimate::nearest(sums.sum(), sums.variance(noise)),
+            centroid_px: [centroid(0), centroid(1)],
+            peak: T::nearest(f64::from(peak(region))),
+            aperture_px: region.aperture.iter().map(Run::len).sum(),
             saturated_px,
-            touches_edge: touches_edge(aperture, region, frame.dim()),
+            other_contacts: extent.others,
+            touches_edge: aperture.grown(1, frame.dim()) != grown_freely(aperture),
         })
     }
 
-    fn saturated(&self, aperture: &Aperture, frame: ArrayView2<'_, u8>, region: BoundingBox) -> usize {
+    /// Pixels of the mask at the end of the scale that contact drives them to.
+    fn saturated(&self, region: &Region, frame: ArrayView2<'_, u8>) -> usize {
         let full = if self.options.polarity.sign() > 0 { u8::MAX } else { 0 };
-        region.of(frame).iter().zip(&aperture.mask).filter(|(f, m)| **m == 1 && **f == full).count()
+        let in_run = |run: &Run| {
+            let row = frame.row(run.row as usize);
+            (run.start as usize..run.end as usize).filter(|x| row[*x] == full).count()
+        };
+        region.mask.iter().map(in_run).sum()
+    }
+}
+
+/// Greatest difference in the mask.
+fn peak(region: &Region) -> f32 {
+    let columns = region.columns();
+    region.mask.iter().flat_map(|run| &region.difference[run.span(columns)]).copied().fold(0.0, f32::max)
+}
+
+/// The box one pixel larger on every side, whether or not the frame is; a box at the first row or column cannot be.
+fn grown_freely(b: BoundingBox) -> BoundingBox {
+    BoundingBox {
+        row_start: b.row_start.wrapping_sub(1),
+        row_end: b.row_end + 1,
+        column_start: b.column_start.wrapping_sub(1),
+        column_end: b.column_end + 1,
     }
 }
 
@@ -202,64 +249,4 @@ impl ContactDetector {
 fn smoothing_width(limit: f64, signal: f64) -> usize {
     let width = (10.0 * limit / signal.max(1.0)).ceil().clamp(1.0, 31.0) as usize;
     width | 1
-}
-
-/// Sums over a box of odd width centred at every pixel; beyond the region there is nothing to add.
-fn box_sums(difference: &[i16], columns: usize, width: usize, scratch: &mut Vec<i32>, sums: &mut Vec<i32>) {
-    let (rows, half) = (difference.len() / columns, width / 2);
-    scratch.clear();
-    scratch.resize(columns, 0);
-    sums.clear();
-    sums.resize(difference.len(), 0);
-    let row = |y: usize| &difference[y * columns..(y + 1) * columns];
-    for y in 0..half.min(rows) {
-        scratch.iter_mut().zip(row(y)).for_each(|(s, d)| *s += i32::from(*d));
-    }
-    for y in 0..rows {
-        if y + half < rows {
-            scratch.iter_mut().zip(row(y + half)).for_each(|(s, d)| *s += i32::from(*d));
-        }
-        if y > half {
-            scratch.iter_mut().zip(row(y - half - 1)).for_each(|(s, d)| *s -= i32::from(*d));
-        }
-        let mut running: i32 = scratch[..half.min(columns)].iter().sum();
-        for x in 0..columns {
-            running += scratch.get(x + half).copied().unwrap_or(0);
-            if x > half {
-                running -= scratch[x - half - 1];
-            }
-            sums[y * columns + x] = running;
-        }
-    }
-}
-
-/// The tight box around the mask, in frame coordinates.
-fn mask_box(aperture: &Aperture, region: BoundingBox) -> BoundingBox {
-    let columns = region.columns();
-    let mut tight: Option<BoundingBox> = None;
-    for (y, row) in aperture.mask.chunks(columns).enumerate() {
-        let first = row.iter().position(|m| *m == 1);
-        let last = row.iter().rposition(|m| *m == 1);
-        if let (Some(first), Some(last)) = (first, last) {
-            let here = BoundingBox {
-                row_start: region.row_start + y,
-                row_end: region.row_start + y + 1,
-                column_start: region.column_start + first,
-                column_end: region.column_start + last + 1,
-            };
-            tight = Some(tight.map_or(here, |b| b.union(here)));
-        }
-    }
-    tight.unwrap_or(region)
-}
-
-/// Whether the aperture reaches the frame's first or last row or column.
-fn touches_edge(aperture: &Aperture, region: BoundingBox, (rows, columns): (usize, usize)) -> bool {
-    let width = region.columns();
-    let any = |mut at: Box<dyn Iterator<Item = usize>>| at.any(|k| aperture.grown[k] == 1);
-    let height = region.rows();
-    (region.row_start == 0 && any(Box::new(0..width)))
-        || (region.row_end == rows && any(Box::new((height - 1) * width..height * width)))
-        || (region.column_start == 0 && any(Box::new((0..height).map(move |y| y * width))))
-        || (region.column_end == columns && any(Box::new((0..height).map(move |y| y * width + width - 1))))
 }

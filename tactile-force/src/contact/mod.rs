@@ -6,16 +6,21 @@
 //! Sums run over the mask grown by a margin (the *aperture*), with the sign of every difference kept, so that the rim,
 //! where the signal drowns in the noise, is not cut off.
 
-mod aperture;
-mod component;
 mod detector;
+mod noise;
+mod region;
+mod runs;
+mod summary;
 mod threshold;
 
 pub use detector::{ContactDetector, DetectorWorkspace};
 
-pub(crate) use aperture::Aperture;
+pub(crate) use region::Region;
 
-use crate::{BoundingBox, Estimate, ForceError, Real, error::Requirement};
+use crate::{
+    BoundingBox, DifferenceNoise, Drift, DriftCorrection, Estimate, ForceError, FrameStatistics, Real,
+    error::Requirement,
+};
 
 /// Whether pressing makes the image brighter (light leaks out) or darker (light is blocked).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,6 +57,8 @@ pub struct ContactOptions {
     pub margin_px: usize,
     /// Components smaller than this are noise; default 4.
     pub minimum_area_px: usize,
+    /// Which change of the light is corrected; default none.
+    pub drift: DriftCorrection,
     /// The share of saturated pixels of the contact beyond which its force is refused; default 0.01.
     pub saturation_limit: f64,
 }
@@ -64,6 +71,7 @@ impl Default for ContactOptions {
             smoothing_px: None,
             margin_px: 4,
             minimum_area_px: 4,
+            drift: DriftCorrection::None,
             saturation_limit: 0.01,
         }
     }
@@ -98,8 +106,24 @@ pub struct Contact<T> {
     pub aperture_px: usize,
     /// Saturated pixels of the mask (255 if brighter, 0 if darker).
     pub saturated_px: usize,
+    /// Other patches of contact in the frame's region, each at least a hundredth of this one; they are not part of it.
+    pub other_contacts: usize,
     /// The aperture reaches the edge of the frame: part of the contact may be missing.
     pub touches_edge: bool,
+}
+
+/// What detection says of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Detection<T> {
+    /// Sums over the whole frame.
+    pub statistics: FrameStatistics,
+    /// The correction of lamps and background.
+    pub drift: Drift,
+    /// The noise that the errors are computed from; `None` without contact.
+    pub noise: Option<DifferenceNoise>,
+    /// The contact, if there is one.
+    pub contact: Option<Contact<T>>,
 }
 
 impl<T: Real> Contact<T> {

@@ -6,10 +6,10 @@ mod reference;
 mod statistics;
 mod strip;
 
-pub use noise::NoiseModel;
+pub use noise::{DifferenceNoise, NoiseModel};
 pub use reference::ReferenceFrame;
 pub use statistics::{BoundingBox, FrameStatistics};
 
-pub(crate) use pass::Tiles;
+pub(crate) use noise::trimmed_variance;
 pub(crate) use reference::PassWorkspace;
 pub(crate) use strip::{TILE_COLUMNS, TILE_ROWS};

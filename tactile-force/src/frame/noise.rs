@@ -17,6 +17,19 @@ pub struct NoiseModel {
     pub gain: f64,
 }
 
+/// Variance of one pixel's difference frame − reference: background + gain × difference, in squared grey levels, and what
+/// all pixels have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct DifferenceNoise {
+    /// Variance where nothing presses, of frame and reference together.
+    pub background: f64,
+    /// Growth of the variance per grey level of difference.
+    pub gain: f64,
+    /// Variance of an error common to all pixels: that of the corrected drift.
+    pub common: f64,
+}
+
 /// Variance of rounding to whole numbers.
 pub(crate) const QUANTISATION: f64 = 1.0 / 12.0;
 
@@ -56,8 +69,21 @@ impl NoiseModel {
     }
 }
 
+impl NoiseModel {
+    /// White noise of repeated frames of one scene, from the changes of every pixel about its mean.
+    pub(crate) fn of_repeats(frames: &[ArrayView2<'_, u8>], mean: ArrayView2<'_, f32>) -> Self {
+        let mut squares = 0.0;
+        for frame in frames {
+            squares +=
+                frame.iter().zip(mean).map(|(f, m)| (f64::from(*f) - f64::from(*m)).powi(2)).sum::<f64>();
+        }
+        let variance = squares / (mean.len() * (frames.len() - 1)) as f64;
+        Self { read_variance: variance.max(QUANTISATION), gain: 0.0 }
+    }
+}
+
 /// Variance of a normal sample given as a histogram of absolute values, with everything beyond 3 sd left out.
-fn trimmed_variance(histogram: &[u64]) -> f64 {
+pub(crate) fn trimmed_variance(histogram: &[u64]) -> f64 {
     /// Variance of a standard normal cut at ±3: 1 − 6 φ(3)/(2Φ(3) − 1).
     const CUT: f64 = 0.973_336_950_7;
     let mut variance = f64::INFINITY;

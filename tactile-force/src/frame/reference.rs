@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2};
 
 use super::pass::{Tiles, pixels_of, scan, tighten};
 use super::{FrameStatistics, NoiseModel, TILE_ROWS};
-use crate::ForceError;
+use crate::{ForceError, drift::TileSum};
 
 /// Longest side for which every integer sum of the pass fits its type: 16384⁴/3 · 255 < 2⁶³.
 const LONGEST_SIDE: usize = 16_384;
@@ -13,7 +13,12 @@ const LONGEST_SIDE: usize = 16_384;
 #[derive(Clone, Debug)]
 pub struct ReferenceFrame {
     image: Array2<u8>,
+    /// The mean of several frames, finer than whole grey levels.
+    mean: Array2<f32>,
+    frames: usize,
     noise: NoiseModel,
+    /// Whether the gain was given, and not only the noise at the reference's own level measured.
+    gain_known: bool,
     sums: FrameStatistics,
     tiles: Tiles,
     /// Brightest pixel of every band of eight rows.
@@ -35,30 +40,51 @@ impl ReferenceFrame {
     /// # Errors
     /// An empty image, or a side longer than 16384 pixels.
     pub fn new(image: ArrayView2<'_, u8>) -> Result<Self, ForceError> {
-        let (rows, columns) = image.dim();
-        if rows == 0 || columns == 0 {
-            return Err(ForceError::EmptyImage { rows, columns });
+        Self::from_frames(&[image])
+    }
+
+    /// From the mean of several frames of the unpressed sensor: its own noise falls with their number, and the noise of a
+    /// frame is that of each pixel from frame to frame, whatever the texture of the image.
+    ///
+    /// # Errors
+    /// No frame, an empty one, a side longer than 16384 pixels, or frames that differ in size.
+    pub fn from_frames(frames: &[ArrayView2<'_, u8>]) -> Result<Self, ForceError> {
+        let size = frames.first().map_or((0, 0), |f| f.dim());
+        check_size(size)?;
+        if let Some(other) = frames.iter().find(|f| f.dim() != size) {
+            return Err(ForceError::SizeMismatch { expected: size, found: other.dim() });
         }
-        if rows.max(columns) > LONGEST_SIDE {
-            return Err(ForceError::ImageTooLarge { found: rows.max(columns), limit: LONGEST_SIDE });
-        }
-        let noise = NoiseModel::of_frame(image);
-        let image = image.as_standard_layout().into_owned();
+        let n = frames.len() as f64;
+        let mean = Array2::from_shape_fn(size, |at| {
+            let total: u32 = frames.iter().map(|f| u32::from(f[at])).sum();
+            (f64::from(total) / n) as f32
+        });
+        let image = mean.mapv(|m| m.round() as u8);
+        let noise = if frames.len() == 1 {
+            NoiseModel::of_frame(frames[0])
+        } else {
+            NoiseModel::of_repeats(frames, mean.view())
+        };
         let mut tiles = Tiles::default();
         let pixels = image.as_slice().unwrap_or_default();
-        let sums = scan(pixels, None, (rows, columns), u8::MAX, &mut tiles);
-        let band = |k: usize| pixels_of(k, pixels, columns).iter().copied().max().unwrap_or(0);
-        let brightest = (0..rows.div_ceil(TILE_ROWS)).map(band).collect();
-        Ok(Self { image, noise, sums, tiles, brightest })
+        let sums = scan(pixels, None, size, u8::MAX, &mut tiles);
+        let band = |k: usize| pixels_of(k, pixels, size.1).iter().copied().max().unwrap_or(0);
+        let brightest = (0..size.0.div_ceil(TILE_ROWS)).map(band).collect();
+        for tile in 0..tiles.sums.len() {
+            let mean_sum: f64 = tiles.pixels(tile, size).of(mean.view()).iter().map(|m| f64::from(*m)).sum();
+            tiles.sums[tile] = mean_sum.round() as i32;
+        }
+        Ok(Self { image, mean, frames: frames.len(), noise, gain_known: false, sums, tiles, brightest })
     }
 
     /// The same reference with a known noise instead of the estimated one.
     pub fn with_noise(mut self, noise: NoiseModel) -> Self {
         self.noise = noise;
+        self.gain_known = true;
         self
     }
 
-    /// The image.
+    /// The image; the mean of several frames, rounded.
     pub fn image(&self) -> ArrayView2<'_, u8> {
         self.image.view()
     }
@@ -111,13 +137,49 @@ impl ReferenceFrame {
         s
     }
 
+    /// The image before rounding.
+    pub(crate) fn mean(&self) -> ArrayView2<'_, f32> {
+        self.mean.view()
+    }
+
     /// Variance of one pixel's difference frame − reference where nothing presses.
     pub(crate) fn difference_variance(&self) -> f64 {
-        2.0 * self.noise.read_variance
+        let level = self.sums.sum as f64 / self.image.len() as f64;
+        self.noise.variance(level) * (1.0 + 1.0 / self.frames as f64)
+    }
+
+    /// The gain, if it was given.
+    pub(crate) fn known_gain(&self) -> Option<f64> {
+        self.gain_known.then_some(self.noise.gain)
+    }
+
+    /// Every tile of the last pass.
+    pub(crate) fn tile_sums<'a>(&'a self, passed: &'a Tiles) -> impl Iterator<Item = TileSum> + Clone + 'a {
+        let size = self.image.dim();
+        passed.sums.iter().zip(&self.tiles.sums).enumerate().map(move |(k, (difference, reference))| {
+            let at = passed.pixels(k, size);
+            TileSum {
+                x: 0.5 * (at.column_start + at.column_end - 1) as f64,
+                y: 0.5 * (at.row_start + at.row_end - 1) as f64,
+                pixels: (at.rows() * at.columns()) as f64,
+                reference: f64::from(*reference),
+                difference: f64::from(*difference),
+            }
+        })
     }
 
     pub(crate) fn check(&self, frame: ArrayView2<'_, u8>) -> Result<(), ForceError> {
         let (expected, found) = (self.image.dim(), frame.dim());
         if expected == found { Ok(()) } else { Err(ForceError::SizeMismatch { expected, found }) }
     }
+}
+
+fn check_size((rows, columns): (usize, usize)) -> Result<(), ForceError> {
+    if rows == 0 || columns == 0 {
+        return Err(ForceError::EmptyImage { rows, columns });
+    }
+    if rows.max(columns) > LONGEST_SIDE {
+        return Err(ForceError::ImageTooLarge { found: rows.max(columns), limit: LONGEST_SIDE });
+    }
+    Ok(())
 }

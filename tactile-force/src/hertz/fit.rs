@@ -1,12 +1,12 @@
-//! Levenberg–Marquardt on the rings.
+//! Least squares on the rings.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::edge::BlurredEdge;
 use super::profile::{Shape, level};
 use super::{HertzFit, HertzFitOptions, Rings};
-use crate::contact::Aperture;
-use crate::{Estimate, ForceError, Real, StopReason};
+use crate::contact::Region;
+use crate::{DifferenceNoise, Estimate, ForceError, Real, StopReason};
 
 type Normal = SMatrix<f64, 6, 6>;
 type Step = SVector<f64, 6>;
@@ -27,13 +27,6 @@ pub(crate) struct Start {
     pub(crate) centre: [f64; 2],
     pub(crate) radius: f64,
     pub(crate) integral: f64,
-}
-
-/// Variance of a difference: background + gain × level.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct DifferenceNoise {
-    pub(crate) background: f64,
-    pub(crate) gain: f64,
 }
 
 struct State {
@@ -64,12 +57,12 @@ impl HertzFitter {
     pub(crate) fn fit_with<T: Real>(
         &self,
         rings: &mut Rings,
-        aperture: &Aperture,
+        region: &Region,
         start: Start,
         noise: DifferenceNoise,
         pixel_size_m: [f64; 2],
     ) -> Option<HertzFit<T>> {
-        let region = aperture.region?;
+        let place = region.place?;
         let aspect = pixel_size_m[1] / pixel_size_m[0];
         let blur = self.options.blur_px.map_or(0.5, |b| b * b) + PIXEL;
         let peak = 1.5 * start.integral * aspect / (std::f64::consts::PI * start.radius * start.radius);
@@ -80,42 +73,41 @@ impl HertzFitter {
             stop: StopReason::IterationLimit,
         };
         for _ in 0..5 {
-            rings.gather(&aperture.difference, &aperture.grown, region.columns(), state.centre, aspect);
+            rings.gather(region, state.centre, aspect);
             let moved = self.descend(rings, &mut state, noise, aspect)?;
             if moved < 0.02 {
                 break;
             }
         }
         let equations = self.assemble(rings, &state.shape, noise);
-        let origin = [region.column_start as f64, region.row_start as f64];
+        let origin = [place.column_start as f64, place.row_start as f64];
         self.report(&state, &equations, origin, pixel_size_m)
     }
 
-    /// Steps until nothing moves; returns how far the centre went, in pixels.
+    /// Gauss–Newton steps on fixed rings until nothing moves; returns how far the centre went, in pixels.
+    ///
+    /// Weights follow the shape, so χ² may rise by a hair near the end: only a step that makes it clearly worse is halved.
     fn descend(&self, rings: &Rings, state: &mut State, noise: DifferenceNoise, aspect: f64) -> Option<f64> {
-        let mut damping = 1e-4;
-        let mut shift = [0.0; 2];
         let mut here = self.assemble(rings, &state.shape, noise);
         state.stop = StopReason::IterationLimit;
+        let mut shift = [0.0; 2];
         while state.iterations < self.options.max_iterations {
             state.iterations += 1;
-            let mut damped = here.normal;
-            for k in 0..6 {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky()?.solve(&here.gradient);
+            let step = here.normal.cholesky()?.solve(&here.gradient);
             // The centre enters linearly on fixed rings: its best shift belongs to the final shape.
             shift = [step[4], step[5]];
-            let trial = self.stepped(&state.shape, &step);
-            let there = self.assemble(rings, &trial, noise);
-            let small = step[2].abs() < 1e-7 * trial.radius && step[0].abs() < 1e-7 * trial.peak.abs();
-            if there.chi2 <= here.chi2 * (1.0 + 1e-14) {
-                (state.shape, here) = (trial, there);
-                damping *= 0.1;
-            } else {
-                damping *= 10.0;
+            let mut trial = self.stepped(&state.shape, &step);
+            let mut there = self.assemble(rings, &trial, noise);
+            for halving in 1..10 {
+                if there.chi2 <= here.chi2 * 1.01 {
+                    break;
+                }
+                trial = self.stepped(&state.shape, &(step * 0.5_f64.powi(halving)));
+                there = self.assemble(rings, &trial, noise);
             }
-            if small {
+            let before = std::mem::replace(&mut state.shape, trial);
+            here = there;
+            if settled(&before, &state.shape) {
                 state.stop = StopReason::Converged;
                 break;
             }
@@ -147,27 +139,35 @@ impl HertzFitter {
             let l = level(&self.edge, shape, r2, spread);
             let weight = 1.0 / (noise.background + noise.gain * l.value.max(0.0));
             let radial = [l.by_peak, 1.0, l.by_radius, l.by_blur];
-            let residual =
-                [ring.d - ring.n * l.value, ring.dc - l.value * ring.c, ring.ds - l.value * ring.s];
-            let slope = -l.by_distance;
+            // Along a ring the model is its level, to first order in r² − mean r²; a shift of the centre changes it by
+            // −2 (dI/dr²) times the place.
+            let along = |place: f64, by_r2: f64| l.value * place + l.by_r2 * (by_r2 - r2 * place);
+            let residual = [
+                ring.d - ring.n * l.value,
+                ring.du - along(ring.u, ring.r2u),
+                ring.dv - along(ring.v, ring.r2v),
+            ];
+            let slope = -2.0 * l.by_r2;
             for (i, a) in radial.iter().enumerate() {
                 for (j, b) in radial.iter().enumerate() {
                     e.normal[(i, j)] += weight * ring.n * a * b;
                 }
-                for (j, sum) in [(4, ring.c), (5, ring.s)] {
+                for (j, sum) in [(4, ring.u), (5, ring.v)] {
                     e.normal[(i, j)] += weight * a * slope * sum;
                     e.normal[(j, i)] += weight * a * slope * sum;
                 }
                 e.gradient[i] += weight * a * residual[0];
             }
             let square = weight * slope * slope;
-            e.normal[(4, 4)] += square * ring.cc;
-            e.normal[(4, 5)] += square * ring.cs;
-            e.normal[(5, 4)] += square * ring.cs;
-            e.normal[(5, 5)] += square * (ring.n - ring.cc);
+            e.normal[(4, 4)] += square * ring.uu;
+            e.normal[(4, 5)] += square * ring.uv;
+            e.normal[(5, 4)] += square * ring.uv;
+            e.normal[(5, 5)] += square * (ring.r2 - ring.uu);
             e.gradient[4] += weight * slope * residual[1];
             e.gradient[5] += weight * slope * residual[2];
-            e.chi2 += weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value);
+            // Along a ring the model itself varies; that is no misfit.
+            let within = ring.n * l.by_r2 * l.by_r2 * spread;
+            e.chi2 += weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value - within);
             e.pixels += ring.n;
         }
         let fixed = [(1, !self.options.fit_background), (3, self.options.blur_px.is_some())];
@@ -226,4 +226,13 @@ impl HertzFitter {
             stop: state.stop,
         })
     }
+}
+
+/// Nothing moves by more than a millionth.
+fn settled(before: &Shape, after: &Shape) -> bool {
+    let close = |a: f64, b: f64, scale: f64| (a - b).abs() <= 1e-6 * scale.abs();
+    close(before.radius, after.radius, after.radius)
+        && close(before.peak, after.peak, after.peak)
+        && close(before.background, after.background, after.peak)
+        && close(before.blur, after.blur, after.blur + after.radius)
 }

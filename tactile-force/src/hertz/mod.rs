@@ -14,5 +14,5 @@ mod rings;
 pub use fit::HertzFitter;
 pub use options::{HertzFit, HertzFitOptions};
 
-pub(crate) use fit::{DifferenceNoise, Start};
+pub(crate) use fit::Start;
 pub(crate) use rings::Rings;

@@ -19,7 +19,8 @@ pub(super) struct Level {
     pub(super) by_peak: f64,
     pub(super) by_radius: f64,
     pub(super) by_blur: f64,
-    pub(super) by_distance: f64,
+    /// dI/d(r²).
+    pub(super) by_r2: f64,
 }
 
 /// B + A E √(1 − |r + ε|²/a²)₊, ε normal with the blur's variance w along each axis.
@@ -53,6 +54,6 @@ pub(super) fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> 
         by_peak: value,
         by_radius: shape.peak * by_radius,
         by_blur: shape.peak * by_blur,
-        by_distance: shape.peak * 2.0 * r2.sqrt() * by_r2,
+        by_r2: shape.peak * by_r2,
     }
 }

@@ -1,0 +1,66 @@
+//! Sums over the aperture and the errors they carry.
+
+use super::region::Region;
+use crate::frame::DifferenceNoise;
+
+/// Sums over the aperture; coordinates are relative to the region's first pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// Number of pixels and their moments: 1, x, y, x², y².
+    pub(super) plain: [f64; 5],
+    /// The same weighted with the difference.
+    pub(super) weighted: [f64; 5],
+}
+
+impl Sums {
+    pub(super) fn over(region: &Region) -> Self {
+        let mut total = Self::default();
+        let columns = region.columns();
+        for run in &region.aperture {
+            let (y, n) = (f64::from(run.row), run.len() as f64);
+            let (first, last) = (f64::from(run.start), f64::from(run.end) - 1.0);
+            // Σ x and Σ x² of consecutive whole numbers.
+            let cubes = |t: f64| t * (t + 1.0) * (2.0 * t + 1.0) / 6.0;
+            let plain = [n, 0.5 * n * (first + last), y * n, cubes(last) - cubes(first - 1.0), y * y * n];
+            let (mut d0, mut d1, mut d2) = (0.0, 0.0, 0.0);
+            for (x, d) in region.difference[run.span(columns)].iter().enumerate() {
+                let (x, d) = (x as f64, f64::from(*d));
+                d0 += d;
+                d1 += x * d;
+                d2 += x * x * d;
+            }
+            let weighted =
+                [d0, d1 + first * d0, y * d0, d2 + 2.0 * first * d1 + first * first * d0, y * y * d0];
+            for k in 0..5 {
+                total.plain[k] += plain[k];
+                total.weighted[k] += weighted[k];
+            }
+        }
+        total
+    }
+
+    pub(super) fn sum(&self) -> f64 {
+        self.weighted[0]
+    }
+
+    pub(super) fn centroid(&self) -> [f64; 2] {
+        [self.weighted[1] / self.weighted[0], self.weighted[2] / self.weighted[0]]
+    }
+
+    /// Variance of Σ d: every pixel's, and that of a background error common to all.
+    pub(super) fn variance(&self, noise: &DifferenceNoise) -> f64 {
+        noise.background * self.plain[0]
+            + noise.gain * self.weighted[0].max(0.0)
+            + noise.common * self.plain[0] * self.plain[0]
+    }
+
+    /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², and the common error's lever.
+    pub(super) fn centroid_variance(&self, axis: usize, noise: &DifferenceNoise) -> f64 {
+        let at = self.centroid()[axis];
+        let about = |s: &[f64; 5]| s[3 + axis] - 2.0 * at * s[1 + axis] + at * at * s[0];
+        let lever = self.plain[1 + axis] - at * self.plain[0];
+        let total = self.weighted[0];
+        let white = noise.background * about(&self.plain) + noise.gain * about(&self.weighted).max(0.0);
+        (white + noise.common * lever * lever) / (total * total)
+    }
+}

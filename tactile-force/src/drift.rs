@@ -1,0 +1,207 @@
+//! What the lamps and the background did since the reference was taken, read from the pixels outside the contact.
+
+use crate::frame::{TILE_COLUMNS, TILE_ROWS};
+use crate::{FrameStatistics, ReferenceFrame};
+
+/// Which change of the light is corrected. Nothing is unless it is asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum DriftCorrection {
+    /// Frames are taken as they are.
+    #[default]
+    None,
+    /// Stray light added everywhere alike: d = f − r − b.
+    Offset,
+    /// Stray light with a gradient: d = f − r − (b + bₓ x + b_y y).
+    Plane,
+    /// Lamps brighter or darker, background and signal alike: d = f/g − r.
+    Lamp,
+    /// Lamps that also moved: d = f/(g + gₓ x + g_y y) − r.
+    TiltedLamp,
+}
+
+/// The correction found for one frame. `coefficients` are [value, per column, per row] about the frame's middle: grey
+/// levels for stray light, shares for lamps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Drift {
+    /// What was corrected.
+    pub correction: DriftCorrection,
+    /// Offset (grey levels) or lamp level (1 for unchanged) in the frame's middle, and its change per column and per row.
+    pub coefficients: [f64; 3],
+    /// Standard error of the background under the contact, in grey levels.
+    pub standard_error: f64,
+    /// Tiles of 8 × 32 pixels it was read from.
+    pub tiles: usize,
+    middle: [f64; 2],
+}
+
+/// The correction along one row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DriftLine {
+    lamp: bool,
+    start: f32,
+    step: f32,
+}
+
+impl DriftLine {
+    /// Corrected difference of the pixel `x` columns from the line's start.
+    pub(crate) fn difference(&self, x: usize, frame: f32, reference: f32) -> f32 {
+        let level = self.start + self.step * x as f32;
+        if self.lamp { frame / level - reference } else { frame - reference - level }
+    }
+}
+
+impl DriftCorrection {
+    fn is_lamp(self) -> bool {
+        matches!(self, Self::Lamp | Self::TiltedLamp)
+    }
+
+    fn terms(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Offset | Self::Lamp => 1,
+            Self::Plane | Self::TiltedLamp => 3,
+        }
+    }
+}
+
+impl Drift {
+    /// No correction of a frame of the given size.
+    pub(crate) fn none() -> Self {
+        Self::default()
+    }
+
+    pub(crate) fn is_zero(&self) -> bool {
+        self.correction == DriftCorrection::None
+    }
+
+    pub(crate) fn line(&self, row: usize, first_column: usize) -> DriftLine {
+        let [value, per_column, per_row] = self.coefficients;
+        let y = row as f64 - self.middle[1];
+        let x = first_column as f64 - self.middle[0];
+        let start = value + per_column * x + per_row * y;
+        DriftLine { lamp: self.correction.is_lamp(), start: start as f32, step: per_column as f32 }
+    }
+
+    /// Background that the correction takes from a frame at a place where the reference is `reference`.
+    fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
+        let [value, per_column, per_row] = self.coefficients;
+        let at = value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1]);
+        if self.correction.is_lamp() { reference * (at - 1.0) } else { at }
+    }
+
+    /// The greatest background it takes anywhere in the frame, in grey levels, for a reference of even brightness.
+    pub(crate) fn greatest_grey(&self, statistics: &FrameStatistics, reference: &ReferenceFrame) -> f64 {
+        if self.is_zero() {
+            return 0.0;
+        }
+        let image = reference.image();
+        let mean = image.iter().map(|p| f64::from(*p)).sum::<f64>() / image.len() as f64;
+        let (right, bottom) = (statistics.columns as f64 - 1.0, statistics.rows as f64 - 1.0);
+        let corners = [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]];
+        corners.iter().map(|[x, y]| self.level(*x, *y, mean).abs()).fold(0.0, f64::max)
+    }
+
+    /// What is left of a tile's summed difference.
+    pub(crate) fn residual(&self, tile: &TileSum) -> f64 {
+        tile.difference - tile.pixels * self.level(tile.x, tile.y, tile.reference / tile.pixels)
+    }
+}
+
+/// One tile: where it is, its number of pixels, the reference's sum and the summed difference.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileSum {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) pixels: f64,
+    pub(crate) reference: f64,
+    pub(crate) difference: f64,
+}
+
+/// Fits the correction to all tiles but those that stand out (the contact), by least squares on what stays, again and
+/// again until the set settles; `sd` is the noise of one pixel's difference.
+pub(crate) fn fit(
+    correction: DriftCorrection,
+    (rows, columns): (usize, usize),
+    tiles: impl Iterator<Item = TileSum> + Clone,
+    sd: f64,
+    scratch: &mut Vec<f64>,
+) -> Drift {
+    let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
+    let mut drift = Drift { correction, middle, ..Drift::none() };
+    if correction.is_lamp() {
+        drift.coefficients[0] = 1.0;
+    }
+    let terms = correction.terms();
+    drift.coefficients[0] += median(scratch, tiles.clone().map(|t| drift.residual(&t) / weight(&drift, &t)));
+    let mut kept = 0;
+    for _ in 0..20 {
+        let spread = 1.4826 * median(scratch, tiles.clone().map(|t| (drift.residual(&t) / t.pixels).abs()));
+        let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
+        let limit = 3.0 * spread.max(noise);
+        let near = tiles.clone().filter(|t| (drift.residual(t) / t.pixels).abs() <= limit);
+        let (step, variance, count) = solve(&drift, near, terms, sd);
+        for (c, s) in drift.coefficients.iter_mut().zip(step) {
+            *c += s;
+        }
+        drift.standard_error = variance.sqrt();
+        drift.tiles = count;
+        if count == kept {
+            break;
+        }
+        kept = count;
+    }
+    drift
+}
+
+/// What one unit of the first coefficient does to a tile's sum.
+fn weight(drift: &Drift, tile: &TileSum) -> f64 {
+    if drift.correction.is_lamp() { tile.reference.max(1.0) } else { tile.pixels }
+}
+
+/// One least-squares step, the variance of the background in the frame's middle, and the number of tiles.
+fn solve(
+    drift: &Drift,
+    tiles: impl Iterator<Item = TileSum>,
+    terms: usize,
+    sd: f64,
+) -> ([f64; 3], f64, usize) {
+    let mut normal = nalgebra::Matrix3::<f64>::zeros();
+    let mut right = nalgebra::Vector3::<f64>::zeros();
+    let scale = [1.0, drift.middle[0].max(1.0), drift.middle[1].max(1.0)];
+    let (mut count, mut reference, mut pixels) = (0, 0.0, 0.0);
+    for tile in tiles {
+        let w = weight(drift, &tile);
+        let at = [1.0, (tile.x - drift.middle[0]) / scale[1], (tile.y - drift.middle[1]) / scale[2]];
+        let residual = drift.residual(&tile);
+        for i in 0..terms {
+            right[i] += w * at[i] * residual / tile.pixels;
+            for j in 0..terms {
+                normal[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
+            }
+        }
+        count += 1;
+        reference += tile.reference;
+        pixels += tile.pixels;
+    }
+    for k in terms..3 {
+        normal[(k, k)] = 1.0;
+    }
+    let Some(inverse) = normal.try_inverse() else { return ([0.0; 3], 0.0, count) };
+    let step = inverse * right;
+    let grey = if drift.correction.is_lamp() { reference / f64::max(pixels, 1.0) } else { 1.0 };
+    let step = [step[0], step[1] / scale[1], step[2] / scale[2]];
+    (step, inverse[(0, 0)] * sd * sd * grey * grey, count)
+}
+
+fn median(scratch: &mut Vec<f64>, values: impl Iterator<Item = f64>) -> f64 {
+    scratch.clear();
+    scratch.extend(values);
+    if scratch.is_empty() {
+        return 0.0;
+    }
+    let middle = scratch.len() / 2;
+    *scratch.select_nth_unstable_by(middle, f64::total_cmp).1
+}
