@@ -3,7 +3,9 @@
 use crate::frame::Frame;
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
-use tactile_tps::{AffineModel, FitOptions, NegR, R2LogR, Scalar, Spline, Warp, WarpModel};
+use tactile_tps::{
+    Affine, AffineModel, FitOptions, NegR, R2LogR, Scalar, Smoothing, Spline, Warp, WarpModel,
+};
 
 /// Soft matches below this weight are left out.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -79,7 +81,9 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
         let kept = p.iter().enumerate().filter(|(_, p)| partner.is_some() && **p > NEGLIGIBLE);
         soft.push_row(kept.map(|(j, &p)| (j, nalgebra::convert::<f64, T>(p))));
     }
-    let warp = warp_through(model, target, &pairs);
+    let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
+    let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
+    let warp = spline(&sources, &images, None, Smoothing::None);
     let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
     let residual =
         pairs.iter().map(|&(i, j)| (warped[i] - target[j]).norm_squared()).fold(T::zero(), |s, r| s + r);
@@ -106,21 +110,32 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
     }
 }
 
-/// The thin-plate spline that interpolates the pairs; an affine map where they do not determine one, the identity where there
-/// are none.
-fn warp_through<T: Scalar, const D: usize>(
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
-    pairs: &[(usize, usize)],
+/// The thin-plate spline through these pairs (`r² ln r²` in the plane, `−r` in space); an affine map where they determine no
+/// spline, the identity where there are none.
+pub(crate) fn spline<T: Scalar, const D: usize>(
+    sources: &[Point<T, D>],
+    images: &[Point<T, D>],
+    weights: Option<Vec<T>>,
+    smoothing: Smoothing<T>,
 ) -> Box<dyn Warp<T, D> + Send + Sync> {
-    let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
-    let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
+    fn options<T: Scalar, K>(
+        kernel: K,
+        smoothing: Smoothing<T>,
+        weights: &Option<Vec<T>>,
+    ) -> FitOptions<T, K> {
+        let options = FitOptions::new(kernel).smoothing(smoothing);
+        weights.iter().fold(options, |options, weights| options.weights(weights.clone()))
+    }
     if D == 2 {
-        if let Ok(spline) = Spline::<T, D, D, R2LogR>::fit(&sources, &images, &FitOptions::new(R2LogR)) {
+        if let Ok(spline) =
+            Spline::<T, D, D, R2LogR>::fit(sources, images, &options(R2LogR, smoothing, &weights))
+        {
             return Box::new(spline);
         }
-    } else if let Ok(spline) = Spline::<T, D, D, NegR>::fit(&sources, &images, &FitOptions::new(NegR)) {
+    } else if let Ok(spline) =
+        Spline::<T, D, D, NegR>::fit(sources, images, &options(NegR, smoothing, &weights))
+    {
         return Box::new(spline);
     }
-    Box::new(AffineModel.fit(&sources, &images, None).unwrap_or_else(|_| tactile_tps::Affine::identity()))
+    Box::new(AffineModel.fit(sources, images, weights.as_deref()).unwrap_or_else(|_| Affine::identity()))
 }

@@ -17,6 +17,7 @@ mod validate;
 pub use assignment::{AssignmentWorkspace, linear_assignment};
 pub use assignment_matcher::LinearAssignment;
 pub use cpd::{CoherentPointDrift, DriftOptions, DriftWarp, DriftWorkspace, Motion, Normalization};
+pub use dense::{DenseOptions, DenseRelaxation};
 pub use error::{MatchError, PointSet};
 pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
 pub use nearest::NearestNeighbour;

@@ -4,9 +4,10 @@ mod common;
 
 use common::{Stream, assert_consistent, bend, grid, reordered, scattered};
 use nalgebra::{Point, SVector};
+use tactile_match::dense::Neighbourhood;
 use tactile_match::{
-    CoherentPointDrift, DriftOptions, LinearAssignment, MatchError, Motion, NearestNeighbour, PointMatcher,
-    PointSet,
+    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, MatchError, Motion,
+    NearestNeighbour, PointMatcher, PointSet,
 };
 use tactile_tps::Scalar;
 
@@ -17,7 +18,11 @@ fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
     let drift = |motion| {
         CoherentPointDrift::new(DriftOptions { motion, ..Default::default() }).expect("valid options")
     };
+    // Eight neighbours instead of half of all points: what is checked here does not need the time of the latter.
+    let options = DenseOptions { neighbourhood: Neighbourhood::Nearest(8), ..Default::default() };
+    let dense = DenseRelaxation::new(options).expect("valid options");
     vec![
+        ("dense relaxation", Box::new(dense)),
         ("nearest neighbour", Box::new(NearestNeighbour::new())),
         ("linear assignment", Box::new(LinearAssignment::new())),
         ("coherent point drift", Box::new(CoherentPointDrift::default())),

@@ -21,17 +21,22 @@
 //! neighbour, so that a point with one neighbour has no support: that is what is printed.
 //!
 //! One sweep costs `O(I J A B)` for `A` and `B` neighbours a point, and with neighbourhoods of the median radius
-//! `A ≈ I/2`, `B ≈ J/2`: fourth order, not the third the paper claims. The crate's fast matcher
-//! is what to use; this one is what to check it against.
+//! `A ≈ I/2`, `B ≈ J/2`: fourth order, not the third the paper claims. [`RelaxationMatcher`](crate::RelaxationMatcher)
+//! is what to use; [`DenseRelaxation`] is what to check it against.
 
 mod compatibility;
 mod match_matrix;
+mod matcher;
 mod neighbourhood;
+mod outcome;
+mod shape_context;
 mod support;
 mod update;
 
 pub use compatibility::{Compatibility, CompatibilityRule, LengthMaximum, alpha, alpha_global, beta, gamma};
 pub use match_matrix::MatchMatrix;
+pub use matcher::{DenseOptions, DenseRelaxation};
 pub use neighbourhood::{Edge, NeighbourGraph, Neighbourhood, median_pairwise_distance};
+pub use shape_context::first_matches;
 pub use support::{energy, support, support_by};
 pub use update::{SinkhornReport, sinkhorn, sweep, update};
