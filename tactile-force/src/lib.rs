@@ -17,7 +17,7 @@ mod shear;
 
 pub use calibration::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, Hysteresis,
-    LinearCalibration, Robustness, StopReason, StressCalibration,
+    LinearCalibration, MonotoneCalibration, PolynomialCalibration, Robustness, StopReason, StressCalibration,
 };
 pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity};
 pub use drift::{Drift, DriftCorrection};

@@ -25,6 +25,21 @@ pub(crate) struct Fit {
     pub(crate) stop: StopReason,
 }
 
+impl Fit {
+    /// A fit whose curve is not a combination of columns.
+    pub(super) fn without_coefficients(residuals: Vec<f64>, weights: Vec<f64>, residual_sd: f64) -> Self {
+        Self {
+            coefficients: Vec::new(),
+            covariance: DMatrix::zeros(0, 0),
+            residuals,
+            weights,
+            residual_sd,
+            iterations: 1,
+            stop: StopReason::Direct,
+        }
+    }
+}
+
 /// Solves for the coefficients of the design's columns.
 pub(crate) fn solve(design: &DMatrix<f64>, y: &[f64], robustness: Robustness) -> Result<Fit, ForceError> {
     let y = DVector::from_column_slice(y);
@@ -44,7 +59,7 @@ pub(crate) fn solve(design: &DMatrix<f64>, y: &[f64], robustness: Robustness) ->
             let residuals = &y - design * &coefficients;
             scale = robust_scale(residuals.as_slice(), design.ncols());
             for (w, r) in weights.iter_mut().zip(residuals.iter()) {
-                *w = weight(stage, *r, scale);
+                *w = robust_weight(stage, *r, scale);
             }
             let next = weighted(design, &y, &weights)?;
             let step = (design * (&next - &coefficients)).amax();
@@ -99,7 +114,7 @@ fn robust_scale(residuals: &[f64], parameters: usize) -> f64 {
     MAD_TO_SD * 0.5 * (kept[kept.len() / 2] + kept[(kept.len() - 1) / 2])
 }
 
-fn weight(stage: Robustness, residual: f64, scale: f64) -> f64 {
+pub(super) fn robust_weight(stage: Robustness, residual: f64, scale: f64) -> f64 {
     if residual == 0.0 {
         return 1.0;
     }
@@ -121,7 +136,7 @@ fn error_variance(robustness: Robustness, residuals: &[f64], scale: f64, p: usiz
         let variance = residuals.iter().map(|r| r * r).sum::<f64>() / freedom;
         return (variance, variance.sqrt());
     }
-    let psi = |r: f64| weight(robustness, r, scale) * r / scale;
+    let psi = |r: f64| robust_weight(robustness, r, scale) * r / scale;
     let slope = |r: f64| match robustness {
         Robustness::Huber => f64::from(r.abs() <= HUBER * scale),
         _ => {

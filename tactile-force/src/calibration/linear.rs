@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::report::{self, Shape};
+use super::curve::extremes;
+use super::report::{self, Parameters, Shape};
 use super::{
     CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs, least_squares,
 };
@@ -54,19 +55,25 @@ impl<T: Real> LinearCalibration<T> {
         let slope = fit.coefficients[last] / scale;
         let level = if columns == 2 { fit.coefficients[0] } else { 0.0 };
         let shape = Shape {
-            linearity_error: nonlinearity(&values, &forces, &fit.residuals),
+            linearity_error: nonlinearity(&forces, &fit.residuals),
             sensitivity: slope,
             monotone: slope > 0.0,
         };
         let (variance, covariance) =
             if columns == 2 { (fit.covariance[(0, 0)], fit.covariance[(0, 1)] / scale) } else { (0.0, 0.0) };
+        let slope_variance = fit.covariance[(last, last)] / (scale * scale);
+        let offset =
+            (level - slope * centre, variance - 2.0 * covariance * centre + slope_variance * centre * centre);
+        let estimates =
+            if columns == 2 { vec![offset, (slope, slope_variance)] } else { vec![(slope, slope_variance)] };
+        let parameters = Parameters { estimates, degrees_of_freedom: pairs.len() - columns };
         Ok(Self {
             centre: T::nearest(centre),
             level_n: Estimate::nearest(level, variance),
             slope_n: Estimate::nearest(slope, fit.covariance[(last, last)] / (scale * scale)),
             covariance: T::nearest(covariance),
-            range: bounds(&values),
-            report: report::build(pairs, &fit, shape),
+            range: extremes(&values).map(T::nearest),
+            report: report::build(pairs, &fit, parameters, shape),
         })
     }
 
@@ -82,14 +89,8 @@ impl<T: Real> LinearCalibration<T> {
 }
 
 /// The line's own linearity error is that of its data: the greatest residual as a share of the full scale.
-fn nonlinearity(_values: &[f64], forces: &[f64], residuals: &[f64]) -> f64 {
+fn nonlinearity(forces: &[f64], residuals: &[f64]) -> f64 {
     residuals.iter().fold(0.0_f64, |m, r| m.max(r.abs())) / report::full_scale(forces)
-}
-
-fn bounds<T: Real>(values: &[f64]) -> [T; 2] {
-    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    [T::nearest(least), T::nearest(greatest)]
 }
 
 impl<T: Real> StressCalibration<T> for LinearCalibration<T> {

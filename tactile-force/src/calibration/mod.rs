@@ -8,11 +8,16 @@
 //! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V)  exactly.
 //! ```
 
+mod curve;
 mod least_squares;
 mod linear;
+mod monotone;
+mod polynomial;
 mod report;
 
 pub use linear::LinearCalibration;
+pub use monotone::MonotoneCalibration;
+pub use polynomial::PolynomialCalibration;
 pub use report::{CalibrationReport, Hysteresis, StopReason};
 
 use crate::{Estimate, ForceError, Real};

@@ -1,7 +1,10 @@
 //! How well a calibration fits its pairs.
 
-use super::{Branch, CalibrationPair, least_squares::Fit};
-use crate::{Estimate, Real};
+use nalgebra::DMatrix;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::{Branch, CalibrationPair, Robustness, least_squares, least_squares::Fit};
+use crate::{Estimate, ForceError, Real};
 
 /// Why a fit stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +37,13 @@ pub struct Hysteresis<T> {
 pub struct CalibrationReport<T> {
     /// Number of pairs.
     pub pairs: usize,
-    /// Number of parameters fitted.
-    pub parameters: usize,
+    /// Parameters with their standard errors: [offset, slope] of a line (slope alone through the origin), Chebyshev
+    /// coefficients of a polynomial, levels of a monotone curve.
+    pub parameters: Vec<Estimate<T>>,
+    /// 95 % confidence interval of every parameter, by Student's t.
+    pub intervals_95: Vec<[T; 2]>,
+    /// Pairs less parameters.
+    pub degrees_of_freedom: usize,
     /// Coefficient of determination, 1 − Σr²/Σ(F − F̄)².
     pub r_squared: T,
     /// Standard deviation of the residuals, √(Σr²/(n − p)); a robust scale where outliers were discounted. Newtons.
@@ -46,7 +54,8 @@ pub struct CalibrationReport<T> {
     pub weights: Vec<T>,
     /// Loading against unloading; `None` unless both branches were given and overlap.
     pub hysteresis: Option<Hysteresis<T>>,
-    /// Greatest departure of the fitted curve from the straight line through its data, as a share of the full scale.
+    /// Greatest departure of the fitted curve from the straight line through its data, as a share of the full scale; of a
+    /// straight line, the greatest departure of a pair.
     pub linearity_error: T,
     /// Mean sensitivity over the range, (F(V₁) − F(V₀))/(V₁ − V₀), in newtons per grey level.
     pub sensitivity_n: T,
@@ -69,7 +78,41 @@ pub(super) struct Shape {
     pub(super) monotone: bool,
 }
 
-pub(super) fn build<T: Real>(pairs: &[CalibrationPair<T>], fit: &Fit, shape: Shape) -> CalibrationReport<T> {
+/// Parameters and their variances.
+pub(super) struct Parameters {
+    pub(super) estimates: Vec<(f64, f64)>,
+    pub(super) degrees_of_freedom: usize,
+}
+
+impl Parameters {
+    /// Coefficients as fitted.
+    pub(super) fn of(fit: &Fit) -> Self {
+        let estimates =
+            fit.coefficients.iter().zip(fit.covariance.diagonal().iter()).map(|(c, v)| (*c, *v)).collect();
+        Self { estimates, degrees_of_freedom: fit.residuals.len() - fit.coefficients.len() }
+    }
+
+    /// Levels, each of (force, sd of a pair, number of pairs).
+    pub(super) fn levels(levels: &[(f64, f64, usize)], pairs: usize) -> Self {
+        let estimates = levels.iter().map(|(f, sd, n)| (*f, sd * sd / *n as f64)).collect();
+        Self { estimates, degrees_of_freedom: pairs.saturating_sub(levels.len()).max(1) }
+    }
+
+    fn intervals<T: Real>(&self) -> Vec<[T; 2]> {
+        let t = StudentsT::new(0.0, 1.0, self.degrees_of_freedom.max(1) as f64)
+            .map_or(f64::NAN, |d| d.inverse_cdf(0.975));
+        let interval =
+            |(value, variance): &(f64, f64)| [-t, t].map(|t| T::nearest(value + t * variance.sqrt()));
+        self.estimates.iter().map(interval).collect()
+    }
+}
+
+pub(super) fn build<T: Real>(
+    pairs: &[CalibrationPair<T>],
+    fit: &Fit,
+    parameters: Parameters,
+    shape: Shape,
+) -> CalibrationReport<T> {
     let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
     let mean = forces.iter().sum::<f64>() / forces.len() as f64;
     let total: f64 = forces.iter().map(|f| (f - mean).powi(2)).sum();
@@ -78,7 +121,9 @@ pub(super) fn build<T: Real>(pairs: &[CalibrationPair<T>], fit: &Fit, shape: Sha
     let cast = |values: &[f64]| values.iter().map(|&v| T::nearest(v)).collect();
     CalibrationReport {
         pairs: pairs.len(),
-        parameters: fit.coefficients.len(),
+        intervals_95: parameters.intervals(),
+        degrees_of_freedom: parameters.degrees_of_freedom,
+        parameters: parameters.estimates.iter().map(|(c, v)| Estimate::nearest(*c, *v)).collect(),
         r_squared: T::nearest(1.0 - left / total),
         residual_sd_n: T::nearest(fit.residual_sd),
         residuals_n: cast(&fit.residuals),
@@ -97,6 +142,22 @@ pub(super) fn build<T: Real>(pairs: &[CalibrationPair<T>], fit: &Fit, shape: Sha
 pub(super) fn full_scale(forces: &[f64]) -> f64 {
     let least = forces.iter().copied().fold(f64::INFINITY, f64::min);
     forces.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
+}
+
+/// Greatest distance of a curve from the least-squares line of its data, over the full scale.
+pub(super) fn linearity_error(
+    values: &[f64],
+    forces: &[f64],
+    grid: &[f64],
+    curve: impl Fn(f64) -> f64,
+) -> Result<f64, ForceError> {
+    let middle = values.iter().sum::<f64>() / values.len() as f64;
+    let half = values.iter().map(|v| (v - middle).abs()).fold(0.0, f64::max);
+    let design =
+        DMatrix::from_fn(values.len(), 2, |i, j| if j == 0 { 1.0 } else { (values[i] - middle) / half });
+    let line = least_squares::solve(&design, forces, Robustness::None)?.coefficients;
+    let distance = |v: &f64| (curve(*v) - line[0] - line[1] * (v - middle) / half).abs();
+    Ok(grid.iter().map(distance).fold(0.0, f64::max) / full_scale(forces))
 }
 
 /// Compares the residuals of each branch with the other branch's, interpolated at the same pixel value. Residuals are
