@@ -20,7 +20,6 @@ pub(super) struct Tracer<'a, 's, T, S: ?Sized> {
     /// Gap that counts as contact with the surface.
     pub(super) tolerance: T,
     pub(super) camera_sine: T,
-    pub(super) cutoff: T,
     pub(super) tally: Tally<T>,
     pub(super) camera_profile: &'a mut [T],
     /// State of the random numbers of the current ray.
@@ -29,7 +28,7 @@ pub(super) struct Tracer<'a, 's, T, S: ?Sized> {
 
 /// What a ray meets next.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Next {
+pub(super) enum Next {
     /// The slab's top.
     Top,
     /// The upper face of its layer, an interface inside the slab.
@@ -45,7 +44,7 @@ enum Next {
 impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
     /// Follows a ray and all its branches.
     pub(super) fn follow(&mut self, first: Ray<T>) {
-        let smallest = first.power * self.cutoff;
+        let smallest = first.power * self.options.cutoff;
         let mut branches = Branches::new();
         let mut current = Some(first);
         while let Some(ray) = current {
@@ -60,7 +59,7 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
     }
 
     /// Moves the ray to what it meets next; returns what goes on.
-    fn advance(&mut self, ray: Ray<T>, branches: &mut Branches<T>) -> Option<Ray<T>> {
+    pub(super) fn advance(&mut self, ray: Ray<T>, branches: &mut Branches<T>) -> Option<Ray<T>> {
         let (way, next) = self.next(&ray);
         let mut ray = Ray { position: ray.at(way), events: ray.events + 1, ..ray };
         match next {
@@ -87,7 +86,7 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
     }
 
     /// The nearest of edge, faces and top.
-    fn next(&self, ray: &Ray<T>) -> (T, Next) {
+    pub(super) fn next(&self, ray: &Ray<T>) -> (T, Next) {
         let (zero, [ux, _, uz]) = (T::zero(), ray.direction);
         let edge = match ux {
             u if u > zero => (self.slab.length - ray.position[0]) / u,

@@ -15,15 +15,17 @@
 
 mod budget;
 mod follow;
+mod path;
 mod ray;
 pub(crate) mod sampling;
 
 pub use budget::LightBudget;
+pub use path::path;
 
 use crate::error::OpticsError;
 use crate::fresnel::from_sine_and_cosine;
 use crate::led::{Geometry, Led};
-use crate::real::{Real, real, within};
+use crate::real::{Real, as_f64, real, within};
 use crate::surface::{TopSurface, contact_gap};
 use budget::{Fate, Tally};
 use follow::Tracer;
@@ -139,24 +141,8 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
     camera_profile: &mut [T],
 ) -> Result<LightBudget<T>, OpticsError> {
     within("number of rays", real::<T>(f64::from(options.rays)), 1.0, 4.3e9)?;
-    within("cut-off", options.cutoff, 0.0, 1.0)?;
-    let right = core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7);
-    within("half angle of the camera", options.camera_half_angle, 0.0, right)?;
-    within("half width of the emitter", options.emitter_half_width_m, 0.0, 1e6)?;
-    let top = slab.layers[0].thickness_m;
-    within("depth of the surface", surface.deepest(), 0.0, crate::real::as_f64(top) * (1.0 - 1e-6))?;
     camera_profile.fill(T::zero());
-    let mut tracer = Tracer {
-        slab,
-        surface,
-        options,
-        tolerance: contact_gap(slab.thickness_m()),
-        camera_sine: options.camera_half_angle.sin(),
-        cutoff: options.cutoff,
-        tally: Tally::new(),
-        camera_profile,
-        stream: 0,
-    };
+    let mut tracer = options_tracer(slab, surface, options, camera_profile)?;
     let points = Points::new(options.geometry == Geometry::Volume, options.seed);
     let mut total = Tally::new();
     for i in 0..u64::from(options.rays) {
@@ -170,8 +156,33 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
         tracer.follow(Ray { power: transmitted, ..entry.0 });
     }
     let total = total.budget(T::one()).entry;
-    camera_profile_share(tracer.camera_profile, total);
+    tracer.camera_profile.iter_mut().for_each(|v| *v = *v / total);
     Ok(tracer.tally.budget(total))
+}
+
+/// Checks the options and makes what follows rays.
+fn options_tracer<'a, 's, T: Real, S: TopSurface<T> + ?Sized>(
+    slab: &'a Slab<'s, T>,
+    surface: &'a S,
+    options: &'a TraceOptions<T>,
+    camera_profile: &'a mut [T],
+) -> Result<Tracer<'a, 's, T, S>, OpticsError> {
+    within("cut-off", options.cutoff, 0.0, 1.0)?;
+    let right = core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7);
+    within("half angle of the camera", options.camera_half_angle, 0.0, right)?;
+    within("half width of the emitter", options.emitter_half_width_m, 0.0, 1e6)?;
+    let top = as_f64(slab.layers[0].thickness_m);
+    within("depth of the surface", surface.deepest(), 0.0, top * (1.0 - 1e-6))?;
+    Ok(Tracer {
+        slab,
+        surface,
+        options,
+        tolerance: contact_gap(slab.thickness_m()),
+        camera_sine: options.camera_half_angle.sin(),
+        tally: Tally::new(),
+        camera_profile,
+        stream: 0,
+    })
 }
 
 /// The ray inside the slab, at the share `z` of its thickness from the top, and the edge's transmittance.
@@ -192,8 +203,4 @@ fn launch<T: Real>(slab: &Slab<'_, T>, z: T, y: T, outside: [T; 3]) -> (Ray<T>, 
     let position = [T::zero(), y, slab.face(layer) - depth];
     let ray = Ray { position, direction: [along, uy, uz], layer, power: T::zero(), events: 0 };
     (ray, edge.transmittance())
-}
-
-fn camera_profile_share<T: Real>(profile: &mut [T], total: T) {
-    profile.iter_mut().for_each(|v| *v = *v / total);
 }

@@ -1,0 +1,54 @@
+//! The way of a single ray, for drawings.
+
+use super::follow::Tracer;
+use super::ray::{Branches, Ray};
+use super::{Slab, TraceOptions, launch, options_tracer};
+use crate::error::OpticsError;
+use crate::real::{Real, real, within};
+use crate::surface::TopSurface;
+
+/// Follows the stronger part of one ray and writes its vertices (x, y, z in metres, z from the undeformed top) to
+/// `vertices`; returns how many were written. The ray enters the edge x = 0 in the plane y = 0 at `depth_share` of the
+/// slab's thickness, `angle` radians upwards from the LED's axis. It ends at an edge, where most of its light leaves
+/// through top or bottom, or where `vertices` is full.
+///
+/// # Errors
+/// [`OpticsError::OutOfRange`] for a share outside 0 to 1, an angle beyond a right one, or a surface deeper than the top layer.
+pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
+    slab: &Slab<'_, T>,
+    surface: &S,
+    depth_share: T,
+    angle: T,
+    vertices: &mut [[T; 3]],
+) -> Result<usize, OpticsError> {
+    within("share of the slab's depth", depth_share, 0.0, 1.0)?;
+    let right = core::f64::consts::FRAC_PI_2;
+    within("angle of the ray", angle, -right, right)?;
+    let options = TraceOptions::default();
+    let mut tracer: Tracer<'_, '_, T, S> = options_tracer(slab, surface, &options, &mut [])?;
+    let outside = [angle.cos(), T::zero(), angle.sin()];
+    let (ray, _) = launch(slab, depth_share, T::zero(), outside);
+    let mut current = Some(Ray { power: T::one(), ..ray });
+    let mut written = 0;
+    while let (Some(ray), true) = (current, written < vertices.len()) {
+        vertices[written] = ray.position;
+        written += 1;
+        let mut waiting = Branches::new();
+        let going_on = tracer.advance(ray, &mut waiting);
+        // The strongest of what goes on, and whether more than that has left.
+        let mut best = going_on;
+        while let Some(branch) = waiting.pop() {
+            if best.is_none_or(|b| b.power < branch.power) {
+                best = Some(branch);
+            }
+        }
+        let stays = best.filter(|b| b.power >= ray.power * real(0.5));
+        if stays.is_none() && written < vertices.len() {
+            let (way, _) = tracer.next(&ray);
+            vertices[written] = ray.at(way);
+            written += 1;
+        }
+        current = stays;
+    }
+    Ok(written)
+}
