@@ -12,7 +12,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Parser;
-use tactile_imaging::optics::surface::{Dimple, Flat, TopSurface, TouchingObject, Touched};
+use tactile_imaging::optics::surface::{Dimple, Flat, TopSurface, Touched, TouchingObject};
 use tactile_imaging::optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, path, trace};
 use tactile_imaging::optics::{AcceptanceAngle, Dispersion, Geometry, LayerStack, Led, OpticsError};
 use tactile_imaging::plot::{Colour, Page, Panel, Scale};
@@ -66,13 +66,18 @@ fn print_angles() -> Result<(), OpticsError> {
     for (n, answer) in indices.iter().zip(stack.acceptance_angles()) {
         let share = 100.0 * Led::lambertian().trapped_share(answer, Geometry::Volume);
         match answer {
-            AcceptanceAngle::Below(angle) => println!("  {n:.2}          {:6.2}°  {share:35.2} %", angle.degrees()),
+            AcceptanceAngle::Below(angle) => {
+                println!("  {n:.2}          {:6.2}°  {share:35.2} %", angle.degrees())
+            }
             AcceptanceAngle::AllTrapped => println!("  {n:.2}          every ray {share:33.2} %"),
             AcceptanceAngle::NoneTrapped => println!("  {n:.2}          none {share:38.2} %"),
         }
     }
     let cone = stack.led_cone(140_f64.to_radians())?;
-    println!("an LED cone of 140° is trapped by every layer: {}", if cone.is_trapped() { "yes" } else { "no" });
+    println!(
+        "an LED cone of 140° is trapped by every layer: {}",
+        if cone.is_trapped() { "yes" } else { "no" }
+    );
     Ok(())
 }
 
@@ -92,7 +97,11 @@ struct Scenes<'a> {
 }
 
 impl Scenes<'_> {
-    fn budget(&self, surface: &dyn TopSurface<f64>, geometry: Geometry) -> Result<LightBudget<f64>, OpticsError> {
+    fn budget(
+        &self,
+        surface: &dyn TopSurface<f64>,
+        geometry: Geometry,
+    ) -> Result<LightBudget<f64>, OpticsError> {
         let options = self.options(geometry, self.rays, 1);
         trace(&self.slab, &self.led, surface, &options, &mut [])
     }
@@ -123,12 +132,24 @@ impl Scenes<'_> {
         let mut panel = Panel::new(title).x_label("along the slab (mm)").y_label("height (mm)");
         let mut vertices = [[0.0; 3]; 200];
         let colours = [Colour::BLUE, Colour::ORANGE, Colour::GREEN, Colour::PURPLE, Colour::SKY];
+        let (mut stays, mut leaves) = (Vec::new(), Vec::new());
         for (k, colour) in colours.into_iter().enumerate() {
-            let (depth, angle) = (0.15 + 0.1 * k as f64, 0.2 + 0.2 * k as f64);
-            let written = path(&self.slab, surface, depth, angle, &mut vertices)?;
-            let line = vertices[..written].iter().map(|v| [mm(v[0]), mm(v[2])]);
+            // Aimed at the flank that faces the LED, from five angles within its cone.
+            let angle = 0.3 + 0.2 * k as f64;
+            let inside = (angle.sin() / 1.40).asin();
+            let depth_share = (12.5e-3 * inside.tan() / self.slab.thickness_m()).min(1.0);
+            let written = path(&self.slab, surface, depth_share, angle, &mut vertices)?;
+            let line: Vec<[f64; 2]> = vertices[..written].iter().map(|v| [mm(v[0]), mm(v[2])]).collect();
+            let end = line[written - 1];
+            if end[0] < mm(LENGTH_M) - 1e-6 {
+                leaves.push(end)
+            } else {
+                stays.push(end)
+            }
             panel = panel.line(line, colour, "");
         }
+        panel =
+            panel.points(stays, Colour::BLACK, "still trapped").points(leaves, Colour::RED, "leaves here");
         let top = (0..=300).map(|i| 1e-4 * f64::from(i)).map(|x| [mm(x), mm(surface.height(x, 0.0))]);
         panel = panel.line(top, Colour::BLACK, "");
         for z in [-2.0, -5.0, -10.0, -12.0] {
@@ -189,7 +210,11 @@ impl Scenes<'_> {
             let mut profile = [0.0; 30];
             let options = self.options(Geometry::Volume, 4 * self.rays, 1);
             trace(&self.slab, &self.led, surface, &options, &mut profile)?;
-            panel = panel.line(profile.iter().enumerate().map(|(k, v)| [k as f64 + 0.5, 100.0 * v]), colour, name);
+            panel = panel.line(
+                profile.iter().enumerate().map(|(k, v)| [k as f64 + 0.5, 100.0 * v]),
+                colour,
+                name,
+            );
         }
         Ok(panel)
     }
@@ -220,7 +245,7 @@ impl Scenes<'_> {
         Ok(Panel::new("Convergence with the number of rays")
             .x_label("rays")
             .y_label("rms error (%)")
-            .scales(Scale::Log, Scale::Log)
+            .scales(Scale::Log10, Scale::Log10)
             .dashed(random, Colour::GREY, "random rays, 1/√N")
             .line(curve, Colour::BLUE, "evenly spread rays"))
     }

@@ -93,10 +93,11 @@ impl<T: Real> AcceptanceAngle<T> {
 /// ```
 pub fn critical_angle<T: Real>(n: T, ambient: T) -> Result<CriticalAngle<T>, OpticsError> {
     let (n, n0) = (index(n)?, index(ambient)?);
-    Ok(match excess(n, n0) {
-        None => CriticalAngle::Never,
-        Some(excess) => CriticalAngle::Beyond(Angle::from_legs(n0, excess)),
-    })
+    if n <= n0 {
+        return Ok(CriticalAngle::Never);
+    }
+    // The root of each factor: the product of two huge indices would overflow.
+    Ok(CriticalAngle::Beyond(Angle::from_legs(n0, (n - n0).sqrt() * (n + n0).sqrt())))
 }
 
 /// The acceptance angle of a layer of index `n` in an ambient of index `ambient`, (1)–(4).
@@ -115,23 +116,21 @@ pub fn critical_angle<T: Real>(n: T, ambient: T) -> Result<CriticalAngle<T>, Opt
 /// ```
 pub fn acceptance_angle<T: Real>(n: T, ambient: T) -> Result<AcceptanceAngle<T>, OpticsError> {
     let (n, n0) = (index(n)?, index(ambient)?);
-    let Some(excess) = excess(n, n0) else { return Ok(AcceptanceAngle::NoneTrapped) };
-    // Squares of very small or large indices would leave the scalar's range.
+    if n <= n0 {
+        return Ok(AcceptanceAngle::NoneTrapped);
+    }
     if n >= n0 + n0 {
         return Ok(AcceptanceAngle::AllTrapped);
     }
+    // Squares of very small or large indices would leave the scalar's range.
     let scale = power_of_two_near(n0).recip();
-    let room = twice_square_minus_square(n0 * scale, n * scale);
+    let (n, n0) = (n * scale, n0 * scale);
+    let room = twice_square_minus_square(n0, n);
     Ok(if room > T::zero() {
-        AcceptanceAngle::Below(Angle::from_legs(excess * scale, room.sqrt()))
+        AcceptanceAngle::Below(Angle::from_legs(((n - n0) * (n + n0)).sqrt(), room.sqrt()))
     } else {
         AcceptanceAngle::AllTrapped
     })
-}
-
-/// √(n² − n₀²), or nothing unless n > n₀.
-fn excess<T: Real>(n: T, n0: T) -> Option<T> {
-    (n > n0).then(|| (n - n0).sqrt() * (n + n0).sqrt())
 }
 
 /// A power of two near `x`, for scaling without rounding; 1 in the range where nothing needs it.

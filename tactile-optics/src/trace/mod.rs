@@ -149,7 +149,11 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
         let [z, u, v, y] = points.point::<T>(i);
         let (outside, weight) = led.direction(u, v, options.geometry);
         total.add(Fate::Entry, weight);
-        let entry = launch(slab, z, (y + y - T::one()) * options.emitter_half_width_m, outside);
+        let across = match options.geometry {
+            Geometry::Section => T::zero(),
+            Geometry::Volume => (y + y - T::one()) * options.emitter_half_width_m,
+        };
+        let entry = launch(slab, z, across, outside);
         let transmitted = weight * entry.1;
         tracer.tally.add(Fate::Entry, weight - transmitted);
         tracer.stream = sampling::hash(options.seed ^ sampling::hash(i));
