@@ -9,7 +9,12 @@ pub use tactile_tps as tps;
 
 #[cfg(feature = "scene")]
 pub mod io;
+pub mod pipeline;
 #[cfg(feature = "plot")]
 pub mod plot;
+#[cfg(feature = "scene")]
+pub mod scene;
 #[cfg(feature = "simulate")]
 pub mod simulate;
+
+pub use pipeline::{Measurement, Object, Pipeline, Press};

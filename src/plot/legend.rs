@@ -1,7 +1,7 @@
 //! The legend: a sample and a name for every labelled layer.
 use super::draw::{Chart, Fail, rgb, style};
 use super::layer::Layer;
-use super::panel::Panel;
+use super::panel::{Legend, Panel};
 use plotters::prelude::*;
 
 pub(super) fn draw_legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, panel: &Panel) -> Result<(), Fail<'a>> {
@@ -30,9 +30,15 @@ pub(super) fn draw_legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, panel: &Panel) 
     if !any {
         return Ok(());
     }
+    let position = match panel.legend {
+        Legend::UpperRight => SeriesLabelPosition::UpperRight,
+        Legend::UpperLeft => SeriesLabelPosition::UpperLeft,
+        Legend::LowerRight => SeriesLabelPosition::LowerRight,
+        Legend::LowerLeft => SeriesLabelPosition::LowerLeft,
+    };
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(position)
         .margin(8)
         .legend_area_size(22)
         .label_font(style(13, BLACK))

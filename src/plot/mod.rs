@@ -30,10 +30,12 @@ mod map;
 mod marks;
 mod page;
 mod panel;
+mod press;
 mod ticks;
 
 pub use colour::{ColorMap, Colour};
 pub use heat::HeatMap;
 pub use layer::{Layer, Marker};
 pub use page::{Page, PlotError};
-pub use panel::{Panel, Scale};
+pub use panel::{Legend, Panel, Scale};
+pub use press::{PressPlotError, save_press_pages, summary_lines};

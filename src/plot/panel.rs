@@ -23,6 +23,21 @@ impl Scale {
     }
 }
 
+/// Where the legend stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Legend {
+    /// Above the data, on the right.
+    #[default]
+    UpperRight,
+    /// Above the data, on the left.
+    UpperLeft,
+    /// Below the data, on the right.
+    LowerRight,
+    /// Below the data, on the left.
+    LowerLeft,
+}
+
 /// One set of axes and what is drawn in it.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
@@ -36,6 +51,7 @@ pub struct Panel {
     pub(super) x_range: Option<[f64; 2]>,
     pub(super) y_range: Option<[f64; 2]>,
     pub(super) text: Vec<String>,
+    pub(super) legend: Legend,
 }
 
 impl Panel {
@@ -70,6 +86,13 @@ impl Panel {
     pub fn image_axes(mut self) -> Self {
         self.y_down = true;
         self.equal_aspect()
+    }
+
+    /// Moves the legend.
+    #[must_use]
+    pub fn legend(mut self, legend: Legend) -> Self {
+        self.legend = legend;
+        self
     }
 
     /// Sets how the axes count.

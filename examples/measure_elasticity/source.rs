@@ -1,0 +1,75 @@
+//! Where the frames come from: the simulator or a scene file.
+use crate::arguments::{Arguments, Polymer};
+use tactile_imaging::pipeline::{Press, Stages, Trial, Truth};
+use tactile_imaging::scene::{Scene, SceneData};
+use tactile_imaging::simulate::{CalibrationOptions, Camera, Elastic, Load, PressOptions, Sphere};
+
+pub type Failure = Box<dyn std::error::Error>;
+
+/// Frames with all that is needed to measure them.
+pub enum Source {
+    /// Simulated, with the truth.
+    Simulated(Box<Trial>),
+    /// A user's own.
+    Scene(Scene, SceneData),
+}
+
+impl Source {
+    pub fn open(arguments: &Arguments) -> Result<Self, Failure> {
+        if let Some(path) = &arguments.scene {
+            eprintln!("reading {}", path.display());
+            let scene = Scene::read(path)?;
+            let data = scene.load()?;
+            return Ok(Self::Scene(scene, data));
+        }
+        eprintln!("simulating a calibration series and {} frames", arguments.forces.len());
+        Ok(Self::Simulated(Box::new(Trial::new(options(arguments), &CalibrationOptions::default())?)))
+    }
+
+    pub fn stages(&self, arguments: &Arguments) -> Result<Box<dyn Stages>, Failure> {
+        Ok(match self {
+            Self::Simulated(trial) => {
+                Box::new(trial.pipeline()?.with_control_points(arguments.points as usize))
+            }
+            Self::Scene(scene, data) => scene.stages_with(data, arguments.points as usize)?,
+        })
+    }
+
+    pub fn press<'a>(&'a self, stages: &'a dyn Stages) -> Result<Press<'a>, Failure> {
+        match self {
+            Self::Simulated(trial) => Ok(trial.press(stages)?),
+            Self::Scene(scene, data) => Ok(scene.press(stages, data)?),
+        }
+    }
+
+    /// The pipeline's error, with file and field where there is a scene file.
+    pub fn explain(&self, error: tactile_imaging::pipeline::PipelineError) -> Failure {
+        match self {
+            Self::Simulated(_) => error.into(),
+            Self::Scene(scene, _) => scene.measure_error(error).into(),
+        }
+    }
+
+    pub fn truth(&self) -> Option<Truth> {
+        if let Self::Simulated(trial) = self { Some(trial.truth()) } else { None }
+    }
+}
+
+fn options(arguments: &Arguments) -> PressOptions {
+    let polymer = match arguments.polymer {
+        Polymer::Cl2000x => Elastic::CL2000X,
+        Polymer::Cl2003x => Elastic::CL2003X,
+    };
+    let material = match arguments.modulus_kpa {
+        Some(kpa) => Elastic { youngs_modulus_pa: kpa * 1e3, ..polymer },
+        None => polymer,
+    };
+    let camera = if arguments.ideal_camera { Camera::default().ideal() } else { Camera::default() };
+    PressOptions {
+        object: Sphere { radius_m: arguments.radius_mm * 1e-3, material },
+        loads: arguments.forces.iter().map(|&f| Load::normal(f)).collect(),
+        camera,
+        seed: arguments.seed,
+        ..PressOptions::default()
+    }
+}

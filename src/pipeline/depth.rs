@@ -1,0 +1,176 @@
+//! Sensors that grow darker with depth: contact by a threshold, depth by a table.
+//!
+//! Such a sensor measures shape, not force: a force must come from a gauge.
+use super::contact::{ContactReading, ContactStage, FrameContact, resize};
+use super::error::PipelineError;
+use crate::force::{BoundingBox, Estimate, ForceError, ForceWorkspace, Polarity, ReferenceFrame};
+use crate::sfs::DepthTable;
+use ndarray::{Array2, ArrayView2};
+
+/// Contact is the largest connected patch that is darker than the reference by more than a threshold.
+#[derive(Clone, Debug)]
+pub struct DarkContact {
+    pixel_size_m: [f64; 2],
+    threshold_grey: f64,
+    table: DepthTable<f64>,
+}
+
+impl DarkContact {
+    /// Darkening that counts as contact: above the noise of an 8-bit camera.
+    pub const DEFAULT_THRESHOLD_GREY: f64 = 3.0;
+
+    /// With a table of (darkness in grey levels, depth in metres). Entries at or below the threshold of contact are
+    /// left out: what lies there is not contact.
+    ///
+    /// # Errors
+    /// [`PipelineError::DepthTable`].
+    pub fn new(table: &[(f64, f64)], pixel_size_m: [f64; 2]) -> Result<Self, PipelineError> {
+        let depth_table = Self::depth_table(table)?;
+        Ok(Self { pixel_size_m, threshold_grey: Self::DEFAULT_THRESHOLD_GREY, table: depth_table })
+    }
+
+    /// The table as a reconstruction, zero where there is no contact.
+    ///
+    /// # Errors
+    /// [`PipelineError::DepthTable`].
+    pub fn depth_table(table: &[(f64, f64)]) -> Result<DepthTable<f64>, PipelineError> {
+        let kept: Vec<_> = table.iter().copied().filter(|(d, z)| *d >= 0.0 && *z >= 0.0).collect();
+        DepthTable::new(&kept)
+            .and_then(|t| t.with_contact_threshold(Self::DEFAULT_THRESHOLD_GREY))
+            .map_err(PipelineError::DepthTable)
+    }
+}
+
+impl ContactStage for DarkContact {
+    fn measure(
+        &self,
+        _workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        gauge_n: Option<f64>,
+        contact: &mut FrameContact,
+    ) -> Result<(), ForceError> {
+        let image = reference.image();
+        if frame.dim() != image.dim() {
+            return Err(ForceError::SizeMismatch { expected: image.dim(), found: frame.dim() });
+        }
+        let darkness = |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]);
+        let patch = largest_patch(frame.dim(), |at| darkness(at) > self.threshold_grey);
+        contact.region = None;
+        contact.reading = None;
+        let Some(patch) = patch else { return Ok(()) };
+        let region = patch.region.grown(1, frame.dim());
+        resize(&mut contact.mask, (region.rows(), region.columns()));
+        contact.mask.fill(false);
+        for &[row, column] in &patch.pixels {
+            contact.mask[[row - region.row_start, column - region.column_start]] = true;
+        }
+        contact.region = Some(region);
+        let peak = patch.pixels.iter().map(|&at| darkness(at)).fold(0.0, f64::max);
+        let saturated = patch.pixels.iter().filter(|&&at| frame[at] == 0).count();
+        contact.reading = Some(self.reading(&patch, frame.dim(), gauge_n, peak, saturated));
+        Ok(())
+    }
+
+    fn polarity(&self) -> Polarity {
+        Polarity::Darker
+    }
+
+    fn pixel_size_m(&self) -> [f64; 2] {
+        self.pixel_size_m
+    }
+}
+
+impl DarkContact {
+    fn reading(
+        &self,
+        patch: &Patch,
+        (rows, columns): (usize, usize),
+        gauge_n: Option<f64>,
+        peak: f64,
+        saturated: usize,
+    ) -> ContactReading {
+        let n = patch.pixels.len() as f64;
+        let mean = |axis: usize| patch.pixels.iter().map(|p| p[axis] as f64).sum::<f64>() / n;
+        // An outline uncertain by half a pixel, pixel by pixel, moves the centroid of a disc by 1/√(2 a) of that.
+        let radius_px = (n / std::f64::consts::PI).sqrt();
+        let centroid_error = 0.5 / (2.0 * radius_px).sqrt();
+        let [hx, hy] = self.pixel_size_m;
+        let pixel = (hx * hy).sqrt();
+        let (depth, _) = self.table.depth(peak);
+        let (step, _) = self.table.depth(peak - 1.0);
+        let b = patch.region;
+        ContactReading {
+            force_n: gauge_n.map(|value| Estimate { value, standard_error: 0.0 }),
+            force_noise_n: 0.0,
+            force_calibration_n: 0.0,
+            contact_radius_m: Estimate { value: radius_px * pixel, standard_error: 0.5 * pixel },
+            indentation_m: Some(Estimate { value: depth, standard_error: (depth - step).abs() }),
+            centroid_px: [mean(1), mean(0)].map(|value| Estimate { value, standard_error: centroid_error }),
+            area_m2: n * hx * hy,
+            peak_grey: peak,
+            saturated_share: saturated as f64 / n,
+            out_of_calibration: !self.table.depth(peak).1,
+            touches_edge: b.row_start == 0
+                || b.column_start == 0
+                || b.row_end == rows
+                || b.column_end == columns,
+            converged: true,
+        }
+    }
+}
+
+/// A connected set of pixels, `[row, column]`, and the box around it.
+struct Patch {
+    pixels: Vec<[usize; 2]>,
+    region: BoundingBox,
+}
+
+/// The largest set of pixels inside, connected by their sides; `None` where no pixel is inside. O(pixels).
+fn largest_patch((rows, columns): (usize, usize), inside: impl Fn([usize; 2]) -> bool) -> Option<Patch> {
+    let mut open = Array2::from_shape_fn((rows, columns), |(r, c)| inside([r, c]));
+    let mut largest: Vec<[usize; 2]> = Vec::new();
+    for start in 0..rows * columns {
+        let start = [start / columns, start % columns];
+        if !std::mem::take(&mut open[start]) {
+            continue;
+        }
+        let mut patch = vec![start];
+        let mut next = 0;
+        while let Some(&[r, c]) = patch.get(next) {
+            next += 1;
+            let beside = [[r.wrapping_sub(1), c], [r + 1, c], [r, c.wrapping_sub(1)], [r, c + 1]];
+            for at in beside {
+                if open.get(at).copied().unwrap_or(false) {
+                    open[at] = false;
+                    patch.push(at);
+                }
+            }
+        }
+        if patch.len() > largest.len() {
+            largest = patch;
+        }
+    }
+    let range = |axis: usize| {
+        let values = largest.iter().map(move |p| p[axis]);
+        values.clone().min().zip(values.max())
+    };
+    let (row_start, row_last) = range(0)?;
+    let (column_start, column_last) = range(1)?;
+    let region = BoundingBox { row_start, row_end: row_last + 1, column_start, column_end: column_last + 1 };
+    Some(Patch { pixels: largest, region })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_patch_wins_and_diagonals_do_not_connect() {
+        let image = ndarray::array![[1, 0, 0, 1], [0, 1, 1, 1], [0, 0, 0, 0], [1, 1, 0, 0]];
+        let patch = largest_patch(image.dim(), |at| image[at] == 1).unwrap();
+        assert_eq!(patch.pixels.len(), 4);
+        assert_eq!((patch.region.row_start, patch.region.column_start), (0, 1));
+        assert!(largest_patch((3, 3), |_| false).is_none());
+    }
+}

@@ -1,0 +1,123 @@
+//! Why a measurement could not be made.
+use crate::elasticity::ElasticityError;
+use crate::force::ForceError;
+use crate::matching::MatchError;
+use crate::sfs::SfsError;
+use crate::tps::TpsError;
+
+/// Why a measurement could not be made. Frames are counted from 0 in the fields and from 1 in the sentences.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PipelineError {
+    /// The reference or the pipeline's own options are not usable.
+    #[error("the sensor's description is not usable: {0}")]
+    Sensor(#[source] ForceError),
+    /// The calibration could not be fitted.
+    #[error("the force calibration cannot be fitted: {0}")]
+    Calibration(#[source] ForceError),
+    /// The depth table is not usable.
+    #[error("the depth table is not usable: {0}")]
+    DepthTable(#[source] SfsError),
+    /// The waveguide or the object is not physical.
+    #[error("the waveguide or the object is not physical: {0}")]
+    Material(#[source] ElasticityError),
+    /// There is no frame of this number.
+    #[error("there is no frame {}: {frames} frames were given", frame + 1)]
+    NoSuchFrame {
+        /// The frame asked for.
+        frame: usize,
+        /// How many there are.
+        frames: usize,
+    },
+    /// A frame could not be read as a contact.
+    #[error("frame {}: {source}", frame + 1)]
+    Contact {
+        /// The frame.
+        frame: usize,
+        /// Why.
+        source: ForceError,
+    },
+    /// A frame shows no contact, but one is needed.
+    #[error("frame {} shows no contact: it does not differ from the reference by more than its noise", frame + 1)]
+    NoContact {
+        /// The frame.
+        frame: usize,
+    },
+    /// The force of a frame is not known: no calibration and no gauge reading.
+    #[error("the force of frame {} is not known: a depth table needs a gauge reading (`force_N`)", frame + 1)]
+    NoForce {
+        /// The frame.
+        frame: usize,
+    },
+    /// No surface could be reconstructed.
+    #[error("frame {}: no surface: {source}", frame + 1)]
+    Surface {
+        /// The frame.
+        frame: usize,
+        /// Why.
+        source: SfsError,
+    },
+    /// The control points could not be matched.
+    #[error("frames {} and {} cannot be matched: {source}", from + 1, to + 1)]
+    Match {
+        /// The first frame.
+        from: usize,
+        /// The second frame.
+        to: usize,
+        /// Why.
+        source: MatchError,
+    },
+    /// Too few control points have partners.
+    #[error("frames {} and {}: only {found} control points have a partner, {expected} are needed", from + 1, to + 1)]
+    TooFewMatches {
+        /// The first frame.
+        from: usize,
+        /// The second frame.
+        to: usize,
+        /// The least number.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// The displacement between two frames has no warp.
+    #[error("frames {} and {}: no warp fits the matches: {source}", from + 1, to + 1)]
+    Warp {
+        /// The first frame.
+        from: usize,
+        /// The second frame.
+        to: usize,
+        /// Why.
+        source: TpsError,
+    },
+    /// The strain between two frames does not exist.
+    #[error("frames {} and {}: no strain: {source}", from + 1, to + 1)]
+    Strain {
+        /// The first frame.
+        from: usize,
+        /// The second frame.
+        to: usize,
+        /// Why.
+        source: ElasticityError,
+    },
+    /// The loads do not determine a modulus.
+    #[error("the loads do not determine the modulus: {0}")]
+    Modulus(#[source] ElasticityError),
+}
+
+impl PipelineError {
+    /// The frame that the trouble comes from, counted from 0, where there is one.
+    pub fn frame(&self) -> Option<usize> {
+        match self {
+            Self::NoSuchFrame { frame, .. }
+            | Self::Contact { frame, .. }
+            | Self::NoContact { frame }
+            | Self::NoForce { frame }
+            | Self::Surface { frame, .. } => Some(*frame),
+            Self::Match { to, .. }
+            | Self::TooFewMatches { to, .. }
+            | Self::Warp { to, .. }
+            | Self::Strain { to, .. } => Some(*to),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Typed cautions: the result stands, but not unconditionally.
+use std::fmt;
+
+/// A caution about a result. Frames are counted from 0 in the fields and from 1 in the sentences.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "kind", rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum Flag {
+    /// Some of the contact's pixels are saturated: force and radius are low.
+    Saturated {
+        /// The frame.
+        frame: usize,
+        /// Share of the contact's pixels.
+        share: f64,
+    },
+    /// The signal lies outside the range of the calibration.
+    OutOfCalibration {
+        /// The frame.
+        frame: usize,
+    },
+    /// The contact reaches the edge of the frame.
+    TouchesEdge {
+        /// The frame.
+        frame: usize,
+    },
+    /// The fit of the contact's profile did not converge.
+    ProfileNotConverged {
+        /// The frame.
+        frame: usize,
+    },
+    /// The calibration and the gauge disagree by more than three standard errors and two per cent.
+    GaugeDisagrees {
+        /// The frame.
+        frame: usize,
+        /// What the calibration says, in newtons.
+        measured_n: f64,
+        /// What the gauge said, in newtons.
+        gauge_n: f64,
+    },
+    /// The matcher stopped before it converged.
+    MatchNotConverged,
+    /// Some control points have no partner.
+    Unmatched {
+        /// How many.
+        points: usize,
+    },
+    /// The warp folds over at some control points; they are left out of the strain.
+    Folded {
+        /// How many.
+        points: usize,
+    },
+    /// There is no strain; the modulus does without it.
+    NoStrain {
+        /// Why.
+        reason: String,
+    },
+    /// An assumption of the estimator is broken.
+    Assumption {
+        /// Which, in words.
+        warning: String,
+    },
+}
+
+impl fmt::Display for Flag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Saturated { frame, share } => {
+                write!(f, "frame {}: {:.2} % of the contact is saturated", frame + 1, 100.0 * share)
+            }
+            Self::OutOfCalibration { frame } => {
+                write!(f, "frame {}: outside the range of the calibration", frame + 1)
+            }
+            Self::TouchesEdge { frame } => {
+                write!(f, "frame {}: the contact reaches the frame's edge", frame + 1)
+            }
+            Self::ProfileNotConverged { frame } => {
+                write!(f, "frame {}: the profile's fit did not converge", frame + 1)
+            }
+            Self::GaugeDisagrees { frame, measured_n, gauge_n } => {
+                write!(
+                    f,
+                    "frame {}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N",
+                    frame + 1
+                )
+            }
+            Self::MatchNotConverged => write!(f, "the match did not converge"),
+            Self::Unmatched { points } => write!(f, "{points} control points have no partner"),
+            Self::Folded { points } => write!(f, "the warp folds over at {points} control points"),
+            Self::NoStrain { reason } => write!(f, "no strain: {reason}"),
+            Self::Assumption { warning } => f.write_str(warning),
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! The pipeline: frames in; force, contact, surface, match, strain and modulus out, each when asked for.
+//!
+//! ```text
+//! frame ─ contact ─┬─ force, radius, centroid ──────────────────────────┐
+//!                  └─ surface ─ control points ─ match ─ warp ─ strain ─┴─ modulus
+//! ```
+//!
+//! A [`Pipeline`] holds the stages (type parameters with defaults, see its docs) and is `Send + Sync`. A [`Press`]
+//! holds frames and computes what it is asked for, with what that needs and nothing else: [`Press::contact`] touches no
+//! surface, [`Press::modulus`] of a ball none either, [`Press::measure`] everything. The [`Report`] says what ran,
+//! for how long, and what was skipped for which reason.
+//!
+//! # Which modulus
+//! For a ball, Hertz's pressure p₀√(1 − r²/a²) read as frontal Lambertian shading is a hemisphere of radius a, and a grows
+//! as (F R/E*)^⅓; between two loads that surface scales by (F₂/F₁)^⅓ whatever the modulus is. The ratio of stress to
+//! strain, equation (31), is therefore reported (first among [`Measurement::estimators`]) but not believed: the modulus comes
+//! from a³ = 3FR/(4E*), both bodies yielding, the waveguide's layers in series. a/R is in every report, and beyond 0.3 the
+//! result carries a flag. For other objects the paper's ratio is the estimate.
+mod contact;
+mod depth;
+mod display;
+mod error;
+mod flag;
+mod measurement;
+mod object;
+mod pair;
+mod press;
+mod report;
+mod stages;
+mod surface;
+#[cfg(feature = "simulate")]
+mod trial;
+
+pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
+pub use depth::DarkContact;
+pub use error::PipelineError;
+pub use flag::Flag;
+pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
+pub use object::Object;
+pub use pair::{LEAST_MATCHES, PairStrain};
+pub use press::Press;
+pub use report::{Report, Skip, SkipReason, Stage, Work};
+pub use stages::{BoxedWarp, DEFAULT_CONTROL_POINTS, Pipeline, Settings, Skips, Stages};
+pub use surface::{ContactSurface, SurfaceInput};
+#[cfg(feature = "simulate")]
+pub use trial::{FrameTruth, Trial, Truth};

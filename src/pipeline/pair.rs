@@ -1,0 +1,64 @@
+//! From two sets of control points to match, displacement and strain.
+use super::error::PipelineError;
+use super::stages::Stages;
+use crate::elasticity::field::{StrainField, StrainSummary};
+use crate::matching::Matching;
+use nalgebra::{Matrix3, Point3};
+
+/// Fewest matches from which a three-dimensional strain can be told.
+pub const LEAST_MATCHES: usize = 8;
+
+/// The strain between two frames.
+#[derive(Clone, Debug)]
+pub struct PairStrain {
+    /// Name of the measure.
+    pub measure: &'static str,
+    /// Strain at every control point of the first frame.
+    pub field: StrainField<f64>,
+    /// Mean, spread and standard error.
+    pub summary: StrainSummary<f64>,
+}
+
+pub(super) fn match_points(
+    stages: &dyn Stages,
+    frames: [usize; 2],
+    model: &[Point3<f64>],
+    target: &[Point3<f64>],
+) -> Result<Matching<f64, 3>, PipelineError> {
+    let [from, to] = frames;
+    stages.matcher().match_points(model, target).map_err(|source| PipelineError::Match { from, to, source })
+}
+
+/// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.
+///
+/// The matcher's own warp follows every point; its gradient across a surface, where no two points lie behind each other,
+/// would be noise. The warp fitted here is smooth.
+pub(super) fn strain(
+    stages: &dyn Stages,
+    frames: [usize; 2],
+    model: &[Point3<f64>],
+    target: &[Point3<f64>],
+    matching: &Matching<f64, 3>,
+) -> Result<PairStrain, PipelineError> {
+    let [from, to] = frames;
+    let pairs = matching.assignment.iter().enumerate().filter_map(|(i, a)| a.map(|j| (i, j)));
+    let pairs: Vec<_> = pairs.filter(|&(i, _)| matching.confidence[i] > 0.0).collect();
+    if pairs.len() < LEAST_MATCHES {
+        return Err(PipelineError::TooFewMatches { from, to, expected: LEAST_MATCHES, found: pairs.len() });
+    }
+    let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
+    let targets: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
+    let weights: Vec<_> = pairs.iter().map(|&(i, _)| matching.confidence[i]).collect();
+    let warp = stages.fit_warp(&sources, &targets, &weights).map_err(|source| PipelineError::Warp {
+        from,
+        to,
+        source,
+    })?;
+    let mut gradients = vec![Matrix3::zeros(); model.len()];
+    warp.jacobian_into(model, &mut gradients).map_err(|source| PipelineError::Warp { from, to, source })?;
+    gradients.iter_mut().for_each(|g| *g -= Matrix3::identity());
+    let measure = stages.strain();
+    let field = StrainField::from_gradients(&gradients, None, measure)
+        .map_err(|source| PipelineError::Strain { from, to, source })?;
+    Ok(PairStrain { measure: measure.name(), summary: field.summary(), field })
+}

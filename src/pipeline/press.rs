@@ -1,0 +1,299 @@
+//! A press: frames at one or more loads, of which nothing is computed before it is asked for.
+use super::contact::{ContactReading, FrameContact};
+use super::error::PipelineError;
+use super::object::{SharedErrors, all_estimates, best_estimate};
+use super::pair::{self, PairStrain};
+use super::report::{Report, SkipReason, Stage};
+use super::stages::Stages;
+use super::surface::{self, ContactSurface};
+use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate};
+use crate::force::{BoundingBox, ForceWorkspace, ReferenceFrame};
+use crate::matching::Matching;
+use crate::sfs::{Surface, Workspace};
+use nalgebra::Point3;
+use ndarray::{Array2, ArrayView2};
+use std::time::Instant;
+
+/// A frame and what is known of it so far.
+struct Loaded<'a> {
+    image: ArrayView2<'a, u8>,
+    gauge_n: Option<f64>,
+    contact: Option<FrameContact>,
+    surface: Option<ContactSurface>,
+    points: Option<Vec<Point3<f64>>>,
+    matching: Option<Matching<f64, 3>>,
+    strain: Option<PairStrain>,
+}
+
+/// Frames at one or more loads. Every result is computed when it is first asked for, with what it needs and nothing else,
+/// and kept. Matches, displacements and strains are from the first frame to a later one.
+///
+/// Made by [`Pipeline::press`](super::Pipeline::press).
+pub struct Press<'a> {
+    stages: &'a dyn Stages,
+    reference: ReferenceFrame,
+    frames: Vec<Loaded<'a>>,
+    /// The frame whose results a frame shares: itself, or an equal one before it.
+    twins: Vec<usize>,
+    force: ForceWorkspace,
+    sfs: Workspace<f64>,
+    signal: Array2<f64>,
+    report: Report,
+}
+
+impl<'a> Press<'a> {
+    /// Starts a press with stages as an object; see [`Pipeline::press`](super::Pipeline::press).
+    ///
+    /// # Errors
+    /// [`PipelineError::Sensor`] for a reference without pixels.
+    pub fn new(stages: &'a dyn Stages, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
+        Ok(Self {
+            stages,
+            reference: ReferenceFrame::new(reference).map_err(PipelineError::Sensor)?,
+            frames: Vec::new(),
+            twins: Vec::new(),
+            force: ForceWorkspace::default(),
+            sfs: Workspace::new(),
+            signal: Array2::default((0, 0)),
+            report: Report::default(),
+        })
+    }
+
+    /// Adds a frame; returns its number.
+    pub fn add_frame(&mut self, image: ArrayView2<'a, u8>) -> usize {
+        self.add_gauged_frame(image, None)
+    }
+
+    /// Adds a frame with a gauge's reading of the force; returns its number.
+    pub fn add_gauged_frame(&mut self, image: ArrayView2<'a, u8>, gauge_n: Option<f64>) -> usize {
+        let index = self.frames.len();
+        let equal = |f: &Loaded<'_>| f.gauge_n == gauge_n && f.image == image;
+        let skip = self.stages.settings().skips.equal_frames;
+        let twin = if skip { self.frames.iter().position(equal) } else { None };
+        if twin.is_some() {
+            self.report.skipped(Stage::Contact, index, SkipReason::EqualFrame, image.len());
+        }
+        self.twins.push(twin.unwrap_or(index));
+        let (contact, surface, points, matching, strain) = (None, None, None, None, None);
+        self.frames.push(Loaded { image, gauge_n, contact, surface, points, matching, strain });
+        index
+    }
+
+    /// The stages.
+    pub fn stages(&self) -> &'a dyn Stages {
+        self.stages
+    }
+
+    /// The image of a frame.
+    pub fn image(&self, frame: usize) -> Option<ArrayView2<'a, u8>> {
+        Some(self.frames.get(frame)?.image)
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// What was computed and skipped so far.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// The gauge's reading of a frame's force, if there was one.
+    pub fn gauge_n(&self, frame: usize) -> Option<f64> {
+        self.frames.get(frame)?.gauge_n
+    }
+
+    fn twin(&self, frame: usize) -> Result<usize, PipelineError> {
+        let frames = self.frames.len();
+        self.twins.get(frame).copied().ok_or(PipelineError::NoSuchFrame { frame, frames })
+    }
+
+    /// The contact of a frame with its force; `None` where nothing touches.
+    ///
+    /// # Errors
+    /// [`PipelineError::Contact`], [`PipelineError::NoSuchFrame`].
+    pub fn contact(&mut self, frame: usize) -> Result<Option<&ContactReading>, PipelineError> {
+        let at = self.twin(frame)?;
+        if self.frames[at].contact.is_none() {
+            let start = Instant::now();
+            let mut contact = FrameContact::default();
+            let loaded = &self.frames[at];
+            self.stages
+                .contact()
+                .measure(&mut self.force, loaded.image, &self.reference, loaded.gauge_n, &mut contact)
+                .map_err(|source| PipelineError::Contact { frame, source })?;
+            let pixels = loaded.image.len();
+            match contact.region {
+                None => self.report.skipped(Stage::Surface, frame, SkipReason::NoContact, pixels),
+                Some(region) if self.stages.settings().skips.outside_contact => {
+                    let saved = pixels - region.rows() * region.columns();
+                    self.report.skipped(Stage::Surface, frame, SkipReason::OutsideContact, saved);
+                }
+                Some(_) => widen(&mut contact, loaded.image.dim()),
+            }
+            self.report.ran(Stage::Contact, start.elapsed());
+            self.frames[at].contact = Some(contact);
+        }
+        Ok(self.frames[at].contact.as_ref().and_then(|c| c.reading.as_ref()))
+    }
+
+    /// The contact of a frame that must have one.
+    fn reading(&mut self, frame: usize) -> Result<ContactReading, PipelineError> {
+        self.contact(frame)?.copied().ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// The surface of a frame's contact.
+    ///
+    /// # Errors
+    /// [`PipelineError::NoContact`], [`PipelineError::Surface`], and those of [`contact`](Self::contact).
+    pub fn surface(&mut self, frame: usize) -> Result<&ContactSurface, PipelineError> {
+        self.reading(frame)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].surface.is_none() {
+            let start = Instant::now();
+            let loaded = &self.frames[at];
+            let contact = loaded.contact.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let region = BoundingBox { row_start: 0, row_end: 0, column_start: 0, column_end: 0 };
+            let mut surface = ContactSurface { surface: Surface::new(), region, pixel_size_m: [1.0; 2] };
+            let reference = self.reference.image();
+            surface::reconstruct(
+                self.stages,
+                &mut self.sfs,
+                &mut self.signal,
+                loaded.image,
+                reference,
+                contact,
+                &mut surface,
+            )
+            .map_err(|source| PipelineError::Surface { frame, source })?;
+            self.report.ran(Stage::Surface, start.elapsed());
+            self.frames[at].surface = Some(surface);
+        }
+        self.frames[at].surface.as_ref().ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// Control points on a frame's surface, in metres from the frame's first pixel.
+    ///
+    /// # Errors
+    /// Those of [`surface`](Self::surface).
+    pub fn control_points(&mut self, frame: usize) -> Result<&[Point3<f64>], PipelineError> {
+        self.surface(frame)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].points.is_none() {
+            let start = Instant::now();
+            let surface = self.frames[at].surface.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let points = surface::sample(self.stages, surface)
+                .map_err(|source| PipelineError::Surface { frame, source })?;
+            self.report.ran(Stage::ControlPoints, start.elapsed());
+            self.frames[at].points = Some(points);
+        }
+        Ok(self.frames[at].points.as_deref().unwrap_or_default())
+    }
+
+    /// The matches of the first frame's control points to those of a later frame.
+    ///
+    /// # Errors
+    /// [`PipelineError::Match`] and those of [`control_points`](Self::control_points).
+    pub fn matching(&mut self, frame: usize) -> Result<&Matching<f64, 3>, PipelineError> {
+        self.control_points(0)?;
+        self.control_points(frame)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].matching.is_none() {
+            let start = Instant::now();
+            let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
+            let matching = pair::match_points(self.stages, [0, frame], points(0), points(at))?;
+            self.report.ran(Stage::Match, start.elapsed());
+            self.frames[at].matching = Some(matching);
+        }
+        self.frames[at].matching.as_ref().ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// The strain between the first frame and a later one.
+    ///
+    /// # Errors
+    /// [`PipelineError::TooFewMatches`], [`PipelineError::Warp`], [`PipelineError::Strain`] and those of
+    /// [`matching`](Self::matching).
+    pub fn strain(&mut self, frame: usize) -> Result<&PairStrain, PipelineError> {
+        self.matching(frame)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].strain.is_none() {
+            let start = Instant::now();
+            let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
+            let matching = self.frames[at].matching.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let strain = pair::strain(self.stages, [0, frame], points(0), points(at), matching)?;
+            self.report.ran(Stage::Strain, start.elapsed());
+            self.frames[at].strain = Some(strain);
+        }
+        self.frames[at].strain.as_ref().ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// Young's modulus by the estimator that fits the object best. For a ball that takes the contacts alone: no surface is
+    /// reconstructed.
+    ///
+    /// # Errors
+    /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
+    pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
+        let with_strain = self.stages.settings().object.needs_strain();
+        let (loads, shared) = self.loads(with_strain)?;
+        let start = Instant::now();
+        let settings = self.stages.settings();
+        let estimate = best_estimate(&settings.object, settings.waveguide.as_ref(), &loads, shared);
+        self.report.ran(Stage::Modulus, start.elapsed());
+        estimate.map_err(PipelineError::Modulus)
+    }
+
+    /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
+    ///
+    /// # Errors
+    /// Those of the contacts; what an estimator cannot do is left out.
+    pub fn estimates(&mut self) -> Result<Vec<ModulusEstimate<f64>>, PipelineError> {
+        let (loads, shared) = match self.loads(true) {
+            Ok(loads) => loads,
+            Err(_) => self.loads(false)?,
+        };
+        let start = Instant::now();
+        let settings = self.stages.settings();
+        let estimates = all_estimates(&settings.object, settings.waveguide.as_ref(), &loads, shared);
+        self.report.ran(Stage::Modulus, start.elapsed());
+        Ok(estimates)
+    }
+
+    /// What every frame says of its load, and the relative errors that all share.
+    fn loads(&mut self, with_strain: bool) -> Result<(Vec<LoadState<f64>>, SharedErrors), PipelineError> {
+        let mut loads = Vec::with_capacity(self.frames.len());
+        let mut shared = SharedErrors::default();
+        for frame in 0..self.frames.len() {
+            let reading = self.reading(frame)?;
+            let force = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
+            shared.force += (reading.force_calibration_n / force.value).abs() / self.frames.len() as f64;
+            let own = if reading.force_noise_n > 0.0 { reading.force_noise_n } else { force.standard_error };
+            let radius = reading.contact_radius_m;
+            let mut load = LoadState::new(Estimate::new(force.value, own))
+                .with_contact_radius(Estimate::new(radius.value, radius.standard_error));
+            if let Some(depth) = reading.indentation_m {
+                load = load.with_indentation(Estimate::new(depth.value, depth.standard_error));
+            }
+            if with_strain && frame > 0 && self.twins[frame] != 0 {
+                let first = self.reading(0)?.force_n.map_or(0.0, |f| f.value);
+                let summary = &self.strain(frame)?.summary;
+                // (31) takes the strain's size; its sign says whether the load rose.
+                let value = summary.mean[(2, 2)].abs().copysign(force.value - first);
+                load = load.with_mean_strain(Estimate::new(value, summary.standard_error[(2, 2)]));
+            }
+            loads.push(load);
+        }
+        Ok((loads, shared))
+    }
+}
+
+/// Gives up the saving of the contact's box: the mask is laid out over the whole frame.
+fn widen(contact: &mut FrameContact, (rows, columns): (usize, usize)) {
+    let Some(region) = contact.region else { return };
+    let mut mask = Array2::from_elem((rows, columns), false);
+    for ((row, column), inside) in contact.mask.indexed_iter() {
+        mask[[region.row_start + row, region.column_start + column]] = *inside;
+    }
+    contact.mask = mask;
+    contact.region = Some(BoundingBox { row_start: 0, row_end: rows, column_start: 0, column_end: columns });
+}

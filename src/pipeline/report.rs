@@ -1,0 +1,167 @@
+//! What was computed, what was skipped and why.
+use std::fmt;
+use std::time::Duration;
+
+/// A stage of the pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum Stage {
+    /// Contact, force, centroid and radius.
+    Contact,
+    /// Image to surface.
+    Surface,
+    /// Surface to control points.
+    ControlPoints,
+    /// Points to matches.
+    Match,
+    /// Matches to a warp, and its strain.
+    Strain,
+    /// Loads to a modulus.
+    Modulus,
+}
+
+impl Stage {
+    /// All stages, in order.
+    pub const ALL: [Self; 6] =
+        [Self::Contact, Self::Surface, Self::ControlPoints, Self::Match, Self::Strain, Self::Modulus];
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Contact => "contact and force",
+            Self::Surface => "surface",
+            Self::ControlPoints => "control points",
+            Self::Match => "match",
+            Self::Strain => "strain",
+            Self::Modulus => "modulus",
+        })
+    }
+}
+
+/// Why work was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum SkipReason {
+    /// Nobody asked for it.
+    NotAsked,
+    /// The frame shows no contact.
+    NoContact,
+    /// The frame equals an earlier one, bit for bit: its results were taken over.
+    EqualFrame,
+    /// Only the contact's box was worked on, not the whole frame.
+    OutsideContact,
+}
+
+impl fmt::Display for SkipReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotAsked => "not asked for",
+            Self::NoContact => "no contact",
+            Self::EqualFrame => "the frame equals an earlier one",
+            Self::OutsideContact => "outside the contact",
+        })
+    }
+}
+
+/// One piece of work that was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Skip {
+    /// The stage.
+    pub stage: Stage,
+    /// The frame, counted from 0.
+    pub frame: usize,
+    /// Why.
+    pub reason: SkipReason,
+    /// How many pixels (or control points, for a match) need not be looked at.
+    pub saved: usize,
+}
+
+/// How often a stage ran, and for how long.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// Number of runs.
+    pub runs: usize,
+    /// Time of all of them.
+    pub time: Duration,
+}
+
+/// What was computed, what was skipped and why.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    work: [Work; 6],
+    /// What was skipped.
+    pub skips: Vec<Skip>,
+}
+
+impl Report {
+    /// How often a stage ran, and for how long.
+    pub fn work(&self, stage: Stage) -> Work {
+        self.work[stage as usize]
+    }
+
+    /// The time of all stages together.
+    pub fn total_time(&self) -> Duration {
+        self.work.iter().map(|w| w.time).sum()
+    }
+
+    /// Forgets everything, keeping the memory.
+    pub fn clear(&mut self) {
+        self.work = Default::default();
+        self.skips.clear();
+    }
+
+    pub(crate) fn ran(&mut self, stage: Stage, time: Duration) {
+        let work = &mut self.work[stage as usize];
+        work.runs += 1;
+        work.time += time;
+    }
+
+    pub(crate) fn skipped(&mut self, stage: Stage, frame: usize, reason: SkipReason, saved: usize) {
+        self.skips.push(Skip { stage, frame, reason, saved });
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for stage in Stage::ALL {
+            let Work { runs, time } = self.work(stage);
+            let milliseconds = time.as_secs_f64() * 1e3;
+            if runs > 0 {
+                writeln!(
+                    f,
+                    "  {stage:<18} {milliseconds:9.3} ms in {runs} run{}",
+                    if runs == 1 { "" } else { "s" }
+                )?;
+            }
+        }
+        for Skip { stage, frame, reason, saved } in &self.skips {
+            writeln!(f, "  skipped: {stage} of frame {}: {reason} ({saved} saved)", frame + 1)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for Report {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct;
+        #[derive(serde::Serialize)]
+        struct Line {
+            stage: Stage,
+            runs: usize,
+            milliseconds: f64,
+        }
+        let line = |stage: Stage| {
+            let work = self.work(stage);
+            Line { stage, runs: work.runs, milliseconds: work.time.as_secs_f64() * 1e3 }
+        };
+        let mut out = serializer.serialize_struct("Report", 2)?;
+        out.serialize_field("stages", &Stage::ALL.map(line))?;
+        out.serialize_field("skips", &self.skips)?;
+        out.end()
+    }
+}

@@ -1,0 +1,123 @@
+//! Reading the fields of a TOML table, with the path of every field for errors.
+use super::error::SceneError;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// A table inside the scene file.
+pub(super) struct Fields<'a> {
+    file: &'a Path,
+    prefix: String,
+    table: &'a Table,
+}
+
+impl<'a> Fields<'a> {
+    pub(super) fn new(file: &'a Path, table: &'a Table) -> Self {
+        Self { file, prefix: String::new(), table }
+    }
+
+    /// The field's name with its path: `waveguide.layers[2].thickness_m`.
+    pub(super) fn path(&self, name: &str) -> String {
+        if self.prefix.is_empty() { name.into() } else { format!("{}.{name}", self.prefix) }
+    }
+
+    /// Refuses fields that are not in `known`.
+    pub(super) fn only(&self, known: &[&'static str]) -> Result<(), SceneError> {
+        match self.table.keys().find(|key| !known.contains(&key.as_str())) {
+            None => Ok(()),
+            Some(key) => Err(SceneError::Unknown {
+                file: self.file.into(),
+                field: self.path(key),
+                known: known.to_vec(),
+            }),
+        }
+    }
+
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.table.contains_key(name)
+    }
+
+    pub(super) fn missing(&self, name: &str, expected: &'static str) -> SceneError {
+        SceneError::Missing { file: self.file.into(), field: self.path(name), expected }
+    }
+
+    pub(super) fn wrong(&self, name: &str, expected: &'static str, found: &Value) -> SceneError {
+        let found = match found {
+            Value::String(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => found.to_string(),
+            Value::Array(values) => format!("an array of {}", values.len()),
+            Value::Table(_) => "a table".into(),
+            Value::Datetime(_) => "a date".into(),
+        };
+        SceneError::Wrong { file: self.file.into(), field: self.path(name), expected, found }
+    }
+
+    fn value(&self, name: &str, expected: &'static str) -> Result<&'a Value, SceneError> {
+        self.table.get(name).ok_or_else(|| self.missing(name, expected))
+    }
+
+    pub(super) fn string(&self, name: &str, expected: &'static str) -> Result<&'a str, SceneError> {
+        let value = self.value(name, expected)?;
+        value.as_str().filter(|s| !s.is_empty()).ok_or_else(|| self.wrong(name, expected, value))
+    }
+
+    /// A number for which `accept` holds.
+    pub(super) fn number(
+        &self,
+        name: &str,
+        expected: &'static str,
+        accept: impl Fn(f64) -> bool,
+    ) -> Result<f64, SceneError> {
+        let value = self.value(name, expected)?;
+        as_number(value).filter(|&v| accept(v)).ok_or_else(|| self.wrong(name, expected, value))
+    }
+
+    pub(super) fn optional_number(
+        &self,
+        name: &str,
+        expected: &'static str,
+        accept: impl Fn(f64) -> bool,
+    ) -> Result<Option<f64>, SceneError> {
+        if self.has(name) { self.number(name, expected, accept).map(Some) } else { Ok(None) }
+    }
+
+    /// Two positive numbers.
+    pub(super) fn positive_pair(&self, name: &str, expected: &'static str) -> Result<[f64; 2], SceneError> {
+        let value = self.value(name, expected)?;
+        let numbers = value.as_array().map(|a| a.iter().map(as_number).collect::<Vec<_>>());
+        match numbers.as_deref() {
+            Some(&[Some(x), Some(y)]) if positive(x) && positive(y) => Ok([x, y]),
+            _ => Err(self.wrong(name, expected, value)),
+        }
+    }
+
+    pub(super) fn table(&self, name: &str, expected: &'static str) -> Result<Self, SceneError> {
+        let value = self.value(name, expected)?;
+        let table = value.as_table().ok_or_else(|| self.wrong(name, expected, value))?;
+        Ok(Self { file: self.file, prefix: self.path(name), table })
+    }
+
+    /// At least one table in an array.
+    pub(super) fn tables(&self, name: &str, expected: &'static str) -> Result<Vec<Self>, SceneError> {
+        let value = self.value(name, expected)?;
+        let wrong = || self.wrong(name, expected, value);
+        let values = value.as_array().filter(|a| !a.is_empty()).ok_or_else(wrong)?;
+        let table = |(i, v): (usize, &'a Value)| {
+            let prefix = format!("{}[{}]", self.path(name), i + 1);
+            v.as_table().map(|table| Self { file: self.file, prefix, table }).ok_or_else(wrong)
+        };
+        values.iter().enumerate().map(table).collect()
+    }
+}
+
+/// Greater than zero and finite.
+pub(super) fn positive(v: f64) -> bool {
+    v > 0.0 && v.is_finite()
+}
+
+/// A Poisson ratio at which an isotropic solid is stable.
+pub(super) fn poisson(v: f64) -> bool {
+    v > -1.0 && v <= 0.5
+}
+
+fn as_number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
+}

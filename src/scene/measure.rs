@@ -1,0 +1,92 @@
+//! A scene as a pipeline with its frames.
+use super::{LoadedCalibration, Scene, SceneData, SceneError};
+use crate::elasticity::contact::{Layer, Waveguide};
+use crate::pipeline::{
+    DEFAULT_CONTROL_POINTS, DarkContact, Measurement, Pipeline, PipelineError, Press, Stages, SurfaceInput,
+};
+
+impl Scene {
+    /// Reads a scene file with its images and measures everything.
+    ///
+    /// # Errors
+    /// [`SceneError`]: one sentence that names the file and the field.
+    pub fn measure_file(path: impl AsRef<std::path::Path>) -> Result<Measurement, SceneError> {
+        let scene = Self::read(path)?;
+        let data = scene.load()?;
+        let stages = scene.stages(&data)?;
+        let mut press = scene.press(stages.as_ref(), &data)?;
+        press.measure().map_err(|e| scene.measure_error(e))
+    }
+
+    /// The default pipeline for this scene's sensor and object.
+    ///
+    /// # Errors
+    /// [`SceneError::Measure`] where the calibration or the waveguide is not usable.
+    pub fn stages(&self, data: &SceneData) -> Result<Box<dyn Stages>, SceneError> {
+        self.stages_with(data, DEFAULT_CONTROL_POINTS)
+    }
+
+    /// As [`stages`](Self::stages), with a number of control points.
+    ///
+    /// # Errors
+    /// As [`stages`](Self::stages).
+    pub fn stages_with(
+        &self,
+        data: &SceneData,
+        control_points: usize,
+    ) -> Result<Box<dyn Stages>, SceneError> {
+        self.build_stages(data, control_points).map_err(|e| self.measure_error(e))
+    }
+
+    /// The scene's frames on a pipeline, ready to be asked.
+    ///
+    /// # Errors
+    /// [`SceneError::Measure`].
+    pub fn press<'a>(&self, stages: &'a dyn Stages, data: &'a SceneData) -> Result<Press<'a>, SceneError> {
+        let mut press = Press::new(stages, data.reference.view()).map_err(|e| self.measure_error(e))?;
+        for (image, frame) in data.frames.iter().zip(&self.frames) {
+            press.add_gauged_frame(image.view(), frame.force_n);
+        }
+        Ok(press)
+    }
+
+    fn build_stages(&self, data: &SceneData, points: usize) -> Result<Box<dyn Stages>, PipelineError> {
+        let layer = |l: &super::SceneLayer| Layer {
+            thickness_m: l.thickness_m,
+            youngs_modulus_pa: l.youngs_modulus_pa,
+            poisson_ratio: l.poisson_ratio,
+        };
+        let layers = self.layers.iter().map(layer).collect();
+        let waveguide = Waveguide::new(layers).map_err(PipelineError::Material)?;
+        Ok(match &data.calibration {
+            LoadedCalibration::Pairs(pairs) => {
+                let pipeline = Pipeline::from_pairs(pairs, self.pixel_size_m, self.object)?;
+                Box::new(pipeline.with_waveguide(waveguide).with_control_points(points))
+            }
+            LoadedCalibration::DepthTable(table) => {
+                let contact = DarkContact::new(table, self.pixel_size_m)?;
+                let depth = DarkContact::depth_table(table)?;
+                let pipeline = Pipeline::new(contact, self.object).with_waveguide(waveguide);
+                let pipeline = pipeline.with_control_points(points);
+                Box::new(pipeline.with_surface(depth, SurfaceInput::Signal))
+            }
+        })
+    }
+
+    /// The pipeline's error with the field that it comes from.
+    pub fn measure_error(&self, error: PipelineError) -> SceneError {
+        let field = match (&error, error.frame()) {
+            (PipelineError::NoForce { .. }, Some(i)) => format!("frames[{}].force_N", i + 1),
+            (_, Some(i)) => match self.frames.get(i) {
+                Some(frame) => format!("frames[{}].image = {}", i + 1, frame.image.display()),
+                None => format!("frames[{}]", i + 1),
+            },
+            (PipelineError::Calibration(_), _) => "calibration.pairs".into(),
+            (PipelineError::DepthTable(_), _) => "calibration.depth_table".into(),
+            (PipelineError::Material(_), _) => "waveguide.layers".into(),
+            (PipelineError::Sensor(_), _) => "reference".into(),
+            _ => "frames".into(),
+        };
+        SceneError::Measure { file: self.file.clone(), field, source: Box::new(error) }
+    }
+}
