@@ -12,6 +12,7 @@ mod error;
 mod estimate;
 mod frame;
 mod hertz;
+mod image;
 mod measure;
 mod shear;
 
@@ -25,5 +26,8 @@ pub use error::{ForceError, Requirement};
 pub use estimate::{Estimate, Real};
 pub use frame::{BoundingBox, DifferenceNoise, FrameStatistics, NoiseModel, ReferenceFrame};
 pub use hertz::{HertzFit, HertzFitOptions, HertzFitter};
+pub use image::{
+    GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,
+};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};

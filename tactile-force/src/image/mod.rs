@@ -1,0 +1,64 @@
+//! Images as numbers: moments that keep their digits, and blobs averaged over pixels exactly.
+
+mod double;
+mod gaussian;
+mod hemisphere;
+mod moments;
+mod quadrature;
+
+pub use gaussian::GaussianProfile;
+pub use hemisphere::HertzProfile;
+pub use moments::{ImageMoments, MomentStatus};
+
+use crate::Real;
+
+/// An axis-parallel rectangle of the image plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Rectangle<T> {
+    /// From and to along x.
+    pub x: [T; 2],
+    /// From and to along y.
+    pub y: [T; 2],
+}
+
+/// Integral, centroid and spread of a profile over part of the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ProfileMoments<T> {
+    /// ∫ p dx dy.
+    pub integral: T,
+    /// ∫ (x, y) p / ∫ p.
+    pub centroid: [T; 2],
+    /// √(∫ |x − centroid|² p / ∫ p).
+    pub radius_of_gyration: T,
+}
+
+/// The square grid of an image: pixel (row, column) = (i, j) is centred at first + (j, i) × size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PixelGrid<T> {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// Width and height of a pixel.
+    pub size: [T; 2],
+    /// Centre [x, y] of the first pixel.
+    pub first: [T; 2],
+}
+
+impl<T: Real> PixelGrid<T> {
+    /// Lower edge of pixel `k` along x (axis 0) or y (axis 1), in double precision.
+    fn edge(&self, axis: usize, k: usize) -> f64 {
+        self.first[axis].as_f64() + (2.0 * k as f64 - 1.0) * (0.5 * self.size[axis].as_f64())
+    }
+
+    /// The pixel's rectangle.
+    fn pixel(&self, row: usize, column: usize) -> Rectangle<f64> {
+        Rectangle {
+            x: [self.edge(0, column), self.edge(0, column + 1)],
+            y: [self.edge(1, row), self.edge(1, row + 1)],
+        }
+    }
+}

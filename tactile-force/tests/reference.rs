@@ -1,0 +1,239 @@
+//! The image references: numbers of 60 digits and more, in `../shared/data/reference/image.json` or under `TACTILE_DATA`.
+#![allow(clippy::print_stdout)]
+
+use ndarray::Array2;
+use serde_json::Value;
+use tactile_force::{
+    GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,
+};
+
+const EPS: f64 = f64::EPSILON;
+
+fn load() -> Option<Value> {
+    let folder = std::env::var("TACTILE_DATA")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data").into());
+    let text = std::fs::read_to_string(std::path::Path::new(&folder).join("reference/image.json")).ok()?;
+    let data: Value = serde_json::from_str(&text).expect("valid JSON");
+    for check in data["header"]["parse_check"].as_array().unwrap() {
+        let bits = u64::from_str_radix(&check["bits"].as_str().unwrap()[2..], 16).unwrap();
+        assert_eq!(check["value"].as_f64().unwrap().to_bits(), bits, "numbers must be read exactly");
+    }
+    Some(data)
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("a number, found {value}"))
+}
+
+fn image(value: &Value) -> Option<Array2<f64>> {
+    let rows = value.as_array()?;
+    let flat: Vec<f64> = rows.iter().flat_map(|r| r.as_array().unwrap()).map(number).collect();
+    Some(Array2::from_shape_vec((rows.len(), flat.len() / rows.len()), flat).unwrap())
+}
+
+type Condition = Box<dyn Fn(f64, f64) -> f64>;
+
+/// Checks one number and keeps the worst ratio of error to allowance.
+struct Judge {
+    worst: (f64, String),
+    failed: Vec<String>,
+}
+
+impl Judge {
+    fn check(&mut self, what: String, found: f64, expected: f64, allowed: f64) {
+        let ratio = (found - expected).abs() / allowed;
+        if ratio.is_nan() || ratio > 1.0 {
+            self.failed
+                .push(format!("{what}: found {found:e}, expected {expected:e}, {ratio:.2} of the allowance"));
+        }
+        if ratio > self.worst.0 {
+            self.worst = (ratio, what);
+        }
+    }
+
+    fn relative(&mut self, what: String, found: f64, expected: f64, condition: f64) {
+        self.check(
+            what,
+            found,
+            expected,
+            f64::max(1e-13, 10.0 * EPS * condition) * expected.abs() + f64::MIN_POSITIVE,
+        );
+    }
+}
+
+/// Conditions of the moments of an image whose pixels are exact: 1 for a sum of one sign, else Σ|d|/|Σd| over what double-double
+/// arithmetic has to spare. The variance's and centroid's inputs are exact, too.
+fn moments(
+    judge: &mut Judge,
+    id: &str,
+    pixels: &Array2<f64>,
+    background: f64,
+    pitch: f64,
+    expected: &Value,
+    rounded: bool,
+) {
+    let m = ImageMoments::of(pixels.view(), background).unwrap();
+    // Pixels that are themselves rounded results carry eps each: the moments' condition is then that of the sums.
+    let n = pixels.len() as f64;
+    let d = pixels.mapv(|p| p - background);
+    let sum_condition = if rounded { d.mapv(f64::abs).sum() / d.sum().abs() } else { 1.0 };
+    let scale = m.greatest.abs().max(m.least.abs());
+    let variance_condition = if rounded { scale * scale / m.variance } else { 1.0 };
+    let relative = |j: &mut Judge, key: &str, found: f64, condition: f64| {
+        if !expected[key].is_null() {
+            j.relative(format!("{id} {key}"), found, number(&expected[key]), condition);
+        }
+    };
+    relative(judge, "sum", m.sum, sum_condition);
+    relative(judge, "force", m.sum * pitch * pitch, sum_condition);
+    relative(judge, "min", m.least, 1.0);
+    relative(judge, "max", m.greatest, 1.0);
+    // An alternating image of 1e16 has a mean of 9: the condition of the mean of exact pixels is 1 in double-double.
+    relative(judge, "mean", m.mean, sum_condition);
+    if number(&expected.get("variance").cloned().unwrap_or(0.0.into())) == 0.0 {
+        assert!(m.variance == 0.0, "{id}: variance of equal pixels {}", m.variance);
+    } else {
+        relative(judge, "variance", m.variance, variance_condition.min(n * variance_condition));
+    }
+    let status = match m.status {
+        MomentStatus::Ok => "ok",
+        MomentStatus::Empty => "empty",
+        MomentStatus::NegativeSecondMoment => "negative_second_moment",
+    };
+    assert_eq!(status, expected["status"].as_str().unwrap(), "{id}");
+    assert_eq!(m.centroid_px.is_none(), expected["centroid"].is_null(), "{id}");
+    if let (Some(c), Some(e)) = (m.centroid_px, expected["centroid"].as_array()) {
+        for (k, axis) in ["x", "y"].iter().enumerate() {
+            judge.relative(
+                format!("{id} centroid {axis}"),
+                (c[k] + 0.5) * pitch,
+                number(&e[k]),
+                sum_condition,
+            );
+        }
+    }
+    if let (Some(r), Some(e)) = (m.radius_of_gyration_px, expected["radius_of_gyration"].as_f64()) {
+        if e == 0.0 {
+            assert_eq!(r, 0.0, "{id}")
+        } else {
+            judge.relative(format!("{id} gyration"), r * pitch, e, sum_condition)
+        }
+    }
+}
+
+/// Distances from the centre are rounded when the centre is subtracted: cond = position over distance to what matters.
+fn profile(
+    judge: &mut Judge,
+    id: &str,
+    found: Option<ProfileMoments<f64>>,
+    expected: &Value,
+    condition: f64,
+) {
+    assert_eq!(found.is_none(), expected.is_null(), "{id}");
+    let Some(m) = found else { return };
+    judge.relative(format!("{id} integral"), m.integral, number(&expected["force"]), condition);
+    for k in 0..2 {
+        judge.relative(
+            format!("{id} centroid {k}"),
+            m.centroid[k],
+            number(&expected["centroid"][k]),
+            condition,
+        );
+    }
+    judge.relative(
+        format!("{id} gyration"),
+        m.radius_of_gyration,
+        number(&expected["radius_of_gyration"]),
+        condition,
+    );
+}
+
+#[test]
+fn every_image_case() {
+    let Some(data) = load() else {
+        println!("skipped: no reference data (set TACTILE_DATA)");
+        return;
+    };
+    let mut judge = Judge { worst: (0.0, String::new()), failed: Vec::new() };
+    let cases = data["cases"].as_array().unwrap();
+    for case in cases {
+        let id = case["id"].as_str().unwrap();
+        let (size, pitch) = (case["size"].as_u64().unwrap() as usize, number(&case["pitch"]));
+        let expected = &case["expected"];
+        if case["kind"] == "given" {
+            moments(
+                &mut judge,
+                id,
+                &image(&case["pixels"]).unwrap(),
+                number(&case["background"]),
+                pitch,
+                &expected["moments"],
+                false,
+            );
+            continue;
+        }
+        let p = &case["params"];
+        let (centre, peak) = ([number(&p["cx"]), number(&p["cy"])], number(&p["amplitude"]));
+        let grid = PixelGrid { rows: size, columns: size, size: [pitch; 2], first: [0.5 * pitch; 2] };
+        let side = [0.0, size as f64 * pitch];
+        let frame = Rectangle { x: side, y: side };
+        let (pixels, whole, within, condition): (Array2<f64>, _, _, Condition) = if case["kind"] == "gaussian"
+        {
+            let sd = number(&p["sigma"]);
+            let blob = GaussianProfile::new(centre, sd, peak).unwrap();
+            // d ln g / d ln x = x (x − c)/σ²: rounding of a position, magnified.
+            let condition = move |x: f64, y: f64| {
+                let along = |x: f64, c: f64| (x.abs() + c.abs()) * (x - c).abs() / (sd * sd);
+                1.0 + along(x, centre[0]) + along(y, centre[1])
+            };
+            (blob.image(&grid), blob.whole(), blob.within(&frame), Box::new(condition))
+        } else {
+            let a = number(&p["a"]);
+            let blob = HertzProfile::new(centre, a, peak).unwrap();
+            // A pixel cut by the rim down to a depth d (of its farthest corner inside) changes as d^1.5 or faster.
+            let condition = move |x: f64, y: f64| {
+                let far = |x: f64, c: f64| ((x - c).abs() - 0.5 * pitch).max(0.0);
+                let depth = (a - far(x, centre[0]).hypot(far(y, centre[1]))).max(0.0);
+                let reach = x.abs() + y.abs() + centre[0].abs() + centre[1].abs() + pitch;
+                1.0 + 3.0 * reach / depth.min(a).min(pitch)
+            };
+            (blob.image(&grid), blob.whole(), blob.within(&frame), Box::new(condition))
+        };
+        profile(&mut judge, &format!("{id} plane"), Some(whole), &expected["plane"], 1.0);
+        let edge = condition(side[0].max(centre[0].min(side[1])), side[0].max(centre[1].min(side[1])));
+        profile(&mut judge, &format!("{id} frame"), within, &expected["frame"], edge);
+        match image(&expected["pixels"]) {
+            None => assert!(pixels.iter().all(|v| *v == 0.0), "{id}"),
+            Some(reference) => {
+                for ((row, column), &e) in reference.indexed_iter() {
+                    let (x, y) = ((column as f64 + 0.5) * pitch, (row as f64 + 0.5) * pitch);
+                    let what = format!("{id} pixel {row} {column}");
+                    if e == 0.0 {
+                        assert_eq!(pixels[[row, column]], 0.0, "{what} lies outside");
+                        continue;
+                    }
+                    judge.relative(what, pixels[[row, column]], e, condition(x, y));
+                }
+                moments(
+                    &mut judge,
+                    &format!("{id} of pixels"),
+                    &reference,
+                    0.0,
+                    pitch,
+                    &expected["moments"],
+                    true,
+                );
+            }
+        }
+        if expected["pixels"].is_null() {
+            moments(&mut judge, id, &pixels, 0.0, pitch, &expected["moments"], true);
+        }
+    }
+    println!("{} cases; worst {:.3} of the allowance: {}", cases.len(), judge.worst.0, judge.worst.1);
+    assert!(
+        judge.failed.is_empty(),
+        "{} failed:\n{}",
+        judge.failed.len(),
+        judge.failed[..judge.failed.len().min(40)].join("\n")
+    );
+}

@@ -1,0 +1,273 @@
+//! Force, centroid and contact radius on simulated frames, against the scene's truth.
+//!
+//! The default camera's noise is 1 % of the brightest signal (2 of 200 grey levels, most of it photons).
+#![allow(clippy::print_stdout)]
+
+use ndarray::{Array2, ArrayView2};
+use tactile_imaging::force::{
+    CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceError, ForceMeasurement, ForceMeter, ForceOptions,
+    ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair, ShearTracker, StressCalibration,
+    measure_force,
+};
+use tactile_imaging::simulate::{
+    Camera, Gain, Hostile, Illumination, Load, PressOptions, PressScene, PressTruth,
+};
+
+/// A quarter of the default resolution, so that a thousand frames take seconds.
+fn camera() -> Camera {
+    Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], vignetting: 0.0, ..Camera::default() }
+}
+
+fn press(camera: Camera) -> PressOptions {
+    PressOptions { camera, loads: vec![Load::normal(0.7)], centre_px: Some([170.3, 131.8]), ..PressOptions::default() }
+}
+
+/// The sensor's true calibration, with its error left out: what is tested is the frames' share of the error.
+fn calibration(scene: &PressScene) -> LinearCalibration<f64> {
+    let camera = scene.options().camera;
+    let newton_per_grey = camera.pixel_area_m2() / scene.grey_per_pascal();
+    let pairs: Vec<_> =
+        (0..11).map(|k| 0.2 * f64::from(k)).map(|f| CalibrationPair::loading(f / newton_per_grey, f)).collect();
+    LinearCalibration::fit(&pairs, &Default::default()).unwrap()
+}
+
+/// A reference with noise of its own for every seed.
+fn dark(scene: &PressScene, seed: u64) -> Array2<u8> {
+    PressScene::new(PressOptions { seed, ..scene.options().clone() }).unwrap().reference(0)
+}
+
+/// Errors of one quantity over many seeds.
+struct Errors {
+    name: &'static str,
+    errors: Vec<f64>,
+    stated: Vec<f64>,
+}
+
+impl Errors {
+    fn new(name: &'static str) -> Self {
+        Self { name, errors: Vec::new(), stated: Vec::new() }
+    }
+
+    fn add(&mut self, found: Estimate<f64>, truth: f64, unit: f64) {
+        self.errors.push((found.value - truth) / unit);
+        self.stated.push(found.standard_error / unit);
+    }
+
+    fn rms(&self) -> f64 {
+        (self.errors.iter().map(|e| e * e).sum::<f64>() / self.errors.len() as f64).sqrt()
+    }
+
+    fn worst(&self) -> f64 {
+        self.errors.iter().fold(0.0, |m, e| m.max(e.abs()))
+    }
+
+    fn inside_one_sigma(&self) -> f64 {
+        let inside = self.errors.iter().zip(&self.stated).filter(|(e, s)| e.abs() < **s).count();
+        inside as f64 / self.errors.len() as f64
+    }
+
+    fn show(&self) {
+        let mean = self.errors.iter().sum::<f64>() / self.errors.len() as f64;
+        println!(
+            "{:22} rms {:.2e}, mean {mean:+.2e}, worst {:.2e}, inside one sigma {:.1} %",
+            self.name,
+            self.rms(),
+            self.worst(),
+            100.0 * self.inside_one_sigma()
+        );
+    }
+}
+
+struct Study {
+    force: Errors,
+    centroid: [Errors; 2],
+    centre: Errors,
+    radius: Errors,
+}
+
+fn study(scene: &PressScene, seeds: u64, options: &ForceOptions) -> Study {
+    let (truth, light) = (scene.truth(0), scene.expected_frame(0));
+    let meter = ForceMeter::new(truth.pixel_size_m, options).unwrap();
+    let (calibration, mut workspace) = (calibration(scene), ForceWorkspace::default());
+    let mut s = Study {
+        force: Errors::new("force / true force"),
+        centroid: [Errors::new("centroid x, px"), Errors::new("centroid y, px")],
+        centre: Errors::new("fitted centre x, px"),
+        radius: Errors::new("radius / true radius"),
+    };
+    for seed in 0..seeds {
+        let frame = scene.options().camera.expose(light.view(), 1_000_000 + seed, 1);
+        let reference = ReferenceFrame::new(dark(scene, 2_000_000 + seed).view()).unwrap();
+        let m = meter.measure_with(&mut workspace, frame.view(), &reference, &calibration).unwrap();
+        let (contact, fit) = (m.contact.expect("contact"), m.profile.expect("profile"));
+        s.force.add(m.force_n, truth.contact.force_n, truth.contact.force_n);
+        for k in 0..2 {
+            s.centroid[k].add(contact.centroid_px[k], truth.centroid_px[k], 1.0);
+        }
+        s.centre.add(fit.centre_px[0], truth.centre_px[0], 1.0);
+        s.radius.add(fit.radius_m, truth.contact.contact_radius_m, truth.contact.contact_radius_m);
+    }
+    [&s.force, &s.centroid[0], &s.centroid[1], &s.centre, &s.radius].map(Errors::show);
+    s
+}
+
+#[test]
+fn a_thousand_seeds() {
+    let scene = PressScene::new(press(camera())).unwrap();
+    let s = study(&scene, 1000, &ForceOptions::default());
+    assert!(s.force.worst() < 2e-3 && s.radius.worst() < 3e-3);
+    assert!(s.centroid.iter().all(|c| c.rms() < 0.01) && s.centre.rms() < 0.01);
+    for errors in [&s.force, &s.centroid[0], &s.centroid[1], &s.centre, &s.radius] {
+        // 68.3 % is the normal law's; the binomial spread of a thousand seeds is 1.5 %.
+        assert!((0.66..=0.71).contains(&errors.inside_one_sigma()), "{}: {}", errors.name, errors.inside_one_sigma());
+    }
+}
+
+#[test]
+fn the_full_frame_with_its_vignetting() {
+    let scene = PressScene::new(PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() }).unwrap();
+    let s = study(&scene, 4, &ForceOptions::default());
+    // Vignetting takes up to 0.1 % of the light at the rim of this contact and is not corrected.
+    assert!(s.force.worst() < 2e-3 && s.radius.worst() < 3e-3 && s.centroid[0].worst() < 0.02);
+}
+
+#[test]
+fn blur_oblong_pixels_and_small_contacts() {
+    let oblong = Camera { pixel_size_m: [86.2e-6, 120e-6], ..camera() };
+    for (name, options) in [
+        ("no blur", press(Camera { blur_sigma_px: 0.0, ..camera() })),
+        ("blur of 2 px", press(Camera { blur_sigma_px: 2.0, ..camera() })),
+        ("oblong pixels", press(oblong)),
+        ("radius of 9 px", PressOptions { loads: vec![Load::normal(0.01)], ..press(camera()) }),
+    ] {
+        println!("{name}");
+        let s = study(&PressScene::new(options).unwrap(), 200, &ForceOptions::default());
+        // Three standard deviations of what the noise allows; 200 seeds: 68.3 ± 3.3 %.
+        assert!(s.force.worst() < 5e-3 && s.radius.rms() < 1e-3 && s.centroid[0].rms() < 0.01);
+        for errors in [&s.force, &s.centre, &s.radius] {
+            assert!((0.58..=0.78).contains(&errors.inside_one_sigma()), "{name} {}", errors.name);
+        }
+    }
+}
+
+#[test]
+fn lamps_that_drift_are_corrected_on_request() {
+    let mut options = press(camera());
+    options.loads[0].illumination = Illumination { level: 1.05, tilt: [0.1, -0.06] };
+    let scene = PressScene::new(options).unwrap();
+    let with = |drift| ForceOptions { contact: ContactOptions { drift, ..Default::default() }, ..Default::default() };
+    let uncorrected = study(&scene, 20, &with(DriftCorrection::None));
+    assert!(uncorrected.force.rms() > 0.03);
+    let corrected = study(&scene, 100, &with(DriftCorrection::TiltedLamp));
+    assert!(corrected.force.worst() < 2e-3 && corrected.radius.worst() < 3e-3);
+    // 100 seeds: 68.3 ± 4.7 %.
+    assert!((0.55..=0.82).contains(&corrected.force.inside_one_sigma()));
+}
+
+#[test]
+fn false_alarms_are_as_rare_as_stated() {
+    let camera = Camera { shape: [130, 174], ..camera() };
+    let scene = PressScene::new(press(camera)).unwrap();
+    let meter = ForceMeter::new([1e-5; 2], &ForceOptions::default()).unwrap();
+    let (calibration, mut workspace) = (calibration(&scene), ForceWorkspace::default());
+    let alarms = (0..1000)
+        .filter(|seed| {
+            let reference = ReferenceFrame::new(dark(&scene, *seed).view()).unwrap();
+            let frame = dark(&scene, 10_000 + seed);
+            meter.measure_with(&mut workspace, frame.view(), &reference, &calibration).unwrap().contact.is_some()
+        })
+        .count();
+    // One in a thousand is stated: more than five has a probability of 6e-4.
+    assert!(alarms <= 5, "{alarms}");
+}
+
+#[test]
+fn faint_contacts_are_found() {
+    // A peak of three grey levels, under three standard deviations of a difference.
+    let scene = PressScene::new(PressOptions { gain: Gain::PeakGrey(3.0), ..press(camera()) }).unwrap();
+    let s = study(&scene, 50, &ForceOptions::default());
+    assert!(s.force.rms() < 0.03, "{}", s.force.rms());
+}
+
+#[test]
+fn shear_follows_the_centroid() {
+    let mut options = press(camera());
+    options.loads = (0..4)
+        .map(|k| Load { shear_n: [0.02 * f64::from(k), -0.03 * f64::from(k)], ..Load::normal(0.7) })
+        .collect();
+    let scene = PressScene::new(options).unwrap();
+    let calibration = calibration(&scene);
+    let made = scene.simulate();
+    let pairs: Vec<ShearPair<f64>> = (1..6)
+        .map(|k| f64::from(k) * 1e-5)
+        .map(|u| ShearPair { centroid_step_m: [u, 2.0 * u], force_n: [400.0 * u, 800.0 * u] })
+        .collect();
+    let mut tracker = ShearTracker::new(ShearCalibration::fit(&pairs).unwrap());
+    for (k, frame) in made.frames.iter().enumerate() {
+        let m = measure(frame.view(), made.reference.view(), made.pixel_size_m, &calibration).unwrap();
+        let shear = tracker.update(&m).expect("contact");
+        for axis in 0..2 {
+            let truth = made.truth[k].load.shear_n[axis];
+            let found = shear.force_n[axis];
+            // Four standard errors of eight numbers.
+            assert!((found.value - truth).abs() <= 4.0 * found.standard_error, "{k}: {found} N, true {truth}");
+        }
+    }
+    let none = measure(made.reference.view(), made.reference.view(), made.pixel_size_m, &calibration).unwrap();
+    assert!(tracker.update(&none).is_none());
+}
+
+fn measure(
+    frame: ArrayView2<'_, u8>,
+    reference: ArrayView2<'_, u8>,
+    pixel_size_m: [f64; 2],
+    calibration: &dyn StressCalibration<f64>,
+) -> Result<ForceMeasurement<f64>, ForceError> {
+    measure_force(frame, reference, pixel_size_m, calibration, &ForceOptions::default())
+}
+
+/// Nothing here may panic, and what is wrong must show.
+#[test]
+fn hostile_scenes_end_civilly() {
+    let base = press(camera());
+    for kind in Hostile::ALL {
+        let made = kind.simulate(&base).unwrap();
+        let scene = PressScene::new(base.clone()).unwrap();
+        let result = measure(made.frames[0].view(), made.reference.view(), made.pixel_size_m, &calibration(&scene));
+        println!("{kind:?}: {}", describe(&result));
+        check(kind, &result, &made.truth);
+    }
+}
+
+fn describe(result: &Result<ForceMeasurement<f64>, ForceError>) -> String {
+    match result {
+        Err(error) => error.to_string(),
+        Ok(m) => match m.contact {
+            None => "no contact".into(),
+            Some(c) => format!(
+                "{} N, edge {}, others {}, out of range {}",
+                m.force_n,
+                c.touches_edge,
+                c.other_contacts,
+                m.reading.is_some_and(|r| r.out_of_range)
+            ),
+        },
+    }
+}
+
+fn check(kind: Hostile, result: &Result<ForceMeasurement<f64>, ForceError>, truth: &[PressTruth]) {
+    let contact = result.as_ref().ok().and_then(|m| m.contact);
+    match kind {
+        Hostile::NoiseOnly | Hostile::AllSaturated | Hostile::AllBlack | Hostile::PressedReference => {
+            assert!(result.is_ok() && contact.is_none(), "{kind:?}");
+        }
+        Hostile::SaturatedContact => {
+            assert!(matches!(result, Err(ForceError::SaturatedContact { .. })), "{kind:?}");
+        }
+        Hostile::SeveralContacts => assert_eq!(contact.unwrap().other_contacts, truth.len() - 1),
+        Hostile::CutByEdge | Hostile::InCorner | Hostile::FillsFrame => {
+            assert!(contact.unwrap().touches_edge, "{kind:?}");
+        }
+        _ => assert!(result.is_ok(), "{kind:?}"),
+    }
+}
