@@ -1,5 +1,7 @@
 //! Fuzzy graph matching of point sets by relaxation labelling, with a thin-plate-spline warp.
 #![forbid(unsafe_code)]
+// Several arrays share one index; zipping them all hides it.
+#![allow(clippy::needless_range_loop)]
 
 mod assignment;
 mod assignment_matcher;
@@ -11,6 +13,7 @@ mod hard;
 mod matching;
 mod nearest;
 mod relaxation;
+mod shape_context;
 mod soft;
 mod validate;
 
@@ -21,5 +24,8 @@ pub use dense::{DenseOptions, DenseRelaxation};
 pub use error::{MatchError, PointSet};
 pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
 pub use nearest::NearestNeighbour;
-pub use relaxation::{Outliers, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace, Rotation};
+pub use relaxation::{
+    Labelling, Outliers, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace, Rotation,
+};
+pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;

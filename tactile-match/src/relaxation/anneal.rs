@@ -1,10 +1,16 @@
 //! The alternation: soft assignment at a falling temperature, then the warp that it asks for.
 
+use super::axes::Axes;
 use super::prior::Prior;
 use super::regression::Regression;
 use super::soft_assign::SoftAssignment;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
+
+/// A point whose own match decides its position is not left out altogether.
+const MAX_LEVERAGE: f64 = 0.95;
+/// Fixed-point rounds for the share of stray points.
+const SHARE_ROUNDS: usize = 8;
 
 /// One annealing run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +67,9 @@ pub(crate) struct Annealer<const D: usize> {
     /// Volume of the targets' bounding box.
     pub(crate) volume: f64,
     weights: Vec<f64>,
-    residuals: Vec<[f64; D]>,
+    residuals: Axes<D>,
+    predicted: Vec<[f64; D]>,
+    sums: Vec<f64>,
 }
 
 impl<const D: usize> Annealer<D> {
@@ -79,6 +87,7 @@ impl<const D: usize> Annealer<D> {
     ) -> ControlFlow<()> {
         let mut variance = schedule.sigma * schedule.sigma;
         state.settled = false;
+        self.predicted.clone_from(&state.warped);
         for iteration in 0..schedule.limit {
             let next = self.step(state, schedule, variance);
             state.iterations += 1;
@@ -97,22 +106,26 @@ impl<const D: usize> Annealer<D> {
     }
 
     /// One soft assignment and one fit; the residual variance that is left.
+    ///
+    /// Distances are taken from where the *other* points' matches put a point: a wrong match does not confirm itself.
     fn step(&mut self, state: &mut State<D>, schedule: &Schedule, variance: f64) -> f64 {
         let slack = self.slack(schedule.slack, state.warped.len(), variance).max(1e-30) as f32;
-        self.soft.affinities(&state.warped, variance);
+        self.soft.affinities(&self.predicted, variance);
         self.soft.normalise(schedule.sweeps, slack, slack);
-        self.soft.moments(&state.warped);
+        self.soft.moments(&self.predicted);
         self.fit(state, variance);
         let (mut total, mut squares) = (0.0, 0.0);
         for i in 0..state.warped.len() {
-            let u = self.regression.displacement(&self.prior, i);
             let (w, shift) = (self.soft.weight[i], self.soft.shift[i]);
+            let leverage = (w * self.regression.variance[i] / variance).min(MAX_LEVERAGE);
             let mut square = self.soft.spread[i];
             for k in 0..D {
-                let moved = state.base[i][k] + u[k];
-                let step = moved - state.warped[i][k];
+                let (u, z) = (self.regression.displacement.0[k][i], self.residuals.0[k][i]);
+                let moved = state.base[i][k] + u;
+                let step = moved - self.predicted[i][k];
                 square += w * step * (step - 2.0 * shift[k]);
                 state.warped[i][k] = moved;
+                self.predicted[i][k] = state.base[i][k] + (u - leverage * z) / (1.0 - leverage);
             }
             total += w;
             squares += square.max(0.0);
@@ -120,13 +133,17 @@ impl<const D: usize> Annealer<D> {
         if total > 0.0 { squares / (D as f64 * total) } else { variance }
     }
 
-    /// Fits the warp to the moments of the soft assignment about `state.warped`.
+    /// Fits the warp to the moments of the soft assignment about the predicted positions.
     fn fit(&mut self, state: &State<D>, variance: f64) {
-        self.residuals.clear();
-        for ((warped, base), shift) in state.warped.iter().zip(&state.base).zip(&self.soft.shift) {
-            self.residuals.push(std::array::from_fn(|k| warped[k] + shift[k] - base[k]));
-        }
-        self.regression.fit(&self.prior, &self.soft.weight, &self.residuals, variance);
+        let stride = self.prior.stride;
+        let rows = self.predicted.iter().zip(&state.base).zip(&self.soft.shift);
+        let target =
+            |((p, b), s): ((&[f64; D], &[f64; D]), &[f64; D])| std::array::from_fn(|k| p[k] + s[k] - b[k]);
+        self.residuals.fill(stride, rows.map(target));
+        self.weights.clone_from(&self.soft.weight);
+        self.weights.resize(stride, 0.0);
+        self.regression.fit(&self.prior, &self.weights, &self.residuals, variance);
+        self.regression.variances(&self.prior);
     }
 
     /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a model point.
@@ -137,35 +154,35 @@ impl<const D: usize> Annealer<D> {
 
     /// What runs are compared by: `−ln p(targets | warp) − ln p(warp)`, with the warp's posterior volume (Laplace).
     ///
-    /// The targets are a mixture of Gaussians about the warped points and of uniform stray points; residuals under
-    /// `resolution` count as that, so that an exact fit does not win by an infinite margin.
+    /// The targets are a mixture of Gaussians about the warped points and of uniform stray points, whose share is
+    /// estimated; residuals under `resolution` count as that, so that an exact fit does not win by an infinite margin.
     pub(crate) fn judge(&mut self, state: &mut State<D>, share: f64, resolution: f64) {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
         self.soft.affinities(&state.warped, variance);
-        let gauss = (1.0 - share) / n as f64 / (TAU * variance).powf(0.5 * D as f64);
-        let stray = share / self.volume;
-        let sums = &mut self.residuals_by_target(m);
-        let mut energy: f64 = sums.iter().map(|s| -(gauss * s + stray).ln()).sum();
+        self.sums.clear();
+        self.sums.resize(m, 0.0);
+        for i in 0..n {
+            self.sums.iter_mut().zip(self.soft.affinity_row(i)).for_each(|(s, k)| *s += f64::from(*k));
+        }
+        let density = 1.0 / n as f64 / (TAU * variance).powf(0.5 * D as f64);
+        let mut share = share;
+        for _ in 0..SHARE_ROUNDS {
+            let stray = share / self.volume;
+            let strays = self.sums.iter().map(|s| stray / ((1.0 - share) * density * s + stray));
+            share = (strays.sum::<f64>() / m as f64).clamp(0.02, 0.95);
+        }
+        let (gauss, stray) = ((1.0 - share) * density, share / self.volume);
+        let data: f64 = self.sums.iter().map(|s| -(gauss * s + stray).ln()).sum();
         self.weights.clear();
         for i in 0..n {
-            let row = self.soft.affinity_row(i).iter().zip(&*sums);
+            let row = self.soft.affinity_row(i).iter().zip(&self.sums);
             self.weights.push(row.map(|(k, s)| gauss * f64::from(*k) / (gauss * s + stray)).sum());
         }
-        self.residuals.clear();
-        let pairs = state.warped.iter().zip(&state.base);
-        self.residuals.extend(pairs.map(|(w, b)| std::array::from_fn::<f64, D, _>(|k| w[k] - b[k])));
+        self.weights.resize(self.prior.stride, 0.0);
+        let rows = state.warped.iter().zip(&state.base);
+        self.residuals.fill(self.prior.stride, rows.map(|(w, b)| std::array::from_fn(|k| w[k] - b[k])));
         self.regression.fit(&self.prior, &self.weights, &self.residuals, variance);
-        energy += 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
-        state.energy = energy;
-    }
-
-    fn residuals_by_target(&self, targets: usize) -> Vec<f64> {
-        let mut sums = vec![0.0; targets];
-        let rows = self.soft.kernel.len() / targets.next_multiple_of(super::soft_assign::LANES);
-        for i in 0..rows {
-            sums.iter_mut().zip(self.soft.affinity_row(i)).for_each(|(s, k)| *s += f64::from(*k));
-        }
-        sums
+        state.energy = data + 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
     }
 }

@@ -37,8 +37,9 @@ impl<const D: usize> Answer<D> {
         self.assign(&annealer.soft, n, targets.len());
         self.place(state, targets);
         self.covariance.clear();
+        annealer.regression.variances(&annealer.prior);
         for i in 0..n {
-            let variance = annealer.regression.variance(&annealer.prior, i);
+            let variance = annealer.regression.variance[i];
             self.covariance.push(covariance(&annealer.soft, targets, &self.warped[i], i, variance));
         }
     }

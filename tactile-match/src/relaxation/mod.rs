@@ -1,20 +1,25 @@
 //! The fast matcher: robust starts, annealed soft assignment and a statistical last stage.
 
 mod anneal;
+mod axes;
+mod correspond;
 mod finish;
 mod frame;
+mod labelling;
 mod options;
 mod prior;
 mod regression;
 mod soft_assign;
 mod starts;
 
+pub use labelling::Labelling;
 pub use options::{Outliers, RelaxationOptions, Rotation};
 
 use crate::{
     MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, unmatched_rows, validate,
 };
 use anneal::{Annealer, Schedule, State};
+use correspond::Correspondence;
 use finish::Answer;
 use frame::Frame;
 use nalgebra::{Point, SMatrix};
@@ -42,6 +47,7 @@ pub struct RelaxationWorkspace<const D: usize> {
     state: State<D>,
     best: State<D>,
     answer: Answer<D>,
+    correspondence: Correspondence<D>,
     starts: usize,
     stopped: bool,
 }
@@ -78,17 +84,23 @@ impl RelaxationMatcher {
         (ws.starts, ws.stopped) = (0, false);
         ws.best.energy = f64::INFINITY;
         starts::centred(&ws.model, &ws.target, &mut ws.state.base);
-        let mut flow = self.attempt(ws, observe);
+        let mut flow = self.attempt(ws, 0.3, observe);
+        if self.options.rotation == Rotation::Limited && flow.is_continue() && !self.is_exact(ws) {
+            starts::centred(&ws.model, &ws.target, &mut ws.state.base);
+            ws.state.warped.clone_from(&ws.state.base);
+            ws.correspondence.start(&mut ws.annealer, SCALES, &ws.model, &ws.target, &mut ws.state);
+            flow = self.refine(ws, 0.15, observe);
+        }
         let rotations = match self.options.rotation {
             Rotation::Any => starts::rotations::<D>(),
-            Rotation::Limited => vec![SMatrix::identity()],
+            Rotation::Limited => starts::limited_rotations::<D>(),
         };
         for rotation in rotations {
             if flow.is_break() || self.is_exact(ws) {
                 break;
             }
             starts::moments(&ws.model, &ws.target, &rotation, &mut ws.state.base);
-            flow = self.attempt(ws, observe);
+            flow = self.attempt(ws, 0.3, observe);
         }
         ws.stopped = flow.is_break();
         ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack);
@@ -99,13 +111,26 @@ impl RelaxationMatcher {
         ws.best.sigma <= finish::CLEAN
     }
 
+    /// A run from `ws.state.base` itself.
     fn attempt<const D: usize>(
         &self,
         ws: &mut RelaxationWorkspace<D>,
+        sigma: f64,
+        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        ws.state.warped.clone_from(&ws.state.base);
+        self.refine(ws, sigma, observe)
+    }
+
+    /// A run from `ws.state.warped`; kept if it is the best so far.
+    fn refine<const D: usize>(
+        &self,
+        ws: &mut RelaxationWorkspace<D>,
+        sigma: f64,
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let schedule = Schedule {
-            sigma: 0.3,
+            sigma,
             floor: 1e-3,
             rate: 0.93,
             limit: self.options.max_iterations,
@@ -113,9 +138,6 @@ impl RelaxationMatcher {
             slack: self.options.slack,
         };
         ws.starts += 1;
-        let base = std::mem::take(&mut ws.state.base);
-        ws.state.warped.clone_from(&base);
-        ws.state.base = base;
         ws.state.trace.clear();
         ws.state.iterations = 0;
         let flow = ws.annealer.run(&mut ws.state, &schedule, observe);

@@ -21,13 +21,17 @@ const MAX_RANK: usize = 64;
 /// Variance left out, relative to the largest.
 const TOLERANCE: f64 = 1e-6;
 
-/// The factor `L` of the prior covariance at the model points, row-major `I × rank`.
+/// Columns are padded with noughts to a multiple of this, so that they are whole vectors.
+pub(crate) const LANES: usize = 8;
+
+/// The factor `L` of the prior covariance at the model points, column by column.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Prior {
-    pub(crate) factor: Vec<f64>,
+    /// Length of a column: the number of points, padded.
+    pub(crate) stride: usize,
     pub(crate) rank: usize,
-    pub(crate) pivots: Vec<usize>,
-    columns: Vec<f64>,
+    pub(crate) columns: Vec<f64>,
+    pivots: Vec<usize>,
     diagonal: Vec<f64>,
 }
 
@@ -48,6 +52,7 @@ impl Prior {
         self.diagonal.clear();
         self.diagonal.extend(points.iter().map(|p| covariance(p, p)));
         self.columns.clear();
+        self.stride = n.next_multiple_of(LANES);
         self.pivots.clear();
         let floor = TOLERANCE * self.diagonal.iter().fold(0.0_f64, |m, &d| m.max(d));
         while self.pivots.len() < MAX_RANK.min(n) {
@@ -58,9 +63,6 @@ impl Prior {
             self.append_column(points, pivot, &covariance);
         }
         self.rank = self.pivots.len();
-        self.factor.clear();
-        let (columns, rank) = (&self.columns, self.rank);
-        self.factor.extend((0..n).flat_map(|i| (0..rank).map(move |c| columns[c * n + i])));
     }
 
     fn append_column<const D: usize>(
@@ -69,12 +71,12 @@ impl Prior {
         pivot: usize,
         covariance: &impl Fn(&[f64; D], &[f64; D]) -> f64,
     ) {
-        let n = points.len();
         let root = self.diagonal[pivot].sqrt();
         let start = self.columns.len();
         self.columns.extend(points.iter().map(|p| covariance(p, &points[pivot])));
+        self.columns.resize(start + self.stride, 0.0);
         let (earlier, new) = self.columns.split_at_mut(start);
-        for column in earlier.chunks_exact(n) {
+        for column in earlier.chunks_exact(self.stride) {
             let f = column[pivot];
             new.iter_mut().zip(column).for_each(|(v, c)| *v -= f * c);
         }
@@ -86,8 +88,9 @@ impl Prior {
         self.pivots.push(pivot);
     }
 
-    pub(crate) fn row(&self, i: usize) -> &[f64] {
-        &self.factor[i * self.rank..(i + 1) * self.rank]
+    /// Column `p` of the factor.
+    pub(crate) fn column(&self, p: usize) -> &[f64] {
+        &self.columns[p * self.stride..(p + 1) * self.stride]
     }
 }
 

@@ -66,6 +66,15 @@ pub(crate) fn rotations<const D: usize>() -> Vec<SMatrix<f64, D, D>> {
     }
 }
 
+/// Rotations tried where the target is turned by little: none, and 30° each way in the plane.
+pub(crate) fn limited_rotations<const D: usize>() -> Vec<SMatrix<f64, D, D>> {
+    let mut out = vec![SMatrix::identity()];
+    if D == 2 {
+        out.extend([-1.0, 1.0].map(|sign| turn(0, 1, sign * std::f64::consts::PI / 6.0)));
+    }
+    out
+}
+
 fn turn<const D: usize>(a: usize, b: usize, angle: f64) -> SMatrix<f64, D, D> {
     let mut r = SMatrix::identity();
     (r[(a, a)], r[(a, b)], r[(b, a)], r[(b, b)]) = (angle.cos(), -angle.sin(), angle.sin(), angle.cos());

@@ -1,0 +1,237 @@
+//! Shape contexts: where the other points of a set lie, seen from each point.
+//!
+//! The context of a point is a histogram of the vectors to all other points, in bins of log-distance and direction
+//! [Belongie, Malik & Puzicha, *Shape matching and object recognition using shape contexts*, PAMI 24 (2002)]; two
+//! contexts are compared by the χ² distance `½ Σ (g − h)²/(g + h)` of the histograms over their mean count. In the plane
+//! directions are twelve sectors, in space the 26 neighbours of a cube's centre. Points between two sectors of the plane
+//! count for both in proportion, so that a small turn changes the histogram a little.
+
+use crate::{MatchError, validate};
+use nalgebra::Point;
+use pulp::Arch;
+use tactile_tps::Scalar;
+
+/// Radial bins: the outermost ends at the largest radius, each further one at half the radius.
+const SHELLS: usize = 5;
+/// Bins are padded to a multiple of this.
+const LANES: usize = 16;
+
+/// The shape contexts of a point set.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::ShapeContexts;
+/// # fn main() -> Result<(), tactile_match::MatchError> {
+/// let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.3, 0.45]].map(Point2::from);
+/// let moved = square.map(|p| Point2::new(p.x + 7.0, p.y - 2.0));
+/// let (a, b) = (ShapeContexts::new(&square, 2.0)?, ShapeContexts::new(&moved, 2.0)?);
+/// assert!(a.cost(4, &b, 4) < 1e-6);
+/// assert!(a.cost(4, &b, 0) > 0.1);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShapeContexts {
+    bins: usize,
+    width: usize,
+    histograms: Vec<f32>,
+    totals: Vec<f32>,
+}
+
+impl ShapeContexts {
+    /// The contexts of all `points`, of neighbours up to `radius` away: `O(n²)`.
+    ///
+    /// # Errors
+    /// [`MatchError::NotFinite`] for a coordinate that is not finite, [`MatchError::InvalidOption`] for a radius that is
+    /// not positive and finite.
+    pub fn new<T: Scalar, const D: usize>(points: &[Point<T, D>], radius: T) -> Result<Self, MatchError> {
+        validate::option_within("radius", radius.widen(), f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+        if !points.is_empty() {
+            validate::point_set(crate::PointSet::Model, points)?;
+        }
+        let plain: Vec<[f64; D]> = points.iter().map(|p| std::array::from_fn(|k| p[k].widen())).collect();
+        let mut contexts = Self::default();
+        contexts.build(&plain, radius.widen());
+        Ok(contexts)
+    }
+
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.totals.len()
+    }
+
+    /// Whether there are no points.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.totals.is_empty()
+    }
+
+    /// The histogram of point `i`, shell by shell from the innermost.
+    #[must_use]
+    pub fn histogram(&self, i: usize) -> &[f32] {
+        &self.histograms[i * self.width..i * self.width + self.bins]
+    }
+
+    /// χ² distance of the contexts of point `i` here and point `j` of `other`, in [0, 1].
+    #[must_use]
+    pub fn cost(&self, i: usize, other: &Self, j: usize) -> f32 {
+        let (g, h) = (self.row(i), other.row(j));
+        chi_squared(g, h) / (self.totals[i] + other.totals[j]).max(1.0)
+    }
+
+    /// The costs of point `i` here and all points of `other`, into `costs`.
+    pub fn costs_into(&self, i: usize, other: &Self, costs: &mut Vec<f32>) {
+        costs.clear();
+        let (g, total) = (self.row(i), self.totals[i]);
+        Arch::new().dispatch(|| {
+            let rows = other.histograms.chunks_exact(other.width.max(1));
+            costs.extend(rows.zip(&other.totals).map(|(h, t)| chi_squared(g, h) / (total + t).max(1.0)));
+        });
+    }
+
+    fn row(&self, i: usize) -> &[f32] {
+        &self.histograms[i * self.width..(i + 1) * self.width]
+    }
+
+    /// Computes the contexts anew, in the memory of the old ones.
+    pub(crate) fn build<const D: usize>(&mut self, points: &[[f64; D]], radius: f64) {
+        self.bins = SHELLS * sectors::<D>();
+        self.width = self.bins.next_multiple_of(LANES);
+        self.histograms.clear();
+        self.histograms.resize(points.len() * self.width, 0.0);
+        self.totals.clear();
+        for (i, p) in points.iter().enumerate() {
+            let histogram = &mut self.histograms[i * self.width..(i + 1) * self.width];
+            for q in points {
+                let offset: [f64; D] = std::array::from_fn(|k| q[k] - p[k]);
+                count(histogram, &offset, radius);
+            }
+            self.totals.push(histogram.iter().sum());
+        }
+    }
+}
+
+fn sectors<const D: usize>() -> usize {
+    match D {
+        2 => 12,
+        3 => 26,
+        _ => 2 * D,
+    }
+}
+
+/// Adds one neighbour to a histogram; coinciding points and those beyond the radius have no place in it.
+fn count<const D: usize>(histogram: &mut [f32], offset: &[f64; D], radius: f64) {
+    let square = offset.iter().map(|v| v * v).sum::<f64>() / (radius * radius);
+    if square <= 0.0 || square > 1.0 {
+        return;
+    }
+    let shell = (0.5 * square.log2() + SHELLS as f64).clamp(0.0, SHELLS as f64 - 1.0) as usize;
+    let shell = &mut histogram[shell * sectors::<D>()..];
+    if D == 2 {
+        let turn = (offset[1].atan2(offset[0]) / std::f64::consts::TAU + 1.0) * 12.0 - 0.5;
+        let share = (turn - turn.floor()) as f32;
+        let sector = turn as usize % 12;
+        shell[sector] += 1.0 - share;
+        shell[(sector + 1) % 12] += share;
+    } else {
+        shell[sector(offset)] += 1.0;
+    }
+}
+
+/// The direction of least angle: the 26 neighbours of a cube's centre, or the axes in other dimensions.
+fn sector<const D: usize>(offset: &[f64; D]) -> usize {
+    let best = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
+    if D != 3 {
+        let axis = (0..D).map(|k| (offset[k].abs(), 2 * k + usize::from(offset[k] < 0.0)));
+        return axis.fold((-1.0, 0), best).1;
+    }
+    // With the sizes sorted, the nearest of (1,0,0), (1,1,0)/√2 and (1,1,1)/√3 has the largest scalar product.
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| offset[b].abs().total_cmp(&offset[a].abs()));
+    let (mut sum, mut choice) = (0.0, (-1.0, 0));
+    for (axes, root) in [1.0, std::f64::consts::SQRT_2, 1.732_050_807_568_877_2].into_iter().enumerate() {
+        sum += offset[order[axes]].abs();
+        choice = best(choice, (sum / root, axes));
+    }
+    let mut code = [1_usize; 3];
+    for &k in &order[..=choice.1] {
+        code[k] = if offset[k] < 0.0 { 0 } else { 2 };
+    }
+    let index = code[0] * 9 + code[1] * 3 + code[2];
+    if index > 13 { index - 1 } else { index }
+}
+
+#[inline(always)]
+fn chi_squared(g: &[f32], h: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    for (x, y) in g.chunks_exact(LANES).zip(h.chunks_exact(LANES)) {
+        (0..LANES).for_each(|l| {
+            let difference = x[l] - y[l];
+            sums[l] += difference * difference / (x[l] + y[l] + 1e-9);
+        });
+    }
+    sums.iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Point2, Point3};
+
+    #[test]
+    fn every_neighbour_within_the_radius_is_counted_once() {
+        let points: Vec<Point2<f64>> =
+            (0..30).map(|i| Point2::new(f64::from(i % 6), f64::from(i / 6))).collect();
+        let contexts = ShapeContexts::new(&points, 3.0).unwrap();
+        for (i, p) in points.iter().enumerate() {
+            let near = points.iter().filter(|q| (1e-9..=3.0).contains(&(*q - p).norm())).count();
+            // Shares of one are summed in single precision.
+            assert!((contexts.histogram(i).iter().sum::<f32>() - near as f32).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn the_sectors_of_space_are_the_nearest_directions() {
+        let mut directions = Vec::new();
+        for code in (0..27).filter(|&c| c != 13) {
+            directions.push([code / 9 - 1, code / 3 % 3 - 1, code % 3 - 1].map(f64::from));
+        }
+        for (index, d) in directions.iter().enumerate() {
+            assert_eq!(sector(d), index);
+        }
+        for i in 0..200 {
+            let v = [(i as f64).sin(), (1.7 * i as f64).cos(), (0.3 * i as f64).sin() - 0.2];
+            let along = |d: &[f64; 3]| {
+                let dot: f64 = (0..3).map(|k| d[k] * v[k]).sum();
+                dot / d.iter().map(|x| x * x).sum::<f64>().sqrt()
+            };
+            let best = directions.iter().map(along).fold(f64::MIN, f64::max);
+            // The same scalar products, in another order of rounding.
+            assert!((along(&directions[sector(&v)]) - best).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn costs_are_symmetric_and_nought_for_the_same_context() {
+        let points: Vec<Point3<f64>> =
+            (0..20).map(|i| Point3::new((i as f64).sin(), (2.1 * i as f64).cos(), 0.1 * i as f64)).collect();
+        let contexts = ShapeContexts::new(&points, 2.0).unwrap();
+        let mut costs = Vec::new();
+        for i in 0..20 {
+            contexts.costs_into(i, &contexts, &mut costs);
+            assert_eq!(costs[i], 0.0);
+            for (j, &cost) in costs.iter().enumerate() {
+                // Sums of 16 lanes in single precision.
+                assert!((cost - contexts.cost(j, &contexts, i)).abs() < 1e-5 && cost <= 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_radius_that_is_not_positive_is_refused() {
+        for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(ShapeContexts::new(&[Point2::new(0.0, 0.0)], radius).is_err());
+        }
+    }
+}
