@@ -5,9 +5,9 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_imaging::force::{
-    CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceError, ForceMeasurement, ForceMeter, ForceOptions,
-    ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair, ShearTracker, StressCalibration,
-    measure_force,
+    CalibrationPair, ContactOptions, DriftCorrection, Estimate, ForceError, ForceMeasurement, ForceMeter,
+    ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair,
+    ShearTracker, StressCalibration, measure_force,
 };
 use tactile_imaging::simulate::{
     Camera, Gain, Hostile, Illumination, Load, PressOptions, PressScene, PressTruth,
@@ -19,15 +19,22 @@ fn camera() -> Camera {
 }
 
 fn press(camera: Camera) -> PressOptions {
-    PressOptions { camera, loads: vec![Load::normal(0.7)], centre_px: Some([170.3, 131.8]), ..PressOptions::default() }
+    PressOptions {
+        camera,
+        loads: vec![Load::normal(0.7)],
+        centre_px: Some([170.3, 131.8]),
+        ..PressOptions::default()
+    }
 }
 
 /// The sensor's true calibration, with its error left out: what is tested is the frames' share of the error.
 fn calibration(scene: &PressScene) -> LinearCalibration<f64> {
     let camera = scene.options().camera;
     let newton_per_grey = camera.pixel_area_m2() / scene.grey_per_pascal();
-    let pairs: Vec<_> =
-        (0..11).map(|k| 0.2 * f64::from(k)).map(|f| CalibrationPair::loading(f / newton_per_grey, f)).collect();
+    let pairs: Vec<_> = (0..11)
+        .map(|k| 0.2 * f64::from(k))
+        .map(|f| CalibrationPair::loading(f / newton_per_grey, f))
+        .collect();
     LinearCalibration::fit(&pairs, &Default::default()).unwrap()
 }
 
@@ -119,13 +126,19 @@ fn a_thousand_seeds() {
     assert!(s.centroid.iter().all(|c| c.rms() < 0.01) && s.centre.rms() < 0.01);
     for errors in [&s.force, &s.centroid[0], &s.centroid[1], &s.centre, &s.radius] {
         // 68.3 % is the normal law's; the binomial spread of a thousand seeds is 1.5 %.
-        assert!((0.66..=0.71).contains(&errors.inside_one_sigma()), "{}: {}", errors.name, errors.inside_one_sigma());
+        assert!(
+            (0.66..=0.71).contains(&errors.inside_one_sigma()),
+            "{}: {}",
+            errors.name,
+            errors.inside_one_sigma()
+        );
     }
 }
 
 #[test]
 fn the_full_frame_with_its_vignetting() {
-    let scene = PressScene::new(PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() }).unwrap();
+    let scene =
+        PressScene::new(PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() }).unwrap();
     let s = study(&scene, 4, &ForceOptions::default());
     // Vignetting takes up to 0.1 % of the light at the rim of this contact and is not corrected.
     assert!(s.force.worst() < 2e-3 && s.radius.worst() < 3e-3 && s.centroid[0].worst() < 0.02);
@@ -155,7 +168,10 @@ fn lamps_that_drift_are_corrected_on_request() {
     let mut options = press(camera());
     options.loads[0].illumination = Illumination { level: 1.05, tilt: [0.1, -0.06] };
     let scene = PressScene::new(options).unwrap();
-    let with = |drift| ForceOptions { contact: ContactOptions { drift, ..Default::default() }, ..Default::default() };
+    let with = |drift| ForceOptions {
+        contact: ContactOptions { drift, ..Default::default() },
+        ..Default::default()
+    };
     let uncorrected = study(&scene, 20, &with(DriftCorrection::None));
     assert!(uncorrected.force.rms() > 0.03);
     let corrected = study(&scene, 100, &with(DriftCorrection::TiltedLamp));
@@ -174,7 +190,11 @@ fn false_alarms_are_as_rare_as_stated() {
         .filter(|seed| {
             let reference = ReferenceFrame::new(dark(&scene, *seed).view()).unwrap();
             let frame = dark(&scene, 10_000 + seed);
-            meter.measure_with(&mut workspace, frame.view(), &reference, &calibration).unwrap().contact.is_some()
+            meter
+                .measure_with(&mut workspace, frame.view(), &reference, &calibration)
+                .unwrap()
+                .contact
+                .is_some()
         })
         .count();
     // One in a thousand is stated: more than five has a probability of 6e-4.
@@ -210,10 +230,14 @@ fn shear_follows_the_centroid() {
             let truth = made.truth[k].load.shear_n[axis];
             let found = shear.force_n[axis];
             // Four standard errors of eight numbers.
-            assert!((found.value - truth).abs() <= 4.0 * found.standard_error, "{k}: {found} N, true {truth}");
+            assert!(
+                (found.value - truth).abs() <= 4.0 * found.standard_error,
+                "{k}: {found} N, true {truth}"
+            );
         }
     }
-    let none = measure(made.reference.view(), made.reference.view(), made.pixel_size_m, &calibration).unwrap();
+    let none =
+        measure(made.reference.view(), made.reference.view(), made.pixel_size_m, &calibration).unwrap();
     assert!(tracker.update(&none).is_none());
 }
 
@@ -233,7 +257,8 @@ fn hostile_scenes_end_civilly() {
     for kind in Hostile::ALL {
         let made = kind.simulate(&base).unwrap();
         let scene = PressScene::new(base.clone()).unwrap();
-        let result = measure(made.frames[0].view(), made.reference.view(), made.pixel_size_m, &calibration(&scene));
+        let result =
+            measure(made.frames[0].view(), made.reference.view(), made.pixel_size_m, &calibration(&scene));
         println!("{kind:?}: {}", describe(&result));
         check(kind, &result, &made.truth);
     }
