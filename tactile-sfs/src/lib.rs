@@ -10,9 +10,11 @@
 
 mod domain;
 mod error;
+mod estimate;
 mod frame;
 mod integrate;
 mod lighting;
+mod quality;
 mod reconstruct;
 mod sample;
 mod scalar;
@@ -21,10 +23,17 @@ mod workspace;
 
 pub use domain::{BoundingBox, Domain};
 pub use error::{Input, SfsError};
+pub use estimate::{estimate_lighting, estimate_normal_intensity};
 pub use frame::Frame;
-pub use integrate::{CosinePoisson, SlopeIntegrator};
+pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
-pub use reconstruct::{Branch, DepthTable, Eikonal, Rim, Signal, SurfaceReconstruction};
+pub use quality::{
+    Alignment, ErrorSummary, HeightError, Reprojection, SlopeError, height_error, render, reprojection,
+    slope_error, slopes,
+};
+pub use reconstruct::{
+    Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Rim, Signal, SurfaceReconstruction, TsaiShah,
+};
 pub use sample::{ControlPointSampler, EquallySpaced};
 pub use scalar::Scalar;
 pub use surface::{Component, PixelFlags, Report, StopReason, Surface};

@@ -35,6 +35,9 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send>;
 pub struct Workspace<T> {
     pub(crate) eikonal: crate::reconstruct::EikonalBuffers<T>,
     pub(crate) poisson: crate::integrate::PoissonBuffers<T>,
+    pub(crate) field: crate::reconstruct::FieldBuffers<T>,
+    pub(crate) fourier: crate::integrate::FourierBuffers<T>,
+    pub(crate) masked: crate::integrate::MaskedBuffers<T>,
     callback: Option<Callback>,
 }
 

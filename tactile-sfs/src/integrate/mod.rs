@@ -2,11 +2,20 @@
 
 mod cosine_poisson;
 mod cosine_transform;
+mod divergence;
+mod frankot_chellappa;
+mod masked;
+pub(crate) mod shift;
+mod tridiagonal;
 
 use ndarray::ArrayView2;
 
 pub use cosine_poisson::CosinePoisson;
 pub(crate) use cosine_poisson::PoissonBuffers;
+pub(crate) use frankot_chellappa::FourierBuffers;
+pub use frankot_chellappa::FrankotChellappa;
+pub(crate) use masked::MaskedBuffers;
+pub use masked::MaskedLeastSquares;
 
 use crate::{Domain, Scalar, SfsError, Surface, Workspace};
 

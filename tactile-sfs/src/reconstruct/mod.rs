@@ -1,13 +1,21 @@
 //! One image to heights: the trait and its implementations.
 
+mod brooks_horn;
 mod depth_table;
 mod eikonal;
+mod pentland;
+mod reflectance;
+mod tsai_shah;
 
 use ndarray::ArrayView2;
 
+pub use brooks_horn::BrooksHorn;
 pub use depth_table::{DepthTable, Signal};
 pub(crate) use eikonal::EikonalBuffers;
 pub use eikonal::{Branch, Eikonal, Rim};
+pub use pentland::Pentland;
+pub(crate) use reflectance::FieldBuffers;
+pub use tsai_shah::TsaiShah;
 
 use crate::{Domain, Frame, Scalar, SfsError, Surface, Workspace};
 

@@ -1,0 +1,162 @@
+//! Height and slope errors against truth.
+
+use ndarray::ArrayView2;
+
+use crate::domain::same_shape;
+use crate::error::Input;
+use crate::{Scalar, SfsError};
+
+/// What is fitted before heights are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Alignment {
+    /// Nothing: absolute heights.
+    None,
+    /// A constant, by least squares.
+    Offset,
+    /// Scale and constant, by least squares: scale · z + offset.
+    Affine,
+}
+
+/// Mean absolute, root mean square and largest error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ErrorSummary {
+    /// Mean of |error|.
+    pub mean_absolute: f64,
+    /// Root of the mean of error².
+    pub rms: f64,
+    /// Largest |error|.
+    pub max: f64,
+    /// Pixels compared.
+    pub pixels: usize,
+}
+
+impl ErrorSummary {
+    pub(super) fn of(errors: impl Iterator<Item = f64>) -> Self {
+        let (mut sum, mut square, mut max, mut pixels) = (0.0, 0.0, 0.0_f64, 0);
+        for error in errors {
+            sum += error.abs();
+            square += error * error;
+            max = max.max(error.abs());
+            pixels += 1;
+        }
+        let n = (pixels as f64).max(1.0);
+        Self { mean_absolute: sum / n, rms: (square / n).sqrt(), max, pixels }
+    }
+}
+
+/// Error of heights, the alignment that was applied, and what a constant guess would have reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightError {
+    /// Error of scale · z + offset.
+    pub error: ErrorSummary,
+    /// Scale applied (1 unless affine).
+    pub scale: f64,
+    /// Offset applied (0 without alignment).
+    pub offset: f64,
+    /// Mean absolute error of the best constant, the median of the truth: what a method must beat.
+    pub constant_guess: f64,
+    /// Range of the true heights.
+    pub range: f64,
+}
+
+/// Compares heights with the truth where both are finite (and the mask is true).
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{Alignment, height_error};
+/// let (z, truth) = (array![[0.0, 1.0, 2.0]], array![[1.0, 3.0, 5.0]]);
+/// let result = height_error(z.view(), truth.view(), None, Alignment::Affine)?;
+/// assert!((result.scale - 2.0).abs() < 1e-12 && result.error.max < 1e-12);
+/// assert!((result.constant_guess - 4.0 / 3.0).abs() < 1e-12);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+///
+/// # Errors
+/// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.
+pub fn height_error<T: Scalar>(
+    heights: ArrayView2<'_, T>,
+    truth: ArrayView2<'_, T>,
+    mask: Option<ArrayView2<'_, bool>>,
+    alignment: Alignment,
+) -> Result<HeightError, SfsError> {
+    let (rows, columns) = heights.dim();
+    same_shape(Input::Truth, [rows, columns], truth.dim())?;
+    if let Some(mask) = mask {
+        same_shape(Input::Mask, [rows, columns], mask.dim())?;
+    }
+    let pairs: Vec<(f64, f64)> = heights
+        .indexed_iter()
+        .filter(|(at, _)| mask.is_none_or(|mask| mask[*at]))
+        .map(|(at, z)| (z.as_f64(), truth[at].as_f64()))
+        .filter(|(z, t)| z.is_finite() && t.is_finite())
+        .collect();
+    if pairs.is_empty() {
+        return Err(SfsError::EmptyMask);
+    }
+    let (scale, offset) = align(&pairs, alignment);
+    let error = ErrorSummary::of(pairs.iter().map(|(z, t)| scale * z + offset - t));
+    let mut truths: Vec<f64> = pairs.iter().map(|pair| pair.1).collect();
+    truths.sort_by(f64::total_cmp);
+    let median = truths[truths.len() / 2];
+    let constant_guess = truths.iter().map(|t| (t - median).abs()).sum::<f64>() / truths.len() as f64;
+    Ok(HeightError { error, scale, offset, constant_guess, range: truths[truths.len() - 1] - truths[0] })
+}
+
+fn align(pairs: &[(f64, f64)], alignment: Alignment) -> (f64, f64) {
+    let n = pairs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n;
+    let (z, t) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    match alignment {
+        Alignment::None => (1.0, 0.0),
+        Alignment::Offset => (1.0, t - z),
+        Alignment::Affine => {
+            let (mut zz, mut zt) = (0.0, 0.0);
+            for pair in pairs {
+                zz += (pair.0 - z) * (pair.0 - z);
+                zt += (pair.0 - z) * (pair.1 - t);
+            }
+            // A flat surface has no scale.
+            let scale = if zz > 0.0 { zt / zz } else { 1.0 };
+            (scale, t - scale * z)
+        }
+    }
+}
+
+/// Errors of slopes: of p, of q, and of their vector difference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlopeError {
+    /// Error of p = ∂z/∂x.
+    pub p: ErrorSummary,
+    /// Error of q = ∂z/∂y.
+    pub q: ErrorSummary,
+    /// Length of the error vector.
+    pub vector: ErrorSummary,
+}
+
+/// Compares slopes (p, q) with true ones where all four are finite.
+///
+/// # Errors
+/// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.
+pub fn slope_error<T: Scalar>(
+    slopes: [ArrayView2<'_, T>; 2],
+    truth: [ArrayView2<'_, T>; 2],
+) -> Result<SlopeError, SfsError> {
+    let (rows, columns) = slopes[0].dim();
+    same_shape(Input::SlopeY, [rows, columns], slopes[1].dim())?;
+    same_shape(Input::Truth, [rows, columns], truth[0].dim())?;
+    same_shape(Input::Truth, [rows, columns], truth[1].dim())?;
+    let errors: Vec<(f64, f64)> = slopes[0]
+        .indexed_iter()
+        .map(|(at, p)| ((*p - truth[0][at]).as_f64(), (slopes[1][at] - truth[1][at]).as_f64()))
+        .filter(|(p, q)| p.is_finite() && q.is_finite())
+        .collect();
+    if errors.is_empty() {
+        return Err(SfsError::EmptyMask);
+    }
+    Ok(SlopeError {
+        p: ErrorSummary::of(errors.iter().map(|e| e.0)),
+        q: ErrorSummary::of(errors.iter().map(|e| e.1)),
+        vector: ErrorSummary::of(errors.iter().map(|e| e.0.hypot(e.1))),
+    })
+}

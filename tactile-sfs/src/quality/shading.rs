@@ -1,0 +1,96 @@
+//! Slopes of a surface, its shading, and how far that is from the image: a check that needs no truth.
+
+use ndarray::{Array2, ArrayView2};
+
+use super::ErrorSummary;
+use crate::domain::same_shape;
+use crate::error::Input;
+use crate::{Frame, Lighting, Scalar, SfsError};
+
+/// Slopes p = ∂z/∂x and q = ∂z/∂y: central differences, one-sided next to missing (NaN) heights or the frame's border,
+/// NaN where the height is missing and 0 along an axis without neighbours. Second order inside, first at borders.
+///
+/// ```
+/// use ndarray::array;
+/// let (p, q) = tactile_sfs::slopes(array![[0.0, 1.0, 4.0], [0.0, 1.0, 4.0]].view(), [1.0, 1.0]);
+/// assert_eq!((p[[0, 1]], q[[0, 1]]), (2.0, 0.0));
+/// ```
+pub fn slopes<T: Scalar>(heights: ArrayView2<'_, T>, pixel_size_m: [T; 2]) -> (Array2<T>, Array2<T>) {
+    let (mut p, mut q) = (Array2::zeros(heights.dim()), Array2::zeros(heights.dim()));
+    for ((row, column), &z) in heights.indexed_iter() {
+        let [slope_x, slope_y] =
+            if z.is_finite() { slopes_at(heights, [row, column], pixel_size_m) } else { [T::nan(); 2] };
+        (p[[row, column]], q[[row, column]]) = (slope_x, slope_y);
+    }
+    (p, q)
+}
+
+/// Slopes at a pixel whose height is finite.
+pub(crate) fn slopes_at<T: Scalar>(z: ArrayView2<'_, T>, [row, column]: [usize; 2], step: [T; 2]) -> [T; 2] {
+    let here = z[[row, column]];
+    let get = |r: usize, c: usize| z.get([r, c]).copied().filter(|z| z.is_finite());
+    let difference = |before: Option<T>, after: Option<T>, step: T| match (before, after) {
+        (Some(a), Some(b)) => (b - a) / (step + step),
+        (Some(a), None) => (here - a) / step,
+        (None, Some(b)) => (b - here) / step,
+        (None, None) => T::zero(),
+    };
+    // Index 0 − 1 wraps to a number no array reaches.
+    let x = difference(get(row, column.wrapping_sub(1)), get(row, column + 1), step[0]);
+    let y = difference(get(row.wrapping_sub(1), column), get(row + 1, column), step[1]);
+    [x, y]
+}
+
+/// Shades a surface; NaN where it has no height.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Lighting, render};
+/// let image = render(Array2::<f64>::zeros((3, 3)).view(), [1.0, 1.0], &Lighting::frontal());
+/// assert_eq!(image[[1, 1]], 1.0);
+/// ```
+pub fn render<T: Scalar>(
+    heights: ArrayView2<'_, T>,
+    pixel_size_m: [T; 2],
+    lighting: &Lighting<T>,
+) -> Array2<T> {
+    Array2::from_shape_fn(heights.dim(), |(row, column)| {
+        if !heights[[row, column]].is_finite() {
+            return T::nan();
+        }
+        let [p, q] = slopes_at(heights, [row, column], pixel_size_m);
+        lighting.shade(p, q)
+    })
+}
+
+/// How far a surface, shaded again, is from the image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reprojection<T> {
+    /// Rendered minus observed intensity, NaN where there is no height.
+    pub residual: Array2<T>,
+    /// Summary of the residual, in the image's unit.
+    pub error: ErrorSummary,
+}
+
+/// Renders a surface and compares it with the image it was made from.
+///
+/// A small residual does not prove the surface right (convex and concave look alike), a large one proves it wrong.
+///
+/// # Errors
+/// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.
+pub fn reprojection<T: Scalar>(
+    heights: ArrayView2<'_, T>,
+    frame: Frame<'_, T>,
+    pixel_size_m: [T; 2],
+    lighting: &Lighting<T>,
+) -> Result<Reprojection<T>, SfsError> {
+    let (rows, columns) = heights.dim();
+    same_shape(Input::Image, [rows, columns], frame.dim())?;
+    let mut residual = render(heights, pixel_size_m, lighting);
+    for ((row, column), value) in residual.indexed_iter_mut() {
+        *value -= frame.at(row, column);
+    }
+    let error =
+        ErrorSummary::of(residual.iter().map(|value| value.as_f64()).filter(|value| value.is_finite()));
+    if error.pixels == 0 { Err(SfsError::EmptyMask) } else { Ok(Reprojection { residual, error }) }
+}

@@ -1,0 +1,223 @@
+//! Brooks & Horn 1985 with the integrability of Frankot & Chellappa 1988.
+//!
+//! Minimises ∫ (R − n·s)² + λ |∇n|² over unit normals by the iteration n ← normalise(n̄ + (R − n̄·s) s/(1 + 4 λ)), n̄ the
+//! mean of the neighbours (the pixel's own equation solved exactly; the printed explicit form diverges for small λ); every few steps the slopes are projected on the integrable ones (in the Fourier domain), and the
+//! heights are those of the last projection. Normals have no infinite slopes, so the occluding rim is an ordinary
+//! boundary condition: there n lies in the image plane and points outwards.
+
+use rustfft::num_complex::Complex;
+
+use crate::error::{non_negative, positive};
+use crate::integrate::shift::write_levelled;
+use crate::{BoundingBox, Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface};
+use crate::{SurfaceReconstruction, Workspace};
+
+/// Variational shape from shading with integrability.
+///
+/// Heights are level with known ones on average, or have mean 0. O(pixels) a step plus O(N M log(N M)) a projection;
+/// `report.residual` is the root mean square misfit of the reflectance.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{BrooksHorn, Domain, Lighting, SurfaceReconstruction};
+/// let image = Array2::from_elem((16, 16), 1.0);
+/// let surface = BrooksHorn::new(Lighting::frontal()).reconstruct(image.view(), &Domain::pixels())?;
+/// assert!(surface.heights.iter().all(|z: &f64| z.abs() < 1e-9)); // facing the light everywhere: flat
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BrooksHorn<T> {
+    lighting: Lighting<T>,
+    smoothness: T,
+    iterations: usize,
+    project_every: usize,
+    occluding_rim: bool,
+    max_slope: T,
+}
+
+impl<T: Scalar> BrooksHorn<T> {
+    /// λ = 0.02, 300 steps, a projection every 20, no occluding rim, slopes up to 10.
+    pub fn new(lighting: Lighting<T>) -> Self {
+        let (smoothness, max_slope) = (T::of(0.02), T::of(10.0));
+        Self { lighting, smoothness, iterations: 300, project_every: 20, occluding_rim: false, max_slope }
+    }
+
+    /// λ, the weight of smoothness against the image.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless positive and finite.
+    pub fn with_smoothness(self, smoothness: T) -> Result<Self, SfsError> {
+        positive("smoothness", smoothness.as_f64())?;
+        Ok(Self { smoothness, ..self })
+    }
+
+    /// Number of steps and of steps between projections.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] if either is 0.
+    pub fn with_iterations(self, iterations: usize, project_every: usize) -> Result<Self, SfsError> {
+        positive("iterations", iterations as f64)?;
+        positive("steps between projections", project_every as f64)?;
+        Ok(Self { iterations, project_every, ..self })
+    }
+
+    /// Whether the mask's border (not the frame's) is an occluding contour of a convex object.
+    pub fn with_occluding_rim(self, occluding_rim: bool) -> Self {
+        Self { occluding_rim, ..self }
+    }
+
+    /// Largest slope handed to the projection.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] if negative or not finite.
+    pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
+        non_negative("steepest slope", max_slope.as_f64())?;
+        Ok(Self { max_slope, ..self })
+    }
+}
+
+impl<T: Scalar> SurfaceReconstruction<T> for BrooksHorn<T> {
+    fn reconstruct_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        let (rows, columns) = frame.dim();
+        let area = domain.validate(rows, columns)?;
+        surface.prepare(rows, columns, area);
+        workspace.field.load(&frame, domain, &self.lighting, surface)?;
+        let start = [T::zero(), T::zero(), T::one()];
+        for normals in [&mut workspace.field.normals, &mut workspace.field.next] {
+            normals.clear();
+            normals.resize(area.area(), start);
+        }
+        surface.report.stop = StopReason::IterationLimit;
+        for step in 1..=self.iterations {
+            let misfit = self.relax(&mut workspace.field, area, [rows, columns]);
+            surface.report.iterations = step;
+            surface.report.residual = misfit;
+            if step % self.project_every == 0 || step == self.iterations {
+                self.project(workspace, domain, area, step == self.iterations);
+                if let Some(stop) = workspace.report(step, self.iterations, misfit) {
+                    surface.report.stop = stop;
+                    break;
+                }
+            }
+        }
+        write_levelled(workspace.fourier.heights(), domain, surface);
+        surface.finish(domain);
+        Ok(())
+    }
+}
+
+impl<T: Scalar> BrooksHorn<T> {
+    /// One Jacobi step on the normals; returns the misfit before it.
+    fn relax(&self, field: &mut super::FieldBuffers<T>, area: BoundingBox, frame: [usize; 2]) -> T {
+        let light = self.lighting.direction();
+        let weight = T::one() / (T::one() + T::of(4.0) * self.smoothness);
+        let (mut sum, mut count) = (T::zero(), 0usize);
+        for r in 0..area.rows {
+            for c in 0..area.columns {
+                let i = r * area.columns + c;
+                let reflectance = field.reflectance[i];
+                if reflectance.is_nan() {
+                    continue;
+                }
+                let n = field.normals[i];
+                let (mut mean, mut outward) = neighbours(&field.normals, &field.reflectance, area, r, c);
+                // Where the frame cuts the surface off there is no rim.
+                let (row, column) = (area.top + r, area.left + c);
+                let cut = [column == 0 || column + 1 == frame[1], row == 0 || row + 1 == frame[0]];
+                (0..2).filter(|&axis| cut[axis]).for_each(|axis| outward[axis] = 0);
+                if self.occluding_rim && outward != [0, 0] {
+                    let length = T::of(f64::from(outward[0]).hypot(f64::from(outward[1])));
+                    let out = outward.map(|d| T::of(f64::from(d)) / length);
+                    mean = [mean[0] + out[0], mean[1] + out[1], mean[2]];
+                }
+                mean = unit(mean);
+                let misfit = reflectance - dot(n, light);
+                sum += misfit * misfit;
+                count += 1;
+                let pull = weight * (reflectance - dot(mean, light));
+                field.next[i] =
+                    unit([mean[0] + pull * light[0], mean[1] + pull * light[1], mean[2] + pull * light[2]]);
+            }
+        }
+        core::mem::swap(&mut field.normals, &mut field.next);
+        (sum / T::of(count.max(1) as f64)).sqrt()
+    }
+
+    /// Projects the slopes on the integrable ones; unless it is the last time, the normals follow.
+    fn project(&self, workspace: &mut Workspace<T>, domain: &Domain<'_, T>, area: BoundingBox, last: bool) {
+        let (field, fourier) = (&mut workspace.field, &mut workspace.fourier);
+        let least = T::one() / (T::one() + self.max_slope * self.max_slope).sqrt();
+        let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
+        let slope = |(n, reflectance): (&[T; 3], &T)| {
+            if reflectance.is_nan() {
+                return Complex::new(T::zero(), T::zero());
+            }
+            let z = n[2].max(least);
+            Complex::new(cut(-n[0] / z), cut(-n[1] / z))
+        };
+        fourier.fill(area.rows, area.columns, field.normals.iter().zip(&field.reflectance).map(slope));
+        fourier.integrate(domain.pixel_size_m);
+        if last {
+            return;
+        }
+        let (hx, hy) = (domain.pixel_size_m[0], domain.pixel_size_m[1]);
+        let z = fourier.heights();
+        let two = T::of(2.0);
+        for r in 0..area.rows {
+            for c in 0..area.columns {
+                let i = r * area.columns + c;
+                if field.reflectance[i].is_nan() {
+                    continue;
+                }
+                let (left, right) = (i - usize::from(c > 0), i + usize::from(c + 1 < area.columns));
+                let up = if r > 0 { i - area.columns } else { i };
+                let down = if r + 1 < area.rows { i + area.columns } else { i };
+                let (p, q) = ((z[right] - z[left]) / (two * hx), (z[down] - z[up]) / (two * hy));
+                field.normals[i] = unit([-p, -q, T::one()]);
+            }
+        }
+    }
+}
+
+/// Sum of the normals of the neighbours in the mask, and the direction out of the mask.
+fn neighbours<T: Scalar>(
+    normals: &[[T; 3]],
+    reflectance: &[T],
+    area: BoundingBox,
+    r: usize,
+    c: usize,
+) -> ([T; 3], [i32; 2]) {
+    let (mut sum, mut outward) = ([T::zero(); 3], [0, 0]);
+    for (dr, dc) in [(0, -1), (0, 1), (-1, 0), (1, 0)] {
+        let (row, column) = (r as isize + dr, c as isize + dc);
+        let in_box = row >= 0 && column >= 0 && row < area.rows as isize && column < area.columns as isize;
+        if !in_box {
+            outward = [outward[0] + dc as i32, outward[1] + dr as i32];
+            continue;
+        }
+        let j = row as usize * area.columns + column as usize;
+        if reflectance[j].is_nan() {
+            outward = [outward[0] + dc as i32, outward[1] + dr as i32];
+        } else {
+            for (sum, &n) in sum.iter_mut().zip(&normals[j]) {
+                *sum += n;
+            }
+        }
+    }
+    (sum, outward)
+}
+
+fn dot<T: Scalar>(a: [T; 3], b: [T; 3]) -> T {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn unit<T: Scalar>(v: [T; 3]) -> [T; 3] {
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    if length > T::zero() { v.map(|x| x / length) } else { [T::zero(), T::zero(), T::one()] }
+}

@@ -1,0 +1,169 @@
+//! Tsai & Shah 1994: Newton's method on the reflectance, pixel by pixel.
+//!
+//! With p = (z − z_left)/h_x and q = (z − z_above)/h_y the residual f(z) = R − (s_z − s_x p − s_y q)/√(1 + p² + q²)
+//! is linearised in the pixel's own height. As printed the method breaks where f′ vanishes (at once under frontal
+//! light, where the start z = 0 is stationary), where slopes run away, and along one diagonal, since only left and
+//! upper neighbours count. Tamed here:
+//!
+//! - the step is K = f′ S/(W + f′² S) · f, S the pixel's own variance, which shrinks as (1 − K f′) S: a Kalman gain
+//!   instead of 1/f′ (the authors' own remedy), with W as the stated noise of the image;
+//! - slopes used in f and f′ are cut to `max_slope`;
+//! - the four corners are taken in turn (left/right, above/below), so that no diagonal is preferred.
+//!
+//! It is a local method: heights are right where the surface falls steadily to or from the light, and only then. The
+//! eikonal method is better wherever a height is known.
+
+use crate::error::positive;
+use crate::integrate::shift::write_levelled;
+use crate::{
+    Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface, SurfaceReconstruction, Workspace,
+};
+
+/// Shape from shading by Newton's method on each pixel.
+///
+/// Heights are level with known ones on average, or have mean 0. Cost: O(pixels) an iteration;
+/// `report.residual` is the root mean square misfit of the reflectance.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
+/// let image = Array2::from_shape_fn((32, 32), |(_, c)| if c < 16 { 0.6 } else { 0.8 });
+/// let method = TsaiShah::new(Lighting::new([1.0, 0.0, 1.0])?).with_iterations(5)?;
+/// assert_eq!(method.reconstruct(image.view(), &Domain::pixels())?.report.iterations, 5);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TsaiShah<T> {
+    lighting: Lighting<T>,
+    iterations: usize,
+    noise: T,
+    max_slope: T,
+}
+
+impl<T: Scalar> TsaiShah<T> {
+    /// 12 iterations, noise variance 10⁻², slopes up to 5.
+    pub fn new(lighting: Lighting<T>) -> Self {
+        Self { lighting, iterations: 12, noise: T::of(1e-2), max_slope: T::of(5.0) }
+    }
+
+    /// Number of iterations; more do not make the method converge to the surface.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] for 0.
+    pub fn with_iterations(self, iterations: usize) -> Result<Self, SfsError> {
+        positive("iterations", iterations as f64)?;
+        Ok(Self { iterations, ..self })
+    }
+
+    /// Variance W of the reflectance: larger damps more.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless positive and finite.
+    pub fn with_noise(self, noise: T) -> Result<Self, SfsError> {
+        positive("noise variance", noise.as_f64())?;
+        Ok(Self { noise, ..self })
+    }
+
+    /// Largest slope used in the residual.
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless positive and finite.
+    pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
+        positive("steepest slope", max_slope.as_f64())?;
+        Ok(Self { max_slope, ..self })
+    }
+}
+
+/// The box of one call.
+struct Grid<T> {
+    rows: usize,
+    columns: usize,
+    step: [T; 2],
+}
+
+impl<T: Scalar> SurfaceReconstruction<T> for TsaiShah<T> {
+    fn reconstruct_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        let (rows, columns) = frame.dim();
+        let area = domain.validate(rows, columns)?;
+        surface.prepare(rows, columns, area);
+        let mut field = core::mem::take(&mut workspace.field);
+        field.load(&frame, domain, &self.lighting, surface)?;
+        let length = area.area();
+        // Heights in widths of a pixel; `first` is the variance of each, `second` its next height.
+        for (vector, value) in
+            [(&mut field.heights, T::zero()), (&mut field.first, T::one()), (&mut field.second, T::zero())]
+        {
+            vector.clear();
+            vector.resize(length, value);
+        }
+        let [hx, hy] = domain.pixel_size_m;
+        let grid = Grid { rows: area.rows, columns: area.columns, step: [T::one(), hy / hx] };
+        surface.report.stop = StopReason::IterationLimit;
+        for iteration in 0..self.iterations {
+            let misfit = self.iterate(&mut field, &grid, iteration);
+            core::mem::swap(&mut field.heights, &mut field.second);
+            surface.report.iterations = iteration + 1;
+            surface.report.residual = misfit;
+            if let Some(stop) = workspace.report(iteration + 1, self.iterations, misfit) {
+                surface.report.stop = stop;
+                break;
+            }
+        }
+        field.heights.iter_mut().for_each(|z| *z *= hx);
+        write_levelled(&field.heights, domain, surface);
+        workspace.field = field;
+        surface.finish(domain);
+        Ok(())
+    }
+}
+
+impl<T: Scalar> TsaiShah<T> {
+    fn iterate(&self, field: &mut super::FieldBuffers<T>, grid: &Grid<T>, iteration: usize) -> T {
+        let [sx, sy, sz] = self.lighting.direction();
+        let sign = |back: bool| if back { T::one() } else { -T::one() };
+        let (back_x, back_y) = (iteration & 1 == 0, iteration & 2 == 0);
+        let (ax, ay) = (sign(back_x) / grid.step[0], sign(back_y) / grid.step[1]);
+        let (mut sum, mut count) = (T::zero(), 0usize);
+        for r in 0..grid.rows {
+            for c in 0..grid.columns {
+                let i = r * grid.columns + c;
+                let (z, reflectance) = (field.heights[i], field.reflectance[i]);
+                if reflectance.is_nan() {
+                    field.second[i] = z;
+                    continue;
+                }
+                let beside = neighbour(&field.heights, i, c, grid.columns, 1, back_x);
+                let above = neighbour(&field.heights, i, r, grid.rows, grid.columns, back_y);
+                let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
+                let (p, q) = (cut(ax * (z - beside)), cut(ay * (z - above)));
+                let w2 = T::one() + p * p + q * q;
+                let w = w2.sqrt();
+                let cosine = (sz - sx * p - sy * q) / w;
+                let f = reflectance - cosine.max(T::zero());
+                let slope = (sx * ax + sy * ay) / w + cosine * (p * ax + q * ay) / w2;
+                let variance = field.first[i];
+                let gain = variance * slope / (self.noise + slope * slope * variance);
+                field.first[i] = (T::one() - gain * slope) * variance;
+                field.second[i] = z - gain * f;
+                sum += f * f;
+                count += 1;
+            }
+        }
+        (sum / T::of(count.max(1) as f64)).sqrt()
+    }
+}
+
+/// Height of the neighbour before or after along one axis; the pixel's own at the border.
+fn neighbour<T: Scalar>(z: &[T], i: usize, at: usize, length: usize, stride: usize, back: bool) -> T {
+    match back {
+        true if at > 0 => z[i - stride],
+        false if at + 1 < length => z[i + stride],
+        _ => z[i],
+    }
+}
