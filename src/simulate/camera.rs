@@ -92,8 +92,8 @@ impl Camera {
         for (row, (mut out, light)) in image.rows_mut().into_iter().zip(expected_grey.rows()).enumerate() {
             let mut rng = row_stream(seed, purpose, frame, row);
             for (pixel, &grey) in out.iter_mut().zip(light) {
-                // `as` saturates at 0 and 255.
-                *pixel = (self.noisy(grey, &mut rng) + 0.5).floor() as u8;
+                // `as` cuts towards zero and saturates at 0 and 255.
+                *pixel = (self.noisy(grey, &mut rng) + 0.5) as u8;
             }
         }
         image

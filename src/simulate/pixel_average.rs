@@ -187,4 +187,37 @@ mod tests {
             assert!((value - same).abs() < 1e-13, "the corner sums differ by rounding only");
         }
     }
+
+    #[test]
+    fn averages_agree_with_the_reference_numbers() {
+        let home = std::env::var_os("TACTILE_DATA").map(std::path::PathBuf::from);
+        let home = home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data").into());
+        let Ok(text) = std::fs::read_to_string(home.join("reference/image.json")) else {
+            eprintln!("skipped: no reference numbers at {}", home.display());
+            return;
+        };
+        let data: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let mut cases = 0;
+        for case in data["cases"].as_array().unwrap().iter().filter(|c| c["kind"] == "hertz") {
+            let (pitch, size) = (case["pitch"].as_f64().unwrap(), case["size"].as_u64().unwrap() as usize);
+            let at = |name: &str| case["params"][name].as_f64().unwrap();
+            // There, pixel (0, 0) covers [0, h] × [0, h]; here its centre is the origin.
+            let centre_px = [at("cx") / pitch - 0.5, at("cy") / pitch - 0.5];
+            let disc = Disc { centre_px, radius_m: at("a"), pixel_size_m: [pitch; 2] };
+            let found = disc.average(Profile::Hemisphere, [[0, size as isize], [0, size as isize]]);
+            // Corners are of size 1 in units of the radius, a pixel of (h/a)².
+            let cancelled = 20.0 * f64::EPSILON * (at("a") / pitch).powi(2).max(1.0);
+            let Some(expected) = case["expected"]["pixels"].as_array() else {
+                assert!(found.values.iter().all(|&v| v == 0.0), "{} is empty", case["id"]);
+                continue;
+            };
+            let expected = expected.iter().flat_map(|line| line.as_array().unwrap());
+            for (value, found) in expected.zip(&found.values) {
+                let error = (at("amplitude") * found - value.as_f64().unwrap()).abs() / at("amplitude");
+                assert!(error < cancelled, "{}: {error:e}", case["id"]);
+            }
+            cases += 1;
+        }
+        assert!(cases >= 7);
+    }
 }

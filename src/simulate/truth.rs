@@ -45,7 +45,7 @@ impl PressTruth {
             visible_force_n: 0.0,
             integrated_pixel_value: 0.0,
             grey_per_pascal: scene.grey_per_pascal(),
-            saturated_pixels: scene.expected_frame(load).iter().filter(|&&v| v > 255.0).count(),
+            saturated_pixels: saturated_pixels(scene, load),
             pixel_size_m: disc.pixel_size_m,
             shape: options.camera.shape,
         };
@@ -142,6 +142,18 @@ impl PressTruth {
         self.visible_force_n = peak * sum * self.pixel_size_m[0] * self.pixel_size_m[1];
         self.integrated_pixel_value = self.grey_per_pascal * peak * (sum - droop_per_pascal * peak * squared);
     }
+}
+
+/// Pixels whose expected grey level exceeds 255; the frame is made only where one can.
+fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
+    let (options, lamps) = (scene.options(), scene.options().loads[load].illumination);
+    let brightest =
+        options.camera.background_grey + scene.grey_per_pascal() * scene.contact(load).peak_pressure_pa;
+    let lit = lamps.level + 0.5 * (lamps.tilt[0].abs() + lamps.tilt[1].abs());
+    if brightest * lit <= 255.0 {
+        return 0;
+    }
+    scene.expected_frame(load).iter().filter(|&&v| v > 255.0).count()
 }
 
 /// The map that takes the apparent surface of one load to that of another: it scales about the contact's centre.

@@ -97,11 +97,25 @@ pub(crate) fn from_sine_and_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) ->
 }
 
 /// n₂ cos θ₂, or nothing when reflection is total.
-pub(crate) fn refracted_normal<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<T> {
+fn refracted_normal<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<T> {
     let room = if sine > real(0.8) {
         (n2 - n1) + n1 * (cosine / (T::one() + sine)) * cosine
     } else {
         (-n1).mul_add(sine, n2)
     };
-    (room >= T::zero()).then(|| room.sqrt() * n1.mul_add(sine, n2).sqrt())
+    (room >= T::zero()).then(|| room.sqrt() * (n2 + n1 * sine).sqrt())
+}
+
+/// Transmittance of unpolarised light and n₂ cos θ₂, or nothing when reflection is total: what a ray tracer needs, without
+/// angles and without fused multiply–adds (which are slow where the processor is not known to have them).
+pub(crate) fn crossing<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<(T, T)> {
+    let room = (n2 - n1) + n1 * (cosine / (T::one() + sine)) * cosine;
+    if room <= T::zero() {
+        return None;
+    }
+    let b = (room * (n2 + n1 * sine)).sqrt();
+    let a = n1 * cosine;
+    let (s, p) = (a + b, n2 * cosine + n1 * (b / n2));
+    let two = T::one() + T::one();
+    Some((two * a * b * ((s * s).recip() + (p * p).recip()), b))
 }

@@ -142,7 +142,7 @@ fn meaningless_input_is_named() {
 
 proptest! {
     #[test]
-    fn energy_is_split_without_loss(n1 in 1.0_f64..3.0, n2 in 1.0_f64..3.0, angle in 0.0_f64..1.570_796) {
+    fn energy_is_split_without_loss(n1 in 1.0_f64..3.0, n2 in 1.0_f64..3.0, angle in 0.0_f64..1.57) {
         let f = fresnel(n1, n2, angle).unwrap();
         // R and T are computed apart; near the critical angle both are steep in the rounding of the sine they share.
         prop_assert!((f.reflectance_s + f.transmittance_s - 1.0).abs() < 1e-13);

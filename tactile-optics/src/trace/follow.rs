@@ -4,7 +4,7 @@ use super::budget::{Fate, Tally};
 use super::ray::{Branches, Ray, dot, normalised, sine_between};
 use super::sampling::{hash, unit};
 use super::{Slab, TraceOptions};
-use crate::fresnel::{from_sine_and_cosine, refracted_normal};
+use crate::fresnel::crossing;
 use crate::led::Geometry;
 use crate::real::{Real, real};
 use crate::surface::{Meeting, TopSurface, march};
@@ -186,10 +186,11 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         let (n1, n2) = (self.slab.layers[ray.layer].index, self.slab.layers[beyond].index);
         let [ux, uy, uz] = ray.direction;
         let (sine, cosine) = (ux.hypot(uy), uz.abs());
-        let transmitted = ray.power * from_sine_and_cosine(n1, n2, sine, cosine).transmittance();
-        let mirrored = ray.mirrored(&normal, ray.power - transmitted);
-        let Some(along) = refracted_normal(n1, n2, sine, cosine) else { return Some(mirrored) };
-        self.keep(mirrored, branches);
+        let Some((share, along)) = crossing(n1, n2, sine, cosine) else {
+            return Some(ray.mirrored(&normal, ray.power));
+        };
+        let transmitted = ray.power * share.min(T::one());
+        self.keep(ray.mirrored(&normal, ray.power - transmitted), branches);
         let ratio = n1 / n2;
         let direction = normalised([ux * ratio, uy * ratio, (along / n2).copysign(uz)]);
         Some(Ray { direction, layer: beyond, power: transmitted, ..ray })
@@ -198,7 +199,8 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
     fn transmittance(&self, ray: &Ray<T>, normal: &[T; 3], outside: T) -> T {
         let inside = self.slab.layers[ray.layer].index;
         let cosine = dot(&ray.direction, normal).abs().min(T::one());
-        from_sine_and_cosine(inside, outside, sine_between(&ray.direction, normal), cosine).transmittance()
+        let sine = sine_between(&ray.direction, normal);
+        crossing(inside, outside, sine, cosine).map_or(T::zero(), |(share, _)| share.min(T::one()))
     }
 
     /// Puts a branch aside, or counts it as unresolved when there is no room.
