@@ -1,17 +1,21 @@
 //! Source points, factored once for any targets.
 
+use std::sync::OnceLock;
+
 use nalgebra::Point;
 
 use crate::{
-    FitOptions, FitReport, Kernel, R2LogR, Scalar, Smoothing, Spline, TpsError,
+    FitOptions, Kernel, R2LogR, Scalar, Smoothing, Spline, TpsError,
     error::Input,
     options::{validate_smoothing, validate_weights},
     refine::{Buffers, Equations, Solution},
     sites::{Sites, finite},
-    span::Span,
-    spline::Shape,
-    system::System,
+    spline::Fitted,
+    system::{Setting, System},
 };
+
+/// Points up to which a refit with another λ decomposes the matrix unasked: a few milliseconds.
+const DECOMPOSE_POINTS: usize = 256;
 
 /// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
 ///
@@ -29,30 +33,45 @@ use crate::{
 /// ```
 #[derive(Clone, Debug)]
 pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
-    pub(crate) kernel: K,
-    pub(crate) sites: Sites<D>,
-    pub(crate) span: Span<D>,
-    pub(crate) system: System,
+    kernel: K,
+    sites: Sites<D>,
+    system: System<D>,
+    /// The same with its spectrum, once a λ needs it.
+    spectral: OnceLock<System<D>>,
     weights: Option<Vec<T>>,
+    /// Weight of every site, empty if all are one.
+    site_weights: Vec<f64>,
     smoothing: Smoothing<T>,
+    rank_tolerance: f64,
 }
 
 /// Memory that refits use again and again.
 #[derive(Clone, Debug, Default)]
-pub struct Workspace {
+pub struct Workspace<const D: usize> {
     buffers: Buffers,
-    system: System,
+    system: System<D>,
+    site_weights: Vec<f64>,
 }
 
-impl Workspace {
+impl<const D: usize> Workspace<D> {
     /// An empty workspace; it grows at its first use.
     pub fn new() -> Self {
         Self::default()
     }
 }
 
+/// One fit: what it is made with.
+struct Task<'a, T, const D: usize> {
+    system: &'a System<D>,
+    weights: Option<&'a [T]>,
+    smoothing: Smoothing<T>,
+    careful: bool,
+}
+
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// Factors `sources` for the kernel, weights and λ of `options`: O(n³/3) time, O(n²) memory.
+    ///
+    /// With [`Smoothing::Gcv`] the matrix is decomposed instead, at some thirty times the cost.
     ///
     /// # Errors
     /// [`TpsError`] for bad input, or a kernel that is not definite on these points.
@@ -60,12 +79,25 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         options.validate(sources.len())?;
         let kernel = options.kernel.clone();
         let sites = Sites::new(sources, kernel.degree().is_some())?;
-        let span = Span::new(&sites, options.rank_tolerance.widen());
-        let (weights, smoothing) = (options.weights.clone(), options.smoothing);
-        let mut this = Self { kernel, sites, span, system: System::default(), weights, smoothing };
-        let weights = this.site_weights(this.weights.as_deref());
-        let lambda = this.inner_lambda(this.smoothing);
-        this.system.factor(&this.kernel, &this.sites, &this.span, &weights, lambda)?;
+        let mut site_weights = Vec::new();
+        weigh(&sites, options.weights.as_deref(), &mut site_weights);
+        let mut this = Self {
+            kernel,
+            sites,
+            system: System::default(),
+            spectral: OnceLock::new(),
+            weights: options.weights.clone(),
+            site_weights,
+            smoothing: options.smoothing,
+            rank_tolerance: options.rank_tolerance.widen(),
+        };
+        if this.smoothing == Smoothing::Gcv {
+            this.decompose();
+        } else {
+            let (mut system, lambda) = (System::default(), this.inner_lambda(this.smoothing));
+            system.factor(&this.setting(), &this.site_weights, lambda)?;
+            this.system = system;
+        }
         Ok(this)
     }
 
@@ -79,37 +111,56 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.len() == 0
     }
 
-    /// The spline to these targets, with the weights and λ of the factorisation.
+    /// Decomposes the matrix into eigenvalues and -vectors, so that a refit with any λ costs no more than one with new
+    /// targets; some 10 n³ operations, once.
+    ///
+    /// Up to 256 points, and for cross-validation, the first refit that can use it does this unasked.
+    pub fn decompose(&self) {
+        self.spectral.get_or_init(|| {
+            let mut system = System::default();
+            system.decompose(&self.setting(), &self.site_weights);
+            system
+        });
+    }
+
+    /// The spline to these targets, with the weights and smoothing of the factorisation.
+    ///
+    /// Measures the residual, and refines the solution where the condition number asks for it.
     ///
     /// # Errors
     /// [`TpsError`] for bad targets.
     pub fn fit<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<Spline<T, D, M, K>, TpsError> {
         let mut spline = Spline::empty(self.kernel.clone());
-        let workspace = &mut Workspace::new();
-        self.finish(&self.system, self.weights.as_deref(), workspace, targets, &mut spline, true)?;
+        let task = Task { careful: true, ..self.task() };
+        self.finish(&task, &mut Buffers::default(), targets, &mut spline)?;
         Ok(spline)
     }
 
-    /// As [`fit`](Self::fit), into a spline that is already there; allocates nothing once both have grown.
+    /// As [`fit`](Self::fit), into a spline that is already there: two triangular solves, and no allocation once
+    /// workspace and spline have grown. Refines only where the condition number exceeds 10⁸.
     ///
     /// # Errors
     /// [`TpsError`] for bad targets; the spline is then left as it was.
     pub fn fit_with<const M: usize>(
         &self,
-        workspace: &mut Workspace,
+        workspace: &mut Workspace<D>,
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
     ) -> Result<(), TpsError> {
-        self.finish(&self.system, self.weights.as_deref(), workspace, targets, spline, false)
+        self.finish(&self.task(), &mut workspace.buffers, targets, spline)
     }
 
-    /// New targets, weights (none: all one) and smoothing for the same sources, into a spline that is already there.
+    /// New targets, weights (`None`: those of the factorisation) and smoothing for the same sources, into a spline that
+    /// is already there; allocates nothing once workspace and spline have grown.
+    ///
+    /// The same weights and λ cost two triangular solves; another λ without weights two products once the matrix is
+    /// [decomposed](Self::decompose); other weights a factorisation without the set-up of the first.
     ///
     /// # Errors
     /// [`TpsError`] for bad targets, weights or smoothing; the spline is then left as it was.
     pub fn refit_with<const M: usize>(
         &self,
-        workspace: &mut Workspace,
+        workspace: &mut Workspace<D>,
         targets: &[Point<T, M>],
         weights: Option<&[T]>,
         smoothing: Smoothing<T>,
@@ -119,14 +170,42 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         if let Some(weights) = weights {
             validate_weights(weights, self.len())?;
         }
-        let mut system = core::mem::take(&mut workspace.system);
-        let site_weights = self.site_weights(weights);
-        let lambda = self.inner_lambda(smoothing);
-        let done = system
-            .factor(&self.kernel, &self.sites, &self.span, &site_weights, lambda)
-            .and_then(|()| self.finish(&system, weights, workspace, targets, spline, false));
-        workspace.system = system;
-        done
+        if weights.is_none() && smoothing == self.smoothing {
+            return self.fit_with(workspace, targets, spline);
+        }
+        let Workspace { buffers, system, site_weights } = workspace;
+        let own = weights.is_none();
+        let gcv = smoothing == Smoothing::Gcv;
+        let spectral = own && (gcv || self.decomposes(smoothing));
+        if spectral {
+            self.decompose();
+        } else {
+            weigh(&self.sites, weights.or(self.weights.as_deref()), site_weights);
+            match gcv {
+                true => system.decompose(&self.setting(), site_weights),
+                false => system.factor(&self.setting(), site_weights, self.inner_lambda(smoothing))?,
+            }
+        }
+        let system = self.spectral.get().filter(|_| spectral).unwrap_or(system);
+        let task = Task { system, weights: weights.or(self.weights.as_deref()), smoothing, careful: false };
+        self.finish(&task, buffers, targets, spline)
+    }
+
+    /// Whether a refit with this smoothing and the factorisation's own weights is to go by the spectrum.
+    fn decomposes(&self, smoothing: Smoothing<T>) -> bool {
+        let few = self.spectral.get().is_some() || self.sites.len() <= DECOMPOSE_POINTS;
+        few && self.site_weights.is_empty() && self.inner_lambda(smoothing) > 0.0
+    }
+
+    /// A quick fit with what the factorisation was made with.
+    fn task(&self) -> Task<'_, T, D> {
+        let gcv = self.smoothing == Smoothing::Gcv;
+        let system = self.spectral.get().filter(|_| gcv).unwrap_or(&self.system);
+        Task { system, weights: self.weights.as_deref(), smoothing: self.smoothing, careful: false }
+    }
+
+    fn setting(&self) -> Setting<'_, K, D> {
+        Setting { kernel: &self.kernel, sites: &self.sites, rank_tolerance: self.rank_tolerance }
     }
 
     /// λ in the frame's units: the kernel scales as length to its degree.
@@ -138,65 +217,56 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// How much larger the kernel is outside than in the frame.
-    pub(crate) fn unit(&self) -> f64 {
+    fn unit(&self) -> f64 {
         self.sites.frame.scale.powi(self.kernel.degree().unwrap_or(0))
-    }
-
-    /// Weight of every site, empty if all are one.
-    fn site_weights(&self, weights: Option<&[T]>) -> Vec<f64> {
-        if weights.is_none() && self.sites.site_of.is_empty() {
-            return Vec::new();
-        }
-        let mut sums = vec![0.0; self.sites.len()];
-        for i in 0..self.len() {
-            sums[self.sites.site(i)] += weights.map_or(1.0, |w| w[i].widen());
-        }
-        sums
     }
 
     fn finish<const M: usize>(
         &self,
-        system: &System,
-        weights: Option<&[T]>,
-        workspace: &mut Workspace,
+        task: &Task<'_, T, D>,
+        buffers: &mut Buffers,
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
-        careful: bool,
     ) -> Result<(), TpsError> {
         if targets.len() != self.len() {
-            return Err(TpsError::Length {
-                input: Input::Targets,
-                expected: self.len(),
-                found: targets.len(),
-            });
+            let (expected, found) = (self.len(), targets.len());
+            return Err(TpsError::Length { input: Input::Targets, expected, found });
         }
         finite(targets, Input::Targets)?;
-        let weight = |i: usize| weights.map_or(1.0, |w| w[i].widen());
-        if system.lambda == 0.0 {
-            self.agree(targets, weight)?;
+        let (system, lambda) = (task.system, self.inner_lambda(task.smoothing));
+        let gcv = task.smoothing == Smoothing::Gcv;
+        if lambda == 0.0 && !gcv {
+            self.agree(targets, task.weights)?;
         }
-        let n = self.sites.len();
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
-        let buffers = &mut workspace.buffers;
-        buffers.targets.clear();
-        buffers.targets.resize(n * M, 0.0);
-        self.gather(targets, weight, &origin, &mut buffers.targets);
-        let equations = Equations { kernel: &self.kernel, sites: &self.sites, span: &self.span, system };
+        self.gather(targets, task.weights, &origin, buffers);
+        let lambda = if gcv { self.validated::<M>(system, buffers)? } else { lambda };
+        let equations = Equations { kernel: &self.kernel, sites: &self.sites, system, lambda };
         let solution: Solution<M> =
-            equations.solve(buffers, careful).ok_or(TpsError::NotDefinite { column: system.null.q })?;
-        spline.assign(self, &buffers.weights, &origin, &solution.affine, self.report(system, &solution));
+            equations.solve(buffers, task.careful).ok_or(TpsError::NotDefinite { column: system.null.q })?;
+        let (sites, unit) = (&self.sites, self.unit());
+        spline.assign(&Fitted { sites, system, lambda, unit, solution, origin }, buffers);
         Ok(())
     }
 
+    /// The λ of least generalised cross-validation.
+    fn validated<const M: usize>(&self, system: &System<D>, buffers: &mut Buffers) -> Result<f64, TpsError> {
+        let (needed, found) = (system.null.q, system.active.len());
+        if found <= needed {
+            return Err(TpsError::TooFewForValidation { needed, found });
+        }
+        let lambda = system.cross_validate::<M>(&buffers.targets, self.sites.len(), &mut buffers.work);
+        Ok(lambda.unwrap_or(0.0))
+    }
+
     /// Coinciding points must have equal targets where the spline interpolates.
-    fn agree<const M: usize>(
-        &self,
-        targets: &[Point<T, M>],
-        weight: impl Fn(usize) -> f64,
-    ) -> Result<(), TpsError> {
-        for second in 0..self.sites.site_of.len() {
-            let first = self.sites.first[self.sites.site(second)];
-            if targets[first] != targets[second] && weight(first) > 0.0 && weight(second) > 0.0 {
+    fn agree<const M: usize>(&self, targets: &[Point<T, M>], weights: Option<&[T]>) -> Result<(), TpsError> {
+        let counts = |i: usize| weights.is_none_or(|w| w[i] > T::zero());
+        for second in (0..self.sites.site_of.len()).filter(|&i| counts(i)) {
+            let site = self.sites.site_of[second];
+            let same = |&i: &usize| self.sites.site_of[i] == site && counts(i);
+            let first = (self.sites.first[site]..second).find(same).unwrap_or(second);
+            if targets[first] != targets[second] {
                 return Err(TpsError::Conflict { first, second });
             }
         }
@@ -207,44 +277,40 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     fn gather<const M: usize>(
         &self,
         targets: &[Point<T, M>],
-        weight: impl Fn(usize) -> f64,
+        weights: Option<&[T]>,
         origin: &[f64; M],
-        values: &mut [f64],
+        buffers: &mut Buffers,
     ) {
-        for (k, column) in values.chunks_exact_mut(self.sites.len()).enumerate() {
+        let n = self.sites.len();
+        buffers.targets.clear();
+        buffers.targets.resize(n * M, 0.0);
+        for (k, column) in buffers.targets.chunks_exact_mut(n).enumerate() {
             if self.sites.site_of.is_empty() {
                 column.iter_mut().zip(targets).for_each(|(v, t)| *v = t[k].widen() - origin[k]);
                 continue;
             }
-            let mut totals = vec![0.0; column.len()];
-            for (i, target) in targets.iter().enumerate() {
-                let site = self.sites.site(i);
-                totals[site] += weight(i);
-                if weight(i) > 0.0 {
-                    column[site] +=
-                        (target[k].widen() - origin[k] - column[site]) * (weight(i) / totals[site]);
+            let totals = &mut buffers.work;
+            totals.clear();
+            totals.resize(n, 0.0);
+            for (target, (i, &site)) in targets.iter().zip(self.sites.site_of.iter().enumerate()) {
+                let weight = weights.map_or(1.0, |w| w[i].widen());
+                totals[site] += weight;
+                if weight > 0.0 {
+                    column[site] += (target[k].widen() - origin[k] - column[site]) * (weight / totals[site]);
                 }
             }
         }
     }
+}
 
-    fn report<const M: usize>(&self, system: &System, solution: &Solution<M>) -> FitReport {
-        FitReport {
-            points: self.len(),
-            merged: self.len() - self.sites.len(),
-            ignored: self.sites.len() - system.active.len(),
-            rank: system.null.q,
-            extents: self.span.extents.to_vec(),
-            lambda: system.lambda * self.unit(),
-            condition: system.condition,
-            residual: solution.residual,
-            refinements: solution.refinements,
-            precise: solution.precise,
-            digits: 0.0,
-        }
+/// Weight of every site, none if all are one.
+fn weigh<T: Scalar, const D: usize>(sites: &Sites<D>, weights: Option<&[T]>, sums: &mut Vec<f64>) {
+    sums.clear();
+    if weights.is_none() && sites.site_of.is_empty() {
+        return;
     }
-
-    pub(crate) fn shape(&self) -> Shape<'_, D> {
-        Shape { sites: &self.sites, span: &self.span }
+    sums.resize(sites.len(), 0.0);
+    for i in 0..sites.inputs() {
+        sums[sites.site(i)] += weights.map_or(1.0, |w| w[i].widen());
     }
 }

@@ -20,6 +20,7 @@ mod sample;
 mod simd;
 mod sites;
 mod span;
+mod spectrum;
 mod spline;
 mod symmetric;
 mod system;

@@ -9,7 +9,7 @@
 
 use crate::{
     cholesky::HEAD,
-    symmetric::{Columns, Update},
+    symmetric::{Columns, Reflect, Update},
 };
 
 /// At most D + 1 columns.
@@ -140,18 +140,9 @@ impl NullSpace {
     }
 
     fn apply_compact(&self, b: &mut [f64], transpose: bool) {
-        let q = self.q;
-        let mut s = [0.0; MAX];
-        (0..q).for_each(|k| s[k] = dot(self.column(k), b));
-        let mut u = [0.0; MAX];
-        for i in 0..q {
-            for j in 0..q {
-                u[i] += if transpose { self.t[j][i] } else { self.t[i][j] } * s[j];
-            }
-        }
-        for k in 0..q {
-            b.iter_mut().zip(self.column(k)).for_each(|(b, v)| *b -= u[k] * v);
-        }
+        let t = |i: usize, j: usize| if transpose { self.t[j][i] } else { self.t[i][j] };
+        let t = core::array::from_fn(|i| core::array::from_fn(|j| t(i, j)));
+        Reflect { v: self.reflectors(), t, b }.apply();
     }
 
     /// Turns the lower triangle of K into that of QᵀKQ, given Y = K V for the reflectors V in `x`; returns the

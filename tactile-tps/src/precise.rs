@@ -3,9 +3,7 @@
 //! The steps are those of [`System`](crate::system::System), written plainly: Householder reflectors, applied to K from
 //! both sides, then Cholesky. It costs some fifty times as much and is used where the condition number asks for it.
 
-use crate::{
-    Kernel, null_space::MAX, real::Real, sites::Sites, span::Span, system::System, twofold::Twofold,
-};
+use crate::{Kernel, null_space::MAX, real::Real, sites::Sites, system::System, twofold::Twofold};
 
 /// A dense matrix, column by column.
 struct Matrix {
@@ -74,17 +72,17 @@ fn dot(a: &[Twofold], b: &[Twofold]) -> Twofold {
 pub(crate) fn solve<const D: usize, const M: usize, K: Kernel>(
     kernel: &K,
     sites: &Sites<D>,
-    span: &Span<D>,
-    system: &System,
+    system: &System<D>,
+    lambda: f64,
     y: &mut [f64],
 ) -> Option<[[f64; MAX]; M]> {
     let (n, q, count) = (system.active.len(), system.null.q, sites.len());
     let scale = |i: usize| Twofold::from_f64(system.scales.get(i).copied().unwrap_or(1.0));
     let point = |i: usize| sites.precise(system.active[i]);
-    let mut k = kernel_matrix(kernel, n, point, scale, system.lambda);
+    let mut k = kernel_matrix(kernel, n, point, scale, lambda);
     let mut p = Matrix { rows: n, data: Vec::with_capacity(n * q) };
     for c in 0..q {
-        p.data.extend((0..n).map(|i| span.precise(c, &point(i)) * scale(i)));
+        p.data.extend((0..n).map(|i| system.span.precise(c, &point(i)) * scale(i)));
     }
     let mut reflectors = Vec::with_capacity(q);
     for c in 0..q {

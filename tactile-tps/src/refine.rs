@@ -2,13 +2,12 @@
 
 use crate::{
     Kernel,
-    evaluate::{BLOCK, Lanes, Sum},
+    evaluate::{BLOCK, Lanes, Sum, TAIL},
     null_space::MAX,
     precise,
     real::Lane,
     simd::{Job, dispatch},
     sites::Sites,
-    span::Span,
     system::System,
 };
 
@@ -26,8 +25,9 @@ const STEPS: usize = 4;
 pub(crate) struct Equations<'a, K, const D: usize> {
     pub(crate) kernel: &'a K,
     pub(crate) sites: &'a Sites<D>,
-    pub(crate) span: &'a Span<D>,
-    pub(crate) system: &'a System,
+    pub(crate) system: &'a System<D>,
+    /// λ in the frame's units.
+    pub(crate) lambda: f64,
 }
 
 /// Memory of a solve.
@@ -38,7 +38,8 @@ pub(crate) struct Buffers {
     /// Weights at the sites, output by output: the answer.
     pub(crate) weights: Vec<f64>,
     residuals: Vec<f64>,
-    work: Vec<f64>,
+    pub(crate) work: Vec<f64>,
+    spare: Vec<f64>,
 }
 
 /// What a solve found beside the weights.
@@ -57,7 +58,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         buffers.weights.clone_from(&buffers.targets);
         if system.indefinite || self.needs_precision(careful) {
             if let Some(affine) =
-                precise::solve(self.kernel, self.sites, self.span, system, &mut buffers.weights)
+                precise::solve(self.kernel, self.sites, system, self.lambda, &mut buffers.weights)
             {
                 let residual = careful.then(|| self.residual(&affine, buffers));
                 return Some(Solution { affine, residual, refinements: 0, precise: true });
@@ -67,13 +68,14 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             }
             buffers.weights.clone_from(&buffers.targets);
         }
-        let affine = system.solve(&mut buffers.weights, n, &mut buffers.work);
+        let affine =
+            system.solve(&mut buffers.weights, n, self.lambda, &mut buffers.work, &mut buffers.spare);
         let mut solution = Solution { affine, residual: None, refinements: 0, precise: false };
         let threshold = if careful { 10.0 * n as f64 } else { 1e8 };
-        if system.condition > threshold {
+        if system.condition(self.lambda) > threshold {
             self.refine(buffers, &mut solution);
         }
-        if careful {
+        if careful && solution.residual.is_none() {
             solution.residual = Some(self.residual(&solution.affine, buffers));
         }
         Some(solution)
@@ -83,8 +85,9 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     ///
     /// Points that are nearly flat lose digits in the gradient across, besides those the matrix costs.
     fn needs_precision(&self, careful: bool) -> bool {
-        let (n, condition) = (self.sites.len(), self.system.condition);
-        let stretch = 1.0 / self.span.extents[..self.span.directions].last().copied().unwrap_or(1.0);
+        let (n, condition) = (self.sites.len(), self.system.condition(self.lambda));
+        let span = &self.system.span;
+        let stretch = 1.0 / span.extents[..span.directions].last().copied().unwrap_or(1.0);
         (n <= PRECISE_POINTS && condition > PRECISE_CONDITION)
             || (careful && n <= FEW_POINTS && condition * stretch > FEW_CONDITION)
     }
@@ -92,9 +95,11 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     fn refine<const M: usize>(&self, buffers: &mut Buffers, solution: &mut Solution<M>) {
         let mut last = f64::INFINITY;
         for _ in 0..STEPS {
-            self.residual(&solution.affine, buffers);
-            let Buffers { weights, residuals, work, .. } = buffers;
-            let affine: [[f64; MAX]; M] = self.system.solve(residuals, self.sites.len(), work);
+            let residual = self.residual(&solution.affine, buffers);
+            solution.residual = Some(residual);
+            let Buffers { weights, residuals, work, spare, .. } = buffers;
+            let affine: [[f64; MAX]; M] =
+                self.system.solve(residuals, self.sites.len(), self.lambda, work, spare);
             let step = largest(residuals) / largest(weights).max(f64::MIN_POSITIVE);
             // A step that is no shorter than half the last is rounding.
             if step.is_nan() || step > 0.5 * last {
@@ -112,7 +117,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
 
     /// y − K w − λ W⁻¹ w − P a at the sites, and its largest entry relative to the largest target.
     fn residual<const M: usize>(&self, affine: &[[f64; MAX]; M], buffers: &mut Buffers) -> f64 {
-        let Self { kernel, sites, span, system } = self;
+        let Self { kernel, sites, system, lambda } = self;
         let n = sites.len();
         let Buffers { targets, weights, residuals, .. } = buffers;
         residuals.clone_from(targets);
@@ -126,8 +131,8 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         for m in 0..M {
             for (i, &site) in system.active.iter().enumerate() {
                 let scale = system.scales.get(i).copied().unwrap_or(1.0);
-                let smooth = system.lambda * (weights[m * n + site] / scale / scale);
-                let polynomial = span.polynomial(&affine[m], |k| sites.axes[k][site]);
+                let smooth = lambda * (weights[m * n + site] / scale / scale);
+                let polynomial = system.span.polynomial(&affine[m], |k| sites.axes[k][site]);
                 let residual = &mut residuals[m * n + site];
                 *residual -= smooth + polynomial;
                 size = f64::max(size, residual.abs());
@@ -152,20 +157,31 @@ impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, 
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lane<f64>>(self) {
+    fn run<L: Lane<f64>>(mut self) {
         let n = self.sum.centres[0].len();
-        for start in (0..n).step_by(BLOCK) {
-            let used = BLOCK.min(n - start);
-            let mut x = [[0.0; BLOCK]; D];
-            for k in 0..D {
-                x[k][..used].copy_from_slice(&self.sum.centres[k][start..start + used]);
-            }
-            let mut sums = Lanes::<f64, D, M, BLOCK>::new();
-            self.sum.block::<L, BLOCK, 0>(&x, &mut sums);
-            for m in 0..M {
-                let residuals = &mut self.residuals[m * n + start..m * n + start + used];
-                residuals.iter_mut().zip(&sums.value[m]).for_each(|(r, sum)| *r -= sum);
-            }
+        let full = n / BLOCK * BLOCK;
+        for start in (0..full).step_by(BLOCK) {
+            self.block::<L, BLOCK>(start, BLOCK);
+        }
+        for start in (full..n).step_by(TAIL) {
+            self.block::<L, TAIL>(start, TAIL.min(n - start));
+        }
+    }
+}
+
+impl<K: Kernel, const D: usize, const M: usize> Subtract<'_, K, D, M> {
+    #[inline(always)]
+    fn block<L: Lane<f64>, const W: usize>(&mut self, start: usize, used: usize) {
+        let n = self.sum.centres[0].len();
+        let mut x = [[0.0; W]; D];
+        for k in 0..D {
+            x[k][..used].copy_from_slice(&self.sum.centres[k][start..start + used]);
+        }
+        let mut sums = Lanes::<f64, D, M, W>::new();
+        self.sum.block::<L, W, 0>(&x, &mut sums);
+        for m in 0..M {
+            let residuals = &mut self.residuals[m * n + start..m * n + start + used];
+            residuals.iter_mut().zip(&sums.value[m]).for_each(|(r, sum)| *r -= sum);
         }
     }
 }

@@ -1,8 +1,12 @@
 //! Which directions the points span.
 
-use nalgebra::DMatrix;
-
-use crate::{cholesky::layout, null_space::NullSpace, real::Real, sites::Sites, twofold::Twofold};
+use crate::{
+    cholesky::layout,
+    null_space::{MAX, NullSpace},
+    real::Real,
+    sites::Sites,
+    twofold::Twofold,
+};
 
 /// The directions points extend in, decided by the singular values of their centred coordinates.
 #[derive(Clone, Debug)]
@@ -10,46 +14,44 @@ pub(crate) struct Span<const D: usize> {
     /// Number of spanned directions.
     pub(crate) directions: usize,
     /// Orthonormal directions, spanned ones first; `None` if all are, and the coordinate axes serve.
-    pub(crate) basis: Option<[[f64; D]; D]>,
+    basis: Option<[[f64; D]; D]>,
     /// Root mean square extent along each direction relative to the largest, falling.
     pub(crate) extents: [f64; D],
 }
 
+impl<const D: usize> Default for Span<D> {
+    fn default() -> Self {
+        Self { directions: 0, basis: None, extents: [0.0; D] }
+    }
+}
+
 impl<const D: usize> Span<D> {
-    /// `tolerance` is the share of the largest extent below which a direction counts as not spanned.
-    pub(crate) fn new(sites: &Sites<D>, tolerance: f64) -> Self {
-        let n = sites.len();
-        let means: [f64; D] = core::array::from_fn(|k| sites.axes[k].iter().sum::<f64>() / n as f64);
-        let mut columns = NullSpace::default();
-        columns.factor(n, D.min(n), layout(n, D.min(n)), |k, column| {
-            column.iter_mut().zip(&sites.axes[k]).for_each(|(v, x)| *v = x - means[k]);
-        });
-        if n < D {
-            return Self::of_few(sites, &means, tolerance);
+    /// The span of the `active` sites. `tolerance` is the share of the largest extent below which a direction counts
+    /// as not spanned; `scratch` is overwritten.
+    pub(crate) fn new(sites: &Sites<D>, active: &[usize], tolerance: f64, scratch: &mut NullSpace) -> Self {
+        let n = active.len();
+        let mean = |k: usize| active.iter().map(|&i| sites.axes[k][i]).sum::<f64>() / n as f64;
+        let means: [f64; D] = core::array::from_fn(mean);
+        let mut rows = [[0.0; D]; D];
+        if n >= D {
+            scratch.factor(n, D, layout(n, D), |k, column| {
+                column.iter_mut().zip(active).for_each(|(v, &i)| *v = sites.axes[k][i] - means[k]);
+            });
+            rows = core::array::from_fn(|j| core::array::from_fn(|i| scratch.triangle(i, j)));
+        } else {
+            for (i, &site) in active.iter().enumerate() {
+                (0..D).for_each(|k| rows[k][i] = sites.axes[k][site] - means[k]);
+            }
         }
-        let triangle = DMatrix::from_fn(D, D, |i, j| columns.triangle(i, j));
-        Self::of_matrix(triangle, n, sites.grain, tolerance)
+        Self::of_columns(rows, n, sites.grain, tolerance)
     }
 
-    /// Fewer points than dimensions: the singular vectors of the points themselves.
-    fn of_few(sites: &Sites<D>, means: &[f64; D], tolerance: f64) -> Self {
-        let n = sites.len();
-        let rows = DMatrix::from_fn(D, D, |i, j| if i < n { sites.axes[j][i] - means[j] } else { 0.0 });
-        Self::of_matrix(rows, n, sites.grain, tolerance)
-    }
-
-    fn of_matrix(matrix: DMatrix<f64>, n: usize, grain: f64, tolerance: f64) -> Self {
-        let svd = matrix.svd(false, true);
-        let mut sizes: Vec<(f64, usize)> = svd.singular_values.iter().copied().zip(0..).collect();
-        sizes.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let root = (n as f64).sqrt();
-        let largest = sizes[0].0;
-        let noise = f64::max(8.0 * (grain + f64::EPSILON) * root, tolerance * largest);
-        let directions = sizes.iter().filter(|s| s.0 > noise).count();
-        let vectors = svd.v_t.unwrap_or_else(|| DMatrix::identity(D, D));
-        let basis = core::array::from_fn(|k| core::array::from_fn(|i| vectors[(sizes[k].1, i)]));
-        let extents = core::array::from_fn(|k| if largest > 0.0 { sizes[k].0 / largest } else { 0.0 });
-        Self { directions, basis: (directions < D).then_some(basis), extents }
+    fn of_columns(columns: [[f64; D]; D], n: usize, grain: f64, tolerance: f64) -> Self {
+        let (sizes, vectors) = singular(columns);
+        let noise = f64::max(8.0 * (grain + f64::EPSILON) * (n as f64).sqrt(), tolerance * sizes[0]);
+        let directions = sizes.iter().filter(|size| **size > noise).count();
+        let extents = sizes.map(|size| if sizes[0] > 0.0 { size / sizes[0] } else { 0.0 });
+        Self { directions, basis: (directions < D).then_some(vectors), extents }
     }
 
     /// Writes affine function `c` of [1, x·b₁, …] at the sites `active`, each value times its `scale`.
@@ -91,13 +93,73 @@ impl<const D: usize> Span<D> {
         }
     }
 
-    /// The gradient in coordinates of one along the directions.
-    pub(crate) fn gradient(&self, along: &[f64]) -> [f64; D] {
+    /// The gradient in coordinates of an affine function with these coefficients.
+    pub(crate) fn gradient(&self, a: &[f64; MAX]) -> [f64; D] {
         match &self.basis {
-            None => core::array::from_fn(|k| along[k]),
+            None => core::array::from_fn(|k| a[k + 1]),
             Some(basis) => {
-                core::array::from_fn(|k| (0..self.directions).map(|c| along[c] * basis[c][k]).sum())
+                core::array::from_fn(|k| (0..self.directions).map(|c| a[c + 1] * basis[c][k]).sum())
             }
         }
+    }
+}
+
+/// Singular values, falling, and right singular vectors by one-sided rotations (Hestenes 1958), which keep small
+/// singular values to their own relative precision.
+fn singular<const D: usize>(mut columns: [[f64; D]; D]) -> ([f64; D], [[f64; D]; D]) {
+    let mut vectors = core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));
+    let dot = |a: &[f64; D], b: &[f64; D]| (0..D).map(|i| a[i] * b[i]).sum::<f64>();
+    // Three columns need a handful of sweeps; convergence is quadratic.
+    for _ in 0..20 {
+        let mut turned = false;
+        for p in 0..D {
+            for q in p + 1..D {
+                let (a, b, c) = (
+                    dot(&columns[p], &columns[p]),
+                    dot(&columns[q], &columns[q]),
+                    dot(&columns[p], &columns[q]),
+                );
+                if c.abs() > f64::EPSILON * (a * b).sqrt() {
+                    turned = true;
+                    let zeta = (b - a) / (2.0 * c);
+                    let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+                    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
+                    rotate(&mut columns, p, q, cosine, cosine * tangent);
+                    rotate(&mut vectors, p, q, cosine, cosine * tangent);
+                }
+            }
+        }
+        if !turned {
+            break;
+        }
+    }
+    let sizes = columns.map(|c| dot(&c, &c).sqrt());
+    let mut order: [usize; D] = core::array::from_fn(|k| k);
+    order.sort_unstable_by(|&i, &j| sizes[j].total_cmp(&sizes[i]));
+    (order.map(|k| sizes[k]), order.map(|k| vectors[k]))
+}
+
+fn rotate<const D: usize>(columns: &mut [[f64; D]; D], p: usize, q: usize, cosine: f64, sine: f64) {
+    for i in 0..D {
+        let (x, y) = (columns[p][i], columns[q][i]);
+        columns[p][i] = cosine * x - sine * y;
+        columns[q][i] = sine * x + cosine * y;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::singular;
+
+    /// Columns of known lengths turned by a known rotation: sizes to rounding, a small one to its own precision.
+    #[test]
+    fn singular_values_come_to_their_own_precision() {
+        let (c, s) = (0.8, 0.6);
+        let (sizes, vectors) =
+            singular([[3.0 * c, -2e-9 * s, 0.0], [3.0 * s, 2e-9 * c, 0.0], [0.0, 0.0, 1.0]]);
+        for (found, expected) in sizes.iter().zip([3.0, 1.0, 2e-9]) {
+            assert!((found / expected - 1.0f64).abs() < 1e-15 * 100.0, "{found}");
+        }
+        assert!((vectors[0][0].abs() - c).abs() < 1e-15 && (vectors[0][1].abs() - s).abs() < 1e-15);
     }
 }

@@ -5,10 +5,11 @@ use nalgebra::{Point, SMatrix, SVector};
 use crate::{
     Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
     evaluate::Sum,
+    refine::{Buffers, Solution},
     sample::{Each, Linear, Sample},
     simd::dispatch,
     sites::{Frame, Sites},
-    span::Span,
+    system::System,
     warp::same_length,
 };
 
@@ -30,10 +31,17 @@ pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
 /// A spline that maps space onto itself.
 pub type ThinPlateSpline<T, const D: usize, K = R2LogR> = Spline<T, D, D, K>;
 
-/// Geometry a spline copies from its factorisation.
-pub(crate) struct Shape<'a, const D: usize> {
+/// A solution and what it was found with.
+pub(crate) struct Fitted<'a, const D: usize, const M: usize> {
     pub(crate) sites: &'a Sites<D>,
-    pub(crate) span: &'a Span<D>,
+    pub(crate) system: &'a System<D>,
+    /// λ in the frame's units.
+    pub(crate) lambda: f64,
+    /// How much larger the kernel is outside than in the frame.
+    pub(crate) unit: f64,
+    pub(crate) solution: Solution<M>,
+    /// What was taken from the targets.
+    pub(crate) origin: [f64; M],
 }
 
 impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
@@ -85,25 +93,30 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         }
     }
 
-    pub(crate) fn assign(
-        &mut self,
-        factorization: &Factorization<T, D, K>,
-        weights: &[f64],
-        origin: &[f64; M],
-        affine: &[[f64; 4]; M],
-        report: FitReport,
-    ) {
-        let Shape { sites, span } = factorization.shape();
+    /// Takes over a solution, in memory that is already there where it suffices.
+    pub(crate) fn assign(&mut self, fitted: &Fitted<'_, D, M>, buffers: &Buffers) {
+        let Fitted { sites, system, lambda, unit, solution, origin } = fitted;
         self.frame = sites.frame;
         self.centres.clear();
         sites.axes.iter().for_each(|axis| self.centres.extend(axis.iter().map(|&x| T::narrow(x))));
         self.weights.clear();
-        self.weights.extend(weights.iter().map(|&w| T::narrow(w)));
+        self.weights.extend(buffers.weights.iter().map(|&w| T::narrow(w)));
         for k in 0..M {
-            self.affine.constant[k] = T::narrow(origin[k] + affine[k][0]);
-            self.affine.gradient[k] = span.gradient(&affine[k][1..]).map(T::narrow);
+            self.affine.constant[k] = T::narrow(origin[k] + solution.affine[k][0]);
+            self.affine.gradient[k] = system.span.gradient(&solution.affine[k]).map(T::narrow);
         }
-        self.report = report;
+        let report = &mut self.report;
+        report.points = sites.inputs();
+        report.merged = sites.inputs() - sites.len();
+        report.ignored = sites.len() - system.active.len();
+        report.rank = system.null.q;
+        report.extents.clear();
+        report.extents.extend_from_slice(&system.span.extents);
+        report.lambda = lambda * unit;
+        report.condition = system.condition(*lambda);
+        report.residual = solution.residual;
+        report.refinements = solution.refinements;
+        report.precise = solution.precise;
     }
 
     /// How the fit went.

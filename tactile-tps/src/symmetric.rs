@@ -1,4 +1,4 @@
-//! Work on one column of the lower triangle of a symmetric matrix: its part of a product, and a low-rank update.
+//! Work on one column: its part of a product with a symmetric matrix, a low-rank update, a block of reflectors.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -111,5 +111,44 @@ impl<const C: usize> WithSimd for Update<'_, C> {
         }
         let upper: f64 = column[above].iter().map(|x| x * x).sum();
         simd.reduce_sum_f64s(squares) - upper - column[diagonal] * column[diagonal]
+    }
+}
+
+/// b ← (I − V T Vᵀ) b.
+pub(crate) struct Reflect<'a, const C: usize> {
+    pub(crate) v: Columns<'a, C>,
+    pub(crate) t: [[f64; C]; C],
+    pub(crate) b: &'a mut [f64],
+}
+
+impl<const C: usize> Reflect<'_, C> {
+    pub(crate) fn apply(self) {
+        Arch::new().dispatch(self);
+    }
+}
+
+impl<const C: usize> WithSimd for Reflect<'_, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { v, t, b } = self;
+        let b = S::as_mut_simd_f64s(&mut b[..v.stride]).0;
+        let count = b.len();
+        let v = v.vectors::<S>(0).map(|v| &v[..count]);
+        let mut sums = [simd.splat_f64s(0.0); C];
+        for i in 0..count {
+            for c in 0..C {
+                sums[c] = simd.mul_add_e_f64s(v[c][i], b[i], sums[c]);
+            }
+        }
+        let sums = sums.map(|sum| simd.reduce_sum_f64s(sum));
+        let factors: [S::f64s; C] =
+            core::array::from_fn(|i| simd.splat_f64s(-(0..C).map(|j| t[i][j] * sums[j]).sum::<f64>()));
+        for i in 0..count {
+            for c in 0..C {
+                b[i] = simd.mul_add_e_f64s(v[c][i], factors[c], b[i]);
+            }
+        }
     }
 }

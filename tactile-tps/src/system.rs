@@ -9,54 +9,55 @@ use crate::{
     simd::{Job, dispatch},
     sites::Sites,
     span::Span,
+    spectrum::Spectrum,
     symmetric::Product,
 };
 
-/// QᵀSQ factored, S = W^½ K W^½ + λI over the sites of positive weight.
+/// What a system is made from.
+pub(crate) struct Setting<'a, K, const D: usize> {
+    pub(crate) kernel: &'a K,
+    pub(crate) sites: &'a Sites<D>,
+    /// Share of the largest extent below which a direction counts as not spanned.
+    pub(crate) rank_tolerance: f64,
+}
+
+/// QᵀSQ, S = W^½ K W^½ + λI over the sites of positive weight, ready to be solved with.
 ///
 /// With v = W^{-½}w the equations K w + λ W⁻¹ w + P a = y, Pᵀw = 0 become S v + W^½P a = W^½y, (W^½P)ᵀv = 0: row
 /// scaling that keeps weights over many decades apart.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct System {
-    /// λ in the frame's units.
+pub(crate) struct System<const D: usize> {
+    /// λ in the frame's units; what a spectral system adds is given at the solve.
     pub(crate) lambda: f64,
     /// Sites of positive weight.
     pub(crate) active: Vec<usize>,
     /// √weight of each; empty if all are one.
     pub(crate) scales: Vec<f64>,
+    pub(crate) span: Span<D>,
     pub(crate) null: NullSpace,
-    /// QᵀSQ: first q columns as they are, the rest factored.
+    /// QᵀSQ: first q columns as they are, the rest factored unless there is a spectrum.
     cholesky: Cholesky,
-    pub(crate) condition: f64,
+    spectrum: Option<Spectrum>,
+    condition: f64,
     /// Rounding left no definite matrix: the factor is of no use.
     pub(crate) indefinite: bool,
     scratch: Vec<f64>,
+    spare: NullSpace,
 }
 
-impl System {
+impl<const D: usize> System<D> {
     /// Factors for site weights (empty: all one) and λ ≥ 0: n³/3 multiplications and additions.
-    pub(crate) fn factor<const D: usize, K: Kernel>(
+    pub(crate) fn factor<K: Kernel>(
         &mut self,
-        kernel: &K,
-        sites: &Sites<D>,
-        span: &Span<D>,
+        setting: &Setting<'_, K, D>,
         weights: &[f64],
         lambda: f64,
     ) -> Result<(), TpsError> {
         self.lambda = lambda;
-        self.choose(sites.len(), weights);
-        let n = self.active.len();
-        let q = n.min(1 + span.directions);
-        let stride = layout(n, q);
-        let Self { active, scales, null, cholesky, scratch, .. } = self;
-        null.factor(n, q, stride, |c, column| span.fill(sites, active, scales, c, column));
-        cholesky.prepare(n - q, stride);
-        scratch.clear();
-        scratch.resize((MAX + D + 1) * stride, 0.0);
-        let (product, places) = scratch.split_at_mut(MAX * stride);
-        gather(sites, active, scales, null.rows(), places);
-        dispatch(Assemble::<_, D> { kernel, places, null, matrix: &mut cholesky.l, product });
-        let size = null.project(&mut cholesky.l, product);
+        self.spectrum = None;
+        let size = self.assemble(setting, weights, lambda > 0.0);
+        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
+        let Self { cholesky, scratch, .. } = self;
         (HEAD..HEAD + n - q).for_each(|j| cholesky.l[j * stride + j] += lambda);
         let factored = cholesky.factor();
         self.indefinite = factored.is_err();
@@ -69,8 +70,41 @@ impl System {
         Ok(())
     }
 
+    /// Decomposes for site weights and any λ > 0: some 10 n³ operations.
+    pub(crate) fn decompose<K: Kernel>(&mut self, setting: &Setting<'_, K, D>, weights: &[f64]) {
+        self.lambda = 0.0;
+        self.assemble(setting, weights, true);
+        self.indefinite = false;
+        let m = self.active.len() - self.null.q;
+        self.spectrum = Some(Spectrum::new(&self.cholesky.l, m, self.null.stride));
+    }
+
+    /// Condition number of QᵀSQ with `lambda` added to a spectral system.
+    pub(crate) fn condition(&self, lambda: f64) -> f64 {
+        self.spectrum.as_ref().map_or(self.condition, |spectrum| spectrum.condition(lambda))
+    }
+
+    /// Writes the lower triangle of QᵀSQ without λ; returns its Frobenius norm.
+    fn assemble<K: Kernel>(&mut self, setting: &Setting<'_, K, D>, weights: &[f64], scaled: bool) -> f64 {
+        let sites = setting.sites;
+        self.choose(sites.len(), weights, scaled);
+        self.span = Span::new(sites, &self.active, setting.rank_tolerance, &mut self.spare);
+        let n = self.active.len();
+        let q = n.min(1 + self.span.directions);
+        let stride = layout(n, q);
+        let Self { active, scales, span, null, cholesky, scratch, .. } = self;
+        null.factor(n, q, stride, |c, column| span.fill(sites, active, scales, c, column));
+        cholesky.prepare(n - q, stride);
+        scratch.clear();
+        scratch.resize((MAX + D + 1) * stride, 0.0);
+        let (product, places) = scratch.split_at_mut(MAX * stride);
+        gather(sites, active, scales, null.rows(), places);
+        dispatch(Assemble::<_, D> { kernel: setting.kernel, places, null, matrix: &mut cholesky.l, product });
+        null.project(&mut cholesky.l, product)
+    }
+
     /// Sites of positive weight, heaviest first so that the reflectors keep light rows apart.
-    fn choose(&mut self, n: usize, weights: &[f64]) {
+    fn choose(&mut self, n: usize, weights: &[f64], scaled: bool) {
         self.active.clear();
         self.scales.clear();
         if weights.is_empty() {
@@ -78,18 +112,39 @@ impl System {
             return;
         }
         self.active.extend((0..n).filter(|&i| weights[i] > 0.0));
-        if self.lambda > 0.0 {
+        if scaled {
             self.active.sort_unstable_by(|&i, &j| weights[j].total_cmp(&weights[i]).then(i.cmp(&j)));
             self.scales.extend(self.active.iter().map(|&i| weights[i].sqrt()));
         }
     }
 
+    /// The λ of least generalised cross-validation for the values `y`; the system must be spectral.
+    pub(crate) fn cross_validate<const M: usize>(
+        &self,
+        y: &[f64],
+        sites: usize,
+        work: &mut Vec<f64>,
+    ) -> Option<f64> {
+        let (n, stride) = (self.active.len(), self.null.stride);
+        work.clear();
+        work.resize(M * stride, 0.0);
+        for (m, column) in work.chunks_exact_mut(stride).enumerate() {
+            self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
+            self.null.apply_transpose(column);
+        }
+        self.spectrum.as_ref().map(|spectrum| spectrum.cross_validate(work, n, &mut Vec::new()))
+    }
+
     /// Solves for `M` outputs: `y` holds the values at all sites and receives the weights w; returns the affine parts.
+    ///
+    /// `lambda` is what to add to a spectral system; a factored one has its own.
     pub(crate) fn solve<const M: usize>(
         &self,
         y: &mut [f64],
         sites: usize,
+        lambda: f64,
         work: &mut Vec<f64>,
+        spare: &mut Vec<f64>,
     ) -> [[f64; MAX]; M] {
         let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
         work.clear();
@@ -100,7 +155,10 @@ impl System {
             self.null.apply_transpose(column);
             heads[m][..q].copy_from_slice(&column[HEAD - q..HEAD]);
         }
-        self.cholesky.solve::<M>(work);
+        match &self.spectrum {
+            Some(spectrum) => spectrum.solve::<M>(work, lambda, spare),
+            None => self.cholesky.solve::<M>(work),
+        }
         y.fill(0.0);
         for (m, column) in work.chunks_exact_mut(stride).enumerate() {
             column[..HEAD].fill(0.0);

@@ -22,7 +22,7 @@ impl Table {
     fn enter(&mut self, case: &Value, quantity: &'static str, error: f64, tolerance: f64) {
         let ratio = error / tolerance;
         let row = self.rows.entry((text(case, "category"), quantity)).or_insert((-1.0, String::new()));
-        if !(ratio <= row.0) {
+        if ratio > row.0 || ratio.is_nan() {
             *row = (ratio, text(case, "id"));
         }
     }
@@ -90,8 +90,8 @@ fn singular<const D: usize, K: Kernel>(
     targets: &[Point<f64, D>],
     fitted: Fitted<D, K>,
 ) {
-    let pairs = (0..sources.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
-    let (i, j) = pairs.filter(|&(i, j)| sources[i] == sources[j]).next().expect("a pair");
+    let mut pairs = (0..sources.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    let (i, j) = pairs.find(|&(i, j)| sources[i] == sources[j]).expect("a pair");
     match fitted {
         Err(TpsError::Conflict { first, second }) => {
             assert_eq!((first, second, true), (i, j, targets[i] != targets[j]))
