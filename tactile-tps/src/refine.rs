@@ -147,6 +147,18 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, x| f64::max(m, x.abs()))
 }
 
+/// wᵀKw, summed over the outputs.
+pub(crate) fn energy<K: Kernel, const D: usize, const M: usize>(
+    kernel: &K,
+    centres: [&[f64]; D],
+    weights: [&[f64]; M],
+) -> f64 {
+    let mut residuals = vec![0.0; M * centres[0].len()];
+    dispatch(Subtract { sum: Sum { kernel, centres, weights }, residuals: &mut residuals });
+    let products = weights.iter().copied().flatten().zip(&residuals).map(|(w, r)| -w * r);
+    f64::max(products.sum(), 0.0)
+}
+
 /// Subtracts the kernel sum at every centre.
 struct Subtract<'a, K, const D: usize, const M: usize> {
     sum: Sum<'a, f64, K, D, M>,

@@ -5,7 +5,7 @@ use nalgebra::{Point, SMatrix, SVector};
 use crate::{
     Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
     evaluate::Sum,
-    refine::{Buffers, Solution},
+    refine::{Buffers, Solution, energy},
     sample::{Each, Linear, Sample},
     simd::dispatch,
     sites::{Frame, Sites},
@@ -264,17 +264,15 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second derivatives is 8π times this.
     pub fn bending_energy(&self) -> f64 {
         let n = self.count();
-        let mut energy = 0.0;
-        for i in 0..n {
-            for j in 0..n {
-                let difference = |k: usize| (self.centres[k * n + i] - self.centres[k * n + j]).widen();
-                let s: f64 = (0..D).map(|k| difference(k) * difference(k)).sum();
-                let u = self.kernel.value(s);
-                let products =
-                    (0..M).map(|k| self.weights[k * n + i].widen() * self.weights[k * n + j].widen());
-                energy += u * products.sum::<f64>();
-            }
-        }
+        let axis = |k: usize| self.centres[k * n..(k + 1) * n].iter().map(|x| x.widen()).collect();
+        let output = |m: usize| self.weights[m * n..(m + 1) * n].iter().map(|x| x.widen()).collect();
+        let centres: [Vec<f64>; D] = core::array::from_fn(axis);
+        let weights: [Vec<f64>; M] = core::array::from_fn(output);
+        let energy = energy::<K, D, M>(
+            &self.kernel,
+            centres.each_ref().map(|x| &x[..]),
+            weights.each_ref().map(|w| &w[..]),
+        );
         energy / self.unit()
     }
 }
