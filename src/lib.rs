@@ -1,4 +1,4 @@
-//! Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 pub use tactile_elasticity as elasticity;
 pub use tactile_force as force;

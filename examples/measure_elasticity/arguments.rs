@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 /// The paper's two polymers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Polymer {
+pub(crate) enum Polymer {
     /// Versaflex CL2000X, 103 kPa.
     Cl2000x,
     /// Versaflex CL2003X, 62 kPa.
@@ -18,43 +18,43 @@ pub enum Polymer {
 /// measures your own frames. Plots go to target/measure_elasticity/, results to stdout, progress to stderr.
 #[derive(Clone, Debug, Parser)]
 #[command(version, after_help = AFTER_HELP)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Scene file with your own frames; see below. Without it a press is simulated.
     #[arg(value_name = "SCENE.toml")]
-    pub scene: Option<PathBuf>,
+    pub(crate) scene: Option<PathBuf>,
     /// Print one JSON object on stdout instead of text.
     #[arg(long)]
-    pub json: bool,
+    pub(crate) json: bool,
     /// Measure N times and report the median and the 99th centile of every stage and of the whole.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    pub repeat: u32,
+    pub(crate) repeat: u32,
     /// Folder for the plots.
     #[arg(long, value_name = "DIR", default_value = "target/measure_elasticity")]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Draw no plots.
     #[arg(long)]
-    pub no_plots: bool,
+    pub(crate) no_plots: bool,
     /// Number of control points on each surface.
     #[arg(long, value_name = "COUNT", default_value_t = 200, value_parser = clap::value_parser!(u32).range(8..=5000))]
-    pub points: u32,
+    pub(crate) points: u32,
     /// Simulation: the ball's material.
     #[arg(long, value_enum, default_value_t = Polymer::Cl2000x, conflicts_with = "scene")]
-    pub polymer: Polymer,
+    pub(crate) polymer: Polymer,
     /// Simulation: the ball's Young's modulus in kPa, instead of a polymer's.
     #[arg(long, value_name = "KPA", conflicts_with_all = ["scene", "polymer"])]
-    pub modulus_kpa: Option<f64>,
+    pub(crate) modulus_kpa: Option<f64>,
     /// Simulation: the ball's radius in mm.
     #[arg(long, value_name = "MM", default_value_t = 3.0, conflicts_with = "scene")]
-    pub radius_mm: f64,
+    pub(crate) radius_mm: f64,
     /// Simulation: the loads in newtons.
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], conflicts_with = "scene")]
-    pub forces: Vec<f64>,
+    pub(crate) forces: Vec<f64>,
     /// Simulation: seed of the camera's noise.
     #[arg(long, default_value_t = 1, conflicts_with = "scene")]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Simulation: no noise, blur, vignetting or background.
     #[arg(long, conflicts_with = "scene")]
-    pub ideal_camera: bool,
+    pub(crate) ideal_camera: bool,
 }
 
 const AFTER_HELP: &str = "\

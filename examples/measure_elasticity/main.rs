@@ -4,6 +4,7 @@
 //! cargo run --release --example measure_elasticity
 //! cargo run --release --example measure_elasticity -- SCENE.toml --json
 //! ```
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 mod arguments;
 mod output;
 mod source;

@@ -25,7 +25,7 @@ struct Json<'a> {
     timing: Vec<Timing>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let source = Source::open(arguments)?;
     let stages = source.stages(arguments)?;
     eprintln!("measuring");

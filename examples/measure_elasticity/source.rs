@@ -4,53 +4,53 @@ use tactile_imaging::pipeline::{Press, Stages, Trial, Truth};
 use tactile_imaging::scene::{Scene, SceneData};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Elastic, Load, PressOptions, Sphere};
 
-pub type Failure = Box<dyn std::error::Error>;
+pub(crate) type Failure = Box<dyn std::error::Error>;
 
 /// Frames with all that is needed to measure them.
-pub enum Source {
+pub(crate) enum Source {
     /// Simulated, with the truth.
     Simulated(Box<Trial>),
     /// A user's own.
-    Scene(Scene, SceneData),
+    Scene(Box<(Scene, SceneData)>),
 }
 
 impl Source {
-    pub fn open(arguments: &Arguments) -> Result<Self, Failure> {
+    pub(crate) fn open(arguments: &Arguments) -> Result<Self, Failure> {
         if let Some(path) = &arguments.scene {
             eprintln!("reading {}", path.display());
             let scene = Scene::read(path)?;
             let data = scene.load()?;
-            return Ok(Self::Scene(scene, data));
+            return Ok(Self::Scene(Box::new((scene, data))));
         }
         eprintln!("simulating a calibration series and {} frames", arguments.forces.len());
         Ok(Self::Simulated(Box::new(Trial::new(options(arguments), &CalibrationOptions::default())?)))
     }
 
-    pub fn stages(&self, arguments: &Arguments) -> Result<Box<dyn Stages>, Failure> {
+    pub(crate) fn stages(&self, arguments: &Arguments) -> Result<Box<dyn Stages>, Failure> {
         Ok(match self {
             Self::Simulated(trial) => {
                 Box::new(trial.pipeline()?.with_control_points(arguments.points as usize))
             }
-            Self::Scene(scene, data) => scene.stages_with(data, arguments.points as usize)?,
+            Self::Scene(own) => own.0.stages_with(&own.1, arguments.points as usize)?,
         })
     }
 
-    pub fn press<'a>(&'a self, stages: &'a dyn Stages) -> Result<Press<'a>, Failure> {
+    pub(crate) fn press<'a>(&'a self, stages: &'a dyn Stages) -> Result<Press<'a>, Failure> {
         match self {
             Self::Simulated(trial) => Ok(trial.press(stages)?),
-            Self::Scene(scene, data) => Ok(scene.press(stages, data)?),
+            Self::Scene(own) => Ok(own.0.press(stages, &own.1)?),
         }
     }
 
     /// The pipeline's error, with file and field where there is a scene file.
-    pub fn explain(&self, error: tactile_imaging::pipeline::PipelineError) -> Failure {
+    pub(crate) fn explain(&self, error: tactile_imaging::pipeline::PipelineError) -> Failure {
         match self {
             Self::Simulated(_) => error.into(),
-            Self::Scene(scene, _) => scene.measure_error(error).into(),
+            Self::Scene(own) => own.0.measure_error(error).into(),
         }
     }
 
-    pub fn truth(&self) -> Option<Truth> {
+    pub(crate) fn truth(&self) -> Option<Truth> {
         if let Self::Simulated(trial) = self { Some(trial.truth()) } else { None }
     }
 }

@@ -10,12 +10,16 @@
 //! surface, [`Press::modulus`] of a ball none either, [`Press::measure`] everything. The [`Report`] says what ran,
 //! for how long, and what was skipped for which reason.
 //!
+//! A [`Session`] follows a stream from a [`FrameSource`] with constant memory; [`contacts`] reads a batch of frames.
+//!
 //! # Which modulus
 //! For a ball, Hertz's pressure p₀√(1 − r²/a²) read as frontal Lambertian shading is a hemisphere of radius a, and a grows
 //! as (F R/E*)^⅓; between two loads that surface scales by (F₂/F₁)^⅓ whatever the modulus is. The ratio of stress to
 //! strain, equation (31), is therefore reported (first among [`Measurement::estimators`]) but not believed: the modulus comes
 //! from a³ = 3FR/(4E*), both bodies yielding, the waveguide's layers in series. a/R is in every report, and beyond 0.3 the
 //! result carries a flag. For other objects the paper's ratio is the estimate.
+mod ball;
+mod batch;
 mod contact;
 mod depth;
 mod display;
@@ -26,11 +30,15 @@ mod object;
 mod pair;
 mod press;
 mod report;
+mod session;
+mod source;
 mod stages;
 mod surface;
 #[cfg(feature = "simulate")]
 mod trial;
 
+pub use ball::BallFit;
+pub use batch::contacts;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
 pub use error::PipelineError;
@@ -40,6 +48,10 @@ pub use object::Object;
 pub use pair::{LEAST_MATCHES, PairStrain};
 pub use press::Press;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
+pub use session::{SESSION_LOADS, Session, Update};
+pub use source::FrameSource;
+#[cfg(feature = "scene")]
+pub use source::ImageFolder;
 pub use stages::{BoxedWarp, DEFAULT_CONTROL_POINTS, Pipeline, Settings, Skips, Stages};
 pub use surface::{ContactSurface, SurfaceInput};
 #[cfg(feature = "simulate")]

@@ -120,6 +120,14 @@ impl Report {
         work.time += time;
     }
 
+    /// Counts a skip of a stream: those of one kind are one entry, of frame 0, with the sum of what was saved.
+    pub(crate) fn count_skip(&mut self, stage: Stage, reason: SkipReason, saved: usize) {
+        match self.skips.iter_mut().find(|s| s.stage == stage && s.reason == reason) {
+            Some(skip) => skip.saved += saved,
+            None => self.skipped(stage, 0, reason, saved),
+        }
+    }
+
     pub(crate) fn skipped(&mut self, stage: Stage, frame: usize, reason: SkipReason, saved: usize) {
         self.skips.push(Skip { stage, frame, reason, saved });
     }

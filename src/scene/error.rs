@@ -57,11 +57,11 @@ pub enum SceneError {
         /// The field, with its path inside the file.
         field: String,
         /// What is wrong with the file it names.
-        source: ReadError,
+        source: Box<ReadError>,
     },
     /// The scene file itself cannot be read.
     #[error(transparent)]
-    Open(#[from] ReadError),
+    Open(Box<ReadError>),
     /// A frame differs in size from the reference.
     #[error(
         "{}: field `{field}`: the image {} is {} × {} pixels, but the reference {} is {} × {}",
@@ -77,9 +77,9 @@ pub enum SceneError {
         /// The reference.
         reference: PathBuf,
         /// Rows and columns of the reference.
-        expected: [usize; 2],
+        expected: [u32; 2],
         /// Rows and columns of the image.
-        found: [usize; 2],
+        found: [u32; 2],
     },
     /// The frames could be read, but not be measured.
     #[error("{}: field `{field}`: {source}", file.display())]

@@ -42,8 +42,8 @@ impl Scene {
                     field,
                     image: frame.image.clone(),
                     reference: self.reference.clone(),
-                    expected: reference.dim().into(),
-                    found: image.dim().into(),
+                    expected: size(&reference),
+                    found: size(&image),
                 });
             }
             frames.push(image);
@@ -77,6 +77,10 @@ impl Scene {
     }
 
     fn file_error(&self, field: &str, source: ReadError) -> SceneError {
-        SceneError::File { file: self.file.clone(), field: field.into(), source }
+        SceneError::File { file: self.file.clone(), field: field.into(), source: Box::new(source) }
     }
+}
+
+fn size(image: &Array2<u8>) -> [u32; 2] {
+    [image.nrows() as u32, image.ncols() as u32]
 }

@@ -99,7 +99,8 @@ impl Scene {
     /// [`SceneError`]: one sentence that names the file and the field.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| ReadError::Open { path: path.into(), source })?;
+        let bytes = std::fs::read(path)
+            .map_err(|source| SceneError::Open(Box::new(ReadError::Open { path: path.into(), source })))?;
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 

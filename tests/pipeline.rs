@@ -1,0 +1,228 @@
+//! The pipeline pulls: what is not asked for is not computed, what is skipped changes no answer, stages can be swapped.
+#![allow(missing_docs)]
+use nalgebra::Point3;
+use ndarray::{Array2, ArrayView2};
+use std::sync::Arc;
+use tactile_imaging::elasticity::strain::Hencky;
+use tactile_imaging::pipeline::{
+    FrameSource, PipelineError, Press, SESSION_LOADS, Session, SkipReason, Skips, Stage, Stages, Trial,
+    contacts,
+};
+use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError};
+use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, LoadCycle, PressOptions};
+
+/// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
+fn trial(forces: &[f64], seed: u64) -> Trial {
+    let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+    let loads = forces.iter().map(|&f| Load::normal(f)).collect();
+    Trial::new(
+        PressOptions { camera, loads, seed, ..PressOptions::default() },
+        &CalibrationOptions::default(),
+    )
+    .unwrap()
+}
+
+fn runs(press: &Press<'_>) -> [usize; 6] {
+    Stage::ALL.map(|stage| press.report().work(stage).runs)
+}
+
+#[test]
+fn nothing_runs_before_it_is_asked_for() {
+    let trial = trial(&[0.7, 1.2], 1);
+    let pipeline = trial.pipeline().unwrap();
+    let mut press = trial.press(&pipeline).unwrap();
+    assert_eq!(runs(&press), [0; 6]);
+    press.contact(0).unwrap();
+    assert_eq!(runs(&press), [1, 0, 0, 0, 0, 0], "force alone never touches a surface");
+    press.modulus().unwrap();
+    assert_eq!(runs(&press), [2, 0, 0, 0, 0, 1], "a ball's modulus takes the contacts alone");
+    press.surface(1).unwrap();
+    assert_eq!(runs(&press), [2, 1, 0, 0, 0, 1]);
+    press.strain(1).unwrap();
+    press.strain(1).unwrap();
+    assert_eq!(runs(&press), [2, 2, 2, 1, 1, 1], "what is known is not computed again");
+}
+
+#[test]
+fn both_polymers_come_out_within_the_papers_error() {
+    for seed in 0..4 {
+        let trial = trial(&[0.7, 1.2], seed);
+        let pipeline = trial.pipeline().unwrap();
+        let modulus = trial.press(&pipeline).unwrap().modulus().unwrap();
+        let error = modulus.youngs_modulus_pa / trial.truth().youngs_modulus_pa - 1.0;
+        assert!(error.abs() < 0.0538, "seed {seed}: error {error}");
+    }
+}
+
+#[test]
+fn a_frame_without_contact_stops_there() {
+    let trial = trial(&[0.7], 1);
+    let pipeline = trial.pipeline().unwrap();
+    let empty = trial.scene.reference(7);
+    let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
+    press.add_frame(empty.view());
+    assert!(press.contact(0).unwrap().is_none());
+    assert_eq!(press.surface(0).unwrap_err(), PipelineError::NoContact { frame: 0 });
+    assert_eq!(press.modulus().unwrap_err(), PipelineError::NoContact { frame: 0 });
+    assert_eq!(runs(&press), [1, 0, 0, 0, 0, 0]);
+    assert!(press.report().skips.iter().any(|s| s.reason == SkipReason::NoContact));
+    assert!(matches!(press.contact(1).unwrap_err(), PipelineError::NoSuchFrame { frame: 1, frames: 1 }));
+}
+
+/// All answers of a press that must not depend on what is skipped.
+fn answers(trial: &Trial, stages: &dyn Stages, twice: bool) -> (Vec<u64>, [usize; 6]) {
+    let mut press = Press::new(stages, trial.simulation.reference.view()).unwrap();
+    for frame in &trial.simulation.frames {
+        press.add_frame(frame.view());
+        if twice {
+            press.add_frame(frame.view());
+        }
+    }
+    let last = press.frames() - 1;
+    let mut bits = Vec::new();
+    for frame in 0..=last {
+        bits.push(press.contact(frame).unwrap().unwrap().contact_radius_m.value.to_bits());
+        bits.extend(
+            press.control_points(frame).unwrap().iter().flat_map(|p| [p.x, p.y, p.z].map(f64::to_bits)),
+        );
+    }
+    bits.extend(press.strain(last).unwrap().summary.mean.iter().map(|v| v.to_bits()));
+    bits.push(press.modulus().unwrap().youngs_modulus_pa.to_bits());
+    let work = runs(&press);
+    (bits, work)
+}
+
+#[test]
+fn equal_frames_are_measured_once_with_the_same_bits() {
+    let trial = trial(&[0.7, 1.2], 2);
+    let with = trial.pipeline().unwrap();
+    let skips = Skips { equal_frames: false, ..Skips::default() };
+    let without = trial.pipeline().unwrap().with_skips(skips);
+    let (a, few) = answers(&trial, &with, true);
+    let (b, many) = answers(&trial, &without, true);
+    assert_eq!(a, b);
+    assert_eq!((few[0], many[0]), (2, 4));
+    assert_eq!((few[1], many[1]), (2, 4));
+}
+
+#[test]
+fn surfaces_of_the_box_alone_equal_those_of_the_whole_frame() {
+    let trial = trial(&[0.7, 1.2], 3);
+    let inside = trial.pipeline().unwrap();
+    let skips = Skips { outside_contact: false, ..Skips::default() };
+    let whole = trial.pipeline().unwrap().with_skips(skips);
+    let (mut a, mut b) = (trial.press(&inside).unwrap(), trial.press(&whole).unwrap());
+    let (a, b) = (a.surface(0).unwrap(), b.surface(0).unwrap());
+    assert!(a.surface.heights.len() < b.surface.heights.len() / 2, "the box is smaller");
+    for ((row, column), h) in a.surface.heights.indexed_iter() {
+        if a.surface.mask[[row, column]] {
+            let other = b.surface.heights[[a.region.row_start + row, a.region.column_start + column]];
+            // Sweeps run in another order over another box: rounding alone may differ.
+            assert!((h - other).abs() < 1e-9, "{h} against {other}");
+        }
+    }
+}
+
+/// A sampler of one's own: half as many points.
+struct Half;
+
+impl ControlPointSampler<f64> for Half {
+    fn sample(
+        &self,
+        surface: ArrayView2<'_, f64>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [f64; 2],
+        count: usize,
+    ) -> Result<Vec<Point3<f64>>, SfsError> {
+        EquallySpaced::new().sample(surface, mask, pixel_size_m, count / 2)
+    }
+}
+
+#[test]
+fn every_stage_can_be_swapped_in_one_line() {
+    let trial = trial(&[0.7, 1.2], 4);
+    let pipeline = trial.pipeline().unwrap().with_sampler(Half).with_strain(Hencky);
+    let mut press = trial.press(&pipeline).unwrap();
+    assert_eq!(press.control_points(0).unwrap().len(), 100);
+    assert!(press.strain(1).unwrap().measure.contains("Hencky"));
+}
+
+#[test]
+fn swapped_loads_give_the_same_modulus() {
+    let (up, down) = (trial(&[0.7, 1.2], 5), trial(&[1.2, 0.7], 5));
+    let modulus = |t: &Trial| {
+        let pipeline = t.pipeline().unwrap();
+        t.press(&pipeline).unwrap().modulus().unwrap()
+    };
+    let (a, b) = (modulus(&up), modulus(&down));
+    // Other noise in each frame: six standard errors.
+    let apart = (a.youngs_modulus_pa - b.youngs_modulus_pa).abs();
+    assert!(apart < 6.0 * a.standard_error_pa.hypot(b.standard_error_pa), "{apart}");
+}
+
+#[test]
+fn frames_of_another_size_are_an_error() {
+    let trial = trial(&[0.7], 1);
+    let pipeline = trial.pipeline().unwrap();
+    let small = Array2::zeros((10, 10));
+    let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
+    press.add_frame(small.view());
+    assert!(matches!(press.contact(0), Err(PipelineError::Contact { frame: 0, .. })));
+}
+
+#[test]
+fn everything_can_cross_threads() {
+    fn crosses<T: Send + Sync>() {}
+    crosses::<tactile_imaging::Pipeline>();
+    fn moves<T: Send>() {}
+    moves::<PipelineError>();
+}
+
+#[test]
+fn a_session_refines_the_modulus_and_agrees_with_a_press() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let expected = trial.press(&pipeline).unwrap().modulus().unwrap();
+    let mut session = Session::new(Arc::new(pipeline), trial.simulation.reference.view()).unwrap();
+    assert!(session.modulus().is_err(), "no load yet");
+    for frame in &trial.simulation.frames {
+        session.push(frame.view()).unwrap();
+    }
+    let modulus = session.modulus().unwrap();
+    // The same two loads; only the calibration's share of the error is averaged in another order.
+    assert!((modulus.youngs_modulus_pa / expected.youngs_modulus_pa - 1.0).abs() < 1e-9);
+    let again = session.push(trial.simulation.frames[1].view()).unwrap();
+    assert!(again.repeated, "an equal frame is not measured again");
+    assert_eq!(session.loads(), 2);
+}
+
+#[test]
+fn a_session_over_a_stream_keeps_its_memory_and_its_answer() {
+    let trial = trial(&[1.5], 7);
+    let stages = Arc::new(trial.pipeline().unwrap());
+    let references: Vec<_> = (1..4).map(|k| trial.scene.reference(k)).collect();
+    let views: Vec<_> = references.iter().map(|r| r.view()).collect();
+    let mut session = Session::from_frames(stages, &views).unwrap();
+    let cycle = LoadCycle { largest_force_n: 1.5, cycles: 2, ..LoadCycle::default() };
+    let mut stream = trial.scene.stream(cycle).unwrap();
+    let mut frame = Array2::zeros((0, 0));
+    while stream.next_frame(&mut frame).unwrap().is_some() {
+        session.push(frame.view()).unwrap();
+    }
+    assert!(session.loads() <= SESSION_LOADS);
+    let modulus = session.modulus().unwrap();
+    let error = modulus.youngs_modulus_pa / trial.truth().youngs_modulus_pa - 1.0;
+    assert!(error.abs() < 0.03, "error {error}");
+}
+
+#[test]
+fn a_batch_reads_as_frames_one_by_one() {
+    let trial = trial(&[0.2, 0.7, 1.2], 8);
+    let pipeline = trial.pipeline().unwrap();
+    let views: Vec<_> = trial.simulation.frames.iter().map(|f| f.view()).collect();
+    let batch = contacts(&pipeline, trial.simulation.reference.view(), &views).unwrap();
+    let mut press = trial.press(&pipeline).unwrap();
+    for (i, reading) in batch.iter().enumerate() {
+        assert_eq!(reading.as_ref().unwrap().as_ref(), press.contact(i).unwrap());
+    }
+}

@@ -1,0 +1,230 @@
+//! Scene files from end to end: a simulated scene written to a folder is measured; every bad input gets its sentence.
+#![allow(missing_docs)]
+use ndarray::Array2;
+use std::fs;
+use std::path::Path;
+use tactile_imaging::io::write_grey_image;
+use tactile_imaging::scene::Scene;
+use tactile_imaging::simulate::{
+    CalibrationOptions, Elastic, PressOptions, PressScene, Sphere, write_folder,
+};
+
+/// The paper's error: ±5.38 % on both polymers.
+const PAPER_ERROR: f64 = 0.0538;
+
+fn scene_of(material: Elastic, seed: u64) -> PressScene {
+    let object = Sphere { radius_m: 3e-3, material };
+    PressScene::new(PressOptions { object, seed, ..PressOptions::default() }).unwrap()
+}
+
+#[test]
+fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
+    for (material, seed) in [(Elastic::CL2000X, 3), (Elastic::CL2003X, 4)] {
+        let folder = tempfile::tempdir().unwrap();
+        let path =
+            write_folder(&scene_of(material, seed), &CalibrationOptions::default(), folder.path()).unwrap();
+        let measured = Scene::measure_file(path).unwrap();
+        let error = measured.youngs_modulus_pa.value / material.youngs_modulus_pa - 1.0;
+        assert!(error.abs() < PAPER_ERROR, "error {error}");
+        assert_eq!(measured.youngs_modulus_pa.estimator, "Hertz sphere");
+        assert!(
+            measured.estimators[0].estimator.contains("stress over mean strain"),
+            "the paper's ratio is first"
+        );
+        assert!(measured.flags.iter().any(|f| f.to_string().contains("a/R")), "a/R beyond 0.3 is flagged");
+    }
+}
+
+/// A small valid scene: frames of 60 × 80 pixels with a bright round blob.
+fn small_scene(folder: &Path) {
+    let blob = |peak: f64| {
+        Array2::from_shape_fn((60, 80), |(r, c)| {
+            let square = (c as f64 - 40.2).powi(2) + (r as f64 - 30.4).powi(2);
+            10 + (peak * (1.0 - square / 400.0).max(0.0).sqrt()).round() as u8
+        })
+    };
+    write_grey_image(folder.join("reference.png"), Array2::from_elem((60, 80), 10).view()).unwrap();
+    write_grey_image(folder.join("one.png"), blob(100.0).view()).unwrap();
+    write_grey_image(folder.join("two.pgm"), blob(130.0).view()).unwrap();
+    fs::write(
+        folder.join("pairs.csv"),
+        "integrated_pixel_value,force_N\n0,0\n50000,0.5\n100000,1.0\n150000,1.5\n",
+    )
+    .unwrap();
+    fs::write(folder.join("depth.csv"), "darkness_grey_levels,depth_mm\n1,0.02\n60,1.9\n").unwrap();
+}
+
+const VALID: &str = r#"
+reference = "reference.png"
+pixel_size_m = [1e-4, 1e-4]
+[calibration]
+pairs = "pairs.csv"
+[[frames]]
+image = "one.png"
+force_N = 0.8
+[[frames]]
+image = "two.pgm"
+[object]
+shape = "sphere"
+radius_m = 0.02
+poisson_ratio = 0.5
+[waveguide]
+layers = [{ refractive_index = 1.41, thickness_m = 0.1, youngs_modulus_pa = 1e7 }]
+"#;
+
+fn sentence(folder: &Path, text: &str) -> String {
+    let path = folder.join("scene.toml");
+    fs::write(&path, text).unwrap();
+    match Scene::measure_file(&path) {
+        Ok(measured) => format!("measured {}", measured.youngs_modulus_pa.value),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn the_small_scene_is_valid() {
+    let folder = tempfile::tempdir().unwrap();
+    small_scene(folder.path());
+    let answer = sentence(folder.path(), VALID);
+    assert!(answer.starts_with("measured "), "{answer}");
+}
+
+/// Replacement in the valid file, and what the sentence must contain.
+const MISTAKES: &[(&str, &str, &[&str])] = &[
+    ("reference = \"reference.png\"", "", &["`reference` is missing"]),
+    ("reference = \"reference.png\"", "reference = 3", &["`reference` must be", "found 3"]),
+    (
+        "reference = \"reference.png\"",
+        "reference = \"none.png\"",
+        &["`reference`", "none.png", "cannot read"],
+    ),
+    (
+        "reference = \"reference.png\"",
+        "reference = \"pairs.csv\"",
+        &["`reference`", "pairs.csv", "cannot decode"],
+    ),
+    ("pixel_size_m = [1e-4, 1e-4]", "", &["`pixel_size_m` is missing"]),
+    (
+        "pixel_size_m = [1e-4, 1e-4]",
+        "pixel_size_m = [1e-4]",
+        &["`pixel_size_m` must be two positive numbers"],
+    ),
+    (
+        "pixel_size_m = [1e-4, 1e-4]",
+        "pixel_size_m = [1e-4, 0.0]",
+        &["`pixel_size_m` must be two positive numbers"],
+    ),
+    (
+        "pixel_size_m = [1e-4, 1e-4]",
+        "pixel_size_m = [nan, 1e-4]",
+        &["`pixel_size_m` must be two positive numbers"],
+    ),
+    ("pixel_size_m = [1e-4, 1e-4]", "pixel_size_m = 1e-4", &["`pixel_size_m` must be two positive numbers"]),
+    ("pairs = \"pairs.csv\"", "", &["`calibration.pairs` is missing"]),
+    ("pairs = \"pairs.csv\"", "pairs = \"none.csv\"", &["`calibration.pairs`", "none.csv"]),
+    ("pairs = \"pairs.csv\"", "pairs = \"depth.csv\"", &["`calibration.pairs`", "integrated_pixel_value"]),
+    ("pairs = \"pairs.csv\"", "pairs = \"short.csv\"", &["`calibration.pairs`", "cannot be fitted"]),
+    (
+        "pairs = \"pairs.csv\"",
+        "pairs = \"bad.csv\"",
+        &["`calibration.pairs`", "bad.csv, line 3, column 2", "found `x`"],
+    ),
+    (
+        "pairs = \"pairs.csv\"",
+        "pairs = \"pairs.csv\"\ndepth_table = \"depth.csv\"",
+        &["`calibration.pairs` must be alone"],
+    ),
+    (
+        "pairs = \"pairs.csv\"",
+        "depth_table = \"pairs.csv\"",
+        &["`calibration.depth_table`", "darkness_grey_levels"],
+    ),
+    ("[calibration]", "[calibrations]", &["unknown field `calibrations`"]),
+    ("image = \"one.png\"", "", &["`frames[1].image` is missing"]),
+    ("image = \"two.pgm\"", "image = \"three.pgm\"", &["`frames[2].image`", "three.pgm"]),
+    ("image = \"two.pgm\"", "image = \"small.png\"", &["`frames[2].image`", "small.png is 7 × 5", "80 × 60"]),
+    ("image = \"two.pgm\"", "image = \"reference.png\"", &["frames[2].image", "reference.png", "no contact"]),
+    ("image = \"two.pgm\"", "image = \"white.png\"", &["frames[2].image", "white.png", "saturated"]),
+    ("force_N = 0.8", "force_N = -1.0", &["`frames[1].force_N` must be a positive number"]),
+    ("force_N = 0.8", "force = 1.0", &["unknown field `frames[1].force`"]),
+    ("shape = \"sphere\"", "", &["`object.shape` is missing"]),
+    ("shape = \"sphere\"", "shape = \"cube\"", &["`object.shape` must be", "cube"]),
+    ("radius_m = 0.02", "", &["`object.radius_m` is missing"]),
+    ("radius_m = 0.02", "radius_m = inf", &["`object.radius_m` must be a positive number"]),
+    ("radius_m = 0.02", "radius_m = \"big\"", &["`object.radius_m` must be a positive number", "big"]),
+    ("poisson_ratio = 0.5", "poisson_ratio = 0.6", &["`object.poisson_ratio` must be"]),
+    ("[waveguide]", "[waveguides]", &["unknown field `waveguides`"]),
+    (
+        "thickness_m = 0.1",
+        "thickness_m = 0",
+        &["`waveguide.layers[1].thickness_m` must be a positive number"],
+    ),
+    ("thickness_m = 0.1, ", "", &["`waveguide.layers[1].thickness_m` is missing"]),
+    (
+        "refractive_index = 1.41",
+        "refractive_index = 0.5",
+        &["`waveguide.layers[1].refractive_index` must be"],
+    ),
+    (
+        "youngs_modulus_pa = 1e7",
+        "youngs_modulus_pa = -1",
+        &["`waveguide.layers[1].youngs_modulus_pa` must be"],
+    ),
+    (
+        "layers = [{ refractive_index = 1.41, thickness_m = 0.1, youngs_modulus_pa = 1e7 }]",
+        "layers = []",
+        &["`waveguide.layers` must be"],
+    ),
+    (
+        "layers = [{ refractive_index = 1.41, thickness_m = 0.1, youngs_modulus_pa = 1e7 }]",
+        "",
+        &["`waveguide.layers` is missing"],
+    ),
+    ("shape = \"sphere\"", "shape = sphere", &["line 12"]),
+];
+
+#[test]
+fn every_mistake_gets_one_sentence_with_file_and_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    small_scene(at);
+    write_grey_image(at.join("small.png"), Array2::from_elem((5, 7), 10).view()).unwrap();
+    write_grey_image(at.join("white.png"), Array2::from_elem((60, 80), 255).view()).unwrap();
+    fs::write(at.join("short.csv"), "1,2\n").unwrap();
+    fs::write(at.join("bad.csv"), "integrated_pixel_value,force_N\n1,2\n3,x\n").unwrap();
+    for (from, to, wanted) in MISTAKES {
+        assert!(VALID.contains(from), "{from} is in the valid file");
+        let answer = sentence(at, &VALID.replacen(from, to, 1));
+        assert!(answer.contains("scene.toml"), "{from} -> {to}: the file is named: {answer}");
+        for part in *wanted {
+            assert!(answer.contains(part), "{from} -> {to}: `{part}` in: {answer}");
+        }
+        assert!(!answer.contains('\n'), "one sentence: {answer}");
+    }
+}
+
+#[test]
+fn a_depth_table_needs_gauge_readings() {
+    let folder = tempfile::tempdir().unwrap();
+    small_scene(folder.path());
+    let dark = Array2::from_shape_fn((60, 80), |(r, c)| {
+        let square = (c as f64 - 40.2).powi(2) + (r as f64 - 30.4).powi(2);
+        200 - (50.0 * (1.0 - square / 400.0).max(0.0).sqrt()).round() as u8
+    });
+    write_grey_image(folder.path().join("bright.png"), Array2::from_elem((60, 80), 200).view()).unwrap();
+    write_grey_image(folder.path().join("dark.png"), dark.view()).unwrap();
+    let text = VALID
+        .replace("pairs = \"pairs.csv\"", "depth_table = \"depth.csv\"")
+        .replace("reference.png", "bright.png")
+        .replace("one.png", "dark.png")
+        .replace("[[frames]]\nimage = \"two.pgm\"\n", "");
+    assert!(sentence(folder.path(), &text).starts_with("measured "), "{}", sentence(folder.path(), &text));
+    let answer = sentence(folder.path(), &text.replace("force_N = 0.8\n", ""));
+    assert!(answer.contains("frames[1].force_N") && answer.contains("gauge"), "{answer}");
+}
+
+#[test]
+fn a_missing_scene_file_is_named() {
+    let error = Scene::read("/no/such/scene.toml").unwrap_err().to_string();
+    assert!(error.contains("/no/such/scene.toml"), "{error}");
+}

@@ -1,0 +1,27 @@
+//! A session allocates nothing per frame once its buffers have their size.
+#![allow(missing_docs)]
+use std::sync::Arc;
+use tactile_imaging::pipeline::{SESSION_LOADS, Session, Trial};
+use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
+
+#[test]
+fn pushing_frames_allocates_nothing_after_warm_up() {
+    let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+    let loads = vec![Load::normal(0.3), Load::normal(0.7), Load::normal(1.2)];
+    let options = PressOptions { camera, loads, ..PressOptions::default() };
+    let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
+    let empty = trial.scene.reference(5);
+    let stages = Arc::new(trial.pipeline().unwrap());
+    let mut session = Session::new(stages, trial.simulation.reference.view()).unwrap();
+    let mut frames: Vec<_> = trial.simulation.frames.iter().collect();
+    frames.push(&empty);
+    for frame in frames.iter().cycle().take(4 * SESSION_LOADS) {
+        session.push(frame.view()).unwrap();
+    }
+    let count = allocation_counter::measure(|| {
+        for frame in frames.iter().cycle().take(40) {
+            session.push(frame.view()).unwrap();
+        }
+    });
+    assert_eq!(count.count_total, 0, "{count:?}");
+}
