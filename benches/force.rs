@@ -1,2 +1,144 @@
-//! Criterion benches of this stage.
-fn main() {}
+//! Force: what a frame costs, with the error beside the time.
+//!
+//! Everything runs on the paper's frame, 1392 × 1042 pixels of 8 bits; the yardstick is adding up its bytes.
+#![allow(missing_docs, clippy::print_stderr)]
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use ndarray::Array2;
+use tactile_imaging::force::{
+    CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions, DetectorWorkspace, ForceMeter,
+    ForceOptions, ForceWorkspace, LinearCalibration, MonotoneCalibration, PolynomialCalibration,
+    ReferenceFrame, StressCalibration,
+};
+use tactile_imaging::simulate::{CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene};
+
+struct Scene {
+    scene: PressScene,
+    reference: ReferenceFrame,
+    quiet: Array2<u8>,
+    pressed: Array2<u8>,
+}
+
+fn scene() -> Scene {
+    let options = PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() };
+    let scene = PressScene::new(options).expect("a valid scene");
+    let reference = ReferenceFrame::new(scene.reference(0).view()).expect("a valid frame");
+    let (quiet, pressed) = (scene.reference(1), scene.frame(0, 0));
+    Scene { scene, reference, quiet, pressed }
+}
+
+/// The sum as one writes it, and with a 32-bit sum for every 64 KiB, which the compiler turns into wide instructions.
+fn add_up(bytes: &[u8]) -> u64 {
+    bytes.iter().map(|&b| u64::from(b)).sum()
+}
+
+fn add_up_blocks(bytes: &[u8]) -> u64 {
+    bytes.chunks(1 << 16).map(|c| u64::from(c.iter().map(|&b| u32::from(b)).sum::<u32>())).sum()
+}
+
+fn pass(c: &mut Criterion) {
+    let s = scene();
+    let bytes = s.quiet.as_slice().expect("contiguous");
+    let mut group = c.benchmark_group("force/pass");
+    group.bench_function("add up the bytes", |b| b.iter(|| add_up(black_box(bytes))));
+    group.bench_function("add up the bytes, blocked", |b| b.iter(|| add_up_blocks(black_box(bytes))));
+    let statistics = s.reference.compare(s.quiet.view(), 10).expect("same size");
+    let reference: u64 = add_up(s.reference.image().as_slice().expect("contiguous"));
+    assert_eq!(statistics.sum, add_up(bytes) as i64 - reference as i64, "the pass is exact");
+    let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
+    let mut workspace = DetectorWorkspace::default();
+    let mut detect = |frame: &Array2<u8>| {
+        detector
+            .detect_with::<f64>(&mut workspace, frame.view(), &s.reference)
+            .expect("valid")
+            .contact
+            .is_some()
+    };
+    assert!(!detect(&s.quiet) && detect(&s.pressed));
+    group.bench_function("frame without contact", |b| b.iter(|| detect(black_box(&s.quiet))));
+    group.finish();
+}
+
+fn contact(c: &mut Criterion) {
+    let s = scene();
+    let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
+    let mut workspace = DetectorWorkspace::default();
+    let found = detector.detect_with::<f64>(&mut workspace, s.pressed.view(), &s.reference).expect("valid");
+    let (contact, truth) = (found.contact.expect("contact"), s.scene.truth(0));
+    let error =
+        (0..2).map(|k| (contact.centroid_px[k].value - truth.centroid_px[k]).abs()).fold(0.0, f64::max);
+    assert!(error < 0.02, "centroid off by {error} px");
+    eprintln!(
+        "force/contact: centroid off by {error:.4} px, stated {:.4} px",
+        contact.centroid_px[0].standard_error
+    );
+    c.bench_function("force/contact/detect, radius 152 px", |b| {
+        b.iter(|| detector.detect_with::<f64>(&mut workspace, black_box(s.pressed.view()), &s.reference))
+    });
+}
+
+fn hertz_fit(c: &mut Criterion) {
+    let s = scene();
+    let run = SimulatedRun { steps: 5, ..SimulatedRun::default() };
+    let series = s.scene.calibrate(&run).expect("valid");
+    let pairs: Vec<_> = series.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
+    let calibration = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");
+    let truth = s.scene.truth(0);
+    let mut group = c.benchmark_group("force/hertz_fit");
+    for (name, skip_profile) in
+        [("whole frame without the profile", true), ("whole frame with the profile", false)]
+    {
+        let options = ForceOptions { skip_profile, ..ForceOptions::default() };
+        let meter = ForceMeter::new(truth.pixel_size_m, &options).expect("valid");
+        let mut workspace = ForceWorkspace::default();
+        let mut measure = || {
+            meter
+                .measure_with(&mut workspace, black_box(s.pressed.view()), &s.reference, &calibration)
+                .expect("valid")
+        };
+        let m = measure();
+        let force = m.force_n.value / truth.contact.force_n - 1.0;
+        let radius = m.contact_radius_m.expect("contact").value / truth.contact.contact_radius_m - 1.0;
+        assert!(force.abs() < 5e-3 && radius.abs() < if skip_profile { 0.02 } else { 3e-3 });
+        eprintln!(
+            "force/hertz_fit/{name}: force off by {:+.3} %, radius by {:+.3} %",
+            100.0 * force,
+            100.0 * radius
+        );
+        group.bench_function(name, |b| b.iter(&mut measure));
+    }
+    group.finish();
+}
+
+fn calibration(c: &mut Criterion) {
+    let curve = |v: f64| 4e-7 * v + 2.5e-14 * v * v;
+    // A fixed, dense set of pairs with a deterministic "noise" of 2 mN.
+    let pairs: Vec<_> = (0..=200)
+        .map(|k| 2e4 * f64::from(k))
+        .map(|v| CalibrationPair::loading(v, curve(v) + 2e-3 * (v * 1e-3).sin()))
+        .collect();
+    let options = CalibrationOptions::default();
+    let mut group = c.benchmark_group("force/calibration");
+    let error = |c: &dyn StressCalibration<f64>| {
+        (0..40).map(|k| 1e5 * f64::from(k)).map(|v| (c.force_n(v) - curve(v)).abs()).fold(0.0, f64::max)
+    };
+    let cubic = PolynomialCalibration::fit(&pairs, 3, &options).expect("enough pairs");
+    let monotone = MonotoneCalibration::fit(&pairs, &options).expect("enough pairs");
+    let errors = [error(&cubic), error(&monotone)];
+    assert!(errors[0] < 1e-3 && errors[1] < 4e-3, "{errors:?}");
+    eprintln!("force/calibration: cubic off by {:.1e} N, monotone by {:.1e} N of 2 N", errors[0], errors[1]);
+    group.bench_function("fit a cubic to 201 pairs", |b| {
+        b.iter(|| PolynomialCalibration::fit(black_box(&pairs), 3, &options))
+    });
+    group.bench_function("fit a monotone curve to 201 pairs", |b| {
+        b.iter(|| MonotoneCalibration::fit(black_box(&pairs), &options))
+    });
+    group.bench_function("read a cubic", |b| b.iter(|| cubic.force_n(black_box(1.23e6))));
+    group.bench_function("read a monotone curve", |b| b.iter(|| monotone.force_n(black_box(1.23e6))));
+    group.finish();
+}
+
+criterion_group!(benches, pass, contact, hertz_fit, calibration);
+criterion_main!(benches);

@@ -114,7 +114,9 @@ fn study(scene: &PressScene, seeds: u64, options: &ForceOptions) -> Study {
         s.centre.add(fit.centre_px[0], truth.centre_px[0], 1.0);
         s.radius.add(fit.radius_m, truth.contact.contact_radius_m, truth.contact.contact_radius_m);
     }
-    [&s.force, &s.centroid[0], &s.centroid[1], &s.centre, &s.radius].map(Errors::show);
+    for errors in [&s.force, &s.centroid[0], &s.centroid[1], &s.centre, &s.radius] {
+        errors.show();
+    }
     s
 }
 

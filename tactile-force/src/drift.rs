@@ -30,11 +30,15 @@ pub struct Drift {
     pub correction: DriftCorrection,
     /// Offset (grey levels) or lamp level (1 for unchanged) in the frame's middle, and its change per column and per row.
     pub coefficients: [f64; 3],
-    /// Standard error of the background under the contact, in grey levels.
+    /// Standard error of the first coefficient.
     pub standard_error: f64,
     /// Tiles of 8 × 32 pixels it was read from.
     pub tiles: usize,
     middle: [f64; 2],
+    /// Covariance of the coefficients.
+    covariance: [[f64; 3]; 3],
+    /// Mean grey level of the reference where the drift was read.
+    reference: f64,
 }
 
 /// The correction along one row.
@@ -83,6 +87,22 @@ impl Drift {
         let x = first_column as f64 - self.middle[0];
         let start = value + per_column * x + per_row * y;
         DriftLine { lamp: self.correction.is_lamp(), start: start as f32, step: per_column as f32 }
+    }
+
+    /// Variances that the correction leaves at a place: of the background in squared grey levels, and of the signal's scale.
+    pub(crate) fn variances(&self, x: f64, y: f64) -> [f64; 2] {
+        let at = [1.0, x - self.middle[0], y - self.middle[1]];
+        let mut variance = 0.0;
+        for i in 0..3 {
+            for j in 0..3 {
+                variance += at[i] * self.covariance[i][j] * at[j];
+            }
+        }
+        if self.correction.is_lamp() {
+            [variance * self.reference * self.reference, variance]
+        } else {
+            [variance, 0.0]
+        }
     }
 
     /// Background that the correction takes from a frame at a place where the reference is `reference`.
@@ -141,12 +161,9 @@ pub(crate) fn fit(
         let spread = 1.4826 * median(scratch, tiles.clone().map(|t| (drift.residual(&t) / t.pixels).abs()));
         let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
         let limit = 3.0 * spread.max(noise);
-        let near = tiles.clone().filter(|t| (drift.residual(t) / t.pixels).abs() <= limit);
-        let (step, variance, count) = solve(&drift, near, terms, sd);
-        for (c, s) in drift.coefficients.iter_mut().zip(step) {
-            *c += s;
-        }
-        drift.standard_error = variance.sqrt();
+        let before = drift;
+        let near = tiles.clone().filter(|t| (before.residual(t) / t.pixels).abs() <= limit);
+        let count = drift.step(near, terms, sd);
         drift.tiles = count;
         if count == kept {
             break;
@@ -161,39 +178,40 @@ fn weight(drift: &Drift, tile: &TileSum) -> f64 {
     if drift.correction.is_lamp() { tile.reference.max(1.0) } else { tile.pixels }
 }
 
-/// One least-squares step, the variance of the background in the frame's middle, and the number of tiles.
-fn solve(
-    drift: &Drift,
-    tiles: impl Iterator<Item = TileSum>,
-    terms: usize,
-    sd: f64,
-) -> ([f64; 3], f64, usize) {
-    let mut normal = nalgebra::Matrix3::<f64>::zeros();
-    let mut right = nalgebra::Vector3::<f64>::zeros();
-    let scale = [1.0, drift.middle[0].max(1.0), drift.middle[1].max(1.0)];
-    let (mut count, mut reference, mut pixels) = (0, 0.0, 0.0);
-    for tile in tiles {
-        let w = weight(drift, &tile);
-        let at = [1.0, (tile.x - drift.middle[0]) / scale[1], (tile.y - drift.middle[1]) / scale[2]];
-        let residual = drift.residual(&tile);
+impl Drift {
+    /// One least-squares step on the given tiles; returns their number.
+    fn step(&mut self, tiles: impl Iterator<Item = TileSum>, terms: usize, sd: f64) -> usize {
+        let mut normal = nalgebra::Matrix3::<f64>::identity();
+        normal.view_mut((0, 0), (terms, terms)).fill(0.0);
+        let mut right = nalgebra::Vector3::<f64>::zeros();
+        let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
+        let (mut count, mut reference, mut pixels) = (0, 0.0, 0.0);
+        for tile in tiles {
+            let w = weight(self, &tile);
+            let at = [1.0, (tile.x - self.middle[0]) / scale[1], (tile.y - self.middle[1]) / scale[2]];
+            let residual = self.residual(&tile);
+            for i in 0..terms {
+                right[i] += w * at[i] * residual / tile.pixels;
+                for j in 0..terms {
+                    normal[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
+                }
+            }
+            count += 1;
+            reference += tile.reference;
+            pixels += tile.pixels;
+        }
+        let Some(inverse) = normal.try_inverse() else { return count };
+        let step = inverse * right;
         for i in 0..terms {
-            right[i] += w * at[i] * residual / tile.pixels;
+            self.coefficients[i] += step[i] / scale[i];
             for j in 0..terms {
-                normal[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
+                self.covariance[i][j] = inverse[(i, j)] * sd * sd / (scale[i] * scale[j]);
             }
         }
-        count += 1;
-        reference += tile.reference;
-        pixels += tile.pixels;
+        self.standard_error = self.covariance[0][0].sqrt();
+        self.reference = reference / f64::max(pixels, 1.0);
+        count
     }
-    for k in terms..3 {
-        normal[(k, k)] = 1.0;
-    }
-    let Some(inverse) = normal.try_inverse() else { return ([0.0; 3], 0.0, count) };
-    let step = inverse * right;
-    let grey = if drift.correction.is_lamp() { reference / f64::max(pixels, 1.0) } else { 1.0 };
-    let step = [step[0], step[1] / scale[1], step[2] / scale[2]];
-    (step, inverse[(0, 0)] * sd * sd * grey * grey, count)
 }
 
 fn median(scratch: &mut Vec<f64>, values: impl Iterator<Item = f64>) -> f64 {

@@ -181,7 +181,13 @@ impl ContactDetector {
         let gain = reference
             .known_gain()
             .unwrap_or_else(|| noise::gain(&workspace.region, &mut workspace.histogram, background, peak));
-        DifferenceNoise { background, gain, common: drift.standard_error * drift.standard_error }
+        let [common, scale] = workspace.region.bounds(&workspace.region.mask).map_or([0.0; 2], |b| {
+            drift.variances(
+                0.5 * (b.column_start + b.column_end) as f64,
+                0.5 * (b.row_start + b.row_end) as f64,
+            )
+        });
+        DifferenceNoise { background, gain, common, scale }
     }
 
     fn summarise<T: Real>(

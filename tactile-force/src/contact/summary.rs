@@ -47,11 +47,11 @@ impl Sums {
         [self.weighted[1] / self.weighted[0], self.weighted[2] / self.weighted[0]]
     }
 
-    /// Variance of Σ d: every pixel's, and that of a background error common to all.
+    /// Variance of Σ d: every pixel's, and that of errors of background and scale common to all, which go together.
     pub(super) fn variance(&self, noise: &DifferenceNoise) -> f64 {
         noise.background * self.plain[0]
             + noise.gain * self.weighted[0].max(0.0)
-            + noise.common * self.plain[0] * self.plain[0]
+            + (noise.common.sqrt() * self.plain[0] + noise.scale.sqrt() * self.weighted[0]).powi(2)
     }
 
     /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², and the common error's lever.

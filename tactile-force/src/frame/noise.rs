@@ -26,8 +26,10 @@ pub struct DifferenceNoise {
     pub background: f64,
     /// Growth of the variance per grey level of difference.
     pub gain: f64,
-    /// Variance of an error common to all pixels: that of the corrected drift.
+    /// Variance of a background error common to all pixels, left by the drift's correction.
     pub common: f64,
+    /// Variance of a relative error of the whole signal, left by the correction of the lamps.
+    pub scale: f64,
 }
 
 /// Variance of rounding to whole numbers.

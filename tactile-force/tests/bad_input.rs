@@ -1,0 +1,133 @@
+//! Every rejected value is one error, and nothing panics.
+
+use ndarray::{Array2, array};
+use proptest::prelude::*;
+use tactile_force::{
+    CalibrationPair, ContactDetector, ContactOptions, ForceError, ForceMeter, ForceOptions, GaussianProfile, HertzFitOptions,
+    HertzFitter, HertzProfile, ImageMoments, LinearCalibration, NoiseModel, ReferenceFrame, ShearCalibration, ShearPair,
+    measure_force,
+};
+
+fn calibration() -> LinearCalibration<f64> {
+    let pairs: Vec<_> = (0..5).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
+    LinearCalibration::fit(&pairs, &Default::default()).unwrap()
+}
+
+fn rejected<T>(result: Result<T, ForceError>, option: &str) {
+    match result {
+        Err(ForceError::InvalidOption { name, .. }) => assert_eq!(name, option),
+        other => panic!("{option}: {:?}", other.err()),
+    }
+}
+
+#[test]
+fn options_outside_their_domain() {
+    let detector = |change: fn(&mut ContactOptions)| {
+        let mut options = ContactOptions::default();
+        change(&mut options);
+        ContactDetector::new(options)
+    };
+    rejected(detector(|o| o.false_alarm_rate = 0.0), "false_alarm_rate");
+    rejected(detector(|o| o.false_alarm_rate = 1.0), "false_alarm_rate");
+    rejected(detector(|o| o.false_alarm_rate = f64::NAN), "false_alarm_rate");
+    rejected(detector(|o| o.saturation_limit = -0.1), "saturation_limit");
+    rejected(detector(|o| o.saturation_limit = f64::NAN), "saturation_limit");
+    rejected(detector(|o| o.minimum_area_px = 0), "minimum_area_px");
+    rejected(detector(|o| o.smoothing_px = Some(4)), "smoothing_px");
+    rejected(detector(|o| o.smoothing_px = Some(0)), "smoothing_px");
+    for blur in [-1.0, f64::NAN, f64::INFINITY] {
+        rejected(HertzFitter::new(HertzFitOptions { blur_px: Some(blur), ..Default::default() }), "blur_px");
+    }
+    rejected(HertzFitter::new(HertzFitOptions { max_iterations: 0, ..Default::default() }), "max_iterations");
+    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        rejected(ForceMeter::new([1e-5, size], &ForceOptions::default()), "pixel_size_m");
+        rejected(HertzProfile::new([0.0; 2], size, 1.0), "radius");
+        rejected(GaussianProfile::new([0.0; 2], size, 1.0), "sd");
+    }
+    rejected(HertzProfile::new([f64::NAN, 0.0], 1.0, 1.0), "centre");
+    rejected(GaussianProfile::new([0.0; 2], 1.0, f64::NAN), "peak");
+    rejected(NoiseModel::new(f64::NAN, 0.0), "read_sd");
+    rejected(NoiseModel::new(0.5, -1.0), "gain");
+}
+
+#[test]
+fn images_that_do_not_fit() {
+    let (small, large) = (Array2::<u8>::zeros((20, 30)), Array2::<u8>::zeros((20, 31)));
+    let measure = |f: &Array2<u8>, r: &Array2<u8>| {
+        measure_force(f.view(), r.view(), [1e-5; 2], &calibration(), &ForceOptions::default())
+    };
+    assert_eq!(measure(&large, &small), Err(ForceError::SizeMismatch { expected: (20, 30), found: (20, 31) }));
+    let empty = Array2::<u8>::zeros((0, 30));
+    assert_eq!(measure(&empty, &empty), Err(ForceError::EmptyImage { rows: 0, columns: 30 }));
+    assert!(matches!(ReferenceFrame::from_frames(&[]), Err(ForceError::EmptyImage { .. })));
+    assert!(matches!(
+        ReferenceFrame::from_frames(&[small.view(), large.view()]),
+        Err(ForceError::SizeMismatch { .. })
+    ));
+    let long = Array2::<u8>::zeros((1, 20_000));
+    assert_eq!(measure(&long, &long), Err(ForceError::ImageTooLarge { found: 20_000, limit: 16_384 }));
+    let nan = array![[1.0, 2.0], [f64::NAN, 3.0]];
+    assert_eq!(ImageMoments::of(nan.view(), 0.0), Err(ForceError::NonFinitePixel { row: 1, column: 0 }));
+    rejected(ImageMoments::of(array![[1.0]].view(), f64::INFINITY), "background");
+    assert!(matches!(ImageMoments::of(Array2::<f64>::zeros((3, 0)).view(), 0.0), Err(ForceError::EmptyImage { .. })));
+}
+
+#[test]
+fn saturation_beyond_the_stated_share_is_an_error_and_below_it_a_count() {
+    let reference = Array2::from_elem((60, 60), 10_u8);
+    let mut frame = reference.clone();
+    for y in 20..40 {
+        for x in 15..45 {
+            frame[[y, x]] = if y < 23 { 255 } else { 200 };
+        }
+    }
+    let with = |limit| {
+        let contact = ContactOptions { saturation_limit: limit, ..Default::default() };
+        let options = ForceOptions { contact, ..Default::default() };
+        measure_force(frame.view(), reference.view(), [1e-5; 2], &calibration(), &options)
+    };
+    assert_eq!(with(0.1), Err(ForceError::SaturatedContact { share: 0.15, limit: 0.1 }));
+    let contact = with(0.2).unwrap().contact.unwrap();
+    assert_eq!((contact.saturated_px, contact.area_px), (90, 600));
+}
+
+#[test]
+fn shear_pairs_that_say_nothing() {
+    let pair = |u: f64, f: f64| ShearPair { centroid_step_m: [u, u], force_n: [f, f] };
+    assert_eq!(ShearCalibration::fit(&[pair(1.0, 2.0)]), Err(ForceError::TooFewPairs { required: 2, found: 1 }));
+    let nan = [pair(1.0, 2.0), pair(f64::NAN, 1.0)];
+    assert_eq!(ShearCalibration::fit(&nan), Err(ForceError::NonFinitePair { index: 1 }));
+    let still = [pair(0.0, 2.0), pair(0.0, 1.0)];
+    assert!(matches!(ShearCalibration::fit(&still), Err(ForceError::DegeneratePairs { .. })));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+    #[test]
+    fn any_pair_of_images_ends_civilly(
+        (rows, columns) in (1_usize..40, 1_usize..70),
+        seed in any::<u64>(),
+        levels in proptest::array::uniform4(any::<u8>()),
+    ) {
+        // Blocks, noise, edges, single pixels, full scale: whatever comes.
+        let mut state = seed | 1;
+        let mut next = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 56) as u8
+        };
+        let mut image = |a: u8, b: u8| Array2::from_shape_fn((rows, columns), |(y, x)| {
+            if (y / 7 + x / 11) % 2 == 0 { a } else { b.saturating_add(next() % 8) }
+        });
+        let (frame, reference) = (image(levels[0], levels[1]), image(levels[2], levels[3]));
+        for polarity in [tactile_force::Polarity::Brighter, tactile_force::Polarity::Darker] {
+            for drift in [tactile_force::DriftCorrection::None, tactile_force::DriftCorrection::TiltedLamp] {
+                let contact = ContactOptions { polarity, drift, ..Default::default() };
+                let options = ForceOptions { contact, ..Default::default() };
+                match measure_force(frame.view(), reference.view(), [1e-5; 2], &calibration(), &options) {
+                    Ok(m) => prop_assert!(m.contact.is_none() || m.force_n.value.is_finite()),
+                    Err(e) => prop_assert!(matches!(e, ForceError::SaturatedContact { .. }), "{e}"),
+                }
+            }
+        }
+    }
+}
