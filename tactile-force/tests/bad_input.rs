@@ -3,13 +3,14 @@
 use ndarray::{Array2, array};
 use proptest::prelude::*;
 use tactile_force::{
-    CalibrationPair, ContactDetector, ContactOptions, ForceError, ForceMeter, ForceOptions, GaussianProfile, HertzFitOptions,
-    HertzFitter, HertzProfile, ImageMoments, LinearCalibration, NoiseModel, ReferenceFrame, ShearCalibration, ShearPair,
-    measure_force,
+    CalibrationPair, ContactDetector, ContactOptions, ForceError, ForceMeter, ForceOptions, GaussianProfile,
+    HertzFitOptions, HertzFitter, HertzProfile, ImageMoments, LinearCalibration, NoiseModel, ReferenceFrame,
+    ShearCalibration, ShearPair, measure_force,
 };
 
 fn calibration() -> LinearCalibration<f64> {
-    let pairs: Vec<_> = (0..5).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
+    let pairs: Vec<_> =
+        (0..5).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
     LinearCalibration::fit(&pairs, &Default::default()).unwrap()
 }
 
@@ -56,7 +57,10 @@ fn images_that_do_not_fit() {
     let measure = |f: &Array2<u8>, r: &Array2<u8>| {
         measure_force(f.view(), r.view(), [1e-5; 2], &calibration(), &ForceOptions::default())
     };
-    assert_eq!(measure(&large, &small), Err(ForceError::SizeMismatch { expected: (20, 30), found: (20, 31) }));
+    assert_eq!(
+        measure(&large, &small),
+        Err(ForceError::SizeMismatch { expected: (20, 30), found: (20, 31) })
+    );
     let empty = Array2::<u8>::zeros((0, 30));
     assert_eq!(measure(&empty, &empty), Err(ForceError::EmptyImage { rows: 0, columns: 30 }));
     assert!(matches!(ReferenceFrame::from_frames(&[]), Err(ForceError::EmptyImage { .. })));
@@ -69,7 +73,10 @@ fn images_that_do_not_fit() {
     let nan = array![[1.0, 2.0], [f64::NAN, 3.0]];
     assert_eq!(ImageMoments::of(nan.view(), 0.0), Err(ForceError::NonFinitePixel { row: 1, column: 0 }));
     rejected(ImageMoments::of(array![[1.0]].view(), f64::INFINITY), "background");
-    assert!(matches!(ImageMoments::of(Array2::<f64>::zeros((3, 0)).view(), 0.0), Err(ForceError::EmptyImage { .. })));
+    assert!(matches!(
+        ImageMoments::of(Array2::<f64>::zeros((3, 0)).view(), 0.0),
+        Err(ForceError::EmptyImage { .. })
+    ));
 }
 
 #[test]
@@ -94,7 +101,10 @@ fn saturation_beyond_the_stated_share_is_an_error_and_below_it_a_count() {
 #[test]
 fn shear_pairs_that_say_nothing() {
     let pair = |u: f64, f: f64| ShearPair { centroid_step_m: [u, u], force_n: [f, f] };
-    assert_eq!(ShearCalibration::fit(&[pair(1.0, 2.0)]), Err(ForceError::TooFewPairs { required: 2, found: 1 }));
+    assert_eq!(
+        ShearCalibration::fit(&[pair(1.0, 2.0)]),
+        Err(ForceError::TooFewPairs { required: 2, found: 1 })
+    );
     let nan = [pair(1.0, 2.0), pair(f64::NAN, 1.0)];
     assert_eq!(ShearCalibration::fit(&nan), Err(ForceError::NonFinitePair { index: 1 }));
     let still = [pair(0.0, 2.0), pair(0.0, 1.0)];

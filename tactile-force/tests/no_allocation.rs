@@ -3,8 +3,8 @@
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
     CalibrationPair, ContactOptions, DriftCorrection, ForceMeter, ForceOptions, ForceWorkspace, HertzProfile,
-    LinearCalibration, MonotoneCalibration, PixelGrid, PolynomialCalibration, ReferenceFrame, ShearCalibration, ShearPair,
-    ShearTracker, StressCalibration,
+    LinearCalibration, MonotoneCalibration, PixelGrid, PolynomialCalibration, ReferenceFrame,
+    ShearCalibration, ShearPair, ShearTracker, StressCalibration,
 };
 
 fn frame(radius: f64, seed: u64) -> Array2<u8> {
@@ -27,7 +27,8 @@ fn count(frames: &[Array2<u8>], mut measure: impl FnMut(ArrayView2<'_, u8>)) -> 
 fn measuring_with_a_workspace_allocates_nothing() {
     let frames = [frame(40.0, 1), frame(0.5, 2), frame(25.0, 3), frame(55.0, 4)];
     let reference = ReferenceFrame::new(frame(0.5, 9).view()).unwrap();
-    let pairs: Vec<_> = (0..9).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
+    let pairs: Vec<_> =
+        (0..9).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
     let calibrations: [Box<dyn StressCalibration<f64>>; 3] = [
         Box::new(LinearCalibration::fit(&pairs, &Default::default()).unwrap()),
         Box::new(PolynomialCalibration::fit(&pairs, 3, &Default::default()).unwrap()),
@@ -36,7 +37,8 @@ fn measuring_with_a_workspace_allocates_nothing() {
     let shear_pairs = [1.0, 2.0].map(|u| ShearPair { centroid_step_m: [u, u], force_n: [u, u] });
     let mut tracker = ShearTracker::new(ShearCalibration::fit(&shear_pairs).unwrap());
     for drift in [DriftCorrection::None, DriftCorrection::Plane, DriftCorrection::TiltedLamp] {
-        let options = ForceOptions { contact: ContactOptions { drift, ..Default::default() }, ..Default::default() };
+        let options =
+            ForceOptions { contact: ContactOptions { drift, ..Default::default() }, ..Default::default() };
         let meter = ForceMeter::new([1e-5; 2], &options).unwrap();
         let mut workspace = ForceWorkspace::default();
         for calibration in &calibrations {

@@ -85,28 +85,47 @@ impl<T: Real> HertzProfile<T> {
 
 /// ∫∫ √(1 − x² − y²)₊ times 1, x − origin and (x − about)² over a rectangle, for the unit disc.
 ///
-/// Along y in closed form; along x by quadrature between the places where a side meets the rim, with x = m + h sin φ, which
+/// Along y in closed form; along x by quadrature between the special places where a side meets the rim, with x = m + h sin φ, which
 /// turns the powers 3/2 at those places into whole ones.
 fn strip(gauss: &Gauss<32>, x: [f64; 2], y: [f64; 2], [origin, about]: [f64; 2]) -> [f64; 3] {
-    let mut breaks = [x[0].clamp(-1.0, 1.0), x[1].clamp(-1.0, 1.0), 0.0, 0.0, 0.0, 0.0];
-    for (k, side) in y.into_iter().enumerate() {
-        let meets = ((1.0 - side) * (1.0 + side)).max(0.0).sqrt();
-        breaks[2 + 2 * k] = (-meets).clamp(breaks[0], breaks[1]);
-        breaks[3 + 2 * k] = meets.clamp(breaks[0], breaks[1]);
-    }
-    breaks.sort_by(f64::total_cmp);
+    let ends = x.map(|x| x.clamp(-1.0, 1.0));
+    let meets = y.map(|side| ((1.0 - side) * (1.0 + side)).max(0.0).sqrt());
+    let mut special = [-1.0, 1.0, -meets[0], meets[0], -meets[1], meets[1]];
+    special.sort_by(f64::total_cmp);
     let mut total = [0.0; 3];
-    for ends in breaks.windows(2).filter(|e| e[1] > e[0]) {
-        let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
-        let quarter = std::f64::consts::FRAC_PI_2;
-        let part = gauss.integrate(-quarter, quarter, |phi| {
-            let at = middle + half * phi.sin();
-            let f = chord(((1.0 - at) * (1.0 + at)).max(0.0), y) * half * phi.cos();
-            [f, (at - origin) * f, (at - about).powi(2) * f]
-        });
+    let mut from = ends[0];
+    while from < ends[1] {
+        let next = special.iter().copied().find(|s| *s > from).unwrap_or(1.0);
+        let to = graded(from, next.min(ends[1]), &special);
+        let part = piece(gauss, [from, to], y, [origin, about]);
         total.iter_mut().zip(part).for_each(|(t, p)| *t += p);
+        from = to;
     }
     total
+}
+
+/// How far a piece that starts at `from` may go towards `end`: three times as far as the special place behind it (or behind
+/// the end) lies away, so that pieces shrink towards places where the integrand is not smooth.
+fn graded(from: f64, end: f64, special: &[f64; 6]) -> f64 {
+    let away = |d: f64| if d > 0.0 { d } else { f64::INFINITY };
+    let behind = special.iter().map(|s| away(from - s)).fold(f64::INFINITY, f64::min);
+    let beyond = special.iter().map(|s| away(s - end)).fold(f64::INFINITY, f64::min);
+    let length = end - from;
+    let reach = length.min(3.0 * behind);
+    // From the far end: keep a quarter of what is left until that is thrice the distance beyond.
+    let reach = if length > 3.0 * beyond { reach.min(0.75 * length) } else { reach };
+    if reach >= length || from + reach <= from { end } else { from + reach }
+}
+
+/// The same over a piece without special places inside, with x = m + h sin φ.
+fn piece(gauss: &Gauss<32>, ends: [f64; 2], y: [f64; 2], [origin, about]: [f64; 2]) -> [f64; 3] {
+    let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
+    let quarter = std::f64::consts::FRAC_PI_2;
+    gauss.integrate(-quarter, quarter, |phi| {
+        let at = middle + half * phi.sin();
+        let f = chord(((1.0 - at) * (1.0 + at)).max(0.0), y) * half * phi.cos();
+        [f, (at - origin) * f, (at - about).powi(2) * f]
+    })
 }
 
 /// ∫ √(w² − y²) dy between two limits, cut to |y| ≤ w, as ½w²[(Δ − sin Δ) + sin Δ (1 + cos Σ)] with y = w sin θ, Δ and Σ the difference
