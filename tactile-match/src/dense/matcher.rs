@@ -47,7 +47,7 @@ impl Default for DenseOptions {
             maximum: LengthMaximum::PerPair,
             temperature: 0.1,
             slack: 0.2,
-            sweeps: 30,
+            sweeps: 10,
             settled: 0.01,
             sinkhorn_sweeps: 10,
             smoothing: 1.0,
@@ -176,6 +176,7 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for DenseRelaxation {
         let mut run = super::outcome::Run::new(start, goal, frames[1]);
         for k in 0..self.options.max_iterations {
             run.matches = self.relax(&run.warped, &run.target);
+            run.record_energy(self.options.neighbourhood);
             let lambda = self.options.smoothing * 0.5_f64.powi(i32::try_from(k).unwrap_or(i32::MAX));
             let step = run.fit(Smoothing::Lambda(nalgebra::convert(lambda)));
             if step <= nalgebra::convert(1e-3) {

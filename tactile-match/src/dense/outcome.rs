@@ -34,6 +34,12 @@ impl<T: Scalar, const D: usize> Run<T, D> {
         }
     }
 
+    /// Keeps the energy (14) of the present match matrix.
+    pub(super) fn record_energy(&mut self, neighbourhood: Neighbourhood) {
+        let [x, y] = [&self.warped, &self.target].map(|points| NeighbourGraph::new(points, neighbourhood));
+        self.energy.push(energy(&self.matches, &x, &y));
+    }
+
     /// Mean partner of model point `i` and its weight, one less the slack.
     fn partner(&self, i: usize) -> (SVector<T, D>, T) {
         let weights = &self.matches.row(i)[..self.target.len()];
