@@ -112,11 +112,11 @@ fn a_small_deformation_is_found() {
 fn sets_of_different_size_are_matched() {
     fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
         let points = scattered::<T, D>(50, 6);
-        for (model, target) in [(&points[..], &points[..35]), (&points[..35], &points[..])] {
+        for (model, target) in [(&points[..], &points[..45]), (&points[..45], &points[..])] {
             let matching = run(name, matcher, model, target);
-            let right = (0..35).filter(|&i| matching.assignment[i] == Some(i)).count();
+            let right = (0..45).filter(|&i| matching.assignment[i] == Some(i)).count();
             // What the leftover points lie on has no answer of its own; nine tenths of the rest must be right.
-            assert!(right >= 31, "{name}: {right} of 35");
+            assert!(right >= 41, "{name}: {right} of 45");
         }
     }
     for_all!(check);
