@@ -12,6 +12,16 @@ use super::random::{Purpose, row_stream};
 /// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 = 0.06).
 const NORMAL_FROM_ELECTRONS: f64 = 256.0;
 
+/// The camera's noise in grey levels.
+#[derive(Debug, Clone, Copy)]
+struct NoiseLaw {
+    /// Photon noise: variance over expected grey level, one over the electrons of a grey level.
+    variance_per_grey: f64,
+    read_variance: f64,
+    /// From here on the normal law stands for Poisson's.
+    normal_from_grey: f64,
+}
+
 /// Camera, lens and stray light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
@@ -89,11 +99,12 @@ impl Camera {
         frame: u64,
     ) -> Array2<u8> {
         let mut image = Array2::zeros(expected_grey.dim());
+        let law = self.noise_law();
         for (row, (mut out, light)) in image.rows_mut().into_iter().zip(expected_grey.rows()).enumerate() {
             let mut rng = row_stream(seed, purpose, frame, row);
             for (pixel, &grey) in out.iter_mut().zip(light) {
                 // `as` cuts towards zero and saturates at 0 and 255.
-                *pixel = (self.noisy(grey, &mut rng) + 0.5) as u8;
+                *pixel = (self.noisy(grey, &law, &mut rng) + 0.5) as u8;
             }
         }
         image
@@ -103,18 +114,24 @@ impl Camera {
         self.full_well_electrons / 255.0
     }
 
-    fn noisy(&self, grey: f64, rng: &mut ChaCha8Rng) -> f64 {
-        let electrons = grey * self.electrons_per_grey();
-        if electrons >= NORMAL_FROM_ELECTRONS {
-            let normal: f64 = StandardNormal.sample(rng);
-            return grey + self.noise_sd_grey(grey) * normal;
-        }
+    fn noisy(&self, grey: f64, law: &NoiseLaw, rng: &mut ChaCha8Rng) -> f64 {
         let normal: f64 = StandardNormal.sample(rng);
-        let photons = match Poisson::new(electrons) {
+        if grey >= law.normal_from_grey {
+            return grey + (grey * law.variance_per_grey + law.read_variance).sqrt() * normal;
+        }
+        let photons = match Poisson::new(grey / law.variance_per_grey) {
             Ok(law) => law.sample(rng),
             Err(_) => 0.0, // no light
         };
-        photons / self.electrons_per_grey() + self.read_noise_grey * normal
+        photons * law.variance_per_grey + self.read_noise_grey * normal
+    }
+
+    fn noise_law(&self) -> NoiseLaw {
+        NoiseLaw {
+            variance_per_grey: self.electrons_per_grey().recip(),
+            read_variance: self.read_noise_grey * self.read_noise_grey,
+            normal_from_grey: NORMAL_FROM_ELECTRONS / self.electrons_per_grey(),
+        }
     }
 
     /// Pixels that a patch must reach beyond the contact so that the blur has all its light.
