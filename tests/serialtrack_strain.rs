@@ -1,0 +1,62 @@
+//! The tracked particles of a uniaxially stretched volume, matched, splined and strained: mean and local strain against
+//! the exact stretch.
+#![allow(clippy::print_stdout)]
+
+#[path = "../examples/strain_between/measure.rs"]
+#[allow(unreachable_pub, dead_code)]
+mod measure;
+#[path = "../examples/strain_between/robust_spline.rs"]
+#[allow(unreachable_pub, dead_code)]
+mod robust_spline;
+
+use nalgebra::{Matrix3, Point3};
+use std::path::PathBuf;
+use tactile_imaging::elasticity::strain::GreenLagrange;
+use tactile_imaging::io::read_points;
+use tactile_imaging::matching::RelaxationMatcher;
+
+fn frame(k: usize) -> Option<Vec<Point3<f64>>> {
+    let folder = std::env::var_os("TACTILE_DATA")
+        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")), PathBuf::from);
+    let path = folder.join(format!("serialtrack/stretch3d_frame{k:02}.csv"));
+    if !path.exists() {
+        println!("skipped: no {} (set TACTILE_DATA)", path.display());
+        return None;
+    }
+    Some(read_points::<3>(&path).expect("the file has three columns"))
+}
+
+fn stretch(k: usize) {
+    let (Some(before), Some(after)) = (frame(0), frame(k)) else { return };
+    let found =
+        measure::strain_between(&before, &after, &RelaxationMatcher::default(), &GreenLagrange).unwrap();
+    let mut exact = Matrix3::zeros();
+    exact[(0, 0)] = 0.5 * ((1.0 + 0.05 * k as f64).powi(2) - 1.0);
+    let gap = found.summary.mean - exact;
+    let squares: f64 = found.strains.iter().map(|e| (e - exact).norm_squared()).sum();
+    let local = (squares / found.strains.len() as f64).sqrt();
+    println!(
+        "0 -> {k}: {} pairs, mean off by xx {:+.1e}, others {:.1e}, standard errors {:.1e}, local rms {local:.1e}",
+        found.pairs.len(),
+        gap[(0, 0)],
+        (gap - Matrix3::from_diagonal(&[gap[(0, 0)], 0.0, 0.0].into())).amax(),
+        found.standard_error.amax()
+    );
+    assert!(gap.amax() < 5e-4, "{gap}");
+    assert!(local < 0.01, "{local}");
+}
+
+#[test]
+fn five_percent() {
+    stretch(1);
+}
+
+#[test]
+fn ten_percent() {
+    stretch(2);
+}
+
+#[test]
+fn twenty_five_percent() {
+    stretch(5);
+}
