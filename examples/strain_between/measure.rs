@@ -7,6 +7,9 @@ use tactile_imaging::elasticity::field::{StrainField, StrainSummary};
 use tactile_imaging::elasticity::strain::StrainMeasure;
 use tactile_imaging::matching::PointMatcher;
 
+/// Pairs that a spline and its error need.
+const FEWEST_PAIRS: usize = 16;
+
 pub struct Strain<const D: usize> {
     /// Matched positions, before and after.
     pub pairs: Vec<[Point<f64, D>; 2]>,
@@ -32,7 +35,7 @@ pub fn strain_between<const D: usize>(
     let matching = matcher.match_points(before, after)?;
     let first: Vec<_> =
         matching.assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect();
-    if first.len() <= 2 * robust_spline::FOLDS {
+    if first.len() < FEWEST_PAIRS {
         return Err(format!("only {} points matched, too few for a spline", first.len()).into());
     }
     let rough = fit(before, after, &first)?;
