@@ -10,8 +10,10 @@ use pulp::{Arch, Simd, WithSimd};
 const PANEL: usize = 8;
 /// Columns of a block.
 const BLOCK: usize = 64;
-/// Depth to which tiles gather before they are written back, so that a strip stays in the first-level cache.
+/// Depth to which tiles gather before they are written back, so that a packed strip stays in the first-level cache.
 const DEPTH: usize = 128;
+/// Rows of the tallest strip: three vectors of eight.
+const TALL: usize = 24;
 
 /// Rows and columns before the matrix proper, which the caller may use.
 pub(crate) const HEAD: usize = 8;
@@ -115,13 +117,14 @@ impl WithSimd for Factor<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { l, stride, order, reciprocal } = self;
+        let mut packed = Packed { strip: [0.0; TALL * DEPTH], block: [0.0; BLOCK * DEPTH] };
         for block in (0..order).step_by(BLOCK) {
             let end = order.min(block + BLOCK);
             for depth in (0..block).step_by(DEPTH) {
-                update(simd, l, stride, order, depth..block.min(depth + DEPTH), block..end);
+                packed.update(simd, l, stride, order, depth..block.min(depth + DEPTH), block..end);
             }
             for column in (block..end).step_by(PANEL) {
-                update(simd, l, stride, order, block..column, column..column + PANEL);
+                update(simd, l, stride, order, block..column, column);
                 diagonal(&mut l[column * stride..], stride, column, reciprocal).map_err(|k| column + k)?;
                 panel(simd, &mut l[column * stride..], stride, column..order, reciprocal);
             }
@@ -130,7 +133,76 @@ impl WithSimd for Factor<'_> {
     }
 }
 
-/// Subtracts what the columns `earlier` contribute to the `columns`, strip of rows by strip of rows.
+/// Copies that bring what a tile reads next to each other: columns lie pages apart.
+struct Packed {
+    strip: [f64; TALL * DEPTH],
+    block: [f64; BLOCK * DEPTH],
+}
+
+impl Packed {
+    /// Subtracts what the columns `earlier` contribute to the `columns`, strip of rows by strip of rows.
+    #[inline(always)]
+    fn update<S: Simd>(
+        &mut self,
+        simd: S,
+        l: &mut [f64],
+        stride: usize,
+        order: usize,
+        earlier: core::ops::Range<usize>,
+        columns: core::ops::Range<usize>,
+    ) {
+        let depth = earlier.len();
+        let (left, right) = l.split_at_mut(columns.start * stride);
+        let left = &left[earlier.start * stride..earlier.end * stride];
+        for (panel, block) in columns.clone().step_by(PANEL).zip(self.block.chunks_exact_mut(PANEL * DEPTH)) {
+            for (to, from) in block.chunks_exact_mut(PANEL).zip(left.chunks_exact(stride)) {
+                to.copy_from_slice(&from[panel..panel + PANEL]);
+            }
+        }
+        let tall = 3 * S::F64_LANES;
+        let mut row = columns.start;
+        while row < order {
+            let whole = row + tall <= order;
+            let height = if whole { tall } else { S::F64_LANES };
+            let strip = &mut self.strip[..depth * height];
+            for (to, from) in strip.chunks_exact_mut(height).zip(left.chunks_exact(stride)) {
+                to.copy_from_slice(&from[row..row + height]);
+            }
+            // Panels that begin below the strip's last row lie above the diagonal.
+            let panels = columns.clone().step_by(PANEL).take_while(|&column| column < row + height);
+            for (column, block) in panels.zip(self.block.chunks_exact(PANEL * DEPTH)) {
+                let panel = &mut right[(column - columns.start) * stride..];
+                if whole {
+                    wide::<S, 3>(simd, strip, &block[..depth * PANEL], panel, stride, row);
+                } else {
+                    wide::<S, 1>(simd, strip, &block[..depth * PANEL], panel, stride, row);
+                }
+            }
+            row += height;
+        }
+    }
+}
+
+/// One packed strip of one panel: as wide a tile as the registers hold.
+#[inline(always)]
+fn wide<S: Simd, const V: usize>(
+    simd: S,
+    a: &[f64],
+    b: &[f64],
+    panel: &mut [f64],
+    stride: usize,
+    row: usize,
+) {
+    let steps = || a.chunks_exact(V * S::F64_LANES).zip(b.chunks_exact(PANEL));
+    if S::F64_LANES >= 8 {
+        tile::<S, V, 8>(simd, steps(), panel, stride, row);
+    } else {
+        tile::<S, V, 4>(simd, steps().map(|(a, b)| (a, &b[..4])), panel, stride, row);
+        tile::<S, V, 4>(simd, steps().map(|(a, b)| (a, &b[4..])), &mut panel[4 * stride..], stride, row);
+    }
+}
+
+/// Subtracts what the columns `earlier` of the same block contribute to the panel at `column`; they are at hand.
 #[inline(always)]
 fn update<S: Simd>(
     simd: S,
@@ -138,32 +210,27 @@ fn update<S: Simd>(
     stride: usize,
     order: usize,
     earlier: core::ops::Range<usize>,
-    columns: core::ops::Range<usize>,
+    column: usize,
 ) {
-    let (left, right) = l.split_at_mut(columns.start * stride);
+    let (left, panel) = l.split_at_mut(column * stride);
     let left = &left[earlier.start * stride..earlier.end * stride];
     if left.is_empty() {
         return;
     }
     let tall = 3 * S::F64_LANES;
-    let mut row = columns.start;
+    let mut row = column;
     while row < order {
-        let whole = row + tall <= order;
-        let height = if whole { tall } else { S::F64_LANES };
-        // Panels that begin below the strip's last row lie above the diagonal.
-        for column in columns.clone().step_by(PANEL).take_while(|&column| column < row + height) {
-            let panel = &mut right[(column - columns.start) * stride..];
-            if whole {
-                strip::<S, 3>(simd, left, panel, stride, row, column);
-            } else {
-                strip::<S, 1>(simd, left, panel, stride, row, column);
-            }
+        if row + tall <= order {
+            strip::<S, 3>(simd, left, panel, stride, row, column);
+            row += tall;
+        } else {
+            strip::<S, 1>(simd, left, panel, stride, row, column);
+            row += S::F64_LANES;
         }
-        row += height;
     }
 }
 
-/// One strip of rows of a panel: as wide a tile as the registers hold.
+/// One strip of one panel, read where it stands.
 #[inline(always)]
 fn strip<S: Simd, const V: usize>(
     simd: S,
@@ -173,27 +240,32 @@ fn strip<S: Simd, const V: usize>(
     row: usize,
     column: usize,
 ) {
+    let height = V * S::F64_LANES;
+    let steps = |offset: usize, width: usize| {
+        let at = column + offset;
+        left.chunks_exact(stride).map(move |l| (&l[row..row + height], &l[at..at + width]))
+    };
     if S::F64_LANES >= 8 {
-        tile::<S, V, 8>(simd, left, panel, stride, row, column);
+        tile::<S, V, 8>(simd, steps(0, 8), panel, stride, row);
     } else {
-        tile::<S, V, 4>(simd, left, panel, stride, row, column);
-        tile::<S, V, 4>(simd, left, &mut panel[4 * stride..], stride, row, column + 4);
+        tile::<S, V, 4>(simd, steps(0, 4), panel, stride, row);
+        tile::<S, V, 4>(simd, steps(4, 4), &mut panel[4 * stride..], stride, row);
     }
 }
 
+/// Subtracts Σ a bᵀ over the steps from `N` columns of the panel, `V` vectors from `row` on.
 #[inline(always)]
-fn tile<S: Simd, const V: usize, const N: usize>(
+fn tile<'a, S: Simd, const V: usize, const N: usize>(
     simd: S,
-    left: &[f64],
+    steps: impl Iterator<Item = (&'a [f64], &'a [f64])>,
     panel: &mut [f64],
     stride: usize,
     row: usize,
-    column: usize,
 ) {
     let mut sum = [[simd.splat_f64s(0.0); V]; N];
-    for earlier in left.chunks_exact(stride) {
-        let a = load::<S, V>(earlier, row);
-        let b = &earlier[column..column + N];
+    for (a, b) in steps {
+        let a = load::<S, V>(a, 0);
+        let b = &b[..N];
         for j in 0..N {
             let b = simd.splat_f64s(b[j]);
             for v in 0..V {

@@ -244,8 +244,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let equations = Equations { kernel: &self.kernel, sites: &self.sites, system, lambda };
         let solution: Solution<M> =
             equations.solve(buffers, task.careful).ok_or(TpsError::NotDefinite { column: system.null.q })?;
+        let level = targets.iter().flat_map(|t| t.iter()).fold(0.0, |m, x| f64::max(m, x.widen().abs()));
         let (sites, unit) = (&self.sites, self.unit());
-        spline.assign(&Fitted { sites, system, lambda, unit, solution, origin }, buffers);
+        spline.assign(&Fitted { sites, system, lambda, unit, solution, origin, level }, buffers);
         Ok(())
     }
 
@@ -255,7 +256,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         if found <= needed {
             return Err(TpsError::TooFewForValidation { needed, found });
         }
-        let lambda = system.cross_validate::<M>(&buffers.targets, self.sites.len(), &mut buffers.work);
+        let Buffers { targets, work, spare, .. } = buffers;
+        let lambda = system.cross_validate::<M>(targets, self.sites.len(), work, spare);
         Ok(lambda.unwrap_or(0.0))
     }
 

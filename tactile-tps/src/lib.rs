@@ -8,10 +8,13 @@ mod cholesky;
 mod error;
 mod evaluate;
 mod factorization;
+mod far;
 mod kernel;
 mod logarithm;
 mod null_space;
 mod options;
+#[cfg(feature = "rayon")]
+mod parallel;
 mod precise;
 mod real;
 mod refine;

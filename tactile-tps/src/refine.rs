@@ -18,6 +18,8 @@ const PRECISE_CONDITION: f64 = 1e10;
 /// For so few points twice the working precision costs a few milliseconds, and is used sooner.
 const FEW_POINTS: usize = 64;
 const FEW_CONDITION: f64 = 1e8;
+/// For so few points a step of refinement costs nothing to speak of, and is taken sooner.
+const SMALL_POINTS: usize = 128;
 /// Steps of refinement at most.
 const STEPS: usize = 4;
 
@@ -39,7 +41,7 @@ pub(crate) struct Buffers {
     pub(crate) weights: Vec<f64>,
     residuals: Vec<f64>,
     pub(crate) work: Vec<f64>,
-    spare: Vec<f64>,
+    pub(crate) spare: Vec<f64>,
 }
 
 /// What a solve found beside the weights.
@@ -60,7 +62,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             if let Some(affine) =
                 precise::solve(self.kernel, self.sites, system, self.lambda, &mut buffers.weights)
             {
-                let residual = careful.then(|| self.residual(&affine, buffers));
+                let residual = careful.then(|| self.sampled(&affine, buffers));
                 return Some(Solution { affine, residual, refinements: 0, precise: true });
             }
             if system.indefinite {
@@ -71,12 +73,16 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         let affine =
             system.solve(&mut buffers.weights, n, self.lambda, &mut buffers.work, &mut buffers.spare);
         let mut solution = Solution { affine, residual: None, refinements: 0, precise: false };
-        let threshold = if careful { 10.0 * n as f64 } else { 1e8 };
+        let threshold = match careful {
+            true if n <= SMALL_POINTS => 10.0 * n as f64,
+            true => 1e6,
+            false => 1e8,
+        };
         if system.condition(self.lambda) > threshold {
             self.refine(buffers, &mut solution);
         }
-        if careful && solution.residual.is_none() {
-            solution.residual = Some(self.residual(&solution.affine, buffers));
+        if careful && solution.refinements == 0 {
+            solution.residual = Some(self.sampled(&solution.affine, buffers));
         }
         Some(solution)
     }
@@ -117,30 +123,67 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
 
     /// y − K w − λ W⁻¹ w − P a at the sites, and its largest entry relative to the largest target.
     fn residual<const M: usize>(&self, affine: &[[f64; MAX]; M], buffers: &mut Buffers) -> f64 {
-        let Self { kernel, sites, system, lambda } = self;
-        let n = sites.len();
+        let n = self.sites.len();
         let Buffers { targets, weights, residuals, .. } = buffers;
         residuals.clone_from(targets);
-        let sum = Sum::<f64, K, D, M> {
-            kernel,
-            centres: core::array::from_fn(|k| &sites.axes[k][..]),
-            weights: core::array::from_fn(|m| &weights[m * n..(m + 1) * n]),
-        };
-        dispatch(Subtract { sum, residuals });
+        let sum = self.sum::<M>(weights);
+        dispatch(Subtract { places: sum.centres, sum, residuals });
         let mut size = 0.0;
-        for m in 0..M {
-            for (i, &site) in system.active.iter().enumerate() {
-                let scale = system.scales.get(i).copied().unwrap_or(1.0);
-                let smooth = lambda * (weights[m * n + site] / scale / scale);
-                let polynomial = system.span.polynomial(&affine[m], |k| sites.axes[k][site]);
+        for (i, &site) in self.system.active.iter().enumerate() {
+            for m in 0..M {
                 let residual = &mut residuals[m * n + site];
-                *residual -= smooth + polynomial;
+                *residual -= self.rest(&affine[m], &weights[m * n..], i);
                 size = f64::max(size, residual.abs());
             }
         }
-        let target = largest(targets);
-        if target > 0.0 { size / target } else { size }
+        relative(size, targets)
     }
+
+    /// The largest residual at up to one block of sites, spread evenly.
+    fn sampled<const M: usize>(&self, affine: &[[f64; MAX]; M], buffers: &mut Buffers) -> f64 {
+        let (n, active) = (self.sites.len(), &self.system.active);
+        let count = active.len().min(BLOCK);
+        let pick = |i: usize| i * active.len() / count;
+        let Buffers { targets, weights, residuals, .. } = buffers;
+        residuals.clear();
+        residuals.resize(M * count, 0.0);
+        let mut places = [[0.0; BLOCK]; D];
+        for (k, axis) in places.iter_mut().enumerate() {
+            (0..count).for_each(|i| axis[i] = self.sites.axes[k][active[pick(i)]]);
+        }
+        let sum = self.sum::<M>(weights);
+        dispatch(Subtract { sum, places: places.each_ref().map(|axis| &axis[..count]), residuals });
+        let mut size = 0.0;
+        for i in 0..count {
+            for m in 0..M {
+                let known =
+                    targets[m * n + active[pick(i)]] - self.rest(&affine[m], &weights[m * n..], pick(i));
+                size = f64::max(size, (known + residuals[m * count + i]).abs());
+            }
+        }
+        relative(size, targets)
+    }
+
+    /// λ W⁻¹ w + P a at an active site.
+    fn rest(&self, affine: &[f64; MAX], weights: &[f64], i: usize) -> f64 {
+        let (site, scale) = (self.system.active[i], self.system.scales.get(i).copied().unwrap_or(1.0));
+        let smooth = self.lambda * (weights[site] / scale / scale);
+        smooth + self.system.span.polynomial(affine, |k| self.sites.axes[k][site])
+    }
+
+    fn sum<'b, const M: usize>(&'b self, weights: &'b [f64]) -> Sum<'b, f64, K, D, M> {
+        let n = self.sites.len();
+        Sum {
+            kernel: self.kernel,
+            centres: core::array::from_fn(|k| &self.sites.axes[k][..]),
+            weights: core::array::from_fn(|m| &weights[m * n..(m + 1) * n]),
+        }
+    }
+}
+
+fn relative(size: f64, targets: &[f64]) -> f64 {
+    let target = largest(targets);
+    if target > 0.0 { size / target } else { size }
 }
 
 fn largest(values: &[f64]) -> f64 {
@@ -154,14 +197,16 @@ pub(crate) fn energy<K: Kernel, const D: usize, const M: usize>(
     weights: [&[f64]; M],
 ) -> f64 {
     let mut residuals = vec![0.0; M * centres[0].len()];
-    dispatch(Subtract { sum: Sum { kernel, centres, weights }, residuals: &mut residuals });
+    let sum = Sum { kernel, centres, weights };
+    dispatch(Subtract { sum, places: centres, residuals: &mut residuals });
     let products = weights.iter().copied().flatten().zip(&residuals).map(|(w, r)| -w * r);
     f64::max(products.sum(), 0.0)
 }
 
-/// Subtracts the kernel sum at every centre.
+/// Subtracts the kernel sum at the places.
 struct Subtract<'a, K, const D: usize, const M: usize> {
     sum: Sum<'a, f64, K, D, M>,
+    places: [&'a [f64]; D],
     residuals: &'a mut [f64],
 }
 
@@ -170,7 +215,7 @@ impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, 
 
     #[inline(always)]
     fn run<L: Lane<f64>>(mut self) {
-        let n = self.sum.centres[0].len();
+        let n = self.places[0].len();
         let full = n / BLOCK * BLOCK;
         for start in (0..full).step_by(BLOCK) {
             self.block::<L, BLOCK>(start, BLOCK);
@@ -184,10 +229,10 @@ impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, 
 impl<K: Kernel, const D: usize, const M: usize> Subtract<'_, K, D, M> {
     #[inline(always)]
     fn block<L: Lane<f64>, const W: usize>(&mut self, start: usize, used: usize) {
-        let n = self.sum.centres[0].len();
+        let n = self.places[0].len();
         let mut x = [[0.0; W]; D];
         for k in 0..D {
-            x[k][..used].copy_from_slice(&self.sum.centres[k][start..start + used]);
+            x[k][..used].copy_from_slice(&self.places[k][start..start + used]);
         }
         let mut sums = Lanes::<f64, D, M, W>::new();
         self.sum.block::<L, W, 0>(&x, &mut sums);

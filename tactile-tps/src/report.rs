@@ -21,8 +21,9 @@ pub struct FitReport {
     pub lambda: f64,
     /// Estimated 2-norm condition number of the matrix solved with, in the inner units; 1 if there was none.
     pub condition: f64,
-    /// Largest residual of the spline's equations relative to the largest target, as last measured: before the last
-    /// step of refinement if there was one. `None` after a quick refit, which does not spend the time.
+    /// Largest residual of the spline's equations relative to the largest target: at up to 64 points spread evenly, or,
+    /// where the solution was refined, at all of them before the last step. `None` after a quick refit, which does
+    /// not spend the time.
     pub residual: Option<f64>,
     /// Steps of iterative refinement taken.
     pub refinements: usize,

@@ -20,15 +20,20 @@ pub(crate) struct Linear<T, const D: usize, const M: usize> {
 /// A spline's value and derivatives at one point.
 #[derive(Clone, Copy)]
 pub(crate) struct Sample<T, const D: usize, const M: usize> {
-    value: [T; M],
-    gradient: [[T; D]; M],
-    hessian: [[[T; D]; D]; M],
+    pub(crate) value: [T; M],
+    pub(crate) gradient: [[T; D]; M],
+    pub(crate) hessian: [[[T; D]; D]; M],
 }
 
 impl<T: Scalar, const D: usize, const M: usize> Sample<T, D, M> {
     #[inline(always)]
     pub(crate) fn point(&self) -> Point<T, M> {
         Point::from(SVector::from(self.value))
+    }
+
+    /// Largest value.
+    pub(crate) fn size(&self) -> f64 {
+        self.value.iter().fold(0.0, |size, x| f64::max(size, x.widen().abs()))
     }
 
     #[inline(always)]

@@ -17,6 +17,9 @@ pub(crate) struct Spectrum {
 impl Spectrum {
     /// Of the matrix of order `m` whose lower triangle stands in `matrix` behind `HEAD` rows and columns.
     pub(crate) fn new(matrix: &[f64], m: usize, stride: usize) -> Self {
+        if m == 0 {
+            return Self { stride, ..Self::default() };
+        }
         let entry = |i: usize, j: usize| matrix[(HEAD + i.min(j)) * stride + HEAD + i.max(j)];
         let eigen = DMatrix::from_fn(m, m, entry).symmetric_eigen();
         let mut vectors = vec![0.0; m * stride];

@@ -5,6 +5,7 @@ use nalgebra::{Point, SMatrix, SVector};
 use crate::{
     Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
     evaluate::Sum,
+    far::{Parts, Terms},
     refine::{Buffers, Solution, energy},
     sample::{Each, Linear, Sample},
     simd::dispatch,
@@ -25,6 +26,7 @@ pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     /// Weights in the frame, output by output.
     weights: Vec<T>,
     affine: Linear<T, D, M>,
+    terms: Terms,
     report: FitReport,
 }
 
@@ -42,6 +44,13 @@ pub(crate) struct Fitted<'a, const D: usize, const M: usize> {
     pub(crate) solution: Solution<M>,
     /// What was taken from the targets.
     pub(crate) origin: [f64; M],
+    /// Largest target.
+    pub(crate) level: f64,
+}
+
+/// Decimal digits of a number with this relative error, at most those of the type.
+fn digits<T: Scalar>(error: f64) -> f64 {
+    f64::max(error, T::UNIT_ROUNDOFF).log10().min(0.0).abs()
 }
 
 impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
@@ -77,6 +86,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
             centres: Vec::new(),
             weights: Vec::new(),
             affine: Linear { constant: [T::zero(); M], gradient: [[T::zero(); D]; M] },
+            terms: Terms::NONE,
             report: FitReport {
                 points: 0,
                 merged: 0,
@@ -95,7 +105,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// Takes over a solution, in memory that is already there where it suffices.
     pub(crate) fn assign(&mut self, fitted: &Fitted<'_, D, M>, buffers: &Buffers) {
-        let Fitted { sites, system, lambda, unit, solution, origin } = fitted;
+        let Fitted { sites, system, lambda, unit, solution, origin, level } = fitted;
         self.frame = sites.frame;
         self.centres.clear();
         sites.axes.iter().for_each(|axis| self.centres.extend(axis.iter().map(|&x| T::narrow(x))));
@@ -105,7 +115,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
             self.affine.constant[k] = T::narrow(origin[k] + solution.affine[k][0]);
             self.affine.gradient[k] = system.span.gradient(&solution.affine[k]).map(T::narrow);
         }
+        let weight = self.columns().1.map(|w| w.iter().map(|x| x.widen().abs()).sum::<f64>());
+        let weight = weight.iter().fold(0.0, |m: f64, &x| m.max(x));
+        self.terms = Terms::new::<T, K>(&self.kernel, weight, *level);
+        let rounding = self.terms.rounding::<T, K>(&self.kernel, 0.0);
         let report = &mut self.report;
+        report.digits = digits::<T>(if *level > 0.0 { rounding / level } else { 0.0 });
         report.points = sites.inputs();
         report.merged = sites.inputs() - sites.len();
         report.ignored = sites.len() - system.active.len();
@@ -249,14 +264,58 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// Hands the sample at every point to `sink`, with derivatives up to `ORDER`.
-    fn each<const ORDER: usize>(&self, points: &[Point<T, D>], sink: impl FnMut(usize, Sample<T, D, M>)) {
-        let n = self.count();
-        let sum = Sum {
-            kernel: &self.kernel,
-            centres: core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
-            weights: core::array::from_fn(|m| &self.weights[m * n..(m + 1) * n]),
+    ///
+    /// A sample whose plain sum has lost too many digits is taken again in twice the working precision.
+    fn each<const ORDER: usize>(&self, points: &[Point<T, D>], mut sink: impl FnMut(usize, Sample<T, D, M>)) {
+        let (centres, weights) = self.columns();
+        let sum = Sum { kernel: &self.kernel, centres, weights };
+        let checked = |i: usize, sample: Sample<T, D, M>| {
+            let s = self.distance_squared(&points[i]);
+            if s > self.terms.reach && self.terms.lost::<T, K>(&self.kernel, s, sample.size()) {
+                sink(i, self.parts().sample(&points[i]));
+            } else {
+                sink(i, sample);
+            }
         };
-        dispatch(Each::<_, _, _, D, M, ORDER> { sum, affine: &self.affine, frame: self.frame, points, sink });
+        dispatch(Each::<_, _, _, D, M, ORDER> {
+            sum,
+            affine: &self.affine,
+            frame: self.frame,
+            points,
+            sink: checked,
+        });
+    }
+
+    /// Squared distance from the frame's centre, in the frame.
+    #[inline(always)]
+    fn distance_squared(&self, point: &Point<T, D>) -> f64 {
+        self.frame.inside(point).iter().map(|x| x * x).sum()
+    }
+
+    /// Coordinates of the centres and their weights, column by column.
+    fn columns(&self) -> ([&[T]; D], [&[T]; M]) {
+        let n = self.count();
+        (
+            core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
+            core::array::from_fn(|m| &self.weights[m * n..(m + 1) * n]),
+        )
+    }
+
+    fn parts(&self) -> Parts<'_, T, K, D, M> {
+        let (centres, weights) = self.columns();
+        Parts { kernel: &self.kernel, frame: self.frame, centres, weights, affine: &self.affine }
+    }
+
+    /// Decimal digits that a plain sum of the spline's terms keeps at a point: −log₁₀ of the rounding error to expect,
+    /// relative to the value or the targets, whichever is larger.
+    ///
+    /// Below eight (four in `f32`) the spline is evaluated in twice the working precision, so that its own digits are lost
+    /// only where those of its weights are. Far from the points the number falls: the terms grow faster than the sum.
+    pub fn digits(&self, point: &Point<T, D>) -> f64 {
+        let mut size = 0.0;
+        self.each::<0>(core::slice::from_ref(point), |_, sample| size = sample.size());
+        let rounding = self.terms.rounding::<T, K>(&self.kernel, self.distance_squared(point));
+        digits::<T>(rounding / f64::max(size, self.terms.level))
     }
 
     /// wᵀKw, summed over the outputs, in the kernel's own units; O(n²).

@@ -124,6 +124,7 @@ impl<const D: usize> System<D> {
         y: &[f64],
         sites: usize,
         work: &mut Vec<f64>,
+        spare: &mut Vec<f64>,
     ) -> Option<f64> {
         let (n, stride) = (self.active.len(), self.null.stride);
         work.clear();
@@ -132,7 +133,7 @@ impl<const D: usize> System<D> {
             self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
             self.null.apply_transpose(column);
         }
-        self.spectrum.as_ref().map(|spectrum| spectrum.cross_validate(work, n, &mut Vec::new()))
+        self.spectrum.as_ref().map(|spectrum| spectrum.cross_validate(work, n, spare))
     }
 
     /// Solves for `M` outputs: `y` holds the values at all sites and receives the weights w; returns the affine parts.

@@ -1,0 +1,196 @@
+//! Where a plain sum loses its digits: how many are left, and the sum in twice the working precision.
+//!
+//! Far from the centres the terms wᵢ U grow like the distance's square while their sum grows like the distance: the side
+//! conditions cancel the rest. In plain arithmetic the digits cancel with it, twice: in the sum, and in the weights,
+//! whose rounding leaves moments that should be zero. Here the sum is carried in double-double numbers, and the
+//! moments left are taken out with w ← w − P (PᵀP)⁻¹ Pᵀw.
+
+use nalgebra::Point;
+
+use crate::{
+    Kernel, Scalar,
+    null_space::MAX,
+    real::Real,
+    sample::{Linear, Sample},
+    sites::Frame,
+    twofold::{Twofold, two_sum},
+};
+
+/// How large the terms of a spline's sum are, against what it is to give.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Terms {
+    /// Largest Σ |wᵢ| of an output.
+    pub(crate) weight: f64,
+    /// Largest target.
+    pub(crate) level: f64,
+    /// Squared distance from the frame's centre from which on the sum deserves a second look.
+    pub(crate) reach: f64,
+}
+
+impl Terms {
+    pub(crate) const NONE: Self = Self { weight: 0.0, level: 0.0, reach: f64::INFINITY };
+
+    pub(crate) fn new<T: Scalar, K: Kernel>(kernel: &K, weight: f64, level: f64) -> Self {
+        let terms = Self { weight, level, reach: 0.0 };
+        let bad = |s: f64| terms.rounding::<T, K>(kernel, s) > tolerance::<T>() * level;
+        // Doubling from the points' own size to beyond any query that has digits itself.
+        let reach = (0..200).map(|k| 2f64.powi(k)).find(|&s| bad(s)).unwrap_or(f64::INFINITY);
+        Self { reach: if reach > 1.0 { reach / 2.0 } else { 0.0 }, ..terms }
+    }
+
+    /// Rounding error to expect of a plain sum at squared distance `s` from the frame's centre.
+    pub(crate) fn rounding<T: Scalar, K: Kernel>(&self, kernel: &K, s: f64) -> f64 {
+        // The farthest centre lies a unit or so beyond; nearer than two units the terms do not shrink.
+        let distance = f64::max(s.sqrt() + 1.0, 2.0);
+        T::UNIT_ROUNDOFF * self.weight * kernel.value(distance * distance).abs()
+    }
+
+    /// Whether a plain sum that gave values of size `found` at `s` lost too many digits.
+    pub(crate) fn lost<T: Scalar, K: Kernel>(&self, kernel: &K, s: f64, found: f64) -> bool {
+        self.rounding::<T, K>(kernel, s) > tolerance::<T>() * f64::max(found, self.level)
+    }
+}
+
+/// Relative error that a plain sum may have: eight digits in `f64`, four in `f32`.
+fn tolerance<T: Scalar>() -> f64 {
+    if T::UNIT_ROUNDOFF < 1e-10 { 1e-8 } else { 1e-4 }
+}
+
+/// A spline's parts, in its frame.
+pub(crate) struct Parts<'a, T, K, const D: usize, const M: usize> {
+    pub(crate) kernel: &'a K,
+    pub(crate) frame: Frame<D>,
+    pub(crate) centres: [&'a [T]; D],
+    pub(crate) weights: [&'a [T]; M],
+    pub(crate) affine: &'a Linear<T, D, M>,
+}
+
+/// Value, gradient and Hessian of a sum.
+#[derive(Clone, Copy)]
+struct Jets<R, const D: usize> {
+    value: R,
+    gradient: [R; D],
+    hessian: [[R; D]; D],
+}
+
+impl<R: Real, const D: usize> Jets<R, D> {
+    fn zero() -> Self {
+        Self { value: R::zero(), gradient: [R::zero(); D], hessian: [[R::zero(); D]; D] }
+    }
+
+    fn add(&mut self, factor: R, term: &Self) {
+        self.value = self.value + factor * term.value;
+        for k in 0..D {
+            self.gradient[k] = self.gradient[k] + factor * term.gradient[k];
+            for i in 0..D {
+                self.hessian[k][i] = self.hessian[k][i] + factor * term.hessian[k][i];
+            }
+        }
+    }
+
+    fn map<S>(&self, f: impl Fn(R) -> S) -> Jets<S, D> {
+        Jets {
+            value: f(self.value),
+            gradient: core::array::from_fn(|k| f(self.gradient[k])),
+            hessian: core::array::from_fn(|k| core::array::from_fn(|i| f(self.hessian[k][i]))),
+        }
+    }
+}
+
+impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M> {
+    /// The sample at a point in twice the working precision.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn sample(&self, point: &Point<T, D>) -> Sample<T, D, M> {
+        let x: [Twofold; D] = core::array::from_fn(|k| {
+            let shifted = two_sum(point[k].widen(), -self.frame.centre[k]);
+            Twofold { high: shifted.high / self.frame.scale, low: shifted.low / self.frame.scale }
+        });
+        let mut sums = [Jets::<Twofold, D>::zero(); M];
+        let mut shadows = [Jets::<f64, D>::zero(); MAX];
+        let mut moments = [[Twofold::ZERO; MAX]; M];
+        let mut gram = [[0.0; MAX]; MAX];
+        for j in 0..self.centres[0].len() {
+            let centre: [f64; D] = core::array::from_fn(|k| self.centres[k][j].widen());
+            let affine: [f64; MAX] = core::array::from_fn(|c| match c {
+                0 => 1.0,
+                c if c <= D => centre[c - 1],
+                _ => 0.0,
+            });
+            let term = self.term(&x, &centre);
+            for m in 0..M {
+                let weight = Twofold::from_f64(self.weights[m][j].widen());
+                sums[m].add(weight, &term);
+                for c in 0..=D {
+                    moments[m][c] = moments[m][c] + weight * Twofold::from_f64(affine[c]);
+                }
+            }
+            let plain = term.map(|x| x.high);
+            for c in 0..=D {
+                shadows[c].add(affine[c], &plain);
+                (0..=D).for_each(|i| gram[c][i] += affine[c] * affine[i]);
+            }
+        }
+        for m in 0..M {
+            let correction = solve_gram(gram, moments[m].map(|x| x.high), D + 1);
+            for c in 0..=D {
+                sums[m].add(Twofold::from_f64(-correction[c]), &shadows[c].map(Twofold::from_f64));
+            }
+        }
+        self.finish(&x, &sums)
+    }
+
+    /// U and its derivatives about one centre.
+    fn term(&self, x: &[Twofold; D], centre: &[f64; D]) -> Jets<Twofold, D> {
+        let d: [Twofold; D] = core::array::from_fn(|k| x[k] - Twofold::from_f64(centre[k]));
+        let s = d.iter().fold(Twofold::ZERO, |s, &d| s + d * d);
+        let jet = self.kernel.jet(s);
+        let (slope, bend) = (jet.first * Twofold::from_f64(2.0), jet.second * Twofold::from_f64(4.0));
+        Jets {
+            value: jet.value,
+            gradient: d.map(|d| slope * d),
+            hessian: core::array::from_fn(|k| {
+                core::array::from_fn(|i| bend * d[k] * d[i] + if i == k { slope } else { Twofold::ZERO })
+            }),
+        }
+    }
+
+    fn finish(&self, x: &[Twofold; D], sums: &[Jets<Twofold, D>; M]) -> Sample<T, D, M> {
+        let wide = |x: T| Twofold::from_f64(x.widen());
+        let scale = self.frame.scale;
+        let value = core::array::from_fn(|m| {
+            let constant = wide(self.affine.constant[m]) + sums[m].value;
+            let sum = (0..D).fold(constant, |sum, k| sum + wide(self.affine.gradient[m][k]) * x[k]);
+            T::narrow(sum.high)
+        });
+        let gradient = core::array::from_fn(|m| {
+            core::array::from_fn(|k| {
+                T::narrow((wide(self.affine.gradient[m][k]) + sums[m].gradient[k]).high / scale)
+            })
+        });
+        let hessian = core::array::from_fn(|m| {
+            sums[m].hessian.map(|row| row.map(|h| T::narrow(h.high / scale / scale)))
+        });
+        Sample { value, gradient, hessian }
+    }
+}
+
+/// Solves the normal equations of the first `q` affine functions; functions that depend on earlier ones are left out.
+fn solve_gram(mut gram: [[f64; MAX]; MAX], mut b: [f64; MAX], q: usize) -> [f64; MAX] {
+    let start: [f64; MAX] = core::array::from_fn(|k| gram[k][k]);
+    let mut used = [false; MAX];
+    for k in 0..q {
+        used[k] = gram[k][k] > 1e-12 * start[k];
+        for i in (k + 1..q).filter(|_| used[k]) {
+            let factor = gram[i][k] / gram[k][k];
+            (k..q).for_each(|j| gram[i][j] -= factor * gram[k][j]);
+            b[i] -= factor * b[k];
+        }
+    }
+    let mut x = [0.0; MAX];
+    for k in (0..q).rev().filter(|&k| used[k]) {
+        let rest: f64 = (k + 1..q).map(|j| gram[k][j] * x[j]).sum();
+        x[k] = (b[k] - rest) / gram[k][k];
+    }
+    x
+}
