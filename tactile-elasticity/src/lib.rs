@@ -8,5 +8,6 @@ pub mod field;
 pub mod modulus;
 mod scalar;
 pub mod strain;
+pub mod stress;
 
 pub use error::{ElasticityError, Quantity};

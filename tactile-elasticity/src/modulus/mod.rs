@@ -1,5 +1,6 @@
 //! Young's modulus from what was measured at one or more loads.
 
+mod bootstrap;
 mod contact;
 mod estimate;
 mod law;
@@ -9,6 +10,7 @@ mod regression;
 mod statistics;
 mod warning;
 
+pub use bootstrap::{Bootstrap, BootstrapSummary};
 pub use contact::{
     BondedLayer, Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere, SphereOnWaveguide, TataraSphere,
 };

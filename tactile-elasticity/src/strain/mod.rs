@@ -23,3 +23,6 @@ pub use deformation::Deformation;
 pub use invariants::{Invariants, PrincipalValues, von_mises_strain};
 pub use measure::{Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure};
 pub use stretch::PrincipalStretches;
+
+pub(crate) use invariants::{deviator, scaled_norm};
+pub(crate) use measure::upright;

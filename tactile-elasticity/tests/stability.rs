@@ -1,0 +1,180 @@
+//! Little strain under much rotation, all scales, both precisions, folding, robustness and no allocation.
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use proptest::prelude::*;
+use tactile_elasticity::contact::{Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa};
+use tactile_elasticity::field::{Averaging, StrainField};
+use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+use tactile_elasticity::strain::{
+    Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, Invariants, PrincipalStretches,
+    StrainMeasure, green_lagrange_into,
+};
+use tactile_elasticity::{ElasticityError, Quantity};
+
+fn measures() -> [&'static dyn StrainMeasure<f64>; 5] {
+    [&GreenLagrange, &EulerAlmansi, &Hencky, &Biot, &Infinitesimal]
+}
+
+fn rotation() -> impl Strategy<Value = Matrix3<f64>> {
+    prop::array::uniform3(-3.0..3.0f64)
+        .prop_map(|a| Rotation3::from_scaled_axis(Vector3::from(a)).into_inner())
+}
+
+fn gradient(size: f64) -> impl Strategy<Value = Matrix3<f64>> {
+    prop::array::uniform9(-size..size).prop_map(|a| Matrix3::from_row_slice(&a))
+}
+
+proptest! {
+    /// Turning the whole does not strain it; F = Q(I + H) is rounded to 10⁻¹⁶, and so is the strain, absolutely.
+    #[test]
+    fn rotations_do_not_strain(q in rotation(), h in gradient(0.2)) {
+        let f = Matrix3::identity() + h;
+        let (still, turned) = (Deformation::from_deformation_gradient(f), Deformation::from_deformation_gradient(q * f));
+        for measure in [&GreenLagrange as &dyn StrainMeasure<f64>, &Hencky, &Biot] {
+            let gap = (measure.of(&still).unwrap() - measure.of(&turned).unwrap()).amax();
+            prop_assert!(gap < 4e-15, "{} {gap:e}", measure.name());
+        }
+        // Euler-Almansi turns with the body.
+        let eulerian = EulerAlmansi.of(&turned).unwrap() - q * EulerAlmansi.of(&still).unwrap() * q.transpose();
+        prop_assert!(eulerian.amax() < 1e-14);
+    }
+
+    /// All measures agree to first order, from strains of 10⁻⁹⁰ up.
+    #[test]
+    fn measures_agree_where_strain_is_tiny(h in gradient(1.0), exponent in -90i32..-9) {
+        let scale = 10f64.powi(exponent);
+        let h = h * scale;
+        let linear = Infinitesimal.strain(&h).unwrap();
+        for measure in measures() {
+            // They differ by H², a share of the scale itself, and by rounding.
+            let gap = (measure.strain(&h).unwrap() - linear).amax() / scale;
+            prop_assert!(gap < 20.0 * scale + 1e-14, "{} {gap:e}", measure.name());
+        }
+    }
+
+    /// tr ln U = ln J, and the principal stretches multiply to J.
+    #[test]
+    fn logarithms_add_up_to_the_volume(h in gradient(0.3)) {
+        let d = Deformation::from_displacement_gradient(h);
+        let hencky = Hencky.of(&d).unwrap();
+        prop_assert!((hencky.trace() - d.volume_change().ln_1p()).abs() < 1e-14);
+        let product: f64 = PrincipalStretches::of(&d).stretches.iter().product();
+        prop_assert!((product / d.jacobian() - 1.0).abs() < 1e-14);
+    }
+
+    /// Invariants do not depend on the axes.
+    #[test]
+    fn invariants_are_invariant(q in rotation(), h in gradient(1.0)) {
+        let e = Infinitesimal.strain(&h).unwrap();
+        let (a, b) = (Invariants::of(&e), Invariants::of(&(q * e * q.transpose())));
+        prop_assert!((a.first - b.first).abs() < 1e-14 && (a.second - b.second).abs() < 1e-14);
+        prop_assert!((a.third - b.third).abs() < 1e-14);
+    }
+
+    /// f32 follows f64 to its own rounding.
+    #[test]
+    fn single_precision_agrees(h in gradient(0.3)) {
+        let single = h.map(|x| x as f32);
+        let exact = single.map(f64::from);
+        for (i, measure) in measures().into_iter().enumerate() {
+            let narrow: [&dyn StrainMeasure<f32>; 5] = [&GreenLagrange, &EulerAlmansi, &Hencky, &Biot, &Infinitesimal];
+            let gap = narrow[i].strain(&single).unwrap().map(f64::from) - measure.strain(&exact).unwrap();
+            prop_assert!(gap.amax() < 3e-6, "{} {:e}", measure.name(), gap.amax());
+        }
+    }
+
+    /// A modulus does not depend on the unit of length or force.
+    #[test]
+    fn contacts_scale(length in -9.0..9.0f64, force in -9.0..9.0f64) {
+        let (l, f) = (10f64.powf(length), 10f64.powf(force));
+        let modulus = 40e3 * f / (l * l);
+        let reduced = reduced_modulus_pa(Body::rigid(), Body::elastic(modulus, 0.4).unwrap()).unwrap();
+        let contact = HertzContact::from_force(1e-3 * f, 4e-3 * l, reduced).unwrap();
+        let load = LoadState::new(Estimate::new(1e-3 * f, 1e-5 * f))
+            .with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-3 * contact.contact_radius_m))
+            .with_indentation(Estimate::new(contact.indentation_m, 1e-3 * contact.indentation_m));
+        let found = HertzSphere::new(4e-3 * l, 0.4).unwrap().estimate(&[load]).unwrap();
+        prop_assert!((found.youngs_modulus_pa / modulus - 1.0).abs() < 1e-12);
+        let outside = hertz_surface_displacement_m(3.0 * contact.contact_radius_m, contact.contact_radius_m, 1.0, 1.0);
+        prop_assert!(outside > 0.0);
+    }
+}
+
+#[test]
+fn a_batch_has_the_bits_of_one_at_a_time() {
+    let gradients: Vec<Matrix3<f64>> = (0..300)
+        .map(|i| {
+            let x = f64::from(i);
+            // Every third a large rotation with little strain, for the careful path.
+            let q = Rotation3::from_scaled_axis(Vector3::new(0.3 * x, 1.0, 0.1)).into_inner();
+            if i % 3 == 0 { q - Matrix3::identity() } else { q * 1e-3 * x }
+        })
+        .collect();
+    let mut batch = vec![Matrix3::zeros(); 300];
+    green_lagrange_into(&gradients, &mut batch).unwrap();
+    for (h, e) in gradients.iter().zip(&batch) {
+        assert_eq!(*e, GreenLagrange.strain(h).unwrap());
+    }
+    let missing = green_lagrange_into(&gradients, &mut batch[1..]).unwrap_err();
+    assert_eq!(
+        missing,
+        ElasticityError::LengthMismatch { quantity: Quantity::Strain, expected: 300, found: 299 }
+    );
+}
+
+#[test]
+fn batches_and_measures_allocate_nothing() {
+    let gradients = vec![Matrix3::from_diagonal_element(0.01); 100];
+    let mut strains = vec![Matrix3::zeros(); 100];
+    let info = allocation_counter::measure(|| {
+        green_lagrange_into(&gradients, &mut strains).unwrap();
+        for measure in measures() {
+            for (h, e) in gradients.iter().zip(&mut strains) {
+                *e = measure.strain(h).unwrap();
+            }
+        }
+    });
+    assert_eq!(info.count_total, 0);
+}
+
+#[test]
+fn bad_gradients_are_named() {
+    let broken = Matrix3::from_diagonal_element(f64::NAN);
+    for measure in measures() {
+        let error = measure.strain(&broken).unwrap_err();
+        assert_eq!(
+            error,
+            ElasticityError::NotFinite { quantity: Quantity::DeformationGradient },
+            "{}",
+            measure.name()
+        );
+    }
+    let flat = Deformation::from_deformation_gradient(Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0)));
+    assert_eq!(Hencky.of(&flat).unwrap_err(), ElasticityError::SingularDeformation);
+    let field = StrainField::from_gradients(&[broken], None, &GreenLagrange);
+    assert!(matches!(field, Err(ElasticityError::NotFinite { .. })));
+    let weights = StrainField::from_gradients(&[Matrix3::zeros()], Some(&[-1.0]), &GreenLagrange);
+    assert!(matches!(weights, Err(ElasticityError::Negative { quantity: Quantity::Weight, .. })));
+}
+
+#[test]
+fn robust_averages_withstand_wild_points() {
+    let mut gradients: Vec<_> =
+        (0..99).map(|i| Matrix3::from_diagonal_element(0.01 + 1e-4 * f64::from(i % 11 - 5))).collect();
+    gradients[7] = Matrix3::from_diagonal_element(5.0);
+    gradients[40] = Matrix3::from_diagonal_element(3.0);
+    let field = StrainField::from_gradients(&gradients, None, &Infinitesimal).unwrap();
+    assert!(field.summary().mean[(0, 0)] > 0.08);
+    for averaging in [Averaging::Huber, Averaging::Median] {
+        let summary = field.summary_with(averaging);
+        assert!((summary.mean[(0, 0)] - 0.01).abs() < 2e-5, "{averaging:?} {}", summary.mean[(0, 0)]);
+        assert!(summary.spread[(0, 0)] < 6e-4 && summary.standard_error[(0, 0)] < 1e-4);
+    }
+}
+
+#[test]
+fn weights_are_areas() {
+    let gradients = [Matrix3::from_diagonal_element(0.0), Matrix3::from_diagonal_element(0.04)];
+    let field = StrainField::from_gradients(&gradients, Some(&[3.0, 1.0]), &Infinitesimal).unwrap();
+    assert!((field.summary().mean[(1, 1)] - 0.01f64).abs() < 1e-17);
+}
