@@ -10,6 +10,7 @@ use super::random::{Purpose, row_stream};
 
 /// How a calibration is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationOptions {
     /// What is pressed on the sensor.
     pub indenter: Sphere,
@@ -34,6 +35,7 @@ impl Default for CalibrationOptions {
 
 /// Whether the force was rising or falling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Branch {
     /// Rising force.
     Loading,
@@ -43,6 +45,7 @@ pub enum Branch {
 
 /// One reading of camera and gauge.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CalibrationPoint {
     /// Rising or falling.
     pub branch: Branch,
@@ -56,6 +59,7 @@ pub struct CalibrationPoint {
 
 /// A whole calibration.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CalibrationSeries {
     /// Readings in the order they were taken.
     pub points: Vec<CalibrationPoint>,

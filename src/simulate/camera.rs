@@ -24,6 +24,7 @@ struct NoiseLaw {
 
 /// Camera, lens and stray light.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Camera {
     /// Rows and columns.
     pub shape: [usize; 2],

@@ -6,6 +6,7 @@ use super::material::{Sphere, Waveguide};
 
 /// How force, contact radius and indentation hang together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ContactLaw {
     /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. Small contact, a ≪ R; the simulator obeys it at any load.
@@ -23,6 +24,7 @@ pub enum ContactLaw {
 
 /// The contact at one load.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Contact {
     /// Normal force in newton.
     pub force_n: f64,

@@ -5,6 +5,7 @@ use super::error::{SimulateError, finite, not_negative, within};
 /// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. Both are monotone up to the
 /// largest peak pressure p_max of the scene and exactly averaged over pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Response {
     /// g·p: the frame's sum is proportional to the force.
@@ -33,6 +34,7 @@ impl Response {
 
 /// The lamps' state during one frame, relative to the reference frame. It scales background and leaked light alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Illumination {
     /// Brightness, 1 for unchanged.
     pub level: f64,

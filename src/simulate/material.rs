@@ -4,6 +4,7 @@ use super::error::{SimulateError, at_least, positive, within};
 
 /// A linear elastic, isotropic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Elastic {
     /// Young's modulus in pascal; infinite for a rigid body.
     pub youngs_modulus_pa: f64,
@@ -32,6 +33,7 @@ impl Elastic {
 
 /// The object: an elastic sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sphere {
     /// Radius in metres.
     pub radius_m: f64,
@@ -48,6 +50,7 @@ impl Sphere {
 
 /// One layer of the waveguide.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WaveguideLayer {
     /// Refractive index.
     pub refractive_index: f64,
@@ -59,6 +62,7 @@ pub struct WaveguideLayer {
 
 /// The layered waveguide, from the object's side to the glass.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Waveguide {
     /// Layers, the one touched first.
     pub layers: Vec<WaveguideLayer>,

@@ -12,6 +12,7 @@ use super::truth::PressTruth;
 
 /// How many grey levels a pascal makes.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Gain {
     /// The largest load's peak pressure lies so many grey levels above the background (before vignetting).
@@ -22,6 +23,7 @@ pub enum Gain {
 
 /// One state of load.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Load {
     /// Normal force in newton.
     pub force_n: f64,
@@ -40,6 +42,7 @@ impl Load {
 
 /// Everything that describes a press; [`PressScene::new`] checks it.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PressOptions {
     /// The object.
     pub object: Sphere,

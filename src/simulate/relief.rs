@@ -13,6 +13,7 @@ use super::random::{Purpose, row_stream};
 
 /// Bumps on a plain face.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SurfacePattern {
     /// Height of the plain face in metres.
     pub base_height_m: f64,

@@ -11,6 +11,7 @@ use super::truth::PressTruth;
 
 /// How the load runs through time: rest, then cycles of F(t) = F_max sin²(πt/T).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoadCycle {
     /// Largest force F_max in newton.
     pub largest_force_n: f64,

@@ -9,6 +9,7 @@ use super::press::{Load, PressScene};
 
 /// The truth of one frame.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PressTruth {
     /// Force, contact radius, pressure, indentation.
     pub contact: Contact,
@@ -161,6 +162,7 @@ fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
 /// The surface read from a press is a hemisphere of the contact's radius, which grows by (F₂/F₁)^⅓ whatever the object's
 /// modulus: the apparent strain says nothing about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SurfaceScaling {
     /// Centre (x, y) of the first contact in metres from the first pixel's centre.
     pub from_centre_m: [f64; 2],

@@ -27,6 +27,7 @@ use super::relief::{Relief, SurfacePattern};
 
 /// Everything that describes the squeezed block; [`UniaxialScene::new`] checks it.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UniaxialOptions {
     /// What the block is made of.
     pub material: Elastic,
@@ -64,6 +65,7 @@ impl Default for UniaxialOptions {
 
 /// Stretch, strain and stress at one force. Compression is negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct UniaxialState {
     /// Compressive force in newton.
     pub force_n: f64,
