@@ -1,11 +1,33 @@
 //! What a person at a bench wants to read.
 use super::measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
+use crate::force::Estimate;
 use std::fmt::{self, Display, Formatter};
+
+/// A value with its standard error, scaled to a unit: two significant digits of the error decide the decimals.
+///
+/// ```
+/// use tactile_imaging::pipeline::with_error;
+/// assert_eq!(with_error(3.27124e-3, 4.1e-8, 1e3), "3.271240 ± 0.000041");
+/// assert_eq!(with_error(103_384.0, 140.0, 1e-3), "103.38 ± 0.14");
+/// assert_eq!(with_error(0.7, 0.0, 1.0), "0.7000");
+/// ```
+pub fn with_error(value: f64, error: f64, scale: f64) -> String {
+    let (value, error) = (value * scale, error * scale);
+    if !(error > 0.0 && error.is_finite()) {
+        return format!("{value:.4}");
+    }
+    let decimals = (1 - error.log10().floor() as i32).clamp(0, 12) as usize;
+    format!("{value:.decimals$} ± {error:.decimals$}")
+}
+
+fn estimate(e: Estimate<f64>, scale: f64) -> String {
+    with_error(e.value, e.standard_error, scale)
+}
 
 impl Display for ModulusResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let k = |v: f64| v * 1e-3;
-        write!(f, "{:8.2} ± {:.2} kPa", k(self.value), k(self.standard_error))?;
+        write!(f, "{} kPa", with_error(self.value, self.standard_error, 1e-3))?;
         match self.interval_95 {
             (low, Some(high)) => write!(f, "   95 %: {:.2} to {:.2} kPa", k(low), k(high))?,
             (low, None) => write!(f, "   95 %: above {:.2} kPa", k(low))?,
@@ -17,18 +39,18 @@ impl Display for ModulusResult {
 impl Display for FrameResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let (force, radius) = (self.force_n, self.contact_radius_m);
-        write!(f, "force {:.4} ± {:.4} N", force.value, force.standard_error)?;
+        write!(f, "force {} N", estimate(force, 1.0))?;
         if let Some(gauge) = self.gauge_force_n {
             write!(f, " (gauge {gauge:.4} N)")?;
         }
-        write!(f, "   contact radius {:.4} ± {:.4} mm", radius.value * 1e3, radius.standard_error * 1e3)?;
+        write!(f, "   contact radius {} mm", estimate(radius, 1e3))?;
         if let Some(ratio) = self.contact_ratio {
             write!(f, "   a/R {ratio:.3}")?;
         }
         let [x, y] = self.centroid_px;
         write!(f, "   centroid ({x:.2}, {y:.2}) px")?;
         match self.mean_stress_pa {
-            Some(stress) => write!(f, "   mean stress {:.2} kPa", stress.value * 1e-3),
+            Some(stress) => write!(f, "   mean stress {} kPa", estimate(stress, 1e-3)),
             None => Ok(()),
         }
     }
@@ -51,7 +73,7 @@ impl Display for MatchResult {
 
 impl Display for StrainResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let e = |i: usize, j: usize| format!("{:+.4} ± {:.4}", self.mean[i][j], self.standard_error[i][j]);
+        let e = |i: usize, j: usize| with_error(self.mean[i][j], self.standard_error[i][j], 1.0);
         write!(f, "{}: e_xx {}  e_yy {}  e_zz {}", self.measure, e(0, 0), e(1, 1), e(2, 2))
     }
 }

@@ -84,7 +84,9 @@ impl fmt::Display for Flag {
                 )
             }
             Self::MatchNotConverged => write!(f, "the match did not converge"),
+            Self::Unmatched { points: 1 } => write!(f, "1 control point has no partner"),
             Self::Unmatched { points } => write!(f, "{points} control points have no partner"),
+            Self::Folded { points: 1 } => write!(f, "the warp folds over at 1 control point"),
             Self::Folded { points } => write!(f, "the warp folds over at {points} control points"),
             Self::NoStrain { reason } => write!(f, "no strain: {reason}"),
             Self::Assumption { warning } => f.write_str(warning),

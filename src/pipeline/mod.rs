@@ -41,6 +41,7 @@ pub use ball::BallFit;
 pub use batch::contacts;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
+pub use display::with_error;
 pub use error::PipelineError;
 pub use flag::Flag;
 pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};

@@ -1,8 +1,9 @@
 //! What is pressed, and the modulus estimators that fit it.
+use super::stages::Settings;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::Waveguide;
 use crate::elasticity::modulus::{
-    Evidence, FlatPunch, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio,
+    Estimate, Evidence, FlatPunch, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio,
     StrainReference, StressStrainRegression,
 };
 
@@ -59,6 +60,42 @@ pub(crate) struct SharedErrors {
     pub force: f64,
     /// Of the lengths: the pixel size's.
     pub length: f64,
+}
+
+/// What one load says, before errors are split into its own and those that all loads share.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LoadReading {
+    pub force_n: f64,
+    /// Error of the force from noise.
+    pub noise_n: f64,
+    /// Error of the force from the calibration.
+    pub calibration_n: f64,
+    pub radius_m: Estimate<f64>,
+}
+
+/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one is common to all loads (the
+/// slope's); what a load has beyond that (the offset's) is its own.
+pub(crate) fn split_errors(
+    readings: impl Iterator<Item = LoadReading> + Clone,
+    settings: &Settings,
+) -> (Vec<LoadState<f64>>, SharedErrors) {
+    let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
+    let common = readings.clone().map(|r| relative(&r)).fold(f64::INFINITY, f64::min);
+    let common = if common.is_finite() { common } else { 0.0 };
+    let load = |r: LoadReading| {
+        let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2)).max(0.0).sqrt();
+        LoadState::new(Estimate::new(r.force_n, r.noise_n.hypot(rest))).with_contact_radius(r.radius_m)
+    };
+    let shared =
+        SharedErrors { force: common.hypot(settings.force_scale_error), length: settings.length_scale_error };
+    (readings.map(load).collect(), shared)
+}
+
+/// The contact radius with what no profile can know better: a hundredth of a pixel, by which a rim of pixels, blur and the
+/// contact's true shape differ from the fitted profile.
+pub(crate) fn radius_with_floor(value: f64, standard_error: f64, pixel_size_m: [f64; 2]) -> Estimate<f64> {
+    let floor = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
+    Estimate::new(value, standard_error.hypot(floor))
 }
 
 type Attempt = Result<ModulusEstimate<f64>, ElasticityError>;

@@ -3,7 +3,8 @@ use super::error::PipelineError;
 use super::stages::Stages;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::matching::Matching;
-use nalgebra::{Matrix3, Point3};
+use crate::tps::Warp;
+use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Fewest matches from which a three-dimensional strain can be told.
 pub const LEAST_MATCHES: usize = 8;
@@ -60,5 +61,22 @@ pub(super) fn strain(
     let measure = stages.strain();
     let field = StrainField::from_gradients(&gradients, None, measure)
         .map_err(|source| PipelineError::Strain { from, to, source })?;
-    Ok(PairStrain { measure: measure.name(), summary: field.summary(), field })
+    let mut summary = field.summary();
+    let noise = gradient_error(warp.as_ref(), &sources, &targets);
+    summary.standard_error.zip_apply(&noise, |error, noise| *error = error.hypot(noise));
+    Ok(PairStrain { measure: measure.name(), summary, field })
+}
+
+/// Standard error of the mean strain that comes from the matches: an affine fit to n pairs with residuals σ_j along axis j, whose
+/// sources spread by s_k along axis k, knows ∂u_j/∂x_k to σ_j/(s_k √n). The spread over the points alone would miss it
+/// where the warp is stiff.
+fn gradient_error(warp: &dyn Warp<f64, 3>, sources: &[Point3<f64>], targets: &[Point3<f64>]) -> Matrix3<f64> {
+    let n = sources.len() as f64;
+    let mean = sources.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
+    let square = |v: Vector3<f64>| v.component_mul(&v);
+    let spread: Vector3<f64> = sources.iter().map(|p| square(p.coords - mean)).sum();
+    let pairs = sources.iter().zip(targets);
+    let residual: Vector3<f64> = pairs.map(|(s, t)| square(warp.apply(s) - t)).sum();
+    let of = |j: usize, k: usize| (residual[j] / (spread[k].max(f64::MIN_POSITIVE) * n)).sqrt();
+    Matrix3::from_fn(|j, k| if j == k { of(j, k) } else { 0.5 * of(j, k).hypot(of(k, j)) })
 }

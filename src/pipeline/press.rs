@@ -1,7 +1,9 @@
 //! A press: frames at one or more loads, of which nothing is computed before it is asked for.
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
-use super::object::{SharedErrors, all_estimates, best_estimate};
+use super::object::{
+    LoadReading, SharedErrors, all_estimates, best_estimate, radius_with_floor, split_errors,
+};
 use super::pair::{self, PairStrain};
 use super::report::{Report, SkipReason, Stage};
 use super::stages::Stages;
@@ -38,6 +40,8 @@ pub struct Press<'a> {
     force: ForceWorkspace,
     sfs: Workspace<f64>,
     signal: Array2<f64>,
+    smoothed: Array2<f64>,
+    line: Vec<f64>,
     report: Report,
 }
 
@@ -55,6 +59,8 @@ impl<'a> Press<'a> {
             force: ForceWorkspace::default(),
             sfs: Workspace::new(),
             signal: Array2::default((0, 0)),
+            smoothed: Array2::default((0, 0)),
+            line: Vec::new(),
             report: Report::default(),
         })
     }
@@ -161,6 +167,7 @@ impl<'a> Press<'a> {
                 self.stages,
                 &mut self.sfs,
                 &mut self.signal,
+                (&mut self.smoothed, &mut self.line),
                 loaded.image,
                 reference,
                 contact,
@@ -261,27 +268,33 @@ impl<'a> Press<'a> {
 
     /// What every frame says of its load, and the relative errors that all share.
     fn loads(&mut self, with_strain: bool) -> Result<(Vec<LoadState<f64>>, SharedErrors), PipelineError> {
-        let mut loads = Vec::with_capacity(self.frames.len());
-        let mut shared = SharedErrors::default();
+        let mut readings = Vec::with_capacity(self.frames.len());
+        let mut depths = Vec::with_capacity(self.frames.len());
+        let size = self.stages.contact().pixel_size_m();
         for frame in 0..self.frames.len() {
             let reading = self.reading(frame)?;
             let force = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
-            shared.force += (reading.force_calibration_n / force.value).abs() / self.frames.len() as f64;
-            let own = if reading.force_noise_n > 0.0 { reading.force_noise_n } else { force.standard_error };
-            let radius = reading.contact_radius_m;
-            let mut load = LoadState::new(Estimate::new(force.value, own))
-                .with_contact_radius(Estimate::new(radius.value, radius.standard_error));
-            if let Some(depth) = reading.indentation_m {
-                load = load.with_indentation(Estimate::new(depth.value, depth.standard_error));
-            }
-            if with_strain && frame > 0 && self.twins[frame] != 0 {
-                let first = self.reading(0)?.force_n.map_or(0.0, |f| f.value);
+            let a = reading.contact_radius_m;
+            readings.push(LoadReading {
+                force_n: force.value,
+                noise_n: reading.force_noise_n,
+                calibration_n: reading.force_calibration_n,
+                radius_m: radius_with_floor(a.value, a.standard_error, size),
+            });
+            depths.push(reading.indentation_m);
+        }
+        let (mut loads, shared) = split_errors(readings.iter().copied(), self.stages.settings());
+        for (load, depth) in loads.iter_mut().zip(depths) {
+            load.indentation_m = depth.map(|d| Estimate::new(d.value, d.standard_error));
+        }
+        for frame in 1..if with_strain { loads.len() } else { 0 } {
+            if self.twins[frame] != 0 {
+                let step = readings[frame].force_n - readings[0].force_n;
                 let summary = &self.strain(frame)?.summary;
                 // (31) takes the strain's size; its sign says whether the load rose.
-                let value = summary.mean[(2, 2)].abs().copysign(force.value - first);
-                load = load.with_mean_strain(Estimate::new(value, summary.standard_error[(2, 2)]));
+                let value = summary.mean[(2, 2)].abs().copysign(step);
+                loads[frame].mean_strain = Some(Estimate::new(value, summary.standard_error[(2, 2)]));
             }
-            loads.push(load);
         }
         Ok((loads, shared))
     }

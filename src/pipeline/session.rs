@@ -5,10 +5,10 @@
 //! have their size.
 use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
-use super::object::{SharedErrors, best_estimate};
+use super::object::{LoadReading, best_estimate, radius_with_floor, split_errors};
 use super::report::{Report, SkipReason, Stage};
 use super::stages::Stages;
-use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate};
+use crate::elasticity::modulus::ModulusEstimate;
 use crate::force::{ForceWorkspace, ReferenceFrame};
 use ndarray::{Array2, ArrayView2};
 use std::sync::Arc;
@@ -66,9 +66,13 @@ impl MergedLoad {
         }
     }
 
-    fn state(&self) -> LoadState<f64> {
-        LoadState::new(Estimate::new(self.force_n, self.force_variance.sqrt()))
-            .with_contact_radius(Estimate::new(self.radius_m, self.radius_variance.sqrt()))
+    fn reading(&self, pixel_size_m: [f64; 2]) -> LoadReading {
+        LoadReading {
+            force_n: self.force_n,
+            noise_n: self.force_variance.sqrt(),
+            calibration_n: self.calibration * self.force_n,
+            radius_m: radius_with_floor(self.radius_m, self.radius_variance.sqrt(), pixel_size_m),
+        }
     }
 }
 
@@ -168,11 +172,10 @@ impl Session {
     /// [`PipelineError::Modulus`].
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
         let start = Instant::now();
-        let loads: Vec<_> = self.loads.iter().map(MergedLoad::state).collect();
-        let n = loads.len().max(1) as f64;
-        let force = self.loads.iter().map(|l| l.calibration).sum::<f64>() / n;
         let settings = self.stages.settings();
-        let shared = SharedErrors { force, length: 0.0 };
+        let size = self.stages.contact().pixel_size_m();
+        let readings = self.loads.iter().map(|load| load.reading(size));
+        let (loads, shared) = split_errors(readings, settings);
         let estimate = best_estimate(&settings.object, settings.waveguide.as_ref(), &loads, shared);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate.map_err(PipelineError::Modulus)

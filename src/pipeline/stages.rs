@@ -42,6 +42,14 @@ pub struct Settings {
     pub control_points: usize,
     /// What of the frame the surface stage looks at.
     pub surface_input: SurfaceInput,
+    /// Width in pixels (odd) of the box that smooths the signal, twice along each axis, before the surface stage; 1 for
+    /// none. Where the surface is nearly level its slope √(1/I² − 1) turns noise of the shading I into height.
+    pub smoothing_px: usize,
+    /// Relative error common to all forces beside the calibration's scatter. Light that is uneven over the frame reads
+    /// contacts of another size than the calibration's with another gain.
+    pub force_scale_error: f64,
+    /// Relative error common to all lengths: that of the pixel size.
+    pub length_scale_error: f64,
     /// What may be left out.
     pub skips: Skips,
 }
@@ -133,6 +141,9 @@ impl<C> Pipeline<C> {
                 waveguide: None,
                 control_points: DEFAULT_CONTROL_POINTS,
                 surface_input: SurfaceInput::Shading,
+                smoothing_px: 5,
+                force_scale_error: 1e-3,
+                length_scale_error: 0.0,
                 skips: Skips::default(),
             },
         }
@@ -156,6 +167,9 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     ) -> Pipeline<C, R2, P, M, W, S> {
         let Self { contact, sampler, matcher, warp, strain, mut settings, .. } = self;
         settings.surface_input = input;
+        if input == SurfaceInput::Signal {
+            settings.smoothing_px = 1;
+        }
         Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
     }
 
@@ -198,6 +212,23 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     #[must_use]
     pub fn with_control_points(mut self, count: usize) -> Self {
         self.settings.control_points = count;
+        self
+    }
+
+    /// Sets the width in pixels of the smoothing before the surface stage: odd, 1 for none (even widths count as one more).
+    #[must_use]
+    pub fn with_smoothing(mut self, width_px: usize) -> Self {
+        self.settings.smoothing_px = width_px | 1;
+        self
+    }
+
+    /// Sets the relative errors common to all forces (default 0.1 %) and to all lengths (default none). What is negative or
+    /// not finite counts as zero.
+    #[must_use]
+    pub fn with_scale_errors(mut self, force: f64, length: f64) -> Self {
+        let valid = |v: f64| if v > 0.0 && v.is_finite() { v } else { 0.0 };
+        self.settings.force_scale_error = valid(force);
+        self.settings.length_scale_error = valid(length);
         self
     }
 

@@ -18,6 +18,7 @@ pub(super) type Fail<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBacken
 pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Room in pixels for labels and title.
+const EDGE: i32 = 10;
 const LEFT: i32 = 62;
 const BOTTOM: i32 = 46;
 const TOP: i32 = 34;
@@ -42,13 +43,13 @@ pub(super) fn draw_panel<'a>(area: &Area<'a>, panel: &Panel) -> Result<(), Fail<
     let bar = panel.layers.iter().find_map(Layer::bar);
     let right = if bar.is_some() { BAR } else { RIGHT };
     let [x, y] = panel.ranges();
-    let room = [width as i32 - LEFT - right, height as i32 - TOP - BOTTOM].map(|v| v.max(20));
+    let room = [width as i32 - EDGE - LEFT - right, height as i32 - TOP - BOTTOM].map(|v| v.max(20));
     let size = if panel.equal_aspect { fit(room, [x[1] - x[0], y[1] - y[0]]) } else { room };
     let spare = [(room[0] - size[0]) / 2, (room[1] - size[1]) / 2];
-    let corner = [LEFT + spare[0], TOP + spare[1]];
+    let corner = [EDGE + LEFT + spare[0], TOP + spare[1]];
     let (bottom, top) = if panel.y_down { (y[1], y[0]) } else { (y[0], y[1]) };
     let mut chart = ChartBuilder::on(area)
-        .margin_left(spare[0])
+        .margin_left(EDGE + spare[0])
         .margin_right(width as i32 - corner[0] - size[0])
         .margin_top(corner[1])
         .margin_bottom(height as i32 - corner[1] - size[1] - BOTTOM)

@@ -1,6 +1,6 @@
 //! The pages of a press: frames, surfaces, matches, displacement, strain, summary.
 use super::{Colour, HeatMap, Legend, Marker, Page, Panel, PlotError};
-use crate::pipeline::{Measurement, PipelineError, Press};
+use crate::pipeline::{Measurement, PipelineError, Press, with_error};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 
@@ -49,13 +49,12 @@ pub fn save_press_pages(
 /// What every measurement says, as lines for the summary page.
 pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
     let modulus = &measurement.youngs_modulus_pa;
-    let kpa = |v: f64| v * 1e-3;
-    let mut lines =
-        vec![format!("Young's modulus\t{:.2} ± {:.2} kPa", kpa(modulus.value), kpa(modulus.standard_error))];
+    let value = with_error(modulus.value, modulus.standard_error, 1e-3);
+    let mut lines = vec![format!("Young's modulus\t{value} kPa")];
     lines.push(format!("estimator\t{}", modulus.estimator));
     for (i, frame) in measurement.frames.iter().enumerate() {
         let (f, a) = (frame.force_n, frame.contact_radius_m);
-        lines.push(format!("force {}\t{:.4} ± {:.4} N", i + 1, f.value, f.standard_error));
+        lines.push(format!("force {}\t{} N", i + 1, with_error(f.value, f.standard_error, 1.0)));
         lines.push(format!(
             "contact radius {}\t{:.4} ± {:.4} mm",
             i + 1,
@@ -70,7 +69,7 @@ pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
         lines.push(format!("matches\t{} of {} control points", m.matched, m.points));
     }
     if let Some(s) = &measurement.strain {
-        lines.push(format!("mean strain e_zz\t{:+.4} ± {:.4}", s.mean[2][2], s.standard_error[2][2]));
+        lines.push(format!("mean strain e_zz\t{}", with_error(s.mean[2][2], s.standard_error[2][2], 1.0)));
     }
     lines
 }
@@ -90,7 +89,7 @@ fn axes(title: impl Into<String>) -> Panel {
 /// The frames with the contact circles.
 fn frames_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
     let size = press.stages().contact().pixel_size_m().map(|s| s * MM);
-    let mut page = Page::new("Frames and contacts").columns(2);
+    let mut page = Page::new("Frames and contacts").columns(press.frames().min(2));
     for frame in 0..press.frames() {
         let title = force_title(press, frame)?;
         let circle = press.contact(frame)?.map(|c| {
@@ -111,7 +110,7 @@ fn circle([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
 
 /// Heights as maps, and a cut through the middle of each.
 fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
-    let mut page = Page::new("Reconstructed surfaces").columns(2);
+    let mut page = Page::new("Reconstructed surfaces").columns((press.frames() + 1).min(3));
     let mut cuts = axes("Cuts along x through the highest point").y_label("height (mm)");
     for frame in 0..press.frames() {
         let title = force_title(press, frame)?;
