@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`angle`] | critical and acceptance angles, (1)–(4) |
 //! | [`snell`] | propagation angles through a stack |
-//! | [`fresnel`] | reflectance and transmittance, s, p and unpolarised |
+//! | [`mod@fresnel`] | reflectance and transmittance, s, p and unpolarised |
 //! | [`stack`] | a stack of layers in its ambient: all of the above, normal incidence, the LED's cone |
 //! | [`dispersion`] | refractive index against wavelength; PDMS and borosilicate glass |
 //! | [`led`] | radiation pattern and the share of it that is trapped |
