@@ -126,16 +126,32 @@ pub(crate) fn spline<T: Scalar, const D: usize>(
         let options = FitOptions::new(kernel).smoothing(smoothing);
         weights.iter().fold(options, |options, weights| options.weights(weights.clone()))
     }
-    if D == 2 {
-        if let Ok(spline) =
-            Spline::<T, D, D, R2LogR>::fit(sources, images, &options(R2LogR, smoothing, &weights))
-        {
-            return Box::new(spline);
-        }
-    } else if let Ok(spline) =
-        Spline::<T, D, D, NegR>::fit(sources, images, &options(NegR, smoothing, &weights))
-    {
-        return Box::new(spline);
+    let exact = smoothing == Smoothing::None;
+    let spline: Option<Box<dyn Warp<T, D> + Send + Sync>> = if D == 2 {
+        let fit = Spline::<T, D, D, R2LogR>::fit(sources, images, &options(R2LogR, smoothing, &weights));
+        fit.ok().map(|spline| Box::new(spline) as _)
+    } else {
+        let fit = Spline::<T, D, D, NegR>::fit(sources, images, &options(NegR, smoothing, &weights));
+        fit.ok().map(|spline| Box::new(spline) as _)
+    };
+    match spline.filter(|spline| follows(&**spline, sources, images, exact)) {
+        Some(spline) => spline,
+        None => Box::new(
+            AffineModel.fit(sources, images, weights.as_deref()).unwrap_or_else(|_| Affine::identity()),
+        ),
     }
-    Box::new(AffineModel.fit(sources, images, weights.as_deref()).unwrap_or_else(|_| Affine::identity()))
+}
+
+/// Whether the spline is any good: where sources nearly coincide and their images do not, no digit is left in it.
+fn follows<T: Scalar, const D: usize>(
+    spline: &(dyn Warp<T, D> + Send + Sync),
+    sources: &[Point<T, D>],
+    images: &[Point<T, D>],
+    exact: bool,
+) -> bool {
+    let size = images.iter().fold(T::zero(), |m, p| m.max(p.coords.amax()));
+    sources.iter().zip(images).all(|(source, image)| {
+        let miss = (spline.apply(source) - image).amax();
+        miss.is_finite() && (!exact || miss <= size * nalgebra::convert(1e-3))
+    })
 }

@@ -1,9 +1,10 @@
-//! What every matcher asks of its input: at least one point in each set, every coordinate finite.
+//! What every matcher asks of its input: at least one point in each set, every coordinate finite and not too
+//! large to be squared.
 
 use crate::{MatchError, PointSet};
 use nalgebra::{Point, RealField};
 
-/// Rejects empty sets and coordinates that are NaN or infinite; `O(I + J)`.
+/// Rejects empty sets and coordinates that are NaN, infinite or too large to be squared; `O(I + J)`.
 ///
 /// # Errors
 /// [`MatchError::Empty`] and [`MatchError::NotFinite`].
@@ -23,7 +24,9 @@ pub(crate) fn point_set<T: RealField + Copy, const D: usize>(
     if points.is_empty() {
         return Err(MatchError::Empty { set });
     }
-    match points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+    // Sixteen: room for differences, and for the sum of their squares.
+    let usable = |c: T| (c * c * nalgebra::convert(16.0)).is_finite();
+    match points.iter().position(|p| p.iter().any(|&c| !usable(c))) {
         Some(row) => Err(MatchError::NotFinite { set, row }),
         None => Ok(()),
     }

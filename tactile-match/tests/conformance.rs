@@ -2,35 +2,10 @@
 
 mod common;
 
-use common::{Stream, assert_consistent, bend, grid, reordered, scattered};
+use common::{Stream, assert_consistent, bend, grid, largest_step, matchers, reordered, scattered};
 use nalgebra::{Point, SVector};
-use tactile_match::dense::Neighbourhood;
-use tactile_match::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, MatchError, Motion,
-    NearestNeighbour, PointMatcher, PointSet,
-};
+use tactile_match::{MatchError, PointMatcher, PointSet};
 use tactile_tps::Scalar;
-
-type Matchers<T, const D: usize> = Vec<(&'static str, Box<dyn PointMatcher<T, D>>)>;
-
-/// Every matcher of the crate; a new one is added here and nowhere else.
-fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
-    let drift = |motion| {
-        CoherentPointDrift::new(DriftOptions { motion, ..Default::default() }).expect("valid options")
-    };
-    // Eight neighbours instead of half of all points: what is checked here does not need the time of the latter.
-    let options = DenseOptions { neighbourhood: Neighbourhood::Nearest(8), ..Default::default() };
-    let dense = DenseRelaxation::new(options).expect("valid options");
-    vec![
-        ("dense relaxation", Box::new(dense)),
-        ("nearest neighbour", Box::new(NearestNeighbour::new())),
-        ("linear assignment", Box::new(LinearAssignment::new())),
-        ("coherent point drift", Box::new(CoherentPointDrift::default())),
-        ("coherent point drift, rigid", Box::new(drift(Motion::Rigid))),
-        ("coherent point drift, similarity", Box::new(drift(Motion::Similarity))),
-        ("coherent point drift, affine", Box::new(drift(Motion::Affine))),
-    ]
-}
 
 /// Runs a check for every matcher, scalar and dimension.
 macro_rules! for_all {
@@ -45,10 +20,6 @@ macro_rules! for_all {
             $check::<$t, $d>(&format!("{name}, {}, {}-D", stringify!($t), $d), &*matcher);
         }
     };
-}
-
-fn largest_step<T: Scalar, const D: usize>(a: &[Point<T, D>], b: &[Point<T, D>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| nalgebra::convert_unchecked::<T, f64>((a - b).norm())).fold(0.0, f64::max)
 }
 
 /// A match that must succeed and be consistent.
