@@ -1,4 +1,4 @@
-//! Cholesky factorisation of a dense symmetric positive definite matrix, and its triangular solves.
+//! Cholesky factorisation of a dense symmetric positive definite matrix.
 //!
 //! Blocked and left-looking: a block of columns gathers all that earlier columns subtract from it in registers, tile by
 //! tile, then panels of eight columns are finished within the block. The matrix is padded to a multiple of eight
@@ -6,8 +6,10 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::triangular::Solve;
+
 /// Columns of a panel, and the multiple the matrix is padded to.
-const PANEL: usize = 8;
+pub(crate) const PANEL: usize = 8;
 /// Columns of a block.
 const BLOCK: usize = 64;
 /// Depth to which tiles gather before they are written back, so that a packed strip stays in the first-level cache.
@@ -99,7 +101,7 @@ impl Cholesky {
 
 /// `V` vectors of `simd` from `column[row..]`.
 #[inline(always)]
-fn load<S: Simd, const V: usize>(column: &[f64], row: usize) -> [S::f64s; V] {
+pub(crate) fn load<S: Simd, const V: usize>(column: &[f64], row: usize) -> [S::f64s; V] {
     let vectors = S::as_simd_f64s(&column[row..row + V * S::F64_LANES]).0;
     core::array::from_fn(|v| vectors[v])
 }
@@ -335,93 +337,6 @@ fn panel<S: Simd>(
             }
             x[c] = simd.mul_f64s(sum, simd.splat_f64s(factor[c][c]));
             S::as_mut_simd_f64s(&mut columns[c * stride + row..c * stride + row + S::F64_LANES]).0[0] = x[c];
-        }
-    }
-}
-
-struct Solve<'a, const R: usize> {
-    l: &'a [f64],
-    stride: usize,
-    order: usize,
-    reciprocal: &'a [f64],
-    b: &'a mut [f64],
-}
-
-impl<const R: usize> WithSimd for Solve<'_, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
-        for start in (0..self.order).step_by(PANEL) {
-            self.forward(simd, start);
-        }
-        for start in (0..self.order).step_by(PANEL).rev() {
-            self.backward(simd, start);
-        }
-    }
-}
-
-impl<const R: usize> Solve<'_, R> {
-    /// Solves one panel of L z = b and subtracts it from the rows below.
-    #[inline(always)]
-    fn forward<S: Simd>(&mut self, simd: S, start: usize) {
-        let Self { l, stride, order, reciprocal, .. } = *self;
-        let columns = &l[start * stride..];
-        let mut x = [[0.0; PANEL]; R];
-        for r in 0..R {
-            let b = &mut self.b[r * stride..];
-            for c in 0..PANEL {
-                let done: f64 =
-                    (0..c).fold(b[start + c], |sum, d| sum - columns[d * stride + start + c] * x[r][d]);
-                x[r][c] = done * reciprocal[start + c];
-            }
-            b[start..start + PANEL].copy_from_slice(&x[r]);
-        }
-        let x: [[S::f64s; PANEL]; R] = x.map(|x| x.map(|x| simd.splat_f64s(-x)));
-        for row in (start + PANEL..order).step_by(S::F64_LANES) {
-            let l: [S::f64s; PANEL] = core::array::from_fn(|c| load::<S, 1>(&columns[c * stride..], row)[0]);
-            for r in 0..R {
-                let at = r * stride + row;
-                let b = &mut S::as_mut_simd_f64s(&mut self.b[at..at + S::F64_LANES]).0[0];
-                for c in 0..PANEL {
-                    *b = simd.mul_add_e_f64s(l[c], x[r][c], *b);
-                }
-            }
-        }
-    }
-
-    /// Solves one panel of Lᵀx = z from the rows below.
-    #[inline(always)]
-    fn backward<S: Simd>(&mut self, simd: S, start: usize) {
-        let Self { l, stride, order, reciprocal, .. } = *self;
-        let columns = &l[start * stride..];
-        let mut known = [[0.0; PANEL]; R];
-        for half in [0, PANEL / 2] {
-            let mut sum = [[simd.splat_f64s(0.0); PANEL / 2]; R];
-            for row in (start + PANEL..order).step_by(S::F64_LANES) {
-                let l: [S::f64s; PANEL / 2] =
-                    core::array::from_fn(|c| load::<S, 1>(&columns[(half + c) * stride..], row)[0]);
-                for r in 0..R {
-                    let b = load::<S, 1>(self.b, r * stride + row)[0];
-                    for c in 0..PANEL / 2 {
-                        sum[r][c] = simd.mul_add_e_f64s(l[c], b, sum[r][c]);
-                    }
-                }
-            }
-            for r in 0..R {
-                for c in 0..PANEL / 2 {
-                    known[r][half + c] = simd.reduce_sum_f64s(sum[r][c]);
-                }
-            }
-        }
-        for r in 0..R {
-            let b = &mut self.b[r * stride..];
-            for c in (0..PANEL).rev() {
-                let own = &columns[c * stride + start..c * stride + start + PANEL];
-                let rest =
-                    (c + 1..PANEL).fold(b[start + c] - known[r][c], |sum, d| sum - own[d] * b[start + d]);
-                b[start + c] = rest * reciprocal[start + c];
-            }
         }
     }
 }

@@ -1,4 +1,15 @@
-//! Thin-plate splines in two and three dimensions: fit, evaluate, differentiate, smooth.
+#![doc = include_str!("../README.md")]
+//!
+//! ## Where to find what
+//!
+//! | to | use |
+//! |---|---|
+//! | fit once | [`ThinPlateSpline::fit`](Spline::fit), or [`Spline::fit`] for other than D outputs |
+//! | fit again and again | [`Factorization`] with a [`Workspace`] |
+//! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
+//! | know how it went | [`FitReport`] |
+//! | take any warp | the object-safe trait [`Warp`]: splines, [`Affine`], [`Rigid`] |
+//! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`], [`RigidModel`] |
 #![forbid(unsafe_code)]
 // Several arrays share one index in dense linear algebra; zipping them hides it.
 #![allow(clippy::needless_range_loop)]
@@ -27,6 +38,7 @@ mod spectrum;
 mod spline;
 mod symmetric;
 mod system;
+mod triangular;
 mod twofold;
 mod warp;
 

@@ -320,7 +320,7 @@ fn directions_that_are_not_spanned_are_dropped() {
 fn bad_input_is_named() {
     let points = Uniform(3).points::<2>(6);
     let fit = |sources: &[Point2<f64>], targets: &[Point2<f64>], options| {
-        ThinPlateSpline::fit(sources, targets, &options).err().expect("an error").to_string()
+        ThinPlateSpline::fit(sources, targets, &options).expect_err("an error").to_string()
     };
     let plain = FitOptions::<f64>::default;
     assert_eq!(fit(&[], &[], plain()), "no source points to fit");
