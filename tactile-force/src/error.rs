@@ -53,6 +53,16 @@ pub enum ForceError {
         /// The longest side allowed.
         limit: usize,
     },
+    /// A reference frame too dark to show how evenly it is lit.
+    #[error(
+        "the reference's mean of {mean} grey levels is below the {required} needed to see its vignetting"
+    )]
+    ReferenceTooDark {
+        /// Its mean grey level.
+        mean: f64,
+        /// The least mean that will do.
+        required: f64,
+    },
     /// Too much of the contact is saturated for its force to be known.
     #[error("{share} of the contact is saturated, more than the stated {limit}")]
     SaturatedContact {

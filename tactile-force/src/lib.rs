@@ -1,10 +1,24 @@
-//! From grey levels to stress, force, contact and shear.
+#![doc = include_str!("../README.md")]
 //!
-//! The easy call is [`measure_force`]; [`ForceMeter`] with a [`ForceWorkspace`] is the same without allocation.
+//! # Conventions
+//! Images are indexed `[row, column]`; x is the column, y the row, and (0, 0) is the centre of the first pixel. Physical quantities are
+//! SI and say so in their names; names that end in `_px` are in pixels. Equation numbers are those of the paper on waveguide tactile
+//! imaging that the workspace follows.
 //!
-//! Images are indexed `[row, column]`; x is the column, y the row, and (0, 0) is the centre of the first pixel.
+//! # Rooms
+//! | module | what it holds |
+//! |---|---|
+//! | `frame` | the pass over a frame, the reference, the noise of both, vignetting |
+//! | `drift` | what the lamps did since the reference was taken |
+//! | `contact` | detection, mask, aperture, what is summed over it |
+//! | `hertz` | the contact radius |
+//! | `calibration` | pixel value to force and stress, (5) and (6) |
+//! | `measure`, `batch` | one frame in, force out; many frames |
+//! | `shear` | (9) to (12) |
+//! | `image` | moments of float images, blobs averaged over pixels |
 #![forbid(unsafe_code)]
 
+mod batch;
 mod calibration;
 mod contact;
 mod drift;
@@ -24,7 +38,7 @@ pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorW
 pub use drift::{Drift, DriftCorrection};
 pub use error::{ForceError, Requirement};
 pub use estimate::{Estimate, Real};
-pub use frame::{BoundingBox, DifferenceNoise, FrameStatistics, NoiseModel, ReferenceFrame};
+pub use frame::{BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame};
 pub use hertz::{HertzFit, HertzFitOptions, HertzFitter};
 pub use image::{
     GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,

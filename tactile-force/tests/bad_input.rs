@@ -68,6 +68,8 @@ fn images_that_do_not_fit() {
         ReferenceFrame::from_frames(&[small.view(), large.view()]),
         Err(ForceError::SizeMismatch { .. })
     ));
+    let black = ReferenceFrame::new(small.view()).unwrap().with_flat_field();
+    assert!(matches!(black, Err(ForceError::ReferenceTooDark { .. })));
     let long = Array2::<u8>::zeros((1, 20_000));
     assert_eq!(measure(&long, &long), Err(ForceError::ImageTooLarge { found: 20_000, limit: 16_384 }));
     let nan = array![[1.0, 2.0], [f64::NAN, 3.0]];

@@ -151,7 +151,7 @@ impl ContactDetector {
         let sign = self.options.polarity.sign() as f32;
         let mut place = suspect.grown(TILE_COLUMNS, frame.dim());
         loop {
-            region.load(frame, reference.mean(), place, drift, sign);
+            region.load(frame, reference, place, drift, sign);
             let z = quantile(self.options.false_alarm_rate, region.difference.len());
             let signal = region.difference.iter().copied().fold(0.0, f32::max);
             let width =
@@ -176,18 +176,19 @@ impl ContactDetector {
         reference: &ReferenceFrame,
         drift: &Drift,
     ) -> DifferenceNoise {
-        let background = reference.difference_variance();
-        let peak = peak(&workspace.region);
-        let gain = reference
-            .known_gain()
-            .unwrap_or_else(|| noise::gain(&workspace.region, &mut workspace.histogram, background, peak));
-        let [common, scale] = workspace.region.bounds(&workspace.region.mask).map_or([0.0; 2], |b| {
-            drift.variances(
-                0.5 * (b.column_start + b.column_end) as f64,
-                0.5 * (b.row_start + b.row_end) as f64,
-            )
-        });
-        DifferenceNoise { background, gain, common, scale }
+        let DetectorWorkspace { region, histogram, .. } = workspace;
+        let (x, y) = region.bounds(&region.mask).map_or((0.0, 0.0), |b| b.middle());
+        // Flattening divides signal and noise alike.
+        let (light, uncertain) =
+            reference.flat_field().map_or((1.0, 0.0), |f| (f.at(x, y), f.variance_at(x, y)));
+        let flat_field = uncertain / (light * light);
+        let background = reference.difference_variance() / (light * light);
+        let [common, scale] = drift.variances(x, y);
+        let gain = match reference.known_gain() {
+            Some(gain) => gain / light,
+            None => noise::gain(region, histogram, background, peak(region)),
+        };
+        DifferenceNoise { background, gain, common: common / (light * light), scale, flat_field }
     }
 
     fn summarise<T: Real>(

@@ -3,7 +3,7 @@
 use ndarray::ArrayView2;
 
 use super::runs::{self, Components, Run, push_runs};
-use crate::{BoundingBox, drift::Drift};
+use crate::{BoundingBox, Drift, ReferenceFrame};
 
 /// Differences over one box, row-major, and the contact in it as runs.
 #[derive(Clone, Debug, Default)]
@@ -37,25 +37,31 @@ impl Region {
         self.place.map_or(1, |p| p.columns())
     }
 
-    /// Takes the differences inside a box.
+    /// Takes the differences inside a box, corrected for drift and vignetting.
     pub(super) fn load(
         &mut self,
         frame: ArrayView2<'_, u8>,
-        reference: ArrayView2<'_, f32>,
+        reference: &ReferenceFrame,
         place: BoundingBox,
         drift: &Drift,
         sign: f32,
     ) {
         self.place = Some(place);
         self.difference.clear();
-        let (frame, reference) = (place.of(frame), place.of(reference));
-        for (y, (f, r)) in frame.rows().into_iter().zip(reference.rows()).enumerate() {
+        let (frame, mean) = (place.of(frame), place.of(reference.mean()));
+        let flat = reference.flat_field();
+        for (y, (f, r)) in frame.rows().into_iter().zip(mean.rows()).enumerate() {
+            let start = self.difference.len();
             let pairs = f.into_iter().zip(r).map(|(f, r)| (f32::from(*f), *r));
+            let row = place.row_start + y;
             if drift.is_zero() {
                 self.difference.extend(pairs.map(|(f, r)| sign * (f - r)));
             } else {
-                let line = drift.line(place.row_start + y, place.column_start);
+                let line = drift.line(row, place.column_start);
                 self.difference.extend(pairs.enumerate().map(|(x, (f, r))| sign * line.difference(x, f, r)));
+            }
+            if let Some(line) = flat.map(|f| f.line(row, place.column_start)) {
+                self.difference[start..].iter_mut().enumerate().for_each(|(x, d)| *d /= line.at(x));
             }
         }
     }

@@ -52,6 +52,7 @@ impl Sums {
         noise.background * self.plain[0]
             + noise.gain * self.weighted[0].max(0.0)
             + (noise.common.sqrt() * self.plain[0] + noise.scale.sqrt() * self.weighted[0]).powi(2)
+            + noise.flat_field * self.weighted[0] * self.weighted[0]
     }
 
     /// Variance of the centroid along x (0) or y (1): Σ var(d) (x − x̄)²/(Σ d)², and the common error's lever.

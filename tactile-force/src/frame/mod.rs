@@ -1,11 +1,13 @@
 //! The one pass over a frame, the reference it is compared with, and the noise of both.
 
+mod flat_field;
 mod noise;
 mod pass;
 mod reference;
 mod statistics;
 mod strip;
 
+pub use flat_field::FlatField;
 pub use noise::{DifferenceNoise, NoiseModel};
 pub use reference::ReferenceFrame;
 pub use statistics::{BoundingBox, FrameStatistics};

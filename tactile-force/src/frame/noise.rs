@@ -30,6 +30,8 @@ pub struct DifferenceNoise {
     pub common: f64,
     /// Variance of a relative error of the whole signal, left by the correction of the lamps.
     pub scale: f64,
+    /// Variance of a relative error of the whole signal, left by the correction for vignetting.
+    pub flat_field: f64,
 }
 
 /// Variance of rounding to whole numbers.

@@ -3,7 +3,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use super::pass::{Tiles, pixels_of, scan, tighten};
-use super::{FrameStatistics, NoiseModel, TILE_ROWS};
+use super::{FlatField, FrameStatistics, NoiseModel, TILE_ROWS};
 use crate::{ForceError, drift::TileSum};
 
 /// Longest side for which every integer sum of the pass fits its type: 16384⁴/3 · 255 < 2⁶³.
@@ -19,6 +19,7 @@ pub struct ReferenceFrame {
     noise: NoiseModel,
     /// Whether the gain was given, and not only the noise at the reference's own level measured.
     gain_known: bool,
+    flat: Option<FlatField>,
     sums: FrameStatistics,
     tiles: Tiles,
     /// Brightest pixel of every band of eight rows.
@@ -74,7 +75,17 @@ impl ReferenceFrame {
             let mean_sum: f64 = tiles.pixels(tile, size).of(mean.view()).iter().map(|m| f64::from(*m)).sum();
             tiles.sums[tile] = mean_sum.round() as i32;
         }
-        Ok(Self { image, mean, frames: frames.len(), noise, gain_known: false, sums, tiles, brightest })
+        Ok(Self {
+            image,
+            mean,
+            frames: frames.len(),
+            noise,
+            gain_known: false,
+            flat: None,
+            sums,
+            tiles,
+            brightest,
+        })
     }
 
     /// The same reference with a known noise instead of the estimated one.
@@ -82,6 +93,27 @@ impl ReferenceFrame {
         self.noise = noise;
         self.gain_known = true;
         self
+    }
+
+    /// Corrects every difference for vignetting: divides it by the brightness that the reference itself has there, relative to
+    /// the frame's middle, smoothed to a quadratic. A calibration then holds wherever the contact lies.
+    ///
+    /// Right where stray light and signal come through the same lens.
+    ///
+    /// # Errors
+    /// The reference is too dark to tell: its mean is below one grey level.
+    pub fn with_flat_field(mut self) -> Result<Self, ForceError> {
+        let mean = self.sums.sum as f64 / self.image.len() as f64;
+        let too_dark = ForceError::ReferenceTooDark { mean, required: 1.0 };
+        let flat = FlatField::fit(self.image.dim(), self.tile_sums(&self.tiles), self.own_variance())
+            .filter(|_| mean >= 1.0);
+        self.flat = Some(flat.ok_or(too_dark)?);
+        Ok(self)
+    }
+
+    /// The correction for vignetting, if it was asked for.
+    pub fn flat_field(&self) -> Option<FlatField> {
+        self.flat
     }
 
     /// The image; the mean of several frames, rounded.
@@ -144,8 +176,13 @@ impl ReferenceFrame {
 
     /// Variance of one pixel's difference frame − reference where nothing presses.
     pub(crate) fn difference_variance(&self) -> f64 {
+        self.own_variance() * (self.frames as f64 + 1.0)
+    }
+
+    /// Variance of one pixel of the reference.
+    fn own_variance(&self) -> f64 {
         let level = self.sums.sum as f64 / self.image.len() as f64;
-        self.noise.variance(level) * (1.0 + 1.0 / self.frames as f64)
+        self.noise.variance(level) / self.frames as f64
     }
 
     /// The gain, if it was given.

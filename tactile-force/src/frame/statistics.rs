@@ -29,6 +29,12 @@ impl BoundingBox {
         self.column_end - self.column_start
     }
 
+    /// Centre (x, y).
+    pub(crate) fn middle(&self) -> (f64, f64) {
+        let half = |from: usize, to: usize| 0.5 * ((from + to) as f64 - 1.0);
+        (half(self.column_start, self.column_end), half(self.row_start, self.row_end))
+    }
+
     /// The part of an image inside the box.
     pub fn of<'a, P>(&self, mut image: ArrayView2<'a, P>) -> ArrayView2<'a, P> {
         image.slice_axis_inplace(Axis(0), Slice::from(self.row_start..self.row_end));

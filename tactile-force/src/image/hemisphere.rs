@@ -10,7 +10,7 @@ use crate::{ForceError, Real, Requirement};
 ///
 /// ```
 /// use tactile_force::{HertzProfile, PixelGrid};
-/// let blob = HertzProfile::new([7.2, 8.1], 5.5, 100.0)?;
+/// let blob = HertzProfile::new([7.2_f64, 8.1], 5.5, 100.0)?;
 /// let image = blob.image(&PixelGrid { rows: 16, columns: 16, size: [1.0; 2], first: [0.0; 2] });
 /// assert!((image.sum() / blob.whole().integral - 1.0).abs() < 1e-14);
 /// # Ok::<(), tactile_force::ForceError>(())
