@@ -9,6 +9,10 @@ use std::ops::ControlFlow;
 
 /// A point whose own match decides its position is not left out altogether.
 const MAX_LEVERAGE: f64 = 0.95;
+/// Soft partners spread less than this, relative to the temperature, are as good as decided: no need to go slowly.
+const DECIDED: f64 = 0.01;
+/// Fall of σ an iteration once the matches are decided.
+const DECIDED_RATE: f64 = 0.3;
 /// Fixed-point rounds for the share of stray points.
 const SHARE_ROUNDS: usize = 8;
 
@@ -21,6 +25,8 @@ pub(crate) struct Schedule {
     pub(crate) floor: f64,
     /// Largest fall of σ an iteration, as a factor.
     pub(crate) rate: f64,
+    /// Smallest fall of σ an iteration, as a factor; 1 lets the residuals decide.
+    pub(crate) least: f64,
     /// Most iterations.
     pub(crate) limit: usize,
     /// Sinkhorn sweeps an iteration.
@@ -38,6 +44,8 @@ pub(crate) struct State<const D: usize> {
     pub(crate) warped: Vec<[f64; D]>,
     /// Standard deviation of the residuals along one axis.
     pub(crate) sigma: f64,
+    /// Model points matched, in all.
+    pub(crate) matched: f64,
     /// Iterations made.
     pub(crate) iterations: usize,
     /// Energy per model point after every iteration.
@@ -54,7 +62,7 @@ impl<const D: usize> State<D> {
         self.warped.clone_from(&other.warped);
         self.trace.clone_from(&other.trace);
         (self.sigma, self.iterations) = (other.sigma, other.iterations);
-        (self.energy, self.settled) = (other.energy, other.settled);
+        (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
     }
 }
 
@@ -70,6 +78,8 @@ pub(crate) struct Annealer<const D: usize> {
     residuals: Axes<D>,
     predicted: Vec<[f64; D]>,
     sums: Vec<f64>,
+    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0 decided.
+    ambiguity: f64,
 }
 
 impl<const D: usize> Annealer<D> {
@@ -89,13 +99,18 @@ impl<const D: usize> Annealer<D> {
         state.settled = false;
         self.predicted.clone_from(&state.warped);
         for iteration in 0..schedule.limit {
-            let next = self.step(state, schedule, variance);
+            let residual = self.step(state, schedule, variance);
             state.iterations += 1;
             state.trace.push(self.free_energy(state, variance));
             observe(state.iterations, *state.trace.last().unwrap_or(&0.0))?;
             let floor = schedule.floor * schedule.floor;
-            let next = next.max(variance * schedule.rate * schedule.rate).max(floor).min(variance);
-            state.settled = variance <= floor || (iteration > 5 && variance - next < 1e-4 * variance);
+            let decided = self.ambiguity < DECIDED;
+            let fall = |rate: f64| variance * rate * rate;
+            let lowest = fall(if decided { DECIDED_RATE } else { schedule.rate }).max(floor);
+            let next = residual.min(fall(schedule.least)).max(lowest).min(variance);
+            let still = if decided { 1e-3 } else { 1e-4 };
+            state.settled =
+                variance <= floor || (iteration > 5 && (residual - variance).abs() < still * variance);
             if state.settled {
                 break;
             }
@@ -103,6 +118,30 @@ impl<const D: usize> Annealer<D> {
         }
         state.sigma = variance.sqrt();
         ControlFlow::Continue(())
+    }
+
+    /// One step from `state` in `scratch`: sets soft matches and regression to those of `state`; how undecided they are,
+    /// see [`ambiguity`](Self::ambiguity).
+    pub(crate) fn look(&mut self, state: &State<D>, scratch: &mut State<D>, schedule: &Schedule) -> f64 {
+        scratch.copy_from(state);
+        self.predicted.clone_from(&state.warped);
+        self.step(scratch, schedule, state.sigma * state.sigma);
+        self.ambiguity
+    }
+
+    /// Expectation and maximisation in turn with the noise level free: `rounds` of them, from where `state` stands.
+    pub(crate) fn settle(&mut self, state: &mut State<D>, schedule: &Schedule, rounds: usize) {
+        self.predicted.clone_from(&state.warped);
+        for _ in 0..rounds {
+            let residual = self.step(state, schedule, state.sigma * state.sigma);
+            let spread =
+                self.soft.weight.iter().zip(&self.regression.variance).map(|(w, v)| w * v).sum::<f64>();
+            let open = spread / self.soft.weight.iter().sum::<f64>().max(1e-9);
+            state.sigma = (residual + open).sqrt().max(schedule.floor);
+            self.predicted.clone_from(&state.warped);
+            state.iterations += 1;
+            state.trace.push(self.free_energy(state, state.sigma * state.sigma));
+        }
     }
 
     /// One soft assignment and one fit; the residual variance that is left.
@@ -114,9 +153,10 @@ impl<const D: usize> Annealer<D> {
         self.soft.normalise(schedule.sweeps, slack, slack);
         self.soft.moments(&self.predicted);
         self.fit(state, variance);
-        let (mut total, mut squares) = (0.0, 0.0);
+        let (mut total, mut squares, mut within) = (0.0, 0.0, 0.0);
         for i in 0..state.warped.len() {
             let (w, shift) = (self.soft.weight[i], self.soft.shift[i]);
+            within += self.soft.spread[i] - w * shift.iter().map(|s| s * s).sum::<f64>();
             let leverage = (w * self.regression.variance[i] / variance).min(MAX_LEVERAGE);
             let mut square = self.soft.spread[i];
             for k in 0..D {
@@ -130,6 +170,8 @@ impl<const D: usize> Annealer<D> {
             total += w;
             squares += square.max(0.0);
         }
+        state.matched = total;
+        self.ambiguity = within / (D as f64 * total.max(1e-9) * variance);
         if total > 0.0 { squares / (D as f64 * total) } else { variance }
     }
 

@@ -5,6 +5,8 @@ use super::soft_assign::SoftAssignment;
 
 /// Residuals below this (radii of the model) are what the prior's factor leaves out: the data are clean.
 pub(crate) const CLEAN: f64 = 3e-3;
+/// The answer is read at no lower temperature.
+const READ: f64 = 1.4e-3;
 /// Soft matches below this are not reported.
 const FAINT: f64 = 1e-3;
 
@@ -29,10 +31,11 @@ impl<const D: usize> Answer<D> {
         share: f64,
     ) {
         let n = state.warped.len();
-        let variance = state.sigma.powi(2);
+        // What the prior's factor leaves out must not cost a clean pair its match.
+        let variance = state.sigma.max(READ).powi(2);
         let slack = annealer.slack(share, n, variance).max(1e-30) as f32;
         annealer.soft.affinities(&state.warped, variance);
-        annealer.soft.normalise(20, slack, slack);
+        annealer.soft.normalise(8, slack, slack);
         annealer.soft.moments(&state.warped);
         self.assign(&annealer.soft, n, targets.len());
         self.place(state, targets);
@@ -52,11 +55,13 @@ impl<const D: usize> Answer<D> {
         self.confidence.clear();
         for i in 0..n {
             let mut best = (0.0, usize::MAX);
-            for j in 0..m {
-                let p = soft.entry(i, j);
+            let scale = f64::from(soft.row_scale[i]);
+            let row = soft.affinity_row(i).iter().zip(&soft.column_scale).zip(&mut self.column_best);
+            for (j, ((k, b), column)) in row.enumerate() {
+                let p = scale * f64::from(k * b);
                 best = if p > best.0 { (p, j) } else { best };
-                if p > self.column_best[j].0 {
-                    self.column_best[j] = (p, i);
+                if p > column.0 {
+                    *column = (p, i);
                 }
             }
             let free = (1.0 - soft.weight[i]).max(0.0);

@@ -1,4 +1,21 @@
-//! The fast matcher: robust starts, annealed soft assignment and a statistical last stage.
+//! The fast matcher: soft assignment and a smooth warp in turn, annealed, with starts from relaxation labelling.
+//!
+//! Given where the warp puts the model points, `m_ij ∝ exp(−|yᵢ − tⱼ|²/2σ²)` made doubly stochastic with slack (15) says
+//! softly who is whom; given that, the warp is the posterior mean of a smooth random field through the soft partners. Both
+//! alternate while the temperature σ falls. Three things make this sure and quick:
+//!
+//! - Distances are taken from the *leave-one-out* prediction of the warp, so that a wrong match does not confirm itself.
+//! - The field's covariance has few modes: a fit costs `O(I r²)` with r near 30, and its leverages come with it.
+//! - Most scenes are easy and end with the first run (`search`). Others get further starts: from shape contexts and
+//!   relaxation labelling with the paper's α, β, γ over few candidates (`correspond`, [`Labelling`]), and from the moments.
+//!   The start of least energy wins: minus the logarithm of the targets' likelihood and of the warp's prior.
+//!
+//! Where the residuals are rounding the data are clean, and matched points go exactly onto their partners. Where they are
+//! noise the scales of the field are averaged over by their evidence, unless the matches themselves are undecided. The
+//! final warp is the thin-plate spline through the estimated positions.
+//!
+//! A search costs `O(I J)` an iteration and memory of one `I × J` matrix in single precision. All of it is worked in double
+//! precision (the assignment in single) whatever the type of the points.
 
 mod anneal;
 mod axes;
@@ -9,6 +26,7 @@ mod labelling;
 mod options;
 mod prior;
 mod regression;
+mod search;
 mod soft_assign;
 mod starts;
 
@@ -18,20 +36,32 @@ pub use options::{Outliers, RelaxationOptions, Rotation};
 use crate::{
     MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, unmatched_rows, validate,
 };
-use anneal::{Annealer, Schedule, State};
+use anneal::{Annealer, State};
 use correspond::Correspondence;
 use finish::Answer;
 use frame::Frame;
 use nalgebra::{Point, SMatrix};
-use prior::PriorScales;
 use std::ops::ControlFlow;
 use tactile_tps::{Affine, FitOptions, Scalar, ThinPlateSpline, Warp};
 
-const SCALES: PriorScales = PriorScales { length: 1.2, bending: 0.35, affine: 0.5 };
-/// Residuals are judged no finer than this.
-const RESOLUTION: f64 = 0.01;
-
-/// The library's matcher. See the [module docs](self).
+/// The library's matcher: annealed soft assignment under a smooth warp, started by relaxation labelling.
+///
+/// One default setting serves deformation, noise, stray and missing points; say [`Rotation::Any`] where the target may be
+/// turned by more than half a right angle. Two and three dimensions.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{PointMatcher, RelaxationMatcher};
+/// # fn main() -> Result<(), tactile_match::MatchError> {
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let mut target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y + 0.05 * p.x));
+/// target.reverse();
+/// let found = RelaxationMatcher::default().match_points(&model, &target)?;
+/// assert_eq!(found.assignment[0], Some(5));
+/// assert!((found.warp.apply(&model[2]) - target[3]).norm() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RelaxationMatcher {
     options: RelaxationOptions,
@@ -48,6 +78,8 @@ pub struct RelaxationWorkspace<const D: usize> {
     best: State<D>,
     answer: Answer<D>,
     correspondence: Correspondence<D>,
+    start: State<D>,
+    mean: Vec<[f64; D]>,
     starts: usize,
     stopped: bool,
 }
@@ -73,93 +105,36 @@ impl RelaxationMatcher {
         &self.options
     }
 
-    fn solve<const D: usize>(
-        &self,
-        ws: &mut RelaxationWorkspace<D>,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) {
-        ws.annealer.volume = bounding_volume(&ws.target);
-        ws.annealer.prior.build(&ws.model, SCALES);
-        ws.annealer.soft.set_targets(&ws.target);
-        (ws.starts, ws.stopped) = (0, false);
-        ws.best.energy = f64::INFINITY;
-        starts::centred(&ws.model, &ws.target, &mut ws.state.base);
-        let mut flow = self.attempt(ws, 0.3, observe);
-        if self.options.rotation == Rotation::Limited && flow.is_continue() && !self.is_exact(ws) {
-            starts::centred(&ws.model, &ws.target, &mut ws.state.base);
-            ws.state.warped.clone_from(&ws.state.base);
-            ws.correspondence.start(&mut ws.annealer, SCALES, &ws.model, &ws.target, &mut ws.state);
-            flow = self.refine(ws, 0.15, observe);
-        }
-        let rotations = match self.options.rotation {
-            Rotation::Any => starts::rotations::<D>(),
-            Rotation::Limited => starts::limited_rotations::<D>(),
-        };
-        for rotation in rotations {
-            if flow.is_break() || self.is_exact(ws) {
-                break;
-            }
-            starts::moments(&ws.model, &ws.target, &rotation, &mut ws.state.base);
-            flow = self.attempt(ws, 0.3, observe);
-        }
-        ws.stopped = flow.is_break();
-        ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack);
-    }
-
-    /// Whether the best run so far explains nearly every point of the smaller set to rounding.
-    fn is_exact<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
-        ws.best.sigma <= finish::CLEAN
-    }
-
-    /// A run from `ws.state.base` itself.
-    fn attempt<const D: usize>(
-        &self,
-        ws: &mut RelaxationWorkspace<D>,
-        sigma: f64,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        ws.state.warped.clone_from(&ws.state.base);
-        self.refine(ws, sigma, observe)
-    }
-
-    /// A run from `ws.state.warped`; kept if it is the best so far.
-    fn refine<const D: usize>(
-        &self,
-        ws: &mut RelaxationWorkspace<D>,
-        sigma: f64,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let schedule = Schedule {
-            sigma,
-            floor: 1e-3,
-            rate: 0.93,
-            limit: self.options.max_iterations,
-            sweeps: 5,
-            slack: self.options.slack,
-        };
-        ws.starts += 1;
-        ws.state.trace.clear();
-        ws.state.iterations = 0;
-        let flow = ws.annealer.run(&mut ws.state, &schedule, observe);
-        ws.annealer.judge(&mut ws.state, self.options.slack, RESOLUTION);
-        if ws.state.energy < ws.best.energy || ws.starts == 1 {
-            ws.best.copy_from(&ws.state);
-        }
-        flow
-    }
-
-    /// As [`PointMatcher::match_points`]; `observe` hears the iteration and the energy after every outer
-    /// iteration and may stop the search: the best answer so far is then returned.
+    /// As [`PointMatcher::match_points`] in the caller's workspace; nothing is allocated once that has grown.
+    ///
+    /// `observe` hears the iteration and the energy after every outer iteration and may stop the search: the best answer
+    /// so far is then returned.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use std::ops::ControlFlow;
+    /// use tactile_match::{RelaxationMatcher, RelaxationWorkspace};
+    /// # fn main() -> Result<(), tactile_match::MatchError> {
+    /// let model: Vec<Point2<f64>> =
+    ///     (0..30).map(|i| Point2::new(f64::from(i % 6) + 0.1 * f64::from(i * i % 7), f64::from(i / 6))).collect();
+    /// let target: Vec<Point2<f64>> = model.iter().rev().map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y)).collect();
+    /// let mut workspace = RelaxationWorkspace::new();
+    /// let found = RelaxationMatcher::default()
+    ///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+    /// assert_eq!(found.assignment()[3], Some(26));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// As [`PointMatcher::match_points`].
-    pub fn match_points_observed<T: Scalar, const D: usize>(
+    pub fn match_points_with<'w, T: Scalar, const D: usize>(
         &self,
-        workspace: &mut RelaxationWorkspace<D>,
+        workspace: &'w mut RelaxationWorkspace<D>,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
         mut observe: impl FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> Result<Matching<T, D>, MatchError> {
+    ) -> Result<RelaxationMatch<'w, D>, MatchError> {
         validate::point_sets(model, target)?;
         let frame = Frame::new(model, target);
         workspace.frame = frame;
@@ -168,21 +143,61 @@ impl RelaxationMatcher {
         workspace.target.clear();
         workspace.target.extend(target.iter().map(|p| frame.inward(p)));
         self.solve(workspace, &mut observe);
-        Ok(workspace.matching(model))
+        Ok(RelaxationMatch { workspace })
     }
 }
 
-impl<const D: usize> RelaxationWorkspace<D> {
-    fn matching<T: Scalar>(&self, model: &[Point<T, D>]) -> Matching<T, D> {
-        let (answer, frame) = (&self.answer, &self.frame);
-        let warped: Vec<Point<T, D>> = answer.warped.iter().map(|w| frame.outward(w)).collect();
+/// The answer in a workspace.
+#[derive(Clone, Copy, Debug)]
+pub struct RelaxationMatch<'w, const D: usize> {
+    workspace: &'w RelaxationWorkspace<D>,
+}
+
+impl<'w, const D: usize> RelaxationMatch<'w, D> {
+    /// The warped model points.
+    pub fn warped<T: Scalar>(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + use<'w, T, D> {
+        let workspace = self.workspace;
+        workspace.answer.warped.iter().map(|w| workspace.frame.outward(w))
+    }
+
+    /// Target row of every model point.
+    #[must_use]
+    pub fn assignment(&self) -> &'w [Option<usize>] {
+        &self.workspace.answer.assignment
+    }
+
+    /// Probability that each assignment is right.
+    #[must_use]
+    pub fn confidence(&self) -> &'w [f64] {
+        &self.workspace.answer.confidence
+    }
+
+    /// How it went.
+    #[must_use]
+    pub fn report(&self) -> MatchReport<f64> {
+        let (workspace, scale) = (self.workspace, self.workspace.frame.scale);
+        MatchReport {
+            stop: self.stop_reason(),
+            iterations: workspace.best.iterations,
+            starts: workspace.starts,
+            residual: workspace.answer.residual * scale,
+            sigma: workspace.best.sigma * scale,
+        }
+    }
+
+    /// The answer with its warp, soft matches and covariances; `model` are the points that were matched.
+    #[must_use]
+    pub fn to_matching<T: Scalar>(&self, model: &[Point<T, D>]) -> Matching<T, D> {
+        let workspace = self.workspace;
+        let (answer, frame) = (&workspace.answer, &workspace.frame);
+        let warped: Vec<Point<T, D>> = self.warped().collect();
         let mut soft = SoftMatches::new();
         for i in 0..model.len() {
-            soft.push_row(finish::soft_row(&self.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))));
+            soft.push_row(finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))));
         }
         let square = frame.scale * frame.scale;
         let covariance = |c: &[[f64; D]; D]| SMatrix::from_fn(|a, b| T::narrow(c[a][b] * square));
-        let (unmatched_model, unmatched_target) = unmatched_rows(&answer.assignment, self.target.len());
+        let (unmatched_model, unmatched_target) = unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
             warp: warp_through(model, &warped),
             warped,
@@ -192,26 +207,34 @@ impl<const D: usize> RelaxationWorkspace<D> {
             unmatched_model,
             unmatched_target,
             displacement_covariance: answer.covariance.iter().map(covariance).collect(),
-            energy: self.best.trace.iter().map(|&e| T::narrow(e)).collect(),
-            report: MatchReport {
-                stop: self.stop_reason(),
-                iterations: self.best.iterations,
-                starts: self.starts,
-                residual: T::narrow(answer.residual * frame.scale),
-                sigma: T::narrow(self.best.sigma * frame.scale),
-            },
+            energy: workspace.best.trace.iter().map(|&e| T::narrow(e)).collect(),
+            report: narrow(&self.report()),
         }
     }
 
     fn stop_reason(&self) -> StopReason {
+        let workspace = self.workspace;
         match () {
-            () if self.stopped => StopReason::Callback,
-            () if self.best.sigma <= finish::CLEAN => StopReason::Exact,
-            () if self.best.settled => StopReason::Converged,
+            () if workspace.stopped => StopReason::Callback,
+            () if workspace.best.sigma <= finish::CLEAN => StopReason::Exact,
+            () if workspace.best.settled => StopReason::Converged,
             () => StopReason::IterationLimit,
         }
     }
 }
+
+fn narrow<T: Scalar>(report: &MatchReport<f64>) -> MatchReport<T> {
+    MatchReport {
+        stop: report.stop,
+        iterations: report.iterations,
+        starts: report.starts,
+        residual: T::narrow(report.residual),
+        sigma: T::narrow(report.sigma),
+    }
+}
+
+/// Above this many model points the spline goes through an even choice of them.
+const SPLINE_POINTS: usize = 400;
 
 /// The interpolating spline through the estimated positions; a translation where the spline does not exist
 /// (coinciding model points that go different ways).
@@ -219,7 +242,14 @@ fn warp_through<T: Scalar, const D: usize>(
     model: &[Point<T, D>],
     warped: &[Point<T, D>],
 ) -> Box<dyn Warp<T, D> + Send + Sync> {
-    match ThinPlateSpline::fit(model, warped, &FitOptions::default()) {
+    let stride = model.len().div_ceil(SPLINE_POINTS);
+    let every = |points: &[Point<T, D>]| points.iter().copied().step_by(stride).collect::<Vec<_>>();
+    let fitted = if stride == 1 {
+        ThinPlateSpline::fit(model, warped, &FitOptions::default())
+    } else {
+        ThinPlateSpline::fit(&every(model), &every(warped), &FitOptions::default())
+    };
+    match fitted {
         Ok(spline) => Box::new(spline),
         Err(_) => Box::new(Affine::new(SMatrix::identity(), warped[0] - model[0])),
     }
@@ -232,15 +262,8 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for RelaxationMatcher {
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
         let mut workspace = RelaxationWorkspace::new();
-        self.match_points_observed(&mut workspace, model, target, |_, _| ControlFlow::Continue(()))
+        let found =
+            self.match_points_with(&mut workspace, model, target, |_, _| ControlFlow::Continue(()))?;
+        Ok(found.to_matching(model))
     }
-}
-
-/// Volume of the bounding box; thin sides count as a tenth of the model's radius.
-fn bounding_volume<const D: usize>(points: &[[f64; D]]) -> f64 {
-    let side = |k: usize| {
-        let (low, high) = points.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
-        (high - low).max(0.1)
-    };
-    (0..D).map(side).product()
 }

@@ -37,7 +37,9 @@ impl<const D: usize> Regression<D> {
         Arch::new().dispatch(|| {
             for p in 0..r {
                 let column = prior.column(p);
-                self.weighted.iter_mut().zip(column).zip(weights).for_each(|((v, l), w)| *v = l * w);
+                for ((v, l), w) in self.weighted.iter_mut().zip(column).zip(weights) {
+                    *v = l * w;
+                }
                 for q in 0..=p {
                     self.gram[p * r + q] = dot(&self.weighted, prior.column(q));
                 }
@@ -57,7 +59,9 @@ impl<const D: usize> Regression<D> {
             axis.clear();
             axis.resize(prior.stride, 0.0);
             for (p, c) in self.solution.iter().enumerate() {
-                axis.iter_mut().zip(prior.column(p)).for_each(|(u, l)| *u += c[k] * l);
+                for (u, l) in axis.iter_mut().zip(prior.column(p)) {
+                    *u += c[k] * l;
+                }
             }
         }
     }
@@ -73,7 +77,9 @@ impl<const D: usize> Regression<D> {
                 self.whitened.extend_from_slice(prior.column(p));
                 let (done, current) = self.whitened.split_at_mut(p * stride);
                 for (column, a) in done.chunks_exact(stride).zip(&self.gram[p * r..]) {
-                    current.iter_mut().zip(column).for_each(|(v, c)| *v -= a * c);
+                    for (v, c) in current.iter_mut().zip(column) {
+                        *v -= a * c;
+                    }
                 }
                 let scale = 1.0 / self.gram[p * r + p];
                 for (v, sum) in current.iter_mut().zip(&mut self.variance) {
@@ -94,7 +100,9 @@ impl<const D: usize> Regression<D> {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
     for (x, y) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        (0..LANES).for_each(|l| sums[l] += x[l] * y[l]);
+        for l in 0..LANES {
+            sums[l] += x[l] * y[l];
+        }
     }
     sums.iter().sum()
 }
@@ -122,7 +130,9 @@ fn short_dot(a: &[f64], b: &[f64]) -> f64 {
     let (x, y) = (a.chunks_exact(4), b.chunks_exact(4));
     let rest: f64 = x.remainder().iter().zip(y.remainder()).map(|(p, q)| p * q).sum();
     for (p, q) in x.zip(y) {
-        (0..4).for_each(|l| sums[l] += p[l] * q[l]);
+        for l in 0..4 {
+            sums[l] += p[l] * q[l];
+        }
     }
     rest + sums.iter().sum::<f64>()
 }

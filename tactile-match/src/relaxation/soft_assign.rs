@@ -9,6 +9,9 @@ use pulp::Arch;
 /// Columns are padded to a multiple of this, so that rows are whole vectors.
 pub(crate) const LANES: usize = 16;
 
+/// Where the padding lies: no Gaussian reaches it, and its square is finite.
+const FAR: f32 = 1e15;
+
 /// The match matrix in factored form, with the moments of its rows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SoftAssignment<const D: usize> {
@@ -35,7 +38,7 @@ impl<const D: usize> SoftAssignment<D> {
         self.axes.clear();
         for k in 0..D {
             self.axes.extend(targets.iter().map(|t| t[k] as f32));
-            self.axes.resize((k + 1) * self.width, f32::MAX.sqrt() * 0.1);
+            self.axes.resize((k + 1) * self.width, FAR);
         }
     }
 
@@ -70,9 +73,13 @@ impl<const D: usize> SoftAssignment<D> {
                 for (row, a) in self.kernel.chunks_exact(width).zip(&mut self.row_scale) {
                     *a = 1.0 / (dot(row, &self.column_scale) + row_slack);
                     let a = *a;
-                    self.column_sum.iter_mut().zip(row).for_each(|(s, k)| *s += a * k);
+                    for (s, k) in self.column_sum.iter_mut().zip(row) {
+                        *s += a * k;
+                    }
                 }
-                self.column_scale.iter_mut().zip(&self.column_sum).for_each(|(b, s)| *b = 1.0 / s);
+                for (b, s) in self.column_scale.iter_mut().zip(&self.column_sum) {
+                    *b = 1.0 / s;
+                }
             }
         });
     }
@@ -110,9 +117,13 @@ fn gaussian_row<const D: usize>(row: &mut [f32], axes: &[f32], width: usize, y: 
     row.fill(0.0);
     for (k, &c) in y.iter().enumerate() {
         let axis = &axes[k * width..(k + 1) * width];
-        row.iter_mut().zip(axis).for_each(|(v, t)| *v += (t - c) * (t - c));
+        for (v, t) in row.iter_mut().zip(axis) {
+            *v += (t - c) * (t - c);
+        }
     }
-    row.iter_mut().for_each(|v| *v = exp(*v * scale));
+    for v in row {
+        *v = exp(*v * scale);
+    }
 }
 
 /// eˣ for x ≤ 0 to two units of single precision; 0 below −87.
@@ -133,7 +144,9 @@ fn exp(x: f32) -> f32 {
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; LANES];
     for (x, y) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        (0..LANES).for_each(|l| sums[l] += x[l] * y[l]);
+        for l in 0..LANES {
+            sums[l] += x[l] * y[l];
+        }
     }
     sums.iter().sum()
 }
@@ -152,17 +165,17 @@ fn row_moments<const D: usize>(
     for start in (0..width).step_by(LANES) {
         let (k, b) = (&row[start..start + LANES], &columns[start..start + LANES]);
         let mut m = [0.0_f32; LANES];
-        (0..LANES).for_each(|l| {
+        for l in 0..LANES {
             m[l] = k[l] * b[l];
             weight[l] += m[l];
-        });
+        }
         for (d, &c) in y.iter().enumerate() {
             let t = &axes[d * width + start..d * width + start + LANES];
-            (0..LANES).for_each(|l| {
-                let e = if m[l] > 0.0 { t[l] - c } else { 0.0 };
+            for l in 0..LANES {
+                let e = t[l] - c;
                 shift[d][l] += m[l] * e;
                 spread[l] += m[l] * e * e;
-            });
+            }
         }
     }
     (weight.iter().sum(), shift.map(|s| s.iter().sum()), spread.iter().sum())

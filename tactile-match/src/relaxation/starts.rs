@@ -1,7 +1,7 @@
 //! Where a run may start: first guesses of the affine part of the warp.
 
 use super::frame::mean;
-use nalgebra::{SMatrix, SVector, SymmetricEigen};
+use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen};
 
 /// The model moved so that the centroids meet.
 pub(crate) fn centred<const D: usize>(model: &[[f64; D]], target: &[[f64; D]], base: &mut Vec<[f64; D]>) {
@@ -42,8 +42,9 @@ fn covariance<const D: usize>(points: &[[f64; D]], centre: &[f64; D]) -> SMatrix
 
 /// Square root and inverse square root of a covariance; directions without extent get a thousandth of the largest.
 fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (SMatrix<f64, D, D>, SMatrix<f64, D, D>) {
-    let dynamic = nalgebra::DMatrix::from_fn(D, D, |r, c| matrix[(r, c)]);
-    let eigen = SymmetricEigen::new(dynamic);
+    // Up to three dimensions, the missing ones filled up with noughts: no allocation.
+    let entry = |r: usize, c: usize| if r < D && c < D { matrix[(r, c)] } else { 0.0 };
+    let eigen = SymmetricEigen::new(Matrix3::from_fn(entry));
     let floor = (1e-6 * eigen.eigenvalues.max()).max(f64::MIN_POSITIVE);
     let power = |exponent: f64| {
         SMatrix::from_fn(|r, c| {
@@ -51,28 +52,36 @@ fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (SMatrix<f64, D, D>, SM
                 let v = &eigen.eigenvectors;
                 v[(r, k)] * eigen.eigenvalues[k].max(floor).powf(exponent) * v[(c, k)]
             };
-            (0..D).map(term).sum()
+            (0..3).map(term).sum()
         })
     };
     (power(0.5), power(-0.5))
 }
 
-/// Rotations that cover all angles (`Any`): every 30° in the plane, the 24 of the cube in space.
-pub(crate) fn rotations<const D: usize>() -> Vec<SMatrix<f64, D, D>> {
-    match D {
-        2 => (0..12).map(|k| turn(0, 1, f64::from(k) * std::f64::consts::PI / 6.0)).collect(),
-        3 => cube(),
-        _ => vec![SMatrix::identity()],
-    }
+/// Rotations to try: in the plane, or in space.
+pub(crate) struct Choice {
+    plane: &'static [f64],
+    space: usize,
 }
 
-/// Rotations tried where the target is turned by little: none, and 30° each way in the plane.
-pub(crate) fn limited_rotations<const D: usize>() -> Vec<SMatrix<f64, D, D>> {
-    let mut out = vec![SMatrix::identity()];
-    if D == 2 {
-        out.extend([-1.0, 1.0].map(|sign| turn(0, 1, sign * std::f64::consts::PI / 6.0)));
-    }
-    out
+/// All angles: every 30° in the plane, the 24 rotations of the cube in space.
+pub(crate) const ANY: Choice =
+    Choice { plane: &[0., 30., -30., 60., -60., 90., -90., 120., -120., 150., -150., 180.], space: 24 };
+/// Little: none, and 30° each way in the plane.
+pub(crate) const LIMITED: Choice = Choice { plane: &[0., -30., 30.], space: 1 };
+
+/// The rotations of a choice.
+pub(crate) fn rotations<const D: usize>(choice: Choice) -> impl Iterator<Item = SMatrix<f64, D, D>> {
+    let count = match D {
+        2 => choice.plane.len(),
+        3 => choice.space,
+        _ => 1,
+    };
+    (0..count).map(move |k| match D {
+        2 => turn(0, 1, choice.plane[k].to_radians()),
+        3 => cube(k),
+        _ => SMatrix::identity(),
+    })
 }
 
 fn turn<const D: usize>(a: usize, b: usize, angle: f64) -> SMatrix<f64, D, D> {
@@ -81,16 +90,14 @@ fn turn<const D: usize>(a: usize, b: usize, angle: f64) -> SMatrix<f64, D, D> {
     r
 }
 
-fn cube<const D: usize>() -> Vec<SMatrix<f64, D, D>> {
+/// Rotation `k` of the 24 that map a cube onto itself, the identity first.
+fn cube<const D: usize>(k: usize) -> SMatrix<f64, D, D> {
     let quarter = std::f64::consts::FRAC_PI_2;
-    let mut out = Vec::with_capacity(24);
-    for face in 0..6 {
-        let up = if face < 4 {
-            turn(0, 2, f64::from(face) * quarter)
-        } else {
-            turn(1, 2, (2 * face - 9) as f64 * quarter)
-        };
-        out.extend((0..4).map(|k| up * turn::<D>(0, 1, f64::from(k) * quarter)));
-    }
-    out
+    let face = k / 4;
+    let up = if face < 4 {
+        turn(0, 2, face as f64 * quarter)
+    } else {
+        turn(1, 2, (2.0 * face as f64 - 9.0) * quarter)
+    };
+    up * turn::<D>(0, 1, (k % 4) as f64 * quarter)
 }

@@ -166,10 +166,10 @@ fn sector<const D: usize>(offset: &[f64; D]) -> usize {
 fn chi_squared(g: &[f32], h: &[f32]) -> f32 {
     let mut sums = [0.0_f32; LANES];
     for (x, y) in g.chunks_exact(LANES).zip(h.chunks_exact(LANES)) {
-        (0..LANES).for_each(|l| {
+        for l in 0..LANES {
             let difference = x[l] - y[l];
             sums[l] += difference * difference / (x[l] + y[l] + 1e-9);
-        });
+        }
     }
     sums.iter().sum()
 }

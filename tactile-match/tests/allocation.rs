@@ -1,0 +1,32 @@
+//! A batch through one workspace allocates nothing after its first match.
+use nalgebra::Point2;
+use std::ops::ControlFlow;
+use tactile_match::{RelaxationMatcher, RelaxationWorkspace};
+
+#[test]
+fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
+    let model: Vec<Point2<f64>> = (0..24)
+        .map(|i| Point2::new((0.618 * f64::from(i * i + 1)).fract(), (0.755 * f64::from(3 * i + 1)).fract()))
+        .collect();
+    // Every other target is noisy, so that the long way with all starts is covered as well.
+    let target = |shift: f64, noise: f64| -> Vec<Point2<f64>> {
+        let wobble = |i: usize| noise * (12.9 * i as f64).sin();
+        model
+            .iter()
+            .enumerate()
+            .map(|(i, p)| Point2::new(1.05 * p.x + shift + wobble(i), p.y - wobble(i + 9)))
+            .collect()
+    };
+    let targets = [target(0.1, 0.0), target(0.1, 0.05)];
+    let matcher = RelaxationMatcher::default();
+    let mut workspace = RelaxationWorkspace::new();
+    let mut run = |k: usize| {
+        let go = |_, _| ControlFlow::Continue(());
+        let found =
+            matcher.match_points_with(&mut workspace, &model, &targets[k % 2], go).expect("finite points");
+        assert_eq!(found.assignment().len(), 24);
+    };
+    (0..2).for_each(&mut run);
+    let info = allocation_counter::measure(|| (0..1000).for_each(&mut run));
+    assert_eq!(info.count_total, 0);
+}
