@@ -1,4 +1,5 @@
 //! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both results asserted.
+#![allow(clippy::print_stdout)]
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::sync::Arc;
