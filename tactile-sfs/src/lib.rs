@@ -32,9 +32,10 @@ pub use quality::{
     slope_error, slopes,
 };
 pub use reconstruct::{
-    Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Rim, Signal, SurfaceReconstruction, TsaiShah,
+    BallCalibration, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Rim, Signal, SurfaceReconstruction,
+    TsaiShah,
 };
-pub use sample::{ControlPointSampler, EquallySpaced};
+pub use sample::{ControlPointSampler, CurvatureAdaptive, EquallySpaced, Random};
 pub use scalar::Scalar;
 pub use surface::{Component, PixelFlags, Report, StopReason, Surface};
 pub use workspace::{Progress, Workspace};

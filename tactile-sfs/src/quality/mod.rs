@@ -4,4 +4,5 @@ mod compare;
 mod shading;
 
 pub use compare::{Alignment, ErrorSummary, HeightError, SlopeError, height_error, slope_error};
+pub(crate) use shading::slopes_at;
 pub use shading::{Reprojection, render, reprojection, slopes};

@@ -76,6 +76,16 @@ impl<T: Scalar> DepthTable<T> {
         Ok(Self { contact_threshold: threshold, ..self })
     }
 
+    /// What is looked up.
+    pub fn signal(&self) -> &Signal<T> {
+        &self.signal
+    }
+
+    /// The (signal, depth) pairs.
+    pub fn entries(&self) -> &[(T, T)] {
+        &self.entries
+    }
+
     /// Depth of a signal and whether the signal lies within the table.
     pub fn depth(&self, signal: T) -> (T, bool) {
         let entries = &self.entries;
@@ -91,7 +101,7 @@ impl<T: Scalar> DepthTable<T> {
         (d0 + (d1 - d0) * (signal - s0) / (s1 - s0), true)
     }
 
-    fn check_reference(&self, (rows, columns): (usize, usize)) -> Result<(), SfsError> {
+    pub(super) fn check_reference(&self, (rows, columns): (usize, usize)) -> Result<(), SfsError> {
         match &self.signal {
             Signal::Intensity => Ok(()),
             Signal::Darkening(reference) | Signal::Brightening(reference) => {
@@ -100,7 +110,7 @@ impl<T: Scalar> DepthTable<T> {
         }
     }
 
-    fn signal_at(&self, frame: &Frame<'_, T>, row: usize, column: usize) -> T {
+    pub(super) fn signal_at(&self, frame: &Frame<'_, T>, row: usize, column: usize) -> T {
         let intensity = frame.at(row, column);
         match &self.signal {
             Signal::Intensity => intensity,

@@ -1,5 +1,6 @@
 //! One image to heights: the trait and its implementations.
 
+mod ball_calibration;
 mod brooks_horn;
 mod depth_table;
 mod eikonal;
@@ -9,6 +10,7 @@ mod tsai_shah;
 
 use ndarray::ArrayView2;
 
+pub use ball_calibration::BallCalibration;
 pub use brooks_horn::BrooksHorn;
 pub use depth_table::{DepthTable, Signal};
 pub(crate) use eikonal::EikonalBuffers;

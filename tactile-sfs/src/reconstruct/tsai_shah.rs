@@ -8,12 +8,13 @@
 //! - the step is K = f′ S/(W + f′² S) · f, S the pixel's own variance, which shrinks as (1 − K f′) S: a Kalman gain
 //!   instead of 1/f′ (the authors' own remedy), with W as the stated noise of the image;
 //! - slopes used in f and f′ are cut to `max_slope`;
+//! - the start is a gently convex paraboloid over the mask, not the stationary plane;
 //! - the four corners are taken in turn (left/right, above/below), so that no diagonal is preferred.
 //!
-//! It is a local method: heights are right where the surface falls steadily to or from the light, and only then. The
-//! eikonal method is better wherever a height is known.
+//! It is a local method: a few iterations write the fine relief on the start, and the large shape remains that of the
+//! start. The eikonal method is better wherever a height is known, Brooks–Horn where none is.
 
-use crate::error::positive;
+use crate::error::{in_range, positive};
 use crate::integrate::shift::write_levelled;
 use crate::{
     Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface, SurfaceReconstruction, Workspace,
@@ -38,12 +39,14 @@ pub struct TsaiShah<T> {
     iterations: usize,
     noise: T,
     max_slope: T,
+    start_slope: T,
 }
 
 impl<T: Scalar> TsaiShah<T> {
-    /// 12 iterations, noise variance 10⁻², slopes up to 5.
+    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at its rim.
     pub fn new(lighting: Lighting<T>) -> Self {
-        Self { lighting, iterations: 12, noise: T::of(1e-2), max_slope: T::of(5.0) }
+        let (noise, max_slope, start_slope) = (T::of(1e-2), T::of(5.0), T::of(0.5));
+        Self { lighting, iterations: 12, noise, max_slope, start_slope }
     }
 
     /// Number of iterations; more do not make the method converge to the surface.
@@ -71,6 +74,37 @@ impl<T: Scalar> TsaiShah<T> {
     pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
         positive("steepest slope", max_slope.as_f64())?;
         Ok(Self { max_slope, ..self })
+    }
+}
+
+impl<T: Scalar> TsaiShah<T> {
+    /// Slope at the rim of the paraboloid the iteration starts from: positive for a bump, negative for a hollow, 0 for
+    /// the plane (which frontal light never leaves).
+    ///
+    /// # Errors
+    /// [`SfsError::InvalidOption`] unless finite.
+    pub fn with_start_slope(self, start_slope: T) -> Result<Self, SfsError> {
+        in_range("slope of the start", "a finite slope", start_slope.as_f64(), true)?;
+        Ok(Self { start_slope, ..self })
+    }
+
+    /// The paraboloid over the pixels that carry data, centred on them.
+    fn start(&self, field: &mut super::FieldBuffers<T>, grid: &Grid<T>) {
+        let aspect = grid.step[1].as_f64();
+        let at = |i: usize| ((i % grid.columns) as f64, (i / grid.columns) as f64 * aspect);
+        let inside = || field.reflectance.iter().enumerate().filter(|(_, r)| !r.is_nan()).map(|(i, _)| at(i));
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        for (x, y) in inside() {
+            sum = [sum[0] + x, sum[1] + y];
+            count += 1.0;
+        }
+        let [cx, cy] = sum.map(|sum| sum / count);
+        let radius2 = |(x, y): (f64, f64)| (x - cx).powi(2) + (y - cy).powi(2);
+        let rim = inside().map(radius2).fold(0.0_f64, f64::max).sqrt().max(1.0);
+        let bend = -0.5 * self.start_slope.as_f64() / rim;
+        for (i, z) in field.heights.iter_mut().enumerate() {
+            *z = T::of(bend * radius2(at(i)));
+        }
     }
 }
 
@@ -104,6 +138,7 @@ impl<T: Scalar> SurfaceReconstruction<T> for TsaiShah<T> {
         }
         let [hx, hy] = domain.pixel_size_m;
         let grid = Grid { rows: area.rows, columns: area.columns, step: [T::one(), hy / hx] };
+        self.start(&mut field, &grid);
         surface.report.stop = StopReason::IterationLimit;
         for iteration in 0..self.iterations {
             let misfit = self.iterate(&mut field, &grid, iteration);

@@ -1,18 +1,25 @@
 //! Control points on a surface: the trait and its implementations.
 
+mod adaptive;
+mod elements;
 mod equally_spaced;
+mod random;
+mod relax;
 
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 
+pub use adaptive::CurvatureAdaptive;
 pub use equally_spaced::EquallySpaced;
+pub use random::Random;
 
 use crate::{Scalar, SfsError};
 
 /// A way to choose control points on a surface.
 ///
-/// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel. None lies outside the mask or
-/// where the height is not finite, no two coincide, and the same input gives the same points. Object safe.
+/// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel, at the centres of pixels. None lies
+/// outside the mask or where the height is not finite, no two coincide, and the same input gives the same points.
+/// Exactly `count` points are returned. Object safe.
 ///
 /// ```
 /// use ndarray::Array2;

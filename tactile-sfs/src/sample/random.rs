@@ -1,0 +1,63 @@
+//! Seeded random points, uniform over the surface's area.
+
+use nalgebra::Point3;
+use ndarray::ArrayView2;
+
+use super::ControlPointSampler;
+use super::elements;
+use crate::{Scalar, SfsError};
+
+/// Random control points: every pixel is drawn with a probability proportional to the surface area over it, without
+/// repetition. The same seed gives the same points on every platform and in every version of the library: the generator
+/// (SplitMix64) is part of this crate for that reason. O(pixels log pixels).
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{ControlPointSampler, Random};
+/// let flat = Array2::<f32>::zeros((20, 20));
+/// let a = Random::new(7).sample(flat.view(), None, [1.0, 1.0], 50)?;
+/// assert_eq!(a, Random::new(7).sample(flat.view(), None, [1.0, 1.0], 50)?);
+/// assert_ne!(a, Random::new(8).sample(flat.view(), None, [1.0, 1.0], 50)?);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Random {
+    seed: u64,
+}
+
+impl Random {
+    /// The sampler with a seed.
+    pub fn new(seed: u64) -> Self {
+        Self { seed }
+    }
+}
+
+impl<T: Scalar> ControlPointSampler<T> for Random {
+    fn sample(
+        &self,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        let (all, _) = elements::collect(surface, mask, pixel_size_m, count)?;
+        // The `count` least of exponential variates with rates = areas are a draw without repetition (Efraimidis &
+        // Spirakis 2006).
+        let mut state = self.seed;
+        let key = |area: f64, state: &mut u64| -(1.0 - unit(state)).ln() / area;
+        let mut keys: Vec<(f64, usize)> =
+            all.iter().enumerate().map(|(i, e)| (key(e.area, &mut state), i)).collect();
+        keys.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let chosen: Vec<_> = keys[..count].iter().map(|&(_, i)| all[i]).collect();
+        Ok(elements::points(&chosen, surface, pixel_size_m))
+    }
+}
+
+/// Uniform in [0, 1): SplitMix64 (Steele, Lea & Flood 2014), the upper 53 bits.
+fn unit(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
