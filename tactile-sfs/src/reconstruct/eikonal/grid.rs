@@ -50,6 +50,9 @@ pub(crate) struct EikonalBuffers<T> {
     pub(super) rise: Vec<T>,
     /// 1/(slope · step)² of the edge to the next node in x and in y.
     pub(super) edges: Vec<[T; 2]>,
+    /// cos²φ of the gradient of an earlier solution, and whether sweeps use it.
+    pub(super) along_x: Vec<T>,
+    pub(super) corrected: bool,
     /// Nodes whose intensity is not finite.
     holes: Vec<usize>,
 }
@@ -66,6 +69,8 @@ impl<T: Scalar> EikonalBuffers<T> {
         fill(&mut self.value, length, T::infinity());
         fill(&mut self.rise, length, T::nan());
         fill(&mut self.edges, length, [T::one(); 2]);
+        fill(&mut self.along_x, length, T::nan());
+        self.corrected = false;
         self.holes.clear();
     }
 

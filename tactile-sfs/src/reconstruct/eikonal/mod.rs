@@ -6,10 +6,12 @@
 //! its minima and rim are known (from any point the steepest descent ends there), and the *falling* one if its maxima
 //! are known. No sign structure is needed: further known heights never hurt either.
 //!
-//! Two things make it accurate where textbook sweeping (first order in the slope at the pixel) is not:
+//! Three things make it accurate where textbook sweeping (first order in the slope at the pixel) is not:
 //!
 //! - *Chord rule.* Between neighbours with normal angles θ₁, θ₂ the slope is tan((θ₁ + θ₂)/2) =
 //!   (sin θ₁ + sin θ₂)/(cos θ₁ + cos θ₂): second order, exact on a circular profile, and finite up to a vertical rim.
+//! - *Deferred correction.* A second solve uses the directions of the first to bring the slopes of both axes to the same
+//!   place, which makes smooth parts second order.
 //! - *Sub-pixel rim.* Between the last pixel of the mask and the next lies the rim. Where sin θ, continued outwards,
 //!   reaches 1 within that pixel the contour is occluding, and the last pixel is cos θ/|∇ sin θ| above it (the
 //!   radius of curvature is 1/|∇ sin θ|); else the rim is taken half a pixel away.
@@ -134,7 +136,7 @@ impl<T: Scalar> Eikonal<T> {
         Ok(Self { tolerance, ..self })
     }
 
-    /// Most sweeps (four directions are four sweeps).
+    /// Most sweeps of one solve (four directions are four sweeps).
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] for 0.
@@ -143,12 +145,25 @@ impl<T: Scalar> Eikonal<T> {
         Ok(Self { max_sweeps, ..self })
     }
 
-    /// Solves one branch into the buffers' values.
+    /// Solves one branch into the buffers' values; under frontal light twice, the second time with the directions of the
+    /// first.
     fn solve(&self, workspace: &mut Workspace<T>, rising: bool) -> Outcome<T> {
+        workspace.eikonal.corrected = false;
+        let first = self.sweep(workspace, rising, 0);
+        if !self.lighting.is_frontal() || first.stop != StopReason::Converged {
+            return first;
+        }
+        frontal::measure_directions(&mut workspace.eikonal);
+        workspace.eikonal.corrected = true;
+        self.sweep(workspace, rising, first.sweeps)
+    }
+
+    /// Sweeps until nothing changes.
+    fn sweep(&self, workspace: &mut Workspace<T>, rising: bool, done: usize) -> Outcome<T> {
         workspace.eikonal.start(rising);
         let light = self.lighting.direction();
-        let mut outcome = Outcome { stop: StopReason::IterationLimit, sweeps: 0, change: T::infinity() };
-        while outcome.sweeps < self.max_sweeps {
+        let mut outcome = Outcome { stop: StopReason::IterationLimit, sweeps: done, change: T::infinity() };
+        while outcome.sweeps < done + self.max_sweeps {
             let buffers = &mut workspace.eikonal;
             outcome.change = T::zero();
             for order in 0..4 {
@@ -164,7 +179,7 @@ impl<T: Scalar> Eikonal<T> {
                 outcome.stop = StopReason::Converged;
                 break;
             }
-            if let Some(stop) = workspace.report(outcome.sweeps, self.max_sweeps, outcome.change) {
+            if let Some(stop) = workspace.report(outcome.sweeps, done + self.max_sweeps, outcome.change) {
                 outcome.stop = stop;
                 break;
             }

@@ -31,9 +31,12 @@ fn rise<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> T {
     let gx = bend(grid, i, 1);
     let gy = bend(grid, i, grid.width) / grid.aspect;
     let bend = gx.hypot(gy);
-    // Extent of a pixel along the gradient.
-    let step =
-        if bend > T::zero() { (gx.abs() + gy.abs() * grid.aspect) / bend } else { T::one().min(grid.aspect) };
+    // A pixel next to the rim lies, along the gradient, at most this far from it.
+    let step = if bend > T::zero() {
+        gx.abs().max(gy.abs() * grid.aspect) / bend
+    } else {
+        T::one().min(grid.aspect)
+    };
     let half = T::of(0.5) * step;
     if (T::one() - sine) < T::of(REACH) * step * bend {
         return cosine / bend;
@@ -43,14 +46,27 @@ fn rise<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> T {
     half * (sine + rim_sine) / (cosine + rim_cosine)
 }
 
-/// Derivative of sin θ along one axis, from the neighbours inside the mask.
+/// cos² of the angle between ∇ sin θ and the x axis.
+pub(super) fn along_x<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> T {
+    let gx = bend(grid, i, 1);
+    let gy = bend(grid, i, grid.width) / grid.aspect;
+    gx * gx / (gx * gx + gy * gy)
+}
+
+/// Derivative of sin θ along one axis, from the neighbours inside the mask; second order where there are enough.
 fn bend<T: Scalar>(grid: &EikonalBuffers<T>, i: usize, stride: usize) -> T {
-    let (before, after) = (i - stride, i + stride);
-    let inside = |j: usize| grid.node[j] != Node::Outside;
-    match (inside(before), inside(after)) {
-        (true, true) => T::of(0.5) * (grid.sine[after] - grid.sine[before]),
-        (true, false) => grid.sine[i] - grid.sine[before],
-        (false, true) => grid.sine[after] - grid.sine[i],
-        (false, false) => T::zero(),
+    let inside =
+        |j: Option<usize>| j.filter(|&j| grid.node.get(j).is_some_and(|&node| node != Node::Outside));
+    let (before, after) = (inside(Some(i - stride)), inside(Some(i + stride)));
+    let here = grid.sine[i];
+    let one_sided = |near: usize, far: Option<usize>| match inside(far) {
+        Some(far) => T::of(1.5) * here - T::of(2.0) * grid.sine[near] + T::of(0.5) * grid.sine[far],
+        None => here - grid.sine[near],
+    };
+    match (before, after) {
+        (Some(before), Some(after)) => T::of(0.5) * (grid.sine[after] - grid.sine[before]),
+        (Some(before), None) => one_sided(before, before.checked_sub(stride)),
+        (None, Some(after)) => -one_sided(after, Some(after + stride)),
+        (None, None) => T::zero(),
     }
 }
