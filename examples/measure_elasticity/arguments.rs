@@ -41,13 +41,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value_t = Polymer::Cl2000x, conflicts_with = "scene")]
     pub(crate) polymer: Polymer,
     /// Simulation: the ball's Young's modulus in kPa, instead of a polymer's.
-    #[arg(long, value_name = "KPA", conflicts_with_all = ["scene", "polymer"])]
+    #[arg(long, value_name = "KPA", value_parser = positive, conflicts_with_all = ["scene", "polymer"])]
     pub(crate) modulus_kpa: Option<f64>,
     /// Simulation: the ball's radius in mm.
-    #[arg(long, value_name = "MM", default_value_t = 3.0, conflicts_with = "scene")]
+    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = positive, conflicts_with = "scene")]
     pub(crate) radius_mm: f64,
     /// Simulation: the loads in newtons.
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], conflicts_with = "scene")]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], value_parser = positive, conflicts_with = "scene")]
     pub(crate) forces: Vec<f64>,
     /// Simulation: seed of the camera's noise.
     #[arg(long, default_value_t = 1, conflicts_with = "scene")]
@@ -55,6 +55,12 @@ pub(crate) struct Arguments {
     /// Simulation: no noise, blur, vignetting or background.
     #[arg(long, conflicts_with = "scene")]
     pub(crate) ideal_camera: bool,
+}
+
+/// A positive, finite number.
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite());
+    value.ok_or_else(|| "expected a positive number".into())
 }
 
 const AFTER_HELP: &str = "\
