@@ -9,6 +9,8 @@ use crate::cholesky::HEAD;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Spectrum {
     values: Vec<f64>,
+    least: f64,
+    most: f64,
     /// Eigenvectors, one after the other, each behind `HEAD` places and padded with zeros.
     vectors: Vec<f64>,
     stride: usize,
@@ -26,7 +28,9 @@ impl Spectrum {
         for (k, vector) in vectors.chunks_exact_mut(stride).enumerate() {
             vector[HEAD..HEAD + m].copy_from_slice(eigen.eigenvectors.column(k).as_slice());
         }
-        Self { values: eigen.eigenvalues.as_slice().to_vec(), vectors, stride }
+        let values = eigen.eigenvalues.as_slice().to_vec();
+        let (least, most) = (eigen.eigenvalues.min(), f64::max(eigen.eigenvalues.max(), 0.0));
+        Self { values, least, most, vectors, stride }
     }
 
     /// b ← (A + λI)⁻¹ b for `M` columns of b.
@@ -39,8 +43,7 @@ impl Spectrum {
 
     /// 2-norm condition number of A + λI; rounding may leave eigenvalues below zero, and then it is infinite.
     pub(crate) fn condition(&self, lambda: f64) -> f64 {
-        let least = self.values.iter().fold(f64::INFINITY, |m, &x| m.min(x)) + lambda;
-        let most = self.values.iter().fold(0.0, |m: f64, &x| m.max(x)) + lambda;
+        let (least, most) = (self.least + lambda, self.most + lambda);
         match self.values.is_empty() {
             true => 1.0,
             false if least > 0.0 => most / least,
@@ -59,7 +62,7 @@ impl Spectrum {
                 b.chunks_exact(self.stride).map(|b| v.iter().zip(b).map(|(v, b)| v * b).sum::<f64>());
             products.map(|p| p * p).sum::<f64>()
         }));
-        let most = self.values.iter().fold(f64::MIN_POSITIVE, |m, &x| m.max(x));
+        let most = f64::max(self.most, f64::MIN_POSITIVE);
         let score = |log: f64| {
             let filter = |mu: f64| 1.0 / (1.0 + mu.max(0.0) / log.exp2());
             let rss: f64 =
@@ -98,26 +101,49 @@ struct Filter<'a, const M: usize> {
 impl<const M: usize> WithSimd for Filter<'_, M> {
     type Output = ();
 
-    /// x = Σ v (vᵀb) / (μ + λ): each eigenvector is used twice while it is at hand.
+    /// x = Σ v (vᵀb) / (μ + λ): a few eigenvectors at a time, each used twice while it is at hand.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self { spectrum: Spectrum { values, vectors, stride }, lambda, b, x } = self;
-        for (vector, &value) in vectors.chunks_exact(*stride).zip(values) {
-            let vector = S::as_simd_f64s(&vector[HEAD..]).0;
-            let mut sums = [simd.splat_f64s(0.0); M];
-            let bs: [&[S::f64s]; M] = core::array::from_fn(|m| {
-                &S::as_simd_f64s(&b[m * stride + HEAD..(m + 1) * stride]).0[..vector.len()]
-            });
-            for i in 0..vector.len() {
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let count = self.spectrum.values.len();
+        let whole = count / 4 * 4;
+        (0..whole).step_by(4).for_each(|k| self.group::<S, 4>(simd, k));
+        (whole..count).for_each(|k| self.group::<S, 1>(simd, k));
+    }
+}
+
+impl<const M: usize> Filter<'_, M> {
+    /// Adds the terms of `N` eigenvectors from `start` on.
+    #[inline(always)]
+    fn group<S: Simd, const N: usize>(&mut self, simd: S, start: usize) {
+        let Spectrum { values, vectors, stride, .. } = self.spectrum;
+        let column = |data, k: usize| lanes::<S>(data, *stride, k);
+        let count = column(self.b, 0).len();
+        let vs: [&[S::f64s]; N] = core::array::from_fn(|n| &column(vectors, start + n)[..count]);
+        let bs: [&[S::f64s]; M] = core::array::from_fn(|m| &column(self.b, m)[..count]);
+        let mut sums = [[simd.splat_f64s(0.0); M]; N];
+        for i in 0..count {
+            for n in 0..N {
                 for m in 0..M {
-                    sums[m] = simd.mul_add_e_f64s(vector[i], bs[m][i], sums[m]);
+                    sums[n][m] = simd.mul_add_e_f64s(vs[n][i], bs[m][i], sums[n][m]);
                 }
             }
-            for m in 0..M {
-                let factor = simd.splat_f64s(simd.reduce_sum_f64s(sums[m]) / (value + lambda));
-                let x = S::as_mut_simd_f64s(&mut x[m * stride + HEAD..(m + 1) * stride]).0;
-                x.iter_mut().zip(vector).for_each(|(x, v)| *x = simd.mul_add_e_f64s(factor, *v, *x));
+        }
+        for m in 0..M {
+            let factors: [S::f64s; N] = core::array::from_fn(|n| {
+                simd.splat_f64s(simd.reduce_sum_f64s(sums[n][m]) / (values[start + n] + self.lambda))
+            });
+            let x = &mut self.x[m * stride + HEAD..(m + 1) * stride];
+            for (i, x) in S::as_mut_simd_f64s(x).0.iter_mut().enumerate().take(count) {
+                for n in 0..N {
+                    *x = simd.mul_add_e_f64s(factors[n], vs[n][i], *x);
+                }
             }
         }
     }
+}
+
+/// Vectors of column `k` behind its `HEAD` places.
+#[inline(always)]
+fn lanes<S: Simd>(data: &[f64], stride: usize, k: usize) -> &[S::f64s] {
+    S::as_simd_f64s(&data[k * stride + HEAD..(k + 1) * stride]).0
 }
