@@ -115,6 +115,12 @@ fn a_batch_has_the_bits_of_one_at_a_time() {
     for (h, e) in gradients.iter().zip(&batch) {
         assert_eq!(*e, GreenLagrange.strain(h).unwrap());
     }
+    #[cfg(feature = "rayon")]
+    {
+        let mut parallel = vec![Matrix3::zeros(); 300];
+        tactile_elasticity::strain::green_lagrange_par_into(&gradients, &mut parallel).unwrap();
+        assert_eq!(parallel, batch);
+    }
     let missing = green_lagrange_into(&gradients, &mut batch[1..]).unwrap_err();
     assert_eq!(
         missing,

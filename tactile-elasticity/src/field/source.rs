@@ -32,6 +32,7 @@ impl<T: RealField + Copy, F: Fn(&Point3<T>) -> Matrix3<T>> DisplacementGradient<
 /// Points with the area or volume each stands for.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
 pub struct Samples<T: RealField> {
     /// Where.
     pub points: Vec<Point3<T>>,

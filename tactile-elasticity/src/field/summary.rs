@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, RealField};
 /// Averages of a strain field, component by component.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
 pub struct StrainSummary<T> {
     /// Weighted mean.
     pub mean: Matrix3<T>,

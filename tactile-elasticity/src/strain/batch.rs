@@ -26,15 +26,40 @@ pub fn green_lagrange_into<T: RealField + Copy>(
     gradients: &[Matrix3<T>],
     strains: &mut [Matrix3<T>],
 ) -> Result<(), ElasticityError> {
-    if gradients.len() != strains.len() {
-        let (expected, found) = (gradients.len(), strains.len());
-        return Err(ElasticityError::LengthMismatch { quantity: Quantity::Strain, expected, found });
+    same_length(gradients, strains)?;
+    fill(gradients, strains);
+    Ok(())
+}
+
+/// [`green_lagrange_into`] over rayon's threads: the same bits.
+///
+/// # Errors
+/// As [`green_lagrange_into`].
+#[cfg(feature = "rayon")]
+pub fn green_lagrange_par_into<T: RealField + Copy>(
+    gradients: &[Matrix3<T>],
+    strains: &mut [Matrix3<T>],
+) -> Result<(), ElasticityError> {
+    use rayon::prelude::*;
+    const CHUNK: usize = 4096;
+    same_length(gradients, strains)?;
+    gradients.par_chunks(CHUNK).zip(strains.par_chunks_mut(CHUNK)).for_each(|(h, e)| fill(h, e));
+    Ok(())
+}
+
+fn same_length<A, B>(gradients: &[A], strains: &[B]) -> Result<(), ElasticityError> {
+    let (expected, found) = (gradients.len(), strains.len());
+    if expected == found {
+        return Ok(());
     }
+    Err(ElasticityError::LengthMismatch { quantity: Quantity::Strain, expected, found })
+}
+
+fn fill<T: RealField + Copy>(gradients: &[Matrix3<T>], strains: &mut [Matrix3<T>]) {
     for (h, strain) in gradients.iter().zip(strains) {
         let plain = green_lagrange_plain(h);
         *strain = if cancels(h, &plain) { careful(h) } else { plain };
     }
-    Ok(())
 }
 
 #[cold]

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, RealField};
 /// Principal values, largest first, and their directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
 pub struct PrincipalValues<T> {
     /// The eigenvalues, largest first.
     pub values: [T; 3],

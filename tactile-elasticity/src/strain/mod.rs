@@ -19,6 +19,8 @@ mod stretch;
 mod twofold;
 
 pub use batch::green_lagrange_into;
+#[cfg(feature = "rayon")]
+pub use batch::green_lagrange_par_into;
 pub use deformation::Deformation;
 pub use invariants::{Invariants, PrincipalValues, von_mises_strain};
 pub use measure::{Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure};

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, RealField, Vector3};
 /// The right stretch U in its principal axes, largest stretch first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
 pub struct PrincipalStretches<T> {
     /// λᵢ, the singular values of F.
     pub stretches: [T; 3],
