@@ -145,9 +145,13 @@ pub(crate) fn green_lagrange_plain<T: RealField + Copy>(h: &Matrix3<T>) -> Matri
 /// Whether E is so much smaller than what it was summed from that more than two digits are gone.
 #[inline(always)]
 pub(crate) fn cancels<T: RealField + Copy>(h: &Matrix3<T>, e: &Matrix3<T>) -> bool {
-    let size = |m: &Matrix3<T>| m.iter().fold(T::zero(), |sum, x| sum + x.abs());
-    let hundred: T = nalgebra::convert(128.0);
-    size(e) * hundred < size(h)
+    // Summed as trees: a chain of additions would take longer than the strain itself.
+    let of_h = ((h[(0, 0)].abs() + h[(1, 1)].abs()) + (h[(2, 2)].abs() + h[(0, 1)].abs()))
+        + ((h[(1, 0)].abs() + h[(0, 2)].abs()) + (h[(2, 0)].abs() + (h[(1, 2)].abs() + h[(2, 1)].abs())));
+    let diagonal = (e[(0, 0)].abs() + e[(1, 1)].abs()) + e[(2, 2)].abs();
+    let shear = (e[(0, 1)].abs() + e[(0, 2)].abs()) + e[(1, 2)].abs();
+    let many: T = nalgebra::convert(128.0);
+    (diagonal + shear) * many < of_h
 }
 
 fn determinant<T: RealField + Copy>(m: &Matrix3<T>) -> Twofold<T> {
