@@ -6,6 +6,8 @@
 //!
 //! Images are indexed `[row, column]`; x is the column, y the row, z points to the viewer; a pixel's coordinate is its
 //! centre. Slopes are p = ∂z/∂x and q = ∂z/∂y. See [`Lighting`] for the sign of the light's direction.
+//!
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod domain;

@@ -64,9 +64,10 @@ fn visit<T: Scalar>(grid: &mut EikonalBuffers<T>, i: usize, width: usize, tolera
     let x = upwind(edge(i - 1, edges[i - 1][0]), edge(i + 1, edges[i][0]));
     let y = upwind(edge(i - width, edges[i - width][1]), edge(i + width, edges[i][1]));
     let k = if grid.corrected {
-        // Means of the node and its neighbours: half of the difference of the neighbours is left.
-        let k = T::one() + T::of(0.5) * (x.along_x - y.along_x);
-        if k.is_nan() { T::one() } else { k }
+        // Means of the node and its neighbours: half of the difference of the neighbours is left. Where the direction
+        // turns within a pixel (along ridges) such means say nothing, and the first order is better.
+        let turn = T::of(0.5) * (x.along_x - y.along_x);
+        if turn.abs() < T::of(0.1) { T::one() + turn } else { T::one() }
     } else {
         T::one()
     };
