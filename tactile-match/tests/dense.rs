@@ -189,6 +189,14 @@ fn every_option_solves_a_smooth_deformation() {
 }
 
 #[test]
+fn one_energy_is_kept_for_every_iteration() {
+    let model = scattered::<f64, 2>(12, 7);
+    let options = DenseOptions { max_iterations: 2, ..Default::default() };
+    let found = DenseRelaxation::new(options).unwrap().match_points(&model, &bend(&model, 0.1)).unwrap();
+    assert!(found.report.iterations <= 2 && found.energy.len() == found.report.iterations);
+}
+
+#[test]
 fn options_out_of_range_are_typed_errors() {
     let good = DenseOptions::default();
     let invalid = |options, name| {

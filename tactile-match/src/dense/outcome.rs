@@ -50,9 +50,6 @@ impl<T: Scalar, const D: usize> Run<T, D> {
 
     /// Fits the spline to the mean partners, moves the model, and returns the largest step.
     pub(super) fn fit(&mut self, smoothing: Smoothing<T>) -> T {
-        let [x, y] =
-            [&self.warped, &self.target].map(|p| NeighbourGraph::new(p, Neighbourhood::MedianRadius));
-        self.energy.push(energy(&self.matches, &x, &y));
         let (means, weights): (Vec<_>, Vec<_>) = (0..self.model.len()).map(|i| self.partner(i)).unzip();
         let floor: T = nalgebra::convert(1e-6);
         let kept: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > floor).collect();
