@@ -13,7 +13,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
-    MatchError, Matching, Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation,
+    CoherentPointDrift, DenseRelaxation, LinearAssignment, MatchError, Matching, NearestNeighbour, Outliers,
+    PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation,
 };
 
 /// Matches the point sets of case files and writes result files.
@@ -34,6 +35,9 @@ struct Arguments {
     /// The matcher.
     #[arg(long, value_enum, default_value_t = Method::Relaxation)]
     method: Method,
+    /// The paper's dense relaxation, as `--method dense`.
+    #[arg(long, conflicts_with = "method")]
+    dense: bool,
     /// Calls a case; the median of their times is written.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
@@ -57,6 +61,14 @@ enum Stray {
 enum Method {
     /// The fast matcher.
     Relaxation,
+    /// The paper's dense relaxation as printed: slow.
+    Dense,
+    /// Coherent point drift.
+    Drift,
+    /// Each model point to the nearest target point.
+    Nearest,
+    /// The cheapest one-to-one assignment by distance.
+    Assignment,
 }
 
 impl Arguments {
@@ -75,8 +87,12 @@ impl Arguments {
     }
 
     fn matcher<const D: usize>(&self) -> Box<dyn PointMatcher<f64, D>> {
-        match self.method {
+        match if self.dense { Method::Dense } else { self.method } {
             Method::Relaxation => Box::new(RelaxationMatcher::new(self.options())),
+            Method::Dense => Box::new(DenseRelaxation::default()),
+            Method::Drift => Box::new(CoherentPointDrift::default()),
+            Method::Nearest => Box::new(NearestNeighbour::default()),
+            Method::Assignment => Box::new(LinearAssignment::default()),
         }
     }
 }

@@ -142,7 +142,7 @@ fn bad_input_is_a_typed_error() {
     assert_eq!(error(&bad, &good), MatchError::NotFinite { set: PointSet::Model, row: 3 });
     assert_eq!(error(&good, &[]), MatchError::Empty { set: PointSet::Target });
     for slack in [f64::NAN, 0.0, 1.0, -1.0] {
-        assert!(RelaxationOptions::default().slack(slack).is_err());
+        assert!(RelaxationOptions::default().stray_share(slack).is_err());
     }
     assert!(RelaxationOptions::default().max_iterations(0).is_err());
 }

@@ -16,6 +16,14 @@ const DECIDED_RATE: f64 = 0.3;
 /// Fixed-point rounds for the share of stray points.
 const SHARE_ROUNDS: usize = 8;
 
+/// Points without a partner: their expected share, and how far each side may have them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Slack {
+    pub(crate) share: f64,
+    pub(crate) model: f64,
+    pub(crate) target: f64,
+}
+
 /// One annealing run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Schedule {
@@ -31,8 +39,8 @@ pub(crate) struct Schedule {
     pub(crate) limit: usize,
     /// Sinkhorn sweeps an iteration.
     pub(crate) sweeps: usize,
-    /// Expected share of points without partner.
-    pub(crate) slack: f64,
+    /// What is expected of points without a partner.
+    pub(crate) slack: Slack,
 }
 
 /// Where a run stands.
@@ -83,9 +91,16 @@ pub(crate) struct Annealer<const D: usize> {
 }
 
 impl<const D: usize> Annealer<D> {
-    /// Weight of the slack beside a Gaussian affinity: `(2πσ²)^{D/2}` times the density of stray points.
-    pub(crate) fn slack(&self, share: f64, points: usize, variance: f64) -> f64 {
-        (TAU * variance).powf(0.5 * D as f64) * share / (1.0 - share) * points as f64 / self.volume
+    /// Soft matches of `warped` at this temperature, with their moments.
+    ///
+    /// The slack weighs `(2πσ²)^{D/2}` times the density of stray points, beside Gaussian affinities.
+    pub(crate) fn assign(&mut self, warped: &[[f64; D]], variance: f64, slack: Slack, sweeps: usize) {
+        let density = slack.share / (1.0 - slack.share) * warped.len() as f64 / self.volume;
+        let weight = (TAU * variance).powf(0.5 * D as f64) * density;
+        let [rows, columns] = [slack.model, slack.target].map(|side| (side * weight).max(1e-30) as f32);
+        self.soft.affinities(warped, variance);
+        self.soft.normalise(sweeps, rows, columns);
+        self.soft.moments(warped);
     }
 
     /// Alternates until the temperature stands still; `observe` is told every iteration and may stop the run.
@@ -148,10 +163,9 @@ impl<const D: usize> Annealer<D> {
     ///
     /// Distances are taken from where the *other* points' matches put a point: a wrong match does not confirm itself.
     fn step(&mut self, state: &mut State<D>, schedule: &Schedule, variance: f64) -> f64 {
-        let slack = self.slack(schedule.slack, state.warped.len(), variance).max(1e-30) as f32;
-        self.soft.affinities(&self.predicted, variance);
-        self.soft.normalise(schedule.sweeps, slack, slack);
-        self.soft.moments(&self.predicted);
+        let predicted = std::mem::take(&mut self.predicted);
+        self.assign(&predicted, variance, schedule.slack, schedule.sweeps);
+        self.predicted = predicted;
         self.fit(state, variance);
         let (mut total, mut squares, mut within) = (0.0, 0.0, 0.0);
         for i in 0..state.warped.len() {

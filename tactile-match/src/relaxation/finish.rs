@@ -1,6 +1,6 @@
 //! From the last soft assignment to the answer: hard matches, confidences, positions, covariances.
 
-use super::anneal::{Annealer, State};
+use super::anneal::{Annealer, Slack, State};
 use super::soft_assign::SoftAssignment;
 
 /// Residuals below this (radii of the model) are what the prior's factor leaves out: the data are clean.
@@ -22,21 +22,18 @@ pub(crate) struct Answer<const D: usize> {
 }
 
 impl<const D: usize> Answer<D> {
-    /// Reads the answer from the run's final state; `exact` asks for interpolation where the data are clean.
+    /// Reads the answer from the run's final state.
     pub(crate) fn read(
         &mut self,
         annealer: &mut Annealer<D>,
         state: &State<D>,
         targets: &[[f64; D]],
-        share: f64,
+        slack: Slack,
     ) {
         let n = state.warped.len();
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
-        let slack = annealer.slack(share, n, variance).max(1e-30) as f32;
-        annealer.soft.affinities(&state.warped, variance);
-        annealer.soft.normalise(8, slack, slack);
-        annealer.soft.moments(&state.warped);
+        annealer.assign(&state.warped, variance, slack, 8);
         self.assign(&annealer.soft, n, targets.len());
         self.place(state, targets);
         self.covariance.clear();

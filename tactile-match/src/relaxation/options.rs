@@ -1,6 +1,10 @@
 //! What a caller may say about a scene.
 
+use super::anneal::Slack;
 use crate::{MatchError, validate::option_within};
+
+/// Weight of the slack on a side where no stray points are expected.
+const RARE: f64 = 0.01;
 
 /// How far the target may be turned against the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,13 +35,13 @@ pub enum Outliers {
 pub struct RelaxationOptions {
     pub(crate) rotation: Rotation,
     pub(crate) outliers: Outliers,
-    pub(crate) slack: f64,
+    pub(crate) share: f64,
     pub(crate) max_iterations: usize,
 }
 
 impl Default for RelaxationOptions {
     fn default() -> Self {
-        Self { rotation: Rotation::Limited, outliers: Outliers::Both, slack: 0.1, max_iterations: 200 }
+        Self { rotation: Rotation::Limited, outliers: Outliers::Both, share: 0.1, max_iterations: 200 }
     }
 }
 
@@ -60,9 +64,9 @@ impl RelaxationOptions {
     ///
     /// # Errors
     /// [`MatchError::InvalidOption`] outside that range.
-    pub fn slack(mut self, share: f64) -> Result<Self, MatchError> {
-        option_within("slack", share, 1e-6, 0.9, "[1e-6, 0.9]")?;
-        self.slack = share;
+    pub fn stray_share(mut self, share: f64) -> Result<Self, MatchError> {
+        option_within("stray_share", share, 1e-6, 0.9, "[1e-6, 0.9]")?;
+        self.share = share;
         Ok(self)
     }
 
@@ -74,5 +78,15 @@ impl RelaxationOptions {
         option_within("max_iterations", limit as f64, 1.0, f64::MAX, "[1, ∞)")?;
         self.max_iterations = limit;
         Ok(self)
+    }
+
+    pub(crate) fn slack(&self) -> Slack {
+        let (model, target) = match self.outliers {
+            Outliers::Both => (1.0, 1.0),
+            Outliers::Model => (1.0, RARE),
+            Outliers::Target => (RARE, 1.0),
+            Outliers::None => (RARE, RARE),
+        };
+        Slack { share: self.share, model, target }
     }
 }

@@ -79,7 +79,7 @@ impl RelaxationMatcher {
         let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
         ws.annealer.look(&ws.best, &mut ws.state, &schedule);
         ws.stopped = flow.is_break();
-        ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack);
+        ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
     }
 
     /// The last stage on noisy data: the prior's scales by their evidence, each with the noise level that fits it.
@@ -100,7 +100,7 @@ impl RelaxationMatcher {
                 ws.annealer.prior.build(&ws.model, scales);
                 ws.state.copy_from(&ws.start);
                 ws.annealer.settle(&mut ws.state, &schedule, 4);
-                ws.annealer.judge(&mut ws.state, self.options.slack, RESOLUTION);
+                ws.annealer.judge(&mut ws.state, self.options.share, RESOLUTION);
                 let old = if total > 0.0 { ws.best.energy } else { ws.state.energy };
                 if ws.state.energy < ws.best.energy {
                     let f = (ws.state.energy - old).exp();
@@ -128,7 +128,7 @@ impl RelaxationMatcher {
             least: pace.least,
             limit: self.options.max_iterations,
             sweeps: 5,
-            slack: self.options.slack,
+            slack: self.options.slack(),
         }
     }
 
@@ -172,7 +172,7 @@ impl RelaxationMatcher {
         ws.state.trace.clear();
         ws.state.iterations = 0;
         let flow = ws.annealer.run(&mut ws.state, &schedule, observe);
-        ws.annealer.judge(&mut ws.state, self.options.slack, RESOLUTION);
+        ws.annealer.judge(&mut ws.state, self.options.share, RESOLUTION);
         if ws.state.energy < ws.best.energy || ws.starts == 1 {
             ws.best.copy_from(&ws.state);
         }
