@@ -62,6 +62,9 @@ fn check(name: &str, matcher: &dyn PointMatcher<f64, 3>, scene: &Scene, share: f
     assert!(right >= share && error <= bound, "{name}");
 }
 
+/// Name, matcher, least share of right pairs, largest error in % of the diameter.
+type Row<'a> = (&'a str, Box<dyn PointMatcher<f64, 3>>, f64, f64);
+
 fn standard_case(criterion: &mut Criterion) {
     let scene = scene(105, 0.05);
     let drift = |rank| {
@@ -69,7 +72,7 @@ fn standard_case(criterion: &mut Criterion) {
         CoherentPointDrift::new(DriftOptions { motion, ..Default::default() }).expect("valid options")
     };
     let mut group = criterion.benchmark_group("match/105x105");
-    let quick: [(&str, Box<dyn PointMatcher<f64, 3>>, f64, f64); 4] = [
+    let quick: [Row<'_>; 4] = [
         ("cpd", Box::new(drift(None)), 0.99, 0.5),
         ("cpd_rank_30", Box::new(drift(Some(30))), 0.99, 0.5),
         ("assignment", Box::new(LinearAssignment::new()), 0.5, 6.0),

@@ -4,6 +4,8 @@
 //!
 //! Only the points are read from a case, never its truth. The time reported is the median of the calls of the matcher
 //! alone; a line starting with `#` says how each match went.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
 use clap::{Parser, ValueEnum};
 use nalgebra::Point;
 use std::error::Error;

@@ -7,7 +7,7 @@ const FEWEST: usize = 16;
 
 /// Estimates light direction and albedo from the statistics of the image (after Zheng & Chellappa 1991).
 ///
-/// Assumes a convex object whose normals are spread evenly over the visible half sphere: with μ₁ = E[I], μ₂ = E[I²] and
+/// Assumes a convex object whose normals are spread evenly over the visible half sphere: with μ₁ = ⟨I⟩, μ₂ = ⟨I²⟩ and
 /// γ = √(6π² μ₂ − 48 μ₁²) the albedo is γ/π and cos(slant) = 4 μ₁/γ; the tilt is the mean direction of the image's
 /// gradient. Real objects break the assumption: expect 5° to 20°, and prefer a calibrated light. The slant is kept
 /// at 80° or less. The result has ambient 0 and the estimated albedo at unit intensity.
