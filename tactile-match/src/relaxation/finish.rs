@@ -33,7 +33,7 @@ impl<const D: usize> Answer<D> {
         let n = state.warped.len();
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
-        annealer.assign(&state.warped, variance, slack, 8);
+        annealer.assign(&state.warped, variance, slack, if state.sigma <= CLEAN { 3 } else { 8 });
         self.assign(&annealer.soft, n, targets.len());
         self.place(state, targets);
         self.covariance.clear();

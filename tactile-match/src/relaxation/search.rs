@@ -17,14 +17,15 @@ struct Pace {
     sigma: f64,
     rate: f64,
     least: f64,
+    sweeps: usize,
 }
 
 /// The first try: most scenes are easy.
-const FAST: Pace = Pace { sigma: 0.3, rate: 0.75, least: 0.9 };
+const FAST: Pace = Pace { sigma: 0.3, rate: 0.75, least: 0.9, sweeps: 3 };
 /// From the best answer so far.
-const REHEAT: Pace = Pace { sigma: 0.1, rate: 0.9, least: 1.0 };
+const REHEAT: Pace = Pace { sigma: 0.1, rate: 0.9, least: 1.0, sweeps: 5 };
 /// Further tries.
-const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0 };
+const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, sweeps: 5 };
 /// So many points that an incomplete exact answer is not worth a second try.
 const MANY: usize = 500;
 /// Residuals are judged no finer than this.
@@ -76,8 +77,11 @@ impl RelaxationMatcher {
         if flow.is_continue() && ws.best.sigma > finish::CLEAN {
             self.fit_scales(ws);
         }
-        let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
-        ws.annealer.look(&ws.best, &mut ws.state, &schedule);
+        if ws.starts > 1 || !self.is_exact(ws) {
+            // Later runs have left their own fit behind.
+            let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
+            ws.annealer.look(&ws.best, &mut ws.state, &schedule);
+        }
         ws.stopped = flow.is_break();
         ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
     }
@@ -127,7 +131,7 @@ impl RelaxationMatcher {
             rate: pace.rate,
             least: pace.least,
             limit: self.options.max_iterations,
-            sweeps: 5,
+            sweeps: pace.sweeps,
             slack: self.options.slack(),
         }
     }
@@ -172,6 +176,12 @@ impl RelaxationMatcher {
         ws.state.trace.clear();
         ws.state.iterations = 0;
         let flow = ws.annealer.run(&mut ws.state, &schedule, observe);
+        if ws.starts == 1 {
+            ws.best.copy_from(&ws.state);
+            if self.is_exact(ws) {
+                return flow; // there will be nothing to compare it with
+            }
+        }
         ws.annealer.judge(&mut ws.state, self.options.share, RESOLUTION);
         if ws.state.energy < ws.best.energy || ws.starts == 1 {
             ws.best.copy_from(&ws.state);
