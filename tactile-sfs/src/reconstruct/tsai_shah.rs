@@ -8,7 +8,7 @@
 //! - the step is K = f′ S/(W + f′² S) · f, S the pixel's own variance, which shrinks as (1 − K f′) S: a Kalman gain
 //!   instead of 1/f′ (the authors' own remedy), with W as the stated noise of the image;
 //! - slopes used in f and f′ are cut to `max_slope`;
-//! - the start is a gently convex paraboloid over the mask, not the stationary plane;
+//! - the start is a gently convex paraboloid with the centre and the axes of the mask, not the stationary plane;
 //! - the four corners are taken in turn (left/right, above/below), so that no diagonal is preferred.
 //!
 //! It is a local method: a few iterations write the fine relief on the start, and the large shape remains that of the
@@ -43,7 +43,7 @@ pub struct TsaiShah<T> {
 }
 
 impl<T: Scalar> TsaiShah<T> {
-    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at its rim.
+    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the nearest of its rim.
     pub fn new(lighting: Lighting<T>) -> Self {
         let (noise, max_slope, start_slope) = (T::of(1e-2), T::of(5.0), T::of(0.5));
         Self { lighting, iterations: 12, noise, max_slope, start_slope }
@@ -88,7 +88,8 @@ impl<T: Scalar> TsaiShah<T> {
         Ok(Self { start_slope, ..self })
     }
 
-    /// The paraboloid over the pixels that carry data, centred on them.
+    /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses of the centre and covariance C of the pixels that
+    /// carry data (a uniform ellipse ends at xᵀC⁻¹x = 4), s its slope at the ends of the minor half axis a = 2 √λ_min(C).
     fn start(&self, field: &mut super::FieldBuffers<T>, grid: &Grid<T>) {
         let aspect = grid.step[1].as_f64();
         let at = |i: usize| ((i % grid.columns) as f64, (i / grid.columns) as f64 * aspect);
@@ -99,11 +100,20 @@ impl<T: Scalar> TsaiShah<T> {
             count += 1.0;
         }
         let [cx, cy] = sum.map(|sum| sum / count);
-        let radius2 = |(x, y): (f64, f64)| (x - cx).powi(2) + (y - cy).powi(2);
-        let rim = inside().map(radius2).fold(0.0_f64, f64::max).sqrt().max(1.0);
-        let bend = -0.5 * self.start_slope.as_f64() / rim;
+        // The variance of a pixel's own square keeps masks of one row or column from being singular.
+        let (mut xx, mut xy, mut yy) = (1.0 / 12.0, 0.0, aspect * aspect / 12.0);
+        for (x, y) in inside() {
+            xx += (x - cx) * (x - cx) / count;
+            xy += (x - cx) * (y - cy) / count;
+            yy += (y - cy) * (y - cy) / count;
+        }
+        let determinant = xx * yy - xy * xy;
+        let largest = 0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy);
+        let minor = 2.0 * (determinant / largest).sqrt();
+        let bend = -0.5 * self.start_slope.as_f64() * minor / (4.0 * determinant);
         for (i, z) in field.heights.iter_mut().enumerate() {
-            *z = T::of(bend * radius2(at(i)));
+            let (x, y) = (at(i).0 - cx, at(i).1 - cy);
+            *z = T::of(bend * (yy * x * x - 2.0 * xy * x * y + xx * y * y));
         }
     }
 }
