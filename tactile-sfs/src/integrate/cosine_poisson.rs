@@ -114,7 +114,7 @@ impl<T: Scalar> PoissonBuffers<T> {
             let (a, b) = lines.split_at_mut(columns);
             transform.forward(a, if b.is_empty() { &mut self.spare } else { b });
         }
-        let scale = -T::one() / T::of(columns as f64);
+        let scale = -1.0 / columns as f64;
         self.tridiagonal.solve(&mut self.grid, rows, columns, aspect * aspect, scale);
         for lines in self.grid.chunks_mut(2 * columns) {
             let (a, b) = lines.split_at_mut(columns);

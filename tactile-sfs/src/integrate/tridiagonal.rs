@@ -25,7 +25,7 @@ pub(super) struct Tridiagonal<T> {
 impl<T: Scalar> Tridiagonal<T> {
     /// Solves for every column of `grid`, whose right-hand sides are multiplied by `scale`; system 0, which is
     /// singular, gets the solution of mean 0.
-    pub(super) fn solve(&mut self, grid: &mut [T], rows: usize, columns: usize, aspect2: T, scale: T) {
+    pub(super) fn solve(&mut self, grid: &mut [T], rows: usize, columns: usize, aspect2: T, scale: f64) {
         self.pivots.resize(rows, [T::zero(); BLOCK]);
         self.wide.resize(rows);
         for left in (0..columns).step_by(BLOCK) {
@@ -42,9 +42,9 @@ impl<T: Scalar> Tridiagonal<T> {
             }
             let block = Block { rows, stride: columns, lanes };
             if lambda[..lanes].iter().any(|&lambda| lambda < WIDE_BELOW) {
-                self.wide.solve(&mut grid[left..], &block, &lambda, scale.as_f64());
+                self.wide.solve(&mut grid[left..], &block, &lambda, scale);
             } else {
-                self.narrow(&mut grid[left..], &block, &lambda.map(T::of), scale);
+                self.narrow(&mut grid[left..], &block, &lambda.map(T::of), T::of(scale));
             }
         }
         for (row, &height) in self.constant.iter().enumerate() {
@@ -53,13 +53,13 @@ impl<T: Scalar> Tridiagonal<T> {
     }
 
     /// Solves −δ² z = f for column 0 with mean 0: z_{r+1} − z_r = −Σ_{i ≤ r} f_i, summed in f64.
-    fn sum_constant(&mut self, grid: &[T], columns: usize, scale: T) {
+    fn sum_constant(&mut self, grid: &[T], columns: usize, scale: f64) {
         self.constant.clear();
         let (mut flux, mut height, mut sum) = (0.0, 0.0, 0.0);
         for line in grid.chunks(columns) {
             self.constant.push(T::of(height));
             sum += height;
-            flux += (line[0] * scale).as_f64();
+            flux += line[0].as_f64() * scale;
             height -= flux;
         }
         let mean = T::of(sum / self.constant.len() as f64);
