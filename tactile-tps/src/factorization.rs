@@ -9,6 +9,7 @@ use crate::{
     error::Input,
     options::{validate_smoothing, validate_weights},
     refine::{Buffers, Equations, Solution},
+    reweight::Reweighting,
     sites::{Sites, finite},
     spline::Fitted,
     system::{Setting, System},
@@ -66,6 +67,8 @@ struct Task<'a, T, const D: usize> {
     weights: Option<&'a [T]>,
     smoothing: Smoothing<T>,
     careful: bool,
+    /// Other weights than the system's, to be met by iteration.
+    reweighting: Option<Reweighting<'a>>,
 }
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
@@ -147,14 +150,16 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
     ) -> Result<(), TpsError> {
-        self.finish(&self.task(), &mut workspace.buffers, targets, spline)
+        self.finish(&self.task(), &mut workspace.buffers, targets, spline).map(drop)
     }
 
     /// New targets, weights (`None`: those of the factorisation) and smoothing for the same sources, into a spline that
     /// is already there; allocates nothing once workspace and spline have grown.
     ///
     /// The same weights and λ cost two triangular solves; another λ without weights two products once the matrix is
-    /// [decomposed](Self::decompose); other weights a factorisation without the set-up of the first.
+    /// [decomposed](Self::decompose). Positive weights leave an interpolating spline as it is, and cost the two solves. With
+    /// λ > 0, weights near each other, or few that differ, are met by conjugate gradients on the decomposed matrix, to 1e-13
+    /// of the targets; weights far apart, or of zero, cost a factorisation without the set-up of the first.
     ///
     /// # Errors
     /// [`TpsError`] for bad targets, weights or smoothing; the spline is then left as it was.
@@ -174,6 +179,14 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             return self.fit_with(workspace, targets, spline);
         }
         let Workspace { buffers, system, site_weights } = workspace;
+        if let Some(weights) = weights {
+            weigh(&self.sites, Some(weights), site_weights);
+            if let Some(task) = self.cheap(weights, site_weights, smoothing, &mut buffers.excess)
+                && self.finish(&task, buffers, targets, spline)?
+            {
+                return Ok(());
+            }
+        }
         let own = weights.is_none();
         let gcv = smoothing == Smoothing::Gcv;
         let spectral = own && (gcv || self.decomposes(smoothing));
@@ -187,8 +200,43 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             }
         }
         let system = self.spectral.get().filter(|_| spectral).unwrap_or(system);
-        let task = Task { system, weights: weights.or(self.weights.as_deref()), smoothing, careful: false };
-        self.finish(&task, buffers, targets, spline)
+        let task = Task {
+            system,
+            weights: weights.or(self.weights.as_deref()),
+            smoothing,
+            careful: false,
+            reweighting: None,
+        };
+        self.finish(&task, buffers, targets, spline).map(drop)
+    }
+
+    /// A fit with other weights by what is already there, if it can be had.
+    ///
+    /// An interpolating spline asks only which weights are positive; a smoothing one changes on a diagonal.
+    fn cheap<'a>(
+        &'a self,
+        weights: &'a [T],
+        site_weights: &[f64],
+        smoothing: Smoothing<T>,
+        excess: &mut Vec<f64>,
+    ) -> Option<Task<'a, T, D>> {
+        if smoothing == Smoothing::Gcv || site_weights.contains(&0.0) {
+            return None;
+        }
+        let task = |system, reweighting| {
+            Some(Task { system, weights: Some(weights), smoothing, careful: false, reweighting })
+        };
+        if self.inner_lambda(smoothing) == 0.0 {
+            let same = self.system.lambda == 0.0 && self.system.active.len() == self.sites.len();
+            return if same { task(&self.system, None) } else { None };
+        }
+        if !self.decomposes(smoothing) {
+            return None;
+        }
+        self.decompose();
+        let system = self.spectral.get()?;
+        let reweighting = system.reweighting(self.inner_lambda(smoothing), site_weights, excess)?;
+        task(system, Some(reweighting))
     }
 
     /// Whether a refit with this smoothing and the factorisation's own weights is to go by the spectrum.
@@ -201,7 +249,13 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     fn task(&self) -> Task<'_, T, D> {
         let gcv = self.smoothing == Smoothing::Gcv;
         let system = self.spectral.get().filter(|_| gcv).unwrap_or(&self.system);
-        Task { system, weights: self.weights.as_deref(), smoothing: self.smoothing, careful: false }
+        Task {
+            system,
+            weights: self.weights.as_deref(),
+            smoothing: self.smoothing,
+            careful: false,
+            reweighting: None,
+        }
     }
 
     fn setting(&self) -> Setting<'_, K, D> {
@@ -221,13 +275,14 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.sites.frame.scale.powi(self.kernel.degree().unwrap_or(0))
     }
 
+    /// Solves and fills the spline; `false` if the task was to iterate and that takes too many steps.
     fn finish<const M: usize>(
         &self,
         task: &Task<'_, T, D>,
         buffers: &mut Buffers,
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
-    ) -> Result<(), TpsError> {
+    ) -> Result<bool, TpsError> {
         if targets.len() != self.len() {
             let (expected, found) = (self.len(), targets.len());
             return Err(TpsError::Length { input: Input::Targets, expected, found });
@@ -242,12 +297,19 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.gather(targets, task.weights, &origin, buffers);
         let lambda = if gcv { self.validated::<M>(system, buffers)? } else { lambda };
         let equations = Equations { kernel: &self.kernel, sites: &self.sites, system, lambda };
-        let solution: Solution<M> =
-            equations.solve(buffers, task.careful).ok_or(TpsError::NotDefinite { column: system.null.q })?;
+        let solution: Solution<M> = match &task.reweighting {
+            None => equations
+                .solve(buffers, task.careful)
+                .ok_or(TpsError::NotDefinite { column: system.null.q })?,
+            Some(reweighting) => match equations.resolve(buffers, reweighting) {
+                Some(solution) => solution,
+                None => return Ok(false),
+            },
+        };
         let level = targets.iter().flat_map(|t| t.iter()).fold(0.0, |m, x| f64::max(m, x.widen().abs()));
         let (sites, unit) = (&self.sites, self.unit());
         spline.assign(&Fitted { sites, system, lambda, unit, solution, origin, level }, buffers);
-        Ok(())
+        Ok(true)
     }
 
     /// The λ of least generalised cross-validation.

@@ -30,6 +30,7 @@ mod precise;
 mod real;
 mod refine;
 mod report;
+mod reweight;
 mod sample;
 mod simd;
 mod sites;

@@ -6,6 +6,7 @@ use crate::{
     null_space::MAX,
     precise,
     real::Lane,
+    reweight::Reweighting,
     simd::{Job, dispatch},
     sites::Sites,
     system::System,
@@ -40,6 +41,8 @@ pub(crate) struct Buffers {
     /// Weights at the sites, output by output: the answer.
     pub(crate) weights: Vec<f64>,
     residuals: Vec<f64>,
+    /// λW⁻¹ − λ̄I at the sites, for a refit with other weights.
+    pub(crate) excess: Vec<f64>,
     pub(crate) work: Vec<f64>,
     pub(crate) spare: Vec<f64>,
 }
@@ -50,6 +53,10 @@ pub(crate) struct Solution<const M: usize> {
     /// Largest residual relative to the largest target, where it was measured.
     pub(crate) residual: Option<f64>,
     pub(crate) refinements: usize,
+    /// Steps of conjugate gradients.
+    pub(crate) iterations: usize,
+    /// Condition number of the matrix, or a bound.
+    pub(crate) condition: f64,
     pub(crate) precise: bool,
 }
 
@@ -57,13 +64,22 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     /// Solves for the targets in `buffers`, `None` if the kernel is not definite on the sites; `careful` measures the residual and refines from a lower condition number on.
     pub(crate) fn solve<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Option<Solution<M>> {
         let (n, system) = (self.sites.len(), self.system);
+        let condition = system.condition(self.lambda);
+        let direct = |affine, precise| Solution {
+            affine,
+            residual: None,
+            refinements: 0,
+            iterations: 0,
+            condition,
+            precise,
+        };
         buffers.weights.clone_from(&buffers.targets);
         if system.indefinite || self.needs_precision(careful) {
             if let Some(affine) =
                 precise::solve(self.kernel, self.sites, system, self.lambda, &mut buffers.weights)
             {
                 let residual = careful.then(|| self.sampled(&affine, buffers));
-                return Some(Solution { affine, residual, refinements: 0, precise: true });
+                return Some(Solution { residual, ..direct(affine, true) });
             }
             if system.indefinite {
                 return None;
@@ -72,19 +88,33 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         }
         let affine =
             system.solve(&mut buffers.weights, n, self.lambda, &mut buffers.work, &mut buffers.spare);
-        let mut solution = Solution { affine, residual: None, refinements: 0, precise: false };
+        let mut solution = direct(affine, false);
         let threshold = match careful {
             true if n <= SMALL_POINTS => 10.0 * n as f64,
             true => 1e6,
             false => 1e8,
         };
-        if system.condition(self.lambda) > threshold {
+        if condition > threshold {
             self.refine(buffers, &mut solution);
         }
         if careful && solution.refinements == 0 {
             solution.residual = Some(self.sampled(&solution.affine, buffers));
         }
         Some(solution)
+    }
+
+    /// Solves with other weights by the spectrum of the system; `None` if that takes too many steps.
+    pub(crate) fn resolve<const M: usize>(
+        &self,
+        buffers: &mut Buffers,
+        reweighting: &Reweighting<'_>,
+    ) -> Option<Solution<M>> {
+        let Buffers { targets, weights, residuals, excess, work, spare } = buffers;
+        weights.clone_from(targets);
+        let memory = [residuals, work, spare];
+        let (affine, iterations) = self.system.resolve(weights, reweighting, excess, memory)?;
+        let condition = reweighting.condition;
+        Some(Solution { affine, residual: None, refinements: 0, iterations, condition, precise: false })
     }
 
     /// Whether plain arithmetic would leave too few digits, and the points are few enough to do something about it.

@@ -41,6 +41,11 @@ impl Spectrum {
         b.copy_from_slice(scratch);
     }
 
+    /// Least and largest eigenvalue.
+    pub(crate) fn range(&self) -> (f64, f64) {
+        (self.least, self.most)
+    }
+
     /// 2-norm condition number of A + λI; rounding may leave eigenvalues below zero, and then it is infinite.
     pub(crate) fn condition(&self, lambda: f64) -> f64 {
         let (least, most) = (self.least + lambda, self.most + lambda);

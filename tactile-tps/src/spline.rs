@@ -97,6 +97,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
                 condition: 1.0,
                 residual: None,
                 refinements: 0,
+                iterations: 0,
                 precise: false,
                 digits: 0.0,
             },
@@ -128,9 +129,10 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         report.extents.clear();
         report.extents.extend_from_slice(&system.span.extents);
         report.lambda = lambda * unit;
-        report.condition = system.condition(*lambda);
+        report.condition = solution.condition;
         report.residual = solution.residual;
         report.refinements = solution.refinements;
+        report.iterations = solution.iterations;
         report.precise = solution.precise;
     }
 

@@ -6,6 +6,7 @@ use crate::{
     null_space::{MAX, NullSpace, dot},
     real::Lane,
     refine::PRECISE_POINTS,
+    reweight::Reweighting,
     simd::{Job, dispatch},
     sites::Sites,
     span::Span,
@@ -147,7 +148,46 @@ impl<const D: usize> System<D> {
         work: &mut Vec<f64>,
         spare: &mut Vec<f64>,
     ) -> [[f64; MAX]; M] {
-        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
+        let mut heads = self.rotate::<M>(y, sites, work);
+        match &self.spectrum {
+            Some(spectrum) => spectrum.solve::<M>(work, lambda, spare),
+            None => self.cholesky.solve::<M>(work),
+        }
+        self.lift(y, sites, work, &mut heads);
+        heads
+    }
+
+    /// What a solve with other weights by this system's spectrum takes; `weights` are those of the sites, and all positive.
+    pub(crate) fn reweighting(
+        &self,
+        lambda: f64,
+        weights: &[f64],
+        excess: &mut Vec<f64>,
+    ) -> Option<Reweighting<'_>> {
+        Reweighting::new(self.spectrum.as_ref()?, &self.null, lambda, weights, excess)
+    }
+
+    /// As [`solve`](Self::solve) with other weights: the affine parts and the steps taken, `None` if they did not suffice.
+    pub(crate) fn resolve<const M: usize>(
+        &self,
+        y: &mut [f64],
+        reweighting: &Reweighting<'_>,
+        excess: &[f64],
+        [columns, work, spare]: [&mut Vec<f64>; 3],
+    ) -> Option<([[f64; MAX]; M], usize)> {
+        let (sites, q, stride) = (excess.len(), self.null.q, self.null.stride);
+        let mut heads = self.rotate::<M>(y, sites, columns);
+        let steps = reweighting.solve::<M>(columns, excess, work, spare)?;
+        for (head, column) in heads.iter_mut().zip(work.chunks_exact(stride)) {
+            head.iter_mut().zip(&column[HEAD - q..HEAD]).for_each(|(h, e)| *h -= e);
+        }
+        self.lift(y, sites, &mut work[..M * stride], &mut heads);
+        Some((heads, steps))
+    }
+
+    /// Qᵀ W^½ y in `work`; returns its first q places, output by output.
+    fn rotate<const M: usize>(&self, y: &[f64], sites: usize, work: &mut Vec<f64>) -> [[f64; MAX]; M] {
+        let (q, stride) = (self.null.q, self.null.stride);
         work.clear();
         work.resize(M * stride, 0.0);
         let mut heads = [[0.0; MAX]; M];
@@ -156,10 +196,18 @@ impl<const D: usize> System<D> {
             self.null.apply_transpose(column);
             heads[m][..q].copy_from_slice(&column[HEAD - q..HEAD]);
         }
-        match &self.spectrum {
-            Some(spectrum) => spectrum.solve::<M>(work, lambda, spare),
-            None => self.cholesky.solve::<M>(work),
-        }
+        heads
+    }
+
+    /// Turns z in `work` into the weights w, and `heads` into the affine parts.
+    fn lift<const M: usize>(
+        &self,
+        y: &mut [f64],
+        sites: usize,
+        work: &mut [f64],
+        heads: &mut [[f64; MAX]; M],
+    ) {
+        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
         y.fill(0.0);
         for (m, column) in work.chunks_exact_mut(stride).enumerate() {
             column[..HEAD].fill(0.0);
@@ -173,7 +221,6 @@ impl<const D: usize> System<D> {
             self.active.iter().enumerate().for_each(|(i, &site)| y[m * sites + site] = values[i] * scale(i));
             heads[m] = self.null.solve_upper(&heads[m][..q]);
         }
-        heads
     }
 
     /// The values at the active sites, each times its scale.

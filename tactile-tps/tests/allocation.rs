@@ -13,19 +13,21 @@ fn refits_and_evaluation_allocate_nothing() {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let queries = random.points::<3>(333);
     let weights: Vec<f64> = (0..105).map(|i| f64::from(i % 5)).collect();
+    let near: Vec<f64> = (0..105).map(|i| 1.0 + 1e-4 * f64::from(i % 5)).collect();
     let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
     let (mut workspace, mut spline) = (Workspace::new(), Spline::<_, 3, 3, _>::empty(NegR));
     let (mut values, mut jacobians) = (vec![Point::origin(); 333], vec![Matrix3::zeros(); 333]);
     let mut hessians = vec![[Matrix3::zeros(); 3]; 333];
     let mut round = |lambda: f64| {
         factorization.fit_with(&mut workspace, &targets, &mut spline).expect("a fit");
-        for weights in [None, Some(&weights[..])] {
+        for weights in [None, Some(&weights[..]), Some(&near)] {
             for smoothing in [Smoothing::None, Smoothing::Lambda(lambda)] {
                 factorization
                     .refit_with(&mut workspace, &targets, weights, smoothing, &mut spline)
                     .expect("a refit");
             }
         }
+        assert!(spline.report().iterations > 0);
         factorization
             .refit_with(&mut workspace, &targets, None, Smoothing::Gcv, &mut spline)
             .expect("a refit");
