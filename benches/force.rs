@@ -47,6 +47,7 @@ fn pass(c: &mut Criterion) {
     let statistics = s.reference.compare(s.quiet.view(), 10).expect("same size");
     let reference: u64 = add_up(s.reference.image().as_slice().expect("contiguous"));
     assert_eq!(statistics.sum, add_up(bytes) as i64 - reference as i64, "the pass is exact");
+    group.bench_function("the pass alone", |b| b.iter(|| s.reference.compare(black_box(s.quiet.view()), 10)));
     let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
     let mut workspace = DetectorWorkspace::default();
     let mut detect = |frame: &Array2<u8>| {

@@ -1,9 +1,10 @@
-//! Force, contact and shear from frames.
+//! Normal force, contact radius, centroid and stress from frames, after fitting the calibration that they are read with.
 //!
 //!     cargo run --release --example measure_force --features simulate,scene,plot -- --help
 //!
 //! With images: a reference frame, pressed frames and a CSV of calibration pairs (integrated pixel value, force in newtons; the second half
-//! of a there-and-back run may follow the first). Without: a simulated sensor that is calibrated, pressed and sheared.
+//! of a there-and-back run may follow the first). Without: a simulated sensor that is calibrated and pressed twice.
+//! The calibration and its residuals are drawn as an SVG.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::error::Error;
@@ -15,7 +16,7 @@ use tactile_imaging::force::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceMeasurement, ForceMeter,
     ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame, StressCalibration,
 };
-use tactile_imaging::plot::{Colour, Page, Panel};
+use tactile_imaging::plot::{Colour, Legend, Page, Panel};
 use tactile_imaging::simulate::{self, Load, PressOptions, PressScene};
 
 /// Measure force, contact radius and centroid from frames of an optical tactile sensor.
@@ -139,10 +140,10 @@ fn describe(name: &str, m: &ForceMeasurement<f64>) {
     };
     println!("  force        {:.4} ± {:.4} N", m.force_n.value, m.force_n.standard_error);
     if let Some(r) = m.contact_radius_m {
-        println!("  radius       {:.4} ± {:.4} mm", 1e3 * r.value, 1e3 * r.standard_error);
+        println!("  radius       {:.4} mm (± {:.2} um)", 1e3 * r.value, 1e6 * r.standard_error);
     }
     println!(
-        "  centroid     {:.4} mm, {:.4} mm (± {:.1} um)",
+        "  centroid     {:.4} mm, {:.4} mm (± {:.2} um)",
         1e3 * centroid[0].value,
         1e3 * centroid[1].value,
         1e6 * centroid[0].standard_error
@@ -179,6 +180,7 @@ fn plot(pairs: &[CalibrationPair<f64>], line: &LinearCalibration<f64>) -> Result
     let residuals = &line.report().residuals_n;
     let [low, high] = line.range();
     let mut top = Panel::new("Calibration")
+        .legend(Legend::UpperLeft)
         .x_label("integrated pixel value (million grey levels)")
         .y_label("force (N)");
     top = top.line(
@@ -189,7 +191,7 @@ fn plot(pairs: &[CalibrationPair<f64>], line: &LinearCalibration<f64>) -> Result
     let mut bottom = Panel::new("Residuals")
         .x_label("integrated pixel value (million grey levels)")
         .y_label("measured − fitted (mN)");
-    bottom = bottom.line([[1e-6 * low, 0.0], [1e-6 * high, 0.0]], Colour::BLACK, "fitted line");
+    bottom = bottom.line([[1e-6 * low, 0.0], [1e-6 * high, 0.0]], Colour::BLACK, "");
     for (branch, colour, name) in
         [(Branch::Loading, Colour::BLUE, "loading"), (Branch::Unloading, Colour::ORANGE, "unloading")]
     {
@@ -197,7 +199,7 @@ fn plot(pairs: &[CalibrationPair<f64>], line: &LinearCalibration<f64>) -> Result
         let found = of(branch);
         if !found.is_empty() {
             top = top.points(found.iter().map(|k| [x(*k), pairs[*k].force_n]), colour, name);
-            bottom = bottom.points(found.iter().map(|k| [x(*k), 1e3 * residuals[*k]]), colour, name);
+            bottom = bottom.points(found.iter().map(|k| [x(*k), 1e3 * residuals[*k]]), colour, "");
         }
     }
     Ok(Page::new("Force calibration").columns(1).panel(top).panel(bottom))

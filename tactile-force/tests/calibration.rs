@@ -9,6 +9,7 @@ use tactile_force::{
 };
 
 type Pairs = Vec<CalibrationPair<f64>>;
+type Fit = fn(&Pairs) -> Box<dyn StressCalibration<f64>>;
 
 /// Loading to two newtons in `steps` steps and back, along a curve, with noise in the force.
 fn cycle(steps: usize, noise: f64, seed: u64, curve: impl Fn(f64) -> f64) -> Pairs {
@@ -167,6 +168,43 @@ fn the_origin_can_be_forced() {
     let pairs = cycle(20, 5e-3, 9, line);
     for c in all(&pairs, &options(true, Robustness::None)) {
         assert!(c.force_n(0.0).abs() < 1e-9, "{}", c.force_n(0.0));
+    }
+}
+
+#[test]
+fn errors_of_two_forces_go_together_as_stated() {
+    let at = [3e5, 3.2e6];
+    let fits: [Fit; 2] = [
+        |p| Box::new(LinearCalibration::fit(p, &CalibrationOptions::default()).unwrap()),
+        |p| Box::new(PolynomialCalibration::fit(p, 3, &CalibrationOptions::default()).unwrap()),
+    ];
+    for fit in fits {
+        let (mut seen, mut stated, mut size) = (0.0, 0.0, 0.0);
+        for seed in 0..1000 {
+            let c = fit(&cycle(20, 5e-3, seed, line));
+            let error = at.map(|v| c.force_n(v) - line(v));
+            seen += error[0] * error[1];
+            stated += c.error_covariance_n2(at[0], at[1]);
+            size += c.standard_error_n(at[0]) * c.standard_error_n(at[1]);
+        }
+        // The mean of a thousand products of two errors is uncertain by √2/√1000 of their size at most; three of that.
+        assert!((seen - stated).abs() < 0.13 * size, "{seen} {stated} {size}");
+    }
+}
+
+#[test]
+fn forces_of_one_calibration_share_its_error() {
+    let c = LinearCalibration::fit(&cycle(20, 5e-3, 2, line), &CalibrationOptions::default()).unwrap();
+    let values = [2e5, 2e6, 3.9e6].map(|value| Estimate { value, standard_error: 4e3 });
+    let covariance = c.force_covariance_n2(&values);
+    for (i, v) in values.iter().enumerate() {
+        let reading = c.read(*v);
+        // One rounding per operation.
+        assert!((covariance[[i, i]].sqrt() / reading.force_n.standard_error - 1.0).abs() < 1e-12);
+        for (j, w) in values.iter().enumerate().filter(|(j, _)| *j != i) {
+            assert_eq!(covariance[[i, j]], covariance[[j, i]]);
+            assert!(covariance[[i, j]].abs() <= reading.calibration_n * c.read(*w).calibration_n);
+        }
     }
 }
 

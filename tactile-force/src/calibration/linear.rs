@@ -103,10 +103,13 @@ impl<T: Real> StressCalibration<T> for LinearCalibration<T> {
     }
 
     fn standard_error_n(&self, integrated_pixel_value: T) -> T {
-        let d = integrated_pixel_value - self.centre;
-        let (level, slope) = (self.level_n.standard_error, self.slope_n.standard_error * d);
-        let two = T::one() + T::one();
-        (level * level + slope * slope + two * self.covariance * d).max(T::zero()).sqrt()
+        self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value).max(T::zero()).sqrt()
+    }
+
+    fn error_covariance_n2(&self, a: T, b: T) -> T {
+        let (level, slope) = (self.level_n.standard_error, self.slope_n.standard_error);
+        let (a, b) = (a - self.centre, b - self.centre);
+        level * level + slope * a * (slope * b) + self.covariance * (a + b)
     }
 
     fn integrated_pixel_value(&self, force_n: T) -> Option<T> {

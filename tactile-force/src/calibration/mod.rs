@@ -20,6 +20,8 @@ pub use monotone::MonotoneCalibration;
 pub use polynomial::PolynomialCalibration;
 pub use report::{CalibrationReport, Hysteresis, StopReason};
 
+use ndarray::Array2;
+
 use crate::{Estimate, ForceError, Real};
 
 /// Whether the force was rising or falling when a pair was taken.
@@ -108,6 +110,41 @@ pub trait StressCalibration<T: Real>: Send + Sync {
 
     /// Standard error of the force due to the uncertainty of the calibration's own parameters, in newtons.
     fn standard_error_n(&self, integrated_pixel_value: T) -> T;
+
+    /// Covariance of the calibration's errors at two integrated pixel values, in N²; at one and the same it is the square of
+    /// [`standard_error_n`](Self::standard_error_n). Unless a calibration knows better, its errors go together.
+    fn error_covariance_n2(&self, a: T, b: T) -> T {
+        self.standard_error_n(a) * self.standard_error_n(b)
+    }
+
+    /// Covariance matrix of forces read with this one calibration, in N²:
+    /// C_ij = cov_cal(V_i, V_j) + δ_ij (dF/dV)² σ_V². The noise of the frames is each force's own, the calibration's error is
+    /// shared. O(n²).
+    ///
+    /// ```
+    /// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
+    /// let pairs: Vec<_> = [0.01, 0.48, 1.03, 1.5, 1.98]
+    ///     .iter()
+    ///     .zip(0..)
+    ///     .map(|(f, k)| CalibrationPair::loading(1e5 * f64::from(k), *f))
+    ///     .collect();
+    /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+    /// let values = [1e5, 3e5].map(|value| Estimate { value, standard_error: 300.0 });
+    /// let covariance = line.force_covariance_n2(&values);
+    /// let alone = line.read(values[1]).force_n.standard_error;
+    /// assert!((covariance[[1, 1]].sqrt() - alone).abs() < 1e-12);
+    /// assert_eq!(covariance[[0, 1]], covariance[[1, 0]]);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    fn force_covariance_n2(&self, integrated_pixel_values: &[Estimate<T>]) -> Array2<T> {
+        let n = integrated_pixel_values.len();
+        Array2::from_shape_fn((n, n), |(i, j)| {
+            let (a, b) = (integrated_pixel_values[i.min(j)], integrated_pixel_values[i.max(j)]);
+            let shared = self.error_covariance_n2(a.value, b.value);
+            let own = self.sensitivity_n(a.value) * a.standard_error;
+            if i == j { shared + own * own } else { shared }
+        })
+    }
 
     /// The integrated pixel value of a force, or `None` where the curve does not take it exactly once.
     fn integrated_pixel_value(&self, force_n: T) -> Option<T>;

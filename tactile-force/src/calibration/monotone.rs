@@ -70,22 +70,7 @@ impl<T: Real> MonotoneCalibration<T> {
             return Err(ForceError::DegeneratePairs { span: 0.0 });
         }
         let scale = neighbour_noise(&points, options.robustness);
-        let mut weights = vec![1.0; points.len()];
-        let (mut iterations, mut stop) = (1, StopReason::Direct);
-        let mut blocks = pool(&points, &weights, options.through_origin);
-        while options.robustness != Robustness::None && iterations <= SWEEPS {
-            iterations += 1;
-            stop = StopReason::IterationLimit;
-            let before = weights.clone();
-            for (w, (v, f)) in weights.iter_mut().zip(&points) {
-                *w = robust_weight(options.robustness, f - level(&blocks, *v), scale);
-            }
-            blocks = pool(&points, &weights, options.through_origin);
-            if before.iter().zip(&weights).all(|(a, b)| (a - b).abs() < 1e-9) {
-                stop = StopReason::Converged;
-                break;
-            }
-        }
+        let (blocks, iterations, stop) = reweighted(&points, scale, options);
         if blocks.len() < 2 {
             return Err(ForceError::NotMonotone { from: low, to: high });
         }
@@ -112,6 +97,30 @@ impl<T: Real> MonotoneCalibration<T> {
             range: [T::nearest(low), T::nearest(high)],
         })
     }
+}
+
+/// Pools, with the weights of outliers lowered until they settle; also the number of solves and why they stopped.
+fn reweighted(
+    points: &[(f64, f64)],
+    scale: f64,
+    options: &CalibrationOptions,
+) -> (Vec<Block>, usize, StopReason) {
+    let mut weights = vec![1.0; points.len()];
+    let mut blocks = pool(points, &weights, options.through_origin);
+    if options.robustness == Robustness::None {
+        return (blocks, 1, StopReason::Direct);
+    }
+    for sweep in 1..=SWEEPS {
+        let before = weights.clone();
+        for (w, (v, f)) in weights.iter_mut().zip(points) {
+            *w = robust_weight(options.robustness, f - level(&blocks, *v), scale);
+        }
+        blocks = pool(points, &weights, options.through_origin);
+        if before.iter().zip(&weights).all(|(a, b)| (a - b).abs() < 1e-9) {
+            return (blocks, sweep + 1, StopReason::Converged);
+        }
+    }
+    (blocks, SWEEPS + 1, StopReason::IterationLimit)
 }
 
 /// Standard deviation of one pair from its distance to the line through its neighbours: mean of e²/(1 + a² + b²)

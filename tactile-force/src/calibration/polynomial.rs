@@ -124,14 +124,16 @@ impl<T: Real> StressCalibration<T> for PolynomialCalibration<T> {
     }
 
     fn standard_error_n(&self, integrated_pixel_value: T) -> T {
+        self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value).max(T::zero()).sqrt()
+    }
+
+    fn error_covariance_n2(&self, a: T, b: T) -> T {
         let terms = self.coefficients.len();
-        let mut variance = 0.0;
-        self.each(integrated_pixel_value, |i, a, _| {
-            self.each(integrated_pixel_value, |j, b, _| {
-                variance += a * b * self.covariance[i * terms + j].as_f64()
-            });
+        let mut covariance = 0.0;
+        self.each(a, |i, a, _| {
+            self.each(b, |j, b, _| covariance += a * b * self.covariance[i * terms + j].as_f64());
         });
-        T::nearest(variance.max(0.0).sqrt())
+        T::nearest(covariance)
     }
 
     fn integrated_pixel_value(&self, force_n: T) -> Option<T> {

@@ -1,9 +1,9 @@
 //! Frame in, contact out.
 
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, Axis, Slice};
 
 use super::noise;
-use super::region::{Extent, Region};
+use super::region::{Extent, Region, greatest};
 use super::runs::Run;
 use super::summary::Sums;
 use super::threshold::quantile;
@@ -153,7 +153,7 @@ impl ContactDetector {
         loop {
             region.load(frame, reference, place, drift, sign);
             let z = quantile(self.options.false_alarm_rate, region.difference.len());
-            let signal = region.difference.iter().copied().fold(0.0, f32::max);
+            let signal = greatest(&region.difference);
             let width =
                 self.options.smoothing_px.unwrap_or_else(|| smoothing_width(z * sd, f64::from(signal)));
             let limit = z * sd / width as f64;
@@ -230,7 +230,11 @@ impl ContactDetector {
         let full = if self.options.polarity.sign() > 0 { u8::MAX } else { 0 };
         let in_run = |run: &Run| {
             let row = frame.row(run.row as usize);
-            (run.start as usize..run.end as usize).filter(|x| row[*x] == full).count()
+            let row = row.slice_axis(Axis(0), Slice::from(run.start as usize..run.end as usize));
+            match row.to_slice() {
+                Some(pixels) => pixels.iter().filter(|p| **p == full).count(),
+                None => row.iter().filter(|p| **p == full).count(),
+            }
         };
         region.mask.iter().map(in_run).sum()
     }
@@ -239,7 +243,7 @@ impl ContactDetector {
 /// Greatest difference in the mask.
 fn peak(region: &Region) -> f32 {
     let columns = region.columns();
-    region.mask.iter().flat_map(|run| &region.difference[run.span(columns)]).copied().fold(0.0, f32::max)
+    region.mask.iter().map(|run| greatest(&region.difference[run.span(columns)])).fold(0.0, f32::max)
 }
 
 /// The box one pixel larger on every side, whether or not the frame is; a box at the first row or column cannot be.

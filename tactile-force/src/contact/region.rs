@@ -3,6 +3,7 @@
 use ndarray::ArrayView2;
 
 use super::runs::{self, Components, Run, push_runs};
+use crate::drift::DriftLine;
 use crate::{BoundingBox, Drift, ReferenceFrame};
 
 /// Differences over one box, row-major, and the contact in it as runs.
@@ -52,13 +53,12 @@ impl Region {
         let flat = reference.flat_field();
         for (y, (f, r)) in frame.rows().into_iter().zip(mean.rows()).enumerate() {
             let start = self.difference.len();
-            let pairs = f.into_iter().zip(r).map(|(f, r)| (f32::from(*f), *r));
             let row = place.row_start + y;
-            if drift.is_zero() {
-                self.difference.extend(pairs.map(|(f, r)| sign * (f - r)));
-            } else {
-                let line = drift.line(row, place.column_start);
-                self.difference.extend(pairs.enumerate().map(|(x, (f, r))| sign * line.difference(x, f, r)));
+            let line = (!drift.is_zero()).then(|| drift.line(row, place.column_start));
+            // Slices, where the layout allows, turn into wide instructions.
+            match (f.to_slice(), r.to_slice()) {
+                (Some(f), Some(r)) => extend(&mut self.difference, f.iter().zip(r), line, sign),
+                _ => extend(&mut self.difference, f.iter().zip(r), line, sign),
             }
             if let Some(line) = flat.map(|f| f.line(row, place.column_start)) {
                 self.difference[start..].iter_mut().enumerate().for_each(|(x, d)| *d /= line.at(x));
@@ -108,6 +108,33 @@ impl Region {
         });
         boxes.reduce(BoundingBox::union)
     }
+}
+
+/// Appends the differences of one row.
+fn extend<'a>(
+    differences: &mut Vec<f32>,
+    pixels: impl Iterator<Item = (&'a u8, &'a f32)>,
+    line: Option<DriftLine>,
+    sign: f32,
+) {
+    let pairs = pixels.map(|(f, r)| (f32::from(*f), *r));
+    match line {
+        None => differences.extend(pairs.map(|(f, r)| sign * (f - r))),
+        Some(line) => {
+            differences.extend(pairs.enumerate().map(|(x, (f, r))| sign * line.difference(x, f, r)));
+        }
+    }
+}
+
+/// Greatest of the values and zero.
+pub(super) fn greatest(values: &[f32]) -> f32 {
+    let larger = |a: f32, b: f32| if b > a { b } else { a };
+    let mut lanes = [0.0_f32; 16];
+    let (chunks, rest) = values.as_chunks::<16>();
+    for chunk in chunks {
+        lanes = std::array::from_fn(|k| larger(lanes[k], chunk[k]));
+    }
+    lanes.iter().chain(rest).copied().fold(0.0, larger)
 }
 
 /// Sums over a box of odd width centred at every pixel; beyond the region there is nothing to add.

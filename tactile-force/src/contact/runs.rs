@@ -20,17 +20,27 @@ impl Run {
     }
 }
 
+/// Pixels that are judged together.
+const BLOCK: usize = 32;
+
 /// Appends the runs of a row where `inside` holds.
 pub(super) fn push_runs<P>(runs: &mut Vec<Run>, row: usize, pixels: &[P], inside: impl Fn(&P) -> bool) {
     let mut start = None;
-    for (x, pixel) in pixels.iter().enumerate() {
-        match (inside(pixel), start) {
-            (true, None) => start = Some(x),
-            (false, Some(first)) => {
-                runs.push(Run { row: row as u32, start: first as u32, end: x as u32 });
-                start = None;
+    for (block, pixels) in pixels.chunks(BLOCK).enumerate() {
+        // Most blocks lie wholly inside or outside; counting takes wide instructions, edges are looked at one by one.
+        let count = pixels.iter().map(|p| u32::from(inside(p))).sum::<u32>() as usize;
+        if count == if start.is_some() { pixels.len() } else { 0 } {
+            continue;
+        }
+        for (x, pixel) in pixels.iter().enumerate().map(|(x, p)| (block * BLOCK + x, p)) {
+            match (inside(pixel), start) {
+                (true, None) => start = Some(x),
+                (false, Some(first)) => {
+                    runs.push(Run { row: row as u32, start: first as u32, end: x as u32 });
+                    start = None;
+                }
+                _ => {}
             }
-            _ => {}
         }
     }
     if let Some(first) = start {
@@ -181,17 +191,27 @@ fn merge(runs: &mut Vec<Run>) {
     });
 }
 
-/// The runs grown by a square of half width `margin`, clipped to the region.
+/// The runs, sorted by row and start, grown by a square of half width `margin` and clipped to the region.
 pub(super) fn grow(runs: &[Run], grown: &mut Vec<Run>, margin: usize, rows: usize, columns: usize) {
     grown.clear();
-    let margin = margin as u32;
-    for run in runs {
-        let (start, end) = (run.start.saturating_sub(margin), (run.end + margin).min(columns as u32));
-        for row in run.row.saturating_sub(margin)..=(run.row + margin).min(rows as u32 - 1) {
-            grown.push(Run { row, start, end });
+    let (Some(top), Some(bottom)) = (runs.first(), runs.last()) else { return };
+    let (margin, columns) = (margin as u32, columns as u32);
+    let (mut first, mut end) = (0, 0);
+    for row in top.row.saturating_sub(margin)..=(bottom.row + margin).min(rows as u32 - 1) {
+        while end < runs.len() && runs[end].row <= row + margin {
+            end += 1;
         }
+        while first < end && runs[first].row + margin < row {
+            first += 1;
+        }
+        let begun = grown.len();
+        grown.extend(runs[first..end].iter().map(|run| Run {
+            row,
+            start: run.start.saturating_sub(margin),
+            end: (run.end + margin).min(columns),
+        }));
+        grown[begun..].sort_unstable_by_key(|r| r.start);
     }
-    grown.sort_unstable_by_key(|r| (r.row, r.start));
     merge(grown);
 }
 

@@ -22,13 +22,7 @@ impl Sums {
             // Σ x and Σ x² of consecutive whole numbers.
             let cubes = |t: f64| t * (t + 1.0) * (2.0 * t + 1.0) / 6.0;
             let plain = [n, 0.5 * n * (first + last), y * n, cubes(last) - cubes(first - 1.0), y * y * n];
-            let (mut d0, mut d1, mut d2) = (0.0, 0.0, 0.0);
-            for (x, d) in region.difference[run.span(columns)].iter().enumerate() {
-                let (x, d) = (x as f64, f64::from(*d));
-                d0 += d;
-                d1 += x * d;
-                d2 += x * x * d;
-            }
+            let [d0, d1, d2] = moments(&region.difference[run.span(columns)]);
             let weighted =
                 [d0, d1 + first * d0, y * d0, d2 + 2.0 * first * d1 + first * first * d0, y * y * d0];
             for k in 0..5 {
@@ -64,4 +58,28 @@ impl Sums {
         let white = noise.background * about(&self.plain) + noise.gain * about(&self.weighted).max(0.0);
         (white + noise.common * lever * lever) / (total * total)
     }
+}
+
+/// Σ d, Σ x d, Σ x² d for x = 0, 1, …; in lanes, so that no sum waits for the one before.
+fn moments(differences: &[f32]) -> [f64; 3] {
+    const LANES: usize = 8;
+    let mut lanes = [[0.0; LANES]; 3];
+    let mut x: [f64; LANES] = std::array::from_fn(|k| k as f64);
+    let (chunks, rest) = differences.as_chunks::<LANES>();
+    for chunk in chunks {
+        for k in 0..LANES {
+            let d = f64::from(chunk[k]);
+            lanes[0][k] += d;
+            lanes[1][k] += x[k] * d;
+            lanes[2][k] += x[k] * x[k] * d;
+            x[k] += LANES as f64;
+        }
+    }
+    for (k, d) in rest.iter().enumerate() {
+        let d = f64::from(*d);
+        lanes[0][k] += d;
+        lanes[1][k] += x[k] * d;
+        lanes[2][k] += x[k] * x[k] * d;
+    }
+    lanes.map(|sums| sums.iter().sum())
 }

@@ -3,8 +3,9 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::edge::BlurredEdge;
-use super::profile::{Shape, level};
-use super::{HertzFit, HertzFitOptions, Rings};
+use super::profile::{Level, Shape, level};
+use super::rings::{RingSums, Rings};
+use super::{HertzFit, HertzFitOptions};
 use crate::contact::Region;
 use crate::{DifferenceNoise, Estimate, ForceError, Real, StopReason};
 
@@ -73,7 +74,7 @@ impl HertzFitter {
             stop: StopReason::IterationLimit,
         };
         for _ in 0..5 {
-            rings.gather(region, state.centre, aspect);
+            rings.gather(region, state.centre, aspect, start.radius);
             let moved = self.descend(rings, &mut state, noise, aspect)?;
             if moved < 0.02 {
                 break;
@@ -133,51 +134,41 @@ impl HertzFitter {
     /// Normal equations over all pixels of the rings; rows of parameters that are not fitted are those of the identity.
     fn assemble(&self, rings: &Rings, shape: &Shape, noise: DifferenceNoise) -> Equations {
         let mut e = Equations { normal: Normal::zeros(), gradient: Step::zeros(), chi2: 0.0, pixels: 0.0 };
-        for ring in rings.rings.iter().filter(|r| r.n > 0.0) {
+        for ring in rings.filled() {
             let r2 = ring.r2 / ring.n;
             let spread = (ring.r4 / ring.n - r2 * r2).max(0.0);
-            let l = level(&self.edge, shape, r2, spread);
-            let weight = 1.0 / (noise.background + noise.gain * l.value.max(0.0));
-            let radial = [l.by_peak, 1.0, l.by_radius, l.by_blur];
-            // Along a ring the model is its level, to first order in r² − mean r²; a shift of the centre changes it by
-            // −2 (dI/dr²) times the place.
-            let along = |place: f64, by_r2: f64| l.value * place + l.by_r2 * (by_r2 - r2 * place);
-            let residual = [
-                ring.d - ring.n * l.value,
-                ring.du - along(ring.u, ring.r2u),
-                ring.dv - along(ring.v, ring.r2v),
-            ];
-            let slope = -2.0 * l.by_r2;
-            for (i, a) in radial.iter().enumerate() {
-                for (j, b) in radial.iter().enumerate() {
-                    e.normal[(i, j)] += weight * ring.n * a * b;
-                }
-                for (j, sum) in [(4, ring.u), (5, ring.v)] {
-                    e.normal[(i, j)] += weight * a * slope * sum;
-                    e.normal[(j, i)] += weight * a * slope * sum;
-                }
-                e.gradient[i] += weight * a * residual[0];
-            }
-            let square = weight * slope * slope;
-            e.normal[(4, 4)] += square * ring.uu;
-            e.normal[(4, 5)] += square * ring.uv;
-            e.normal[(5, 4)] += square * ring.uv;
-            e.normal[(5, 5)] += square * (ring.r2 - ring.uu);
-            e.gradient[4] += weight * slope * residual[1];
-            e.gradient[5] += weight * slope * residual[2];
-            // Along a ring the model itself varies; that is no misfit.
-            let within = ring.n * l.by_r2 * l.by_r2 * spread;
-            e.chi2 += weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value - within);
-            e.pixels += ring.n;
+            let level = level(&self.edge, shape, r2, spread);
+            let weight = 1.0 / (noise.background + noise.gain * level.value.max(0.0));
+            e.add(&ring, &level, weight, r2, spread);
         }
-        let fixed = [(1, !self.options.fit_background), (3, self.options.blur_px.is_some())];
-        for (k, _) in fixed.into_iter().filter(|(_, fixed)| *fixed) {
+        e.normal.fill_upper_triangle_with_lower_triangle();
+        for (k, _) in self.fixed().into_iter().filter(|(_, fixed)| *fixed) {
             e.normal.fill_row(k, 0.0);
             e.normal.fill_column(k, 0.0);
             e.normal[(k, k)] = 1.0;
             e.gradient[k] = 0.0;
         }
         e
+    }
+
+    /// The parameters that need not be fitted, and whether they are not.
+    fn fixed(&self) -> [(usize, bool); 2] {
+        [(1, !self.options.fit_background), (3, self.options.blur_px.is_some())]
+    }
+
+    /// The parameters' covariance, scaled by the residuals and in pixels along both axes, and the reduced χ².
+    fn covariance(&self, equations: &Equations, aspect: f64) -> Option<(Normal, f64)> {
+        let mut covariance = equations.normal.cholesky()?.inverse();
+        let fixed = self.fixed();
+        for (k, _) in fixed.into_iter().filter(|(_, fixed)| *fixed) {
+            covariance[(k, k)] = 0.0;
+        }
+        let fitted = 6 - fixed.iter().filter(|(_, fixed)| *fixed).count();
+        let reduced = equations.chi2 / (equations.pixels - fitted as f64).max(1.0);
+        covariance *= reduced;
+        covariance.row_mut(5).unscale_mut(aspect);
+        covariance.column_mut(5).unscale_mut(aspect);
+        Some((covariance, reduced))
     }
 
     fn report<T: Real>(
@@ -187,45 +178,66 @@ impl HertzFitter {
         origin: [f64; 2],
         pixel_size_m: [f64; 2],
     ) -> Option<HertzFit<T>> {
-        let mut covariance = equations.normal.cholesky()?.inverse();
-        for (k, fixed) in [(1, !self.options.fit_background), (3, self.options.blur_px.is_some())] {
-            if fixed {
-                covariance[(k, k)] = 0.0;
-            }
-        }
-        let fitted =
-            6 - usize::from(!self.options.fit_background) - usize::from(self.options.blur_px.is_some());
-        let reduced = equations.chi2 / (equations.pixels - fitted as f64).max(1.0);
-        covariance *= reduced;
         let aspect = pixel_size_m[1] / pixel_size_m[0];
-        for k in 0..6 {
-            covariance[(k, 5)] /= aspect;
-            covariance[(5, k)] /= aspect;
-        }
+        let (covariance, reduced) = self.covariance(equations, aspect)?;
         let s = &state.shape;
-        let volume = 2.0 / 3.0 * std::f64::consts::PI / aspect * s.radius;
-        let (by_peak, by_radius) = (volume * s.radius, 2.0 * volume * s.peak);
-        let volume_variance = by_peak * by_peak * covariance[(0, 0)]
-            + 2.0 * by_peak * by_radius * covariance[(0, 2)]
-            + by_radius * by_radius * covariance[(2, 2)];
         let radius_px = Estimate::<T>::nearest(s.radius, covariance[(2, 2)]);
+        let centre = |k: usize| Estimate::nearest(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)]);
         Some(HertzFit {
-            centre_px: [
-                Estimate::nearest(origin[0] + state.centre[0], covariance[(4, 4)]),
-                Estimate::nearest(origin[1] + state.centre[1], covariance[(5, 5)]),
-            ],
+            centre_px: [centre(0), centre(1)],
             radius_px,
             radius_m: radius_px.scaled(T::nearest(pixel_size_m[0])),
             peak: Estimate::nearest(s.peak, covariance[(0, 0)]),
             background: Estimate::nearest(s.background, covariance[(1, 1)]),
             blur_px: T::nearest((s.blur - PIXEL).max(0.0).sqrt()),
-            integrated_pixel_value: Estimate::nearest(volume * s.radius * s.peak, volume_variance),
+            integrated_pixel_value: integral(s, &covariance, aspect),
             covariance: std::array::from_fn(|i| std::array::from_fn(|j| T::nearest(covariance[(i, j)]))),
             reduced_chi_squared: T::nearest(reduced),
             iterations: state.iterations,
             stop: state.stop,
         })
     }
+}
+
+impl Equations {
+    /// Adds one ring's pixels; only the lower triangle of the normal matrix is filled.
+    ///
+    /// Along a ring the model is its level, to first order in r² − mean r²; a shift of the centre changes it by
+    /// −2 (dI/dr²) times the place.
+    fn add(&mut self, ring: &RingSums, l: &Level, weight: f64, r2: f64, spread: f64) {
+        let radial = [l.by_peak, 1.0, l.by_radius, l.by_blur];
+        let along = |place: f64, by_r2: f64| l.value * place + l.by_r2 * (by_r2 - r2 * place);
+        let slope = -2.0 * weight * l.by_r2;
+        for i in 0..4 {
+            let a = weight * ring.n * radial[i];
+            for (j, b) in radial[..=i].iter().enumerate() {
+                self.normal[(i, j)] += a * b;
+            }
+            self.normal[(4, i)] += slope * radial[i] * ring.u;
+            self.normal[(5, i)] += slope * radial[i] * ring.v;
+            self.gradient[i] += weight * radial[i] * (ring.d - ring.n * l.value);
+        }
+        let square = -2.0 * slope * l.by_r2;
+        self.normal[(4, 4)] += square * ring.uu;
+        self.normal[(5, 4)] += square * ring.uv;
+        self.normal[(5, 5)] += square * (ring.r2 - ring.uu);
+        self.gradient[4] += slope * (ring.du - along(ring.u, ring.r2u));
+        self.gradient[5] += slope * (ring.dv - along(ring.v, ring.r2v));
+        // Along a ring the model itself varies; that is no misfit.
+        let within = ring.n * l.by_r2 * l.by_r2 * spread;
+        self.chi2 += weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value - within);
+        self.pixels += ring.n;
+    }
+}
+
+/// Integral of the profile, 2π/3 A a² over a pixel's area, and its error.
+fn integral<T: Real>(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate<T> {
+    let volume = 2.0 / 3.0 * std::f64::consts::PI / aspect * s.radius;
+    let (by_peak, by_radius) = (volume * s.radius, 2.0 * volume * s.peak);
+    let variance = by_peak * by_peak * covariance[(0, 0)]
+        + 2.0 * by_peak * by_radius * covariance[(0, 2)]
+        + by_radius * by_radius * covariance[(2, 2)];
+    Estimate::nearest(volume * s.radius * s.peak, variance)
 }
 
 /// Nothing moves by more than a millionth.

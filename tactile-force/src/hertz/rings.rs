@@ -2,9 +2,23 @@
 
 use crate::contact::Region;
 
-/// Sums over the pixels of one ring; (u, v) is a pixel's place relative to the centre, d its difference.
+/// Sums over the pixels of one ring; (u, v) is a pixel's place relative to the centre, d its difference. Four by four, so
+/// that a pixel is added with a few wide instructions.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Ring {
+    /// Σ 1, Σ u, Σ v, Σ r².
+    place: [f64; 4],
+    /// Σ u², Σ u v, Σ r² u, Σ r² v.
+    product: [f64; 4],
+    /// Σ d, Σ d u, Σ d v, Σ d².
+    difference: [f64; 4],
+    /// Σ r⁴.
+    r4: f64,
+}
+
+/// The sums by name.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RingSums {
     pub(super) n: f64,
     pub(super) r2: f64,
     pub(super) r4: f64,
@@ -20,46 +34,98 @@ pub(super) struct Ring {
     pub(super) dd: f64,
 }
 
-/// Rings of a quarter of a pixel's width, reused from fit to fit.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Rings {
-    pub(super) rings: Vec<Ring>,
+impl Ring {
+    #[inline(always)]
+    fn add(&mut self, u: f64, v: f64, r2: f64, d: f64) {
+        let place = [1.0, u, v, r2];
+        let product = [u * u, u * v, r2 * u, r2 * v];
+        let difference = [d, d * u, d * v, d * d];
+        for k in 0..4 {
+            self.place[k] += place[k];
+            self.product[k] += product[k];
+            self.difference[k] += difference[k];
+        }
+        self.r4 += r2 * r2;
+    }
+
+    pub(super) fn sums(&self) -> RingSums {
+        let [n, u, v, r2] = self.place;
+        let [uu, uv, r2u, r2v] = self.product;
+        let [d, du, dv, dd] = self.difference;
+        RingSums { n, r2, r4: self.r4, u, v, uu, uv, r2u, r2v, d, du, dv, dd }
+    }
 }
 
-/// Rings per pixel of distance.
+/// Rings of a quarter of a pixel's width near the contact's edge and one pixel's further in, where the profile hardly bends
+/// across a ring; reused from fit to fit.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rings {
+    rings: Vec<Ring>,
+}
+
+/// Rings per pixel of distance near the edge.
 const PER_PIXEL: f64 = 4.0;
+/// How far inside the edge the rings are thin: there a² − r² is twenty times its change across a wide ring.
+const EDGE: f64 = 20.0;
 
 impl Rings {
+    /// Every ring that has pixels.
+    pub(super) fn filled(&self) -> impl Iterator<Item = RingSums> + '_ {
+        self.rings.iter().map(Ring::sums).filter(|r| r.n > 0.0)
+    }
+
     /// Gathers the pixels of the aperture. The centre is relative to the region's first pixel; `aspect` is the pixel's
-    /// height over its width, and distances are in pixel widths.
-    pub(super) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64) {
+    /// height over its width, and distances are in pixel widths. `radius` is about that of the contact.
+    pub(super) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         self.rings.clear();
-        let columns = region.columns();
-        for run in &region.aperture {
-            let v = (f64::from(run.row) - centre[1]) * aspect;
-            let first = f64::from(run.start) - centre[0];
+        let wide = (radius - EDGE).max(0.0).floor();
+        let gather = Gather { rings: &mut self.rings, region, centre, aspect, wide };
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return simd.vectorize(gather);
+        }
+        pulp::NullaryFnOnce::call(gather);
+    }
+}
+
+struct Gather<'a> {
+    rings: &'a mut Vec<Ring>,
+    region: &'a Region,
+    centre: [f64; 2],
+    aspect: f64,
+    /// Distance up to which rings are one pixel wide.
+    wide: f64,
+}
+
+impl Gather<'_> {
+    /// Number of the ring at a distance: r up to `wide`, four times as steep beyond.
+    #[inline(always)]
+    fn ring(&self, r: f64) -> usize {
+        let thin = PER_PIXEL * r - (PER_PIXEL - 1.0) * self.wide;
+        (if thin > r { thin } else { r }) as i32 as usize
+    }
+}
+
+impl pulp::NullaryFnOnce for Gather<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let columns = self.region.columns();
+        for run in &self.region.aperture {
+            let v = (f64::from(run.row) - self.centre[1]) * self.aspect;
+            let first = f64::from(run.start) - self.centre[0];
             let far = first.abs().max((first + run.len() as f64).abs()).hypot(v);
-            let needed = (PER_PIXEL * far) as usize + 1;
+            let needed = self.ring(far) + 1;
             if needed > self.rings.len() {
                 self.rings.resize(needed, Ring::default());
             }
-            for (x, d) in region.difference[run.span(columns)].iter().enumerate() {
-                let (u, d) = (first + x as f64, f64::from(*d));
+            let mut u = first;
+            for d in &self.region.difference[run.span(columns)] {
                 let r2 = u * u + v * v;
-                let ring = &mut self.rings[(PER_PIXEL * r2.sqrt()) as usize];
-                ring.n += 1.0;
-                ring.r2 += r2;
-                ring.r4 += r2 * r2;
-                ring.u += u;
-                ring.v += v;
-                ring.uu += u * u;
-                ring.uv += u * v;
-                ring.r2u += r2 * u;
-                ring.r2v += r2 * v;
-                ring.d += d;
-                ring.du += d * u;
-                ring.dv += d * v;
-                ring.dd += d * d;
+                let ring = self.ring(r2.sqrt());
+                self.rings[ring].add(u, v, r2, f64::from(*d));
+                u += 1.0;
             }
         }
     }
