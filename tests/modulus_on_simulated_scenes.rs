@@ -340,5 +340,5 @@ fn block(seed: u64) -> (f64, ModulusEstimate<f64>) {
 
 #[test]
 fn blocks_by_the_papers_ratio() {
-    Study::run(scenes(40), "blocks", block).check();
+    Study::run(scenes(120), "blocks", block).check();
 }
