@@ -99,7 +99,8 @@ fn dense(criterion: &mut Criterion) {
             error = scene.error(matcher.match_points(&scene.model, &scene.target).unwrap().warped.into_iter())
         });
         println!("match/105x105/dense: mean error {error:.2e}");
-        assert!(error.is_finite());
+        // It measured 1.6e-3 of the disc's radius on this scene; three times that would be another answer.
+        assert!(error < 5e-3, "dense: error {error}");
     });
     group.finish();
 }
