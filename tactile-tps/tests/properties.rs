@@ -49,12 +49,14 @@ fn reproduces_affine_maps<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let targets: Vec<_> = sources.iter().map(|x| map.apply(x)).collect();
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.1), Smoothing::Lambda(1e6)] {
         let spline = fit(&sources, &targets, &FitOptions::new(kernel.clone()).smoothing(smoothing));
-        // The targets' own rounding, 1e-15, times the condition number, below 1e5 here.
-        assert!(largest(spline.weights().flat_map(|w| w.iter().copied().collect::<Vec<_>>())) < 1e-9);
+        // The targets' own rounding, up to 1e-15 of their size 10 over 30 points, times the condition number: close
+        // points under r³ bring it to 1e8.
+        let rounding = 5e-15 * spline.report().condition;
+        assert!(largest(spline.weights().flat_map(|w| w.iter().copied().collect::<Vec<_>>())) < rounding);
         let far = random.point::<D>() * 50.0;
-        assert!((spline.apply(&far) - map.apply(&far)).norm() < 1e-8);
-        assert!((spline.jacobian(&far) - linear).norm() < 1e-8);
-        assert!(spline.bending_energy() < 1e-12);
+        assert!((spline.apply(&far) - map.apply(&far)).norm() < 100.0 * rounding);
+        assert!((spline.jacobian(&far) - linear).norm() < rounding);
+        assert!(spline.bending_energy() < 1e-14 * rounding);
     }
 }
 
