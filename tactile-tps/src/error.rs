@@ -91,6 +91,9 @@ pub enum TpsError {
         /// Distinct points of positive weight.
         found: usize,
     },
+    /// The spline is no linear map of its targets: cross-validation chooses λ from them.
+    #[error("cross-validation lets λ follow the targets: hold λ at what it chose")]
+    DependsOnTargets,
     /// The kernel's matrix is not positive definite on the complement of the affine functions.
     #[error("kernel is not conditionally positive definite on these points (column {column})")]
     NotDefinite {

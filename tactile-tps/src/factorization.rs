@@ -34,22 +34,22 @@ const DECOMPOSE_POINTS: usize = 256;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
-    kernel: K,
-    sites: Sites<D>,
-    system: System<D>,
+    pub(crate) kernel: K,
+    pub(crate) sites: Sites<D>,
+    pub(crate) system: System<D>,
     /// The same with its spectrum, once a λ needs it.
     spectral: OnceLock<System<D>>,
-    weights: Option<Vec<T>>,
+    pub(crate) weights: Option<Vec<T>>,
     /// Weight of every site, empty if all are one.
-    site_weights: Vec<f64>,
-    smoothing: Smoothing<T>,
+    pub(crate) site_weights: Vec<f64>,
+    pub(crate) smoothing: Smoothing<T>,
     rank_tolerance: f64,
 }
 
 /// Memory that refits use again and again.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace<const D: usize> {
-    buffers: Buffers,
+    pub(crate) buffers: Buffers,
     system: System<D>,
     site_weights: Vec<f64>,
 }

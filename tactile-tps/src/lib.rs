@@ -7,6 +7,7 @@
 //! | fit once | [`ThinPlateSpline::fit`](Spline::fit), or [`Spline::fit`] for other than D outputs |
 //! | fit again and again | [`Factorization`] with a [`Workspace`] |
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
+//! | carry the targets' uncertainty to values and Jacobians | [`Factorization::influence`], [`Factorization::jacobian_influence`] |
 //! | know how it went | [`FitReport`] |
 //! | take any warp | the object-safe trait [`Warp`]: splines, [`Affine`], [`Rigid`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`], [`RigidModel`] |
@@ -20,6 +21,7 @@ mod error;
 mod evaluate;
 mod factorization;
 mod far;
+mod influence;
 mod kernel;
 mod logarithm;
 mod null_space;

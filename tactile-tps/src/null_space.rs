@@ -197,6 +197,16 @@ impl NullSpace {
         (0..self.q).for_each(|i| a[self.order[i]] = pivoted[i]);
         a
     }
+
+    /// Solves (R Πᵀ)ᵀ h = p: what the side conditions Pᵀw = p leave of w = Q₁h + Q₂z.
+    pub(crate) fn solve_transpose(&self, p: &[f64; MAX]) -> [f64; MAX] {
+        let mut h = [0.0; MAX];
+        for i in 0..self.q {
+            let rest: f64 = (0..i).map(|j| self.r[j][i] * h[j]).sum();
+            h[i] = (p[self.order[i]] - rest) / self.r[i][i];
+        }
+        h
+    }
 }
 
 /// Inner product in eight partial sums, which the compiler turns into vectors.

@@ -83,6 +83,24 @@ impl<const D: usize> Span<D> {
     }
 
     /// Affine function `c` at a point.
+    pub(crate) fn value(&self, c: usize, point: &[f64; D]) -> f64 {
+        match (c, &self.basis) {
+            (0, _) => 1.0,
+            (c, None) => point[c - 1],
+            (c, Some(basis)) => (0..D).map(|k| basis[c - 1][k] * point[k]).sum(),
+        }
+    }
+
+    /// Derivative of affine function `c` along an axis.
+    pub(crate) fn slope(&self, c: usize, axis: usize) -> f64 {
+        match (c, &self.basis) {
+            (0, _) => 0.0,
+            (c, None) => f64::from(u8::from(c - 1 == axis)),
+            (c, Some(basis)) => basis[c - 1][axis],
+        }
+    }
+
+    /// Affine function `c` at a point, in twice the working precision.
     pub(crate) fn precise(&self, c: usize, point: &[Twofold; D]) -> Twofold {
         match (c, &self.basis) {
             (0, _) => Twofold::from_f64(1.0),

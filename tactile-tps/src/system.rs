@@ -212,15 +212,53 @@ impl<const D: usize> System<D> {
         for (m, column) in work.chunks_exact_mut(stride).enumerate() {
             column[..HEAD].fill(0.0);
             for (k, head) in heads[m].iter_mut().enumerate().take(q) {
-                let coupling = &self.cholesky.l[(HEAD - q + k) * stride..][..stride];
-                *head -= dot(&coupling[HEAD..HEAD + n - q], &column[HEAD..HEAD + n - q]);
+                *head -= dot(self.coupling(k), &column[HEAD..HEAD + n - q]);
             }
             self.null.apply(column);
-            let values = &column[self.null.rows()];
-            let scale = |i: usize| if self.scales.is_empty() { 1.0 } else { self.scales[i] };
-            self.active.iter().enumerate().for_each(|(i, &site)| y[m * sites + site] = values[i] * scale(i));
+            self.scatter(&column[self.null.rows()], &mut y[m * sites..(m + 1) * sites]);
             heads[m] = self.null.solve_upper(&heads[m][..q]);
         }
+    }
+
+    /// Solves for the weights alone, with side conditions: (K + λW⁻¹)w + P a = y, Pᵀw = p for each column of `y`.
+    ///
+    /// With W^{-½}w = Q₁h + Q₂z the conditions give h, which moves to the right-hand side of the equations for z.
+    pub(crate) fn solve_adjoint<const R: usize>(
+        &self,
+        y: &mut [f64],
+        sites: usize,
+        p: [&[f64; MAX]; R],
+        work: &mut Vec<f64>,
+    ) {
+        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
+        self.rotate::<R>(y, sites, work);
+        let heads = p.map(|p| self.null.solve_transpose(p));
+        for (column, head) in work.chunks_exact_mut(stride).zip(&heads) {
+            for (k, head) in head.iter().enumerate().take(q) {
+                let tail = column[HEAD..HEAD + n - q].iter_mut();
+                tail.zip(self.coupling(k)).for_each(|(b, coupling)| *b -= head * coupling);
+            }
+        }
+        self.cholesky.solve::<R>(work);
+        y.fill(0.0);
+        for (r, column) in work.chunks_exact_mut(stride).enumerate() {
+            column[..HEAD].fill(0.0);
+            column[HEAD - q..HEAD].copy_from_slice(&heads[r][..q]);
+            self.null.apply(column);
+            self.scatter(&column[self.null.rows()], &mut y[r * sites..(r + 1) * sites]);
+        }
+    }
+
+    /// Row `k` of Q₁ᵀSQ₂.
+    fn coupling(&self, k: usize) -> &[f64] {
+        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
+        &self.cholesky.l[(HEAD - q + k) * stride + HEAD..][..n - q]
+    }
+
+    /// Spreads the rows, each times its scale, over the sites.
+    fn scatter(&self, rows: &[f64], y: &mut [f64]) {
+        let scale = |i: usize| if self.scales.is_empty() { 1.0 } else { self.scales[i] };
+        self.active.iter().enumerate().for_each(|(i, &site)| y[site] = rows[i] * scale(i));
     }
 
     /// The values at the active sites, each times its scale.

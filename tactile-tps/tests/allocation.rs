@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Uniform, bend};
-use nalgebra::{Matrix3, Point};
+use nalgebra::{Matrix3, Point, SVector};
 use tactile_tps::{Factorization, FitOptions, NegR, Smoothing, Spline, Workspace};
 
 #[test]
@@ -18,6 +18,7 @@ fn refits_and_evaluation_allocate_nothing() {
     let (mut workspace, mut spline) = (Workspace::new(), Spline::<_, 3, 3, _>::empty(NegR));
     let (mut values, mut jacobians) = (vec![Point::origin(); 333], vec![Matrix3::zeros(); 333]);
     let mut hessians = vec![[Matrix3::zeros(); 3]; 333];
+    let (mut influence, mut slopes) = (vec![0.0; 7 * 105], vec![SVector::zeros(); 7 * 105]);
     let mut round = |lambda: f64| {
         factorization.fit_with(&mut workspace, &targets, &mut spline).expect("a fit");
         for weights in [None, Some(&weights[..]), Some(&near)] {
@@ -35,6 +36,10 @@ fn refits_and_evaluation_allocate_nothing() {
         spline.apply_and_jacobian_into(&queries, &mut values, &mut jacobians).expect("equal lengths");
         spline.hessian_into(&queries, &mut hessians).expect("equal lengths");
         values[0] = spline.apply(&queries[0]);
+        factorization.influence_into(&mut workspace, &queries[..7], &mut influence).expect("a linear map");
+        factorization
+            .jacobian_influence_into(&mut workspace, &queries[..7], &mut slopes)
+            .expect("a linear map");
     };
     round(0.5);
     let counted = allocation_counter::measure(|| round(0.25));

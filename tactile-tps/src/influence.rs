@@ -1,0 +1,210 @@
+//! How a spline follows its targets: the linear map from them to its value or Jacobian at a point.
+//!
+//! The value is f(x) = k(x)ᵀw + p(x)ᵀa with (w, a) from the symmetric system S(w, a) = (y, 0), so that f(x) = α(x)ᵀy for
+//! the first part of S(α, β) = (k(x), p(x)): one solve, whatever the targets. Derivatives of k and p give those of f.
+
+use nalgebra::{Point, SVector};
+
+use crate::{
+    Factorization, Kernel, Scalar, Smoothing, TpsError, Workspace,
+    null_space::MAX,
+    real::Lane,
+    refine::Buffers,
+    simd::{Job, dispatch},
+    warp::same_length,
+};
+
+/// Points whose values are solved for together.
+const GROUP: usize = 4;
+
+impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
+    /// How much the spline's value at a point follows each target: aⱼ in f(x) = Σⱼ aⱼ yⱼ, one a source point.
+    ///
+    /// The same for every output and all targets, with the weights and λ of the factorisation. Σ aⱼ = 1, and Σ aⱼ xⱼ = x
+    /// where the points span space. Targets with covariances Cⱼ give f(x) the covariance Σ aⱼ² Cⱼ. O(n²).
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{Factorization, FitOptions};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
+    /// let influence = factorization.influence(&Point2::new(0.5, 0.5))?;
+    /// let standard_error = 0.01 * influence.iter().map(|a| a * a).sum::<f64>().sqrt();
+    /// assert!((influence.iter().sum::<f64>() - 1.0).abs() < 1e-14 && standard_error < 0.01);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NotDefinite`] if the points are so
+    /// close to degenerate that plain arithmetic has no factor.
+    pub fn influence(&self, point: &Point<T, D>) -> Result<Vec<T>, TpsError> {
+        let mut influence = vec![T::zero(); self.len()];
+        self.influence_into(&mut Workspace::new(), core::slice::from_ref(point), &mut influence)?;
+        Ok(influence)
+    }
+
+    /// How much the Jacobian at a point follows each target: bⱼ in J(x) = Σⱼ yⱼ bⱼᵀ, one a source point.
+    ///
+    /// ∂fₘ/∂xₖ = Σⱼ yⱼₘ bⱼₖ, so that Σ bⱼ = 0, and targets with covariances Cⱼ give the entries (m, k) and (m', k') the
+    /// covariance Σⱼ Cⱼₘₘ' bⱼₖ bⱼₖ'. O(D n²).
+    ///
+    /// ```
+    /// use nalgebra::{Matrix2, Point2};
+    /// use tactile_tps::{Factorization, FitOptions};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let (factorization, x) = (Factorization::<f64, 2>::new(&sources, &FitOptions::default())?, Point2::new(0.5, 0.5));
+    /// let influence = factorization.jacobian_influence(&x)?;
+    /// let sum = targets.iter().zip(&influence).fold(Matrix2::zeros(), |j, (y, b)| j + y.coords * b.transpose());
+    /// assert!((factorization.fit(&targets)?.jacobian(&x) - sum).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`influence`](Self::influence).
+    pub fn jacobian_influence(&self, point: &Point<T, D>) -> Result<Vec<SVector<T, D>>, TpsError> {
+        let mut influence = vec![SVector::zeros(); self.len()];
+        self.jacobian_influence_into(&mut Workspace::new(), core::slice::from_ref(point), &mut influence)?;
+        Ok(influence)
+    }
+
+    /// [`influence`](Self::influence) at many points, into the caller's memory: row by row, [`len`](Self::len) entries a
+    /// point. Allocates nothing once the workspace has grown.
+    ///
+    /// # Errors
+    /// Those of [`influence`](Self::influence), and [`TpsError::Length`] if `influence` is not of that length.
+    pub fn influence_into(
+        &self,
+        workspace: &mut Workspace<D>,
+        points: &[Point<T, D>],
+        influence: &mut [T],
+    ) -> Result<(), TpsError> {
+        self.linear(points.len(), influence.len())?;
+        let whole = points.len() / GROUP * GROUP;
+        let (grouped, single) = influence.split_at_mut(whole * self.len());
+        for (points, rows) in points.chunks_exact(GROUP).zip(grouped.chunks_exact_mut(GROUP * self.len())) {
+            let columns = core::array::from_fn(|r| Column::value(self, &points[r]));
+            self.follow::<GROUP>(&columns, &mut workspace.buffers, |r, i, a| rows[r * self.len() + i] = a);
+        }
+        for (point, row) in points[whole..].iter().zip(single.chunks_exact_mut(self.len())) {
+            self.follow(&[Column::value(self, point)], &mut workspace.buffers, |_, i, a| row[i] = a);
+        }
+        Ok(())
+    }
+
+    /// [`jacobian_influence`](Self::jacobian_influence) at many points, into the caller's memory: row by row,
+    /// [`len`](Self::len) entries a point. Allocates nothing once the workspace has grown.
+    ///
+    /// # Errors
+    /// Those of [`influence`](Self::influence), and [`TpsError::Length`] if `influence` is not of that length.
+    pub fn jacobian_influence_into(
+        &self,
+        workspace: &mut Workspace<D>,
+        points: &[Point<T, D>],
+        influence: &mut [SVector<T, D>],
+    ) -> Result<(), TpsError> {
+        self.linear(points.len(), influence.len())?;
+        for (point, row) in points.iter().zip(influence.chunks_exact_mut(self.len())) {
+            let columns: [Column<D>; D] = core::array::from_fn(|k| Column::slope(self, point, k));
+            self.follow(&columns, &mut workspace.buffers, |k, i, b| row[i][k] = b);
+        }
+        Ok(())
+    }
+
+    /// Whether there is a linear map, and memory for it at so many points.
+    fn linear(&self, points: usize, found: usize) -> Result<(), TpsError> {
+        same_length(points * self.len(), found)?;
+        match self.smoothing {
+            Smoothing::Gcv => Err(TpsError::DependsOnTargets),
+            _ if self.system.indefinite => Err(TpsError::NotDefinite { column: self.system.null.q }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Hands what each column has of each source point to `sink`.
+    fn follow<const R: usize>(
+        &self,
+        columns: &[Column<D>; R],
+        buffers: &mut Buffers,
+        mut sink: impl FnMut(usize, usize, T),
+    ) {
+        let n = self.sites.len();
+        let Buffers { targets, work, .. } = buffers;
+        targets.clear();
+        targets.resize(R * n, 0.0);
+        for (column, terms) in columns.iter().zip(targets.chunks_exact_mut(n)) {
+            let axes = core::array::from_fn(|k| &self.sites.axes[k][..]);
+            dispatch(Fill { kernel: &self.kernel, axes, column, terms });
+        }
+        self.system.solve_adjoint(targets, n, columns.each_ref().map(|c| &c.affine), work);
+        for (r, found) in targets.chunks_exact(n).enumerate() {
+            for i in 0..self.len() {
+                sink(r, i, T::narrow(found[self.sites.site(i)] * self.share(i) / columns[r].unit));
+            }
+        }
+    }
+
+    /// The part of an input point in the target of its site.
+    fn share(&self, i: usize) -> f64 {
+        if self.sites.site_of.is_empty() {
+            return 1.0;
+        }
+        let total = self.site_weights[self.sites.site(i)];
+        let weight = self.weights.as_ref().map_or(1.0, |w| w[i].widen());
+        if total > 0.0 { weight / total } else { 0.0 }
+    }
+}
+
+/// One right-hand side: the kernels and affine functions at a point, or their derivative along an axis.
+struct Column<const D: usize> {
+    point: [f64; D],
+    axis: Option<usize>,
+    affine: [f64; MAX],
+    /// Length of the frame's unit for a derivative, else one.
+    unit: f64,
+}
+
+impl<const D: usize> Column<D> {
+    fn value<T: Scalar, K>(factorization: &Factorization<T, D, K>, point: &Point<T, D>) -> Self {
+        let (span, point) = (&factorization.system.span, factorization.sites.frame.inside(point));
+        let affine = core::array::from_fn(|c| if c <= span.directions { span.value(c, &point) } else { 0.0 });
+        Self { point, axis: None, affine, unit: 1.0 }
+    }
+
+    fn slope<T: Scalar, K>(factorization: &Factorization<T, D, K>, point: &Point<T, D>, axis: usize) -> Self {
+        let (span, frame) = (&factorization.system.span, &factorization.sites.frame);
+        let affine = core::array::from_fn(|c| if c <= span.directions { span.slope(c, axis) } else { 0.0 });
+        Self { point: frame.inside(point), axis: Some(axis), affine, unit: frame.scale }
+    }
+}
+
+/// Writes what a column has of the kernel about every site.
+struct Fill<'a, K, const D: usize> {
+    kernel: &'a K,
+    axes: [&'a [f64]; D],
+    column: &'a Column<D>,
+    terms: &'a mut [f64],
+}
+
+impl<K: Kernel, const D: usize> Job<f64> for Fill<'_, K, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) {
+        let n = self.terms.len();
+        let axes = self.axes.map(|axis| &axis[..n]);
+        let point = self.column.point.map(L::new);
+        for (i, term) in self.terms.iter_mut().enumerate() {
+            let d: [L; D] = core::array::from_fn(|k| point[k] - L::new(axes[k][i]));
+            let s = d.iter().fold(L::zero(), |s, d| d.mul_add(*d, s));
+            *term = match self.column.axis {
+                None => self.kernel.value(s).get(),
+                Some(axis) => (L::from_f64(2.0) * self.kernel.jet(s).first * d[axis]).get(),
+            };
+        }
+    }
+}
