@@ -126,11 +126,21 @@ impl ContactDetector {
         let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
         let size = (statistics.rows, statistics.columns);
         let sign = f64::from(self.options.polarity.sign());
-        let bright = reference
-            .tile_sums(tiles)
-            .enumerate()
-            .filter(|(_, t)| sign * drift.residual(t) > z * t.pixels.sqrt())
-            .map(|(k, _)| tiles.pixels(k, size));
+        let stands_out = |k: usize| {
+            let tile = reference.tile_sum(tiles, k);
+            sign * drift.residual(&tile) > z * tile.pixels.sqrt()
+        };
+        // The last tile of a band is its smallest: a band that stays below its noise needs no closer look.
+        let quiet = |band: usize| {
+            drift.is_zero() && {
+                let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
+                f64::from(tiles.greatest(band, self.options.polarity.sign())) <= z * last.pixels.sqrt()
+            }
+        };
+        let bright = (0..tiles.rows)
+            .filter(|&band| !quiet(band))
+            .flat_map(|band| (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k)))
+            .map(|k| tiles.pixels(k, size));
         // Pixels were judged before the drift was known: their verdict stands while the drift is small beside it.
         let pixels = statistics
             .bounding_box

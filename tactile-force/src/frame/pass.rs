@@ -21,6 +21,12 @@ impl Tiles {
         self.sums.resize(self.rows * self.columns, 0);
     }
 
+    /// Greatest sum of a band, each times `sign`.
+    pub(crate) fn greatest(&self, band: usize, sign: i32) -> i32 {
+        let sums = &self.sums[band * self.columns..(band + 1) * self.columns];
+        sums.iter().map(|s| sign * s).max().unwrap_or(0)
+    }
+
     /// The pixels of a tile.
     pub(crate) fn pixels(&self, tile: usize, (rows, columns): (usize, usize)) -> BoundingBox {
         let (row, column) = (tile / self.columns, tile % self.columns);

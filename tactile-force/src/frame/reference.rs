@@ -192,17 +192,19 @@ impl ReferenceFrame {
 
     /// Every tile of the last pass.
     pub(crate) fn tile_sums<'a>(&'a self, passed: &'a Tiles) -> impl Iterator<Item = TileSum> + Clone + 'a {
-        let size = self.image.dim();
-        passed.sums.iter().zip(&self.tiles.sums).enumerate().map(move |(k, (difference, reference))| {
-            let at = passed.pixels(k, size);
-            TileSum {
-                x: 0.5 * (at.column_start + at.column_end - 1) as f64,
-                y: 0.5 * (at.row_start + at.row_end - 1) as f64,
-                pixels: (at.rows() * at.columns()) as f64,
-                reference: f64::from(*reference),
-                difference: f64::from(*difference),
-            }
-        })
+        (0..passed.sums.len()).map(move |k| self.tile_sum(passed, k))
+    }
+
+    /// One tile of the last pass.
+    pub(crate) fn tile_sum(&self, passed: &Tiles, tile: usize) -> TileSum {
+        let at = passed.pixels(tile, self.image.dim());
+        TileSum {
+            x: 0.5 * (at.column_start + at.column_end - 1) as f64,
+            y: 0.5 * (at.row_start + at.row_end - 1) as f64,
+            pixels: (at.rows() * at.columns()) as f64,
+            reference: f64::from(self.tiles.sums[tile]),
+            difference: f64::from(passed.sums[tile]),
+        }
     }
 
     pub(crate) fn check(&self, frame: ArrayView2<'_, u8>) -> Result<(), ForceError> {

@@ -123,7 +123,9 @@ impl<const D: usize> DriftWorkspace<D> {
         if options.normalization == Normalization::Off {
             self.model_frame = Frame::default();
         } else if options.motion == Motion::Rigid {
-            self.target_frame.scale = self.model_frame.scale;
+            // Rigid motion knows one unit: that of the larger set, or squares of the other could overflow.
+            let scale = self.model_frame.scale.max(self.target_frame.scale);
+            (self.model_frame.scale, self.target_frame.scale) = (scale, scale);
         }
         self.model_frame.enter(model, &mut self.model);
         self.target_frame.enter(target, &mut self.target);
@@ -180,10 +182,10 @@ impl<const D: usize> DriftWorkspace<D> {
             sum += weighted(&self.posterior.target_mass, x, x) - 2.0 * cross
                 + weighted(&self.posterior.model_mass, t, t);
         }
-        self.sigma2 = sum / (mass * D as f64);
-        if self.sigma2 <= 0.0 {
-            self.sigma2 = (0.1 * tolerance).max(f64::EPSILON * f64::EPSILON);
-        }
+        // Coordinates of size one are not known better than ε, and 1/σ² must stay finite.
+        let least = f64::EPSILON * f64::EPSILON;
+        let variance = sum / (mass * D as f64);
+        self.sigma2 = if variance > 0.0 { variance } else { 0.1 * tolerance }.max(least);
     }
 
     /// The model points where the last registration left them.
