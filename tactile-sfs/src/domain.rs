@@ -132,6 +132,14 @@ impl BoundingBox {
         self.rows * self.columns
     }
 
+    /// Whether every pixel of `other` lies in this box.
+    pub(crate) fn holds(&self, other: Self) -> bool {
+        self.top <= other.top
+            && self.left <= other.left
+            && other.top + other.rows <= self.top + self.rows
+            && other.left + other.columns <= self.left + self.columns
+    }
+
     /// The part of an array inside the box.
     pub(crate) fn view<'a, A>(&self, mut array: ArrayView2<'a, A>) -> ArrayView2<'a, A> {
         array.slice_axis_inplace(Axis(0), Slice::from(self.top..self.top + self.rows));

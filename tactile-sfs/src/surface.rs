@@ -125,19 +125,31 @@ impl<T: Scalar> Surface<T> {
     /// Makes the surface `rows` × `columns` and empty, at the cost of the rectangles concerned.
     pub(crate) fn prepare(&mut self, rows: usize, columns: usize, bounding_box: BoundingBox) {
         if self.heights.dim() == (rows, columns) {
-            let old = self.bounding_box;
-            old.view_mut(self.heights.view_mut()).fill(T::nan());
-            old.view_mut(self.mask.view_mut()).fill(false);
-            old.view_mut(self.flags.view_mut()).fill(PixelFlags::NONE);
-        } else {
+            self.clear(self.bounding_box);
+            self.bounding_box = bounding_box;
+        }
+        self.prepare_to_overwrite(rows, columns, bounding_box);
+    }
+
+    /// The same for callers that write every pixel of the box themselves: what it holds need not be cleared.
+    pub(crate) fn prepare_to_overwrite(&mut self, rows: usize, columns: usize, bounding_box: BoundingBox) {
+        if self.heights.dim() != (rows, columns) {
             self.heights = Array2::from_elem((rows, columns), T::nan());
             self.mask = Array2::from_elem((rows, columns), false);
             self.flags = Array2::from_elem((rows, columns), PixelFlags::NONE);
+        } else if !bounding_box.holds(self.bounding_box) {
+            self.clear(self.bounding_box);
         }
         self.bounding_box = bounding_box;
         self.report.components.clear();
         self.report =
             Report { components: core::mem::take(&mut self.report.components), ..Report::default() };
+    }
+
+    fn clear(&mut self, area: BoundingBox) {
+        area.view_mut(self.heights.view_mut()).fill(T::nan());
+        area.view_mut(self.mask.view_mut()).fill(false);
+        area.view_mut(self.flags.view_mut()).fill(PixelFlags::NONE);
     }
 
     /// Writes one height and marks the pixel as solved (unless the height is not finite).

@@ -300,3 +300,28 @@ fn progress_can_stop_a_solve() {
     assert_eq!(surface.report.stop, StopReason::Cancelled);
     assert_eq!(surface.report.iterations, 1);
 }
+
+#[test]
+fn noise_at_the_rim_does_not_draw_the_surface_down() {
+    // The solution is a minimum over all rim pixels; with each judged alone, grey levels with a noise of one lose 4 % here.
+    let (radius, mut state) = (60.0_f64, 7_u64);
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let square = |r: usize, c: usize| {
+        radius * radius - (r as f64 - radius - 4.3).powi(2) - (c as f64 - radius - 4.1).powi(2)
+    };
+    let z = Array2::from_shape_fn((129, 129), |(r, c)| square(r, c).max(0.0).sqrt());
+    let mask = z.mapv(|z| z > 0.0);
+    // The sum of twelve uniform numbers has variance 1.
+    let image = z
+        .mapv(|z| 200.0 * z / radius + (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
+        .mapv(|v| v.round() as u8);
+    let lighting = Lighting::frontal().with_normal_intensity(200.0).unwrap();
+    let method = Eikonal::new(lighting).with_rim(Rim::Height(0.0)).unwrap();
+    let surface = method.reconstruct_u8(image.view(), &Domain::pixels().with_mask(mask.view())).unwrap();
+    let error = height_error(surface.heights.view(), z.view(), Some(mask.view()), Alignment::None).unwrap();
+    // 0.8 % of the radius for this seed; the bound leaves the spread of other seeds.
+    assert!(error.error.mean_absolute < 0.012 * radius, "{}", error.error.mean_absolute);
+}

@@ -4,11 +4,13 @@
 //! calibrated table, linearly between the entries. No neighbour is involved, so nothing accumulates; the price is a
 //! calibration and even illumination.
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayViewMut2};
 
 use crate::domain::same_shape;
 use crate::error::{Input, non_negative};
-use crate::{Domain, Frame, PixelFlags, Scalar, SfsError, Surface, SurfaceReconstruction, Workspace};
+use crate::{
+    BoundingBox, Domain, Frame, PixelFlags, Scalar, SfsError, Surface, SurfaceReconstruction, Workspace,
+};
 
 /// What is looked up in a [`DepthTable`].
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +27,7 @@ pub enum Signal<T> {
 /// Depth from a calibration table of (signal, depth) pairs.
 ///
 /// Depth is 0 where the signal does not exceed the contact threshold, so that nothing is where nothing touches.
-/// Signals beyond the last entry get the last depth and the flag `OUT_OF_RANGE`. Cost: O(pixels).
+/// Signals beyond the last entry get the last depth and the flag `OUT_OF_RANGE`. Cost: O(pixels of the mask's box).
 ///
 /// ```
 /// use ndarray::array;
@@ -142,18 +144,103 @@ impl<T: Scalar> SurfaceReconstruction<T> for DepthTable<T> {
         let (rows, columns) = frame.dim();
         let area = domain.validate(rows, columns)?;
         self.check_reference((rows, columns))?;
-        surface.prepare(rows, columns, area);
-        for row in area.top..area.top + area.rows {
-            for column in area.left..area.left + area.columns {
-                if !domain.contains(row, column) {
-                    continue;
-                }
-                let (depth, flags) = self.pixel(self.signal_at(&frame, row, column));
-                surface.set(row, column, domain.known(row, column).unwrap_or(depth));
-                surface.flags[[row, column]] = flags;
+        surface.prepare_to_overwrite(rows, columns, area);
+        match frame {
+            Frame::Real(_) => self.look_up(&frame, domain, surface, |signal| self.pixel(signal)),
+            Frame::Bytes(_) => {
+                let levels = Levels::new(|signal| self.pixel(signal));
+                let pixel = |signal: T| levels.get(signal).unwrap_or_else(|| self.pixel(signal));
+                self.look_up(&frame, domain, surface, pixel);
             }
         }
-        surface.finish(domain);
+        if domain.known_heights.is_some() {
+            keep_known(domain, surface);
+        }
         Ok(())
+    }
+}
+
+impl<T: Scalar> DepthTable<T> {
+    /// Fills the surface's box, row by row, and counts.
+    fn look_up(
+        &self,
+        frame: &Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+        pixel: impl Fn(T) -> (T, PixelFlags),
+    ) {
+        let area = surface.bounding_box;
+        let Surface { heights, mask, flags, report, .. } = surface;
+        for row in area.top..area.top + area.rows {
+            let line = BoundingBox { top: row, rows: 1, ..area };
+            let mut heights = line.view_mut(heights.view_mut());
+            let mut mask = line.view_mut(mask.view_mut());
+            let mut flags = line.view_mut(flags.view_mut());
+            self.signals(frame, line, heights.view_mut());
+            for ((height, solved), flag) in heights.iter_mut().zip(&mut mask).zip(&mut flags) {
+                (*height, *flag) = pixel(*height);
+                *solved = height.is_finite();
+            }
+            if let Some(wanted) = domain.mask {
+                let out = heights.iter_mut().zip(&mut mask).zip(&mut flags);
+                for (((height, solved), flag), &wanted) in out.zip(line.view(wanted)) {
+                    if !wanted {
+                        (*height, *solved, *flag) = (T::nan(), false, PixelFlags::NONE);
+                    }
+                }
+            }
+            report.solved += mask.iter().map(|&solved| usize::from(solved)).sum::<usize>();
+            report.flagged += flags.iter().map(|flag| usize::from(!flag.is_empty())).sum::<usize>();
+        }
+    }
+
+    /// The signals of one line of pixels.
+    fn signals(&self, frame: &Frame<'_, T>, line: BoundingBox, mut out: ArrayViewMut2<'_, T>) {
+        match frame {
+            Frame::Real(image) => out.assign(&line.view(image.view())),
+            Frame::Bytes(image) => {
+                let real = |&byte: &u8| T::from_u8(byte).unwrap_or_else(T::nan);
+                out.zip_mut_with(&line.view(image.view()), |out, byte| *out = real(byte));
+            }
+        }
+        match &self.signal {
+            Signal::Intensity => {}
+            Signal::Darkening(level) => {
+                out.zip_mut_with(&line.view(level.view()), |out, &level| *out = level - *out);
+            }
+            Signal::Brightening(level) => {
+                out.zip_mut_with(&line.view(level.view()), |out, &level| *out -= level);
+            }
+        }
+    }
+}
+
+/// Known heights replace those of the table.
+fn keep_known<T: Scalar>(domain: &Domain<'_, T>, surface: &mut Surface<T>) {
+    let BoundingBox { top, left, rows, columns } = surface.bounding_box;
+    for (row, column) in
+        (top..top + rows).flat_map(|row| (left..left + columns).map(move |column| (row, column)))
+    {
+        if let Some(height) = domain.known(row, column).filter(|_| domain.contains(row, column)) {
+            surface.report.solved += usize::from(!surface.mask[[row, column]]);
+            surface.set(row, column, height);
+        }
+    }
+}
+
+/// The table at every whole signal of 8-bit frames, −255 to 255.
+struct Levels<T>([(T, PixelFlags); 511]);
+
+impl<T: Scalar> Levels<T> {
+    fn new(pixel: impl Fn(T) -> (T, PixelFlags)) -> Self {
+        Self(core::array::from_fn(|index| pixel(T::of(index as f64 - 255.0))))
+    }
+
+    /// What the table has for a signal, if the signal is one of its levels.
+    #[inline(always)]
+    fn get(&self, signal: T) -> Option<(T, PixelFlags)> {
+        let level = signal.to_i32()?;
+        let entry = self.0.get(usize::try_from(level + 255).ok()?)?;
+        (T::from_i32(level)? == signal).then_some(*entry)
     }
 }

@@ -4,8 +4,8 @@ use nalgebra::Point3;
 use ndarray::ArrayView2;
 
 use super::ControlPointSampler;
-use super::elements;
 use super::equally_spaced::spread;
+use super::lattice::Lattice;
 use crate::error::in_range;
 use crate::{Scalar, SfsError};
 
@@ -46,17 +46,17 @@ impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
         pixel_size_m: [T; 2],
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
-        let (mut all, area) = elements::collect(surface, mask, pixel_size_m, count)?;
+        let mut lattice = Lattice::sparse(surface, mask, pixel_size_m, count)?;
         let step = pixel_size_m.map(Scalar::as_f64);
-        let bends: Vec<f64> = all.iter().map(|e| bend(surface, [e.row, e.column], step)).collect();
+        let nodes: Vec<usize> = lattice.nodes().collect();
+        let bends: Vec<f64> = nodes.iter().map(|&node| bend(surface, lattice.pixel(node), step)).collect();
         let mean = bends.iter().sum::<f64>() / bends.len() as f64;
         if mean > 0.0 {
-            for (element, bend) in all.iter_mut().zip(bends) {
-                element.area *= 1.0 + self.emphasis * (bend / mean).sqrt();
+            for (node, bend) in nodes.into_iter().zip(bends) {
+                lattice.weight[node] *= 1.0 + self.emphasis * (bend / mean).sqrt();
             }
         }
-        let chosen = spread(&mut all, count, area.rows, step);
-        Ok(elements::points(&chosen, surface, pixel_size_m))
+        Ok(spread(&lattice, count))
     }
 }
 

@@ -1,10 +1,11 @@
 //! Control points on a surface: the trait and its implementations.
 
 mod adaptive;
-mod elements;
 mod equally_spaced;
+mod lattice;
 mod random;
 mod relax;
+mod strips;
 
 use nalgebra::Point3;
 use ndarray::ArrayView2;

@@ -4,12 +4,12 @@ use nalgebra::Point3;
 use ndarray::ArrayView2;
 
 use super::ControlPointSampler;
-use super::elements;
+use super::lattice::Lattice;
 use crate::{Scalar, SfsError};
 
 /// Random control points: every pixel is drawn with a probability proportional to the surface area over it, without
 /// repetition. The same seed gives the same points on every platform and in every version of the library: the generator
-/// (SplitMix64) is part of this crate for that reason. O(pixels log pixels).
+/// (SplitMix64) is part of this crate for that reason. O(pixels + count log count).
 ///
 /// ```
 /// use ndarray::Array2;
@@ -40,16 +40,19 @@ impl<T: Scalar> ControlPointSampler<T> for Random {
         pixel_size_m: [T; 2],
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
-        let (all, _) = elements::collect(surface, mask, pixel_size_m, count)?;
+        let lattice = Lattice::dense(surface, mask, pixel_size_m, count)?;
         // The `count` least of exponential variates with rates = areas are a draw without repetition (Efraimidis &
         // Spirakis 2006).
         let mut state = self.seed;
-        let key = |area: f64, state: &mut u64| -(1.0 - unit(state)).ln() / area;
-        let mut keys: Vec<(f64, usize)> =
-            all.iter().enumerate().map(|(i, e)| (key(e.area, &mut state), i)).collect();
-        keys.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let chosen: Vec<_> = keys[..count].iter().map(|&(_, i)| all[i]).collect();
-        Ok(elements::points(&chosen, surface, pixel_size_m))
+        let mut key = |node: usize| -(1.0 - unit(&mut state)).ln() / lattice.weight[node];
+        let mut keys: Vec<(f64, usize)> = lattice.nodes().map(|node| (key(node), node)).collect();
+        let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if count < keys.len() {
+            keys.select_nth_unstable_by(count, order);
+            keys.truncate(count);
+        }
+        keys.sort_unstable_by(order);
+        Ok(keys.into_iter().map(|(_, node)| lattice.point(lattice.pixel(node))).collect())
     }
 }
 

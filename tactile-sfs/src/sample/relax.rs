@@ -1,93 +1,131 @@
-//! Lloyd's relaxation on a thinned set of elements: points move to the middle of their cells.
+//! Lloyd's relaxation on a lattice: points move to the middle of the part of the surface nearest to them.
+//!
+//! Every point looks at the nodes around it (as superpixels do, Achanta et al. 2012) instead of every node at all points:
+//! O(nodes) a step, along rows of memory.
 
-use super::elements::Element;
+use super::lattice::Lattice;
+use crate::Scalar;
 
-/// Elements per point that the cells are measured with; more do not change the spacing visibly.
-const PER_POINT: usize = 40;
 const STEPS: usize = 4;
+/// How far a point looks, in mean spacings; the farthest node of an even spread is 0.62 away.
+const REACH: f64 = 1.3;
 
-/// Evens out the spacing of `chosen`; every point stays an element, and no two become the same.
-pub(super) fn relax(all: &[Element], chosen: &mut [Element], step: [f64; 2]) {
-    let stride = ((all.len() as f64 / (PER_POINT * chosen.len()) as f64).sqrt() as usize).max(1);
-    let thin: Vec<Element> =
-        all.iter().filter(|e| e.row % stride == 0 && e.column % stride == 0).copied().collect();
-    if thin.len() < 4 * chosen.len() {
-        return;
-    }
-    let total: f64 = thin.len() as f64 * step[0] * step[1] * (stride * stride) as f64;
-    let cell = 1.5 * (total / chosen.len() as f64).sqrt();
-    let mut owner = vec![0; thin.len()];
+/// Evens out the spacing of the points that start at the nodes `chosen`; their pixels.
+pub(super) fn relax<T: Scalar>(lattice: &Lattice<'_, T>, chosen: &[usize]) -> Vec<[usize; 2]> {
+    let mut cells = Cells::new(lattice, chosen);
     for _ in 0..STEPS {
-        assign(&thin, chosen, cell, &mut owner);
-        recentre(&thin, &owner, chosen);
+        cells.assign();
+        cells.recentre(&lattice.weight);
+    }
+    cells.assign();
+    match cells.nearest_nodes() {
+        Some(nodes) => {
+            let place = |k: usize| [cells.points[k][0], cells.points[k][1] / cells.aspect];
+            nodes.iter().enumerate().map(|(k, &node)| lattice.refine(node, place(k))).collect()
+        }
+        // A point lost all its nodes: the first spread is the better one.
+        None => chosen.iter().map(|&node| lattice.pixel(node)).collect(),
     }
 }
 
-/// Nearest point of every element, searched in the buckets around it.
-fn assign(thin: &[Element], chosen: &[Element], cell: f64, owner: &mut [usize]) {
-    let bound = |axis: usize, pick: fn(f64, f64) -> f64, start: f64| {
-        thin.iter().map(|e| e.position[axis]).fold(start, pick)
-    };
-    let low = [bound(0, f64::min, f64::INFINITY), bound(1, f64::min, f64::INFINITY)];
-    let high = [bound(0, f64::max, f64::NEG_INFINITY), bound(1, f64::max, f64::NEG_INFINITY)];
-    let size = [0, 1].map(|axis| ((high[axis] - low[axis]) / cell) as usize + 1);
-    let bucket = |position: &[f64; 3]| {
-        [0, 1].map(|axis| (((position[axis] - low[axis]) / cell).max(0.0) as usize).min(size[axis] - 1))
-    };
-    let mut buckets: Vec<Vec<usize>> = vec![Vec::new(); size[0] * size[1]];
-    for (k, point) in chosen.iter().enumerate() {
-        let [x, y] = bucket(&point.position);
-        buckets[y * size[0] + x].push(k);
+/// Points, and which of them is nearest to each node. Lengths are in units of the lattice's spacing along x.
+struct Cells {
+    columns: usize,
+    rows: usize,
+    aspect: f32,
+    reach: f32,
+    heights: Vec<f32>,
+    points: Vec<[f32; 3]>,
+    owner: Vec<u32>,
+    /// Squared distance to the owner; +∞ if no point has looked here.
+    distance: Vec<f32>,
+}
+
+impl Cells {
+    fn new<T: Scalar>(lattice: &Lattice<'_, T>, chosen: &[usize]) -> Self {
+        let heights = lattice.heights();
+        let (columns, rows, aspect) = (lattice.columns, lattice.rows, lattice.aspect() as f32);
+        let total: f64 = lattice.weight.iter().sum::<f64>() * lattice.aspect();
+        let point =
+            |&node: &usize| [(node % columns) as f32, (node / columns) as f32 * aspect, heights[node]];
+        let points: Vec<_> = chosen.iter().map(point).collect();
+        let reach = (REACH * (total / points.len() as f64).sqrt()) as f32;
+        let (owner, distance) = (vec![u32::MAX; heights.len()], vec![f32::INFINITY; heights.len()]);
+        Self { columns, rows, aspect, reach, heights, points, owner, distance }
     }
-    for (element, owner) in thin.iter().zip(owner) {
-        let at = bucket(&element.position);
-        let mut best = f64::INFINITY;
-        // Distances in the plane bound those in space from below, so that rings beyond the best need no look.
-        for ring in 0..size[0].max(size[1]) {
-            if ring > 1 && ((ring - 1) as f64 * cell).powi(2) > best {
-                break;
+
+    /// Finds the nearest point of every node.
+    fn assign(&mut self) {
+        self.distance.fill(f32::INFINITY);
+        for k in 0..self.points.len() {
+            let [x, y, _] = self.points[k];
+            let span = |place: f32, unit: f32, length: usize| {
+                let low = ((place - self.reach) / unit).max(0.0) as usize;
+                (low.min(length), (((place + self.reach) / unit).max(0.0) as usize + 1).min(length))
+            };
+            let (left, right) = span(x, 1.0, self.columns);
+            let (top, bottom) = span(y, self.aspect, self.rows);
+            for row in top..bottom {
+                self.look(k, row, left..right);
             }
-            for (x, y) in ring_of(at, ring, size) {
-                for &k in &buckets[y * size[0] + x] {
-                    let distance = squared(&element.position, &chosen[k].position);
-                    if distance < best {
-                        (best, *owner) = (distance, k);
-                    }
-                }
+        }
+        // Nodes that no point has seen, where the spread is uneven.
+        for node in 0..self.heights.len() {
+            if self.distance[node] == f32::INFINITY && !self.heights[node].is_nan() {
+                let (row, column) = (node / self.columns, node % self.columns);
+                (0..self.points.len()).for_each(|k| self.look(k, row, column..column + 1));
             }
         }
     }
-}
 
-/// Buckets at Chebyshev distance `ring` (the first two rings at once: ring 0 gives nothing new after ring 1).
-fn ring_of([x, y]: [usize; 2], ring: usize, [w, h]: [usize; 2]) -> impl Iterator<Item = (usize, usize)> {
-    let (left, right) = (x.saturating_sub(ring), (x + ring).min(w - 1));
-    let (top, bottom) = (y.saturating_sub(ring), (y + ring).min(h - 1));
-    (top..=bottom)
-        .flat_map(move |v| (left..=right).map(move |u| (u, v)))
-        .filter(move |&(u, v)| u.abs_diff(x).max(v.abs_diff(y)) == ring)
-}
-
-/// Moves every point to the element nearest to the weighted centroid of its cell.
-fn recentre(thin: &[Element], owner: &[usize], chosen: &mut [Element]) {
-    let mut sums = vec![([0.0; 3], 0.0); chosen.len()];
-    for (element, &k) in thin.iter().zip(owner) {
-        for (sum, x) in sums[k].0.iter_mut().zip(element.position) {
-            *sum += element.area * x;
-        }
-        sums[k].1 += element.area;
-    }
-    let mut best = vec![f64::INFINITY; chosen.len()];
-    for (element, &k) in thin.iter().zip(owner) {
-        let centre = sums[k].0.map(|sum| sum / sums[k].1);
-        let distance = squared(&element.position, &centre);
-        // A point only ever moves to an element of its own cell, so that no two meet.
-        if distance < best[k] {
-            (best[k], chosen[k]) = (distance, *element);
+    /// Point `k` takes the nodes of a piece of a row that are nearer to it than to any before.
+    #[inline]
+    fn look(&mut self, k: usize, row: usize, columns: core::ops::Range<usize>) {
+        let [x, y, z] = self.points[k];
+        let above = (y - row as f32 * self.aspect).powi(2);
+        let nodes = row * self.columns + columns.start..row * self.columns + columns.end;
+        let along = columns.start as f32 - x;
+        let (heights, distances) = (&self.heights[nodes.clone()], &mut self.distance[nodes.clone()]);
+        let owners = &mut self.owner[nodes];
+        for (j, ((height, distance), owner)) in heights.iter().zip(distances).zip(owners).enumerate() {
+            let (dx, dz) = (along + j as f32, height - z);
+            let new = above + dx * dx + dz * dz;
+            // NaN, where there is no node, is never less.
+            let nearer = new < *distance;
+            *distance = if nearer { new } else { *distance };
+            *owner = if nearer { k as u32 } else { *owner };
         }
     }
-}
 
-fn squared(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    (0..3).map(|i| (a[i] - b[i]) * (a[i] - b[i])).sum()
+    /// The nodes that belong to a point: node, point.
+    fn owned(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let seen = |&(node, _): &(usize, &f32)| self.distance[node].is_finite();
+        self.heights.iter().enumerate().filter(seen).map(|(node, _)| (node, self.owner[node] as usize))
+    }
+
+    /// Moves every point to the weighted centroid of its nodes.
+    fn recentre(&mut self, weight: &[f64]) {
+        let mut sums = vec![[0.0_f64; 4]; self.points.len()];
+        for (node, k) in self.owned() {
+            let (w, place) = (weight[node], [(node % self.columns) as f64, (node / self.columns) as f64]);
+            let terms = [w * place[0], w * place[1], w * f64::from(self.heights[node]), w];
+            sums[k].iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+        for (point, [x, y, z, w]) in self.points.iter_mut().zip(sums) {
+            if w > 0.0 {
+                *point = [(x / w) as f32, (y / w) as f32 * self.aspect, (z / w) as f32];
+            }
+        }
+    }
+
+    /// The node nearest to each point among those that belong to it, so that no two points get the same.
+    fn nearest_nodes(&self) -> Option<Vec<usize>> {
+        let mut best = vec![(f32::INFINITY, usize::MAX); self.points.len()];
+        for (node, k) in self.owned() {
+            if self.distance[node] < best[k].0 {
+                best[k] = (self.distance[node], node);
+            }
+        }
+        best.iter().map(|&(distance, node)| distance.is_finite().then_some(node)).collect()
+    }
 }

@@ -7,10 +7,23 @@ use crate::Scalar;
 /// for the error of the extrapolation.
 const REACH: f64 = 1.25;
 
+/// Pixels around a rim pixel, in both directions, over which the rim's kind and curvature are taken to be the same.
+const WINDOW: usize = 4;
+
 /// Measures the rise of every unknown pixel of the mask that has a given height outside next to it.
+///
+/// The solution is a minimum over all of the rim: one pixel that noise makes look flatter than it is would draw down the
+/// whole surface. So the kind of rim is decided by the majority of the rim pixels around, and their mean bend is taken.
 pub(super) fn measure<T: Scalar>(grid: &mut EikonalBuffers<T>) {
     for i in grid.width..grid.node.len() - grid.width {
         if grid.node[i] == Node::Unknown && lowest(grid, i, T::one()).is_finite() {
+            // Until the edges are measured their place holds bend and step.
+            grid.edges[i] = bend_and_step(grid, i);
+            grid.rise[i] = T::zero();
+        }
+    }
+    for i in grid.width..grid.node.len() - grid.width {
+        if !grid.rise[i].is_nan() {
             grid.rise[i] = rise(grid, i);
         }
     }
@@ -26,24 +39,47 @@ pub(super) fn lowest<T: Scalar>(grid: &EikonalBuffers<T>, i: usize, sign: T) -> 
     given(i - 1).min(given(i + 1)).min(given(i - width)).min(given(i + width))
 }
 
-fn rise<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> T {
-    let (sine, cosine) = (grid.sine[i], grid.cosine[i]);
+/// |∇ sin θ| at a pixel, and how far the rim can be from it along that gradient.
+fn bend_and_step<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> [T; 2] {
     let gx = bend(grid, i, 1);
     let gy = bend(grid, i, grid.width) / grid.aspect;
     let bend = gx.hypot(gy);
-    // A pixel next to the rim lies, along the gradient, at most this far from it.
-    let step = if bend > T::zero() {
-        gx.abs().max(gy.abs() * grid.aspect) / bend
+    if bend > T::zero() {
+        [bend, gx.abs().max(gy.abs() * grid.aspect) / bend]
     } else {
-        T::one().min(grid.aspect)
-    };
-    let half = T::of(0.5) * step;
-    if (T::one() - sine) < T::of(REACH) * step * bend {
+        [bend, T::one().min(grid.aspect)]
+    }
+}
+
+fn rise<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> T {
+    let (sine, cosine) = (grid.sine[i], grid.cosine[i]);
+    let (bend, occluding) = around(grid, i);
+    if occluding {
         return cosine / bend;
     }
+    let half = T::of(0.5) * grid.edges[i][1];
     let rim_sine = (sine + half * bend).min(T::one());
     let rim_cosine = (T::one() - rim_sine * rim_sine).max(T::zero()).sqrt();
     half * (sine + rim_sine) / (cosine + rim_cosine)
+}
+
+/// Mean bend of the rim pixels around one, and whether most of them lie at an occluding contour.
+fn around<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> (T, bool) {
+    let (width, rows) = (grid.width, grid.node.len() / grid.width);
+    let span =
+        |middle: usize, length: usize| middle.saturating_sub(WINDOW)..(middle + WINDOW + 1).min(length);
+    let (mut sum, mut count, mut votes) = (T::zero(), 0usize, 0usize);
+    for row in span(i / width, rows) {
+        for j in span(i % width, width).map(|column| row * width + column) {
+            if !grid.rise[j].is_nan() {
+                let [bend, step] = grid.edges[j];
+                sum += bend;
+                count += 1;
+                votes += usize::from(T::one() - grid.sine[j] < T::of(REACH) * step * bend);
+            }
+        }
+    }
+    (sum / T::of(count as f64), 2 * votes > count)
 }
 
 /// cos² of the angle between ∇ sin θ and the x axis.
