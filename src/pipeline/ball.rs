@@ -117,7 +117,7 @@ mod tests {
         let domain = Domain::new(size).unwrap().with_mask(mask.view());
         let surface = table.reconstruct(heights.view(), &domain).unwrap();
         let region = BoundingBox { row_start: 4, row_end: 134, column_start: 10, column_end: 120 };
-        let fit = ContactSurface { surface, region, pixel_size_m: size }.fit_ball(4e-3).unwrap();
+        let fit = ContactSurface { surface, region, binning: 1, pixel_size_m: size }.fit_ball(4e-3).unwrap();
         // Gauss–Newton stops at 10⁻⁹ of the radius.
         for k in 0..2 {
             assert!((fit.centre_m[k] - truth.centre_m[k]).abs() < 1e-10);

@@ -20,6 +20,7 @@
 //! result carries a flag. For other objects the paper's ratio is the estimate.
 mod ball;
 mod batch;
+mod binning;
 mod contact;
 mod depth;
 mod display;
@@ -39,6 +40,7 @@ mod trial;
 
 pub use ball::BallFit;
 pub use batch::contacts;
+pub use binning::Binning;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
 pub use display::with_error;

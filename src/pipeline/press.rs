@@ -7,13 +7,13 @@ use super::object::{
 use super::pair::{self, PairStrain};
 use super::report::{Report, SkipReason, Stage};
 use super::stages::Stages;
-use super::surface::{self, ContactSurface};
+use super::surface::{self, ContactSurface, SurfaceWorkspace};
 use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate};
 use crate::force::{BoundingBox, ForceWorkspace, ReferenceFrame};
 use crate::matching::Matching;
-use crate::sfs::{Surface, Workspace};
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A frame and what is known of it so far.
@@ -33,15 +33,12 @@ struct Loaded<'a> {
 /// Made by [`Pipeline::press`](super::Pipeline::press).
 pub struct Press<'a> {
     stages: &'a dyn Stages,
-    reference: ReferenceFrame,
+    reference: Arc<ReferenceFrame>,
     frames: Vec<Loaded<'a>>,
     /// The frame whose results a frame shares: itself, or an equal one before it.
     twins: Vec<usize>,
     force: ForceWorkspace,
-    sfs: Workspace<f64>,
-    signal: Array2<f64>,
-    smoothed: Array2<f64>,
-    line: Vec<f64>,
+    surface: SurfaceWorkspace,
     report: Report,
 }
 
@@ -51,18 +48,21 @@ impl<'a> Press<'a> {
     /// # Errors
     /// [`PipelineError::Sensor`] for a reference without pixels.
     pub fn new(stages: &'a dyn Stages, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
-        Ok(Self {
+        let reference = ReferenceFrame::new(reference).map_err(PipelineError::Sensor)?;
+        Ok(Self::with_reference(stages, Arc::new(reference)))
+    }
+
+    /// Starts a press on a reference made before: its noise is measured once for many presses.
+    pub fn with_reference(stages: &'a dyn Stages, reference: Arc<ReferenceFrame>) -> Self {
+        Self {
             stages,
-            reference: ReferenceFrame::new(reference).map_err(PipelineError::Sensor)?,
+            reference,
             frames: Vec::new(),
             twins: Vec::new(),
             force: ForceWorkspace::default(),
-            sfs: Workspace::new(),
-            signal: Array2::default((0, 0)),
-            smoothed: Array2::default((0, 0)),
-            line: Vec::new(),
+            surface: SurfaceWorkspace::new(),
             report: Report::default(),
-        })
+        }
     }
 
     /// Adds a frame; returns its number.
@@ -160,20 +160,9 @@ impl<'a> Press<'a> {
             let start = Instant::now();
             let loaded = &self.frames[at];
             let contact = loaded.contact.as_ref().ok_or(PipelineError::NoContact { frame })?;
-            let region = BoundingBox { row_start: 0, row_end: 0, column_start: 0, column_end: 0 };
-            let mut surface = ContactSurface { surface: Surface::new(), region, pixel_size_m: [1.0; 2] };
-            let reference = self.reference.image();
-            surface::reconstruct(
-                self.stages,
-                &mut self.sfs,
-                &mut self.signal,
-                (&mut self.smoothed, &mut self.line),
-                loaded.image,
-                reference,
-                contact,
-                &mut surface,
-            )
-            .map_err(|source| PipelineError::Surface { frame, source })?;
+            let images = [loaded.image, self.reference.image()];
+            let surface = surface::reconstruct(self.stages, &mut self.surface, images, contact)
+                .map_err(|source| PipelineError::Surface { frame, source })?;
             self.report.ran(Stage::Surface, start.elapsed());
             self.frames[at].surface = Some(surface);
         }

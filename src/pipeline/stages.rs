@@ -1,4 +1,5 @@
 //! The pipeline: its stages, chosen at compile time or, boxed, at run time, and its settings.
+use super::binning::Binning;
 use super::contact::{ContactStage, LightContact};
 use super::error::PipelineError;
 use super::object::Object;
@@ -6,12 +7,13 @@ use super::press::Press;
 use super::surface::SurfaceInput;
 use crate::elasticity::contact::Waveguide;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
-use crate::force::CalibrationPair;
+use crate::force::{CalibrationPair, ReferenceFrame};
 use crate::matching::{PointMatcher, RelaxationMatcher};
 use crate::sfs::{ControlPointSampler, Eikonal, EquallySpaced, Lighting, Rim, SurfaceReconstruction};
 use crate::tps::{FitOptions, NegR, Smoothing, TpsError, Warp, WarpModel};
 use nalgebra::Point3;
 use ndarray::ArrayView2;
+use std::sync::Arc;
 
 /// Control points on each surface where nothing else is asked for: the paper's number.
 pub const DEFAULT_CONTROL_POINTS: usize = 200;
@@ -45,6 +47,8 @@ pub struct Settings {
     /// Width in pixels (odd) of the box that smooths the signal, twice along each axis, before the surface stage; 1 for
     /// none. Where the surface is nearly level its slope √(1/I² − 1) turns noise of the shading I into height.
     pub smoothing_px: usize,
+    /// Grid of the surface stage.
+    pub binning: Binning,
     /// Relative error common to all forces beside the calibration's scatter. Light that is uneven over the frame reads
     /// contacts of another size than the calibration's with another gain.
     pub force_scale_error: f64,
@@ -142,6 +146,7 @@ impl<C> Pipeline<C> {
                 control_points: DEFAULT_CONTROL_POINTS,
                 surface_input: SurfaceInput::Shading,
                 smoothing_px: 5,
+                binning: Binning::default(),
                 force_scale_error: 1e-3,
                 length_scale_error: 0.0,
                 skips: Skips::default(),
@@ -222,6 +227,13 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
         self
     }
 
+    /// Sets the grid of the surface stage (default: every pixel).
+    #[must_use]
+    pub fn with_binning(mut self, binning: Binning) -> Self {
+        self.settings.binning = binning;
+        self
+    }
+
     /// Sets the relative errors common to all forces (default 0.1 %) and to all lengths (default none). What is negative or
     /// not finite counts as zero.
     #[must_use]
@@ -260,6 +272,11 @@ where
     /// [`PipelineError::Sensor`] for a reference without pixels.
     pub fn press<'a>(&'a self, reference: ArrayView2<'_, u8>) -> Result<Press<'a>, PipelineError> {
         Press::new(self, reference)
+    }
+
+    /// Starts a press on a reference made before; see [`Press::with_reference`].
+    pub fn press_on(&self, reference: Arc<ReferenceFrame>) -> Press<'_> {
+        Press::with_reference(self, reference)
     }
 }
 

@@ -1,6 +1,7 @@
 //! From a frame's contact to its surface and the control points on it.
-use super::contact::{FrameContact, resize};
-use super::stages::Stages;
+use super::binning;
+use super::contact::FrameContact;
+use super::stages::{Settings, Stages};
 use crate::force::{BoundingBox, Polarity};
 use crate::sfs::{Domain, Frame, SfsError, Surface, Workspace};
 use nalgebra::Point3;
@@ -23,56 +24,102 @@ pub struct ContactSurface {
     pub surface: Surface<f64>,
     /// The box, in pixels of the frame.
     pub region: BoundingBox,
-    /// The size of a pixel in metres, x and y.
+    /// Frame pixels along the side of one of the grid's pixels.
+    pub binning: usize,
+    /// The size of one of the grid's pixels in metres, x and y.
     pub pixel_size_m: [f64; 2],
 }
 
 impl ContactSurface {
-    /// Position (x, y) in metres of the box's first pixel.
+    /// Position (x, y) in metres of the grid's first pixel: from the middle of the frame's first pixel to that of the block.
     pub fn origin_m(&self) -> [f64; 2] {
-        let [hx, hy] = self.pixel_size_m;
-        [self.region.column_start as f64 * hx, self.region.row_start as f64 * hy]
+        let side = self.binning as f64;
+        let middle = 0.5 * (side - 1.0);
+        let first = [self.region.column_start as f64 + middle, self.region.row_start as f64 + middle];
+        [first[0] * self.pixel_size_m[0] / side, first[1] * self.pixel_size_m[1] / side]
     }
 }
 
-/// Reconstructs the surface of a contact into `surface`. `signal`, `smoothed` and `column` are scratch.
-#[allow(clippy::too_many_arguments)]
+/// What the surface stage reuses from frame to frame.
+#[derive(Debug)]
+pub(super) struct SurfaceWorkspace {
+    sfs: Workspace<f64>,
+    signal: Array2<f64>,
+    smoothed: Array2<f64>,
+    mask: Array2<bool>,
+    line: Vec<f64>,
+}
+
+impl SurfaceWorkspace {
+    pub(super) fn new() -> Self {
+        Self {
+            sfs: Workspace::new(),
+            signal: Array2::default((0, 0)),
+            smoothed: Array2::default((0, 0)),
+            mask: Array2::default((0, 0)),
+            line: Vec::new(),
+        }
+    }
+
+    /// The signal and the mask on the grid; returns the grid's box.
+    fn load(
+        &mut self,
+        settings: &Settings,
+        images: [ArrayView2<'_, u8>; 2],
+        contact: &FrameContact,
+        (region, scale, side): (BoundingBox, f64, usize),
+    ) -> BoundingBox {
+        let [frame, reference] = images;
+        let whole = binning::whole_blocks(region, side, frame.dim());
+        binning::mean_difference(frame, reference, whole, side, scale, &mut self.signal);
+        binning::block_mask(contact.mask.view(), region, whole, side, &mut self.mask);
+        let ceiling = settings.surface_input.ceiling();
+        // The width is that in the frame: a block has smoothed already.
+        let width = (settings.smoothing_px / side) | 1;
+        if width > 1 {
+            self.smoothed.clone_from(&self.signal);
+            smooth(&mut self.smoothed, &mut self.line, width);
+            self.signal.zip_mut_with(&self.smoothed, |sharp, level| {
+                *sharp += levelness(*level / ceiling) * (*level - *sharp)
+            });
+        }
+        self.signal.mapv_inplace(|v| v.clamp(0.0, ceiling));
+        whole
+    }
+}
+
+impl SurfaceInput {
+    /// Greatest value of the input.
+    fn ceiling(self) -> f64 {
+        if self == Self::Shading { 1.0 } else { 255.0 }
+    }
+}
+
+/// Reconstructs the surface of a contact.
 pub(super) fn reconstruct(
     stages: &dyn Stages,
-    workspace: &mut Workspace<f64>,
-    signal: &mut Array2<f64>,
-    (smoothed, column): (&mut Array2<f64>, &mut Vec<f64>),
-    frame: ArrayView2<'_, u8>,
-    reference: ArrayView2<'_, u8>,
+    workspace: &mut SurfaceWorkspace,
+    images: [ArrayView2<'_, u8>; 2],
     contact: &FrameContact,
-    surface: &mut ContactSurface,
-) -> Result<(), SfsError> {
+) -> Result<ContactSurface, SfsError> {
     let (Some(region), Some(reading)) = (contact.region, contact.reading) else {
         return Err(SfsError::EmptyMask);
     };
-    let scale = match stages.settings().surface_input {
+    let settings = stages.settings();
+    let scale = match settings.surface_input {
         SurfaceInput::Shading => 1.0 / reading.peak_grey,
         SurfaceInput::Signal => 1.0,
     };
     let scale = if stages.contact().polarity() == Polarity::Darker { -scale } else { scale };
-    let ceiling = if stages.settings().surface_input == SurfaceInput::Shading { 1.0 } else { 255.0 };
-    resize(signal, (region.rows(), region.columns()));
-    let pairs = region.of(frame).into_iter().zip(region.of(reference));
-    for (out, (&i, &r)) in signal.iter_mut().zip(pairs) {
-        *out = scale * (f64::from(i) - f64::from(r));
-    }
-    let width = stages.settings().smoothing_px;
-    if width > 1 {
-        smoothed.clone_from(signal);
-        smooth(smoothed, column, width);
-        signal
-            .zip_mut_with(smoothed, |sharp, level| *sharp += levelness(*level / ceiling) * (*level - *sharp));
-    }
-    signal.mapv_inplace(|v| v.clamp(0.0, ceiling));
-    surface.region = region;
-    surface.pixel_size_m = stages.contact().pixel_size_m();
-    let domain = Domain::new(surface.pixel_size_m)?.with_mask(contact.mask.view());
-    stages.surface().reconstruct_with(workspace, Frame::Real(signal.view()), &domain, &mut surface.surface)
+    let pixels = contact.mask.iter().filter(|m| **m).count();
+    let side = settings.binning.side(pixels, settings.control_points);
+    let region = workspace.load(settings, images, contact, (region, scale, side));
+    let pixel_size_m = stages.contact().pixel_size_m().map(|size| size * side as f64);
+    let domain = Domain::new(pixel_size_m)?.with_mask(workspace.mask.view());
+    let mut surface = Surface::new();
+    let frame = Frame::Real(workspace.signal.view());
+    stages.surface().reconstruct_with(&mut workspace.sfs, frame, &domain, &mut surface)?;
+    Ok(ContactSurface { surface, region, binning: side, pixel_size_m })
 }
 
 /// Control points on a surface, in metres from the frame's first pixel.

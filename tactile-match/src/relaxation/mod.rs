@@ -31,7 +31,7 @@ mod soft_assign;
 mod starts;
 
 pub use labelling::Labelling;
-pub use options::{Outliers, RelaxationOptions, Rotation};
+pub use options::{Outliers, RelaxationOptions, Rotation, Search};
 
 use crate::{
     MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, unmatched_rows, validate,

@@ -30,18 +30,36 @@ pub enum Outliers {
     None,
 }
 
+/// How far the search for the right start goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Search {
+    /// Until an answer is exact, or every start is tried and the scales of the prior are fitted to the data: any scene.
+    #[default]
+    Thorough,
+    /// One annealing run from the sets as they lie, centred: for sets known to be near each other, such as those of one
+    /// contact at two loads. A fixed, small number of iterations.
+    Near,
+}
+
 /// Options of [`RelaxationMatcher`](crate::RelaxationMatcher); all of them have defaults that suit every scene tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelaxationOptions {
     pub(crate) rotation: Rotation,
     pub(crate) outliers: Outliers,
+    pub(crate) search: Search,
     pub(crate) share: f64,
     pub(crate) max_iterations: usize,
 }
 
 impl Default for RelaxationOptions {
     fn default() -> Self {
-        Self { rotation: Rotation::Limited, outliers: Outliers::Both, share: 0.1, max_iterations: 200 }
+        Self {
+            rotation: Rotation::Limited,
+            outliers: Outliers::Both,
+            search: Search::Thorough,
+            share: 0.1,
+            max_iterations: 200,
+        }
     }
 }
 
@@ -57,6 +75,13 @@ impl RelaxationOptions {
     #[must_use]
     pub fn outliers(mut self, outliers: Outliers) -> Self {
         self.outliers = outliers;
+        self
+    }
+
+    /// Says how far to search.
+    #[must_use]
+    pub fn search(mut self, search: Search) -> Self {
+        self.search = search;
         self
     }
 

@@ -6,7 +6,7 @@
 
 use super::anneal::Schedule;
 use super::prior::PriorScales;
-use super::{RelaxationMatcher, RelaxationWorkspace, Rotation, finish, starts};
+use super::{RelaxationMatcher, RelaxationWorkspace, Rotation, Search, finish, starts};
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
@@ -47,6 +47,25 @@ impl RelaxationMatcher {
         ws.best.energy = f64::INFINITY;
         starts::centred(&ws.model, &ws.target, &mut ws.state.base);
         let mut flow = self.attempt(ws, FAST, observe);
+        if self.options.search == Search::Thorough {
+            flow = self.try_further(ws, flow, observe);
+        }
+        if ws.starts > 1 || !self.is_exact(ws) {
+            // Later runs have left their own fit behind.
+            let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
+            ws.annealer.look(&ws.best, &mut ws.state, &schedule);
+        }
+        ws.stopped = flow.is_break();
+        ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
+    }
+
+    /// What follows the first run where its answer is not exact and complete.
+    fn try_further<const D: usize>(
+        &self,
+        ws: &mut RelaxationWorkspace<D>,
+        mut flow: ControlFlow<()>,
+        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         if flow.is_continue() && !self.is_exact(ws) {
             flow = self.reheat(ws, observe);
         }
@@ -77,13 +96,7 @@ impl RelaxationMatcher {
         if flow.is_continue() && ws.best.sigma > finish::CLEAN {
             self.fit_scales(ws);
         }
-        if ws.starts > 1 || !self.is_exact(ws) {
-            // Later runs have left their own fit behind.
-            let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
-            ws.annealer.look(&ws.best, &mut ws.state, &schedule);
-        }
-        ws.stopped = flow.is_break();
-        ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
+        flow
     }
 
     /// The last stage on noisy data: the prior's scales by their evidence, each with the noise level that fits it.

@@ -1,0 +1,136 @@
+//! How fine the grid is on which a surface is reconstructed.
+//!
+//! A contact of 10⁵ pixels carries 200 control points; the heights between them are not asked for. Means over blocks of
+//! pixels cost one pass, lower the noise by the block's width, and leave the reconstruction a small grid.
+use super::contact::resize;
+use crate::force::BoundingBox;
+use ndarray::{Array2, ArrayView2};
+
+/// Pixels of the reconstruction's grid, inside the contact, for every control point: the points then stand five or
+/// more pixels apart.
+const PIXELS_PER_POINT: usize = 32;
+
+/// The grid of the surface stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Binning {
+    /// Blocks as large as the control points allow: at least 32 of them inside the contact for every point.
+    Auto,
+    /// Blocks of n × n pixels; 1 for every pixel on its own (0 counts as 1).
+    Blocks(usize),
+}
+
+impl Default for Binning {
+    /// Every pixel.
+    fn default() -> Self {
+        Self::Blocks(1)
+    }
+}
+
+impl Binning {
+    /// Side of a block in pixels, for a contact of `pixels` with `points` control points.
+    pub(super) fn side(self, pixels: usize, points: usize) -> usize {
+        match self {
+            Self::Auto => (pixels / (PIXELS_PER_POINT * points.max(1))).isqrt().max(1),
+            Self::Blocks(side) => side.max(1),
+        }
+    }
+}
+
+/// The box that whole blocks make of a contact's box: grown to the right and downwards, cut at the frame's end.
+pub(super) fn whole_blocks(region: BoundingBox, side: usize, (rows, columns): (usize, usize)) -> BoundingBox {
+    let end = |start: usize, end: usize, limit: usize| {
+        let blocks = (end - start).div_ceil(side).min((limit - start) / side);
+        start + blocks * side
+    };
+    BoundingBox {
+        row_end: end(region.row_start, region.row_end, rows),
+        column_end: end(region.column_start, region.column_end, columns),
+        ..region
+    }
+}
+
+/// Mean differences frame − reference of the blocks of `region`, times `scale`; O(pixels of the box).
+pub(super) fn mean_difference(
+    frame: ArrayView2<'_, u8>,
+    reference: ArrayView2<'_, u8>,
+    region: BoundingBox,
+    side: usize,
+    scale: f64,
+    means: &mut Array2<f64>,
+) {
+    resize(means, (region.rows() / side, region.columns() / side));
+    means.fill(0.0);
+    let (frame, reference) = (region.of(frame), region.of(reference));
+    for (row, (f, r)) in frame.rows().into_iter().zip(reference.rows()).enumerate() {
+        let mut out = means.row_mut(row / side);
+        let blocks = f.exact_chunks(side).into_iter().zip(r.exact_chunks(side));
+        for (sum, (f, r)) in out.iter_mut().zip(blocks) {
+            *sum += f64::from(f.iter().zip(r).map(|(&f, &r)| i32::from(f) - i32::from(r)).sum::<i32>());
+        }
+    }
+    let scale = scale / (side * side) as f64;
+    means.mapv_inplace(|sum| sum * scale);
+}
+
+/// Blocks of which at least half lies in the contact; `mask` covers `contact`, blocks are those of `region`.
+pub(super) fn block_mask(
+    mask: ArrayView2<'_, bool>,
+    contact: BoundingBox,
+    region: BoundingBox,
+    side: usize,
+    blocks: &mut Array2<bool>,
+) {
+    resize(blocks, (region.rows() / side, region.columns() / side));
+    let (rows, columns) = (contact.rows(), contact.columns());
+    for ((row, column), inside) in blocks.indexed_iter_mut() {
+        let span = |start: usize, end: usize| [start.min(end), (start + side).min(end)];
+        let ([row_start, row_end], [column_start, column_end]) =
+            (span(row * side, rows), span(column * side, columns));
+        let pixels = BoundingBox { row_start, row_end, column_start, column_end }.of(mask);
+        *inside = 2 * pixels.iter().filter(|m| **m).count() >= side * side;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_no_larger_than_the_points_allow() {
+        assert_eq!(Binning::Auto.side(6_399, 200), 1);
+        assert_eq!(Binning::Auto.side(4 * 6_400, 200), 2);
+        assert_eq!(Binning::Auto.side(9 * 6_400 - 1, 200), 2);
+        assert_eq!(Binning::Blocks(0).side(10, 0), 1);
+    }
+
+    #[test]
+    fn means_of_blocks_are_those_of_their_pixels() {
+        let frame = Array2::from_shape_fn((9, 11), |(r, c)| (7 * r + 3 * c) as u8);
+        let reference = Array2::from_elem((9, 11), 5_u8);
+        let contact = BoundingBox { row_start: 1, row_end: 8, column_start: 2, column_end: 9 };
+        let region = whole_blocks(contact, 3, frame.dim());
+        assert_eq!(
+            (region.row_end, region.column_end),
+            (7, 11),
+            "two blocks down to the frame's end, three across"
+        );
+        let mut means = Array2::zeros((0, 0));
+        mean_difference(frame.view(), reference.view(), region, 3, 2.0, &mut means);
+        // The mean of a linear function is its value in the block's middle; all sums are exact in f64.
+        let middle =
+            |(r, c): (usize, usize)| 2.0 * (7.0 * (3 * r + 2) as f64 + 3.0 * (3 * c + 3) as f64 - 5.0);
+        for (at, mean) in means.indexed_iter() {
+            assert!((mean - middle(at)).abs() < 1e-12, "{at:?}: {mean}");
+        }
+    }
+
+    #[test]
+    fn a_block_is_inside_if_half_of_it_is() {
+        let contact = BoundingBox { row_start: 0, row_end: 2, column_start: 0, column_end: 6 };
+        let mask = Array2::from_shape_fn((2, 6), |(r, c)| c < 2 || (c == 2 && r == 0) || (c == 4));
+        let mut blocks = Array2::default((0, 0));
+        block_mask(mask.view(), contact, contact, 2, &mut blocks);
+        assert_eq!(blocks.as_slice(), Some(&[true, false, true][..]));
+    }
+}
