@@ -24,16 +24,8 @@ pub(crate) fn widened<T: RealField + Copy, const D: usize>(point: &Point<T, D>) 
 impl<const D: usize> Frame<D> {
     /// Centre and root mean square radius of a set; scale one where all points coincide.
     pub(crate) fn of<T: RealField + Copy>(points: &[Point<T, D>]) -> Self {
-        let n = points.len() as f64;
-        let origin = widened(&points[0]); // sums of differences keep the digits of sets far from the origin
-        let centre = origin + points.iter().map(|p| widened(p) - origin).sum::<SVector<f64, D>>() / n;
-        // The largest radius taken out first: no square under- or overflows.
-        let largest = points.iter().map(|p| (widened(p) - centre).amax()).fold(0.0, f64::max);
-        if !(largest > 0.0 && largest.is_finite()) {
-            return Self { centre, scale: 1.0 };
-        }
-        let squares: f64 = points.iter().map(|p| ((widened(p) - centre) / largest).norm_squared()).sum();
-        Self { centre, scale: largest * (squares / n).sqrt() }
+        let (centre, radius) = centre_and_radius(points);
+        Self { centre, scale: if radius > 0.0 { radius } else { 1.0 } }
     }
 
     /// The model's centre and the largest distance from it along an axis in either set: for sets compared as they lie.
@@ -60,4 +52,20 @@ impl<const D: usize> Frame<D> {
     pub(crate) fn leave<T: RealField + Copy>(&self, inside: SVector<f64, D>) -> Point<T, D> {
         Point::from((inside * self.scale + self.centre).map(nalgebra::convert))
     }
+}
+
+/// Centroid of a set and its root mean square radius, nought where all points coincide.
+pub(crate) fn centre_and_radius<T: RealField + Copy, const D: usize>(
+    points: &[Point<T, D>],
+) -> (SVector<f64, D>, f64) {
+    let n = points.len() as f64;
+    let origin = widened(&points[0]); // sums of differences keep the digits of sets far from the origin
+    let centre = origin + points.iter().map(|p| widened(p) - origin).sum::<SVector<f64, D>>() / n;
+    // The largest radius taken out first: no square under- or overflows.
+    let largest = points.iter().map(|p| (widened(p) - centre).amax()).fold(0.0, f64::max);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return (centre, 0.0);
+    }
+    let squares: f64 = points.iter().map(|p| ((widened(p) - centre) / largest).norm_squared()).sum();
+    (centre, largest * (squares / n).sqrt())
 }

@@ -83,8 +83,7 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
     }
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
-    let warp = spline(&sources, &images, None, Smoothing::None);
-    let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
+    let (warp, warped) = through(model, &sources, &images);
     let residual =
         pairs.iter().map(|&(i, j)| (warped[i] - target[j]).norm_squared()).fold(T::zero(), |s, r| s + r);
     let count: T = nalgebra::convert(pairs.len().max(1) as f64);
@@ -108,6 +107,27 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
             sigma: T::zero(),
         },
     }
+}
+
+/// The spline through these pairs and where it takes the model; where that is beyond all numbers, the affine map, or none.
+fn through<T: Scalar, const D: usize>(
+    model: &[Point<T, D>],
+    sources: &[Point<T, D>],
+    images: &[Point<T, D>],
+) -> (Box<dyn Warp<T, D> + Send + Sync>, Vec<Point<T, D>>) {
+    let finite = |warp: &dyn Warp<T, D>| {
+        let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
+        warped.iter().all(|p| p.iter().all(|c| c.is_finite())).then_some(warped)
+    };
+    let spline = spline(sources, images, None, Smoothing::None);
+    if let Some(warped) = finite(&spline) {
+        return (spline, warped);
+    }
+    let affine = AffineModel.fit(sources, images, None).unwrap_or_else(|_| Affine::identity());
+    if let Some(warped) = finite(&affine) {
+        return (Box::new(affine), warped);
+    }
+    (Box::new(Affine::identity()), model.to_vec())
 }
 
 /// The thin-plate spline through these pairs (`r² ln r²` in the plane, `−r` in space); an affine map where they determine no

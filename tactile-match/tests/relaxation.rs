@@ -43,12 +43,19 @@ fn all_right<const D: usize>(n: usize) {
         assert!((found.warped[i] - bend(p)).norm() < 1e-12 && found.confidence[i] > 0.9);
     }
     assert!(found.unmatched_model.is_empty() && found.unmatched_target.is_empty());
+    // Exact says that the points returned lie on their partners.
+    assert!(found.report.residual < 1e-12);
 }
 
 #[test]
 fn clean_warps_of_plane_and_space_are_found_exactly() {
     all_right::<2>(52);
     all_right::<3>(61);
+}
+
+#[test]
+fn the_warp_goes_through_every_point_of_a_large_set() {
+    all_right::<2>(502);
 }
 
 #[test]

@@ -34,6 +34,7 @@ impl<const D: usize> Answer<D> {
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
         annealer.assign(&state.warped, variance, slack, if state.sigma <= CLEAN { 3 } else { 8 });
+        annealer.soft.cap_rows();
         self.assign(&annealer.soft, n, targets.len());
         self.place(state, targets);
         self.covariance.clear();
@@ -77,11 +78,11 @@ impl<const D: usize> Answer<D> {
         self.warped.clone_from(&state.warped);
         let (mut squares, mut pairs) = (0.0, 0);
         for (i, j) in self.assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))) {
-            squares += (0..D).map(|k| (state.warped[i][k] - targets[j][k]).powi(2)).sum::<f64>();
-            pairs += 1;
             if state.sigma <= CLEAN {
                 self.warped[i] = targets[j];
             }
+            squares += (0..D).map(|k| (self.warped[i][k] - targets[j][k]).powi(2)).sum::<f64>();
+            pairs += 1;
         }
         self.residual = if pairs > 0 { (squares / f64::from(pairs)).sqrt() } else { 0.0 };
     }

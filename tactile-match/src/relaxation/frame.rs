@@ -1,49 +1,57 @@
-//! Units of the work: positions relative to the model's centroid, divided by its root mean square radius.
+//! Units of the work: either set relative to its own centroid, divided by the model's root mean square radius.
+//!
+//! Two origins, so that sets far from each other lose no digits.
 
-use nalgebra::Point;
+use crate::frame::{centre_and_radius, widened};
+use nalgebra::{Point, SVector};
 use tactile_tps::Scalar;
 
-/// Centroid and root mean square radius of the model; every length inside the matcher is in that radius.
+/// Beyond this many radii a coordinate is as good as at infinity, and its square is still finite in single precision.
+const FARTHEST: f64 = 1e12;
+
+/// The centroids, and the length that is one inside the matcher.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame<const D: usize> {
-    pub(crate) centre: [f64; D],
+    model: SVector<f64, D>,
+    target: SVector<f64, D>,
     pub(crate) scale: f64,
 }
 
 impl<const D: usize> Default for Frame<D> {
     fn default() -> Self {
-        Self { centre: [0.0; D], scale: 1.0 }
+        Self { model: SVector::zeros(), target: SVector::zeros(), scale: 1.0 }
     }
 }
 
 impl<const D: usize> Frame<D> {
-    /// The frame of `model`; the radius of `target` stands in for a model without extent, 1 if that has none either.
+    /// The frame of two sets; the radius of `target` stands in for a model without extent, 1 if that has none either.
     pub(crate) fn new<T: Scalar>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
-        let (centre, own) = centroid_and_radius(model);
-        let scale = [own, centroid_and_radius(target).1].into_iter().find(|&r| r > 0.0).unwrap_or(1.0);
-        Self { centre, scale }
+        let sets = [model, target].map(centre_and_radius);
+        // Below the rounding of the coordinates the radius is noise: such a set is one point.
+        let extended =
+            |(centre, radius): &(SVector<f64, D>, f64)| *radius > 8.0 * f64::EPSILON * centre.amax();
+        let scale = sets.iter().find(|set| extended(set)).map_or(1.0, |set| set.1);
+        Self { model: sets[0].0, target: sets[1].0, scale }
     }
 
-    pub(crate) fn inward<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
-        std::array::from_fn(|k| (point[k].widen() - self.centre[k]) / self.scale)
+    /// A model point in the frame.
+    pub(crate) fn model<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
+        self.inward(widened(point) - self.model)
     }
 
+    /// A target point in the frame.
+    pub(crate) fn target<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
+        self.inward(widened(point) - self.target)
+    }
+
+    fn inward(&self, offset: SVector<f64, D>) -> [f64; D] {
+        std::array::from_fn(|k| (offset[k] / self.scale).clamp(-FARTHEST, FARTHEST))
+    }
+
+    /// A warped point, which lies among the targets, in the units of the caller.
     pub(crate) fn outward<T: Scalar>(&self, point: &[f64; D]) -> Point<T, D> {
-        Point::from(std::array::from_fn(|k| T::narrow(point[k] * self.scale + self.centre[k])))
+        Point::from(std::array::from_fn(|k| T::narrow(point[k] * self.scale + self.target[k])))
     }
-}
-
-fn centroid_and_radius<T: Scalar, const D: usize>(points: &[Point<T, D>]) -> ([f64; D], f64) {
-    let count = points.len() as f64;
-    let mut centre = [0.0; D];
-    for point in points {
-        (0..D).for_each(|k| centre[k] += point[k].widen() / count);
-    }
-    let square = |p: &Point<T, D>| (0..D).map(|k| (p[k].widen() - centre[k]).powi(2)).sum::<f64>();
-    let radius = (points.iter().map(square).sum::<f64>() / count).sqrt();
-    // Below the rounding of the coordinates the radius is noise: such a set is one point.
-    let size = centre.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-    (centre, if radius > 8.0 * f64::EPSILON * size { radius } else { 0.0 })
 }
 
 /// Mean of points already in the frame.

@@ -34,7 +34,7 @@ pub use labelling::Labelling;
 pub use options::{Outliers, RelaxationOptions, Rotation, Search};
 
 use crate::{
-    MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, unmatched_rows, validate,
+    MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, hard, unmatched_rows, validate,
 };
 use anneal::{Annealer, State};
 use correspond::Correspondence;
@@ -42,7 +42,7 @@ use finish::Answer;
 use frame::Frame;
 use nalgebra::{Point, SMatrix};
 use std::ops::ControlFlow;
-use tactile_tps::{Affine, FitOptions, Scalar, ThinPlateSpline, Warp};
+use tactile_tps::{Scalar, Smoothing, Warp};
 
 /// The library's matcher: annealed soft assignment under a smooth warp, started by relaxation labelling.
 ///
@@ -139,9 +139,9 @@ impl RelaxationMatcher {
         let frame = Frame::new(model, target);
         workspace.frame = frame;
         workspace.model.clear();
-        workspace.model.extend(model.iter().map(|p| frame.inward(p)));
+        workspace.model.extend(model.iter().map(|p| frame.model(p)));
         workspace.target.clear();
-        workspace.target.extend(target.iter().map(|p| frame.inward(p)));
+        workspace.target.extend(target.iter().map(|p| frame.target(p)));
         self.solve(workspace, &mut observe);
         Ok(RelaxationMatch { workspace })
     }
@@ -190,7 +190,8 @@ impl<'w, const D: usize> RelaxationMatch<'w, D> {
     pub fn to_matching<T: Scalar>(&self, model: &[Point<T, D>]) -> Matching<T, D> {
         let workspace = self.workspace;
         let (answer, frame) = (&workspace.answer, &workspace.frame);
-        let warped: Vec<Point<T, D>> = self.warped().collect();
+        let mut warped: Vec<Point<T, D>> = self.warped().collect();
+        let warp = warp_through(model, &mut warped);
         let mut soft = SoftMatches::new();
         for i in 0..model.len() {
             soft.push_row(finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))));
@@ -199,7 +200,7 @@ impl<'w, const D: usize> RelaxationMatch<'w, D> {
         let covariance = |c: &[[f64; D]; D]| SMatrix::from_fn(|a, b| T::narrow(c[a][b] * square));
         let (unmatched_model, unmatched_target) = unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
-            warp: warp_through(model, &warped),
+            warp,
             warped,
             assignment: answer.assignment.clone(),
             confidence: answer.confidence.iter().map(|&c| T::narrow(c)).collect(),
@@ -233,26 +234,33 @@ fn narrow<T: Scalar>(report: &MatchReport<f64>) -> MatchReport<T> {
     }
 }
 
-/// Above this many model points the spline goes through an even choice of them.
-const SPLINE_POINTS: usize = 400;
+/// Smoothing of the spline where none goes through all positions.
+const SMOOTHING: f64 = 1e-6;
 
-/// The interpolating spline through the estimated positions; a translation where the spline does not exist
-/// (coinciding model points that go different ways).
+/// The interpolating spline through the estimated positions. Where there is none (model points that coincide and go different
+/// ways) a smoothed one, and `warped` becomes what that gives.
 fn warp_through<T: Scalar, const D: usize>(
     model: &[Point<T, D>],
-    warped: &[Point<T, D>],
+    warped: &mut [Point<T, D>],
 ) -> Box<dyn Warp<T, D> + Send + Sync> {
-    let stride = model.len().div_ceil(SPLINE_POINTS);
-    let every = |points: &[Point<T, D>]| points.iter().copied().step_by(stride).collect::<Vec<_>>();
-    let fitted = if stride == 1 {
-        ThinPlateSpline::fit(model, warped, &FitOptions::default())
-    } else {
-        ThinPlateSpline::fit(&every(model), &every(warped), &FitOptions::default())
-    };
-    match fitted {
-        Ok(spline) => Box::new(spline),
-        Err(_) => Box::new(Affine::new(SMatrix::identity(), warped[0] - model[0])),
+    let exact = hard::spline(model, warped, None, Smoothing::None);
+    if agrees(&*exact, model, warped) {
+        return exact;
     }
+    let warp = hard::spline(model, warped, None, Smoothing::Lambda(T::narrow(SMOOTHING)));
+    model.iter().zip(warped).for_each(|(p, w)| *w = warp.apply(p));
+    warp
+}
+
+/// Whether a warp takes the model to these positions, to half the digits.
+fn agrees<T: Scalar, const D: usize>(
+    warp: &(dyn Warp<T, D> + Send + Sync),
+    model: &[Point<T, D>],
+    warped: &[Point<T, D>],
+) -> bool {
+    let size = warped.iter().fold(T::zero(), |size, p| size.max(p.coords.amax()));
+    let tolerance = size * T::narrow(T::UNIT_ROUNDOFF.sqrt());
+    model.iter().zip(warped).all(|(p, w)| (warp.apply(p) - w).amax() <= tolerance)
 }
 
 impl<T: Scalar, const D: usize> PointMatcher<T, D> for RelaxationMatcher {

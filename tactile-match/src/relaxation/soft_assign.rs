@@ -101,6 +101,16 @@ impl<const D: usize> SoftAssignment<D> {
         });
     }
 
+    /// Makes rows that the last column normalisation left above one sum to one: where points coincide, a few sweeps do not
+    /// converge.
+    pub(crate) fn cap_rows(&mut self) {
+        for (weight, scale) in self.weight.iter_mut().zip(&mut self.row_scale) {
+            let excess = weight.max(1.0);
+            *scale /= excess as f32;
+            *weight /= excess;
+        }
+    }
+
     /// `m_ij` of the last normalisation.
     pub(crate) fn entry(&self, i: usize, j: usize) -> f64 {
         f64::from(self.row_scale[i] * self.kernel[i * self.width + j] * self.column_scale[j])

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use tactile_match::dense::Neighbourhood;
 use tactile_match::{
     CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Matching, Motion,
-    NearestNeighbour, PointMatcher,
+    NearestNeighbour, PointMatcher, RelaxationMatcher,
 };
 use tactile_tps::Scalar;
 
@@ -21,6 +21,7 @@ pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
     let options = DenseOptions { neighbourhood: Neighbourhood::Nearest(8), ..Default::default() };
     let dense = DenseRelaxation::new(options).expect("valid options");
     vec![
+        ("relaxation", Box::new(RelaxationMatcher::default())),
         ("dense relaxation", Box::new(dense)),
         ("nearest neighbour", Box::new(NearestNeighbour::new())),
         ("linear assignment", Box::new(LinearAssignment::new())),
