@@ -72,10 +72,11 @@ fn solved<K: Kernel>(problem: &Problem, kernel: K, label: &str) -> ThinPlateSpli
     let error = problem.error(&spline);
     let report = spline.report();
     println!(
-        "{label}/{}: rms error {error:.3e}, residual {:.1e}, condition {:.1e}",
+        "{label}/{}: rms error {error:.3e}, residual {:.1e}, condition {:.1e}, {} steps",
         report.points,
         report.residual.unwrap_or(f64::NAN),
-        report.condition
+        report.condition,
+        report.iterations
     );
     // 105 points resolve bumps of width 0.6 to about a hundredth.
     assert!(error < 0.02, "{error}");
@@ -157,8 +158,22 @@ impl Bench for Jacobian {
     }
 }
 
+/// A fit of ten thousand points takes seconds: not for a quick look.
+fn many(c: &mut Criterion) {
+    if std::env::args().any(|argument| argument == "--test" || argument == "--quick") {
+        return;
+    }
+    let mut group = c.benchmark_group("tps/fit");
+    group.sample_size(10);
+    let problem = Problem::new(10_000);
+    Fit.run(&mut group, &problem, "r2logr", R2LogR);
+    Fit.run(&mut group, &problem, "r", NegR);
+    group.finish();
+}
+
 fn all(c: &mut Criterion) {
     kernels(c, "fit", Fit);
+    many(c);
     kernels(c, "refit", Refit);
     kernels(c, "evaluate", Evaluate);
     kernels(c, "jacobian", Jacobian);

@@ -8,6 +8,7 @@
 use std::{
     error::Error,
     fmt::Write as _,
+    ops::ControlFlow,
     path::{Path, PathBuf},
     process::ExitCode,
     time::Instant,
@@ -18,8 +19,8 @@ use nalgebra::{Point, SMatrix};
 use tactile_imaging::{
     io::{PointTable, read_point_table, read_points},
     tps::{
-        Factorization, FitOptions, Input, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline,
-        TpsError, Workspace,
+        Factorization, FitOptions, Input, Kernel, NegR, Progress, R2LogR, R3, Smoothing, Spline,
+        ThinPlateSpline, TpsError, Workspace,
     },
 };
 
@@ -111,7 +112,7 @@ fn warp<const D: usize, K: Kernel>(
     let queries = read_points::<D>(&arguments.queries)?;
     let options = FitOptions::new(kernel.clone()).smoothing(arguments.lambda);
     let name = |error| in_files(arguments, error);
-    let (fit_ms, spline) = median_ms(|| ThinPlateSpline::fit(sources, &targets, &options));
+    let (fit_ms, spline) = median_ms(|| fit(sources, &targets, &options));
     let spline = spline.map_err(name)?;
     let factorization = Factorization::new(sources, &options).map_err(name)?;
     let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel));
@@ -132,7 +133,8 @@ fn warp<const D: usize, K: Kernel>(
         "n": report.points, "lambda": report.lambda, "bending_energy": spline.bending_energy(),
         "condition": report.condition, "rank": report.rank, "fit_ms": fit_ms, "refit_ms": refit_ms,
         "evaluate_ms": evaluate_ms, "jacobian_ms": jacobian_ms, "merged": report.merged, "extents": report.extents,
-        "residual": report.residual, "digits": report.digits,
+        "residual": report.residual, "digits": report.digits, "iterations": report.iterations,
+        "converged": report.converged,
     });
     println!("{line}");
     if report.rank <= D {
@@ -142,6 +144,26 @@ fn warp<const D: usize, K: Kernel>(
         );
     }
     Ok(())
+}
+
+/// The spline; thousands of points are solved for by iteration, which tells on stderr how far it is.
+fn fit<const D: usize, K: Kernel>(
+    sources: &[Point<f64, D>],
+    targets: &[Point<f64, D>],
+    options: &FitOptions<f64, K>,
+) -> Result<ThinPlateSpline<f64, D, K>, TpsError> {
+    let tell = |progress: &Progress| {
+        match progress.residual {
+            Some(residual) => eprint!("\rstep {}: largest residual {residual:.1e}   ", progress.done),
+            None => eprint!("\rprepared {} of {} points   ", progress.done, progress.total),
+        }
+        ControlFlow::Continue(())
+    };
+    let spline = Factorization::new_watched(sources, options, tell)?.fit_watched(targets, tell)?;
+    if spline.report().iterations > 0 {
+        eprintln!();
+    }
+    Ok(spline)
 }
 
 /// The error with the file it is about.

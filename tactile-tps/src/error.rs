@@ -75,6 +75,18 @@ pub enum TpsError {
         /// What was given.
         value: f64,
     },
+    /// The residual at which to stop iterating is outside `(0, 1)`.
+    #[error("tolerance {value}, expected a number above 0 and below 1")]
+    Tolerance {
+        /// What was given.
+        value: f64,
+    },
+    /// The caller's watch stopped the fit before there was a spline.
+    #[error("stopped by the caller")]
+    Stopped,
+    /// The iterative solver keeps no factor to ask.
+    #[error("the iterative solver keeps no factor: ask for the direct one")]
+    NoFactor,
     /// Two source points coincide, their targets differ, and no smoothing was asked for.
     #[error("source points {first} and {second} coincide but their targets differ: smooth, or drop one")]
     Conflict {

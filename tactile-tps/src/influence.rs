@@ -37,7 +37,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NotDefinite`] if the points are so
+    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if the solver is iterative,
+    /// [`TpsError::NotDefinite`] if the points are so
     /// close to degenerate that plain arithmetic has no factor.
     pub fn influence(&self, point: &Point<T, D>) -> Result<Vec<T>, TpsError> {
         let mut influence = vec![T::zero(); self.len()];
@@ -120,6 +121,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         same_length(points * self.len(), found)?;
         match self.smoothing {
             Smoothing::Gcv => Err(TpsError::DependsOnTargets),
+            _ if self.iterative.is_some() => Err(TpsError::NoFactor),
             _ if self.system.indefinite => Err(TpsError::NotDefinite { column: self.system.null.q }),
             _ => Ok(()),
         }

@@ -16,6 +16,23 @@ pub enum Smoothing<T> {
     Gcv,
 }
 
+/// How the equations are solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Solver {
+    /// Direct up to 3000 points and for cross-validation, iterative beyond.
+    #[default]
+    Automatic,
+    /// A dense factor: n³/3 operations and 8n² bytes, to rounding.
+    Direct,
+    /// Preconditioned conjugate gradients: n² kernels a step, O(n) memory, to the [tolerance](FitOptions::tolerance).
+    Iterative,
+}
+
+/// Points up to which [`Solver::Automatic`] is direct.
+const DIRECT_POINTS: usize = 3000;
+
 /// Kernel, smoothing and weights of a fit.
 ///
 /// ```
@@ -30,6 +47,8 @@ pub struct FitOptions<T, K = R2LogR> {
     pub(crate) smoothing: Smoothing<T>,
     pub(crate) weights: Option<Vec<T>>,
     pub(crate) rank_tolerance: T,
+    pub(crate) solver: Solver,
+    pub(crate) tolerance: T,
 }
 
 impl<T: Scalar> Default for FitOptions<T, R2LogR> {
@@ -41,7 +60,14 @@ impl<T: Scalar> Default for FitOptions<T, R2LogR> {
 impl<T: Scalar, K> FitOptions<T, K> {
     /// Interpolation with this kernel, all points alike.
     pub fn new(kernel: K) -> Self {
-        Self { kernel, smoothing: Smoothing::None, weights: None, rank_tolerance: T::zero() }
+        Self {
+            kernel,
+            smoothing: Smoothing::None,
+            weights: None,
+            rank_tolerance: T::zero(),
+            solver: Solver::Automatic,
+            tolerance: T::narrow(1e-10),
+        }
     }
 
     /// Sets the smoothing.
@@ -70,6 +96,32 @@ impl<T: Scalar, K> FitOptions<T, K> {
         self
     }
 
+    /// Sets how the equations are solved.
+    #[must_use]
+    pub fn solver(mut self, solver: Solver) -> Self {
+        self.solver = solver;
+        self
+    }
+
+    /// The residual at which an iterative solver stops: the largest at a point, relative to the largest target.
+    ///
+    /// The default is 10⁻¹⁰. The spline's values are off by about as much; its report says how far it came.
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: T) -> Self {
+        self.tolerance = tolerance;
+        self
+    }
+
+    /// Whether so many points are to be solved for by iteration.
+    pub(crate) fn iterates(&self, points: usize) -> bool {
+        match self.solver {
+            _ if self.smoothing == Smoothing::Gcv => false,
+            Solver::Automatic => points > DIRECT_POINTS,
+            Solver::Direct => false,
+            Solver::Iterative => true,
+        }
+    }
+
     /// The kernel.
     pub fn kernel(&self) -> &K {
         &self.kernel
@@ -79,6 +131,10 @@ impl<T: Scalar, K> FitOptions<T, K> {
         let tolerance = self.rank_tolerance.widen();
         if !(0.0..1.0).contains(&tolerance) {
             return Err(TpsError::RankTolerance { value: tolerance });
+        }
+        let tolerance = self.tolerance.widen();
+        if !(tolerance > 0.0 && tolerance < 1.0) {
+            return Err(TpsError::Tolerance { value: tolerance });
         }
         validate_smoothing(&self.smoothing)?;
         self.weights.as_deref().map_or(Ok(()), |weights| validate_weights(weights, points))

@@ -2,12 +2,13 @@
 
 use crate::{
     Kernel,
-    evaluate::{BLOCK, Lanes, Sum, TAIL},
+    evaluate::{BLOCK, Sum},
+    iterative::Vectors,
     null_space::MAX,
     precise,
-    real::Lane,
+    product::Subtract,
     reweight::Reweighting,
-    simd::{Job, dispatch},
+    simd::dispatch,
     sites::Sites,
     system::System,
 };
@@ -45,6 +46,8 @@ pub(crate) struct Buffers {
     pub(crate) excess: Vec<f64>,
     pub(crate) work: Vec<f64>,
     pub(crate) spare: Vec<f64>,
+    /// Memory of an iterative solve.
+    pub(crate) vectors: Vectors,
 }
 
 /// What a solve found beside the weights.
@@ -58,6 +61,23 @@ pub(crate) struct Solution<const M: usize> {
     /// Condition number of the matrix, or a bound.
     pub(crate) condition: f64,
     pub(crate) precise: bool,
+    /// Whether an iteration got where it was to go.
+    pub(crate) converged: bool,
+}
+
+impl<const M: usize> Solution<M> {
+    /// A direct one.
+    pub(crate) fn new(affine: [[f64; MAX]; M], condition: f64) -> Self {
+        Self {
+            affine,
+            residual: None,
+            refinements: 0,
+            iterations: 0,
+            condition,
+            precise: false,
+            converged: true,
+        }
+    }
 }
 
 impl<K: Kernel, const D: usize> Equations<'_, K, D> {
@@ -65,21 +85,13 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     pub(crate) fn solve<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Option<Solution<M>> {
         let (n, system) = (self.sites.len(), self.system);
         let condition = system.condition(self.lambda);
-        let direct = |affine, precise| Solution {
-            affine,
-            residual: None,
-            refinements: 0,
-            iterations: 0,
-            condition,
-            precise,
-        };
         buffers.weights.clone_from(&buffers.targets);
         if system.indefinite || self.needs_precision(careful) {
             if let Some(affine) =
                 precise::solve(self.kernel, self.sites, system, self.lambda, &mut buffers.weights)
             {
                 let residual = careful.then(|| self.sampled(&affine, buffers));
-                return Some(Solution { residual, ..direct(affine, true) });
+                return Some(Solution { residual, precise: true, ..Solution::new(affine, condition) });
             }
             if system.indefinite {
                 return None;
@@ -88,7 +100,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         }
         let affine =
             system.solve(&mut buffers.weights, n, self.lambda, &mut buffers.work, &mut buffers.spare);
-        let mut solution = direct(affine, false);
+        let mut solution = Solution::new(affine, condition);
         let threshold = match careful {
             true if n <= SMALL_POINTS => 10.0 * n as f64,
             true => 1e6,
@@ -109,12 +121,11 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         buffers: &mut Buffers,
         reweighting: &Reweighting<'_>,
     ) -> Option<Solution<M>> {
-        let Buffers { targets, weights, residuals, excess, work, spare } = buffers;
+        let Buffers { targets, weights, residuals, excess, work, spare, .. } = buffers;
         weights.clone_from(targets);
         let memory = [residuals, work, spare];
         let (affine, iterations) = self.system.resolve(weights, reweighting, excess, memory)?;
-        let condition = reweighting.condition;
-        Some(Solution { affine, residual: None, refinements: 0, iterations, condition, precise: false })
+        Some(Solution { iterations, ..Solution::new(affine, reweighting.condition) })
     }
 
     /// Whether plain arithmetic would leave too few digits, and the points are few enough to do something about it.
@@ -211,64 +222,13 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     }
 }
 
-fn relative(size: f64, targets: &[f64]) -> f64 {
+/// The size relative to the largest target.
+pub(crate) fn relative(size: f64, targets: &[f64]) -> f64 {
     let target = largest(targets);
     if target > 0.0 { size / target } else { size }
 }
 
-fn largest(values: &[f64]) -> f64 {
+/// Largest magnitude.
+pub(crate) fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, x| f64::max(m, x.abs()))
-}
-
-/// wᵀKw, summed over the outputs.
-pub(crate) fn energy<K: Kernel, const D: usize, const M: usize>(
-    kernel: &K,
-    centres: [&[f64]; D],
-    weights: [&[f64]; M],
-) -> f64 {
-    let mut residuals = vec![0.0; M * centres[0].len()];
-    let sum = Sum { kernel, centres, weights };
-    dispatch(Subtract { sum, places: centres, residuals: &mut residuals });
-    let products = weights.iter().copied().flatten().zip(&residuals).map(|(w, r)| -w * r);
-    f64::max(products.sum(), 0.0)
-}
-
-/// Subtracts the kernel sum at the places.
-struct Subtract<'a, K, const D: usize, const M: usize> {
-    sum: Sum<'a, f64, K, D, M>,
-    places: [&'a [f64]; D],
-    residuals: &'a mut [f64],
-}
-
-impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lane<f64>>(mut self) {
-        let n = self.places[0].len();
-        let full = n / BLOCK * BLOCK;
-        for start in (0..full).step_by(BLOCK) {
-            self.block::<L, BLOCK>(start, BLOCK);
-        }
-        for start in (full..n).step_by(TAIL) {
-            self.block::<L, TAIL>(start, TAIL.min(n - start));
-        }
-    }
-}
-
-impl<K: Kernel, const D: usize, const M: usize> Subtract<'_, K, D, M> {
-    #[inline(always)]
-    fn block<L: Lane<f64>, const W: usize>(&mut self, start: usize, used: usize) {
-        let n = self.places[0].len();
-        let mut x = [[0.0; W]; D];
-        for k in 0..D {
-            x[k][..used].copy_from_slice(&self.places[k][start..start + used]);
-        }
-        let mut sums = Lanes::<f64, D, M, W>::new();
-        self.sum.block::<L, W, 0>(&x, &mut sums);
-        for m in 0..M {
-            let residuals = &mut self.residuals[m * n + start..m * n + start + used];
-            residuals.iter_mut().zip(&sums.value[m]).for_each(|(r, sum)| *r -= sum);
-        }
-    }
 }

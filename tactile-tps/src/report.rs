@@ -19,8 +19,8 @@ pub struct FitReport {
     pub extents: Vec<f64>,
     /// The smoothing parameter λ used, in the units of the points and the kernel; 0 for interpolation.
     pub lambda: f64,
-    /// Estimated 2-norm condition number of the matrix solved with, in the inner units; 1 if there was none. A bound
-    /// where the solution is iterative.
+    /// Estimated 2-norm condition number of the matrix solved with, in the inner units; 1 if there was none, as for the
+    /// iterative solver. A bound for a refit with other weights by the spectrum.
     pub condition: f64,
     /// Largest residual of the spline's equations relative to the largest target: at up to 64 points spread evenly, or,
     /// where the solution was refined, at all of them before the last step. `None` after a quick refit, which does
@@ -28,8 +28,12 @@ pub struct FitReport {
     pub residual: Option<f64>,
     /// Steps of iterative refinement taken.
     pub refinements: usize,
-    /// Steps of conjugate gradients taken, by a refit with other weights that went by the spectrum; zero for a direct solve.
+    /// Steps of conjugate gradients taken, by the iterative solver or by a refit with other weights that went by the
+    /// spectrum; zero for a direct solve.
     pub iterations: usize,
+    /// Whether the iterative solver reached its tolerance; if not, it was stopped, or rounding allows no more, and
+    /// `residual` says how far it came. Direct solves always do.
+    pub converged: bool,
     /// Whether the equations were solved in twice the working precision because plain arithmetic had no digits left.
     pub precise: bool,
     /// Decimal digits left in a plain sum of the spline's terms near the points: −log₁₀ of its rounding error

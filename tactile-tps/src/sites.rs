@@ -84,6 +84,18 @@ impl<const D: usize> Sites<D> {
         })
     }
 
+    /// Replaces `local` by these sites alone, in the same frame.
+    pub(crate) fn select(&self, sites: impl Iterator<Item = usize> + Clone, local: &mut Self) {
+        for k in 0..D {
+            local.axes[k].clear();
+            local.axes[k].extend(sites.clone().map(|i| self.axes[k][i]));
+            local.low[k].clear();
+            local.low[k].extend(sites.clone().map(|i| self.low[k][i]));
+        }
+        local.first.clear();
+        local.first.extend(sites.map(|i| self.first[i]));
+    }
+
     /// Number of distinct points.
     pub(crate) fn len(&self) -> usize {
         self.first.len()

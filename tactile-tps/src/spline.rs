@@ -6,7 +6,8 @@ use crate::{
     Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
     evaluate::Sum,
     far::{Parts, Terms},
-    refine::{Buffers, Solution, energy},
+    product::energy,
+    refine::{Buffers, Solution},
     sample::{Each, Linear, Sample},
     simd::dispatch,
     sites::{Frame, Sites},
@@ -98,6 +99,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
                 residual: None,
                 refinements: 0,
                 iterations: 0,
+                converged: true,
                 precise: false,
                 digits: 0.0,
             },
@@ -133,6 +135,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         report.residual = solution.residual;
         report.refinements = solution.refinements;
         report.iterations = solution.iterations;
+        report.converged = solution.converged;
         report.precise = solution.precise;
     }
 

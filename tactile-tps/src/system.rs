@@ -89,12 +89,9 @@ impl<const D: usize> System<D> {
     fn assemble<K: Kernel>(&mut self, setting: &Setting<'_, K, D>, weights: &[f64], scaled: bool) -> f64 {
         let sites = setting.sites;
         self.choose(sites.len(), weights, scaled);
-        self.span = Span::new(sites, &self.active, setting.rank_tolerance, &mut self.spare);
-        let n = self.active.len();
-        let q = n.min(1 + self.span.directions);
-        let stride = layout(n, q);
-        let Self { active, scales, span, null, cholesky, scratch, .. } = self;
-        null.factor(n, q, stride, |c, column| span.fill(sites, active, scales, c, column));
+        self.outline(setting);
+        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
+        let Self { active, scales, null, cholesky, scratch, .. } = self;
         cholesky.prepare(n - q, stride);
         scratch.clear();
         scratch.resize((MAX + D + 1) * stride, 0.0);
@@ -104,8 +101,18 @@ impl<const D: usize> System<D> {
         null.project(&mut cholesky.l, product)
     }
 
+    /// Finds what the active sites span and its complement.
+    pub(crate) fn outline<K>(&mut self, setting: &Setting<'_, K, D>) {
+        let sites = setting.sites;
+        self.span = Span::new(sites, &self.active, setting.rank_tolerance, &mut self.spare);
+        let n = self.active.len();
+        let q = n.min(1 + self.span.directions);
+        let Self { active, scales, span, null, .. } = self;
+        null.factor(n, q, layout(n, q), |c, column| span.fill(sites, active, scales, c, column));
+    }
+
     /// Sites of positive weight, heaviest first so that the reflectors keep light rows apart.
-    fn choose(&mut self, n: usize, weights: &[f64], scaled: bool) {
+    pub(crate) fn choose(&mut self, n: usize, weights: &[f64], scaled: bool) {
         self.active.clear();
         self.scales.clear();
         if weights.is_empty() {

@@ -1,0 +1,124 @@
+//! Other weights and other λ for the same source points.
+
+use core::ops::ControlFlow;
+
+use nalgebra::Point;
+
+use crate::{
+    Factorization, Kernel, Scalar, Smoothing, Spline, TpsError, Workspace,
+    options::{validate_smoothing, validate_weights},
+    task::Task,
+};
+
+/// Points up to which a refit with another λ decomposes the matrix unasked: a few milliseconds.
+const DECOMPOSE_POINTS: usize = 256;
+
+impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
+    /// New targets, weights (`None`: those of the factorisation) and smoothing for the same sources, into a spline that
+    /// is already there; allocates nothing once workspace and spline have grown.
+    ///
+    /// The same weights and λ cost two triangular solves; another λ without weights two products once the matrix is
+    /// [decomposed](Self::decompose). Positive weights leave an interpolating spline as it is, and cost the two solves. With
+    /// λ > 0, weights near each other, or few that differ, are met by conjugate gradients on the decomposed matrix, to 1e-13
+    /// of the targets; weights far apart, or of zero, cost a factorisation without the set-up of the first.
+    ///
+    /// # Errors
+    /// [`TpsError`] for bad targets, weights or smoothing; the spline is then left as it was.
+    pub fn refit_with<const M: usize>(
+        &self,
+        workspace: &mut Workspace<D>,
+        targets: &[Point<T, M>],
+        weights: Option<&[T]>,
+        smoothing: Smoothing<T>,
+        spline: &mut Spline<T, D, M, K>,
+    ) -> Result<(), TpsError> {
+        validate_smoothing(&smoothing)?;
+        if let Some(weights) = weights {
+            validate_weights(weights, self.len())?;
+        }
+        if weights.is_none() && smoothing == self.smoothing {
+            return self.fit_with(workspace, targets, spline);
+        }
+        if let Some(weights) = weights {
+            let Workspace { buffers, site_weights, .. } = workspace;
+            self.sites.weigh(Some(weights), site_weights);
+            if let Some(task) = self.cheap(weights, site_weights, smoothing, &mut buffers.excess)
+                && self.finish(&task, buffers, targets, spline)?
+            {
+                return Ok(());
+            }
+        }
+        self.rebuilt(workspace, targets, weights, smoothing, spline)
+    }
+
+    /// A fit by a system made for it: the spectrum at hand where it serves, else a new factor or preconditioner.
+    fn rebuilt<const M: usize>(
+        &self,
+        workspace: &mut Workspace<D>,
+        targets: &[Point<T, M>],
+        weights: Option<&[T]>,
+        smoothing: Smoothing<T>,
+        spline: &mut Spline<T, D, M, K>,
+    ) -> Result<(), TpsError> {
+        let Workspace { buffers, system, iterative, site_weights } = workspace;
+        let gcv = smoothing == Smoothing::Gcv;
+        let spectral = weights.is_none() && (gcv || self.decomposes(smoothing));
+        let weights = weights.or(self.weights.as_deref());
+        let mut task = Task { weights, smoothing, ..Task::new(&self.system) };
+        if spectral {
+            self.decompose();
+            task.system = self.spectral.get().unwrap_or(system);
+        } else {
+            self.sites.weigh(weights, site_weights);
+            let lambda = self.inner_lambda(smoothing);
+            match (gcv, &self.iterative) {
+                (true, _) => system.decompose(&self.setting(), site_weights),
+                (false, None) => system.factor(&self.setting(), site_weights, lambda)?,
+                (false, Some(_)) => {
+                    let _ = iterative.build(&self.setting(), site_weights, lambda, system, &mut |_| {
+                        ControlFlow::Continue(())
+                    });
+                    task.iterative = Some(iterative);
+                }
+            }
+            task.system = system;
+        }
+        self.finish(&task, buffers, targets, spline).map(drop)
+    }
+
+    /// A fit with other weights by what is already there, if it can be had.
+    ///
+    /// An interpolating spline asks only which weights are positive; a smoothing one changes on a diagonal.
+    fn cheap<'a>(
+        &'a self,
+        weights: &'a [T],
+        site_weights: &[f64],
+        smoothing: Smoothing<T>,
+        excess: &mut Vec<f64>,
+    ) -> Option<Task<'a, T, D>> {
+        if smoothing == Smoothing::Gcv || site_weights.contains(&0.0) {
+            return None;
+        }
+        let task = |system, reweighting| {
+            Some(Task { weights: Some(weights), smoothing, reweighting, ..Task::new(system) })
+        };
+        if self.inner_lambda(smoothing) == 0.0 {
+            let same = self.system.lambda == 0.0 && self.system.active.len() == self.sites.len();
+            let task = task(&self.system, None).filter(|_| same);
+            return task.map(|task| Task { iterative: self.iterative.as_ref(), ..task });
+        }
+        if !self.decomposes(smoothing) {
+            return None;
+        }
+        self.decompose();
+        let system = self.spectral.get()?;
+        let reweighting = system.reweighting(self.inner_lambda(smoothing), site_weights, excess)?;
+        task(system, Some(reweighting))
+    }
+
+    /// Whether a refit with this smoothing and the factorisation's own weights is to go by the spectrum.
+    fn decomposes(&self, smoothing: Smoothing<T>) -> bool {
+        let few = self.spectral.get().is_some() || self.sites.len() <= DECOMPOSE_POINTS;
+        few && self.iterative.is_none() && self.site_weights.is_empty() && self.inner_lambda(smoothing) > 0.0
+    }
+}

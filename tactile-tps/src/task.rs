@@ -1,0 +1,128 @@
+//! One fit from targets to spline, whatever solves the equations.
+
+use core::ops::ControlFlow;
+
+use nalgebra::Point;
+
+use crate::{
+    Factorization, Kernel, Scalar, Smoothing, Spline, TpsError,
+    error::Input,
+    iterative::{Iterative, Run},
+    progress::Watch,
+    refine::{Buffers, Equations, Solution},
+    reweight::Reweighting,
+    sites::finite,
+    spline::Fitted,
+    system::System,
+};
+
+/// One fit: what it is made with.
+pub(crate) struct Task<'a, T, const D: usize> {
+    pub(crate) system: &'a System<D>,
+    pub(crate) weights: Option<&'a [T]>,
+    pub(crate) smoothing: Smoothing<T>,
+    /// Measure the residual and refine sooner.
+    pub(crate) careful: bool,
+    /// Other weights than the system's, to be met by the spectrum.
+    pub(crate) reweighting: Option<Reweighting<'a>>,
+    /// Where there is no factor.
+    pub(crate) iterative: Option<&'a Iterative<D>>,
+}
+
+impl<'a, T: Scalar, const D: usize> Task<'a, T, D> {
+    /// A quick interpolation without weights.
+    pub(crate) fn new(system: &'a System<D>) -> Self {
+        let (weights, smoothing) = (None, Smoothing::None);
+        Self { system, weights, smoothing, careful: false, reweighting: None, iterative: None }
+    }
+}
+
+impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
+    /// A quick fit with what the factorisation was made with.
+    pub(crate) fn task(&self) -> Task<'_, T, D> {
+        let gcv = self.smoothing == Smoothing::Gcv;
+        let system = self.spectral.get().filter(|_| gcv).unwrap_or(&self.system);
+        Task {
+            weights: self.weights.as_deref(),
+            smoothing: self.smoothing,
+            iterative: self.iterative.as_ref(),
+            ..Task::new(system)
+        }
+    }
+
+    /// Solves and fills the spline; `false` if the task was to go by the spectrum and that takes too many steps.
+    pub(crate) fn finish<const M: usize>(
+        &self,
+        task: &Task<'_, T, D>,
+        buffers: &mut Buffers,
+        targets: &[Point<T, M>],
+        spline: &mut Spline<T, D, M, K>,
+    ) -> Result<bool, TpsError> {
+        self.watched(task, buffers, targets, spline, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`finish`](Self::finish), telling `watch` how an iteration gets on.
+    pub(crate) fn watched<const M: usize>(
+        &self,
+        task: &Task<'_, T, D>,
+        buffers: &mut Buffers,
+        targets: &[Point<T, M>],
+        spline: &mut Spline<T, D, M, K>,
+        watch: &mut Watch<'_>,
+    ) -> Result<bool, TpsError> {
+        if targets.len() != self.len() {
+            let (expected, found) = (self.len(), targets.len());
+            return Err(TpsError::Length { input: Input::Targets, expected, found });
+        }
+        finite(targets, Input::Targets)?;
+        let (system, lambda) = (task.system, self.inner_lambda(task.smoothing));
+        let gcv = task.smoothing == Smoothing::Gcv;
+        if lambda == 0.0 && !gcv {
+            self.sites.agree(targets, task.weights)?;
+        }
+        let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
+        self.sites.gather(targets, task.weights, &origin, buffers);
+        let lambda = if gcv { self.validated::<M>(system, buffers)? } else { lambda };
+        let Some(solution) = self.solution::<M>(task, lambda, buffers, watch)? else {
+            return Ok(false);
+        };
+        let level = targets.iter().flat_map(|t| t.iter()).fold(0.0, |m, x| f64::max(m, x.widen().abs()));
+        let (sites, unit) = (&self.sites, self.unit());
+        spline.assign(&Fitted { sites, system, lambda, unit, solution, origin, level }, buffers);
+        Ok(true)
+    }
+
+    /// Solves for the targets in `buffers` by what the task has.
+    fn solution<const M: usize>(
+        &self,
+        task: &Task<'_, T, D>,
+        lambda: f64,
+        buffers: &mut Buffers,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Solution<M>>, TpsError> {
+        let (system, tolerance) = (task.system, self.tolerance);
+        if let Some(iterative) = task.iterative {
+            let run = Run { kernel: &self.kernel, system, iterative, tolerance };
+            return Ok(Some(run.solve(buffers, watch)));
+        }
+        let equations = Equations { kernel: &self.kernel, sites: &self.sites, system, lambda };
+        match &task.reweighting {
+            Some(reweighting) => Ok(equations.resolve(buffers, reweighting)),
+            None => match equations.solve(buffers, task.careful) {
+                None => Err(TpsError::NotDefinite { column: system.null.q }),
+                solution => Ok(solution),
+            },
+        }
+    }
+
+    /// The λ of least generalised cross-validation.
+    fn validated<const M: usize>(&self, system: &System<D>, buffers: &mut Buffers) -> Result<f64, TpsError> {
+        let (needed, found) = (system.null.q, system.active.len());
+        if found <= needed {
+            return Err(TpsError::TooFewForValidation { needed, found });
+        }
+        let Buffers { targets, work, spare, .. } = buffers;
+        let lambda = system.cross_validate::<M>(targets, self.sites.len(), work, spare);
+        Ok(lambda.unwrap_or(0.0))
+    }
+}
