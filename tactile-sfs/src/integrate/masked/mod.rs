@@ -1,7 +1,9 @@
 //! Weighted least squares on a mask of any shape: conjugate gradients, preconditioned by multigrid.
 //!
-//! Minimises Σ w_ij (z_j − z_i − h · (s_i + s_j)/2)² over the edges between neighbouring pixels of the mask, s the slope
-//! along the edge, w_ij the harmonic mean of the pixels' weights. The border of the mask is free (natural). Connected
+//! Minimises Σ w_ij (z_j − z_i − h s̄_ij)² over the edges between neighbouring pixels of the mask, s̄ the mean slope along
+//! the edge, of the cubic (at the border: parabola or line) through the slopes of the pixels in line with it, w_ij the
+//! harmonic mean of the two pixels' weights. Error O(h⁴) inside. On a full rectangle with equal weights that is what
+//! [`CosinePoisson`] solves directly, and it is asked to. The border of the mask is free (natural). Connected
 //! parts have nothing to do with each other: each gets mean 0, or is fixed by its own known heights.
 
 mod components;
@@ -11,10 +13,10 @@ mod system;
 
 use ndarray::ArrayView2;
 
-use super::SlopeIntegrator;
+use super::{CosinePoisson, SlopeIntegrator};
 use crate::domain::same_shape;
 use crate::error::{Input, positive};
-use crate::{Domain, Scalar, SfsError, Surface, Workspace};
+use crate::{BoundingBox, Domain, Scalar, SfsError, Surface, Workspace};
 use components::Components;
 use multigrid::Hierarchy;
 
@@ -23,7 +25,8 @@ use multigrid::Hierarchy;
 /// Slopes that are NaN or infinite are left out: the edge takes the other pixel's slope alone, or, if both are missing,
 /// a weak zero slope; the pixel is flagged `NON_FINITE`. Known heights inside the mask are met exactly, and each
 /// connected part without one has mean 0 (`report.components`). `report.residual` is the residual of the normal
-/// equations relative to the right-hand side. O(pixels) a step, a dozen or two of steps whatever the size.
+/// equations relative to the right-hand side. O(pixels) a step, a dozen or two of steps whatever the size; on a full rectangle
+/// with equal weights and no known height it is solved directly (`StopReason::Direct`), ten times faster.
 ///
 /// ```
 /// use ndarray::{Array2, array};
@@ -75,6 +78,12 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
         Ok(Self { max_iterations, ..self })
     }
 
+    /// Whether the fit is Poisson's equation on a rectangle: equal weights, no height known, no hole in the mask.
+    fn is_plain(&self, domain: &Domain<'_, T>, area: BoundingBox) -> bool {
+        let full = |mask: ArrayView2<'_, bool>| area.view(mask.view()).iter().all(|&inside| inside);
+        self.weights.is_none() && domain.known_heights.is_none() && domain.mask.is_none_or(full)
+    }
+
     /// Weight of each pixel's slopes, such as the inverse of their variance; 0, NaN or less leave the slopes out.
     pub fn with_weights(self, weights: ArrayView2<'a, T>) -> Self {
         Self { weights: Some(weights), ..self }
@@ -109,6 +118,19 @@ impl<T: Scalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
         same_shape(Input::SlopeY, [rows, columns], q.dim())?;
         if let Some(weights) = self.weights {
             same_shape(Input::Weights, [rows, columns], weights.dim())?;
+        }
+        if self.is_plain(domain, area) {
+            match CosinePoisson::new().integrate_with(workspace, p, q, domain, surface) {
+                Ok(()) => {
+                    let first = [area.top, area.left];
+                    let whole = crate::Component { pixels: area.area(), first, mean_height: T::zero() };
+                    surface.report.components.push(whole);
+                    return Ok(());
+                }
+                // Left out below.
+                Err(SfsError::NonFiniteSlope { .. }) => {}
+                Err(error) => return Err(error),
+            }
         }
         surface.prepare(rows, columns, area);
         let slopes = system::Slopes { p, q, weights: self.weights };

@@ -21,19 +21,34 @@ impl<T: Scalar> Slopes<'_, T> {
         self.weights.map_or(T::one(), |weights| weights[at])
     }
 
-    /// Slope and weight of the edge between two neighbours; `None` for the slope if both are missing.
-    fn edge(&self, slopes: ArrayView2<'_, T>, a: [usize; 2], b: [usize; 2]) -> (T, T) {
-        let usable = |at: [usize; 2]| {
-            let (slope, weight) = (slopes[at], self.weight(at));
+    /// Mean slope along the edge between neighbours b and c, and its weight, from the pixels a, b, c, d in a line, of which
+    /// those beside the edge may be missing.
+    fn edge(&self, slopes: ArrayView2<'_, T>, [a, b, c, d]: [Option<[usize; 2]>; 4]) -> (T, T) {
+        let usable = |at: Option<[usize; 2]>| {
+            let (slope, weight) = at.map(|at| (slopes[at], self.weight(at)))?;
             (slope.is_finite() && weight > T::zero() && weight.is_finite()).then_some((slope, weight))
         };
-        let two = T::of(2.0);
-        match (usable(a), usable(b)) {
-            (Some((s, v)), Some((t, w))) => ((s + t) / two, two * v * w / (v + w)),
+        match (usable(b), usable(c)) {
+            (Some((s, v)), Some((t, w))) => {
+                let beside = |at| usable(at).map(|(slope, _)| slope);
+                (mean_slope([beside(a), Some(s), Some(t), beside(d)]), T::of(2.0) * v * w / (v + w))
+            }
             (Some((s, v)), None) => (s, v),
             (None, Some((t, w))) => (t, w),
             (None, None) => (T::zero(), T::of(BRIDGE)),
         }
+    }
+}
+
+/// Mean of the cubic or parabola through the slopes at −1, 0, 1, 2 over the edge from 0 to 1.
+fn mean_slope<T: Scalar>([a, b, c, d]: [Option<T>; 4]) -> T {
+    let (b, c) = (b.unwrap_or_default(), c.unwrap_or_default());
+    let part = |numerator: f64, denominator: f64| T::of(numerator / denominator);
+    match (a, d) {
+        (Some(a), Some(d)) => part(13.0, 24.0) * (b + c) - part(1.0, 24.0) * (a + d),
+        (Some(a), None) => part(5.0, 12.0) * c + part(8.0, 12.0) * b - part(1.0, 12.0) * a,
+        (None, Some(d)) => part(5.0, 12.0) * b + part(8.0, 12.0) * c - part(1.0, 12.0) * d,
+        (None, None) => part(1.0, 2.0) * (b + c),
     }
 }
 
@@ -75,12 +90,26 @@ pub(super) fn assemble<T: Scalar>(
     for r in 0..area.rows {
         for c in 0..area.columns {
             let (row, column, i) = (area.top + r, area.left + c, (r + 1) * width + c + 1);
+            let inside = |j: usize, at: [usize; 2]| level.inside[j].then_some(at);
             if level.inside[i] && level.inside[i + 1] {
-                let (slope, weight) = slopes.edge(slopes.p, [row, column], [row, column + 1]);
+                let line = [
+                    inside(i - 1, [row, column.wrapping_sub(1)]),
+                    Some([row, column]),
+                    Some([row, column + 1]),
+                    inside(i + 2, [row, column + 2]),
+                ];
+                let (slope, weight) = slopes.edge(slopes.p, line);
                 add_edge(level, residual, z, [i, i + 1], weight * aspect2, slope * hx);
             }
+            let inside = |j: usize, at: [usize; 2]| level.inside[j].then_some(at);
             if level.inside[i] && level.inside[i + width] {
-                let (slope, weight) = slopes.edge(slopes.q, [row, column], [row + 1, column]);
+                let line = [
+                    inside(i - width, [row.wrapping_sub(1), column]),
+                    Some([row, column]),
+                    Some([row + 1, column]),
+                    inside(i + 2 * width, [row + 2, column]),
+                ];
+                let (slope, weight) = slopes.edge(slopes.q, line);
                 add_edge(level, residual, z, [i, i + width], weight, slope * hy);
             }
         }
