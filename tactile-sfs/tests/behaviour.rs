@@ -288,6 +288,32 @@ fn equal_spacing_is_even_on_the_surface() {
 }
 
 #[test]
+fn points_between_pixels_are_more_even_and_on_the_surface() {
+    let radius = 30.0_f64;
+    let height = |x: f64, y: f64| (radius * radius - (x - 31.0).powi(2) - (y - 31.0).powi(2)).max(0.0).sqrt();
+    let z = Array2::from_shape_fn((63, 63), |(r, c)| height(c as f64, r as f64));
+    let mask = z.mapv(|z| z > 0.0);
+    let spread = |sampler: EquallySpaced| {
+        let points = sampler.sample(z.view(), Some(mask.view()), [1.0; 2], 200).unwrap();
+        let nearest: Vec<f64> = (0..200)
+            .map(|i| {
+                (0..200)
+                    .filter(|&j| j != i)
+                    .map(|j| (points[i] - points[j]).norm())
+                    .fold(f64::INFINITY, f64::min)
+            })
+            .collect();
+        // A chord of one pixel lies up to h²/8 times the curvature below the surface, more near the vertical rim.
+        let inner = points.iter().filter(|p| (p.x - 31.0).hypot(p.y - 31.0) < 0.8 * radius);
+        assert!(inner.into_iter().all(|p| (height(p.x, p.y) - p.z).abs() < 0.05));
+        let mean = nearest.iter().sum::<f64>() / 200.0;
+        (nearest.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / 200.0).sqrt() / mean
+    };
+    let (between, pixels) = (spread(EquallySpaced::new().between_pixels()), spread(EquallySpaced::new()));
+    assert!(between < pixels, "{between} {pixels}");
+}
+
+#[test]
 fn progress_can_stop_a_solve() {
     let case = Sampled::new(48, sphere);
     let mut workspace = Workspace::new();

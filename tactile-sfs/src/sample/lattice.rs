@@ -131,20 +131,43 @@ impl<'a, T: Scalar> Lattice<'a, T> {
             .collect()
     }
 
-    /// The pixel nearest to a place (x, y) in units of the lattice, among those of a node's own cell; the node's pixel where
-    /// that is not on the surface.
-    pub(super) fn refine(&self, node: usize, [x, y]: [f32; 2]) -> [usize; 2] {
+    /// Whether a pixel lies on the surface.
+    fn is_on(&self, [row, column]: [usize; 2]) -> bool {
+        self.surface.get([row, column]).is_some_and(|z| z.is_finite()) && self.domain.contains(row, column)
+    }
+
+    /// The point at the pixel nearest to a place (x, y) in units of the lattice, among those of a node's own cell; at the
+    /// node's pixel where that is not on the surface.
+    pub(super) fn snapped(&self, node: usize, [x, y]: [f32; 2]) -> Point3<T> {
         let at = self.pixel(node);
         let stride = self.stride as f32;
         // The cells of two nodes share no pixel: offsets run from −stride/2 to (stride − 1)/2.
         let (low, high) = (-(self.stride as i64 / 2), (self.stride as i64 - 1) / 2);
-        let offset =
-            |place: f32, index: usize| (((place - index as f32) * stride).round() as i64).clamp(low, high);
-        let row = at[0].checked_add_signed(offset(y, node / self.columns) as isize);
-        let column = at[1].checked_add_signed(offset(x, node % self.columns) as isize);
-        let (Some(row), Some(column)) = (row, column) else { return at };
-        let on = self.surface.get([row, column]).is_some_and(|z| z.is_finite());
-        if on && self.domain.contains(row, column) { [row, column] } else { at }
+        let offset = |place: f32, index: usize| {
+            (((place - index as f32) * stride).round() as i64).clamp(low, high) as isize
+        };
+        let row = at[0].checked_add_signed(offset(y, node / self.columns));
+        let column = at[1].checked_add_signed(offset(x, node % self.columns));
+        let near = row.zip(column).map(|(row, column)| [row, column]);
+        self.point(near.filter(|&near| self.is_on(near)).unwrap_or(at))
+    }
+
+    /// The point of the surface at a place between pixels, by bilinear interpolation; `None` where one of the pixels around is
+    /// not on the surface.
+    pub(super) fn between(&self, [x, y]: [f32; 2]) -> Option<Point3<T>> {
+        let [first_row, first_column] = self.pixel(0);
+        let at = |place: f32, first: usize| first as f64 + f64::from(place) * self.stride as f64;
+        let (x, y) = (at(x, first_column), at(y, first_row));
+        let (row, column) = (y as usize, x as usize);
+        let (u, v) = (T::of(x.fract()), T::of(y.fract()));
+        let corner = |dr: usize, dc: usize| {
+            let at = [row + dr, column + dc];
+            self.is_on(at).then(|| self.surface[at])
+        };
+        let (above, below) = ((corner(0, 0)?, corner(0, 1)?), (corner(1, 0)?, corner(1, 1)?));
+        let line = |(a, b): (T, T)| a + u * (b - a);
+        let [hx, hy] = self.domain.pixel_size_m;
+        Some(Point3::new(T::of(x) * hx, T::of(y) * hy, line(above) + v * (line(below) - line(above))))
     }
 
     /// The point at a pixel, in metres.

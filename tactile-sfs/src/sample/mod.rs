@@ -18,8 +18,8 @@ use crate::{Scalar, SfsError};
 
 /// A way to choose control points on a surface.
 ///
-/// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel, at the centres of pixels. None lies
-/// outside the mask or where the height is not finite, no two coincide, and the same input gives the same points.
+/// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel, at the centres of pixels
+/// unless the sampler says otherwise. None lies outside the mask or where the height is not finite, no two coincide, and the same input gives the same points.
 /// Exactly `count` points are returned. Object safe.
 ///
 /// ```

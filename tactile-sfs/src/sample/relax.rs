@@ -10,8 +10,9 @@ const STEPS: usize = 4;
 /// How far a point looks, in mean spacings; the farthest node of an even spread is 0.62 away.
 const REACH: f64 = 1.3;
 
-/// Evens out the spacing of the points that start at the nodes `chosen`; their pixels.
-pub(super) fn relax<T: Scalar>(lattice: &Lattice<'_, T>, chosen: &[usize]) -> Vec<[usize; 2]> {
+/// Evens out the spacing of the points that start at the nodes `chosen`: for each a node of its own and, near it, its place
+/// (x, y) in units of the lattice.
+pub(super) fn relax<T: Scalar>(lattice: &Lattice<'_, T>, chosen: &[usize]) -> Vec<(usize, [f32; 2])> {
     let mut cells = Cells::new(lattice, chosen);
     for _ in 0..STEPS {
         cells.assign();
@@ -20,11 +21,14 @@ pub(super) fn relax<T: Scalar>(lattice: &Lattice<'_, T>, chosen: &[usize]) -> Ve
     cells.assign();
     match cells.nearest_nodes() {
         Some(nodes) => {
-            let place = |k: usize| [cells.points[k][0], cells.points[k][1] / cells.aspect];
-            nodes.iter().enumerate().map(|(k, &node)| lattice.refine(node, place(k))).collect()
+            let place = |point: [f32; 3]| [point[0], point[1] / cells.aspect];
+            nodes.into_iter().zip(cells.points.iter().map(|&point| place(point))).collect()
         }
         // A point lost all its nodes: the first spread is the better one.
-        None => chosen.iter().map(|&node| lattice.pixel(node)).collect(),
+        None => {
+            let place = |node: usize| [(node % lattice.columns) as f32, (node / lattice.columns) as f32];
+            chosen.iter().map(|&node| (node, place(node))).collect()
+        }
     }
 }
 
