@@ -13,6 +13,10 @@ const MAX_LEVERAGE: f64 = 0.95;
 const DECIDED: f64 = 0.01;
 /// Fall of σ an iteration once the matches are decided.
 const DECIDED_RATE: f64 = 0.3;
+/// Affinities so much fainter than the slack's are left out.
+const FAINTER: f64 = 1e-3;
+/// Least share of stray points an estimate may come to.
+const LEAST_SHARE: f64 = 0.02;
 /// Fixed-point rounds for the share of stray points.
 const SHARE_ROUNDS: usize = 8;
 
@@ -98,7 +102,7 @@ impl<const D: usize> Annealer<D> {
         let density = slack.share / (1.0 - slack.share) * warped.len() as f64 / self.volume;
         let weight = (TAU * variance).powf(0.5 * D as f64) * density;
         let [rows, columns] = [slack.model, slack.target].map(|side| (side * weight).max(1e-30) as f32);
-        self.soft.affinities(warped, variance);
+        self.soft.affinities(warped, variance, FAINTER * f64::from(rows.min(columns)));
         self.soft.normalise(sweeps, rows, columns);
         self.soft.moments(warped);
     }
@@ -215,26 +219,21 @@ impl<const D: usize> Annealer<D> {
     pub(crate) fn judge(&mut self, state: &mut State<D>, share: f64, resolution: f64) {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
-        self.soft.affinities(&state.warped, variance);
-        self.sums.clear();
-        self.sums.resize(m, 0.0);
-        for i in 0..n {
-            self.sums.iter_mut().zip(self.soft.affinity_row(i)).for_each(|(s, k)| *s += f64::from(*k));
-        }
-        let density = 1.0 / n as f64 / (TAU * variance).powf(0.5 * D as f64);
+        let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
+        self.soft.affinities(&state.warped, variance, FAINTER * LEAST_SHARE * gaussian / self.volume);
+        self.soft.column_totals(&mut self.sums);
+        let sums = &self.sums[..m];
+        let density = 1.0 / gaussian;
         let mut share = share;
         for _ in 0..SHARE_ROUNDS {
             let stray = share / self.volume;
-            let strays = self.sums.iter().map(|s| stray / ((1.0 - share) * density * s + stray));
-            share = (strays.sum::<f64>() / m as f64).clamp(0.02, 0.95);
+            let strays = sums.iter().map(|s| stray / ((1.0 - share) * density * s + stray));
+            share = (strays.sum::<f64>() / m as f64).clamp(LEAST_SHARE, 0.95);
         }
         let (gauss, stray) = ((1.0 - share) * density, share / self.volume);
-        let data: f64 = self.sums.iter().map(|s| -(gauss * s + stray).ln()).sum();
-        self.weights.clear();
-        for i in 0..n {
-            let row = self.soft.affinity_row(i).iter().zip(&self.sums);
-            self.weights.push(row.map(|(k, s)| gauss * f64::from(*k) / (gauss * s + stray)).sum());
-        }
+        let data: f64 = sums.iter().map(|s| -(gauss * s + stray).ln()).sum();
+        self.sums.iter_mut().for_each(|s| *s = gauss / (gauss * *s + stray));
+        self.soft.row_totals(&self.sums, &mut self.weights);
         self.weights.resize(self.prior.stride, 0.0);
         let rows = state.warped.iter().zip(&state.base);
         self.residuals.fill(self.prior.stride, rows.map(|(w, b)| std::array::from_fn(|k| w[k] - b[k])));

@@ -53,13 +53,10 @@ impl<const D: usize> Answer<D> {
         self.confidence.clear();
         for i in 0..n {
             let mut best = (0.0, usize::MAX);
-            let scale = f64::from(soft.row_scale[i]);
-            let row = soft.affinity_row(i).iter().zip(&soft.column_scale).zip(&mut self.column_best);
-            for (j, ((k, b), column)) in row.enumerate() {
-                let p = scale * f64::from(k * b);
+            for (j, p) in soft.entries(i) {
                 best = if p > best.0 { (p, j) } else { best };
-                if p > column.0 {
-                    *column = (p, i);
+                if p > self.column_best[j].0 {
+                    self.column_best[j] = (p, i);
                 }
             }
             let free = (1.0 - soft.weight[i]).max(0.0);
@@ -93,7 +90,7 @@ pub(crate) fn soft_row<const D: usize>(
     soft: &SoftAssignment<D>,
     i: usize,
 ) -> impl Iterator<Item = (usize, f64)> + '_ {
-    (0..soft.targets()).map(move |j| (j, soft.entry(i, j))).filter(|&(_, p)| p > FAINT)
+    soft.entries(i).filter(|&(_, p)| p > FAINT)
 }
 
 /// Spread of the soft partners about the answer, and what the warp itself leaves open.

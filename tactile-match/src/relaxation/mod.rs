@@ -14,11 +14,13 @@
 //! noise the scales of the field are averaged over by their evidence, unless the matches themselves are undecided. The
 //! final warp is the thin-plate spline through the estimated positions.
 //!
-//! A search costs `O(I J)` an iteration and memory of one `I × J` matrix in single precision. All of it is worked in double
+//! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, and memory of one `I × J` matrix in single
+//! precision. All of it is worked in double
 //! precision (the assignment in single) whatever the type of the points.
 
 mod anneal;
 mod axes;
+mod blocks;
 mod correspond;
 mod finish;
 mod frame;
@@ -192,9 +194,12 @@ impl<'w, const D: usize> RelaxationMatch<'w, D> {
         let (answer, frame) = (&workspace.answer, &workspace.frame);
         let mut warped: Vec<Point<T, D>> = self.warped().collect();
         let warp = warp_through(model, &mut warped);
-        let mut soft = SoftMatches::new();
+        let (mut soft, mut row) = (SoftMatches::new(), Vec::new());
         for i in 0..model.len() {
-            soft.push_row(finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))));
+            row.clear();
+            row.extend(finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))));
+            row.sort_unstable_by_key(|entry| entry.0);
+            soft.push_row(row.iter().copied());
         }
         let square = frame.scale * frame.scale;
         let covariance = |c: &[[f64; D]; D]| SMatrix::from_fn(|a, b| T::narrow(c[a][b] * square));

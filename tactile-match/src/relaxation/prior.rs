@@ -21,6 +21,9 @@ const MAX_RANK: usize = 64;
 /// Variance left out, relative to the largest.
 const TOLERANCE: f64 = 1e-6;
 
+/// Variance left out that the noise hides, relative to the noise's.
+const UNSEEN: f64 = 0.01;
+
 /// Columns are padded with noughts to a multiple of this, so that they are whole vectors.
 pub(crate) const LANES: usize = 8;
 
@@ -29,8 +32,9 @@ pub(crate) const LANES: usize = 8;
 pub(crate) struct Prior {
     /// Length of a column: the number of points, padded.
     pub(crate) stride: usize,
-    pub(crate) rank: usize,
     pub(crate) columns: Vec<f64>,
+    /// Largest variance left out before every column.
+    left: Vec<f64>,
     pivots: Vec<usize>,
     diagonal: Vec<f64>,
 }
@@ -54,15 +58,16 @@ impl Prior {
         self.columns.clear();
         self.stride = n.next_multiple_of(LANES);
         self.pivots.clear();
+        self.left.clear();
         let floor = TOLERANCE * self.diagonal.iter().fold(0.0_f64, |m, &d| m.max(d));
         while self.pivots.len() < MAX_RANK.min(n) {
             let pivot = largest(&self.diagonal);
             if self.diagonal[pivot] <= floor {
                 break;
             }
+            self.left.push(self.diagonal[pivot]);
             self.append_column(points, pivot, &covariance);
         }
-        self.rank = self.pivots.len();
     }
 
     fn append_column<const D: usize>(
@@ -86,6 +91,11 @@ impl Prior {
         }
         self.diagonal[pivot] = 0.0;
         self.pivots.push(pivot);
+    }
+
+    /// Columns that matter beside noise of variance `noise`.
+    pub(crate) fn rank_beside(&self, noise: f64) -> usize {
+        self.left.partition_point(|&left| left > UNSEEN * noise)
     }
 
     /// Column `p` of the factor.

@@ -23,14 +23,15 @@ pub(crate) struct Regression<const D: usize> {
     /// Their variances along one axis, once [`variances`](Self::variances) has been called.
     pub(crate) variance: Vec<f64>,
     noise: f64,
+    rank: usize,
 }
 
 impl<const D: usize> Regression<D> {
     /// Fits `targets` (displacements, one array an axis) with `weights`, both padded with noughts, at noise variance
-    /// `noise`: `O(I r² + r³)`.
+    /// `noise`, in the modes that are not lost in it: `O(I r² + r³)`.
     pub(crate) fn fit(&mut self, prior: &Prior, weights: &[f64], targets: &Axes<D>, noise: f64) {
-        let r = prior.rank;
-        self.noise = noise;
+        let r = prior.rank_beside(noise);
+        (self.rank, self.noise) = (r, noise);
         self.gram.resize(r * r, 0.0);
         self.solution.clear();
         self.weighted.resize(prior.stride, 0.0);
@@ -68,7 +69,7 @@ impl<const D: usize> Regression<D> {
 
     /// Computes the variances of the last fit: `O(I r²)`.
     pub(crate) fn variances(&mut self, prior: &Prior) {
-        let (r, stride) = (prior.rank, prior.stride);
+        let (r, stride) = (self.rank, prior.stride);
         self.whitened.clear();
         self.variance.clear();
         self.variance.resize(stride, 0.0);

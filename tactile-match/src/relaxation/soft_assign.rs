@@ -3,22 +3,22 @@
 //! `m_ij = aᵢ bⱼ exp(−|yᵢ − tⱼ|²/2σ²)` with `aᵢ`, `bⱼ` such that every row and every column sums to one together with its
 //! slack, whose weight is the density of stray points seen through the same Gaussian. Worked in single precision: the
 //! weights need no more, and the positions they lead to are refined in double precision.
+//!
+//! The targets are put into blocks of neighbours ([`blocks`](super::blocks)); of a row only the blocks within reach of its
+//! Gaussian are kept. At a low temperature that is a small part of `I J`.
 
+use super::blocks::{Blocks, LANES};
 use pulp::Arch;
 
-/// Columns are padded to a multiple of this, so that rows are whole vectors.
-pub(crate) const LANES: usize = 16;
-
-/// Where the padding lies: no Gaussian reaches it, and its square is finite.
-const FAR: f32 = 1e15;
-
-/// The match matrix in factored form, with the moments of its rows.
+/// The match matrix in factored form, with the moments of its rows. Columns stand in the order of the blocks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SoftAssignment<const D: usize> {
-    axes: Vec<f32>,
-    targets: usize,
-    width: usize,
-    pub(crate) kernel: Vec<f32>,
+    blocks: Blocks<D>,
+    /// Where the blocks of every row begin in `active`, and one past the last.
+    starts: Vec<usize>,
+    active: Vec<u32>,
+    reach: Vec<f32>,
+    kernel: Vec<f32>,
     pub(crate) row_scale: Vec<f32>,
     pub(crate) column_scale: Vec<f32>,
     column_sum: Vec<f32>,
@@ -31,72 +31,96 @@ pub(crate) struct SoftAssignment<const D: usize> {
 }
 
 impl<const D: usize> SoftAssignment<D> {
-    /// Takes the target points, one array an axis.
+    /// Takes the target points.
     pub(crate) fn set_targets(&mut self, targets: &[[f64; D]]) {
-        self.targets = targets.len();
-        self.width = targets.len().next_multiple_of(LANES);
-        self.axes.clear();
-        for k in 0..D {
-            self.axes.extend(targets.iter().map(|t| t[k] as f32));
-            self.axes.resize((k + 1) * self.width, FAR);
-        }
+        self.blocks.build(targets);
     }
 
     /// Number of target points.
     pub(crate) fn targets(&self) -> usize {
-        self.targets
+        self.blocks.order.len()
     }
 
-    /// The Gaussian affinities of `warped` at variance `variance`.
-    pub(crate) fn affinities(&mut self, warped: &[[f64; D]], variance: f64) {
-        let width = self.width;
-        self.kernel.resize(warped.len() * width, 0.0);
-        let scale = (-0.5 / variance) as f32;
+    /// The Gaussian affinities of `warped` at variance `variance`; blocks in which all are below `least`, or
+    /// below a millionth, are left out.
+    pub(crate) fn affinities(&mut self, warped: &[[f64; D]], variance: f64, least: f64) {
+        let blocks = &self.blocks;
+        let (scale, cut) = ((-0.5 / variance) as f32, (-2.0 * variance * least.min(1e-6).ln()) as f32);
+        self.starts.clear();
+        self.starts.push(0);
+        self.active.clear();
+        // Taken whole and cut at the end: the largest there can be, once.
+        self.kernel.resize(warped.len() * blocks.width(), 0.0);
         Arch::new().dispatch(|| {
-            for (row, y) in self.kernel.chunks_exact_mut(width).zip(warped) {
-                gaussian_row(row, &self.axes, width, &y.map(|v| v as f32), scale);
+            for y in warped {
+                let (y, from) = (y.map(|v| v as f32), self.active.len());
+                blocks.squared_distances(&y, &mut self.reach);
+                self.active.extend((0..).zip(&self.reach).filter(|(_, r)| **r <= cut).map(|(b, _)| b));
+                let kernel = self.kernel[from * LANES..].as_chunks_mut::<LANES>().0;
+                for (row, &block) in kernel.iter_mut().zip(&self.active[from..]) {
+                    gaussians(row, blocks.at(block), &y, scale);
+                }
+                self.starts.push(self.active.len());
             }
         });
     }
 
+    /// Number of model points.
+    fn rows(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The blocks of row `i`, and its affinities there.
+    #[inline(always)]
+    fn row(&self, i: usize) -> impl Iterator<Item = (usize, &[f32; LANES])> {
+        row_of(&self.starts, &self.active, &self.kernel, i)
+    }
+
     /// Alternates row and column normalisation `sweeps` times.
     pub(crate) fn normalise(&mut self, sweeps: usize, row_slack: f32, column_slack: f32) {
-        let (width, rows) = (self.width, self.kernel.len() / self.width);
-        self.row_scale.clear();
-        self.row_scale.resize(rows, 1.0);
-        self.column_scale.clear();
-        self.column_scale.resize(width, 1.0);
-        self.column_sum.resize(width, 0.0);
+        let rows = self.rows();
+        refill(&mut self.row_scale, rows, 1.0);
+        refill(&mut self.column_scale, self.blocks.width(), 1.0);
+        let Self { starts, active, kernel, row_scale, column_scale, column_sum, .. } = self;
         Arch::new().dispatch(|| {
             for _ in 0..sweeps {
-                self.column_sum.fill(column_slack);
-                for (row, a) in self.kernel.chunks_exact(width).zip(&mut self.row_scale) {
-                    *a = 1.0 / (dot(row, &self.column_scale) + row_slack);
-                    let a = *a;
-                    for (s, k) in self.column_sum.iter_mut().zip(row) {
-                        *s += a * k;
+                refill(column_sum, column_scale.len(), column_slack);
+                let (b, sums) = (column_scale.as_chunks::<LANES>().0, column_sum.as_chunks_mut::<LANES>().0);
+                for (i, a) in row_scale.iter_mut().enumerate() {
+                    let mut dots = [0.0_f32; LANES];
+                    for (block, k) in row_of(starts, active, kernel, i) {
+                        (0..LANES).for_each(|l| dots[l] += k[l] * b[block][l]);
+                    }
+                    *a = 1.0 / (dots.iter().sum::<f32>() + row_slack);
+                    for (block, k) in row_of(starts, active, kernel, i) {
+                        (0..LANES).for_each(|l| sums[block][l] += *a * k[l]);
                     }
                 }
-                for (b, s) in self.column_scale.iter_mut().zip(&self.column_sum) {
-                    *b = 1.0 / s;
-                }
+                column_scale.iter_mut().zip(&*column_sum).for_each(|(b, s)| *b = 1.0 / s);
             }
         });
     }
 
     /// Row sums, mean shifts and spreads of M about `warped`.
     pub(crate) fn moments(&mut self, warped: &[[f64; D]]) {
-        let width = self.width;
         self.weight.clear();
         self.shift.clear();
         self.spread.clear();
+        let Self { blocks, starts, active, kernel, row_scale, column_scale, weight, shift, spread, .. } =
+            self;
+        let columns = column_scale.as_chunks::<LANES>().0;
         Arch::new().dispatch(|| {
-            for ((row, y), &a) in self.kernel.chunks_exact(width).zip(warped).zip(&self.row_scale) {
-                let m = row_moments(row, &self.column_scale, &self.axes, width, &y.map(|v| v as f32));
-                let weight = f64::from(m.0);
-                self.weight.push(weight * f64::from(a));
-                self.shift.push(m.1.map(|s| if weight > 0.0 { f64::from(s) / weight } else { 0.0 }));
-                self.spread.push(f64::from(m.2) * f64::from(a));
+            for ((i, y), &a) in warped.iter().enumerate().zip(&*row_scale) {
+                let y = y.map(|v| v as f32);
+                let mut sums = Moments::new();
+                for (block, k) in row_of(starts, active, kernel, i) {
+                    sums.add(k, &columns[block], blocks.at(block as u32), &y);
+                }
+                let total = f64::from(sums.weight.iter().sum::<f32>());
+                let mean = |s: [f32; LANES]| f64::from(s.iter().sum::<f32>()) / total;
+                weight.push(total * f64::from(a));
+                shift.push(sums.shift.map(|s| if total > 0.0 { mean(s) } else { 0.0 }));
+                spread.push(f64::from(sums.spread.iter().sum::<f32>()) * f64::from(a));
             }
         });
     }
@@ -111,28 +135,95 @@ impl<const D: usize> SoftAssignment<D> {
         }
     }
 
-    /// `m_ij` of the last normalisation.
-    pub(crate) fn entry(&self, i: usize, j: usize) -> f64 {
-        f64::from(self.row_scale[i] * self.kernel[i * self.width + j] * self.column_scale[j])
+    /// Row `i` of M where it is not nought: target rows, in the order of the blocks, and entries.
+    pub(crate) fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (scale, columns) = (self.row_scale[i], self.column_scale.as_chunks::<LANES>().0);
+        self.row(i).flat_map(move |(block, k)| {
+            let real = self.blocks.order[block * LANES..].iter().take(LANES);
+            real.enumerate().map(move |(l, &j)| (j, f64::from(scale * k[l] * columns[block][l])))
+        })
     }
 
-    /// The affinities of row i.
-    pub(crate) fn affinity_row(&self, i: usize) -> &[f32] {
-        &self.kernel[i * self.width..i * self.width + self.targets]
+    /// Sums of the affinities over the rows, for every column; the first [`targets`](Self::targets) are targets.
+    pub(crate) fn column_totals(&self, totals: &mut Vec<f64>) {
+        refill(totals, self.blocks.width(), 0.0);
+        let totals = totals.as_chunks_mut::<LANES>().0;
+        Arch::new().dispatch(|| {
+            for i in 0..self.rows() {
+                self.row(i).for_each(|(b, k)| (0..LANES).for_each(|l| totals[b][l] += f64::from(k[l])));
+            }
+        });
+    }
+
+    /// Sums of the affinities over the columns, each times its factor, for every row.
+    pub(crate) fn row_totals(&self, factors: &[f64], totals: &mut Vec<f64>) {
+        let factors = factors.as_chunks::<LANES>().0;
+        totals.clear();
+        Arch::new().dispatch(|| {
+            for i in 0..self.rows() {
+                let mut sums = [0.0; LANES];
+                self.row(i).for_each(|(b, k)| {
+                    (0..LANES).for_each(|l| sums[l] += f64::from(k[l]) * factors[b][l]);
+                });
+                totals.push(sums.iter().sum());
+            }
+        });
     }
 }
 
 #[inline(always)]
-fn gaussian_row<const D: usize>(row: &mut [f32], axes: &[f32], width: usize, y: &[f32; D], scale: f32) {
-    row.fill(0.0);
-    for (k, &c) in y.iter().enumerate() {
-        let axis = &axes[k * width..(k + 1) * width];
-        for (v, t) in row.iter_mut().zip(axis) {
-            *v += (t - c) * (t - c);
-        }
+fn row_of<'a>(
+    starts: &[usize],
+    active: &'a [u32],
+    kernel: &'a [f32],
+    i: usize,
+) -> impl Iterator<Item = (usize, &'a [f32; LANES])> + use<'a> {
+    let range = starts[i]..starts[i + 1];
+    let rows = kernel.as_chunks::<LANES>().0;
+    active[range.clone()].iter().map(|&b| b as usize).zip(&rows[range])
+}
+
+fn refill<V: Clone>(values: &mut Vec<V>, len: usize, value: V) {
+    values.clear();
+    values.resize(len, value);
+}
+
+#[inline(always)]
+fn gaussians<const D: usize>(row: &mut [f32; LANES], targets: [&[f32; LANES]; D], y: &[f32; D], scale: f32) {
+    *row = [0.0; LANES];
+    for (t, c) in targets.iter().zip(y) {
+        (0..LANES).for_each(|l| row[l] += (t[l] - c) * (t[l] - c));
     }
-    for v in row {
-        *v = exp(*v * scale);
+    (0..LANES).for_each(|l| row[l] = exp(row[l] * scale));
+}
+
+/// Running sums of a row, lane by lane.
+struct Moments<const D: usize> {
+    weight: [f32; LANES],
+    shift: [[f32; LANES]; D],
+    spread: [f32; LANES],
+}
+
+impl<const D: usize> Moments<D> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { weight: [0.0; LANES], shift: [[0.0; LANES]; D], spread: [0.0; LANES] }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, k: &[f32; LANES], b: &[f32; LANES], targets: [&[f32; LANES]; D], y: &[f32; D]) {
+        let mut m = [0.0_f32; LANES];
+        for l in 0..LANES {
+            m[l] = k[l] * b[l];
+            self.weight[l] += m[l];
+        }
+        for d in 0..D {
+            for l in 0..LANES {
+                let e = targets[d][l] - y[d];
+                self.shift[d][l] += m[l] * e;
+                self.spread[l] += m[l] * e * e;
+            }
+        }
     }
 }
 
@@ -150,47 +241,6 @@ fn exp(x: f32) -> f32 {
     if x > -87.0 { p * power } else { 0.0 }
 }
 
-#[inline(always)]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    for (x, y) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        for l in 0..LANES {
-            sums[l] += x[l] * y[l];
-        }
-    }
-    sums.iter().sum()
-}
-
-#[inline(always)]
-fn row_moments<const D: usize>(
-    row: &[f32],
-    columns: &[f32],
-    axes: &[f32],
-    width: usize,
-    y: &[f32; D],
-) -> (f32, [f32; D], f32) {
-    let mut weight = [0.0_f32; LANES];
-    let mut shift = [[0.0_f32; LANES]; D];
-    let mut spread = [0.0_f32; LANES];
-    for start in (0..width).step_by(LANES) {
-        let (k, b) = (&row[start..start + LANES], &columns[start..start + LANES]);
-        let mut m = [0.0_f32; LANES];
-        for l in 0..LANES {
-            m[l] = k[l] * b[l];
-            weight[l] += m[l];
-        }
-        for (d, &c) in y.iter().enumerate() {
-            let t = &axes[d * width + start..d * width + start + LANES];
-            for l in 0..LANES {
-                let e = t[l] - c;
-                shift[d][l] += m[l] * e;
-                spread[l] += m[l] * e * e;
-            }
-        }
-    }
-    (weight.iter().sum(), shift.map(|s| s.iter().sum()), spread.iter().sum())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,24 +256,50 @@ mod tests {
         assert_eq!(exp(f32::MIN), 0.0);
     }
 
-    #[test]
-    fn rows_and_columns_sum_to_one_with_their_slack() {
-        let targets: Vec<[f64; 2]> = (0..21).map(|i| [f64::from(i) * 0.1, f64::from(i % 4) * 0.2]).collect();
-        let warped: Vec<[f64; 2]> = targets.iter().take(17).map(|t| [t[0] + 0.02, t[1] - 0.01]).collect();
+    fn scene() -> (Vec<[f64; 2]>, SoftAssignment<2>) {
+        let targets: Vec<[f64; 2]> =
+            (0..41).map(|i| [f64::from(i) * 0.1, f64::from(i * i % 7) * 0.2]).collect();
         let mut soft = SoftAssignment::default();
         soft.set_targets(&targets);
-        soft.affinities(&warped, 0.02);
+        (targets.iter().take(37).map(|t| [t[0] + 0.02, t[1] - 0.01]).collect(), soft)
+    }
+
+    #[test]
+    fn rows_and_columns_sum_to_one_with_their_slack() {
+        let (warped, mut soft) = scene();
+        soft.affinities(&warped, 0.02, 1e-9);
         soft.normalise(300, 0.05, 0.05);
         soft.moments(&warped);
-        for i in 0..17 {
+        let mut columns = vec![0.0; 41];
+        for i in 0..37 {
             let slack = f64::from(soft.row_scale[i]) * 0.05;
-            let sum: f64 = (0..21).map(|j| soft.entry(i, j)).sum();
-            // Single precision sums of 21 terms, at the fixed point of the sweeps.
+            let sum: f64 = soft.entries(i).map(|(_, p)| p).sum();
+            // Single precision sums of 41 terms, at the fixed point of the sweeps.
             assert!((sum + slack - 1.0).abs() < 1e-5 && (sum - soft.weight[i]).abs() < 1e-5);
+            soft.entries(i).for_each(|(j, p)| columns[j] += p);
         }
-        for j in 0..21 {
-            let sum: f64 = (0..17).map(|i| soft.entry(i, j)).sum();
-            assert!((sum + f64::from(soft.column_scale[j]) * 0.05 - 1.0).abs() < 1e-5);
+        for (c, &j) in soft.blocks.order.iter().enumerate() {
+            assert!((columns[j] + f64::from(soft.column_scale[c]) * 0.05 - 1.0).abs() < 1e-5);
         }
+    }
+
+    #[test]
+    fn what_is_out_of_reach_makes_no_difference() {
+        let (warped, mut soft) = scene();
+        let (mut near, mut sparse) = (vec![vec![0.0_f64; 41]; 37], 0);
+        for least in [1e-30, 1e-7] {
+            soft.affinities(&warped, 0.01, least);
+            soft.normalise(5, 0.01, 0.01);
+            soft.moments(&warped);
+            sparse = sparse.max(37 * 3 - soft.active.len());
+            for i in 0..37 {
+                for (j, p) in soft.entries(i) {
+                    // Forty affinities of 1e-7 each, over a slack of 1e-2.
+                    assert!(least == 1e-30 || (p - near[i][j]).abs() < 4e-4);
+                    near[i][j] = p;
+                }
+            }
+        }
+        assert!(sparse > 20, "blocks were left out: {sparse}");
     }
 }

@@ -21,9 +21,11 @@ pub(crate) fn moments<const D: usize>(
     base: &mut Vec<[f64; D]>,
 ) {
     let (from, to) = (mean(model), mean(target));
-    let (root, inverse) = roots(&covariance(model, &from));
-    let middle = roots(&(root * covariance(target, &to) * root)).0;
-    let map = inverse * middle * inverse * root * rotation * inverse;
+    let [root, inverse, _] = roots(&covariance(model, &from));
+    let spread = covariance(target, &to);
+    let [middle, ..] = roots(&(root * spread * root));
+    let [.., span] = roots(&spread);
+    let map = span * inverse * middle * inverse * root * rotation * inverse;
     base.clear();
     base.extend(model.iter().map(|x| {
         let image = map * SVector::from_fn(|k, _| x[k] - from[k]);
@@ -40,22 +42,24 @@ fn covariance<const D: usize>(points: &[[f64; D]], centre: &[f64; D]) -> SMatrix
     sum / points.len() as f64
 }
 
-/// Square root and inverse square root of a covariance; directions without extent get a thousandth of the largest.
-fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (SMatrix<f64, D, D>, SMatrix<f64, D, D>) {
+/// Square root and inverse square root of a covariance, in which directions without extent get a thousandth of the largest,
+/// and the projection onto the other directions.
+fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> [SMatrix<f64, D, D>; 3] {
     // Up to three dimensions, the missing ones filled up with noughts: no allocation.
     let entry = |r: usize, c: usize| if r < D && c < D { matrix[(r, c)] } else { 0.0 };
     let eigen = SymmetricEigen::new(Matrix3::from_fn(entry));
     let floor = (1e-6 * eigen.eigenvalues.max()).max(f64::MIN_POSITIVE);
-    let power = |exponent: f64| {
+    let function = |f: &dyn Fn(f64) -> f64| {
         SMatrix::from_fn(|r, c| {
-            let term = |k: usize| {
-                let v = &eigen.eigenvectors;
-                v[(r, k)] * eigen.eigenvalues[k].max(floor).powf(exponent) * v[(c, k)]
-            };
-            (0..3).map(term).sum()
+            let v = &eigen.eigenvectors;
+            (0..3).map(|k| v[(r, k)] * f(eigen.eigenvalues[k]) * v[(c, k)]).sum()
         })
     };
-    (power(0.5), power(-0.5))
+    [
+        function(&|value| value.max(floor).sqrt()),
+        function(&|value| value.max(floor).sqrt().recip()),
+        function(&|value| if value < floor { 0.0 } else { 1.0 }),
+    ]
 }
 
 /// Rotations to try: in the plane, or in space.

@@ -1,0 +1,107 @@
+//! Target points in blocks of neighbours: what is far from a block's box is far from all its points.
+
+/// Points a block: one or two vectors of single precision.
+pub(crate) const LANES: usize = 16;
+
+/// Where the padding lies: no Gaussian reaches it, and its square is finite.
+const FAR: f32 = 1e15;
+
+/// Points in the order of their blocks, one array an axis, with the blocks' boxes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Blocks<const D: usize> {
+    /// Which point stands at every place.
+    pub(crate) order: Vec<usize>,
+    axes: Vec<f32>,
+    low: Vec<f32>,
+    high: Vec<f32>,
+}
+
+impl<const D: usize> Blocks<D> {
+    /// Sorts `points` into blocks: halves across the longest side, until one block is left; `O(J log² J)`.
+    pub(crate) fn build(&mut self, points: &[[f64; D]]) {
+        self.order.clear();
+        self.order.extend(0..points.len());
+        split(points, &mut self.order);
+        let width = points.len().next_multiple_of(LANES);
+        let (order, axes) = (&self.order, &mut self.axes);
+        axes.clear();
+        self.low.clear();
+        self.high.clear();
+        for k in 0..D {
+            axes.extend(order.iter().map(|&j| points[j][k] as f32));
+            let real = axes[k * width..].chunks(LANES);
+            self.low.extend(real.clone().map(|block| block.iter().copied().fold(f32::MAX, f32::min)));
+            self.high.extend(real.map(|block| block.iter().copied().fold(f32::MIN, f32::max)));
+            axes.resize((k + 1) * width, FAR);
+        }
+    }
+
+    /// Number of places, padding included.
+    pub(crate) fn width(&self) -> usize {
+        self.order.len().next_multiple_of(LANES)
+    }
+
+    /// The coordinates of block `block`.
+    #[inline(always)]
+    pub(crate) fn at(&self, block: u32) -> [&[f32; LANES]; D] {
+        let axes = self.axes.as_chunks::<LANES>().0;
+        let count = axes.len() / D;
+        std::array::from_fn(|k| &axes[k * count + block as usize])
+    }
+
+    /// Squared distance of `y` from the box of every block.
+    #[inline(always)]
+    pub(crate) fn squared_distances(&self, y: &[f32; D], squared: &mut Vec<f32>) {
+        let count = self.low.len() / D;
+        squared.clear();
+        squared.resize(count, 0.0);
+        for (k, &c) in y.iter().enumerate() {
+            let sides = self.low[k * count..].iter().zip(&self.high[k * count..]);
+            for (s, (low, high)) in squared.iter_mut().zip(sides) {
+                let outside = (low - c).max(c - high).max(0.0);
+                *s += outside * outside;
+            }
+        }
+    }
+}
+
+/// Orders `rows` so that blocks of [`LANES`] consecutive ones lie close together.
+fn split<const D: usize>(points: &[[f64; D]], rows: &mut [usize]) {
+    if rows.len() <= LANES {
+        return;
+    }
+    let side = |k: usize| {
+        let (low, high) =
+            rows.iter().map(|&j| points[j][k]).fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c), h.max(c)));
+        high - low
+    };
+    let axis = (1..D).fold(0, |best, k| if side(k) > side(best) { k } else { best });
+    let half = (rows.len() / 2).next_multiple_of(LANES).min(rows.len() - 1);
+    rows.select_nth_unstable_by(half, |&a, &b| points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b)));
+    let (left, right) = rows.split_at_mut(half);
+    split(points, left);
+    split(points, right);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_hold_every_point_once_and_keep_their_distance() {
+        let points: Vec<[f64; 2]> =
+            (0..101).map(|i| [f64::from(i * 37 % 101), f64::from(i * 53 % 89)]).collect();
+        let mut blocks = Blocks::default();
+        blocks.build(&points);
+        let mut sorted = blocks.order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..101).collect::<Vec<_>>());
+        let mut squared = Vec::new();
+        blocks.squared_distances(&[20.0, 30.0], &mut squared);
+        for (place, &j) in blocks.order.iter().enumerate() {
+            let distance = (points[j][0] - 20.0).powi(2) + (points[j][1] - 30.0).powi(2);
+            // Whole numbers below 2¹⁴ are exact in single precision.
+            assert!(f64::from(squared[place / LANES]) <= distance, "{place}");
+        }
+    }
+}
