@@ -32,6 +32,8 @@ pub struct ContactReading {
     pub out_of_calibration: bool,
     /// The contact reaches the frame's edge: part of it may be missing.
     pub touches_edge: bool,
+    /// Other contacts in the frame: this one is the largest.
+    pub other_contacts: usize,
     /// Whether the fit of the contact's profile converged (no fit counts as converged).
     pub converged: bool,
 }
@@ -59,6 +61,7 @@ impl ContactReading {
             saturated_share: contact.saturated_share(),
             out_of_calibration: reading.out_of_range,
             touches_edge: contact.touches_edge,
+            other_contacts: contact.other_contacts,
             converged: force.profile.is_none_or(|p| p.stop == StopReason::Converged),
         })
     }
@@ -73,6 +76,8 @@ pub struct FrameContact {
     pub region: Option<BoundingBox>,
     /// The contact's pixels within the box.
     pub mask: Array2<bool>,
+    /// Mean of frame minus reference in grey levels, of a frame without contact; `None` with one, or where it is not known.
+    pub background_step_grey: Option<f64>,
 }
 
 /// One frame to contact and force.
@@ -150,6 +155,9 @@ impl<C: StressCalibration<f64>> ContactStage for LightContact<C> {
         let force = self.meter.measure_with(workspace, frame, reference, &self.calibration)?;
         contact.reading = ContactReading::of_light(&force);
         contact.region = None;
+        let pixels = frame.len().max(1) as f64;
+        contact.background_step_grey =
+            force.contact.is_none().then_some(force.statistics.sum as f64 / pixels);
         if contact.reading.is_some()
             && let Some((region, mask)) = workspace.mask()
         {

@@ -58,6 +58,7 @@ impl ContactStage for DarkContact {
         let patch = largest_patch(frame.dim(), |at| darkness(at) > self.threshold_grey);
         contact.region = None;
         contact.reading = None;
+        contact.background_step_grey = None;
         let Some(patch) = patch else { return Ok(()) };
         let region = patch.region.grown(1, frame.dim());
         resize(&mut contact.mask, (region.rows(), region.columns()));
@@ -115,6 +116,8 @@ impl DarkContact {
                 || b.column_start == 0
                 || b.row_end == rows
                 || b.column_end == columns,
+            // Specks of noise are patches too: they are not counted.
+            other_contacts: 0,
             converged: true,
         }
     }

@@ -1,4 +1,5 @@
 //! Typed cautions: the result stands, but not unconditionally.
+use super::contact::ContactReading;
 use std::fmt;
 
 /// A caution about a result. Frames are counted from 0 in the fields and from 1 in the sentences.
@@ -22,6 +23,18 @@ pub enum Flag {
     TouchesEdge {
         /// The frame.
         frame: usize,
+    },
+    /// The frame shows more than one contact; the largest is measured, and theory knows of one.
+    SeveralContacts {
+        /// The frame.
+        frame: usize,
+        /// How many beside the largest.
+        others: usize,
+    },
+    /// The light has changed since the reference was taken.
+    LightDrifted {
+        /// Mean of frame minus reference without contact, in grey levels.
+        grey: f64,
     },
     /// The fit of the contact's profile did not converge.
     ProfileNotConverged {
@@ -61,6 +74,20 @@ pub enum Flag {
     },
 }
 
+impl ContactReading {
+    /// The cautions about this reading, as one of frame number `frame` (from 0).
+    pub fn flags(&self, frame: usize) -> impl Iterator<Item = Flag> {
+        let share = self.saturated_share;
+        let saturated = (share > 0.0).then_some(Flag::Saturated { frame, share });
+        let outside = self.out_of_calibration.then_some(Flag::OutOfCalibration { frame });
+        let edge = self.touches_edge.then_some(Flag::TouchesEdge { frame });
+        let others = self.other_contacts;
+        let several = (others > 0).then_some(Flag::SeveralContacts { frame, others });
+        let fit = (!self.converged).then_some(Flag::ProfileNotConverged { frame });
+        [saturated, outside, edge, several, fit].into_iter().flatten()
+    }
+}
+
 impl fmt::Display for Flag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -72,6 +99,15 @@ impl fmt::Display for Flag {
             }
             Self::TouchesEdge { frame } => {
                 write!(f, "frame {}: the contact reaches the frame's edge", frame + 1)
+            }
+            Self::SeveralContacts { frame, others: 1 } => {
+                write!(f, "frame {}: another contact beside the one measured", frame + 1)
+            }
+            Self::SeveralContacts { frame, others } => {
+                write!(f, "frame {}: {others} other contacts beside the one measured", frame + 1)
+            }
+            Self::LightDrifted { grey } => {
+                write!(f, "the light has drifted by {grey:+.2} grey levels since the reference was taken")
             }
             Self::ProfileNotConverged { frame } => {
                 write!(f, "frame {}: the profile's fit did not converge", frame + 1)

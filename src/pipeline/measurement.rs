@@ -149,18 +149,7 @@ impl Press<'_> {
         let reading = *self.contact(frame)?.ok_or(PipelineError::NoContact { frame })?;
         let force_n = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
         let gauge_force_n = self.gauge_n(frame);
-        if reading.saturated_share > 0.0 {
-            flags.push(Flag::Saturated { frame, share: reading.saturated_share });
-        }
-        if reading.out_of_calibration {
-            flags.push(Flag::OutOfCalibration { frame });
-        }
-        if reading.touches_edge {
-            flags.push(Flag::TouchesEdge { frame });
-        }
-        if !reading.converged {
-            flags.push(Flag::ProfileNotConverged { frame });
-        }
+        flags.extend(reading.flags(frame));
         if let Some(gauge_n) = gauge_force_n {
             let apart = (gauge_n - force_n.value).abs();
             if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {

@@ -1,21 +1,26 @@
 //! A session: one sensor, one object, a stream of frames.
 //!
 //! The first frames without contact make the reference; then every frame gives its contact and force, and every contact
-//! refines the modulus. Memory is constant: similar loads are merged. [`Session::push`] allocates nothing once its buffers
-//! have their size.
+//! refines the modulus. Shear is followed where its stiffnesses are known, drift of the light watched in frames without
+//! contact. Memory is constant: similar loads are merged. [`Session::push`] allocates nothing once its buffers have their
+//! size.
 use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
-use super::object::{LoadReading, best_estimate, radius_with_floor, split_errors};
+use super::flag::Flag;
+use super::loads::SeenLoads;
+use super::object::{best_estimate, split_errors};
 use super::report::{Report, SkipReason, Stage};
+use super::shear::ShearFollower;
 use super::stages::Stages;
 use crate::elasticity::modulus::ModulusEstimate;
-use crate::force::{ForceWorkspace, ReferenceFrame};
+use crate::force::{ForceWorkspace, ReferenceFrame, ShearCalibration, ShearMeasurement};
 use ndarray::{Array2, ArrayView2};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Loads that a session keeps apart; more are merged.
-pub const SESSION_LOADS: usize = 32;
+/// Grey levels by which frames without contact may differ from the reference in the mean before a session speaks of drift:
+/// half the camera's step.
+pub const DRIFT_LIMIT_GREY: f64 = 0.5;
 
 /// What one frame of a stream says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,52 +31,29 @@ pub struct Update {
     pub contact: Option<ContactReading>,
     /// The frame equals the one before it, bit for bit, and was not measured again.
     pub repeated: bool,
+    /// Shear since contact began, where the session knows the stiffnesses.
+    pub shear: Option<ShearMeasurement<f64>>,
 }
 
-/// Force and radius at one load, averaged over the frames taken there.
-#[derive(Clone, Copy, Debug)]
-struct MergedLoad {
-    frames: f64,
-    force_n: f64,
-    radius_m: f64,
-    force_variance: f64,
-    radius_variance: f64,
-    calibration: f64,
+/// What frames without contact say of the light since the reference was taken, in grey levels: the mean of frame minus
+/// reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct DriftWatch {
+    /// Frames without contact so far.
+    pub frames: u64,
+    /// In the last of them.
+    pub last_grey: f64,
+    /// The greatest so far, with its sign.
+    pub greatest_grey: f64,
 }
 
-impl MergedLoad {
-    fn of(reading: &ContactReading) -> Option<Self> {
-        let force = reading.force_n?;
-        Some(Self {
-            frames: 1.0,
-            force_n: force.value,
-            radius_m: reading.contact_radius_m.value,
-            force_variance: reading.force_noise_n.powi(2),
-            radius_variance: reading.contact_radius_m.standard_error.powi(2),
-            calibration: (reading.force_calibration_n / force.value).abs(),
-        })
-    }
-
-    /// The mean of both. Radii are averaged as cubes, which grow in proportion to the force.
-    fn merged(self, other: Self) -> Self {
-        let frames = self.frames + other.frames;
-        let (a, b) = (self.frames / frames, other.frames / frames);
-        Self {
-            frames,
-            force_n: a * self.force_n + b * other.force_n,
-            radius_m: (a * self.radius_m.powi(3) + b * other.radius_m.powi(3)).cbrt(),
-            force_variance: a * a * self.force_variance + b * b * other.force_variance,
-            radius_variance: a * a * self.radius_variance + b * b * other.radius_variance,
-            calibration: a * self.calibration + b * other.calibration,
-        }
-    }
-
-    fn reading(&self, pixel_size_m: [f64; 2]) -> LoadReading {
-        LoadReading {
-            force_n: self.force_n,
-            noise_n: self.force_variance.sqrt(),
-            calibration_n: self.calibration * self.force_n,
-            radius_m: radius_with_floor(self.radius_m, self.radius_variance.sqrt(), pixel_size_m),
+impl DriftWatch {
+    fn watch(&mut self, grey: f64) {
+        self.frames += 1;
+        self.last_grey = grey;
+        if grey.abs() > self.greatest_grey.abs() {
+            self.greatest_grey = grey;
         }
     }
 }
@@ -101,7 +83,9 @@ pub struct Session {
     /// Whether `contact` is that of `last`.
     measured: bool,
     frames: u64,
-    loads: Vec<MergedLoad>,
+    loads: SeenLoads,
+    shear: Option<ShearFollower>,
+    drift: DriftWatch,
     report: Report,
 }
 
@@ -130,12 +114,22 @@ impl Session {
             last: Array2::default((0, 0)),
             measured: false,
             frames: 0,
-            loads: Vec::with_capacity(SESSION_LOADS + 1),
+            loads: SeenLoads::new(),
+            shear: None,
+            drift: DriftWatch::default(),
             report: Report::default(),
         })
     }
 
-    /// Measures the next frame. A contact that is whole, unsaturated and inside the calibration refines the modulus.
+    /// Follows shear too: F_x = K_x u_x, F_y = K_y u_y, u the way of the centroid since contact began.
+    #[must_use]
+    pub fn with_shear(mut self, calibration: ShearCalibration<f64>) -> Self {
+        self.shear = Some(ShearFollower::new(calibration));
+        self
+    }
+
+    /// Measures the next frame. A contact that is alone, whole, unsaturated and inside the calibration refines the modulus;
+    /// a frame without contact is watched for drift of the light.
     ///
     /// # Errors
     /// [`PipelineError::Contact`]; the session can go on with the next frame.
@@ -143,10 +137,19 @@ impl Session {
         let number = self.frames;
         self.frames += 1;
         let skip = self.stages.settings().skips.equal_frames;
-        if skip && self.measured && self.last == frame {
+        let repeated = skip && self.measured && self.last == frame;
+        if repeated {
             self.report.count_skip(Stage::Contact, SkipReason::EqualFrame, frame.len());
-            return Ok(Update { frame: number, contact: self.contact.reading, repeated: true });
+        } else {
+            self.measure(number, frame)?;
         }
+        let contact = self.contact.reading;
+        let size = self.stages.contact().pixel_size_m();
+        let shear = self.shear.as_mut().and_then(|follower| follower.update(contact.as_ref(), size));
+        Ok(Update { frame: number, contact, repeated, shear })
+    }
+
+    fn measure(&mut self, number: u64, frame: ArrayView2<'_, u8>) -> Result<(), PipelineError> {
         let start = Instant::now();
         self.measured = false;
         resize(&mut self.last, frame.dim());
@@ -157,12 +160,14 @@ impl Session {
             .map_err(|source| PipelineError::Contact { frame: number as usize, source })?;
         self.measured = true;
         self.report.ran(Stage::Contact, start.elapsed());
-        let contact = self.contact.reading;
-        match contact {
+        match self.contact.reading {
             None => self.report.count_skip(Stage::Surface, SkipReason::NoContact, frame.len()),
-            Some(reading) => self.learn(&reading),
+            Some(reading) => self.loads.learn(&reading),
         }
-        Ok(Update { frame: number, contact, repeated: false })
+        if let Some(grey) = self.contact.background_step_grey {
+            self.drift.watch(grey);
+        }
+        Ok(())
     }
 
     /// Young's modulus from all loads so far, by the estimator that fits the object best. Objects whose modulus needs
@@ -174,8 +179,7 @@ impl Session {
         let start = Instant::now();
         let settings = self.stages.settings();
         let size = self.stages.contact().pixel_size_m();
-        let readings = self.loads.iter().map(|load| load.reading(size));
-        let (loads, shared) = split_errors(readings, settings);
+        let (loads, shared) = split_errors(self.loads.readings(size), settings);
         let estimate = best_estimate(&settings.object, settings.waveguide.as_ref(), &loads, shared);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate.map_err(PipelineError::Modulus)
@@ -186,28 +190,25 @@ impl Session {
         self.frames
     }
 
-    /// Loads kept apart so far, at most [`SESSION_LOADS`].
+    /// Loads kept apart so far, at most [`SESSION_LOADS`](super::SESSION_LOADS).
     pub fn loads(&self) -> usize {
         self.loads.len()
+    }
+
+    /// What frames without contact say of the light.
+    pub fn drift(&self) -> DriftWatch {
+        self.drift
+    }
+
+    /// A caution if the light has drifted by more than [`DRIFT_LIMIT_GREY`] when the sensor was last free: the reference
+    /// should be taken anew, or the contact stage told to correct drift.
+    pub fn drift_flag(&self) -> Option<Flag> {
+        let grey = self.drift.last_grey;
+        (grey.abs() > DRIFT_LIMIT_GREY).then_some(Flag::LightDrifted { grey })
     }
 
     /// What ran and what was skipped so far; skips of one kind are added up.
     pub fn report(&self) -> &Report {
         &self.report
-    }
-
-    fn learn(&mut self, reading: &ContactReading) {
-        let whole = !reading.touches_edge && !reading.out_of_calibration && reading.converged;
-        let trusted = whole && reading.saturated_share == 0.0;
-        let Some(load) = MergedLoad::of(reading).filter(|l| trusted && l.force_n > 0.0) else { return };
-        let at = self.loads.partition_point(|l| l.force_n < load.force_n);
-        self.loads.insert(at, load);
-        if self.loads.len() > SESSION_LOADS {
-            // The neighbours that are closest by ratio become one.
-            let gap = |i: usize| self.loads[i + 1].force_n / self.loads[i].force_n;
-            let closest = (0..SESSION_LOADS).min_by(|&i, &j| gap(i).total_cmp(&gap(j))).unwrap_or(0);
-            self.loads[closest] = self.loads[closest].merged(self.loads[closest + 1]);
-            self.loads.remove(closest + 1);
-        }
     }
 }

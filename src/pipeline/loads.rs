@@ -1,0 +1,94 @@
+//! The loads that a session has seen: a bounded number, similar ones merged.
+use super::contact::ContactReading;
+use super::object::{LoadReading, radius_with_floor};
+
+/// Loads that a session keeps apart; more are merged.
+pub const SESSION_LOADS: usize = 32;
+
+/// Force and radius at one load, averaged over the frames taken there.
+#[derive(Clone, Copy, Debug)]
+struct MergedLoad {
+    frames: f64,
+    force_n: f64,
+    radius_m: f64,
+    force_variance: f64,
+    radius_variance: f64,
+    calibration: f64,
+}
+
+impl MergedLoad {
+    fn of(reading: &ContactReading) -> Option<Self> {
+        let force = reading.force_n?;
+        Some(Self {
+            frames: 1.0,
+            force_n: force.value,
+            radius_m: reading.contact_radius_m.value,
+            force_variance: reading.force_noise_n.powi(2),
+            radius_variance: reading.contact_radius_m.standard_error.powi(2),
+            calibration: (reading.force_calibration_n / force.value).abs(),
+        })
+    }
+
+    /// The mean of both. Radii are averaged as cubes, which grow in proportion to the force.
+    fn merged(self, other: Self) -> Self {
+        let frames = self.frames + other.frames;
+        let (a, b) = (self.frames / frames, other.frames / frames);
+        Self {
+            frames,
+            force_n: a * self.force_n + b * other.force_n,
+            radius_m: (a * self.radius_m.powi(3) + b * other.radius_m.powi(3)).cbrt(),
+            force_variance: a * a * self.force_variance + b * b * other.force_variance,
+            radius_variance: a * a * self.radius_variance + b * b * other.radius_variance,
+            calibration: a * self.calibration + b * other.calibration,
+        }
+    }
+
+    fn reading(&self, pixel_size_m: [f64; 2]) -> LoadReading {
+        LoadReading {
+            force_n: self.force_n,
+            noise_n: self.force_variance.sqrt(),
+            calibration_n: self.calibration * self.force_n,
+            radius_m: radius_with_floor(self.radius_m, self.radius_variance.sqrt(), pixel_size_m),
+        }
+    }
+}
+
+/// At most [`SESSION_LOADS`] loads in rising order of force.
+#[derive(Clone, Debug)]
+pub(super) struct SeenLoads(Vec<MergedLoad>);
+
+impl SeenLoads {
+    pub(super) fn new() -> Self {
+        Self(Vec::with_capacity(SESSION_LOADS + 1))
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// What all loads say.
+    pub(super) fn readings(&self, pixel_size_m: [f64; 2]) -> impl Iterator<Item = LoadReading> + Clone {
+        self.0.iter().map(move |load| load.reading(pixel_size_m))
+    }
+
+    /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its profile fitted.
+    pub(super) fn learn(&mut self, reading: &ContactReading) {
+        let whole = !reading.touches_edge && reading.other_contacts == 0;
+        let trusted = whole && !reading.out_of_calibration && reading.converged;
+        let trusted = trusted && reading.saturated_share == 0.0;
+        let Some(load) = MergedLoad::of(reading).filter(|l| trusted && l.force_n > 0.0) else { return };
+        let at = self.0.partition_point(|l| l.force_n < load.force_n);
+        self.0.insert(at, load);
+        if self.0.len() > SESSION_LOADS {
+            self.merge_closest();
+        }
+    }
+
+    /// The neighbours that are closest by ratio become one.
+    fn merge_closest(&mut self) {
+        let gap = |i: usize| self.0[i + 1].force_n / self.0[i].force_n;
+        let closest = (0..self.0.len() - 1).min_by(|&i, &j| gap(i).total_cmp(&gap(j))).unwrap_or(0);
+        self.0[closest] = self.0[closest].merged(self.0[closest + 1]);
+        self.0.remove(closest + 1);
+    }
+}

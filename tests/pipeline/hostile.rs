@@ -1,0 +1,131 @@
+//! Ten thousand hostile presses: a typed error or a flagged answer, never a panic, never a silent NaN.
+use ndarray::{Array2, s};
+use proptest::prelude::*;
+use std::sync::{Arc, OnceLock};
+use tactile_imaging::Pipeline;
+use tactile_imaging::force::CalibrationPair;
+use tactile_imaging::pipeline::{Flag, Measurement, Object, Press, Session, Stages};
+use tactile_imaging::simulate::{Camera, Hostile, PressOptions};
+
+const SHAPE: [usize; 2] = [36, 44];
+const SEEDS: usize = 24;
+
+/// Reference and frame of every kind of trouble and every seed, made once; the kind after the last is a sound press.
+fn frames(kind: usize, seed: usize) -> &'static [Array2<u8>; 2] {
+    static FRAMES: OnceLock<Vec<[Array2<u8>; 2]>> = OnceLock::new();
+    let all =
+        || (0..(Hostile::ALL.len() + 1) * SEEDS).map(|i| simulate(i / SEEDS, (i % SEEDS) as u64)).collect();
+    &FRAMES.get_or_init(all)[kind * SEEDS + seed]
+}
+
+fn simulate(kind: usize, seed: u64) -> [Array2<u8>; 2] {
+    let camera = Camera { shape: SHAPE, pixel_size_m: [0.4e-3; 2], ..Camera::default() };
+    let base = PressOptions { camera, seed, ..PressOptions::default() };
+    let made = match Hostile::ALL.get(kind) {
+        Some(hostile) => hostile.simulate(&base).unwrap(),
+        None => tactile_imaging::simulate::PressScene::new(base).unwrap().simulate(),
+    };
+    [made.reference, made.frames[0].clone()]
+}
+
+/// What is done to a frame on its way.
+fn spoil(frame: &Array2<u8>, how: u8, noise: u64) -> Array2<u8> {
+    let (rows, columns) = frame.dim();
+    match how {
+        0 => frame.slice(s![..rows - 1, ..]).to_owned(),
+        1 => frame.t().to_owned(),
+        2 => Array2::zeros((0, 0)),
+        3 => Array2::from_shape_fn((rows, columns), |(r, c)| {
+            let x = (noise | 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add((r * columns + c) as u64);
+            (x.wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 56) as u8
+        }),
+        _ => frame.clone(),
+    }
+}
+
+fn pipeline(object: u8) -> Pipeline {
+    let pairs: Vec<_> = (0..8).map(|k| CalibrationPair::loading(2e4 * k as f64, 0.3 * k as f64)).collect();
+    let object = match object {
+        0 => Object::sphere(3e-3),
+        1 => Object::FlatPunch { radius_m: 2e-3, poisson_ratio: 0.5 },
+        _ => Object::Unknown { poisson_ratio: 0.45 },
+    };
+    Pipeline::from_pairs(&pairs, [0.4e-3; 2], object).unwrap().with_control_points(16)
+}
+
+fn is_sound(m: &Measurement) -> bool {
+    let modulus = &m.youngs_modulus_pa;
+    let mut numbers = vec![modulus.value, modulus.standard_error, modulus.interval_95.0];
+    for f in &m.frames {
+        let (force, radius) = (f.force_n, f.contact_radius_m);
+        numbers.extend([force.value, force.standard_error, radius.value, radius.standard_error]);
+        numbers.extend(f.centroid_px.into_iter().chain(f.centroid_sd_px).chain(f.surface_height_m));
+    }
+    if let Some(strain) = &m.strain {
+        numbers.extend(strain.mean.iter().chain(&strain.standard_error).flatten());
+    }
+    numbers.iter().all(|v| v.is_finite())
+}
+
+/// Every frame through a session, in which no error may stick.
+fn stream(stages: Arc<dyn Stages>, reference: &Array2<u8>, frames: [&Array2<u8>; 2]) {
+    let mut session = Session::new(stages, reference.view()).unwrap();
+    for frame in frames.into_iter().chain(frames) {
+        if let Ok(update) = session.push(frame.view())
+            && let Some(contact) = update.contact
+        {
+            let force = contact.force_n.unwrap();
+            let finite = [force.value, force.standard_error, contact.contact_radius_m.value];
+            assert!(finite.iter().all(|v| v.is_finite()) || contact.flags(0).next().is_some(), "{contact:?}");
+        }
+    }
+    if let Ok(modulus) = session.modulus() {
+        assert!(modulus.youngs_modulus_pa.is_finite() || !modulus.warnings.is_empty(), "{modulus:?}");
+    }
+}
+
+fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
+    let [reference, first] = frames(kinds[0], seed);
+    let [_, second] = frames(kinds[1], SEEDS - 1 - seed);
+    let (first, second) = (spoil(first, spoilt[0], seed as u64), spoil(second, spoilt[1], !(seed as u64)));
+    let pipeline = Arc::new(pipeline(object));
+    stream(pipeline.clone(), reference, [&first, &second]);
+    let mut press = Press::new(pipeline.as_ref(), reference.view()).unwrap();
+    press.add_frame(first.view());
+    press.add_frame(second.view());
+    // Two thirds go without surfaces where they can, to be quick.
+    if (seed + usize::from(object)) % 3 != 0 {
+        if let Ok(modulus) = press.modulus() {
+            let sound = modulus.youngs_modulus_pa.is_finite() && modulus.standard_error_pa.is_finite();
+            assert!(sound || !modulus.warnings.is_empty(), "a silent NaN: {modulus:?}");
+        }
+        return;
+    }
+    let Ok(measured) = press.measure() else { return };
+    assert!(is_sound(&measured) || !measured.flags.is_empty(), "a silent NaN: {measured:?}");
+    let flagged = |wanted: fn(&Flag) -> bool| measured.flags.iter().any(wanted);
+    let whole = spoilt[0] > 3;
+    match Hostile::ALL.get(kinds[0]) {
+        Some(Hostile::CutByEdge | Hostile::InCorner | Hostile::FillsFrame) if whole => {
+            assert!(flagged(|f| matches!(f, Flag::TouchesEdge { frame: 0 })), "{kinds:?}");
+        }
+        Some(Hostile::SeveralContacts) if whole => {
+            assert!(flagged(|f| matches!(f, Flag::SeveralContacts { frame: 0, .. })), "{kinds:?}");
+        }
+        _ => {}
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 10_000, max_shrink_iters: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn hostile_presses_end_civilly(
+        kinds in [0..=Hostile::ALL.len(), 0..=Hostile::ALL.len()],
+        seed in 0..SEEDS,
+        spoilt in [0_u8..40, 0_u8..40],
+        object in 0_u8..3,
+    ) {
+        check(kinds, seed, spoilt, object);
+    }
+}
