@@ -22,7 +22,13 @@ struct Scene {
 }
 
 fn scene() -> Scene {
-    let options = PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() };
+    scene_of(1.0)
+}
+
+/// A contact so many times as wide as the default ball's: a ∝ R^⅓ under the same force.
+fn scene_of(wider: f64) -> Scene {
+    let mut options = PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() };
+    options.object.radius_m *= wider.powi(3);
     let scene = PressScene::new(options).expect("a valid scene");
     let reference = ReferenceFrame::new(scene.reference(0).view()).expect("a valid frame");
     let (quiet, pressed) = (scene.reference(1), scene.frame(0, 0));
@@ -63,21 +69,32 @@ fn pass(c: &mut Criterion) {
 }
 
 fn contact(c: &mut Criterion) {
-    let s = scene();
-    let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
-    let mut workspace = DetectorWorkspace::default();
-    let found = detector.detect_with::<f64>(&mut workspace, s.pressed.view(), &s.reference).expect("valid");
-    let (contact, truth) = (found.contact.expect("contact"), s.scene.truth(0));
-    let error =
-        (0..2).map(|k| (contact.centroid_px[k].value - truth.centroid_px[k]).abs()).fold(0.0, f64::max);
-    assert!(error < 0.02, "centroid off by {error} px");
-    eprintln!(
-        "force/contact: centroid off by {error:.4} px, stated {:.4} px",
-        contact.centroid_px[0].standard_error
-    );
-    c.bench_function("force/contact/detect, radius 152 px", |b| {
-        b.iter(|| detector.detect_with::<f64>(&mut workspace, black_box(s.pressed.view()), &s.reference))
-    });
+    for (wider, name) in [(1.0, "5 % of the frame"), (1.73, "15 % of the frame")] {
+        let s = scene_of(wider);
+        let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
+        let mut workspace = DetectorWorkspace::default();
+        let mut detect =
+            || detector.detect_with::<f64>(&mut workspace, black_box(s.pressed.view()), &s.reference);
+        let (contact, truth) = (detect().expect("valid").contact.expect("contact"), s.scene.truth(0));
+        let error =
+            (0..2).map(|k| (contact.centroid_px[k].value - truth.centroid_px[k]).abs()).fold(0.0, f64::max);
+        assert!(error < 0.02, "centroid off by {error} px");
+        eprintln!(
+            "force/contact: radius {:.0} px, {:.1} % of the frame, centroid off by {error:.4} px, stated {:.4} px",
+            contact.equivalent_radius_px,
+            100.0 * contact.area_px as f64 / s.pressed.len() as f64,
+            contact.centroid_px[0].standard_error
+        );
+        let meter = ForceMeter::new([1.0, 1.0], &ForceOptions::default()).expect("valid");
+        let mut workspace = ForceWorkspace::default();
+        let unit: Vec<_> =
+            (0..5).map(|k| 1e6 * f64::from(k)).map(|v| CalibrationPair::loading(v, v)).collect();
+        let unit = LinearCalibration::fit(&unit, &CalibrationOptions::default()).expect("enough pairs");
+        c.bench_function(&format!("force/contact/detect, {name}"), |b| b.iter(&mut detect));
+        c.bench_function(&format!("force/contact/detect and fit the profile, {name}"), |b| {
+            b.iter(|| meter.measure_with(&mut workspace, black_box(s.pressed.view()), &s.reference, &unit))
+        });
+    }
 }
 
 fn hertz_fit(c: &mut Criterion) {

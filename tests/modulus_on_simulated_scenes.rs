@@ -11,6 +11,8 @@ mod measure;
 #[path = "../examples/strain_between/robust_spline.rs"]
 #[allow(unreachable_pub, dead_code)]
 mod robust_spline;
+#[path = "modulus_on_simulated_scenes/uncertainty.rs"]
+mod uncertainty;
 
 use nalgebra::{DMatrix, Point2};
 use ndarray::Array2;
@@ -24,7 +26,7 @@ use tactile_imaging::elasticity::modulus::{
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace,
-    LinearCalibration, ReferenceFrame,
+    LinearCalibration, ReferenceFrame, StressCalibration,
 };
 use tactile_imaging::matching::RelaxationMatcher;
 use tactile_imaging::simulate::{
@@ -130,13 +132,20 @@ fn estimate(e: tactile_imaging::force::Estimate<f64>) -> Estimate<f64> {
     Estimate::new(e.value, e.standard_error)
 }
 
-/// Covariance of forces that share the slope of one calibration.
-fn force_covariance(measured: &[ForceMeasurement<f64>]) -> DMatrix<f64> {
-    let reading: Vec<_> = measured.iter().map(|m| m.reading.unwrap()).collect();
-    DMatrix::from_fn(reading.len(), reading.len(), |i, j| {
-        let own = if i == j { reading[i].noise_n.powi(2) } else { 0.0 };
-        own + reading[i].calibration_n * reading[j].calibration_n
-    })
+/// The force with the calibration's degrees of freedom.
+fn force(measured: &ForceMeasurement<f64>) -> Estimate<f64> {
+    let degrees_of_freedom = measured.reading.and_then(|r| r.degrees_of_freedom);
+    Estimate { degrees_of_freedom, ..estimate(measured.force_n) }
+}
+
+/// Covariance of forces that share one calibration.
+fn force_covariance(
+    calibration: &LinearCalibration<f64>,
+    measured: &[ForceMeasurement<f64>],
+) -> DMatrix<f64> {
+    let values: Vec<_> = measured.iter().map(|m| m.contact.unwrap().integrated_pixel_value).collect();
+    let covariance = calibration.force_covariance_n2(&values);
+    DMatrix::from_fn(values.len(), values.len(), |i, j| covariance[[i, j]])
 }
 
 /// One sphere: truth and estimate.
@@ -185,15 +194,13 @@ fn sphere(seed: u64) -> (f64, ModulusEstimate<f64>) {
         })
         .collect();
     let loads: Vec<_> = (measured.iter())
-        .map(|m| {
-            LoadState::new(estimate(m.force_n)).with_contact_radius(estimate(m.contact_radius_m.unwrap()))
-        })
+        .map(|m| LoadState::new(force(m)).with_contact_radius(estimate(m.contact_radius_m.unwrap())))
         .collect();
     let estimator = HertzSphere::new(radius, NU)
         .unwrap()
         .with_waveguide(&waveguide())
         .with_evidence(Evidence::ContactRadius)
-        .with_force_covariance(&force_covariance(&measured))
+        .with_force_covariance(&force_covariance(&calibration, &measured))
         .unwrap();
     if std::env::var_os("VERBOSE").is_some() {
         let last = ratios.len() - 1;
@@ -286,30 +293,37 @@ fn block(seed: u64) -> (f64, ModulusEstimate<f64>) {
     let calibration = calibrate(&meter, &reference, frames, &mut rng);
     let mut workspace = ForceWorkspace::default();
     let pressed = [1, 7].map(|k| (3..7).map(|repeat| scene.frame(k, repeat)).collect::<Vec<_>>());
-    let forces = [0, 1].map(|i| {
+    let measured = [0, 1].map(|i| {
         let one = pressed[i][0].view();
-        meter.measure_with(&mut workspace, one, &reference, &calibration).unwrap().force_n
+        meter.measure_with(&mut workspace, one, &reference, &calibration).unwrap()
     });
+    let forces = measured.each_ref().map(force);
     let unlit = mean_frame(&dark);
     let [before, after] = [0, 1].map(|i| bumps(&(mean_frame(&pressed[i]) - &unlit), camera.pixel_size_m[0]));
     let found = measure::strain_between(&before, &after, &RelaxationMatcher::default(), &GreenLagrange)
         .expect("strain");
     let (mean, error) = (found.summary.mean, found.standard_error);
-    // e_xx = e_yy = −ν e_zz, each counted from the first load and hence over its λ_t² = 1 − 2ν e_zz.
+    // e_xx = e_yy = −ν e_zz, each counted from the first load and hence over its λ_t² = 1 − 2ν e_zz. Two errors of much the same size
+    // have twice the degrees of freedom of one.
     let lateral =
-        Estimate::new(0.5 * (mean[(0, 0)] + mean[(1, 1)]), 0.5 * error[(0, 0)].hypot(error[(1, 1)]));
+        Estimate::new(0.5 * (mean[(0, 0)] + mean[(1, 1)]), 0.5 * error[(0, 0)].hypot(error[(1, 1)]))
+            .with_degrees_of_freedom(2.0 * found.degrees_of_freedom as f64);
     let solve = |first: f64| {
         let squeeze = |e: f64| e * (1.0 + 2.0 * NU * first) / NU;
         let strains = [first, first + squeeze(lateral.value)];
         // Second Piola–Kirchhoff: force over λ_z A₀.
         let load = |i: usize| {
             let area = (1.0 - 2.0 * strains[i]).sqrt() * face * face;
-            LoadState::new(estimate(forces[i])).with_contact_area(Estimate::exact(area))
+            LoadState::new(forces[i]).with_contact_area(Estimate::exact(area))
         };
-        let strain = Estimate::new(squeeze(lateral.value), squeeze(lateral.standard_error));
+        let (value, standard_error) = (squeeze(lateral.value), squeeze(lateral.standard_error));
+        let strain = Estimate { value, standard_error, ..lateral };
         [load(0), load(1).with_mean_strain(strain)]
     };
-    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let ratio = PaperRatio::new()
+        .with_reference(StrainReference::FirstLoad)
+        .with_force_covariance(&force_covariance(&calibration, &measured))
+        .unwrap();
     let mut answer = ratio.estimate(&solve(0.0)).unwrap();
     for _ in 0..5 {
         // The first load's own strain, by the modulus found so far.

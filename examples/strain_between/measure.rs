@@ -18,8 +18,10 @@ pub struct Strain<const D: usize> {
     /// Strain at every matched point of the first set.
     pub strains: Vec<Matrix3<f64>>,
     pub summary: StrainSummary<f64>,
-    /// Standard error of the mean: the jackknife over the spline's parts.
+    /// Standard error of the mean: the jackknife over the spline's parts, and the response of the spline's weights.
     pub standard_error: Matrix3<f64>,
+    /// Of the standard error: parts less one.
+    pub degrees_of_freedom: usize,
     /// Noise of one coordinate, in the points' unit.
     pub sigma: f64,
     pub relative_lambda: f64,
@@ -57,7 +59,8 @@ pub fn strain_between<const D: usize>(
         pairs: pairs.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
         strains: field.strains().to_vec(),
         summary: field.summary(),
-        standard_error: jackknife(&means),
+        standard_error: jackknife(&means) * robust.response,
+        degrees_of_freedom: means.len() - 1,
         weights: robust.weights,
         sigma: robust.sigma,
         relative_lambda: robust.relative_lambda,

@@ -17,6 +17,7 @@ mod error;
 pub mod field;
 pub mod modulus;
 mod scalar;
+mod selection;
 pub mod strain;
 pub mod stress;
 

@@ -39,6 +39,20 @@ fn hertz_loads(other: Body<f64>, forces: &[f64]) -> Vec<LoadState<f64>> {
         .collect()
 }
 
+/// The same, with the indentation that of both contacts: the waveguide's and a rigid plate's. Relative error as stated.
+fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState<f64>> {
+    let far = hertz_loads(Body::rigid(), forces);
+    (hertz_loads(waveguide().as_body(), forces).into_iter().zip(far))
+        .map(|(near, far)| {
+            let indentation = near.indentation_m.unwrap().value + far.indentation_m.unwrap().value;
+            let a = near.contact_radius_m.unwrap().value;
+            LoadState::new(Estimate::new(near.force_n.value, relative * near.force_n.value))
+                .with_contact_radius(Estimate::new(a, relative * a))
+                .with_indentation(Estimate::new(indentation, relative * indentation))
+        })
+        .collect()
+}
+
 fn finds(estimator: &dyn ModulusEstimator<f64>, loads: &[LoadState<f64>]) {
     let found = estimator.estimate(loads).unwrap();
     let gap = (found.youngs_modulus_pa / SAMPLE - 1.0).abs();
@@ -68,6 +82,10 @@ fn every_law_inverts_itself() {
         LoadState::new(exact(4.0 / 3.0 * reduced() * a.powi(3) / 3e-3)).with_indentation(exact(d))
     };
     finds(&TataraSphere::new(3e-3, NU).unwrap(), &[squeezed(3e-4), squeezed(1.6e-3)]);
+    finds(
+        &SphereBetweenPlates::new(4e-3, NU).unwrap().with_waveguide(&waveguide()),
+        &between_plates(&forces, 0.0),
+    );
 }
 
 #[test]
@@ -278,4 +296,89 @@ fn f32_agrees_with_f64() {
     let found = HertzSphere::new(4e-3f32, NU as f32).unwrap().estimate(&single).unwrap();
     // Three roundings of a at 6·10⁻⁸ each, cubed.
     assert!((f64::from(found.youngs_modulus_pa) / SAMPLE - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn loads_choose_their_law() {
+    let forces = [1e-3, 4e-3, 1.6e-2];
+    let candidates = sphere_as_sample(4e-3, NU, &waveguide()).unwrap();
+    let choice = select_estimator(&candidates, &between_plates(&forces, 0.003)).unwrap();
+    assert_eq!(choice.chosen().estimator, EstimatorKind::SphereBetweenPlates);
+    assert!((choice.chosen().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-9);
+    // Hertz with one contact takes the plate's approach for twice what it is: many standard errors off.
+    assert!(matches!(choice.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
+    assert!((choice.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 && choice.weights[0] > 0.99);
+    assert_eq!(choice.estimates.len() + choice.left_out.len(), candidates.len());
+
+    // A sliding layer tells itself from a glued and from a deep one.
+    let equation = LayerEquation::new(&LayerKernel::new(Bond::Free, NU).unwrap());
+    let load = |ratio: f64| {
+        let (h, contact) = (2e-3, equation.solve(ratio).unwrap());
+        let hertz = 4.0 / 3.0 * reduced() * (ratio * h).powi(3) / 4e-3;
+        let depth = (contact.chi * h).powi(2) / 4e-3;
+        LoadState::new(exact(hertz * contact.force_ratio_same_radius))
+            .with_indentation(Estimate::new(depth, 0.003 * depth))
+    };
+    let layer =
+        select_estimator(&sphere_on_sample(4e-3, NU, Some(2e-3)).unwrap(), &[0.2, 0.5, 0.9, 1.3].map(load))
+            .unwrap();
+    assert_eq!(layer.chosen().estimator, EstimatorKind::FreeLayerIntegralEquation);
+    assert!((layer.chosen().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn one_load_is_answered_by_the_most_general_law() {
+    let mut loads = between_plates(&[1e-3], 0.01);
+    loads[0].indentation_m = None;
+    let choice = select_estimator(&sphere_as_sample(4e-3, NU, &waveguide()).unwrap(), &loads).unwrap();
+    assert_eq!(choice.chosen().estimator, EstimatorKind::SphereOnWaveguide);
+    assert!(matches!(choice.reason, SelectionReason::MostGeneral { behind } if behind.abs() < 1e-9));
+    assert!(select_estimator::<f64>(&[], &loads).is_err());
+}
+
+#[test]
+fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
+    let load = |force: f64, strain: f64| {
+        LoadState::new(Estimate::new(force, 0.01 * force))
+            .with_contact_area(exact(1e-4))
+            .with_mean_strain(exact(strain))
+    };
+    let loads = [load(0.02, 0.0), load(0.08, 0.01)];
+    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let shared = DMatrix::from_fn(2, 2, |i, j| (0.01f64).powi(2) * [0.02, 0.08][i] * [0.02, 0.08][j]);
+    let common = ratio.clone().with_force_covariance(&shared).unwrap().estimate(&loads).unwrap();
+    // One factor on both forces is one factor on their difference: 1 %.
+    assert!((common.standard_error_pa / common.youngs_modulus_pa - 0.01).abs() < 1e-12);
+    // Independent errors of 1 % of 20 and 80 mN on a difference of 60 mN.
+    let apart = ratio.estimate(&loads).unwrap();
+    let expected = 0.01 * 0.02f64.hypot(0.08) / 0.06;
+    assert!((apart.standard_error_pa / apart.youngs_modulus_pa - expected).abs() < 1e-12);
+    let wrong = PaperRatio::new().with_force_covariance(&DMatrix::<f64>::zeros(3, 3)).unwrap();
+    let mismatch = wrong.estimate(&[load(0.08, 0.01)]).unwrap_err();
+    assert_eq!(
+        mismatch,
+        ElasticityError::LengthMismatch { quantity: Quantity::Force, expected: 1, found: 3 }
+    );
+}
+
+/// Student's t with Welch and Satterthwaite's degrees of freedom, against quantiles from tables.
+#[test]
+fn errors_learnt_from_few_repetitions_widen_the_interval() {
+    let load = |force: Estimate<f64>, strain: Estimate<f64>| {
+        [LoadState::new(force).with_contact_area(exact(1e-4)).with_mean_strain(strain)]
+    };
+    let half_width = |loads: &[LoadState<f64>]| {
+        let found = PaperRatio::new().estimate(loads).unwrap();
+        (found.interval_95.upper.unwrap() / found.interval_95.lower).ln() / 2.0 * found.youngs_modulus_pa
+            / found.standard_error_pa
+    };
+    let force = Estimate::new(0.1, 0.002);
+    let strain = Estimate::new(0.02, 0.0004);
+    assert!((half_width(&load(force, strain)) - 1.959_964).abs() < 1e-5);
+    let learnt = force.with_degrees_of_freedom(5.0);
+    assert!((half_width(&load(learnt, exact(0.02))) - 2.570_582).abs() < 1e-5);
+    // Half of the variance with five degrees of freedom, half known: 5/0.5² = 20.
+    assert!((half_width(&load(learnt, strain)) - 2.085_963).abs() < 1e-5);
+    let refused = PaperRatio::new().estimate(&load(force.with_degrees_of_freedom(f64::NAN), strain));
+    assert!(refused.is_err());
 }

@@ -156,7 +156,7 @@ fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions
     CurveFit {
         model: law.kind(),
         youngs_modulus_pa: best.modulus * to_modulus,
-        standard_error_pa: (upper - lower) / (2.0 * quantile_95(Some(degrees))),
+        standard_error_pa: (upper - lower) / (2.0 * quantile_95(Some(degrees as f64))),
         interval_95: Interval { lower, upper: Some(upper) },
         contact_point_m: best.contact_m,
         offset_n: best.offset,
@@ -195,7 +195,7 @@ fn interval(
     inflation: f64,
     contact: ContactPoint,
 ) -> (f64, f64) {
-    let t = quantile_95(Some(degrees));
+    let t = quantile_95(Some(degrees as f64));
     let bound = best.squares * (1.0 + t * t * inflation / degrees as f64);
     let reach = 0.5 * (p.curve.span().1 - best.contact_m);
     let inside = |ln_ratio: f64| {

@@ -46,11 +46,13 @@ pub enum EstimatorKind {
     StressStrainRegression,
     HertzSphere,
     SphereOnWaveguide,
+    SphereBetweenPlates,
     FlatPunch,
     Cone,
     LayerPublishedSeries,
     LayerCorrectedSeries,
     LayerIntegralEquation,
+    FreeLayerIntegralEquation,
     TataraSphere,
 }
 
@@ -61,11 +63,13 @@ impl core::fmt::Display for EstimatorKind {
             Self::StressStrainRegression => "regression of stress on strain",
             Self::HertzSphere => "Hertz sphere",
             Self::SphereOnWaveguide => "sphere on a layered waveguide",
+            Self::SphereBetweenPlates => "Hertz sphere between two bodies",
             Self::FlatPunch => "flat punch",
             Self::Cone => "cone",
             Self::LayerPublishedSeries => "sphere on a layer, published series",
             Self::LayerCorrectedSeries => "sphere on a layer, corrected series",
             Self::LayerIntegralEquation => "sphere on a layer, integral equation",
+            Self::FreeLayerIntegralEquation => "sphere on a sliding layer, integral equation",
             Self::TataraSphere => "Tatara's sphere",
         })
     }

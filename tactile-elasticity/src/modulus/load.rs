@@ -12,21 +12,47 @@ pub struct Estimate<T> {
     pub value: T,
     /// Its standard deviation over repetitions; zero where unknown.
     pub standard_error: T,
+    /// Degrees of freedom the standard error was itself learnt with (pairs less parameters of a calibration, parts of a jackknife
+    /// less one); None where it is known. Intervals are wider the fewer there are.
+    pub degrees_of_freedom: Option<T>,
 }
 
 impl<T: RealField + Copy> Estimate<T> {
     /// A value with its standard error.
     pub fn new(value: T, standard_error: T) -> Self {
-        Self { value, standard_error }
+        Self { value, standard_error, degrees_of_freedom: None }
+    }
+
+    /// With a standard error that was learnt from so few repetitions that it is itself uncertain.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, PaperRatio};
+    /// let load = |force| {
+    ///     LoadState::new(force).with_contact_area(Estimate::exact(1e-4)).with_mean_strain(Estimate::exact(0.02))
+    /// };
+    /// let force = Estimate::new(0.12, 0.001);
+    /// let known = PaperRatio::new().estimate(&[load(force)])?;
+    /// let learnt = PaperRatio::new().estimate(&[load(force.with_degrees_of_freedom(5.0))])?;
+    /// assert_eq!(known.standard_error_pa, learnt.standard_error_pa);
+    /// assert!(learnt.interval_95.lower < known.interval_95.lower); // Student's t instead of the normal distribution
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn with_degrees_of_freedom(mut self, degrees: T) -> Self {
+        self.degrees_of_freedom = Some(degrees);
+        self
     }
 
     /// A value whose error is unknown or negligible.
     pub fn exact(value: T) -> Self {
-        Self { value, standard_error: T::zero() }
+        Self::new(value, T::zero())
     }
 
     pub(crate) fn widen(self) -> Estimate<f64> {
-        Estimate { value: widen(self.value), standard_error: widen(self.standard_error) }
+        Estimate {
+            value: widen(self.value),
+            standard_error: widen(self.standard_error),
+            degrees_of_freedom: self.degrees_of_freedom.map(widen),
+        }
     }
 }
 
@@ -39,6 +65,9 @@ impl Estimate<f64> {
     pub(crate) fn validated(self, quantity: Quantity) -> Result<Self, ElasticityError> {
         crate::error::finite(self.value, quantity)?;
         not_negative(self.standard_error, Quantity::StandardError)?;
+        if let Some(degrees) = self.degrees_of_freedom {
+            crate::error::positive(degrees, Quantity::DegreesOfFreedom)?;
+        }
         Ok(self)
     }
 }
@@ -114,6 +143,18 @@ impl<T: RealField + Copy> LoadState<T> {
             (None, None) => return None,
         };
         (area > T::zero()).then(|| self.force_n.value / area)
+    }
+}
+
+impl LoadState<f64> {
+    /// The area given, or πa².
+    pub(crate) fn area(&self) -> Option<Estimate<f64>> {
+        let disc = |a: Estimate<f64>| Estimate {
+            value: std::f64::consts::PI * a.value * a.value,
+            standard_error: 2.0 * std::f64::consts::PI * a.value.abs() * a.standard_error,
+            ..a
+        };
+        self.contact_area_m2.or_else(|| self.contact_radius_m.map(disc))
     }
 }
 

@@ -7,19 +7,26 @@ mod law;
 mod load;
 mod ratio;
 mod regression;
+mod select;
+mod source;
 mod statistics;
 mod warning;
 
+pub use crate::selection::SelectionReason;
 pub use bootstrap::{Bootstrap, BootstrapSummary};
 pub use contact::{
-    BondedLayer, Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere, SphereOnWaveguide, TataraSphere,
+    BondedLayer, Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere, SphereBetweenPlates,
+    SphereOnWaveguide, TataraSphere,
 };
 pub use estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-pub use law::{ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, WaveguideLaw};
+pub use law::{
+    ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw, WaveguideLaw,
+};
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::{Intercept, StressStrainRegression};
+pub use select::{Candidates, ModulusSelection, select_estimator, sphere_as_sample, sphere_on_sample};
 pub(crate) use statistics::quantile_95;
 pub use warning::Warning;

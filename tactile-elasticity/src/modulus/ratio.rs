@@ -4,7 +4,8 @@ use super::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 use super::load::{Estimate, LoadState};
-use super::statistics::{common_mean, quantile_95};
+use super::source::{LogErrors, Source, finite};
+use super::statistics::{CommonMean, common_mean, effective_degrees, quantile_95};
 use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity, not_negative, positive};
 use crate::scalar::{narrow, widen};
@@ -32,11 +33,13 @@ pub enum StrainReference {
 /// and use [`HertzSphere`](super::HertzSphere) for a number.
 ///
 /// Several loads are averaged with the weights of their relative errors.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PaperRatio {
     reference: StrainReference,
     sphere_radius_m: Option<f64>,
     stress_scale_error: f64,
+    force_covariance: Option<DMatrix<f64>>,
+    strain_covariance: Option<DMatrix<f64>>,
 }
 
 impl PaperRatio {
@@ -72,34 +75,49 @@ impl PaperRatio {
         Ok(self)
     }
 
+    /// Covariance of the forces (N²), one row per load; replaces their standard errors.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`]; the size is checked against the loads.
+    pub fn with_force_covariance<T: RealField + Copy>(
+        mut self,
+        covariance: &DMatrix<T>,
+    ) -> Result<Self, ElasticityError> {
+        self.force_covariance = Some(finite(covariance, Quantity::Force)?);
+        Ok(self)
+    }
+
+    /// Covariance of the mean strains, one row per load (loads without a strain: zeros); replaces their standard errors. Strains
+    /// counted from one frame share its errors.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`]; the size is checked against the loads.
+    pub fn with_strain_covariance<T: RealField + Copy>(
+        mut self,
+        covariance: &DMatrix<T>,
+    ) -> Result<Self, ElasticityError> {
+        self.strain_covariance = Some(finite(covariance, Quantity::Strain)?);
+        Ok(self)
+    }
+
     fn ratios(&self, loads: &[LoadState<f64>]) -> Result<Vec<Ratio>, ElasticityError> {
         let mut ratios = Vec::new();
         let from_first = self.reference == StrainReference::FirstLoad;
         let base = if from_first { loads.first().map(|l| stress(0, l)).transpose()? } else { None };
         for (load, state) in loads.iter().enumerate().skip(usize::from(from_first)) {
             let Some(strain) = state.mean_strain else { continue };
-            let strain = strain.validated(Quantity::Strain)?;
-            let mut s = stress(load, state)?;
-            if let Some(base) = base {
-                s = Estimate {
-                    value: s.value - base.value,
-                    standard_error: s.standard_error.hypot(base.standard_error),
-                };
-            }
-            if s.value == 0.0 && from_first {
+            let strain = strain.validated(Quantity::Strain)?.value;
+            let stress_pa = stress(load, state)?.value - base.map_or(0.0, |b| b.value);
+            if stress_pa == 0.0 && from_first {
                 return Err(ElasticityError::EqualLoads);
             }
-            if strain.value == 0.0 {
+            if strain == 0.0 {
                 return Err(ElasticityError::ZeroStrain);
             }
-            if s.value * strain.value <= 0.0 {
-                return Err(ElasticityError::OppositeSigns { stress_pa: s.value, strain: strain.value });
+            if stress_pa * strain <= 0.0 {
+                return Err(ElasticityError::OppositeSigns { stress_pa, strain });
             }
-            ratios.push(Ratio {
-                load,
-                log: (s.value / strain.value).ln(),
-                variance: s.relative_error().powi(2) + strain.relative_error().powi(2),
-            });
+            ratios.push(Ratio { load, stress_pa, strain });
         }
         if ratios.is_empty() {
             let expected = if from_first { 2 } else { 1 };
@@ -107,63 +125,110 @@ impl PaperRatio {
         }
         Ok(ratios)
     }
+
+    /// Covariances of the ln E, from forces, areas and strains, each with its degrees of freedom.
+    ///
+    /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A.
+    fn sources(&self, loads: &[LoadState<f64>], ratios: &[Ratio]) -> Result<[LogErrors; 3], ElasticityError> {
+        let areas: Vec<_> = loads.iter().map(LoadState::area).collect();
+        let area_of = |k: usize| areas[k].map_or(1.0, |a| a.value);
+        let stress_slope = |i: usize, k: usize| {
+            let base = self.reference == StrainReference::FirstLoad && k == 0;
+            (f64::from(ratios[i].load == k) - f64::from(base)) / ratios[i].stress_pa
+        };
+        let slopes = |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(ratios.len(), loads.len(), f);
+        let by_force = slopes(&|i, k| stress_slope(i, k) / area_of(k));
+        let by_area = slopes(&|i, k| -stress_slope(i, k) * loads[k].force_n.value / area_of(k).powi(2));
+        let by_strain = slopes(&|i, k| -f64::from(ratios[i].load == k) / ratios[i].strain);
+        let forces: Vec<_> = loads.iter().map(|l| Some(l.force_n)).collect();
+        let strains: Vec<_> = loads.iter().map(|l| l.mean_strain).collect();
+        Ok([
+            Source::new(&forces, self.force_covariance.as_ref(), Quantity::Force)?.through(&by_force),
+            Source::new(&areas, None, Quantity::ContactArea)?.through(&by_area),
+            Source::new(&strains, self.strain_covariance.as_ref(), Quantity::Strain)?.through(&by_strain),
+        ])
+    }
+
+    fn warnings<T: RealField + Copy>(
+        &self,
+        loads: &[LoadState<f64>],
+        diagnostics: &[LoadDiagnostics<T>],
+        mean: &CommonMean,
+    ) -> Vec<Warning<T>> {
+        let mut warnings = strain_warnings(loads);
+        let on_sphere = |(load, d): (usize, &LoadDiagnostics<T>)| {
+            Some(Warning::RatioOnSphere { load, ratio: d.contact_ratio? })
+        };
+        warnings.extend(diagnostics.iter().enumerate().filter_map(on_sphere));
+        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
+        if mean.standard_error.is_infinite() {
+            warnings.push(Warning::NoErrorEstimate);
+        }
+        warnings
+    }
+
+    fn diagnose<T: RealField + Copy>(
+        &self,
+        loads: &[LoadState<f64>],
+        ratios: &[Ratio],
+        mean: &CommonMean,
+    ) -> Vec<LoadDiagnostics<T>> {
+        let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
+        for (d, state) in diagnostics.iter_mut().zip(loads) {
+            let ratio = self.sphere_radius_m.zip(state.contact_radius_m).map(|(radius, a)| a.value / radius);
+            d.contact_ratio = ratio.map(narrow);
+        }
+        for (r, &residual) in ratios.iter().zip(&mean.standardized_residuals) {
+            diagnostics[r.load].used = true;
+            diagnostics[r.load].youngs_modulus_pa = Some(narrow(r.log().exp()));
+            diagnostics[r.load].standardized_residual = Some(narrow(residual));
+        }
+        diagnostics
+    }
 }
 
 struct Ratio {
     load: usize,
-    log: f64,
-    variance: f64,
+    stress_pa: f64,
+    strain: f64,
+}
+
+impl Ratio {
+    fn log(&self) -> f64 {
+        (self.stress_pa / self.strain).ln()
+    }
 }
 
 /// Mean stress of a load with its error; the area must be above zero.
 pub(crate) fn stress(load: usize, state: &LoadState<f64>) -> Result<Estimate<f64>, ElasticityError> {
     let force = state.force_n.validated(Quantity::Force)?;
-    let (area, relative) = match (state.contact_area_m2, state.contact_radius_m) {
-        (Some(area), _) => {
-            let area = area.validated(Quantity::ContactArea)?;
-            (positive(area.value, Quantity::ContactArea)?, area.relative_error())
-        }
-        (None, Some(a)) => {
-            let a = a.validated(Quantity::ContactRadius)?;
-            positive(a.value, Quantity::ContactRadius)?;
-            (std::f64::consts::PI * a.value * a.value, 2.0 * a.relative_error())
-        }
-        (None, None) => return Err(ElasticityError::Missing { load, quantity: Quantity::ContactArea }),
-    };
-    let value = force.value / area;
-    Ok(Estimate { value, standard_error: (force.standard_error / area).hypot(value * relative) })
+    let quantity =
+        if state.contact_area_m2.is_some() { Quantity::ContactArea } else { Quantity::ContactRadius };
+    if let Some(radius) = state.contact_radius_m.filter(|_| state.contact_area_m2.is_none()) {
+        positive(radius.value, quantity)?;
+    }
+    let missing = ElasticityError::Missing { load, quantity: Quantity::ContactArea };
+    let area = state.area().ok_or(missing)?.validated(quantity)?;
+    positive(area.value, quantity)?;
+    let value = force.value / area.value;
+    let standard_error = (force.standard_error / area.value).hypot(value * area.relative_error());
+    let parts = [force, area].map(|e| (e.relative_error().powi(2), e.degrees_of_freedom));
+    Ok(Estimate { value, standard_error, degrees_of_freedom: effective_degrees(&parts) })
 }
 
 impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
     fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
         let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
         let ratios = self.ratios(&loads)?;
-        let shared = self.stress_scale_error.powi(2);
-        let covariance = DMatrix::from_fn(ratios.len(), ratios.len(), |i, j| {
-            shared + if i == j { ratios[i].variance } else { 0.0 }
-        });
-        let logs: Vec<f64> = ratios.iter().map(|r| r.log).collect();
+        let sources = self.sources(&loads, &ratios)?;
+        let shared = DMatrix::repeat(ratios.len(), ratios.len(), self.stress_scale_error.powi(2));
+        let covariance = sources.iter().fold(shared.clone(), |sum, s| sum + &s.0);
+        let logs: Vec<f64> = ratios.iter().map(Ratio::log).collect();
         let mean = common_mean(&logs, &covariance)?;
-        let reach = quantile_95(mean.degrees) * mean.standard_error;
+        let errors = sources.iter().map(|s| (&s.0, s.1)).chain([(&shared, None)]);
+        let reach = quantile_95(mean.degrees_from(errors)) * mean.standard_error;
         let modulus = mean.mean.exp();
-        let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
-        for (i, r) in ratios.iter().enumerate() {
-            diagnostics[r.load].used = true;
-            diagnostics[r.load].youngs_modulus_pa = Some(narrow(r.log.exp()));
-            diagnostics[r.load].standardized_residual = Some(narrow(mean.standardized_residuals[i]));
-        }
-        let mut warnings = strain_warnings(&loads);
-        for (load, state) in loads.iter().enumerate() {
-            if let (Some(radius), Some(a)) = (self.sphere_radius_m, state.contact_radius_m) {
-                let ratio = narrow(a.value / radius);
-                diagnostics[load].contact_ratio = Some(ratio);
-                warnings.push(Warning::RatioOnSphere { load, ratio });
-            }
-        }
-        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
-        if mean.standard_error.is_infinite() {
-            warnings.push(Warning::NoErrorEstimate);
-        }
+        let diagnostics = self.diagnose(&loads, &ratios, &mean);
         Ok(ModulusEstimate {
             youngs_modulus_pa: narrow(modulus),
             standard_error_pa: narrow(modulus * mean.standard_error),
@@ -172,9 +237,9 @@ impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
                 upper: reach.is_finite().then(|| narrow((mean.mean + reach).exp())),
             },
             estimator: EstimatorKind::PaperRatio,
+            warnings: self.warnings(&loads, &diagnostics, &mean),
             loads: diagnostics,
             fit: FitStatistics::new(ratios.len(), 1, mean.chi_squared, mean.minus_two_log_likelihood),
-            warnings,
         })
     }
 

@@ -5,7 +5,7 @@ use super::estimate::{
 };
 use super::load::{Estimate, LoadState};
 use super::ratio::{strain_warnings, stress};
-use super::statistics::{chi_squared_tail, quantile_95, t_tail};
+use super::statistics::{chi_squared_tail, effective_degrees, fewest, quantile_95, t_tail};
 use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity, not_negative};
 use crate::scalar::{narrow, widen};
@@ -177,6 +177,22 @@ impl StressStrainRegression {
         }
     }
 
+    /// Degrees of freedom of the slope's error: those of the scatter, or of the sources, the stresses counted as one.
+    fn degrees(&self, points: &[Point], line: &Line) -> Option<f64> {
+        if line.learnt {
+            return Some(line.degrees as f64);
+        }
+        let stress = points.iter().map(|p| p.stress.standard_error.powi(2)).sum::<f64>();
+        let strain = points.iter().map(|p| (line.slope * p.strain.standard_error).powi(2)).sum::<f64>();
+        // What the slope's error has of either, in proportion.
+        let unit = line.slope_error.powi(2) / (stress + strain);
+        effective_degrees(&[
+            (unit * stress, fewest(points.iter().map(|p| p.stress.degrees_of_freedom))),
+            (unit * strain, fewest(points.iter().map(|p| p.strain.degrees_of_freedom))),
+            ((line.slope * self.stress_scale_error).powi(2), None),
+        ])
+    }
+
     fn warnings<T: RealField + Copy>(&self, loads: &[LoadState<f64>], line: &Line) -> Vec<Warning<T>> {
         let mut warnings = strain_warnings(loads);
         warnings.extend(line.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
@@ -206,7 +222,7 @@ impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
             return Err(ElasticityError::OppositeSigns { stress_pa: p.0, strain: p.1 });
         }
         let error = line.slope_error.hypot(line.slope * self.stress_scale_error);
-        let reach = error * quantile_95(line.learnt.then_some(line.degrees));
+        let reach = error * quantile_95(self.degrees(&points, &line));
         let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
         for p in &points {
             let residual = p.stress.value - line.intercept - line.slope * p.strain.value;

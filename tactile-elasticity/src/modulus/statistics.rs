@@ -5,12 +5,25 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 /// Two-sided 95 % quantile of Student's t; of the normal distribution where `degrees` is None.
-pub(crate) fn quantile_95(degrees: Option<usize>) -> f64 {
+pub(crate) fn quantile_95(degrees: Option<f64>) -> f64 {
     const P: f64 = 0.975;
-    match degrees.and_then(|n| StudentsT::new(0.0, 1.0, n as f64).ok()) {
+    match degrees.and_then(|n| StudentsT::new(0.0, 1.0, n).ok()) {
         Some(t) => t.inverse_cdf(P),
         None => Normal::standard().inverse_cdf(P),
     }
+}
+
+/// ν = (Σ vᵢ)²/Σ (vᵢ²/νᵢ) of a sum of variances vᵢ, each learnt with νᵢ degrees of freedom (Welch 1947, Satterthwaite 1946); None
+/// where all are known.
+pub(crate) fn effective_degrees(parts: &[(f64, Option<f64>)]) -> Option<f64> {
+    let total: f64 = parts.iter().map(|p| p.0).sum();
+    let learnt: f64 = parts.iter().filter_map(|(v, degrees)| Some(v * v / (*degrees)?)).sum();
+    (learnt > 0.0).then(|| total * total / learnt)
+}
+
+/// The smallest of the degrees of freedom that are not infinite.
+pub(crate) fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    degrees.flatten().reduce(f64::min)
 }
 
 /// P(χ²_degrees > x).
@@ -30,12 +43,29 @@ pub(crate) struct CommonMean {
     /// Standard error, scaled up where the scatter exceeds the covariance.
     pub(crate) standard_error: f64,
     pub(crate) chi_squared: f64,
+    /// Of the measured forces and lengths with their true values fitted to the law. Given errors enter by χ² and a constant alone:
+    /// the covariance of ln E* depends on the law's slope, and would favour flat ones.
     pub(crate) minus_two_log_likelihood: f64,
     /// Degrees of freedom where the error was learnt from the scatter; None where it was given.
-    pub(crate) degrees: Option<usize>,
+    pub(crate) degrees: Option<f64>,
     /// χ²/ν where it was used to scale the error up.
     pub(crate) excess: Option<f64>,
     pub(crate) standardized_residuals: Vec<f64>,
+    /// Of every number in the mean; their sum is one.
+    pub(crate) weights: DVector<f64>,
+}
+
+impl CommonMean {
+    /// Degrees of freedom of the standard error; those of its independent sources, each with its covariance, where the scatter
+    /// did not tell it.
+    pub(crate) fn degrees_from<'a>(
+        &self,
+        sources: impl Iterator<Item = (&'a DMatrix<f64>, Option<f64>)>,
+    ) -> Option<f64> {
+        let variance = |c: &DMatrix<f64>| self.weights.dot(&(c * &self.weights));
+        let parts: Vec<_> = sources.map(|(c, degrees)| (variance(c), degrees)).collect();
+        self.degrees.or_else(|| effective_degrees(&parts))
+    }
 }
 
 /// The scatter is believed over the stated errors when χ² is this improbable.
@@ -54,7 +84,6 @@ pub(crate) fn common_mean(z: &[f64], covariance: &DMatrix<f64>) -> Result<Common
     let mean = weights.dot(&z) / information;
     let residual = &z - &ones * mean;
     let chi_squared = residual.dot(&factor.solve(&residual));
-    let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
     let degrees = n - 1;
     let scale = chi_squared / degrees.max(1) as f64;
     let excess = degrees > 0 && known && chi_squared_tail(chi_squared, degrees) < EXCESS_PROBABILITY;
@@ -70,13 +99,14 @@ pub(crate) fn common_mean(z: &[f64], covariance: &DMatrix<f64>) -> Result<Common
         standard_error: if !known && degrees == 0 { f64::INFINITY } else { variance.sqrt() },
         chi_squared,
         minus_two_log_likelihood: if known {
-            full + log_determinant + chi_squared
+            full + chi_squared
         } else {
             full + n as f64 * (1.0 + (chi_squared / n as f64).ln())
         },
-        degrees: (learnt && degrees > 0).then_some(degrees),
+        degrees: (learnt && degrees > 0).then_some(degrees as f64),
         excess: excess.then_some(scale),
         standardized_residuals,
+        weights: weights / information,
     })
 }
 
@@ -103,8 +133,8 @@ mod tests {
     #[test]
     fn quantiles_are_those_of_the_tables() {
         assert_relative_eq!(quantile_95(None), 1.959_963_984_540_054, max_relative = 1e-9);
-        assert_relative_eq!(quantile_95(Some(1)), 12.706_204_736_174_7, max_relative = 1e-7);
-        assert_relative_eq!(quantile_95(Some(10)), 2.228_138_851_964_94, max_relative = 1e-7);
+        assert_relative_eq!(quantile_95(Some(1.0)), 12.706_204_736_174_7, max_relative = 1e-7);
+        assert_relative_eq!(quantile_95(Some(10.0)), 2.228_138_851_964_94, max_relative = 1e-7);
     }
 
     #[test]

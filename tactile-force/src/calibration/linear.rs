@@ -6,6 +6,7 @@ use super::curve::extremes;
 use super::report::{self, Parameters, Shape};
 use super::{
     CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs, least_squares,
+    least_squares::Fit,
 };
 use crate::{Estimate, ForceError, Real};
 
@@ -37,41 +38,27 @@ impl<T: Real> LinearCalibration<T> {
     /// # Errors
     /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value only.
     pub fn fit(pairs: &[CalibrationPair<T>], options: &CalibrationOptions) -> Result<Self, ForceError> {
-        check_pairs(pairs, if options.through_origin { 1 } else { 2 })?;
+        let columns = if options.through_origin { 1 } else { 2 };
+        check_pairs(pairs, columns)?;
         let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value.as_f64()).collect();
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
-        let n = values.len() as f64;
-        let centre = if options.through_origin { 0.0 } else { values.iter().sum::<f64>() / n };
-        let scale = values.iter().map(|v| (v - centre).abs()).fold(0.0, f64::max);
-        let reach = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        if scale <= 4.0 * f64::EPSILON * reach || scale == 0.0 {
-            return Err(ForceError::DegeneratePairs { span: scale });
-        }
-        let columns = if options.through_origin { 1 } else { 2 };
+        let (centre, scale) = axis(&values, options.through_origin)?;
         let entry = |i: usize, j: usize| if j + 1 == columns { (values[i] - centre) / scale } else { 1.0 };
         let design = DMatrix::from_fn(values.len(), columns, entry);
         let fit = least_squares::solve(&design, &forces, options.robustness)?;
-        let last = columns - 1;
-        let slope = fit.coefficients[last] / scale;
-        let level = if columns == 2 { fit.coefficients[0] } else { 0.0 };
+        let line = Line::of(&fit, centre, scale);
         let shape = Shape {
             linearity_error: nonlinearity(&forces, &fit.residuals),
-            sensitivity: slope,
-            monotone: slope > 0.0,
+            sensitivity: line.slope.0,
+            monotone: line.slope.0 > 0.0,
         };
-        let (variance, covariance) =
-            if columns == 2 { (fit.covariance[(0, 0)], fit.covariance[(0, 1)] / scale) } else { (0.0, 0.0) };
-        let slope_variance = fit.covariance[(last, last)] / (scale * scale);
-        let offset =
-            (level - slope * centre, variance - 2.0 * covariance * centre + slope_variance * centre * centre);
-        let estimates =
-            if columns == 2 { vec![offset, (slope, slope_variance)] } else { vec![(slope, slope_variance)] };
-        let parameters = Parameters { estimates, degrees_of_freedom: pairs.len() - columns };
+        let parameters =
+            Parameters { estimates: line.parameters(), degrees_of_freedom: pairs.len() - columns };
         Ok(Self {
             centre: T::nearest(centre),
-            level_n: Estimate::nearest(level, variance),
-            slope_n: Estimate::nearest(slope, fit.covariance[(last, last)] / (scale * scale)),
-            covariance: T::nearest(covariance),
+            level_n: Estimate::nearest(line.level.0, line.level.1),
+            slope_n: Estimate::nearest(line.slope.0, line.slope.1),
+            covariance: T::nearest(line.covariance),
             range: extremes(&values).map(T::nearest),
             report: report::build(pairs, &fit, parameters, shape),
         })
@@ -85,6 +72,51 @@ impl<T: Real> LinearCalibration<T> {
     /// Force at zero pixel value, in newtons, with its standard error.
     pub fn offset_n(&self) -> Estimate<T> {
         Estimate { value: self.force_n(T::zero()), standard_error: self.standard_error_n(T::zero()) }
+    }
+}
+
+/// Centre and half width of the pixel values, which keep the two parameters apart.
+fn axis(values: &[f64], through_origin: bool) -> Result<(f64, f64), ForceError> {
+    let centre = if through_origin { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 };
+    let scale = values.iter().map(|v| (v - centre).abs()).fold(0.0, f64::max);
+    let reach = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    if scale <= 4.0 * f64::EPSILON * reach || scale == 0.0 {
+        return Err(ForceError::DegeneratePairs { span: scale });
+    }
+    Ok((centre, scale))
+}
+
+/// A fitted line in grey levels and newtons; values with their variances.
+struct Line {
+    centre: f64,
+    /// Force at the centre; exactly zero where the line goes through the origin.
+    level: (f64, f64),
+    slope: (f64, f64),
+    covariance: f64,
+    through_origin: bool,
+}
+
+impl Line {
+    fn of(fit: &Fit, centre: f64, scale: f64) -> Self {
+        let last = fit.coefficients.len() - 1;
+        let through_origin = last == 0;
+        let slope = (fit.coefficients[last] / scale, fit.covariance[(last, last)] / (scale * scale));
+        let (level, covariance) = if through_origin {
+            ((0.0, 0.0), 0.0)
+        } else {
+            ((fit.coefficients[0], fit.covariance[(0, 0)]), fit.covariance[(0, 1)] / scale)
+        };
+        Self { centre, level, slope, covariance, through_origin }
+    }
+
+    /// [offset, slope], or the slope alone through the origin.
+    fn parameters(&self) -> Vec<(f64, f64)> {
+        if self.through_origin {
+            return vec![self.slope];
+        }
+        let c = self.centre;
+        let variance = self.level.1 - 2.0 * self.covariance * c + self.slope.1 * c * c;
+        vec![(self.level.0 - self.slope.0 * c, variance), self.slope]
     }
 }
 

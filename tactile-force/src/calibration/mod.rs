@@ -94,6 +94,9 @@ pub struct ForceReading<T> {
     /// The part of the standard error that comes from the calibration's parameters, in newtons: it is the same for
     /// every frame read with one calibration.
     pub calibration_n: T,
+    /// Degrees of freedom of the standard error, for Student's t: the calibration's share was learnt from the scatter of a
+    /// few pairs, the frame's is known (Welch–Satterthwaite); `None` where the calibration adds nothing.
+    pub degrees_of_freedom: Option<T>,
     /// The pixel value lies outside the range the calibration was fitted on.
     pub out_of_range: bool,
 }
@@ -161,10 +164,14 @@ pub trait StressCalibration<T: Real>: Send + Sync {
         let noise_n = (self.sensitivity_n(v) * integrated_pixel_value.standard_error).abs();
         let calibration_n = self.standard_error_n(v);
         let [low, high] = self.range();
+        let standard_error = noise_n.hypot(calibration_n);
+        let share = (calibration_n / standard_error).powi(4);
+        let degrees = T::nearest(self.report().degrees_of_freedom as f64);
         ForceReading {
-            force_n: Estimate { value: self.force_n(v), standard_error: noise_n.hypot(calibration_n) },
+            force_n: Estimate { value: self.force_n(v), standard_error },
             noise_n,
             calibration_n,
+            degrees_of_freedom: (share > T::zero()).then(|| degrees / share),
             out_of_range: !(v >= low && v <= high),
         }
     }

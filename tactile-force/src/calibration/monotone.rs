@@ -80,13 +80,7 @@ impl<T: Real> MonotoneCalibration<T> {
         let residuals: Vec<f64> = pairs.iter().map(residual).collect();
         let weights = residuals.iter().map(|r| robust_weight(options.robustness, *r, scale)).collect();
         let fit = Fit { iterations, stop, ..Fit::without_coefficients(residuals, weights, scale) };
-        let forces: Vec<f64> = points.iter().map(|p| p.1).collect();
-        let grid: Vec<f64> = (0..=256).map(|k| low + (high - low) * f64::from(k) / 256.0).collect();
-        let shape = Shape {
-            linearity_error: report::linearity_error(&values, &forces, &grid, curve)?,
-            sensitivity: (curve(high) - curve(low)) / (high - low),
-            monotone: true,
-        };
+        let shape = shape(&points, &knots)?;
         let parameters = Parameters::levels(
             &blocks.iter().map(|b| (b.force, scale, b.count)).collect::<Vec<_>>(),
             pairs.len(),
@@ -97,6 +91,19 @@ impl<T: Real> MonotoneCalibration<T> {
             range: [T::nearest(low), T::nearest(high)],
         })
     }
+}
+
+/// What the report says of the joined cubics.
+fn shape(points: &[(f64, f64)], knots: &[Knot<f64>]) -> Result<Shape, ForceError> {
+    let (values, forces): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+    let [low, high] = extremes(&values);
+    let curve = |v: f64| evaluate(knots, v).0;
+    let grid: Vec<f64> = (0..=256).map(|k| low + (high - low) * f64::from(k) / 256.0).collect();
+    Ok(Shape {
+        linearity_error: report::linearity_error(&values, &forces, &grid, curve)?,
+        sensitivity: (curve(high) - curve(low)) / (high - low),
+        monotone: true,
+    })
 }
 
 /// Pools, with the weights of outliers lowered until they settle; also the number of solves and why they stopped.

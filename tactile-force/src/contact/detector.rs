@@ -93,8 +93,9 @@ impl ContactDetector {
             workspace.region.place = None;
             return Ok(none);
         };
-        let noise = self.noise(workspace, reference, &drift);
-        let contact = self.summarise(&workspace.region, extent, frame, &noise)?;
+        let peak = peak(&workspace.region);
+        let noise = self.noise(workspace, reference, &drift, peak);
+        let contact = self.summarise(&workspace.region, extent, peak, frame, &noise)?;
         Ok(Detection { statistics, drift, noise: Some(noise), contact: Some(contact) })
     }
 
@@ -185,6 +186,7 @@ impl ContactDetector {
         workspace: &mut DetectorWorkspace,
         reference: &ReferenceFrame,
         drift: &Drift,
+        peak: f32,
     ) -> DifferenceNoise {
         let DetectorWorkspace { region, histogram, .. } = workspace;
         let (x, y) = region.bounds(&region.mask).map_or((0.0, 0.0), |b| b.middle());
@@ -196,7 +198,7 @@ impl ContactDetector {
         let [common, scale] = drift.variances(x, y);
         let gain = match reference.known_gain() {
             Some(gain) => gain / light,
-            None => noise::gain(region, histogram, background, peak(region)),
+            None => noise::gain(region, histogram, background, peak),
         };
         DifferenceNoise { background, gain, common: common / (light * light), scale, flat_field }
     }
@@ -205,6 +207,7 @@ impl ContactDetector {
         &self,
         region: &Region,
         extent: Extent,
+        peak: f32,
         frame: ArrayView2<'_, u8>,
         noise: &DifferenceNoise,
     ) -> Result<Contact<T>, ForceError> {
@@ -227,7 +230,7 @@ impl ContactDetector {
             equivalent_radius_px: T::nearest((extent.area as f64 / std::f64::consts::PI).sqrt()),
             integrated_pixel_value: Estimate::nearest(sums.sum(), sums.variance(noise)),
             centroid_px: [centroid(0), centroid(1)],
-            peak: T::nearest(f64::from(peak(region))),
+            peak: T::nearest(f64::from(peak)),
             aperture_px: region.aperture.iter().map(Run::len).sum(),
             saturated_px,
             other_contacts: extent.others,

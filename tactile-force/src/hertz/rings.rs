@@ -63,6 +63,8 @@ pub(crate) struct Rings {
     rings: Vec<Ring>,
 }
 
+/// Pixels well inside the edge beyond which rows are left out there: the profile is flat and they only repeat each other.
+const ENOUGH: f64 = 32768.0;
 /// Rings per pixel of distance near the edge.
 const PER_PIXEL: f64 = 4.0;
 /// How far inside the edge the rings are thin: there a² − r² is twenty times its change across a wide ring.
@@ -79,7 +81,8 @@ impl Rings {
     pub(super) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         self.rings.clear();
         let wide = (radius - EDGE).max(0.0).floor();
-        let gather = Gather { rings: &mut self.rings, region, centre, aspect, wide };
+        let stride = (std::f64::consts::PI * wide * wide / aspect / ENOUGH).max(1.0) as u32;
+        let gather = Gather { rings: &mut self.rings, region, centre, aspect, wide, stride };
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
             return simd.vectorize(gather);
@@ -95,6 +98,8 @@ struct Gather<'a> {
     aspect: f64,
     /// Distance up to which rings are one pixel wide.
     wide: f64,
+    /// Of the rows inside that distance every so many are gathered.
+    stride: u32,
 }
 
 impl Gather<'_> {
@@ -104,13 +109,33 @@ impl Gather<'_> {
         let thin = PER_PIXEL * r - (PER_PIXEL - 1.0) * self.wide;
         (if thin > r { thin } else { r }) as i32 as usize
     }
+
+    /// The pixels of a row that lie inside the distance `wide`.
+    #[inline(always)]
+    fn inner(&self, v: f64, first: f64, len: usize) -> std::ops::Range<usize> {
+        let half = (self.wide * self.wide - v * v).max(0.0).sqrt();
+        let at = |u: f64| ((u - first).max(0.0) as usize).min(len);
+        let (start, end) = (at(-half), at(half));
+        if start < end { start..end } else { 0..0 }
+    }
+
+    /// Adds pixels side by side, the first at (u, v).
+    #[inline(always)]
+    fn row(&mut self, v: f64, mut u: f64, differences: &[f32]) {
+        for d in differences {
+            let r2 = u * u + v * v;
+            let ring = self.ring(r2.sqrt());
+            self.rings[ring].add(u, v, r2, f64::from(*d));
+            u += 1.0;
+        }
+    }
 }
 
 impl pulp::NullaryFnOnce for Gather<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
+    fn call(mut self) {
         let columns = self.region.columns();
         for run in &self.region.aperture {
             let v = (f64::from(run.row) - self.centre[1]) * self.aspect;
@@ -120,13 +145,10 @@ impl pulp::NullaryFnOnce for Gather<'_> {
             if needed > self.rings.len() {
                 self.rings.resize(needed, Ring::default());
             }
-            let mut u = first;
-            for d in &self.region.difference[run.span(columns)] {
-                let r2 = u * u + v * v;
-                let ring = self.ring(r2.sqrt());
-                self.rings[ring].add(u, v, r2, f64::from(*d));
-                u += 1.0;
-            }
+            let pixels = &self.region.difference[run.span(columns)];
+            let inner = if run.row % self.stride == 0 { 0..0 } else { self.inner(v, first, pixels.len()) };
+            self.row(v, first, &pixels[..inner.start]);
+            self.row(v, first + inner.end as f64, &pixels[inner.end..]);
         }
     }
 }

@@ -7,7 +7,8 @@ use crate::modulus::estimate::{
 };
 use crate::modulus::law::{ContactLaw, LogForce};
 use crate::modulus::load::{Estimate, LoadState};
-use crate::modulus::statistics::{CommonMean, common_mean, quantile_95};
+use crate::modulus::source::{LogErrors, checked};
+use crate::modulus::statistics::{CommonMean, common_mean, fewest, quantile_95};
 use crate::modulus::warning::Warning;
 use crate::scalar::{narrow, widen};
 use nalgebra::{DMatrix, RealField};
@@ -44,27 +45,28 @@ impl<L: ContactLaw> ContactEstimator<L> {
         Ok(all)
     }
 
-    /// Covariance of the ln E*.
-    fn covariance(&self, all: &[Observation], loads: usize) -> Result<DMatrix<f64>, ElasticityError> {
-        if let Some(c) = &self.force_covariance {
-            let (expected, found) = (loads, if c.nrows() == loads { c.ncols() } else { c.nrows() });
-            if found != expected {
-                return Err(ElasticityError::LengthMismatch { quantity: Quantity::Force, expected, found });
-            }
-        }
-        Ok(DMatrix::from_fn(all.len(), all.len(), |i, j| {
-            let (p, q) = (&all[i], &all[j]);
-            let force = match &self.force_covariance {
-                Some(c) => c[(p.load, q.load)] / (p.force.value * q.force.value),
-                None if p.load == q.load => p.force.relative_error().powi(2),
-                None => 0.0,
-            };
-            let own = if i == j { (p.log_force.slope * p.length.relative_error()).powi(2) } else { 0.0 };
-            let shared = self.force_scale_error.powi(2)
-                + p.log_force.slope * q.log_force.slope * self.length_scale_error.powi(2)
-                + p.log_force.size_slope * q.log_force.size_slope * self.size_error.powi(2);
-            force + own + shared
-        }))
+    /// Covariances of the ln E*, with their degrees of freedom: of forces, of lengths, of what all have in common.
+    fn sources(&self, all: &[Observation], loads: usize) -> Result<[LogErrors; 3], ElasticityError> {
+        let given = self.force_covariance.as_ref().map(|c| checked(c, loads, Quantity::Force)).transpose()?;
+        let over = |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(all.len(), all.len(), f);
+        let forces = over(&|i, j| match given {
+            Some(c) => c[(all[i].load, all[j].load)] / (all[i].force.value * all[j].force.value),
+            None if all[i].load == all[j].load => all[i].force.relative_error().powi(2),
+            None => 0.0,
+        });
+        let own = |o: &Observation| (o.log_force.slope * o.length.relative_error()).powi(2);
+        let lengths = over(&|i, j| if i == j { own(&all[i]) } else { 0.0 });
+        let shared = over(&|i, j| {
+            let (p, q) = (all[i].log_force, all[j].log_force);
+            self.force_scale_error.powi(2)
+                + p.slope * q.slope * self.length_scale_error.powi(2)
+                + p.size_slope * q.size_slope * self.size_error.powi(2)
+        });
+        Ok([
+            (forces, fewest(all.iter().map(|o| o.force.degrees_of_freedom))),
+            (lengths, fewest(all.iter().map(|o| o.length.degrees_of_freedom))),
+            (shared, None),
+        ])
     }
 
     /// E of the sample at a given ln E*; None where the other body leaves no compliance.
@@ -82,7 +84,9 @@ impl<L: ContactLaw> ContactEstimator<L> {
     ) -> Result<(Vec<Observation>, CommonMean), ElasticityError> {
         let all = self.observe(loads, share)?;
         let logs: Vec<f64> = all.iter().map(|o| o.log_modulus).collect();
-        let mean = common_mean(&logs, &self.covariance(&all, loads.len())?)?;
+        let sources = self.sources(&all, loads.len())?;
+        let mut mean = common_mean(&logs, &(&sources[0].0 + &sources[1].0 + &sources[2].0))?;
+        mean.degrees = mean.degrees_from(sources.iter().map(|s| (&s.0, s.1)));
         Ok((all, mean))
     }
 

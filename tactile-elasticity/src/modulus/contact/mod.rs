@@ -8,7 +8,10 @@
 
 mod fit;
 
-use super::law::{ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, WaveguideLaw};
+use super::law::{
+    ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw, WaveguideLaw,
+};
+use super::source::finite;
 use crate::contact::{Body, Bond, Waveguide};
 use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
 use crate::scalar::widen;
@@ -50,6 +53,8 @@ pub type Cone = ContactEstimator<ConeLaw>;
 pub type BondedLayer = ContactEstimator<LayerLaw>;
 /// A soft sphere squeezed beyond Hertz's reach.
 pub type TataraSphere = ContactEstimator<TataraLaw>;
+/// A soft sphere squeezed between the other body and a rigid plate: both contacts flatten.
+pub type SphereBetweenPlates = ContactEstimator<TwoContactsLaw>;
 /// A soft sphere on a waveguide that is not deep beside the contact: the integral equation with both bodies yielding.
 pub type SphereOnWaveguide = ContactEstimator<WaveguideLaw>;
 
@@ -114,6 +119,16 @@ impl ContactEstimator<TataraLaw> {
     }
 }
 
+impl ContactEstimator<TwoContactsLaw> {
+    /// A soft sphere of radius R (m) and Poisson ratio ν between the other body and a rigid plate.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        Self::from_law(TwoContactsLaw::new(radius_m)?, poisson_ratio)
+    }
+}
+
 impl ContactEstimator<WaveguideLaw> {
     /// A soft sphere of radius R (m) and Poisson ratio ν on a waveguide whose layers, taken in series, are one layer of their
     /// whole thickness.
@@ -175,11 +190,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
         mut self,
         covariance: &DMatrix<T>,
     ) -> Result<Self, ElasticityError> {
-        let covariance = covariance.map(widen);
-        if !covariance.iter().all(|x| x.is_finite()) {
-            return Err(ElasticityError::NotFinite { quantity: Quantity::Force });
-        }
-        self.force_covariance = Some(covariance);
+        self.force_covariance = Some(finite(covariance, Quantity::Force)?);
         Ok(self)
     }
 

@@ -26,6 +26,7 @@ pub struct LayerLaw {
     sphere: Sphere,
     radius_m: f64,
     thickness_m: f64,
+    bond: Bond,
     theory: LayerTheory,
     series: LayerSeries,
     kernel: LayerKernel,
@@ -51,6 +52,7 @@ impl LayerLaw {
             sphere: Sphere::new(radius_m)?,
             radius_m,
             thickness_m,
+            bond,
             theory,
             series,
             kernel,
@@ -92,6 +94,9 @@ impl ContactLaw for LayerLaw {
         match self.theory {
             LayerTheory::PublishedSeries => EstimatorKind::LayerPublishedSeries,
             LayerTheory::CorrectedSeries => EstimatorKind::LayerCorrectedSeries,
+            LayerTheory::IntegralEquation if self.bond == Bond::Free => {
+                EstimatorKind::FreeLayerIntegralEquation
+            }
             LayerTheory::IntegralEquation => EstimatorKind::LayerIntegralEquation,
         }
     }

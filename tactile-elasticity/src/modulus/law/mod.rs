@@ -3,10 +3,12 @@
 mod half_space;
 mod layer;
 mod tatara;
+mod two_contacts;
 
 pub use half_space::{ConeLaw, Punch, Sphere};
 pub use layer::{LayerLaw, LayerTheory, WaveguideLaw};
 pub use tatara::TataraLaw;
+pub use two_contacts::TwoContactsLaw;
 
 use crate::modulus::EstimatorKind;
 
