@@ -10,10 +10,13 @@ use ndarray::Array2;
 use tactile_sfs::*;
 use worst::Worst;
 
-fn integrators() -> [(&'static str, Box<dyn SlopeIntegrator<f64>>, Box<dyn SlopeIntegrator<f32>>); 3] {
+/// A method in both precisions.
+type Integrators = (&'static str, Box<dyn SlopeIntegrator<f64>>, Box<dyn SlopeIntegrator<f32>>);
+
+fn integrators() -> [Integrators; 3] {
     [
-        ("Frankot-Chellappa", Box::new(FrankotChellappa::default()), Box::new(FrankotChellappa::default())),
-        ("cosine Poisson", Box::new(CosinePoisson::default()), Box::new(CosinePoisson::default())),
+        ("Frankot-Chellappa", Box::new(FrankotChellappa::new()), Box::new(FrankotChellappa::new())),
+        ("cosine Poisson", Box::new(CosinePoisson::new()), Box::new(CosinePoisson::new())),
         (
             "masked least squares",
             Box::new(MaskedLeastSquares::default()),

@@ -100,7 +100,7 @@ fn singular_systems_are_said_to_be() {
         let spline = ThinPlateSpline::fit(&scaled, &targets, &FitOptions::new(NegR)).unwrap();
         assert_eq!(spline.report().rank, 2, "a line spans one direction at scale {scale}");
     }
-    let spline = ThinPlateSpline::fit(&one, &vec![targets[4]; 5], &FitOptions::new(NegR)).unwrap();
+    let spline = ThinPlateSpline::fit(&one, &[targets[4]; 5], &FitOptions::new(NegR)).unwrap();
     assert_eq!((spline.report().rank, spline.report().merged), (1, 4));
     let clash = ThinPlateSpline::fit(&one, &targets[..5], &FitOptions::new(NegR));
     assert!(matches!(clash, Err(TpsError::Conflict { .. })));
