@@ -143,6 +143,7 @@ fn print<const D: usize>(found: &Strain<D>, before: usize, after: usize, argumen
         let (mean, spread) = (at(&found.summary.mean), at(&found.summary.spread));
         println!("{name:<8} {mean:>12.6} {spread:>12.6} {:>12.6}", at(&found.standard_error));
     }
+    println!("(standard errors with {} degrees of freedom)", found.degrees_of_freedom);
 }
 
 fn json<const D: usize>(
@@ -171,6 +172,7 @@ fn json<const D: usize>(
         "left_out_as_misplaced": left_out(found),
         "noise_per_coordinate": found.sigma,
         "smoothing_over_squared_radius": found.relative_lambda,
+        "degrees_of_freedom": found.degrees_of_freedom,
         "folded_points": found.summary.folded,
         "strain": components,
     })
