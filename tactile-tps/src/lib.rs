@@ -27,6 +27,7 @@ mod kernel;
 mod logarithm;
 mod null_space;
 mod options;
+mod packed;
 #[cfg(feature = "rayon")]
 mod parallel;
 mod precise;

@@ -19,8 +19,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ///
     /// The same weights and λ cost two triangular solves; another λ without weights two products once the matrix is
     /// [decomposed](Self::decompose). Positive weights leave an interpolating spline as it is, and cost the two solves. With
-    /// λ > 0, weights near each other, or few that differ, are met by conjugate gradients on the decomposed matrix, to 1e-13
-    /// of the targets; weights far apart, or of zero, cost a factorisation without the set-up of the first.
+    /// λ > 0, up to sixteen weights that differ from the rest are met by a small system of their own, weights near each other
+    /// by conjugate gradients on the decomposed matrix, to 1e-13 of the targets; weights far apart, or of zero, cost a
+    /// factorisation. An iterative solver builds its preconditioner anew for another λ, or other weights beside one.
     ///
     /// # Errors
     /// [`TpsError`] for bad targets, weights or smoothing; the spline is then left as it was.

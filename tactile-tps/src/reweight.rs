@@ -1,4 +1,4 @@
-//! New weights without a new factorisation: conjugate gradients preconditioned by the spectrum at hand.
+//! New weights without a new factorisation, by the spectrum at hand: equations of the few that differ, or conjugate gradients.
 //!
 //! Weights enter the equations as a diagonal, (K + λW⁻¹) w + P a = y, Pᵀw = 0. With w = Q₂z, B = Q₂ᵀKQ₂ and any λ̄,
 //!
@@ -7,7 +7,9 @@
 //! and the spectrum of B gives C = (B + λ̄I)⁻¹ in one pass. A direction p = Cr + βp' has (B + λ̄I)p = r + β(B + λ̄I)p', so that
 //! a step costs one pass over the eigenvectors and no product with B (Eisenstat's trick, 1981). What C leaves is of
 //! condition at most (μ₁ + λ max W⁻¹)/(μ₁ + λ min W⁻¹) with μ₁ the least eigenvalue of B, and k weights apart from the rest
-//! are k directions: k + 1 steps.
+//! are k directions: k + 1 steps. A few are met at once instead, by their [own equations](Reweighting::few).
+
+use nalgebra::SMatrix;
 
 use crate::{
     cholesky::HEAD,
@@ -21,6 +23,8 @@ const TOLERANCE: f64 = 1e-13;
 const CONDITION: f64 = 1e8;
 /// A factorisation takes as long as one step for every so many points.
 const POINTS_PER_STEP: usize = 18;
+/// Weights apart from the rest up to which their own equations are solved.
+const FEW: usize = 16;
 
 /// λW⁻¹ at the active sites, and how far to go with it.
 pub(crate) struct Reweighting<'a> {
@@ -32,6 +36,8 @@ pub(crate) struct Reweighting<'a> {
     pub(crate) condition: f64,
     /// Steps after which a factorisation is cheaper.
     steps: usize,
+    /// How many weights are apart from the rest.
+    apart: usize,
 }
 
 impl<'a> Reweighting<'a> {
@@ -56,18 +62,113 @@ impl<'a> Reweighting<'a> {
         let apart = excess.iter().filter(|&&d| d != level).count();
         let steps = null.n / POINTS_PER_STEP;
         let good = least + low > 0.0 && condition < CONDITION;
-        if !good || f64::min(bound, apart as f64) + 1.0 > steps as f64 {
+        if !good || (apart > FEW && f64::min(bound, apart as f64) + 1.0 > steps as f64) {
             return None;
         }
         excess.clear();
         excess.extend(weights.iter().map(|w| lambda / w - level));
-        Some(Self { spectrum, null, level, condition, steps })
+        Some(Self { spectrum, null, level, condition, steps, apart })
+    }
+
+    /// By the equations of the few weights that differ (Woodbury 1950).
+    ///
+    /// With U the rows of Q₂ that carry an excess e, (A + UᵀeU)⁻¹b = A⁻¹(b − Uᵀt), (I + eUA⁻¹Uᵀ) t = eUA⁻¹b. All of it
+    /// happens among the coefficients of the eigenvectors, where A is diagonal.
+    fn few<const M: usize>(
+        &self,
+        b: &[f64],
+        excess: &[f64],
+        work: &mut Vec<f64>,
+        spare: &mut Vec<f64>,
+    ) -> Option<()> {
+        let (stride, spectrum) = (self.null.stride, self.spectrum);
+        self.units(excess, work, spare);
+        spare.clear();
+        spare.resize(M * stride, 0.0);
+        spectrum.coefficients::<M>(b, spare);
+        spectrum.divide(spare, self.level);
+        let length = work.len();
+        work.extend_from_within(..);
+        let (units, solved) = work.split_at_mut(length);
+        spectrum.divide(solved, self.level);
+        let t = self.reactions::<M>(excess, units, solved, spare)?;
+        for (m, found) in spare.chunks_exact_mut(stride).enumerate() {
+            for (i, solved) in solved.chunks_exact(stride).enumerate() {
+                found.iter_mut().zip(solved).for_each(|(c, s)| *c -= t[(i, m)] * s);
+            }
+        }
+        work.clear();
+        work.resize(2 * M * stride, 0.0);
+        let (x, product) = work.split_at_mut(M * stride);
+        spectrum.combine::<M>(spare, x);
+        self.diagonal(excess, x, product);
+        take_heads(x, product, stride);
+        Some(())
+    }
+
+    /// The t of [`few`](Self::few), from U, UA⁻¹ and A⁻¹b.
+    fn reactions<const M: usize>(
+        &self,
+        excess: &[f64],
+        units: &[f64],
+        solved: &[f64],
+        found: &[f64],
+    ) -> Option<SMatrix<f64, FEW, M>> {
+        let row = |data: &'_ [f64], i: usize, unit: usize| {
+            dot(
+                &units[unit * self.null.stride..][..self.null.stride],
+                &data[i * self.null.stride..][..self.null.stride],
+            )
+        };
+        let mut matrix = SMatrix::<f64, FEW, FEW>::identity();
+        let mut sides = SMatrix::<f64, FEW, M>::zeros();
+        for (i, e) in excess.iter().filter(|e| **e != 0.0).enumerate() {
+            // A row of large excess is scaled down.
+            let scale = 1.0 / f64::max(e.abs(), 1.0);
+            matrix[(i, i)] = scale;
+            (0..self.apart).for_each(|j| matrix[(i, j)] += scale * e * row(solved, j, i));
+            (0..M).for_each(|m| sides[(i, m)] = scale * e * row(found, m, i));
+        }
+        matrix.lu().solve_mut(&mut sides).then_some(sides)
+    }
+
+    /// The rows of Q₂ with an excess, as coefficients of the eigenvectors, one after the other in `units`.
+    fn units(&self, excess: &[f64], units: &mut Vec<f64>, group: &mut Vec<f64>) {
+        const GROUP: usize = 4;
+        let (stride, first) = (self.null.stride, self.null.rows().start);
+        let mut apart = (0..excess.len()).filter(|&i| excess[i] != 0.0);
+        units.clear();
+        for start in (0..self.apart).step_by(GROUP) {
+            group.clear();
+            group.resize(GROUP * stride, 0.0);
+            for (column, i) in group.chunks_exact_mut(stride).zip(&mut apart) {
+                column[first + i] = 1.0;
+                self.null.apply_transpose(column);
+            }
+            units.resize((start + GROUP) * stride, 0.0);
+            self.spectrum.coefficients::<GROUP>(group, &mut units[start * stride..]);
+        }
+        units.truncate(self.apart * stride);
     }
 
     /// Solves for `M` columns b = Q₂ᵀy, which it overwrites; z comes at the front of `work`, followed by Q₁ᵀEQ₂z
     /// in the places before the complement's. Returns the steps taken, `None` if they do
     /// not suffice.
     pub(crate) fn solve<const M: usize>(
+        &self,
+        b: &mut [f64],
+        excess: &[f64],
+        work: &mut Vec<f64>,
+        spare: &mut Vec<f64>,
+    ) -> Option<usize> {
+        if self.apart <= FEW {
+            return self.few::<M>(b, excess, work, spare).map(|()| 0);
+        }
+        self.iterate::<M>(b, excess, work, spare)
+    }
+
+    /// By conjugate gradients.
+    fn iterate<const M: usize>(
         &self,
         b: &mut [f64],
         excess: &[f64],
@@ -113,9 +214,7 @@ impl<'a> Reweighting<'a> {
             let residual = (0..M).map(|m| ratio(left[m], start[m]).sqrt()).fold(0.0, f64::max);
             if residual <= TOLERANCE {
                 self.diagonal(excess, x, product);
-                for (x, product) in x.chunks_exact_mut(stride).zip(product.chunks_exact(stride)) {
-                    x[..HEAD].copy_from_slice(&product[..HEAD]);
-                }
+                take_heads(x, product, stride);
                 return Some(step);
             }
         }
@@ -132,6 +231,13 @@ impl<'a> Reweighting<'a> {
             values.iter_mut().zip(excess).for_each(|(v, e)| *v *= e);
             self.null.apply_transpose(column);
         }
+    }
+}
+
+/// Copies the places before the complement's, column by column.
+fn take_heads(x: &mut [f64], from: &[f64], stride: usize) {
+    for (x, from) in x.chunks_exact_mut(stride).zip(from.chunks_exact(stride)) {
+        x[..HEAD].copy_from_slice(&from[..HEAD]);
     }
 }
 

@@ -141,7 +141,7 @@ impl<const D: usize> System<D> {
             self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
             self.null.apply_transpose(column);
         }
-        self.spectrum.as_ref().map(|spectrum| spectrum.cross_validate(work, n, spare))
+        self.spectrum.as_ref().map(|spectrum| spectrum.cross_validate::<M>(work, n, spare))
     }
 
     /// Solves for `M` outputs: `y` holds the values at all sites and receives the weights w; returns the affine parts.

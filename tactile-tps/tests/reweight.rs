@@ -35,15 +35,16 @@ fn weights(weight: impl FnMut(usize) -> f64) -> Vec<f64> {
     (0..POINTS).map(weight).collect()
 }
 
-/// Weights alike, or few that differ, are met by iteration; the tolerance of the iteration is 1e-13 of the targets, the
+/// Weights alike are met by iteration, few that differ by equations of their own; the tolerance of the iteration is 1e-13 of the targets, the
 /// direct solution's own rounding 1e-15 times a condition number of at most some 1e4 in the eigenvectors at hand.
 #[test]
-fn weights_that_differ_little_are_iterated() {
+fn weights_that_differ_little_are_no_new_factorisation() {
     let near = weights(|i| 1.0 + 0.003 * (i as f64).sin());
-    let few = weights(|i| if i % 60 == 7 { 0.01 } else { 1.0 });
+    let few = weights(|i| if i % 12 == 7 { [0.01, 1e-6, 30.0][i / 12 % 3] } else { 1.0 });
     for lambda in [1e-3, 0.1, 10.0] {
         for weights in [&near, &few] {
             let smoothing = Smoothing::Lambda(lambda);
+            let range = if std::ptr::eq(weights, &few) { 0..=0 } else { 1..=POINTS / 18 };
             for (difference, steps) in [
                 compare::<2, _>(R2LogR, weights, smoothing),
                 compare::<3, _>(R2LogR, weights, smoothing),
@@ -52,7 +53,7 @@ fn weights_that_differ_little_are_iterated() {
                 compare::<3, _>(R3, weights, smoothing),
             ] {
                 assert!(difference < 1e-11, "λ = {lambda}: {difference:e}");
-                assert!((1..=POINTS / 18).contains(&steps), "λ = {lambda}: {steps} steps");
+                assert!(range.contains(&steps), "λ = {lambda}: {steps} steps");
             }
         }
     }
