@@ -1,0 +1,72 @@
+//! Time against error: every knob that trades one for the other, stage by stage and for the whole pipeline.
+//!
+//! ```console
+//! cargo bench --bench work_precision              # some minutes
+//! cargo bench --bench work_precision -- --quick   # under two minutes: fewer repeats, smaller problems
+//! cargo bench --bench work_precision -- matching  # one study
+//! ```
+//! Writes `target/work_precision/STUDY.csv` and `.svg` (time on one axis, error on the other, the front drawn, defaults marked) and fails if
+//! a default lies more than 20 % behind the front of its study, that is, if some setting is at once more than 1.2 times faster and
+//! 1.2 times more accurate. A setting that is only faster, with the same error, is not counted against a default: read the table for these.
+//! With `--test` everything runs once and nothing is judged: one timing is none.
+#![allow(missing_docs, clippy::print_stdout)]
+
+mod elasticity;
+mod force;
+mod matching;
+mod optics;
+mod peers;
+mod picture;
+mod pipeline;
+mod sfs;
+mod study;
+mod tps;
+
+use std::path::Path;
+use std::process::ExitCode;
+use study::{Effort, Study};
+
+/// How far behind the front a default may lie.
+const WITHIN: f64 = 1.2;
+
+/// A name and what fills the study of that name.
+type Filler = (&'static str, fn(&mut Study));
+
+const STUDIES: [Filler; 10] = [
+    ("splines", tps::clean),
+    ("splines_noise", tps::noisy),
+    ("matching", matching::noisy),
+    ("matching_strays", matching::strays),
+    ("surfaces", sfs::surfaces),
+    ("slopes", sfs::slopes),
+    ("force", force::frame),
+    ("bootstrap", elasticity::bootstrap),
+    ("rays", optics::rays),
+    ("pipeline", pipeline::strain),
+];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let has = |flag: &str| arguments.iter().any(|a| a == flag);
+    let effort = if has("--test") {
+        Effort::Once
+    } else if has("--quick") {
+        Effort::Quick
+    } else {
+        Effort::Full
+    };
+    let named: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/target/work_precision"));
+    std::fs::create_dir_all(folder).expect("a folder for the results");
+    let mut behind = 0;
+    for (name, fill) in STUDIES.iter().filter(|(name, _)| named.is_empty() || named.iter().any(|n| n == name))
+    {
+        let mut study = Study::new(name, effort);
+        fill(&mut study);
+        study.write_csv(&folder.join(format!("{name}.csv"))).expect("a written table");
+        picture::save(&study, &folder.join(format!("{name}.svg"))).expect("a written picture");
+        behind += study.judge(WITHIN);
+    }
+    println!("results in {}", folder.display());
+    if behind == 0 || effort == Effort::Once { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
