@@ -8,7 +8,7 @@ use super::surface::SurfaceInput;
 use crate::elasticity::contact::Waveguide;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
-use crate::matching::{PointMatcher, RelaxationMatcher};
+use crate::matching::{PointMatcher, RelaxationMatcher, RelaxationOptions, Search};
 use crate::sfs::{ControlPointSampler, Eikonal, EquallySpaced, Lighting, Rim, SurfaceReconstruction};
 use crate::tps::{FitOptions, NegR, Smoothing, TpsError, Warp, WarpModel};
 use nalgebra::Point3;
@@ -137,7 +137,8 @@ impl<C> Pipeline<C> {
             contact,
             surface: surface.unwrap_or_else(|_| Eikonal::new(Lighting::frontal())),
             sampler: EquallySpaced::new(),
-            matcher: RelaxationMatcher::default(),
+            // Two loads of one contact lie near each other: one run from where they are.
+            matcher: RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near)),
             warp: FitOptions::new(NegR).smoothing(Smoothing::Gcv),
             strain: GreenLagrange,
             settings: Settings {
@@ -174,6 +175,7 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
         settings.surface_input = input;
         if input == SurfaceInput::Signal {
             settings.smoothing_px = 1;
+            settings.binning = Binning::Blocks(1);
         }
         Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
     }
@@ -227,7 +229,7 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
         self
     }
 
-    /// Sets the grid of the surface stage (default: every pixel).
+    /// Sets the grid of the surface stage (default [`Binning::Auto`] for shading, every pixel for signals).
     #[must_use]
     pub fn with_binning(mut self, binning: Binning) -> Self {
         self.settings.binning = binning;

@@ -24,6 +24,8 @@ struct Pace {
 const FAST: Pace = Pace { sigma: 0.3, rate: 0.75, least: 0.9, sweeps: 3 };
 /// From the best answer so far.
 const REHEAT: Pace = Pace { sigma: 0.1, rate: 0.9, least: 1.0, sweeps: 5 };
+/// The only try between sets that lie near each other.
+const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, sweeps: 3 };
 /// Further tries.
 const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, sweeps: 5 };
 /// So many points that an incomplete exact answer is not worth a second try.
@@ -46,10 +48,13 @@ impl RelaxationMatcher {
         (ws.starts, ws.stopped) = (0, false);
         ws.best.energy = f64::INFINITY;
         starts::centred(&ws.model, &ws.target, &mut ws.state.base);
-        let mut flow = self.attempt(ws, FAST, observe);
-        if self.options.search == Search::Thorough {
-            flow = self.try_further(ws, flow, observe);
-        }
+        let flow = match self.options.search {
+            Search::Near => self.attempt(ws, NEAR, observe),
+            Search::Thorough => {
+                let flow = self.attempt(ws, FAST, observe);
+                self.try_further(ws, flow, observe)
+            }
+        };
         if ws.starts > 1 || !self.is_exact(ws) {
             // Later runs have left their own fit behind.
             let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });

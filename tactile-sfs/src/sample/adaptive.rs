@@ -56,7 +56,7 @@ impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
                 lattice.weight[node] *= 1.0 + self.emphasis * (bend / mean).sqrt();
             }
         }
-        Ok(spread(&lattice, count, false))
+        Ok(spread(&lattice, count))
     }
 }
 

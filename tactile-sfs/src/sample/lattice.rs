@@ -6,8 +6,9 @@ use ndarray::ArrayView2;
 use crate::quality::slopes_at;
 use crate::{BoundingBox, Domain, Scalar, SfsError};
 
-/// Nodes per point the spacing is measured with, if the surface filled its box; more do not change it visibly.
-const NODES_PER_POINT: usize = 25;
+/// Nodes per point the areas are measured with, if the surface filled its box: with every pixel of most surfaces points
+/// follow a surface that grows or moves to a hundredth of a pixel, with every other pixel to a third.
+const NODES_PER_POINT: usize = 100;
 /// Fewest nodes per point that leave points room to move.
 const ROOM: usize = 8;
 
@@ -53,7 +54,7 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         let domain = Domain { mask, pixel_size_m, known_heights: None };
         let area = domain.validate(rows, columns)?;
         let wanted = NODES_PER_POINT * points.max(1);
-        let mut stride = ((area.area() as f64 / wanted as f64).sqrt().round() as usize).max(1);
+        let mut stride = (area.area() / wanted).isqrt().max(1);
         loop {
             let lattice = Self::with_stride(surface, domain, area, stride);
             if stride == 1 || lattice.has_room_for(points) {
@@ -120,54 +121,42 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         self.domain.pixel_size_m[1].as_f64() / self.domain.pixel_size_m[0].as_f64()
     }
 
-    /// Heights of all nodes in units of the lattice's spacing along x, from that of the first; NaN where there is no node.
-    pub(super) fn heights(&self) -> Vec<f32> {
-        let unit = self.domain.pixel_size_m[0].as_f64() * self.stride as f64;
-        let height = |node: usize| self.surface[self.pixel(node)].as_f64();
-        let on = |node: &usize| self.weight[*node] > 0.0;
-        let start = (0..self.weight.len()).find(on).map_or(0.0, height);
-        (0..self.weight.len())
-            .map(|node| if on(&node) { ((height(node) - start) / unit) as f32 } else { f32::NAN })
-            .collect()
-    }
-
-    /// Whether a pixel lies on the surface.
-    fn is_on(&self, [row, column]: [usize; 2]) -> bool {
-        self.surface.get([row, column]).is_some_and(|z| z.is_finite()) && self.domain.contains(row, column)
-    }
-
-    /// The point at the pixel nearest to a place (x, y) in units of the lattice, among those of a node's own cell; at the
-    /// node's pixel where that is not on the surface.
-    pub(super) fn snapped(&self, node: usize, [x, y]: [f32; 2]) -> Point3<T> {
-        let at = self.pixel(node);
-        let stride = self.stride as f32;
-        // The cells of two nodes share no pixel: offsets run from −stride/2 to (stride − 1)/2.
-        let (low, high) = (-(self.stride as i64 / 2), (self.stride as i64 - 1) / 2);
-        let offset = |place: f32, index: usize| {
-            (((place - index as f32) * stride).round() as i64).clamp(low, high) as isize
+    /// The point at a place (x, y) of the lattice, its height interpolated, and the pixel it lies in; where that is not
+    /// inside the surface, the nearest node.
+    pub(super) fn point_near(&self, [x, y]: [f64; 2]) -> ([usize; 2], Point3<T>) {
+        let place = |start: usize, length: usize, at: f64| {
+            (start + Self::first(self.stride, length)) as f64 + at * self.stride as f64
         };
-        let row = at[0].checked_add_signed(offset(y, node / self.columns));
-        let column = at[1].checked_add_signed(offset(x, node % self.columns));
-        let near = row.zip(column).map(|(row, column)| [row, column]);
-        self.point(near.filter(|&near| self.is_on(near)).unwrap_or(at))
-    }
-
-    /// The point of the surface at a place between pixels, by bilinear interpolation; `None` where one of the pixels around is
-    /// not on the surface.
-    pub(super) fn between(&self, [x, y]: [f32; 2]) -> Option<Point3<T>> {
-        let [first_row, first_column] = self.pixel(0);
-        let at = |place: f32, first: usize| first as f64 + f64::from(place) * self.stride as f64;
-        let (x, y) = (at(x, first_column), at(y, first_row));
-        let (row, column) = (y as usize, x as usize);
-        let (u, v) = (T::of(x.fract()), T::of(y.fract()));
-        let corner = |dr: usize, dc: usize| {
-            let at = [row + dr, column + dc];
-            self.is_on(at).then(|| self.surface[at])
+        let column = place(self.area.left, self.area.columns, x);
+        let row = place(self.area.top, self.area.rows, y);
+        let Some(height) = self.height_at(row, column) else {
+            let pixel = self.pixel(self.nearest([x, y]));
+            return (pixel, self.point(pixel));
         };
-        let (above, below) = ((corner(0, 0)?, corner(0, 1)?), (corner(1, 0)?, corner(1, 1)?));
-        let line = |(a, b): (T, T)| a + u * (b - a);
         let [hx, hy] = self.domain.pixel_size_m;
-        Some(Point3::new(T::of(x) * hx, T::of(y) * hy, line(above) + v * (line(below) - line(above))))
+        let point = Point3::new(T::of(column) * hx, T::of(row) * hy, height);
+        ([row.round() as usize, column.round() as usize], point)
+    }
+
+    /// The node on the surface nearest to a place.
+    fn nearest(&self, [x, y]: [f64; 2]) -> usize {
+        let distance = |node: &usize| {
+            let (dx, dy) = ((node % self.columns) as f64 - x, (node / self.columns) as f64 - y);
+            dx.hypot(dy * self.aspect())
+        };
+        self.nodes().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    }
+
+    /// Height between four pixels, bilinear; `None` unless all four lie on the surface.
+    fn height_at(&self, row: f64, column: f64) -> Option<T> {
+        let (r, c) = (row.floor() as usize, column.floor() as usize);
+        let (down, right) = (T::of(row - r as f64), T::of(column - c as f64));
+        let height = |row: usize, column: usize| {
+            let z = self.surface.get([row, column]).copied().filter(|z| z.is_finite())?;
+            self.domain.contains(row, column).then_some(z)
+        };
+        let along = |row: usize| Some(height(row, c)? * (T::one() - right) + height(row, c + 1)? * right);
+        Some(along(r)? * (T::one() - down) + along(r + 1)? * down)
     }
 
     /// The point at a pixel, in metres.

@@ -1,10 +1,10 @@
 //! Control points on a surface: the trait and its implementations.
 
 mod adaptive;
+mod crowded;
 mod equally_spaced;
 mod lattice;
 mod random;
-mod relax;
 mod strips;
 
 use nalgebra::Point3;
@@ -18,9 +18,9 @@ use crate::{Scalar, SfsError};
 
 /// A way to choose control points on a surface.
 ///
-/// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel, at the centres of pixels
-/// unless the sampler says otherwise. None lies outside the mask or where the height is not finite, no two coincide, and the same input gives the same points.
-/// Exactly `count` points are returned. Object safe.
+/// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel; between pixels the height is
+/// interpolated. None lies outside the mask or where the height is not finite, no two coincide, and the same input gives
+/// the same points. Exactly `count` points are returned. Object safe.
 ///
 /// ```
 /// use ndarray::Array2;
