@@ -58,6 +58,28 @@ fn the_warp_goes_through_every_point_of_a_large_set() {
     all_right::<2>(502);
 }
 
+/// A jittered sunflower: nearly regular, so that a whole part may settle one point aside and support itself there.
+#[test]
+fn a_dense_nearly_regular_set_does_not_slip() {
+    let n = 842;
+    let model: Vec<Point2<f64>> = (0..n)
+        .map(|i| {
+            let (r, angle) = (((i as f64 + 0.5) / n as f64).sqrt(), 2.399_963 * i as f64);
+            let jitter = |k: usize| 0.5 * (scatter(i, k) - 0.5) / (n as f64).sqrt();
+            Point2::new(r * angle.cos() + jitter(0), r * angle.sin() + jitter(1))
+        })
+        .collect();
+    let bulge = |p: &Point2<f64>| {
+        let pull = |x: f64, y: f64| (-((p.x - x).powi(2) + (p.y - y).powi(2)) / 1.28).exp();
+        Point2::new(p.x + 0.15 * pull(0.5, 0.2) - 0.1 * pull(-0.6, 0.4), p.y - 0.2 * pull(-0.2, -0.6))
+    };
+    let partner: Vec<usize> = (0..n).map(|i| (5 * i + 3) % n).collect();
+    let mut target = vec![Point2::origin(); n];
+    partner.iter().zip(&model).for_each(|(&j, p)| target[j] = bulge(p));
+    let found = RelaxationMatcher::default().match_points(&model, &target).unwrap();
+    assert!(found.assignment.iter().zip(&partner).all(|(a, &j)| *a == Some(j)));
+}
+
 #[test]
 fn units_and_origin_do_not_matter() {
     let model = cloud::<2>(52);

@@ -30,6 +30,10 @@ const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, sweeps: 3 };
 const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, sweeps: 5 };
 /// So many points that an incomplete exact answer is not worth a second try.
 const MANY: usize = 500;
+/// First temperatures of further reheats of so many points, in spacings of the targets.
+const MENDS: [f64; 5] = [0.5, 0.15, 0.15, 0.5, 0.15];
+/// Share of the smaller set that an exact answer should match.
+const COMPLETE: f64 = 0.98;
 /// Residuals are judged no finer than this.
 const RESOLUTION: f64 = 0.01;
 
@@ -72,7 +76,7 @@ impl RelaxationMatcher {
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         if flow.is_continue() && !self.is_exact(ws) {
-            flow = self.reheat(ws, observe);
+            flow = self.mend(ws, observe);
         }
         if flow.is_continue() && !self.is_exact(ws) {
             starts::centred(&ws.model, &ws.target, &mut ws.state.base);
@@ -96,7 +100,7 @@ impl RelaxationMatcher {
             flow = self.attempt(ws, SLOW, observe);
         }
         if flow.is_continue() && !self.is_exact(ws) && ws.starts > 2 {
-            flow = self.reheat(ws, observe);
+            flow = self.reheat(ws, REHEAT.sigma, observe);
         }
         if flow.is_continue() && ws.best.sigma > finish::CLEAN {
             self.fit_scales(ws);
@@ -157,18 +161,39 @@ impl RelaxationMatcher {
     /// Whether the best run so far explains nearly every point of the smaller set to rounding.
     fn is_exact<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
-        let wanted = if ws.starts == 1 || points < MANY { 0.98 } else { 0.8 };
+        let wanted = if ws.starts == 1 || points < MANY { COMPLETE } else { 0.8 };
         ws.best.sigma <= finish::CLEAN && ws.best.matched >= wanted * points as f64
+    }
+
+    /// Reheats. A dense set again and again, below the targets' spacing, so that it does not slip by one point: what is right
+    /// then spreads from its border.
+    fn mend<const D: usize>(
+        &self,
+        ws: &mut RelaxationWorkspace<D>,
+        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let points = ws.model.len().min(ws.target.len());
+        let spacing = (ws.annealer.volume / ws.target.len() as f64).powf(1.0 / D as f64);
+        let dense = if points < MANY { &[][..] } else { &MENDS };
+        self.reheat(ws, REHEAT.sigma, observe)?;
+        for part in dense {
+            if ws.best.matched >= COMPLETE * points as f64 {
+                break;
+            }
+            self.reheat(ws, REHEAT.sigma.min(part * spacing), observe)?;
+        }
+        ControlFlow::Continue(())
     }
 
     /// A short run from the best answer so far: warm enough to mend parts that went astray.
     fn reheat<const D: usize>(
         &self,
         ws: &mut RelaxationWorkspace<D>,
+        sigma: f64,
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         ws.state.copy_from(&ws.best);
-        self.refine(ws, REHEAT, observe)
+        self.refine(ws, Pace { sigma, ..REHEAT }, observe)
     }
 
     /// A run from `ws.state.base` itself.
