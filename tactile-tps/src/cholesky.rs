@@ -6,16 +6,13 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::triangular::Solve;
+use crate::{
+    tiles::{BLOCK, DEPTH, Strips, load, tile},
+    triangular::Solve,
+};
 
 /// Columns of a panel, and the multiple the matrix is padded to.
 pub(crate) const PANEL: usize = 8;
-/// Columns of a block.
-const BLOCK: usize = 64;
-/// Depth to which tiles gather before they are written back, so that a packed strip stays in the first-level cache.
-const DEPTH: usize = 128;
-/// Rows of the tallest strip: three vectors of eight.
-const TALL: usize = 24;
 
 /// Rows and columns before the matrix proper, which the caller may use.
 pub(crate) const HEAD: usize = 8;
@@ -99,13 +96,6 @@ impl Cholesky {
     }
 }
 
-/// `V` vectors of `simd` from `column[row..]`.
-#[inline(always)]
-pub(crate) fn load<S: Simd, const V: usize>(column: &[f64], row: usize) -> [S::f64s; V] {
-    let vectors = S::as_simd_f64s(&column[row..row + V * S::F64_LANES]).0;
-    core::array::from_fn(|v| vectors[v])
-}
-
 struct Factor<'a> {
     l: &'a mut [f64],
     stride: usize,
@@ -119,7 +109,7 @@ impl WithSimd for Factor<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { l, stride, order, reciprocal } = self;
-        let mut packed = Packed { strip: [0.0; TALL * DEPTH], block: [0.0; BLOCK * DEPTH] };
+        let mut packed = Strips::new();
         for block in (0..order).step_by(BLOCK) {
             let end = order.min(block + BLOCK);
             for depth in (0..block).step_by(DEPTH) {
@@ -132,75 +122,6 @@ impl WithSimd for Factor<'_> {
             }
         }
         Ok(())
-    }
-}
-
-/// Copies that bring what a tile reads next to each other: columns lie pages apart.
-struct Packed {
-    strip: [f64; TALL * DEPTH],
-    block: [f64; BLOCK * DEPTH],
-}
-
-impl Packed {
-    /// Subtracts what the columns `earlier` contribute to the `columns`, strip of rows by strip of rows.
-    #[inline(always)]
-    fn update<S: Simd>(
-        &mut self,
-        simd: S,
-        l: &mut [f64],
-        stride: usize,
-        order: usize,
-        earlier: core::ops::Range<usize>,
-        columns: core::ops::Range<usize>,
-    ) {
-        let depth = earlier.len();
-        let (left, right) = l.split_at_mut(columns.start * stride);
-        let left = &left[earlier.start * stride..earlier.end * stride];
-        for (panel, block) in columns.clone().step_by(PANEL).zip(self.block.chunks_exact_mut(PANEL * DEPTH)) {
-            for (to, from) in block.chunks_exact_mut(PANEL).zip(left.chunks_exact(stride)) {
-                to.copy_from_slice(&from[panel..panel + PANEL]);
-            }
-        }
-        let tall = 3 * S::F64_LANES;
-        let mut row = columns.start;
-        while row < order {
-            let whole = row + tall <= order;
-            let height = if whole { tall } else { S::F64_LANES };
-            let strip = &mut self.strip[..depth * height];
-            for (to, from) in strip.chunks_exact_mut(height).zip(left.chunks_exact(stride)) {
-                to.copy_from_slice(&from[row..row + height]);
-            }
-            // Panels that begin below the strip's last row lie above the diagonal.
-            let panels = columns.clone().step_by(PANEL).take_while(|&column| column < row + height);
-            for (column, block) in panels.zip(self.block.chunks_exact(PANEL * DEPTH)) {
-                let panel = &mut right[(column - columns.start) * stride..];
-                if whole {
-                    wide::<S, 3>(simd, strip, &block[..depth * PANEL], panel, stride, row);
-                } else {
-                    wide::<S, 1>(simd, strip, &block[..depth * PANEL], panel, stride, row);
-                }
-            }
-            row += height;
-        }
-    }
-}
-
-/// One packed strip of one panel: as wide a tile as the registers hold.
-#[inline(always)]
-fn wide<S: Simd, const V: usize>(
-    simd: S,
-    a: &[f64],
-    b: &[f64],
-    panel: &mut [f64],
-    stride: usize,
-    row: usize,
-) {
-    let steps = || a.chunks_exact(V * S::F64_LANES).zip(b.chunks_exact(PANEL));
-    if S::F64_LANES >= 8 {
-        tile::<S, V, 8>(simd, steps(), panel, stride, row);
-    } else {
-        tile::<S, V, 4>(simd, steps().map(|(a, b)| (a, &b[..4])), panel, stride, row);
-        tile::<S, V, 4>(simd, steps().map(|(a, b)| (a, &b[4..])), &mut panel[4 * stride..], stride, row);
     }
 }
 
@@ -252,35 +173,6 @@ fn strip<S: Simd, const V: usize>(
     } else {
         tile::<S, V, 4>(simd, steps(0, 4), panel, stride, row);
         tile::<S, V, 4>(simd, steps(4, 4), &mut panel[4 * stride..], stride, row);
-    }
-}
-
-/// Subtracts Σ a bᵀ over the steps from `N` columns of the panel, `V` vectors from `row` on.
-#[inline(always)]
-fn tile<'a, S: Simd, const V: usize, const N: usize>(
-    simd: S,
-    steps: impl Iterator<Item = (&'a [f64], &'a [f64])>,
-    panel: &mut [f64],
-    stride: usize,
-    row: usize,
-) {
-    let mut sum = [[simd.splat_f64s(0.0); V]; N];
-    for (a, b) in steps {
-        let a = load::<S, V>(a, 0);
-        let b = &b[..N];
-        for j in 0..N {
-            let b = simd.splat_f64s(b[j]);
-            for v in 0..V {
-                sum[j][v] = simd.mul_add_e_f64s(a[v], b, sum[j][v]);
-            }
-        }
-    }
-    for j in 0..N {
-        let at = j * stride + row;
-        let target = S::as_mut_simd_f64s(&mut panel[at..at + V * S::F64_LANES]).0;
-        for v in 0..V {
-            target[v] = simd.sub_f64s(target[v], sum[j][v]);
-        }
     }
 }
 

@@ -41,6 +41,7 @@ mod reweight;
 mod sample;
 mod simd;
 mod sites;
+mod solve;
 mod span;
 mod spectrum;
 mod spline;
@@ -48,8 +49,10 @@ mod symmetric;
 mod system;
 mod targets;
 mod task;
+mod tiles;
 mod triangular;
 mod twofold;
+mod values;
 mod warp;
 
 pub use affine::{Affine, AffineModel, Rigid, RigidModel};

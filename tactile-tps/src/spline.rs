@@ -1,18 +1,15 @@
-//! The fitted spline: values, derivatives, energy.
+//! The fitted spline: its parts, its report, its energy.
 
 use nalgebra::{Point, SMatrix, SVector};
 
 use crate::{
     Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
-    evaluate::Sum,
     far::{Parts, Terms},
     product::energy,
     refine::{Buffers, Solution},
-    sample::{Each, Linear, Sample},
-    simd::dispatch,
+    sample::Linear,
     sites::{Frame, Sites},
     system::System,
-    warp::same_length,
 };
 
 /// A thin-plate spline from `D`-space to `M`-space: f(x) = a₀ + A x + Σᵢ wᵢ U(|x − xᵢ|).
@@ -20,14 +17,14 @@ use crate::{
 /// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw (Wahba 1990).
 #[derive(Clone, Debug)]
 pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
-    kernel: K,
-    frame: Frame<D>,
+    pub(crate) kernel: K,
+    pub(crate) frame: Frame<D>,
     /// Centres in the frame, axis by axis.
     centres: Vec<T>,
     /// Weights in the frame, output by output.
-    weights: Vec<T>,
-    affine: Linear<T, D, M>,
-    terms: Terms,
+    pub(crate) weights: Vec<T>,
+    pub(crate) affine: Linear<T, D, M>,
+    pub(crate) terms: Terms,
     report: FitReport,
 }
 
@@ -190,115 +187,14 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.frame.scale.powi(self.kernel.degree().unwrap_or(0))
     }
 
-    /// f(x).
-    pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
-        let mut value = [Point::origin()];
-        self.each::<0>(core::slice::from_ref(point), |_, sample| value[0] = sample.point());
-        value[0]
-    }
-
-    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own term is left out.
-    pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
-        let mut jacobian = SMatrix::zeros();
-        self.each::<1>(core::slice::from_ref(point), |_, sample| jacobian = sample.jacobian());
-        jacobian
-    }
-
-    /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
-    pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
-        let mut hessian = [SMatrix::zeros(); M];
-        self.each::<2>(core::slice::from_ref(point), |_, sample| hessian = sample.hessian());
-        hessian
-    }
-
-    /// f at many points, into the caller's memory.
-    ///
-    /// # Errors
-    /// [`TpsError::Length`] if the slices differ in length.
-    pub fn apply_into(&self, points: &[Point<T, D>], values: &mut [Point<T, M>]) -> Result<(), TpsError> {
-        same_length(points.len(), values.len())?;
-        self.each::<0>(points, |i, sample| values[i] = sample.point());
-        Ok(())
-    }
-
-    /// Jacobians at many points, into the caller's memory.
-    ///
-    /// # Errors
-    /// [`TpsError::Length`] if the slices differ in length.
-    pub fn jacobian_into(
-        &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, M, D>],
-    ) -> Result<(), TpsError> {
-        same_length(points.len(), jacobians.len())?;
-        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
-        Ok(())
-    }
-
-    /// Values and Jacobians at many points in one pass, into the caller's memory.
-    ///
-    /// # Errors
-    /// [`TpsError::Length`] if the slices differ in length.
-    pub fn apply_and_jacobian_into(
-        &self,
-        points: &[Point<T, D>],
-        values: &mut [Point<T, M>],
-        jacobians: &mut [SMatrix<T, M, D>],
-    ) -> Result<(), TpsError> {
-        same_length(points.len(), values.len())?;
-        same_length(points.len(), jacobians.len())?;
-        self.each::<1>(points, |i, sample| {
-            values[i] = sample.point();
-            jacobians[i] = sample.jacobian();
-        });
-        Ok(())
-    }
-
-    /// Hessians of every output at many points, into the caller's memory.
-    ///
-    /// # Errors
-    /// [`TpsError::Length`] if the slices differ in length.
-    pub fn hessian_into(
-        &self,
-        points: &[Point<T, D>],
-        hessians: &mut [[SMatrix<T, D, D>; M]],
-    ) -> Result<(), TpsError> {
-        same_length(points.len(), hessians.len())?;
-        self.each::<2>(points, |i, sample| hessians[i] = sample.hessian());
-        Ok(())
-    }
-
-    /// Hands the sample at every point to `sink`, with derivatives up to `ORDER`.
-    ///
-    /// A sample whose plain sum has lost too many digits is taken again in twice the working precision.
-    fn each<const ORDER: usize>(&self, points: &[Point<T, D>], mut sink: impl FnMut(usize, Sample<T, D, M>)) {
-        let (centres, weights) = self.columns();
-        let sum = Sum { kernel: &self.kernel, centres, weights };
-        let checked = |i: usize, sample: Sample<T, D, M>| {
-            let s = self.distance_squared(&points[i]);
-            if s > self.terms.reach && self.terms.lost::<T, K>(&self.kernel, s, sample.size()) {
-                sink(i, self.parts().sample(&points[i]));
-            } else {
-                sink(i, sample);
-            }
-        };
-        dispatch(Each::<_, _, _, D, M, ORDER> {
-            sum,
-            affine: &self.affine,
-            frame: self.frame,
-            points,
-            sink: checked,
-        });
-    }
-
     /// Squared distance from the frame's centre, in the frame.
     #[inline(always)]
-    fn distance_squared(&self, point: &Point<T, D>) -> f64 {
+    pub(crate) fn distance_squared(&self, point: &Point<T, D>) -> f64 {
         self.frame.inside(point).iter().map(|x| x * x).sum()
     }
 
     /// Coordinates of the centres and their weights, column by column.
-    fn columns(&self) -> ([&[T]; D], [&[T]; M]) {
+    pub(crate) fn columns(&self) -> ([&[T]; D], [&[T]; M]) {
         let n = self.count();
         (
             core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
@@ -306,7 +202,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         )
     }
 
-    fn parts(&self) -> Parts<'_, T, K, D, M> {
+    pub(crate) fn parts(&self) -> Parts<'_, T, K, D, M> {
         let (centres, weights) = self.columns();
         Parts { kernel: &self.kernel, frame: self.frame, centres, weights, affine: &self.affine }
     }

@@ -3,10 +3,9 @@
 use crate::{
     Kernel, TpsError,
     cholesky::{Cholesky, HEAD, layout},
-    null_space::{MAX, NullSpace, dot},
+    null_space::{MAX, NullSpace},
     real::Lane,
     refine::PRECISE_POINTS,
-    reweight::Reweighting,
     simd::{Job, dispatch},
     sites::Sites,
     span::Span,
@@ -37,8 +36,8 @@ pub(crate) struct System<const D: usize> {
     pub(crate) span: Span<D>,
     pub(crate) null: NullSpace,
     /// QᵀSQ: first q columns as they are, the rest factored unless there is a spectrum.
-    cholesky: Cholesky,
-    spectrum: Option<Spectrum>,
+    pub(crate) cholesky: Cholesky,
+    pub(crate) spectrum: Option<Spectrum>,
     condition: f64,
     /// Rounding left no definite matrix: the factor is of no use.
     pub(crate) indefinite: bool,
@@ -124,154 +123,6 @@ impl<const D: usize> System<D> {
             self.active.sort_unstable_by(|&i, &j| weights[j].total_cmp(&weights[i]).then(i.cmp(&j)));
             self.scales.extend(self.active.iter().map(|&i| weights[i].sqrt()));
         }
-    }
-
-    /// The λ of least generalised cross-validation for the values `y`; the system must be spectral.
-    pub(crate) fn cross_validate<const M: usize>(
-        &self,
-        y: &[f64],
-        sites: usize,
-        work: &mut Vec<f64>,
-        spare: &mut Vec<f64>,
-    ) -> Option<f64> {
-        let (n, stride) = (self.active.len(), self.null.stride);
-        work.clear();
-        work.resize(M * stride, 0.0);
-        for (m, column) in work.chunks_exact_mut(stride).enumerate() {
-            self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
-            self.null.apply_transpose(column);
-        }
-        self.spectrum.as_ref().map(|spectrum| spectrum.cross_validate::<M>(work, n, spare))
-    }
-
-    /// Solves for `M` outputs: `y` holds the values at all sites and receives the weights w; returns the affine parts.
-    ///
-    /// `lambda` is what to add to a spectral system; a factored one has its own.
-    pub(crate) fn solve<const M: usize>(
-        &self,
-        y: &mut [f64],
-        sites: usize,
-        lambda: f64,
-        work: &mut Vec<f64>,
-        spare: &mut Vec<f64>,
-    ) -> [[f64; MAX]; M] {
-        let mut heads = self.rotate::<M>(y, sites, work);
-        match &self.spectrum {
-            Some(spectrum) => spectrum.solve::<M>(work, lambda, spare),
-            None => self.cholesky.solve::<M>(work),
-        }
-        self.lift(y, sites, work, &mut heads);
-        heads
-    }
-
-    /// What a solve with other weights by this system's spectrum takes; `weights` are those of the sites, and all positive.
-    pub(crate) fn reweighting(
-        &self,
-        lambda: f64,
-        weights: &[f64],
-        excess: &mut Vec<f64>,
-    ) -> Option<Reweighting<'_>> {
-        Reweighting::new(self.spectrum.as_ref()?, &self.null, lambda, weights, excess)
-    }
-
-    /// As [`solve`](Self::solve) with other weights: the affine parts and the steps taken, `None` if they did not suffice.
-    pub(crate) fn resolve<const M: usize>(
-        &self,
-        y: &mut [f64],
-        reweighting: &Reweighting<'_>,
-        excess: &[f64],
-        [columns, work, spare]: [&mut Vec<f64>; 3],
-    ) -> Option<([[f64; MAX]; M], usize)> {
-        let (sites, q, stride) = (excess.len(), self.null.q, self.null.stride);
-        let mut heads = self.rotate::<M>(y, sites, columns);
-        let steps = reweighting.solve::<M>(columns, excess, work, spare)?;
-        for (head, column) in heads.iter_mut().zip(work.chunks_exact(stride)) {
-            head.iter_mut().zip(&column[HEAD - q..HEAD]).for_each(|(h, e)| *h -= e);
-        }
-        self.lift(y, sites, &mut work[..M * stride], &mut heads);
-        Some((heads, steps))
-    }
-
-    /// Qᵀ W^½ y in `work`; returns its first q places, output by output.
-    fn rotate<const M: usize>(&self, y: &[f64], sites: usize, work: &mut Vec<f64>) -> [[f64; MAX]; M] {
-        let (q, stride) = (self.null.q, self.null.stride);
-        work.clear();
-        work.resize(M * stride, 0.0);
-        let mut heads = [[0.0; MAX]; M];
-        for (m, column) in work.chunks_exact_mut(stride).enumerate() {
-            self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
-            self.null.apply_transpose(column);
-            heads[m][..q].copy_from_slice(&column[HEAD - q..HEAD]);
-        }
-        heads
-    }
-
-    /// Turns z in `work` into the weights w, and `heads` into the affine parts.
-    fn lift<const M: usize>(
-        &self,
-        y: &mut [f64],
-        sites: usize,
-        work: &mut [f64],
-        heads: &mut [[f64; MAX]; M],
-    ) {
-        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
-        y.fill(0.0);
-        for (m, column) in work.chunks_exact_mut(stride).enumerate() {
-            column[..HEAD].fill(0.0);
-            for (k, head) in heads[m].iter_mut().enumerate().take(q) {
-                *head -= dot(self.coupling(k), &column[HEAD..HEAD + n - q]);
-            }
-            self.null.apply(column);
-            self.scatter(&column[self.null.rows()], &mut y[m * sites..(m + 1) * sites]);
-            heads[m] = self.null.solve_upper(&heads[m][..q]);
-        }
-    }
-
-    /// Solves for the weights alone, with side conditions: (K + λW⁻¹)w + P a = y, Pᵀw = p for each column of `y`.
-    ///
-    /// With W^{-½}w = Q₁h + Q₂z the conditions give h, which moves to the right-hand side of the equations for z.
-    pub(crate) fn solve_adjoint<const R: usize>(
-        &self,
-        y: &mut [f64],
-        sites: usize,
-        p: [&[f64; MAX]; R],
-        work: &mut Vec<f64>,
-    ) {
-        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
-        self.rotate::<R>(y, sites, work);
-        let heads = p.map(|p| self.null.solve_transpose(p));
-        for (column, head) in work.chunks_exact_mut(stride).zip(&heads) {
-            for (k, head) in head.iter().enumerate().take(q) {
-                let tail = column[HEAD..HEAD + n - q].iter_mut();
-                tail.zip(self.coupling(k)).for_each(|(b, coupling)| *b -= head * coupling);
-            }
-        }
-        self.cholesky.solve::<R>(work);
-        y.fill(0.0);
-        for (r, column) in work.chunks_exact_mut(stride).enumerate() {
-            column[..HEAD].fill(0.0);
-            column[HEAD - q..HEAD].copy_from_slice(&heads[r][..q]);
-            self.null.apply(column);
-            self.scatter(&column[self.null.rows()], &mut y[r * sites..(r + 1) * sites]);
-        }
-    }
-
-    /// Row `k` of Q₁ᵀSQ₂.
-    fn coupling(&self, k: usize) -> &[f64] {
-        let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
-        &self.cholesky.l[(HEAD - q + k) * stride + HEAD..][..n - q]
-    }
-
-    /// Spreads the rows, each times its scale, over the sites.
-    fn scatter(&self, rows: &[f64], y: &mut [f64]) {
-        let scale = |i: usize| if self.scales.is_empty() { 1.0 } else { self.scales[i] };
-        self.active.iter().enumerate().for_each(|(i, &site)| y[site] = rows[i] * scale(i));
-    }
-
-    /// The values at the active sites, each times its scale.
-    fn scaled(&self, y: &[f64], column: &mut [f64]) {
-        self.active.iter().zip(column.iter_mut()).for_each(|(&site, value)| *value = y[site]);
-        column.iter_mut().zip(&self.scales).for_each(|(value, scale)| *value *= scale);
     }
 }
 

@@ -1,0 +1,118 @@
+//! A spline's values, Jacobians and Hessians, at one point or many.
+
+use nalgebra::{Point, SMatrix};
+
+use crate::{
+    Kernel, Scalar, Spline, TpsError,
+    evaluate::Sum,
+    sample::{Each, Sample},
+    simd::dispatch,
+    warp::same_length,
+};
+
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
+    /// f(x).
+    pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
+        let mut value = [Point::origin()];
+        self.each::<0>(core::slice::from_ref(point), |_, sample| value[0] = sample.point());
+        value[0]
+    }
+
+    /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own term is left out.
+    pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
+        let mut jacobian = SMatrix::zeros();
+        self.each::<1>(core::slice::from_ref(point), |_, sample| jacobian = sample.jacobian());
+        jacobian
+    }
+
+    /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
+    pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
+        let mut hessian = [SMatrix::zeros(); M];
+        self.each::<2>(core::slice::from_ref(point), |_, sample| hessian = sample.hessian());
+        hessian
+    }
+
+    /// f at many points, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn apply_into(&self, points: &[Point<T, D>], values: &mut [Point<T, M>]) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        self.each::<0>(points, |i, sample| values[i] = sample.point());
+        Ok(())
+    }
+
+    /// Jacobians at many points, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        jacobians: &mut [SMatrix<T, M, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), jacobians.len())?;
+        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
+        Ok(())
+    }
+
+    /// Values and Jacobians at many points in one pass, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn apply_and_jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+        jacobians: &mut [SMatrix<T, M, D>],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), values.len())?;
+        same_length(points.len(), jacobians.len())?;
+        self.each::<1>(points, |i, sample| {
+            values[i] = sample.point();
+            jacobians[i] = sample.jacobian();
+        });
+        Ok(())
+    }
+
+    /// Hessians of every output at many points, into the caller's memory.
+    ///
+    /// # Errors
+    /// [`TpsError::Length`] if the slices differ in length.
+    pub fn hessian_into(
+        &self,
+        points: &[Point<T, D>],
+        hessians: &mut [[SMatrix<T, D, D>; M]],
+    ) -> Result<(), TpsError> {
+        same_length(points.len(), hessians.len())?;
+        self.each::<2>(points, |i, sample| hessians[i] = sample.hessian());
+        Ok(())
+    }
+
+    /// Hands the sample at every point to `sink`, with derivatives up to `ORDER`.
+    ///
+    /// A sample whose plain sum has lost too many digits is taken again in twice the working precision.
+    pub(crate) fn each<const ORDER: usize>(
+        &self,
+        points: &[Point<T, D>],
+        mut sink: impl FnMut(usize, Sample<T, D, M>),
+    ) {
+        let (centres, weights) = self.columns();
+        let sum = Sum { kernel: &self.kernel, centres, weights };
+        let checked = |i: usize, sample: Sample<T, D, M>| {
+            let s = self.distance_squared(&points[i]);
+            if s > self.terms.reach && self.terms.lost::<T, K>(&self.kernel, s, sample.size()) {
+                sink(i, self.parts().sample(&points[i]));
+            } else {
+                sink(i, sample);
+            }
+        };
+        dispatch(Each::<_, _, _, D, M, ORDER> {
+            sum,
+            affine: &self.affine,
+            frame: self.frame,
+            points,
+            sink: checked,
+        });
+    }
+}
