@@ -94,7 +94,7 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
     press.add_frame(first.view());
     press.add_frame(second.view());
     // Two thirds go without surfaces where they can, to be quick.
-    if (seed + usize::from(object)) % 3 != 0 {
+    if !(seed + usize::from(object)).is_multiple_of(3) {
         if let Ok(modulus) = press.modulus() {
             let sound = modulus.youngs_modulus_pa.is_finite() && modulus.standard_error_pa.is_finite();
             assert!(sound || !modulus.warnings.is_empty(), "a silent NaN: {modulus:?}");

@@ -1,4 +1,5 @@
 //! Sessions: the modulus refined, shear followed, drift watched, memory and answer kept.
+#![allow(clippy::print_stdout)]
 use super::trial;
 use ndarray::Array2;
 use std::sync::Arc;

@@ -57,7 +57,7 @@ fn cuts(weights: &[f64], shares: &[f64]) -> Vec<f64> {
 fn parts(from: f64, to: f64, nodes: usize) -> impl Iterator<Item = (usize, f64, f64)> {
     (from as usize..(to.ceil() as usize).min(nodes)).filter_map(move |node| {
         let (low, high) = (from.max(node as f64), to.min(node as f64 + 1.0));
-        (high > low).then(|| (node, high - low, 0.5 * (low + high) - 0.5))
+        (high > low).then_some((node, high - low, 0.5 * (low + high) - 0.5))
     })
 }
 
