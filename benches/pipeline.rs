@@ -1,10 +1,16 @@
-//! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both results asserted.
+//! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both results asserted, and a
+//! table of times and errors over 500 simulated scenes (two with `--test` or `--quick`) whose contacts cover 1 to 15 % of
+//! the frame: ten sensors, each calibrated once, and on each presses at random places with random forces and noise.
 #![allow(clippy::print_stdout)]
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::sync::Arc;
-use tactile_imaging::pipeline::{Session, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, PressOptions};
+use std::time::Instant;
+use tactile_imaging::force::ReferenceFrame;
+use tactile_imaging::pipeline::{Press, Session, Stage, Stages, Trial};
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, PressSimulation, Sphere,
+};
 
 fn press(c: &mut Criterion) {
     let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default()).expect("default options");
@@ -49,5 +55,122 @@ fn press(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, press);
+/// Share of the frame under the larger load of sensor `k` of ten: 1.2 to 13 %, in equal ratios. Forces vary by a fifth
+/// around it, areas by a seventh.
+fn coverage(k: usize) -> f64 {
+    0.012 * (0.13_f64 / 0.012).powf(k as f64 / 9.0)
+}
+
+/// A calibrated sensor and a ball whose larger load covers that share of the frame.
+fn sensor(k: usize) -> Trial {
+    let camera = Camera::default();
+    let material = if k.is_multiple_of(2) { Elastic::CL2000X } else { Elastic::CL2003X };
+    let object = Sphere { radius_m: 3e-3, material };
+    let base = PressOptions { object, gain: Gain::PeakGrey(180.0), seed: k as u64 + 1, ..Default::default() };
+    let area_m2: f64 = camera.pixel_size_m.iter().zip([1392.0, 1042.0]).map(|(size, n)| size * n).product();
+    let wanted_m = (coverage(k) * area_m2 / std::f64::consts::PI).sqrt();
+    let unit = PressScene::new(PressOptions { loads: vec![Load::normal(1.0)], ..base.clone() });
+    let radius_m = unit.expect("a unit load").truth(0).contact.contact_radius_m;
+    let force_n = (wanted_m / radius_m).powi(3);
+    let loads = vec![Load::normal(force_n / 1.2 * 0.7), Load::normal(force_n)];
+    let calibration = CalibrationOptions {
+        largest_force_n: 1.3 * force_n,
+        gauge_noise_n: 1e-3 * force_n,
+        ..CalibrationOptions::default()
+    };
+    Trial::new(PressOptions { loads, ..base }, &calibration).expect("a sensor")
+}
+
+/// One press on a sensor: another place, other forces, other noise.
+fn scene(trial: &Trial, number: u64) -> PressScene {
+    let mut state = number.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut options = trial.scene.options().clone();
+    let camera = options.camera;
+    let reach = 1.1 * trial.simulation.truth[1].contact.contact_radius_m / camera.pixel_size_m[0];
+    let mut place = |n: usize| reach + uniform() * (n as f64 - 2.0 * reach).max(0.0);
+    options.centre_px = Some([place(camera.shape[1]), place(camera.shape[0])]);
+    let strength = 0.8 + 0.4 * uniform();
+    options.loads.iter_mut().for_each(|load| load.force_n *= strength);
+    options.gain = Gain::GreyPerPascal(trial.scene.grey_per_pascal());
+    options.seed = 1000 + number;
+    PressScene::new(options).expect("a scene")
+}
+
+/// Times in milliseconds and errors in per cent of many presses.
+#[derive(Default)]
+struct Table {
+    modulus_ms: Vec<f64>,
+    everything_ms: Vec<f64>,
+    stages_ms: [Vec<f64>; Stage::ALL.len()],
+    modulus_error: Vec<f64>,
+    force_error: Vec<f64>,
+}
+
+impl Table {
+    fn add(&mut self, stages: &dyn Stages, made: &PressSimulation, reference: &Arc<ReferenceFrame>) {
+        let press = || {
+            let mut press = Press::with_reference(stages, reference.clone());
+            for frame in &made.frames {
+                press.add_frame(frame.view());
+            }
+            press
+        };
+        let start = Instant::now();
+        let modulus = press().modulus().expect("a modulus").youngs_modulus_pa;
+        self.modulus_ms.push(start.elapsed().as_secs_f64() * 1e3);
+        let start = Instant::now();
+        let all = press().measure().expect("a measurement");
+        self.everything_ms.push(start.elapsed().as_secs_f64() * 1e3);
+        for (list, stage) in self.stages_ms.iter_mut().zip(Stage::ALL) {
+            list.push(all.report.work(stage).time.as_secs_f64() * 1e3);
+        }
+        self.modulus_error.push(100.0 * (modulus / made.youngs_modulus_pa - 1.0).abs());
+        for (frame, truth) in all.frames.iter().zip(&made.truth) {
+            self.force_error.push(100.0 * (frame.force_n.value / truth.contact.force_n - 1.0).abs());
+        }
+    }
+
+    fn print(&mut self) {
+        println!("{:<24} {:>10} {:>14} {:>10}", "", "median", "99th centile", "worst");
+        row("modulus of a pair", "ms", &mut self.modulus_ms);
+        row("everything of a pair", "ms", &mut self.everything_ms);
+        for (stage, list) in Stage::ALL.iter().zip(&mut self.stages_ms) {
+            row(&format!("  {stage}"), "ms", list);
+        }
+        row("modulus error", "%", &mut self.modulus_error);
+        row("force error", "%", &mut self.force_error);
+    }
+}
+
+fn row(name: &str, unit: &str, values: &mut [f64]) {
+    values.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| values[((values.len() - 1) as f64 * share).ceil() as usize];
+    println!("{name:<24} {:>7.3} {unit:<2} {:>11.3} {unit:<2} {:>7.3} {unit}", at(0.5), at(0.99), at(1.0));
+}
+
+fn scenes(_: &mut Criterion) {
+    let quick = std::env::args().any(|a| a == "--test" || a == "--quick");
+    let (sensors, presses) =
+        if quick { ([4, 9].as_slice(), 1) } else { ([0, 1, 2, 3, 4, 5, 6, 7, 8, 9].as_slice(), 50) };
+    let mut table = Table::default();
+    for &k in sensors {
+        let trial = sensor(k);
+        let pipeline = trial.pipeline().expect("a calibrated sensor").with_flat_field(true);
+        let reference = ReferenceFrame::new(trial.simulation.reference.view()).expect("a reference");
+        let reference = Arc::new(reference.with_flat_field().expect("stray light"));
+        for press in 0..presses {
+            table.add(&pipeline, &scene(&trial, 100 * k as u64 + press).simulate(), &reference);
+        }
+    }
+    println!("{} presses", table.modulus_ms.len());
+    table.print();
+    let worst = table.modulus_error.last().copied().unwrap_or(f64::NAN);
+    assert!(worst < 5.38, "modulus error {worst} %");
+}
+
+criterion_group!(benches, press, scenes);
 criterion_main!(benches);

@@ -1,8 +1,8 @@
 //! Many frames at once: serial, or over threads with the feature `rayon`; the bits are the same.
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
-use super::stages::Stages;
-use crate::force::{ForceWorkspace, ReferenceFrame};
+use super::stages::{Stages, reference_frame};
+use crate::force::ForceWorkspace;
 use ndarray::ArrayView2;
 
 type Reading = Result<Option<ContactReading>, PipelineError>;
@@ -17,7 +17,7 @@ pub fn contacts(
     reference: ArrayView2<'_, u8>,
     frames: &[ArrayView2<'_, u8>],
 ) -> Result<Vec<Reading>, PipelineError> {
-    let reference = ReferenceFrame::new(reference).map_err(PipelineError::Sensor)?;
+    let reference = reference_frame(stages, &[reference])?;
     let one = |(workspace, contact): &mut (ForceWorkspace, FrameContact),
                (frame, image): (usize, &ArrayView2<'_, u8>)| {
         stages

@@ -6,7 +6,7 @@ use super::object::{
 };
 use super::pair::{self, PairStrain};
 use super::report::{Report, SkipReason, Stage};
-use super::stages::Stages;
+use super::stages::{Stages, reference_frame};
 use super::surface::{self, ContactSurface, SurfaceWorkspace};
 use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate};
 use crate::force::{BoundingBox, ForceWorkspace, ReferenceFrame};
@@ -46,10 +46,9 @@ impl<'a> Press<'a> {
     /// Starts a press with stages as an object; see [`Pipeline::press`](super::Pipeline::press).
     ///
     /// # Errors
-    /// [`PipelineError::Sensor`] for a reference without pixels.
+    /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
     pub fn new(stages: &'a dyn Stages, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
-        let reference = ReferenceFrame::new(reference).map_err(PipelineError::Sensor)?;
-        Ok(Self::with_reference(stages, Arc::new(reference)))
+        Ok(Self::with_reference(stages, Arc::new(reference_frame(stages, &[reference])?)))
     }
 
     /// Starts a press on a reference made before: its noise is measured once for many presses.
@@ -63,6 +62,16 @@ impl<'a> Press<'a> {
             surface: SurfaceWorkspace::new(),
             report: Report::default(),
         }
+    }
+
+    /// The same frames on the same reference, of which nothing is computed yet: to time it again.
+    #[must_use]
+    pub fn renewed(&self) -> Self {
+        let mut press = Self::with_reference(self.stages, Arc::clone(&self.reference));
+        for frame in &self.frames {
+            press.add_gauged_frame(frame.image, frame.gauge_n);
+        }
+        press
     }
 
     /// Adds a frame; returns its number.

@@ -11,7 +11,7 @@ use super::loads::SeenLoads;
 use super::object::{best_estimate, split_errors};
 use super::report::{Report, SkipReason, Stage};
 use super::shear::ShearFollower;
-use super::stages::Stages;
+use super::stages::{Stages, reference_frame};
 use crate::elasticity::modulus::ModulusEstimate;
 use crate::force::{ForceWorkspace, ReferenceFrame, ShearCalibration, ShearMeasurement};
 use ndarray::{Array2, ArrayView2};
@@ -107,8 +107,8 @@ impl Session {
         references: &[ArrayView2<'_, u8>],
     ) -> Result<Self, PipelineError> {
         Ok(Self {
+            reference: reference_frame(stages.as_ref(), references)?,
             stages,
-            reference: ReferenceFrame::from_frames(references).map_err(PipelineError::Sensor)?,
             workspace: ForceWorkspace::default(),
             contact: FrameContact::default(),
             last: Array2::default((0, 0)),

@@ -49,6 +49,9 @@ pub struct Settings {
     pub smoothing_px: usize,
     /// Grid of the surface stage.
     pub binning: Binning,
+    /// Whether differences are divided by the brightness that the reference has there: vignetting then costs no force. Right
+    /// where stray light and signal come through the same lens, and the calibration was taken in the frame's middle.
+    pub flat_field: bool,
     /// Relative error common to all forces beside the calibration's scatter. Light that is uneven over the frame reads
     /// contacts of another size than the calibration's with another gain.
     pub force_scale_error: f64,
@@ -148,6 +151,7 @@ impl<C> Pipeline<C> {
                 surface_input: SurfaceInput::Shading,
                 smoothing_px: 5,
                 binning: Binning::default(),
+                flat_field: false,
                 force_scale_error: 1e-3,
                 length_scale_error: 0.0,
                 skips: Skips::default(),
@@ -236,6 +240,13 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
         self
     }
 
+    /// Corrects vignetting by the reference's own brightness or not (default: not); see [`Settings::flat_field`].
+    #[must_use]
+    pub fn with_flat_field(mut self, flat_field: bool) -> Self {
+        self.settings.flat_field = flat_field;
+        self
+    }
+
     /// Sets the relative errors common to all forces (default 0.1 %) and to all lengths (default none). What is negative or
     /// not finite counts as zero.
     #[must_use]
@@ -271,7 +282,7 @@ where
     /// Starts a press: add frames, then ask for what you want.
     ///
     /// # Errors
-    /// [`PipelineError::Sensor`] for a reference without pixels.
+    /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
     pub fn press<'a>(&'a self, reference: ArrayView2<'_, u8>) -> Result<Press<'a>, PipelineError> {
         Press::new(self, reference)
     }
@@ -324,4 +335,16 @@ where
     fn settings(&self) -> &Settings {
         &self.settings
     }
+}
+
+/// The reference that the settings ask for, of one or more frames without contact.
+pub(super) fn reference_frame(
+    stages: &dyn Stages,
+    frames: &[ArrayView2<'_, u8>],
+) -> Result<ReferenceFrame, PipelineError> {
+    let reference = ReferenceFrame::from_frames(frames).map_err(PipelineError::Sensor)?;
+    if !stages.settings().flat_field {
+        return Ok(reference);
+    }
+    reference.with_flat_field().map_err(PipelineError::Sensor)
 }

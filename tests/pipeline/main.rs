@@ -5,12 +5,14 @@ mod streams;
 
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2};
+use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
+use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{
-    PipelineError, Press, Session, SkipReason, Skips, Stage, Stages, Trial, contacts,
+    Object, PipelineError, Press, Session, SkipReason, Skips, Stage, Stages, Trial, contacts,
 };
 use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
+use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
 fn trial(forces: &[f64], seed: u64) -> Trial {
@@ -159,6 +161,27 @@ fn swapped_loads_give_the_same_modulus() {
     // Other noise in each frame: six standard errors.
     let apart = (a.youngs_modulus_pa - b.youngs_modulus_pa).abs();
     assert!(apart < 6.0 * a.standard_error_pa.hypot(b.standard_error_pa), "{apart}");
+}
+
+#[test]
+fn a_flat_field_makes_the_force_the_same_in_a_corner() {
+    let mut options = trial(&[0.5], 11).scene.options().clone();
+    options.centre_px = Some([50.0, 45.0]);
+    options.camera.vignetting = 0.15;
+    let corner = Trial::new(options.clone(), &CalibrationOptions::default()).unwrap();
+    let scene = PressScene::new(PressOptions { centre_px: None, ..options }).unwrap();
+    // The sensor is calibrated in the frame's middle.
+    let series = scene.calibrate(&CalibrationOptions::default()).unwrap();
+    let pairs: Vec<_> = series.pairs().map(|(sum, force)| CalibrationPair::loading(sum, force)).collect();
+    let error = |flat: bool| {
+        let pipeline = Pipeline::from_pairs(&pairs, corner.simulation.pixel_size_m, Object::sphere(3e-3));
+        let pipeline = pipeline.unwrap().with_flat_field(flat);
+        let mut press = corner.press(&pipeline).unwrap();
+        press.contact(0).unwrap().unwrap().force_n.unwrap().value / 0.5 - 1.0
+    };
+    // The corner loses a tenth; what is left is noise (0.3 %) and the calibration (0.3 %).
+    assert!(error(false) < -0.05, "{}", error(false));
+    assert!(error(true).abs() < 0.02, "{}", error(true));
 }
 
 #[test]
