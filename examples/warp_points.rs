@@ -44,7 +44,7 @@ struct Arguments {
     /// Points to warp.
     queries: PathBuf,
     /// U(r): r² ln r (the thin plate of the plane), −r (of space) or r³.
-    #[arg(long, value_enum, default_value = "r2logr")]
+    #[arg(long, value_enum, default_value = "r2logr2")]
     kernel: KernelName,
     /// Smoothing parameter, a number of at least zero, or gcv for the one of least cross-validation.
     #[arg(long, value_name = "X|gcv", default_value = "0", value_parser = smoothing, allow_negative_numbers = true)]
@@ -56,7 +56,8 @@ struct Arguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum KernelName {
-    /// r² ln r.
+    /// r² ln r, half of r² log r²: the same splines, and with λ half of the other's the same smoothing.
+    #[value(name = "r2logr2", alias = "r2logr")]
     R2logr,
     /// −r.
     R,
