@@ -15,6 +15,17 @@ use crate::error::OpticsError;
 use crate::real::{Real, index, real, twice_square_minus_square};
 
 /// An angle between 0 and π/2 together with its complement, both to full precision.
+///
+/// ```
+/// use tactile_optics::{Angle, CriticalAngle, critical_angle};
+///
+/// // An index a hair above the ambient's: the complement keeps the digits that π/2 minus the angle has lost.
+/// let CriticalAngle::Beyond(angle) = critical_angle(1.0 + 1e-14_f64, 1.0)? else { unreachable!() };
+/// assert!((angle.complement() / 1.4136e-7 - 1.0).abs() < 1e-2);
+/// assert!((angle.degrees() - angle.radians().to_degrees()).abs() < 1e-12);
+/// assert_eq!(Angle::<f64>::right().complement(), 0.0);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Angle<T> {
     radians: T,
@@ -49,6 +60,18 @@ impl<T: Real> Angle<T> {
 }
 
 /// From which angle of incidence on light is totally reflected.
+///
+/// ```
+/// use tactile_optics::{CriticalAngle, critical_angle};
+///
+/// let says = |n: f64| match critical_angle(n, 1.0)? {
+///     CriticalAngle::Beyond(angle) => Ok::<_, tactile_optics::OpticsError>(format!("beyond {:.1}°", angle.degrees())),
+///     CriticalAngle::Never => Ok("never".to_string()),
+/// };
+/// assert_eq!(says(1.41)?, "beyond 45.2°");
+/// assert_eq!(says(0.9)?, "never");
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CriticalAngle<T> {
     /// Beyond this angle.
@@ -58,6 +81,16 @@ pub enum CriticalAngle<T> {
 }
 
 /// Which rays entering through the layer's edge are trapped.
+///
+/// ```
+/// use tactile_optics::{AcceptanceAngle, acceptance_angle};
+///
+/// assert_eq!(acceptance_angle(1.3_f64, 1.33)?, AcceptanceAngle::NoneTrapped);
+/// assert_eq!(acceptance_angle(1.5_f64, 1.0)?, AcceptanceAngle::AllTrapped);
+/// assert_eq!(acceptance_angle(1.5_f64, 1.0)?.radians(), std::f64::consts::FRAC_PI_2);
+/// assert!(matches!(acceptance_angle(1.38_f64, 1.0)?, AcceptanceAngle::Below(angle) if angle.degrees() < 72.0));
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AcceptanceAngle<T> {
     /// None: the layer is no denser than its ambient.

@@ -90,12 +90,28 @@ impl Dispersion {
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] if one of them lies outside the fit.
+    ///
+    /// ```
+    /// use tactile_optics::Dispersion;
+    ///
+    /// // Schott's catalogue has 64.17.
+    /// assert!((Dispersion::N_BK7.abbe_number::<f64>()? - 64.17).abs() < 0.01);
+    /// # Ok::<(), tactile_optics::OpticsError>(())
+    /// ```
     pub fn abbe_number<T: Real>(&self) -> Result<T, OpticsError> {
         let [d, f, c] = [587.56e-9, 486.13e-9, 656.27e-9].map(|w| self.index(real::<T>(w)));
         Ok((d? - T::one()) / (f? - c?))
     }
 
     /// Shortest and longest wavelength of the fit in metres.
+    ///
+    /// ```
+    /// use tactile_optics::Dispersion;
+    ///
+    /// let [shortest, longest] = Dispersion::PDMS_10_1.range_m();
+    /// assert_eq!([shortest, longest], [0.40e-6, 0.75e-6]);
+    /// assert!(Dispersion::PDMS_10_1.index(0.85e-6_f64).is_err());
+    /// ```
     pub fn range_m(&self) -> [f64; 2] {
         match self {
             Self::Cauchy { range_m, .. } | Self::Sellmeier { range_m, .. } => *range_m,

@@ -1,6 +1,13 @@
 //! What can be wrong with the input.
 
 /// An input was rejected. Values are reported as `f64` whatever the scalar in use.
+///
+/// ```
+/// use tactile_optics::{OpticsError, critical_angle};
+///
+/// let error = critical_angle(-1.4_f64, 1.0).unwrap_err();
+/// assert!(matches!(error, OpticsError::OutOfRange { quantity: "refractive index", found, .. } if found == -1.4));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpticsError {

@@ -14,6 +14,17 @@ use crate::error::OpticsError;
 use crate::real::{Real, difference_of_products, index, real, within};
 
 /// What an interface does to incident light, by polarisation.
+///
+/// ```
+/// use tactile_optics::fresnel;
+///
+/// // At Brewster's angle, atan(n₂/n₁), nothing polarised in the plane of incidence is reflected.
+/// let glass = fresnel(1.0_f64, 1.5, 1.5_f64.atan())?;
+/// assert!(glass.reflectance_p < 1e-30 && glass.reflectance_s > 0.14);
+/// assert!(!glass.is_total());
+/// assert!((glass.reflectance() + glass.transmittance() - 1.0).abs() < 1e-15);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fresnel<T> {
     /// Angle of refraction; none when reflection is total.

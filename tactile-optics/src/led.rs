@@ -5,6 +5,16 @@ use crate::error::OpticsError;
 use crate::real::{Real, real, within};
 
 /// Whether light stays in one plane or fills space.
+///
+/// ```
+/// use tactile_optics::{Geometry, Led, acceptance_angle};
+///
+/// // In space more of the light slips past the layer's plane sideways, so less of it is lost than in a section.
+/// let acceptance = acceptance_angle(1.38_f64, 1.0)?;
+/// let [section, volume] = [Geometry::Section, Geometry::Volume].map(|g| Led::lambertian().trapped_share(acceptance, g));
+/// assert!(section > 0.95 && volume > section && volume < 1.0);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Geometry {
     /// A section: rays in the plane of the LED's axis and the slab's normal.
@@ -15,6 +25,16 @@ pub enum Geometry {
 }
 
 /// An LED facing the slab's edge: intensity ∝ cosᵐ θ up to a half angle, θ from its axis.
+///
+/// ```
+/// use tactile_optics::Led;
+///
+/// let narrow = Led::new(4.0_f64, 60.0_f64.to_radians())?;
+/// assert_eq!((narrow.exponent(), narrow.half_angle()), (4.0, 60.0_f64.to_radians()));
+/// // A data sheet's "half intensity at 60°" is Lambert's law.
+/// assert!((Led::from_half_intensity_angle(60.0_f64.to_radians())?.exponent() - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Led<T> {
     exponent: T,

@@ -7,6 +7,17 @@ use num_traits::{Float, FloatConst, NumCast};
 use crate::OpticsError;
 
 /// A real scalar: `f32` or `f64`.
+///
+/// ```
+/// use tactile_optics::{Real, fresnel};
+///
+/// fn reflectance_of_glass<T: Real>() -> T {
+///     let one = T::one();
+///     fresnel(one, one + one / (one + one), T::zero()).map_or(T::nan(), |glass| glass.reflectance())
+/// }
+/// assert!((reflectance_of_glass::<f32>() - 0.04).abs() < 1e-7);
+/// assert!((reflectance_of_glass::<f64>() - 0.04).abs() < 1e-15);
+/// ```
 pub trait Real: Float + FloatConst + Debug + 'static {}
 impl<T: Float + FloatConst + Debug + 'static> Real for T {}
 

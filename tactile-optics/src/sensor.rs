@@ -4,6 +4,27 @@ use crate::error::OpticsError;
 use crate::real::{Real, within};
 
 /// Inputs of the specification.
+///
+/// ```
+/// use tactile_optics::SensorSpecification;
+///
+/// let sensor = SensorSpecification {
+///     side_m: 30e-3_f64,
+///     pixel_m: 4.65e-6,
+///     frame_rate_hz: 80.0,
+///     largest_force_n: 2.0,
+///     newton_per_grey: 1e-6,
+///     pixel_noise_grey: 1.0,
+///     summed_pixels: 10_000.0,
+/// }
+/// .validated()?;
+/// assert_eq!(sensor.grid_elements().round(), 6452.0);
+/// assert_eq!(sensor.temporal_resolution_s(), 12.5e-3);
+/// // Three σ of the difference of two frames' sums over 100 × 100 pixels: 3 √2 · 100 grey levels of 1 µN.
+/// assert!((sensor.force_resolution_n(3.0) - 4.243e-4).abs() < 1e-7);
+/// assert_eq!(sensor.force_levels(3.0).floor(), 4714.0);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorSpecification<T> {
     /// Side of the sensing area in metres.
@@ -67,7 +88,21 @@ impl<T: Real> SensorSpecification<T> {
 
 /// The force sensitivity of the sensor in newton as the paper's text has it. Table 1 swaps it with
 /// [`FINGERTIP_FORCE_SENSITIVITY_N`].
+///
+/// ```
+/// use tactile_optics::sensor::{FINGERTIP_FORCE_SENSITIVITY_N, PAPER_FORCE_SENSITIVITY_N};
+///
+/// // The sensor tells forces an eighth of what a fingertip does.
+/// assert!((FINGERTIP_FORCE_SENSITIVITY_N / PAPER_FORCE_SENSITIVITY_N - 8.0).abs() < 1e-12);
+/// ```
 pub const PAPER_FORCE_SENSITIVITY_N: f64 = 2.5e-3;
 
 /// The force sensitivity of a human fingertip in newton, as the paper's text has it.
+///
+/// ```
+/// use tactile_optics::sensor::FINGERTIP_FORCE_SENSITIVITY_N;
+///
+/// // About the weight of two grams.
+/// assert!((FINGERTIP_FORCE_SENSITIVITY_N / 9.81 - 2e-3).abs() < 1e-4);
+/// ```
 pub const FINGERTIP_FORCE_SENSITIVITY_N: f64 = 2.0e-2;

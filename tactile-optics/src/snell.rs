@@ -5,6 +5,15 @@ use crate::error::OpticsError;
 use crate::real::{Real, index, within};
 
 /// How light of a given invariant n sin θ travels in a medium.
+///
+/// ```
+/// use tactile_optics::{Propagation, propagation};
+///
+/// // Near grazing the cosine has digits that the angle has not.
+/// let Propagation::At { angle, cosine } = propagation(1.0 + 1e-14_f64, 1.0)? else { unreachable!() };
+/// assert!((cosine - angle.complement().sin()).abs() < 1e-15 * cosine);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Propagation<T> {
     /// At this angle to the interfaces' normal; `cosine` is kept apart because near grazing it has more digits

@@ -23,6 +23,17 @@ pub struct LayerStack<'a, T> {
 }
 
 /// What a stack does to light that falls on it at right angles; lossless.
+///
+/// ```
+/// use tactile_optics::LayerStack;
+///
+/// // A pane of glass: 4 % at each face; the light between the faces adds a little.
+/// let pane = LayerStack::new(&[1.5_f64], 1.0)?.normal_incidence();
+/// assert!((pane.single_pass - 0.96 * 0.96).abs() < 1e-15);
+/// assert!((pane.transmittance - 12.0 / 13.0).abs() < 1e-15);
+/// assert!((pane.transmittance + pane.reflectance - 1.0).abs() < 1e-15);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NormalIncidence<T> {
     /// Transmittance if what is reflected once is lost, Π(1 − Rⱼ).
@@ -34,6 +45,16 @@ pub struct NormalIncidence<T> {
 }
 
 /// Whether an LED's cone of light is trapped by the whole stack.
+///
+/// ```
+/// use tactile_optics::LayerStack;
+///
+/// let cone = LayerStack::new(&[1.38_f64, 1.41], 1.0)?.led_cone(150.0_f64.to_radians())?;
+/// assert!(!cone.is_trapped());
+/// // Six degrees too wide for the layer of 1.38.
+/// assert!((cone.margin.to_degrees() + 6.0211).abs() < 1e-4);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LedCone<T> {
     /// Full angle of the LED's cone in radians.
@@ -72,6 +93,14 @@ impl<'a, T: Real> LayerStack<'a, T> {
     }
 
     /// The layers' indices.
+    ///
+    /// ```
+    /// use tactile_optics::LayerStack;
+    ///
+    /// let stack = LayerStack::new(&[1.38_f64, 1.41], 1.0)?;
+    /// assert_eq!((stack.indices(), stack.ambient()), (&[1.38, 1.41][..], 1.0));
+    /// # Ok::<(), tactile_optics::OpticsError>(())
+    /// ```
     pub fn indices(&self) -> &'a [T] {
         self.indices
     }
@@ -82,12 +111,32 @@ impl<'a, T: Real> LayerStack<'a, T> {
     }
 
     /// The critical angle of each layer against the ambient.
+    ///
+    /// ```
+    /// use tactile_optics::{CriticalAngle, LayerStack};
+    ///
+    /// let stack = LayerStack::new(&[1.38_f64, 0.9], 1.0)?;
+    /// let answers: Vec<_> = stack.critical_angles().collect();
+    /// assert!(matches!(answers[0], CriticalAngle::Beyond(angle) if (angle.degrees() - 46.4387).abs() < 1e-4));
+    /// assert_eq!(answers[1], CriticalAngle::Never);
+    /// # Ok::<(), tactile_optics::OpticsError>(())
+    /// ```
     pub fn critical_angles(&self) -> impl Iterator<Item = CriticalAngle<T>> + 'a {
         let ambient = self.ambient;
         self.indices.iter().map(move |&n| critical_angle(n, ambient).unwrap_or(CriticalAngle::Never))
     }
 
     /// The acceptance angle of each layer in the ambient, (1)–(4).
+    ///
+    /// ```
+    /// use tactile_optics::LayerStack;
+    ///
+    /// let stack = LayerStack::new(&[1.38_f64, 1.39, 1.40, 1.41], 1.0)?;
+    /// let degrees: Vec<_> = stack.acceptance_angles().map(|a| a.radians().to_degrees()).collect();
+    /// // The paper prints them truncated: 71.98, 74.89, 78.46 and 83.73.
+    /// assert!((degrees[0] - 71.98).abs() < 0.01 && (degrees[3] - 83.73).abs() < 0.01);
+    /// # Ok::<(), tactile_optics::OpticsError>(())
+    /// ```
     pub fn acceptance_angles(&self) -> impl Iterator<Item = AcceptanceAngle<T>> + 'a {
         let ambient = self.ambient;
         self.indices
@@ -100,6 +149,19 @@ impl<'a, T: Real> LayerStack<'a, T> {
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for an invariant that is negative or not finite.
+    ///
+    /// ```
+    /// use tactile_optics::{LayerStack, Propagation};
+    ///
+    /// // Light that entered from air at 60° is steeper the denser the layer.
+    /// let stack = LayerStack::new(&[1.38_f64, 1.41], 1.0)?;
+    /// let cosines: Vec<_> = stack
+    ///     .propagation(60.0_f64.to_radians().sin())?
+    ///     .map(|p| if let Propagation::At { cosine, .. } = p { cosine } else { 0.0 })
+    ///     .collect();
+    /// assert!(0.5 < cosines[0] && cosines[0] < cosines[1]);
+    /// # Ok::<(), tactile_optics::OpticsError>(())
+    /// ```
     pub fn propagation(
         &self,
         invariant: T,
@@ -112,6 +174,16 @@ impl<'a, T: Real> LayerStack<'a, T> {
     /// Light through the whole stack at right angles, ambient to ambient, with no interference.
     ///
     /// Rⱼ/(1 − Rⱼ) = (a − b)²/(4ab) and 1 − Rⱼ = 4ab/(a + b)² at the interface of indices a and b. O(layers).
+    ///
+    /// ```
+    /// use tactile_optics::LayerStack;
+    ///
+    /// // An index between the ambient's and the layer's on both faces halves the loss.
+    /// let bare = LayerStack::new(&[1.5_f64], 1.0)?.normal_incidence();
+    /// let coated = LayerStack::new(&[1.5_f64.sqrt(), 1.5, 1.5_f64.sqrt()], 1.0)?.normal_incidence();
+    /// assert!(coated.reflectance < 0.55 * bare.reflectance);
+    /// # Ok::<(), tactile_optics::OpticsError>(())
+    /// ```
     pub fn normal_incidence(&self) -> NormalIncidence<T> {
         let four = real::<T>(4.0);
         let (mut single_pass, mut reflected) = (T::one(), T::zero());

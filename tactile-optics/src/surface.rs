@@ -4,6 +4,15 @@ use crate::error::OpticsError;
 use crate::real::{Real, real, within};
 
 /// An object in optical contact with the slab: light that enters it is scattered back evenly or lost.
+///
+/// ```
+/// use tactile_optics::surface::{Flat, TopSurface, Touched, TouchingObject};
+///
+/// let skin = TouchingObject { index: 1.44_f64, albedo: 0.5 };
+/// let touched = Touched::new(Flat, skin, [15e-3, 0.0], 2e-3)?;
+/// assert_eq!(touched.touching(16e-3, 1e-3), Some(skin));
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TouchingObject<T> {
     /// Refractive index of the object.
@@ -14,6 +23,40 @@ pub struct TouchingObject<T> {
 
 /// The shape of the slab's top. Coordinates in metres: x along the LED's axis from the lit edge, y across, z up from
 /// the undeformed top.
+///
+/// ```
+/// use tactile_optics::surface::{TopSurface, TouchingObject};
+///
+/// /// A wedge pressed in from x = 10 mm to 20 mm.
+/// struct Wedge;
+///
+/// impl TopSurface<f64> for Wedge {
+///     fn height(&self, x: f64, _y: f64) -> f64 {
+///         0.1 * ((x - 15e-3).abs() - 5e-3).min(0.0)
+///     }
+///     fn gradient(&self, x: f64, _y: f64) -> [f64; 2] {
+///         if (x - 15e-3).abs() < 5e-3 { [0.1 * (x - 15e-3).signum(), 0.0] } else { [0.0; 2] }
+///     }
+///     fn steepest(&self) -> f64 {
+///         0.1
+///     }
+///     fn deepest(&self) -> f64 {
+///         0.5e-3
+///     }
+///     fn support(&self) -> [f64; 2] {
+///         [10e-3, 20e-3]
+///     }
+///     fn touching(&self, _x: f64, _y: f64) -> Option<TouchingObject<f64>> {
+///         None
+///     }
+/// }
+///
+/// # use tactile_optics::{Led, trace::{Slab, SlabLayer, TraceOptions, trace}};
+/// let slab = Slab::new(&[SlabLayer { index: 1.40, thickness_m: 10e-3 }], 1.0, 30e-3)?;
+/// let budget = trace(&slab, &Led::lambertian(), &Wedge, &TraceOptions::default(), &mut [])?;
+/// assert!(budget.leaked() > 0.01);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 pub trait TopSurface<T> {
     /// Height above the undeformed top, in metres; negative under load.
     fn height(&self, x: T, y: T) -> T;
@@ -32,6 +75,13 @@ pub trait TopSurface<T> {
 }
 
 /// The undeformed top.
+///
+/// ```
+/// use tactile_optics::surface::{Flat, TopSurface};
+///
+/// assert_eq!(TopSurface::<f64>::deepest(&Flat), 0.0);
+/// assert_eq!(Flat.gradient(1e-3_f64, 0.0), [0.0, 0.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flat;
 
@@ -54,6 +104,17 @@ impl<T: Real> TopSurface<T> for Flat {
 }
 
 /// A round dimple z = −d cos²(πr/2w) for r < w, flat beyond; its steepest slope is πd/2w, halfway down.
+///
+/// ```
+/// use tactile_optics::surface::{Dimple, TopSurface};
+///
+/// let dimple = Dimple::new([15e-3_f64, 0.0], 4e-3, 1.5e-3)?;
+/// assert_eq!(dimple.height(15e-3, 0.0), -1.5e-3);
+/// assert_eq!(dimple.height(19.1e-3, 0.0), 0.0);
+/// // By its slope instead of its depth.
+/// assert!((Dimple::of_slope([15e-3_f64, 0.0], 4e-3, 0.3)?.steepest() - 0.3).abs() < 1e-15);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dimple<T> {
     centre: [T; 2],
@@ -119,6 +180,22 @@ impl<T: Real> TopSurface<T> for Dimple<T> {
 }
 
 /// A surface with an object in optical contact inside a circle.
+///
+/// ```
+/// use tactile_optics::Led;
+/// use tactile_optics::surface::{Dimple, Touched, TouchingObject};
+/// use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, trace};
+///
+/// let slab = Slab::new(&[SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }], 1.0, 30e-3)?;
+/// let dimple = Dimple::new([15e-3, 0.0], 4e-3, 0.2e-3)?;
+/// let finger = Touched::new(dimple, TouchingObject { index: 1.44, albedo: 0.6 }, [15e-3, 0.0], 2e-3)?;
+/// let (led, options) = (Led::lambertian(), TraceOptions::default());
+/// let pressed_by_air = trace(&slab, &led, &dimple, &options, &mut [])?;
+/// let pressed_by_finger = trace(&slab, &led, &finger, &options, &mut [])?;
+/// // What touches scatters light down to the camera: that is what is seen.
+/// assert!(pressed_by_finger.camera > 2.0 * pressed_by_air.camera);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touched<S, T> {
     surface: S,

@@ -3,6 +3,19 @@
 use crate::real::Real;
 
 /// Shares of the LED's light by where it ended; they add up to 1 to rounding.
+///
+/// ```
+/// use tactile_optics::Led;
+/// use tactile_optics::surface::Flat;
+/// use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, trace};
+///
+/// let slab = Slab::new(&[SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }], 1.0, 30e-3)?;
+/// let budget = trace(&slab, &Led::lambertian(), &Flat, &TraceOptions::default(), &mut [])?;
+/// assert!((budget.total() - 1.0).abs() < 1e-12);
+/// // A flat layer keeps nearly all that enters it.
+/// assert!(budget.guided_of_entered() > 0.98 && budget.leaked() < 0.02);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightBudget<T> {
     /// Reflected at the lit edge, never entering.

@@ -33,6 +33,15 @@ use ray::Ray;
 use sampling::Points;
 
 /// One layer of the slab.
+///
+/// ```
+/// use tactile_optics::Dispersion;
+/// use tactile_optics::trace::SlabLayer;
+///
+/// let epidermis = SlabLayer { index: Dispersion::PDMS_5_1.index(525e-9)?, thickness_m: 2e-3 };
+/// assert!((epidermis.index - 1.405_f64).abs() < 1e-3);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlabLayer<T> {
     /// Refractive index.
@@ -42,6 +51,16 @@ pub struct SlabLayer<T> {
 }
 
 /// The slab: layers from the top (the object's side) down.
+///
+/// ```
+/// use tactile_optics::trace::{Slab, SlabLayer};
+///
+/// // Epidermis, dermis and subcutanea on a plate of glass.
+/// let layers = [(1.405, 2e-3), (1.398, 3e-3), (1.410, 5e-3), (1.473, 3e-3)].map(|(index, thickness_m)| SlabLayer { index, thickness_m });
+/// let slab = Slab::new(&layers, 1.0_f64, 30e-3)?;
+/// assert!((slab.thickness_m() - 13e-3).abs() < 1e-15);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slab<'a, T> {
     layers: &'a [SlabLayer<T>],
@@ -80,6 +99,14 @@ impl<'a, T: Real> Slab<'a, T> {
 }
 
 /// How rays are shot and counted.
+///
+/// ```
+/// use tactile_optics::Geometry;
+/// use tactile_optics::trace::TraceOptions;
+///
+/// let quick = TraceOptions::<f32> { geometry: Geometry::Section, rays: 256, ..TraceOptions::default() };
+/// assert_eq!(quick.seed, 1);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TraceOptions<T> {
     /// Section or space.

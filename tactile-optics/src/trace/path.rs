@@ -14,6 +14,19 @@ use crate::surface::TopSurface;
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for a share outside 0 to 1, an angle beyond a right one, or a surface deeper than the top layer.
+///
+/// ```
+/// use tactile_optics::surface::Flat;
+/// use tactile_optics::trace::{Slab, SlabLayer, path};
+///
+/// let slab = Slab::new(&[SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }], 1.0, 30e-3)?;
+/// let mut vertices = [[0.0; 3]; 8];
+/// let count = path(&slab, &Flat, 0.5, 45.0_f64.to_radians(), &mut vertices)?;
+/// // In at the middle of the edge, from side to side, out of the far edge.
+/// assert_eq!(vertices[0], [0.0, 0.0, -5e-3]);
+/// assert!((vertices[count - 1][0] - 30e-3).abs() < 1e-12);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
     slab: &Slab<'_, T>,
     surface: &S,
