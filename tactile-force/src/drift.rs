@@ -4,6 +4,21 @@ use crate::frame::{TILE_COLUMNS, TILE_ROWS};
 use crate::{FrameStatistics, ReferenceFrame};
 
 /// Which change of the light is corrected. Nothing is unless it is asked for.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame};
+///
+/// // Three grey levels of stray light everywhere are no contact.
+/// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 20_u8).view())?;
+/// let brighter = Array2::from_elem((160, 160), 23_u8);
+/// let options = ContactOptions { drift: DriftCorrection::Offset, ..ContactOptions::default() };
+/// let found: Detection<f64> =
+///     ContactDetector::new(options)?.detect_with(&mut Default::default(), brighter.view(), &reference)?;
+/// assert!(found.contact.is_none());
+/// assert!((found.drift.coefficients[0] - 3.0).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -23,6 +38,21 @@ pub enum DriftCorrection {
 
 /// The correction found for one frame. `coefficients` are [value, per column, per row] about the frame's middle: grey
 /// levels for stray light, shares for lamps.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame};
+///
+/// // Lamps a tenth brighter.
+/// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 100_u8).view())?;
+/// let brighter = Array2::from_elem((160, 160), 110_u8);
+/// let options = ContactOptions { drift: DriftCorrection::Lamp, ..ContactOptions::default() };
+/// let found: Detection<f64> =
+///     ContactDetector::new(options)?.detect_with(&mut Default::default(), brighter.view(), &reference)?;
+/// assert!((found.drift.coefficients[0] - 1.1).abs() < 1e-9);
+/// assert_eq!(found.drift.tiles, 20 * 5);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drift {

@@ -3,6 +3,14 @@
 use thiserror::Error;
 
 /// What an option's value has to satisfy.
+///
+/// ```
+/// use tactile_force::{ForceError, HertzFitOptions, HertzFitter, Requirement};
+///
+/// let options = HertzFitOptions { blur_px: Some(f64::NAN), ..HertzFitOptions::default() };
+/// let error = HertzFitter::new(options).unwrap_err();
+/// assert!(matches!(error, ForceError::InvalidOption { name: "blur_px", requirement: Requirement::NonNegative, .. }));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Requirement {
@@ -26,6 +34,16 @@ pub enum Requirement {
 ///
 /// No contact is a value, a fit that does not converge is a report, and a calibration used outside its range is a
 /// flag: none of them is an error.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ForceError, ReferenceFrame};
+///
+/// let reference = ReferenceFrame::new(Array2::zeros((40, 50)).view())?;
+/// let error = reference.compare(Array2::zeros((50, 40)).view(), 10).unwrap_err();
+/// assert_eq!(error, ForceError::SizeMismatch { expected: (40, 50), found: (50, 40) });
+/// # Ok::<(), ForceError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ForceError {

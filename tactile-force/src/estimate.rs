@@ -7,6 +7,13 @@ use num_traits::{Float, FromPrimitive};
 /// The scalar of results and calibrations: `f32` or `f64`.
 ///
 /// Sums over 8-bit frames are exact integers and fits run in `f64`, so `f32` results are `f64` results rounded once.
+///
+/// ```
+/// use tactile_force::Real;
+///
+/// assert_eq!(f32::nearest(0.1), 0.1_f32);
+/// assert_eq!(0.5_f32.as_f64(), 0.5);
+/// ```
 pub trait Real: Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static {
     /// The nearest value to an `f64`.
     fn nearest(value: f64) -> Self {
@@ -43,6 +50,13 @@ impl<T: Real> Estimate<T> {
     }
 
     /// The value and its error in another unit.
+    ///
+    /// ```
+    /// use tactile_force::Estimate;
+    ///
+    /// let metres = Estimate { value: 400.0_f64, standard_error: 8.0 }.scaled(0.25);
+    /// assert_eq!(metres, Estimate { value: 100.0, standard_error: 2.0 });
+    /// ```
     pub fn scaled(self, factor: T) -> Self {
         Self { value: self.value * factor, standard_error: self.standard_error * factor.abs() }
     }

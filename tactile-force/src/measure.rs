@@ -10,6 +10,15 @@ use crate::{
 };
 
 /// How a force is measured.
+///
+/// ```
+/// use tactile_force::{ContactOptions, ForceOptions};
+///
+/// // Force and centroid only, at one false alarm in a million frames.
+/// let contact = ContactOptions { false_alarm_rate: 1e-6, ..ContactOptions::default() };
+/// let options = ForceOptions { contact, skip_profile: true, ..ForceOptions::default() };
+/// assert!(tactile_force::ForceMeter::<f64>::new([20e-6; 2], &options).is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceOptions {
@@ -22,6 +31,20 @@ pub struct ForceOptions {
 }
 
 /// What one frame says of the contact.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeasurement, LinearCalibration, measure_force};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let quiet = Array2::from_elem((64, 64), 12_u8);
+/// let m: ForceMeasurement<f64> =
+///     measure_force(quiet.view(), quiet.view(), [20e-6; 2], &calibration, &Default::default())?;
+/// // No contact is an answer, not an error.
+/// assert_eq!((m.force_n.value, m.contact, m.mean_stress_pa), (0.0, None, None));
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceMeasurement<T> {
@@ -52,6 +75,24 @@ pub struct ForceMeasurement<T> {
 }
 
 /// Everything a measurement reuses from frame to frame. After the first frames nothing is allocated.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 24..48]).fill(90);
+/// let mut workspace = ForceWorkspace::default();
+/// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?;
+/// meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
+/// let (place, mask) = workspace.mask().expect("contact");
+/// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 20 * 24);
+/// assert!(place.row_start <= 20 && place.row_end >= 40);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct ForceWorkspace {
     detector: DetectorWorkspace,
@@ -66,6 +107,23 @@ impl ForceWorkspace {
 }
 
 /// Measures forces with one sensor: options checked and tables built once.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(112);
+///
+/// let (meter, mut workspace) = (ForceMeter::new([20e-6; 2], &Default::default())?, ForceWorkspace::default());
+/// let measured = meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
+/// // 400 pixels of 100 grey levels at 10 µN each.
+/// assert!((measured.force_n.value - 0.4_f64).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ForceMeter<T> {
     detector: ContactDetector,

@@ -3,6 +3,13 @@
 use crate::{Estimate, ForceError, ForceMeasurement, Real};
 
 /// One measurement for the shear calibration: how far the centroid went under a known shear force.
+///
+/// ```
+/// use tactile_force::ShearPair;
+///
+/// let pulled_right = ShearPair { centroid_step_m: [50e-6, 0.0], force_n: [0.1, 0.0] };
+/// assert_eq!(pulled_right.force_n[0] / pulled_right.centroid_step_m[0], 2000.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShearPair<T> {
@@ -13,6 +20,21 @@ pub struct ShearPair<T> {
 }
 
 /// The stiffnesses K_x and K_y, in newtons per metre.
+///
+/// ```
+/// use tactile_force::{Estimate, ShearCalibration, ShearPair};
+///
+/// // 2 N/mm along x, 3 N/mm along y.
+/// let pairs: Vec<_> = [1e-5, 2e-5, 5e-5]
+///     .map(|u| ShearPair { centroid_step_m: [u, -u], force_n: [2e3 * u, -3e3 * u] })
+///     .to_vec();
+/// let calibration = ShearCalibration::<f64>::fit(&pairs)?;
+/// assert!((calibration.stiffness_n_per_m[1].value - 3e3).abs() < 1e-9);
+/// let step = Estimate { value: 1e-5_f64, standard_error: 1e-7 };
+/// let [x, _] = calibration.force_n([step, step]);
+/// assert!((x.value - 0.02).abs() < 1e-12 && (x.standard_error - 2e-4).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShearCalibration<T> {
@@ -74,6 +96,18 @@ fn axis<T: Real>(pairs: &[ShearPair<T>], k: usize) -> Result<(f64, f64, f64), Fo
 }
 
 /// Shear of one frame.
+///
+/// ```
+/// use tactile_force::{Estimate, ShearMeasurement};
+///
+/// let along = |measured: &ShearMeasurement<f64>| {
+///     let [x, y] = measured.force_n.map(|f| f.value);
+///     x.hypot(y)
+/// };
+/// let still = [Estimate::default(); 2];
+/// let pulled = ShearMeasurement { displacement_m: still, step_m: still, force_n: [0.3, 0.4].map(|value| Estimate { value, standard_error: 0.01 }) };
+/// assert_eq!(along(&pulled), 0.5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ShearMeasurement<T> {
@@ -89,6 +123,28 @@ pub struct ShearMeasurement<T> {
 ///
 /// The shear force belongs to the displacement since contact began. Taking each step from the frame before and adding up
 /// would add up the noise of every frame; here it is that of two.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::*;
+///
+/// let press = |x0: f64| Array2::from_shape_fn((120, 120), |(y, x)| {
+///     let r2 = (x as f64 - x0).powi(2) + (y as f64 - 60.0).powi(2);
+///     12 + (150.0 * (1.0 - r2 / 400.0).max(0.0).sqrt()).round() as u8
+/// });
+/// let force = LinearCalibration::fit(&[0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v)), &Default::default())?;
+/// let shear = ShearCalibration::fit(&[1e-5, 2e-5].map(|u| ShearPair { centroid_step_m: [u, u], force_n: [2e3 * u; 2] }))?;
+/// let at_rest = Array2::from_elem((120, 120), 12_u8);
+/// let measure = |frame: &Array2<u8>| measure_force(frame.view(), at_rest.view(), [20e-6; 2], &force, &Default::default());
+///
+/// let mut tracker = ShearTracker::new(shear);
+/// assert!(tracker.update(&measure(&at_rest)?).is_none());
+/// assert_eq!(tracker.update(&measure(&press(60.0))?).map(|s| s.force_n[0].value), Some(0.0));
+/// // Two pixels to the right are 40 µm and 80 mN.
+/// let pulled = tracker.update(&measure(&press(62.0))?).expect("contact");
+/// assert!((pulled.force_n[0].value - 0.08_f64).abs() < 1e-3);
+/// # Ok::<(), ForceError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ShearTracker<T> {
     calibration: ShearCalibration<T>,

@@ -65,11 +65,32 @@ impl<T: Real> LinearCalibration<T> {
     }
 
     /// Newtons per grey level, with its standard error.
+    ///
+    /// ```
+    /// use tactile_force::{CalibrationPair, LinearCalibration};
+    ///
+    /// let pairs = [(0.0, 0.0), (1e5, 0.5), (2e5, 1.1)].map(|(v, f)| CalibrationPair::loading(v, f));
+    /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+    /// let slope = line.slope_n();
+    /// assert!((slope.value - 5.5e-6_f64).abs() < 1e-15 && slope.standard_error > 0.0);
+    /// assert!((line.offset_n().value + 1.0 / 60.0).abs() < 1e-12);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn slope_n(&self) -> Estimate<T> {
         self.slope_n
     }
 
     /// Force at zero pixel value, in newtons, with its standard error.
+    ///
+    /// ```
+    /// use tactile_force::{CalibrationPair, LinearCalibration};
+    ///
+    /// // The gauge was not tared.
+    /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 0.02 + 5e-6 * v));
+    /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+    /// assert!((line.offset_n().value - 0.02_f64).abs() < 1e-12);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn offset_n(&self) -> Estimate<T> {
         Estimate { value: self.force_n(T::zero()), standard_error: self.standard_error_n(T::zero()) }
     }

@@ -25,6 +25,13 @@ use ndarray::Array2;
 use crate::{Estimate, ForceError, Real};
 
 /// Whether the force was rising or falling when a pair was taken.
+///
+/// ```
+/// use tactile_force::{Branch, CalibrationPair};
+///
+/// assert_eq!(CalibrationPair::loading(1e5, 0.5).branch, Branch::Loading);
+/// assert_eq!(CalibrationPair::unloading(1e5, 0.5).branch, Branch::Unloading);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Branch {
@@ -36,6 +43,19 @@ pub enum Branch {
 }
 
 /// One calibration measurement.
+///
+/// ```
+/// use tactile_force::CalibrationPair;
+///
+/// // A gauge's readings up and down again.
+/// let readings = [(0.0, 0.0), (1.02e5, 0.5), (2.01e5, 1.0), (0.99e5, 0.5)];
+/// let pairs: Vec<_> = readings
+///     .iter()
+///     .enumerate()
+///     .map(|(k, &(v, f))| if k < 3 { CalibrationPair::loading(v, f) } else { CalibrationPair::unloading(v, f) })
+///     .collect();
+/// assert_eq!(pairs[3].force_n, 0.5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationPair<T> {
@@ -60,6 +80,21 @@ impl<T> CalibrationPair<T> {
 }
 
 /// How much a pair far from the curve may pull on it.
+///
+/// ```
+/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration, Robustness};
+///
+/// // One reading in ten is grossly wrong.
+/// let mut pairs: Vec<_> = (0..10).map(|k| CalibrationPair::loading(f64::from(k), 2.0 * f64::from(k))).collect();
+/// pairs[7].force_n = 40.0;
+/// let slope = |robustness| {
+///     let options = CalibrationOptions { robustness, ..CalibrationOptions::default() };
+///     LinearCalibration::fit(&pairs, &options).map(|line| line.slope_n().value)
+/// };
+/// assert!((slope(Robustness::None)? - 2.0).abs() > 0.5);
+/// assert!((slope(Robustness::Tukey)? - 2.0).abs() < 1e-6);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -74,6 +109,17 @@ pub enum Robustness {
 }
 
 /// What all calibration fits have in common.
+///
+/// ```
+/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration};
+///
+/// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
+/// let options = CalibrationOptions { through_origin: true, ..CalibrationOptions::default() };
+/// let line = LinearCalibration::fit(&pairs, &options)?;
+/// assert_eq!(line.offset_n().value, 0.0);
+/// assert!((line.slope_n().value - (2.0 + 0.1 * 6.0 / 14.0_f64)).abs() < 1e-12);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationOptions {
@@ -84,6 +130,18 @@ pub struct CalibrationOptions {
 }
 
 /// A force read from a calibration.
+///
+/// ```
+/// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
+///
+/// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)].map(|(v, f)| CalibrationPair::loading(v, f));
+/// let line = LinearCalibration::<f64>::fit(&pairs, &Default::default())?;
+/// let reading = line.read(Estimate { value: 2.5e5, standard_error: 400.0 });
+/// assert!(reading.noise_n < reading.calibration_n && !reading.out_of_range);
+/// let both = reading.noise_n.hypot(reading.calibration_n);
+/// assert!((reading.force_n.standard_error - both).abs() < 1e-15);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceReading<T> {
@@ -104,6 +162,26 @@ pub struct ForceReading<T> {
 /// Pixel value to force and stress, equations (5) and (6).
 ///
 /// V is the integrated pixel value: the sum of the grey-level differences over the contact.
+///
+/// ```
+/// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
+///
+/// let pairs = [0.0, 1e5, 2e5, 3e5].map(|v| CalibrationPair::loading(v, 5e-6 * v));
+/// let line = LinearCalibration::<f64>::fit(&pairs, &Default::default())?;
+/// assert!((line.force_n(1e5) - 0.5).abs() < 1e-12 && (line.sensitivity_n(1e5) - 5e-6_f64).abs() < 1e-15);
+/// assert_eq!(line.range(), [0.0, 3e5]);
+/// // Exact pairs leave the parameters no error, at one value or between two.
+/// assert!(line.standard_error_n(1e5) < 1e-12 && line.error_covariance_n2(1e5, 2e5).abs() < 1e-24);
+/// assert!((line.integrated_pixel_value(0.5).unwrap() - 1e5).abs() < 1e-6);
+/// assert!(line.report().r_squared > 0.999_999);
+/// // Stress of one grey level on pixels of (20 µm)².
+/// let step = line.stress_per_grey_level_pa(1e5, 4e-10);
+/// assert!((step - 12_500.0).abs() < 1e-6);
+/// assert_eq!(line.stress_table_pa(1e5, 4e-10)[2], 2.0 * step);
+/// // Beyond the range: read, and flagged.
+/// assert!(line.read(Estimate { value: 4e5, standard_error: 0.0 }).out_of_range);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 pub trait StressCalibration<T: Real>: Send + Sync {
     /// Force at an integrated pixel value, in newtons.
     fn force_n(&self, integrated_pixel_value: T) -> T;

@@ -76,6 +76,15 @@ impl<T: Real> PolynomialCalibration<T> {
     }
 
     /// Degree of the polynomial.
+    ///
+    /// ```
+    /// use tactile_force::{CalibrationOptions, CalibrationPair, PolynomialCalibration};
+    ///
+    /// let pairs: Vec<_> = (1..8).map(f64::from).map(|v| CalibrationPair::loading(v, v * v)).collect();
+    /// let options = CalibrationOptions { through_origin: true, ..CalibrationOptions::default() };
+    /// assert_eq!(PolynomialCalibration::fit(&pairs, 3, &options)?.degree(), 3);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn degree(&self) -> usize {
         self.coefficients.len() - usize::from(self.scale.is_none())
     }

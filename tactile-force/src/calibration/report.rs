@@ -7,6 +7,19 @@ use super::{Branch, CalibrationPair, Robustness, least_squares, least_squares::F
 use crate::{Estimate, ForceError, Real};
 
 /// Why a fit stopped.
+///
+/// ```
+/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration, Robustness, StopReason, StressCalibration};
+///
+/// let pairs = [(0.0, 0.0), (1.0, 1.1), (2.0, 1.9), (3.0, 3.0)].map(|(v, f)| CalibrationPair::loading(v, f));
+/// let stop = |robustness| {
+///     let options = CalibrationOptions { robustness, ..CalibrationOptions::default() };
+///     LinearCalibration::<f64>::fit(&pairs, &options).map(|line| line.report().stop)
+/// };
+/// assert_eq!(stop(Robustness::None)?, StopReason::Direct);
+/// assert_eq!(stop(Robustness::Huber)?, StopReason::Converged);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -20,6 +33,21 @@ pub enum StopReason {
 }
 
 /// The difference between loading and unloading.
+///
+/// ```
+/// use tactile_force::{CalibrationPair, LinearCalibration, StressCalibration};
+///
+/// // Unloading lags by 10 mN everywhere.
+/// let pairs: Vec<_> = (0..11)
+///     .map(f64::from)
+///     .flat_map(|v| [CalibrationPair::loading(v, 0.1 * v), CalibrationPair::unloading(v, 0.1 * v - 0.01)])
+///     .collect();
+/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let hysteresis = line.report().hysteresis.expect("both branches");
+/// assert!((hysteresis.mean_n.value - 0.01).abs() < 1e-12);
+/// assert!((hysteresis.share_of_full_scale - 0.01 / 1.01).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Hysteresis<T> {
@@ -32,6 +60,19 @@ pub struct Hysteresis<T> {
 }
 
 /// Quality of a calibration.
+///
+/// ```
+/// use tactile_force::{CalibrationPair, LinearCalibration, StressCalibration};
+///
+/// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)].map(|(v, f)| CalibrationPair::loading(v, f));
+/// let line = LinearCalibration::<f64>::fit(&pairs, &Default::default())?;
+/// let report = line.report();
+/// assert!(report.r_squared > 0.999 && report.monotone);
+/// assert_eq!((report.pairs, report.degrees_of_freedom), (4, 2));
+/// // Offset and slope lie within their 95 % intervals.
+/// assert!(report.parameters.iter().zip(&report.intervals_95).all(|(p, [low, high])| *low < p.value && p.value < *high));
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationReport<T> {

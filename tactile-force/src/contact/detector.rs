@@ -35,6 +35,22 @@ pub struct ContactDetector {
 }
 
 /// Buffers that detection reuses from frame to frame.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+///
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
+/// frame.slice_mut(ndarray::s![28..32, 28..32]).fill(12); // a hole, which is filled
+/// let mut workspace = DetectorWorkspace::default();
+/// let _: Detection<f64> = ContactDetector::new(ContactOptions::default())?
+///     .detect_with(&mut workspace, frame.view(), &reference)?;
+/// let (_, mask) = workspace.mask().expect("contact");
+/// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 400);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct DetectorWorkspace {
     pass: PassWorkspace,

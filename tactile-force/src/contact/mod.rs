@@ -23,6 +23,20 @@ use crate::{
 };
 
 /// Whether pressing makes the image brighter (light leaks out) or darker (light is blocked).
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, Polarity, ReferenceFrame};
+///
+/// let mut frame = Array2::from_elem((64, 64), 120_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(60);
+/// let options = ContactOptions { polarity: Polarity::Darker, ..ContactOptions::default() };
+/// let found: Detection<f64> =
+///     ContactDetector::new(options)?.detect_with(&mut Default::default(), frame.view(), &reference)?;
+/// assert_eq!(found.contact.map(|c| c.integrated_pixel_value.value), Some(400.0 * 60.0));
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Polarity {
@@ -43,6 +57,15 @@ impl Polarity {
 }
 
 /// How a contact is found.
+///
+/// ```
+/// use tactile_force::{ContactDetector, ContactOptions};
+///
+/// let options = ContactOptions { false_alarm_rate: 1e-6, margin_px: 6, ..ContactOptions::default() };
+/// assert_eq!(ContactDetector::new(options)?.options().margin_px, 6);
+/// assert!(ContactDetector::new(ContactOptions { false_alarm_rate: 0.0, ..options }).is_err());
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ContactOptions {
@@ -87,6 +110,22 @@ impl ContactOptions {
 }
 
 /// One contact. Its mask stays in the workspace.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, ReferenceFrame};
+///
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
+/// frame[[30, 30]] = 255;
+/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())?
+///     .detect_with(&mut Default::default(), frame.view(), &reference)?;
+/// let contact = found.contact.expect("contact");
+/// assert_eq!((contact.area_px, contact.peak, contact.touches_edge), (400, 243.0, false));
+/// assert_eq!(contact.saturated_share(), 1.0 / 400.0);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Contact<T> {
@@ -113,6 +152,19 @@ pub struct Contact<T> {
 }
 
 /// What detection says of a frame.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, ReferenceFrame};
+///
+/// let quiet = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(quiet.view())?;
+/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())?
+///     .detect_with(&mut Default::default(), quiet.view(), &reference)?;
+/// assert!(found.contact.is_none() && found.noise.is_none());
+/// assert_eq!(found.statistics.sum, 0);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Detection<T> {

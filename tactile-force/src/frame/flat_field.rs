@@ -7,6 +7,21 @@ use crate::drift::TileSum;
 /// Brightness relative to the frame's middle: a quadratic L(x, y) in x and y, least squares over the tiles of a reference frame.
 ///
 /// Where stray light reaches the camera through the same lens as the signal, the reference shows the vignetting of both.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::ReferenceFrame;
+///
+/// // Darker towards the corners, by a fifth.
+/// let image = Array2::from_shape_fn((240, 320), |(y, x)| {
+///     let (u, v) = ((x as f64 - 159.5) / 159.5, (y as f64 - 119.5) / 119.5);
+///     (200.0 * (1.0 - 0.1 * (u * u + v * v))).round() as u8
+/// });
+/// let flat = ReferenceFrame::new(image.view())?.with_flat_field()?.flat_field().expect("asked for");
+/// assert!((flat.at(0.0, 0.0) - 0.8).abs() < 3e-3);
+/// assert!((flat.at(159.5, 119.5) - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FlatField {

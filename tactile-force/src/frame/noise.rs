@@ -8,6 +8,18 @@ use crate::{ForceError, error::Requirement};
 ///
 /// The read variance includes the 1/12 of rounding to whole grey levels. The gain is the camera's: grey levels per
 /// photoelectron, so that the shot noise of a grey level g is gain × g.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::NoiseModel;
+///
+/// let camera = NoiseModel::new(1.5, 0.02)?;
+/// // 1.5² of reading, 1/12 of rounding, 0.02 × 100 of photons.
+/// assert!((camera.variance(100.0) - (2.25 + 1.0 / 12.0 + 2.0)).abs() < 1e-12);
+/// // An even image shows no noise but its rounding.
+/// assert_eq!(NoiseModel::of_frame(Array2::from_elem((32, 32), 9).view()).read_variance, 1.0 / 12.0);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NoiseModel {
@@ -19,6 +31,14 @@ pub struct NoiseModel {
 
 /// Variance of one pixel's difference frame − reference: background + gain × difference, in squared grey levels, and what
 /// all pixels have in common.
+///
+/// ```
+/// use tactile_force::DifferenceNoise;
+///
+/// let noise = DifferenceNoise { background: 4.0, gain: 0.02, common: 0.0, scale: 0.0, flat_field: 0.0 };
+/// // The variance of a pixel that a press has made 100 grey levels brighter.
+/// assert_eq!(noise.background + noise.gain * 100.0, 6.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DifferenceNoise {

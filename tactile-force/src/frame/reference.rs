@@ -10,6 +10,20 @@ use crate::{ForceError, drift::TileSum};
 const LONGEST_SIDE: usize = 16_384;
 
 /// A frame of the unpressed sensor, its noise and its sums, prepared once and compared with many frames.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{NoiseModel, ReferenceFrame};
+///
+/// let frames = [20_u8, 21, 22].map(|grey| Array2::from_elem((40, 50), grey));
+/// let reference = ReferenceFrame::from_frames(&frames.each_ref().map(|f| f.view()))?;
+/// assert_eq!(reference.image()[[0, 0]], 21);
+/// // Each pixel changed by one grey level from frame to frame.
+/// assert!((reference.noise().read_variance - 1.0).abs() < 1e-9);
+/// let known = reference.with_noise(NoiseModel::new(1.2, 0.01)?);
+/// assert_eq!(known.noise().gain, 0.01);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ReferenceFrame {
     image: Array2<u8>,

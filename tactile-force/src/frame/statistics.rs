@@ -5,6 +5,18 @@ use ndarray::{ArrayView2, Axis, Slice};
 use crate::Real;
 
 /// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::BoundingBox;
+///
+/// let left = BoundingBox { row_start: 2, row_end: 5, column_start: 0, column_end: 4 };
+/// let right = BoundingBox { row_start: 4, row_end: 6, column_start: 6, column_end: 9 };
+/// let both = left.union(right).grown(1, (6, 20));
+/// assert_eq!((both.rows(), both.columns()), (5, 10));
+/// let image = Array2::from_shape_fn((6, 20), |(row, column)| 100 * row + column);
+/// assert_eq!(right.of(image.view())[[0, 0]], 406);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BoundingBox {
@@ -67,6 +79,21 @@ impl BoundingBox {
 ///
 /// x is the column and y the row of a pixel, counted from the centre of the first pixel. Differences keep their sign:
 /// clamping the negative ones to zero would turn noise into force.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::ReferenceFrame;
+///
+/// // A bar of 9 × 3 pixels: (n² − 1)/12 along each axis.
+/// let mut frame = Array2::zeros((40, 40));
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![10..13, 20..29]).fill(100_u8);
+/// let statistics = reference.compare(frame.view(), 10)?;
+/// assert_eq!(statistics.centroid_px(), Some([24.0, 11.0]));
+/// let [xx, xy, yy] = statistics.central_moments_px2::<f64>().expect("a signal");
+/// assert!((xx - 80.0 / 12.0).abs() < 1e-12 && xy == 0.0 && (yy - 8.0 / 12.0).abs() < 1e-12);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrameStatistics {

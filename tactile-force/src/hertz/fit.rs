@@ -16,6 +16,13 @@ type Step = SVector<f64, 6>;
 const PIXEL: f64 = 1.0 / 12.0;
 
 /// Fits Hertz profiles; holds the table of the blurred edge.
+///
+/// ```
+/// use tactile_force::{HertzFitOptions, HertzFitter};
+///
+/// assert!(HertzFitter::new(HertzFitOptions::default()).is_ok());
+/// assert!(HertzFitter::new(HertzFitOptions { max_iterations: 0, ..HertzFitOptions::default() }).is_err());
+/// ```
 #[derive(Clone, Debug)]
 pub struct HertzFitter {
     options: HertzFitOptions,

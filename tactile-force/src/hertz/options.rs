@@ -3,6 +3,14 @@
 use crate::{Estimate, ForceError, StopReason, error::Requirement};
 
 /// Which parameters of the profile are known and which are fitted.
+///
+/// ```
+/// use tactile_force::{ForceMeter, ForceOptions, HertzFitOptions};
+///
+/// // A lens whose blur is known, over a background that is not.
+/// let hertz = HertzFitOptions { blur_px: Some(1.2), fit_background: true, ..HertzFitOptions::default() };
+/// assert!(ForceMeter::<f64>::new([20e-6; 2], &ForceOptions { hertz, ..ForceOptions::default() }).is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HertzFitOptions {
@@ -28,6 +36,25 @@ impl HertzFitOptions {
 }
 
 /// A fitted Hertz profile.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::*;
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let blob = HertzProfile::new([60.3_f64, 57.8], 30.0, 150.0)?;
+/// let frame = blob
+///     .image(&PixelGrid { rows: 120, columns: 120, size: [1.0; 2], first: [0.0; 2] })
+///     .mapv(|d| 12 + d.round() as u8);
+/// let quiet = Array2::from_elem((120, 120), 12);
+/// let measured = measure_force(frame.view(), quiet.view(), [20e-6; 2], &calibration, &Default::default())?;
+/// let fit: HertzFit<f64> = measured.profile.expect("a profile");
+/// assert!((fit.radius_px.value - 30.0).abs() < 0.02);
+/// assert!((fit.centre_px[0].value - 60.3).abs() < 0.01 && (fit.peak.value - 150.0).abs() < 0.3);
+/// assert_eq!(fit.stop, StopReason::Converged);
+/// # Ok::<(), ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HertzFit<T> {

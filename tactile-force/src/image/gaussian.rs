@@ -51,6 +51,16 @@ impl<T: Real> GaussianProfile<T> {
     }
 
     /// Moments over a rectangle; `None` where the profile is zero in double precision.
+    ///
+    /// ```
+    /// use tactile_force::{GaussianProfile, Rectangle};
+    ///
+    /// // Far out on the tail the digits are still there.
+    /// let blob = GaussianProfile::new([0.0_f64, 0.0], 1.0, 1.0)?;
+    /// let tail = blob.within(&Rectangle { x: [20.0, 21.0], y: [-40.0, 40.0] }).expect("not dark");
+    /// assert!(tail.integral > 0.0 && tail.integral < 1e-87);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn within(&self, part: &Rectangle<T>) -> Option<ProfileMoments<T>> {
         let gauss = Gauss::new();
         let x = self.along(&gauss, 0, part.x.map(T::as_f64), 0.0);

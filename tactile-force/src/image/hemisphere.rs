@@ -48,6 +48,16 @@ impl<T: Real> HertzProfile<T> {
     }
 
     /// Moments over a rectangle; `None` if it does not meet the contact.
+    ///
+    /// ```
+    /// use tactile_force::{HertzProfile, Rectangle};
+    ///
+    /// let contact = HertzProfile::new([0.0_f64, 0.0], 2.0, 1.0)?;
+    /// let half = contact.within(&Rectangle { x: [0.0, 5.0], y: [-5.0, 5.0] }).expect("they meet");
+    /// assert!((half.integral - 0.5 * contact.whole().integral).abs() < 1e-13);
+    /// assert!(contact.within(&Rectangle { x: [3.0, 5.0], y: [-5.0, 5.0] }).is_none());
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn within(&self, part: &Rectangle<T>) -> Option<ProfileMoments<T>> {
         let gauss = Gauss::new();
         let (c, a) = (self.centre.map(T::as_f64), self.radius.as_f64());

@@ -13,6 +13,16 @@ pub use moments::{ImageMoments, MomentStatus};
 use crate::Real;
 
 /// An axis-parallel rectangle of the image plane.
+///
+/// ```
+/// use tactile_force::{GaussianProfile, Rectangle};
+///
+/// // A quarter of the plane holds a quarter of a blob around the origin.
+/// let blob = GaussianProfile::new([0.0_f64, 0.0], 1.5, 100.0)?;
+/// let quarter = blob.within(&Rectangle { x: [0.0, 60.0], y: [0.0, 60.0] }).expect("not dark");
+/// assert!((quarter.integral / blob.whole().integral - 0.25).abs() < 1e-12);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Rectangle<T> {
@@ -23,6 +33,15 @@ pub struct Rectangle<T> {
 }
 
 /// Integral, centroid and spread of a profile over part of the plane.
+///
+/// ```
+/// use tactile_force::HertzProfile;
+///
+/// let whole = HertzProfile::new([7.0_f64, 8.0], 5.0, 100.0)?.whole();
+/// assert_eq!(whole.centroid, [7.0, 8.0]);
+/// assert!((whole.radius_of_gyration - 5.0 * 0.4_f64.sqrt()).abs() < 1e-14);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ProfileMoments<T> {
@@ -35,6 +54,17 @@ pub struct ProfileMoments<T> {
 }
 
 /// The square grid of an image: pixel (row, column) = (i, j) is centred at first + (j, i) × size.
+///
+/// ```
+/// use tactile_force::{HertzProfile, PixelGrid};
+///
+/// // Pixels twice as wide as high, in metres.
+/// let grid = PixelGrid { rows: 40, columns: 20, size: [40e-6, 20e-6], first: [20e-6, 10e-6] };
+/// let image = HertzProfile::new([400e-6_f64, 400e-6], 300e-6, 1.0)?.image(&grid);
+/// let volume = image.sum() * grid.size[0] * grid.size[1];
+/// assert!((volume / (2.0 / 3.0 * std::f64::consts::PI * 9e-8) - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PixelGrid<T> {

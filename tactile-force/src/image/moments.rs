@@ -6,6 +6,15 @@ use super::double::Double;
 use crate::{ForceError, Real};
 
 /// Whether the moments mean something.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ImageMoments, MomentStatus};
+///
+/// let even = ImageMoments::of(Array2::from_elem((4, 4), 7.0).view(), 7.0)?;
+/// assert_eq!((even.status, even.centroid_px), (MomentStatus::Empty, None));
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MomentStatus {
