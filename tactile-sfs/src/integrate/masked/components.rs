@@ -1,6 +1,6 @@
 //! Connected parts of the mask (four neighbours) by union–find.
 
-use super::multigrid::Level;
+use super::system::System;
 use crate::Scalar;
 
 const NONE: u32 = u32::MAX;
@@ -15,14 +15,14 @@ pub(super) struct Components {
 
 impl Components {
     /// Labels the parts in reading order of their first pixels.
-    pub(super) fn label<T: Scalar>(&mut self, level: &Level<T>) {
-        let length = level.len();
+    pub(super) fn label<T: Scalar>(&mut self, system: &System<T>) {
+        let length = system.inside.len();
         self.parent.clear();
-        self.parent.extend((0..length as u32).map(|i| if level.inside[i as usize] { i } else { NONE }));
+        self.parent.extend((0..length as u32).map(|i| if system.inside[i as usize] { i } else { NONE }));
         for i in 0..length {
-            if level.inside[i] {
-                for j in [i - 1, i - level.width] {
-                    if level.inside[j] {
+            if system.inside[i] {
+                for j in [i - 1, i - system.width] {
+                    if system.inside[j] {
                         self.unite(i as u32, j as u32);
                     }
                 }

@@ -7,6 +7,7 @@
 //! parts have nothing to do with each other: each gets mean 0, or is fixed by its own known heights.
 
 mod components;
+mod level;
 mod multigrid;
 mod solve;
 mod system;
@@ -16,9 +17,11 @@ use ndarray::ArrayView2;
 use super::{CosinePoisson, SlopeIntegrator};
 use crate::domain::same_shape;
 use crate::error::{Input, positive};
-use crate::{BoundingBox, Domain, Scalar, SfsError, Surface, Workspace};
+use crate::{BoundingBox, Component, Domain, Scalar, SfsError, Surface, Workspace};
 use components::Components;
 use multigrid::Hierarchy;
+use solve::Limits;
+use system::System;
 
 /// Weighted least squares integration on a mask.
 ///
@@ -93,15 +96,30 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
 /// The system on all grids, the vectors of conjugate gradients and the labels of the parts.
 #[derive(Debug, Default)]
 pub(crate) struct MaskedBuffers<T> {
-    hierarchy: Hierarchy<T>,
+    system: System<T>,
+    hierarchy: Hierarchy,
     components: Components,
     /// Heights, residual, direction, and A · direction: in f64 for both float types, for A's smallest eigenvalues are
-    /// far below single precision. The preconditioner works in T.
+    /// far below single precision.
     z: Vec<f64>,
     residual: Vec<f64>,
     direction: Vec<f64>,
     image: Vec<f64>,
-    sums: Vec<(f64, usize, bool)>,
+    parts: Vec<Part>,
+}
+
+/// Sum of the heights of a connected part, and whether one of them is known.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    sum: f64,
+    pixels: usize,
+    anchored: bool,
+}
+
+impl Part {
+    fn mean(&self) -> f64 {
+        self.sum / self.pixels as f64
+    }
 }
 
 impl<T: Scalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
@@ -119,31 +137,16 @@ impl<T: Scalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
         if let Some(weights) = self.weights {
             same_shape(Input::Weights, [rows, columns], weights.dim())?;
         }
-        if self.is_plain(domain, area) {
-            match CosinePoisson::new().integrate_with(workspace, p, q, domain, surface) {
-                Ok(()) => {
-                    let first = [area.top, area.left];
-                    let whole = crate::Component { pixels: area.area(), first, mean_height: T::zero() };
-                    surface.report.components.push(whole);
-                    return Ok(());
-                }
-                // Left out below.
-                Err(SfsError::NonFiniteSlope { .. }) => {}
-                Err(error) => return Err(error),
-            }
+        if self.is_plain(domain, area) && solve_directly(workspace, [p, q], domain, surface)? {
+            return Ok(());
         }
         surface.prepare(rows, columns, area);
         let slopes = system::Slopes { p, q, weights: self.weights };
         let mut buffers = core::mem::take(&mut workspace.masked);
         system::assemble(&mut buffers, &slopes, domain, surface);
-        buffers.components.label(&buffers.hierarchy.levels[0]);
-        solve::conjugate_gradients(
-            &mut buffers,
-            workspace,
-            self.tolerance,
-            self.max_iterations,
-            &mut surface.report,
-        );
+        buffers.components.label(&buffers.system);
+        let limits = Limits { tolerance: self.tolerance.as_f64(), iterations: self.max_iterations };
+        solve::conjugate_gradients(&mut buffers, workspace, &limits, &mut surface.report);
         buffers.level(surface);
         buffers.write(domain, surface);
         workspace.masked = buffers;
@@ -152,47 +155,66 @@ impl<T: Scalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
     }
 }
 
+/// The fit on a full rectangle with equal weights; false if there are slopes to be left out.
+fn solve_directly<T: Scalar>(
+    workspace: &mut Workspace<T>,
+    [p, q]: [ArrayView2<'_, T>; 2],
+    domain: &Domain<'_, T>,
+    surface: &mut Surface<T>,
+) -> Result<bool, SfsError> {
+    match CosinePoisson::new().integrate_with(workspace, p, q, domain, surface) {
+        Ok(()) => {
+            let BoundingBox { top, left, .. } = surface.bounding_box;
+            let pixels = surface.bounding_box.area();
+            surface.report.components.push(Component { pixels, first: [top, left], mean_height: T::zero() });
+            Ok(true)
+        }
+        Err(SfsError::NonFiniteSlope { .. }) => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
 impl<T: Scalar> MaskedBuffers<T> {
     /// Gives parts without a known height mean 0 and reports all parts.
     fn level(&mut self, surface: &mut Surface<T>) {
-        let area = surface.bounding_box;
-        let level = &self.hierarchy.levels[0];
-        let count = self.components.count();
-        self.sums.clear();
-        self.sums.resize(count, (0.0, 0, false));
+        self.sum_up(surface);
+        for (part, component) in self.parts.iter().zip(&mut surface.report.components) {
+            component.pixels = part.pixels;
+            component.mean_height = if part.anchored { T::of(part.mean()) } else { T::zero() };
+        }
+        for i in 0..self.z.len() {
+            if let Some(label) = self.components.of(i).filter(|&label| !self.parts[label].anchored) {
+                self.z[i] -= self.parts[label].mean();
+            }
+        }
+    }
+
+    /// Sums the heights of the parts, whose first pixels go to the report.
+    fn sum_up(&mut self, surface: &mut Surface<T>) {
+        let (area, system) = (surface.bounding_box, &self.system);
+        self.parts.clear();
+        self.parts.resize(self.components.count(), Part::default());
         surface.report.components.clear();
-        for i in 0..self.z.len() {
+        for (i, z) in self.z.iter().enumerate() {
             let Some(label) = self.components.of(i) else { continue };
-            let entry = &mut self.sums[label];
-            if entry.1 == 0 {
-                let first = [area.top + i / level.width - 1, area.left + i % level.width - 1];
-                surface.report.components.push(crate::Component { pixels: 0, first, mean_height: T::zero() });
+            let part = &mut self.parts[label];
+            if part.pixels == 0 {
+                let first = [area.top + i / system.width - 1, area.left + i % system.width - 1];
+                surface.report.components.push(Component { pixels: 0, first, mean_height: T::zero() });
             }
-            entry.0 += self.z[i];
-            entry.1 += 1;
-            entry.2 |= level.anchor[i] > T::zero() || level.fixed[i];
-        }
-        for (&(sum, pixels, anchored), component) in self.sums.iter().zip(&mut surface.report.components) {
-            component.pixels = pixels;
-            component.mean_height = if anchored { T::of(sum / pixels as f64) } else { T::zero() };
-        }
-        for i in 0..self.z.len() {
-            if let Some(label) = self.components.of(i) {
-                let (sum, pixels, anchored) = self.sums[label];
-                if !anchored {
-                    self.z[i] -= sum / pixels as f64;
-                }
-            }
+            part.sum += z;
+            part.pixels += 1;
+            part.anchored |= system.anchor[i] > T::zero() || system.fixed[i];
         }
     }
 
     fn write(&self, domain: &Domain<'_, T>, surface: &mut Surface<T>) {
         let area = surface.bounding_box;
-        let level = &self.hierarchy.levels[0];
+        let system = &self.system;
         for r in 0..area.rows {
             for c in 0..area.columns {
-                let i = (r + 1) * level.width + c + 1;
-                if level.inside[i] {
+                let i = (r + 1) * system.width + c + 1;
+                if system.inside[i] {
                     let (row, column) = (area.top + r, area.left + c);
                     surface.set(row, column, domain.known(row, column).unwrap_or(T::of(self.z[i])));
                 }

@@ -1,123 +1,33 @@
-//! A hierarchy of grids, each a weighted graph Laplacian with four neighbours, and its V-cycle.
+//! A hierarchy of grids and its V-cycle, the preconditioner of the fit.
 //!
-//! Coarse nodes are blocks of 2×2. With piecewise constant interpolation the coarse operator is again a graph
-//! Laplacian, whose edge is the sum of the fine edges that cross between two blocks; it is too stiff by a factor of 2
-//! (Braess 1995), so half the sum is taken. Symmetric Gauss–Seidel makes the cycle a symmetric preconditioner.
+//! Coarse nodes are blocks of 2×2. An edge between two of them weighs half the sum of the fine edges that cross: the
+//! same Laplacian again on the coarser grid, and right for corridors one pixel wide, too. Corrections are interpolated
+//! linearly, from a node's block (½ where all weights are equal) and the blocks next to it in x and y (¼ each); a block
+//! behind a gap has no share. Restriction is the transpose, the smoother Gauss–Seidel one way before and the other way
+//! after, so that the cycle is symmetric, as conjugate gradients need. It is kept in single precision: it need not be
+//! exact, and memory is what it waits for.
+//!
+//! The number of steps does not depend on the size: 9 or 10 to a residual of 10⁻⁹ on squares and discs of 32 to 1024
+//! pixels, up to 17 on ragged masks.
 
-use crate::Scalar;
-
-/// One grid with a border of one node.
-#[derive(Debug, Default)]
-pub(super) struct Level<T> {
-    pub(super) width: usize,
-    rows: usize,
-    /// Node belongs to the mask.
-    pub(super) inside: Vec<bool>,
-    /// Node has a given height (finest level alone).
-    pub(super) fixed: Vec<bool>,
-    /// Weight of the edge to the right neighbour, and to the one below.
-    pub(super) right: Vec<T>,
-    pub(super) below: Vec<T>,
-    /// Weight of the edges to given heights.
-    pub(super) anchor: Vec<T>,
-    /// 1/diagonal, 0 where there is nothing to solve.
-    inverse: Vec<T>,
-    /// Right-hand side and solution of the cycle.
-    pub(super) rhs: Vec<T>,
-    pub(super) x: Vec<T>,
-}
-
-impl<T: Scalar> Level<T> {
-    pub(super) fn len(&self) -> usize {
-        self.width * (self.rows + 2)
-    }
-
-    fn reset(&mut self, rows: usize, columns: usize) {
-        (self.width, self.rows) = (columns + 2, rows);
-        let length = self.len();
-        for flags in [&mut self.inside, &mut self.fixed] {
-            flags.clear();
-            flags.resize(length, false);
-        }
-        let Self { right, below, anchor, inverse, rhs, x, .. } = self;
-        for vector in [right, below, anchor, inverse, rhs, x] {
-            vector.clear();
-            vector.resize(length, T::zero());
-        }
-    }
-
-    /// The nodes that are not border.
-    fn nodes(&self) -> core::ops::Range<usize> {
-        self.width..self.len() - self.width
-    }
-
-    fn invert_diagonal(&mut self) {
-        for i in self.nodes() {
-            let edges = self.right[i] + self.right[i - 1] + self.below[i] + self.below[i - self.width];
-            let diagonal = edges + self.anchor[i];
-            self.inverse[i] = if diagonal > T::zero() { diagonal.recip() } else { T::zero() };
-        }
-    }
-
-    /// y = A x, in differences of neighbours so that smooth x keeps its digits.
-    pub(super) fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        let w = self.width;
-        for r in 1..=self.rows {
-            let n = w - 2;
-            let at = r * w + 1;
-            let (here, left, right) = (&x[at..at + n], &x[at - 1..at - 1 + n], &x[at + 1..at + 1 + n]);
-            let (above, below) = (&x[at - w..at - w + n], &x[at + w..at + w + n]);
-            let (e, wt) = (&self.right[at..at + n], &self.right[at - 1..at - 1 + n]);
-            let (s, nt) = (&self.below[at..at + n], &self.below[at - w..at - w + n]);
-            let (anchor, out) = (&self.anchor[at..at + n], &mut y[at..at + n]);
-            for i in 0..n {
-                let z = here[i];
-                out[i] = anchor[i].as_f64() * z
-                    + e[i].as_f64() * (z - right[i])
-                    + wt[i].as_f64() * (z - left[i])
-                    + s[i].as_f64() * (z - below[i])
-                    + nt[i].as_f64() * (z - above[i]);
-            }
-        }
-    }
-
-    /// One Gauss–Seidel sweep, in reading order or against it.
-    fn relax(&self, x: &mut [T], rhs: &[T], forward: bool) {
-        let (w, n) = (self.width, self.width - 2);
-        for k in 1..=self.rows {
-            let r = if forward { k } else { self.rows + 1 - k };
-            let at = r * w + 1;
-            let (before, rest) = x.split_at_mut(at - 1);
-            let (here, after) = rest.split_at_mut(w);
-            let (above, below) = (&before[before.len() + 1 - w..][..n], &after[1..][..n]);
-            let here = &mut here[..n + 2];
-            let (right, left) = (&self.right[at..at + n], &self.right[at - 1..at - 1 + n]);
-            let (s, nt) = (&self.below[at..at + n], &self.below[at - w..at - w + n]);
-            let (inverse, rhs) = (&self.inverse[at..at + n], &rhs[at..at + n]);
-            let mut update = |i: usize| {
-                let vertical = rhs[i] + s[i] * below[i] + nt[i] * above[i];
-                here[i + 1] = inverse[i] * (vertical + right[i] * here[i + 2] + left[i] * here[i]);
-            };
-            if forward {
-                (0..n).for_each(&mut update);
-            } else {
-                (0..n).rev().for_each(&mut update);
-            }
-        }
-    }
-}
+use super::level::Level;
 
 /// Grids from fine to coarse.
 #[derive(Debug, Default)]
-pub(super) struct Hierarchy<T> {
-    pub(super) levels: Vec<Level<T>>,
+pub(super) struct Hierarchy {
+    pub(super) levels: Vec<Level>,
     /// Levels in use; more may be kept from larger problems.
     depth: usize,
+    lines: [Vec<f32>; 3],
 }
 
-impl<T: Scalar> Hierarchy<T> {
+impl Hierarchy {
     pub(super) fn reset(&mut self, mut rows: usize, mut columns: usize) {
         self.depth = 0;
+        for line in &mut self.lines {
+            line.clear();
+            line.resize(columns + 4, 0.0);
+        }
         loop {
             if self.levels.len() == self.depth {
                 self.levels.push(Level::default());
@@ -133,11 +43,11 @@ impl<T: Scalar> Hierarchy<T> {
 
     /// Computes the coarse operators from the finest.
     pub(super) fn build(&mut self) {
-        self.levels[0].invert_diagonal();
+        self.levels[0].finish();
         for k in 1..self.depth {
             let (fine, coarse) = self.levels.split_at_mut(k);
             coarsen(&fine[k - 1], &mut coarse[0]);
-            coarse[0].invert_diagonal();
+            coarse[0].finish();
         }
     }
 
@@ -145,81 +55,96 @@ impl<T: Scalar> Hierarchy<T> {
     pub(super) fn cycle(&mut self) {
         for k in 0..self.depth {
             let (fine, coarse) = self.levels.split_at_mut(k + 1);
-            let level = &mut fine[k];
-            let (mut x, rhs) = (core::mem::take(&mut level.x), core::mem::take(&mut level.rhs));
-            x.fill(T::zero());
-            level.relax(&mut x, &rhs, true);
+            fine[k].relax_from_zero();
             if k + 1 < self.depth {
-                restrict(level, &x, &rhs, &mut coarse[0]);
+                restrict(&fine[k], &mut coarse[0], &mut self.lines);
             }
-            (level.x, level.rhs) = (x, rhs);
         }
         for k in (0..self.depth).rev() {
             let (fine, coarse) = self.levels.split_at_mut(k + 1);
-            let level = &mut fine[k];
-            let (mut x, rhs) = (core::mem::take(&mut level.x), core::mem::take(&mut level.rhs));
             if k + 1 < self.depth {
-                prolong(level, &mut x, &coarse[0]);
+                prolong(&mut fine[k], &coarse[0], &mut self.lines);
             }
-            level.relax(&mut x, &rhs, false);
-            (level.x, level.rhs) = (x, rhs);
+            fine[k].relax_backwards();
         }
     }
 }
 
-/// Index of the block a node of a row belongs to.
-#[inline(always)]
-fn block(fine_width: usize, coarse_width: usize, i: usize) -> usize {
-    let (r, c) = (i / fine_width - 1, i % fine_width);
-    (r / 2 + 1) * coarse_width + (c.wrapping_sub(1) / 2 + 1)
-}
-
-fn coarsen<T: Scalar>(fine: &Level<T>, coarse: &mut Level<T>) {
-    let half = T::of(0.5);
-    for i in fine.nodes() {
-        if fine.inverse[i] == T::zero() {
-            continue;
-        }
-        let b = block(fine.width, coarse.width, i);
-        coarse.anchor[b] += fine.anchor[i];
-        if fine.right[i] > T::zero() && block(fine.width, coarse.width, i + 1) != b {
-            coarse.right[b] += half * fine.right[i];
-        }
-        if fine.below[i] > T::zero() && block(fine.width, coarse.width, i + fine.width) != b {
-            coarse.below[b] += half * fine.below[i];
-        }
-    }
-}
-
-/// Sums the residual over the blocks.
-fn restrict<T: Scalar>(fine: &Level<T>, x: &[T], rhs: &[T], coarse: &mut Level<T>) {
-    coarse.rhs.fill(T::zero());
+fn coarsen(fine: &Level, coarse: &mut Level) {
     let (w, n) = (fine.width, fine.width - 2);
     for r in 1..=fine.rows {
-        let at = r * w + 1;
-        let (here, left, right) = (&x[at..at + n], &x[at - 1..at - 1 + n], &x[at + 1..at + 1 + n]);
-        let (above, below) = (&x[at - w..at - w + n], &x[at + w..at + w + n]);
-        let (e, wt) = (&fine.right[at..at + n], &fine.right[at - 1..at - 1 + n]);
-        let (s, nt) = (&fine.below[at..at + n], &fine.below[at - w..at - w + n]);
-        let (anchor, rhs) = (&fine.anchor[at..at + n], &rhs[at..at + n]);
-        let to = &mut coarse.rhs[r.div_ceil(2) * coarse.width + 1..][..n.div_ceil(2)];
-        for i in 0..n {
-            let z = here[i];
-            let outward = e[i] * (right[i] - z)
-                + wt[i] * (left[i] - z)
-                + s[i] * (below[i] - z)
-                + nt[i] * (above[i] - z);
-            to[i / 2] += rhs[i] + outward - anchor[i] * z;
+        for c in 1..=n {
+            let i = r * w + c;
+            let b = r.div_ceil(2) * coarse.width + c.div_ceil(2);
+            coarse.anchor[b] += fine.anchor[i];
+            if c % 2 == 0 {
+                coarse.right[b] += 0.5 * fine.right[i];
+            }
+            if r % 2 == 0 {
+                coarse.below[b] += 0.5 * fine.below[i];
+            }
         }
     }
 }
 
-fn prolong<T: Scalar>(fine: &Level<T>, x: &mut [T], coarse: &Level<T>) {
-    let n = fine.width - 2;
+/// Hands the residual to the coarser grid. After one sweep from zero it is what the sweep did not feel: the right and the
+/// lower neighbours.
+fn restrict(fine: &Level, coarse: &mut Level, [own, near, sides]: &mut [Vec<f32>; 3]) {
+    coarse.rhs.fill(0.0);
+    let (w, n, cw) = (fine.width, fine.width - 2, coarse.width);
     for r in 1..=fine.rows {
-        let from = &coarse.x[r.div_ceil(2) * coarse.width + 1..][..n.div_ceil(2)];
-        for (i, x) in x[r * fine.width + 1..][..n].iter_mut().enumerate() {
-            *x += from[i / 2];
+        let at = r * w + 1;
+        let (next, under) = (&fine.x[at + 1..][..n], &fine.x[at + w..][..n]);
+        let (right, lower) = (&fine.right[at..][..n], &fine.below[at..][..n]);
+        let (lean_x, lean_y) = (&fine.lean_x[at..][..n], &fine.lean_y[at..][..n]);
+        let (own, near, sides) = (&mut own[..n + 1], &mut near[..n + 1], &mut sides[..n + 1]);
+        for i in 0..n {
+            let residual = right[i] * next[i] + lower[i] * under[i];
+            near[i] = residual * lean_y[i];
+            sides[i] = residual * lean_x[i];
+            own[i] = residual - near[i] - sides[i];
+        }
+        for line in [&mut *own, &mut *near, &mut *sides] {
+            line[n] = 0.0;
+        }
+        let block = r.div_ceil(2);
+        let beyond = if r % 2 == 1 { block - 1 } else { block + 1 };
+        let m = n.div_ceil(2);
+        let to = &mut coarse.rhs[block * cw..][..m + 2];
+        for (j, (own, sides)) in own.chunks_exact(2).zip(sides.chunks_exact(2)).take(m).enumerate() {
+            to[j + 1] += own[0] + own[1];
+            to[j] += sides[0];
+            to[j + 2] += sides[1];
+        }
+        let to = &mut coarse.rhs[beyond * cw + 1..][..m];
+        for (to, near) in to.iter_mut().zip(near.chunks_exact(2)) {
+            *to += near[0] + near[1];
+        }
+    }
+}
+
+/// Adds the correction of the coarser grid.
+fn prolong(fine: &mut Level, coarse: &Level, [own, near, sides]: &mut [Vec<f32>; 3]) {
+    let (w, n, cw) = (fine.width, fine.width - 2, coarse.width);
+    let m = n.div_ceil(2);
+    for r in 1..=fine.rows {
+        let block = r.div_ceil(2);
+        let beyond = if r % 2 == 1 { block - 1 } else { block + 1 };
+        let from = &coarse.x[block * cw..][..m + 2];
+        let (own, near, sides) = (&mut own[..2 * m], &mut near[..2 * m], &mut sides[..2 * m]);
+        for (j, (own, sides)) in own.chunks_exact_mut(2).zip(sides.chunks_exact_mut(2)).enumerate() {
+            own.fill(from[j + 1]);
+            (sides[0], sides[1]) = (from[j], from[j + 2]);
+        }
+        let from = &coarse.x[beyond * cw + 1..][..m];
+        for (near, from) in near.chunks_exact_mut(2).zip(from) {
+            near.fill(*from);
+        }
+        let at = r * w + 1;
+        let x = &mut fine.x[at..][..n];
+        let (lean_x, lean_y) = (&fine.lean_x[at..][..n], &fine.lean_y[at..][..n]);
+        for i in 0..n {
+            x[i] += own[i] + lean_x[i] * (sides[i] - own[i]) + lean_y[i] * (near[i] - own[i]);
         }
     }
 }

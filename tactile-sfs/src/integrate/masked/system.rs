@@ -3,8 +3,9 @@
 use ndarray::ArrayView2;
 
 use super::MaskedBuffers;
-use super::multigrid::Level;
-use crate::{Domain, PixelFlags, Scalar, Surface};
+use super::level::Level;
+use super::solve::dot;
+use crate::{BoundingBox, Domain, PixelFlags, Scalar, Surface};
 
 /// Weight of an edge both of whose slopes are missing, relative to an edge of weight 1: it only bridges the gap.
 const BRIDGE: f64 = 1e-4;
@@ -16,16 +17,24 @@ pub(super) struct Slopes<'a, T> {
     pub(super) weights: Option<ArrayView2<'a, T>>,
 }
 
-impl<T: Scalar> Slopes<'_, T> {
-    fn weight(&self, at: [usize; 2]) -> T {
-        self.weights.map_or(T::one(), |weights| weights[at])
-    }
+/// The direction of a family of edges: the slopes along it and its unit.
+struct Axis<'a, T> {
+    slopes: ArrayView2<'a, T>,
+    /// From a pixel to the next: rows and columns, and nodes.
+    step: [usize; 2],
+    stride: usize,
+    /// Weight of an edge between pixels of weight 1, and its length.
+    weight: T,
+    length: T,
+}
 
+impl<T: Scalar> Slopes<'_, T> {
     /// Mean slope along the edge between neighbours b and c, and its weight, from the pixels a, b, c, d in a line, of which
     /// those beside the edge may be missing.
     fn edge(&self, slopes: ArrayView2<'_, T>, [a, b, c, d]: [Option<[usize; 2]>; 4]) -> (T, T) {
         let usable = |at: Option<[usize; 2]>| {
-            let (slope, weight) = at.map(|at| (slopes[at], self.weight(at)))?;
+            let at = at?;
+            let (slope, weight) = (slopes[at], self.weights.map_or(T::one(), |weights| weights[at]));
             (slope.is_finite() && weight > T::zero() && weight.is_finite()).then_some((slope, weight))
         };
         match (usable(b), usable(c)) {
@@ -52,8 +61,23 @@ fn mean_slope<T: Scalar>([a, b, c, d]: [Option<T>; 4]) -> T {
     }
 }
 
-/// Sets up the finest level, the first heights (known ones) and the right-hand side (in `residual`), and the coarser
-/// levels. Heights are in units of h_y; an edge along x weighs (h_y/h_x)² times its own weight.
+/// A weighted graph Laplacian whose nodes of given height have been moved to the right-hand side.
+#[derive(Debug, Default)]
+pub(super) struct System<T> {
+    pub(super) width: usize,
+    /// Node belongs to the mask.
+    pub(super) inside: Vec<bool>,
+    /// Node has a given height.
+    pub(super) fixed: Vec<bool>,
+    /// Weight of the edge to the right neighbour, and to the one below.
+    right: Vec<T>,
+    below: Vec<T>,
+    /// Weight of the edges to given heights.
+    pub(super) anchor: Vec<T>,
+}
+
+/// Sets up the system, the first heights (known ones) and the right-hand side (in `residual`), and the preconditioner.
+/// Heights are in units of h_y; an edge along x weighs (h_y/h_x)² times its own weight.
 pub(super) fn assemble<T: Scalar>(
     buffers: &mut MaskedBuffers<T>,
     slopes: &Slopes<'_, T>,
@@ -61,87 +85,155 @@ pub(super) fn assemble<T: Scalar>(
     surface: &mut Surface<T>,
 ) {
     let area = surface.bounding_box;
-    let MaskedBuffers { hierarchy, z, residual, .. } = buffers;
-    hierarchy.reset(area.rows, area.columns);
-    let level = &mut hierarchy.levels[0];
-    let width = level.width;
+    let MaskedBuffers { hierarchy, system, z, residual, .. } = buffers;
+    system.reset(area);
     for vector in [&mut *z, &mut *residual] {
         vector.clear();
-        vector.resize(level.len(), 0.0);
+        vector.resize(system.inside.len(), 0.0);
     }
+    system.mark(z, slopes, domain, surface);
+    let ([hx, hy], width) = (domain.pixel_size_m, system.width);
+    let x = Axis { slopes: slopes.p, step: [0, 1], stride: 1, weight: (hy / hx) * (hy / hx), length: hx };
+    let y = Axis { slopes: slopes.q, step: [1, 0], stride: width, weight: T::one(), length: hy };
     for r in 0..area.rows {
         for c in 0..area.columns {
-            let (row, column, i) = (area.top + r, area.left + c, (r + 1) * width + c + 1);
-            if !domain.contains(row, column) {
-                continue;
-            }
-            level.inside[i] = true;
-            if let Some(height) = domain.known(row, column) {
-                level.fixed[i] = true;
-                z[i] = height.as_f64();
-            }
-            if !(slopes.p[[row, column]].is_finite() && slopes.q[[row, column]].is_finite()) {
-                surface.flags[[row, column]] |= PixelFlags::NON_FINITE;
+            let (at, i) = ([area.top + r, area.left + c], (r + 1) * width + c + 1);
+            for axis in [&x, &y] {
+                if system.inside[i] && system.inside[i + axis.stride] {
+                    let (slope, weight) = slopes.edge(axis.slopes, system.line(axis, i, at));
+                    system.add(z, residual, axis, i, weight * axis.weight, slope * axis.length);
+                }
             }
         }
     }
-    let [hx, hy] = domain.pixel_size_m;
-    let aspect2 = (hy / hx) * (hy / hx);
-    for r in 0..area.rows {
-        for c in 0..area.columns {
-            let (row, column, i) = (area.top + r, area.left + c, (r + 1) * width + c + 1);
-            let inside = |j: usize, at: [usize; 2]| level.inside[j].then_some(at);
-            if level.inside[i] && level.inside[i + 1] {
-                let line = [
-                    inside(i - 1, [row, column.wrapping_sub(1)]),
-                    Some([row, column]),
-                    Some([row, column + 1]),
-                    inside(i + 2, [row, column + 2]),
-                ];
-                let (slope, weight) = slopes.edge(slopes.p, line);
-                add_edge(level, residual, z, [i, i + 1], weight * aspect2, slope * hx);
-            }
-            let inside = |j: usize, at: [usize; 2]| level.inside[j].then_some(at);
-            if level.inside[i] && level.inside[i + width] {
-                let line = [
-                    inside(i - width, [row.wrapping_sub(1), column]),
-                    Some([row, column]),
-                    Some([row + 1, column]),
-                    inside(i + 2 * width, [row + 2, column]),
-                ];
-                let (slope, weight) = slopes.edge(slopes.q, line);
-                add_edge(level, residual, z, [i, i + width], weight, slope * hy);
-            }
-        }
-    }
+    hierarchy.reset(area.rows, area.columns);
+    system.copy_to(&mut hierarchy.levels[0]);
     hierarchy.build();
 }
 
-/// Adds w (z_j − z_i − rise)² to the fit; an end of known height moves to the right-hand side.
-fn add_edge<T: Scalar>(
-    level: &mut Level<T>,
-    rhs: &mut [f64],
-    z: &[f64],
-    [i, j]: [usize; 2],
-    weight: T,
-    rise: T,
-) {
-    let (w, rise) = (weight.as_f64(), rise.as_f64());
-    match (level.fixed[i], level.fixed[j]) {
-        (false, false) => {
-            let edges = if j == i + 1 { &mut level.right } else { &mut level.below };
-            edges[i] = weight;
-            rhs[i] -= w * rise;
-            rhs[j] += w * rise;
+impl<T: Scalar> System<T> {
+    fn reset(&mut self, area: BoundingBox) {
+        self.width = area.columns + 2;
+        let length = self.width * (area.rows + 2);
+        for flags in [&mut self.inside, &mut self.fixed] {
+            flags.clear();
+            flags.resize(length, false);
         }
-        (true, false) => {
-            level.anchor[j] += weight;
-            rhs[j] += w * (z[i] + rise);
+        for weights in [&mut self.right, &mut self.below, &mut self.anchor] {
+            weights.clear();
+            weights.resize(length, T::zero());
         }
-        (false, true) => {
-            level.anchor[i] += weight;
-            rhs[i] += w * (z[j] - rise);
+    }
+
+    /// Marks the nodes of the mask, takes over known heights and flags slopes that are not finite.
+    fn mark(
+        &mut self,
+        z: &mut [f64],
+        slopes: &Slopes<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) {
+        let area = surface.bounding_box;
+        for (row, r) in (area.top..).zip(1..=area.rows) {
+            for (column, c) in (area.left..).zip(1..=area.columns) {
+                if !domain.contains(row, column) {
+                    continue;
+                }
+                let i = r * self.width + c;
+                self.inside[i] = true;
+                if let Some(height) = domain.known(row, column) {
+                    self.fixed[i] = true;
+                    z[i] = height.as_f64();
+                }
+                if !(slopes.p[[row, column]].is_finite() && slopes.q[[row, column]].is_finite()) {
+                    surface.flags[[row, column]] |= PixelFlags::NON_FINITE;
+                }
+            }
         }
-        (true, true) => {}
+    }
+
+    /// The pixels in line with the edge from node i, which lies at `at`, to the next.
+    fn line(&self, axis: &Axis<'_, T>, i: usize, at: [usize; 2]) -> [Option<[usize; 2]>; 4] {
+        let forth = |n: usize| [at[0] + n * axis.step[0], at[1] + n * axis.step[1]];
+        let before = || [at[0] - axis.step[0], at[1] - axis.step[1]];
+        [
+            self.inside[i - axis.stride].then(before),
+            Some(at),
+            Some(forth(1)),
+            self.inside[i + 2 * axis.stride].then(|| forth(2)),
+        ]
+    }
+
+    /// Adds w (z_j − z_i − rise)², j the node after i, to the fit; an end of known height moves to the right-hand side.
+    fn add(&mut self, z: &[f64], rhs: &mut [f64], axis: &Axis<'_, T>, i: usize, weight: T, rise: T) {
+        let j = i + axis.stride;
+        let (w, rise) = (weight.as_f64(), rise.as_f64());
+        match (self.fixed[i], self.fixed[j]) {
+            (false, false) => {
+                let edges = if axis.stride == 1 { &mut self.right } else { &mut self.below };
+                edges[i] = weight;
+                rhs[i] -= w * rise;
+                rhs[j] += w * rise;
+            }
+            (true, false) => {
+                self.anchor[j] += weight;
+                rhs[j] += w * (z[i] + rise);
+            }
+            (false, true) => {
+                self.anchor[i] += weight;
+                rhs[i] += w * (z[j] - rise);
+            }
+            (true, true) => {}
+        }
+    }
+
+    /// Copies the weights, the largest as 1.
+    fn copy_to(&self, level: &mut Level) {
+        let all = || [&self.right, &self.below, &self.anchor].into_iter();
+        let largest = all().flatten().fold(T::zero(), |largest, &weight| largest.max(weight)).as_f64();
+        let scale = if largest > 0.0 { largest.recip() } else { 1.0 };
+        for (from, to) in all().zip([&mut level.right, &mut level.below, &mut level.anchor]) {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = (from.as_f64() * scale) as f32;
+            }
+        }
+    }
+
+    /// Turns the direction, d ← x + β d, and multiplies it, image ← A d; returns d · A d.
+    pub(super) fn turn(&self, beta: f64, x: &[f32], direction: &mut [f64], image: &mut [f64]) -> f64 {
+        let w = self.width;
+        let advance = |direction: &mut [f64], row: usize| {
+            for (d, &x) in direction[row * w..][..w].iter_mut().zip(&x[row * w..][..w]) {
+                *d = f64::from(x) + beta * *d;
+            }
+        };
+        let rows = direction.len() / w - 2;
+        advance(direction, 1);
+        let mut curvature = 0.0;
+        for row in 1..=rows {
+            advance(direction, row + 1);
+            self.multiply_row(direction, image, row);
+            curvature += dot(&direction[row * w..][..w], &image[row * w..][..w]);
+        }
+        curvature
+    }
+
+    /// One row of y = A x, in differences of neighbours so that smooth x keeps its digits.
+    fn multiply_row(&self, x: &[f64], y: &mut [f64], row: usize) {
+        let (w, n) = (self.width, self.width - 2);
+        let at = row * w + 1;
+        let (here, left, right) = (&x[at..][..n], &x[at - 1..][..n], &x[at + 1..][..n]);
+        let (above, below) = (&x[at - w..][..n], &x[at + w..][..n]);
+        let (e, wt) = (&self.right[at..][..n], &self.right[at - 1..][..n]);
+        let (s, nt) = (&self.below[at..][..n], &self.below[at - w..][..n]);
+        let (anchor, out) = (&self.anchor[at..][..n], &mut y[at..][..n]);
+        for i in 0..n {
+            let z = here[i];
+            out[i] = anchor[i].as_f64() * z
+                + e[i].as_f64() * (z - right[i])
+                + wt[i].as_f64() * (z - left[i])
+                + s[i].as_f64() * (z - below[i])
+                + nt[i].as_f64() * (z - above[i]);
+        }
     }
 }
