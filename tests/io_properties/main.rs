@@ -8,6 +8,8 @@ use tactile_imaging::io::{
 use tactile_imaging::io::{read_grid, read_points, write_grid, write_points};
 use tactile_imaging::scene::Scene;
 
+mod mutated;
+
 /// Text that looks like a table often enough to reach the depths of the parsers.
 fn tabular() -> impl Strategy<Value = Vec<u8>> {
     let piece = prop_oneof![

@@ -1,0 +1,201 @@
+//! Valid files with bytes, fields or lines changed, dropped, doubled or cut: every reader gives an answer or an error that names
+//! the file, none panics; nor does what the values are given to.
+//!
+//! Random bytes alone end at a parser's door; a valid file with a few edits comes further in.
+
+use nalgebra::Point;
+use proptest::prelude::*;
+use tactile_imaging::elasticity::curve::{CurveOptions, IndentationCurve, Indenter, Model, select_model};
+use tactile_imaging::force::{
+    CalibrationOptions, CalibrationPair, LinearCalibration, MonotoneCalibration, PolynomialCalibration,
+    StressCalibration,
+};
+use tactile_imaging::io::{
+    cases::parse_cases, grid::parse_grid, image::parse_grey_image, points::parse_points, read_table,
+    write_grey_image,
+};
+use tactile_imaging::scene::Scene;
+use tactile_imaging::tps::ThinPlateSpline;
+
+/// One change: what is done, where as a share of the file, and with what.
+type Edit = (u8, f64, u8);
+
+/// Few changes, so that most of the file stays valid and doubling keeps it small.
+fn edits() -> impl Strategy<Value = Vec<Edit>> {
+    prop::collection::vec((0..12_u8, 0.0..1.0, any::<u8>()), 1..6)
+}
+
+/// Values and words that a field of a table or scene may wrongly hold.
+const FIELDS: [&str; 12] =
+    ["", "0", "-1", "nan", "inf", "1e308", "-1e-320", "1e999", "99999999999999999999", "x", "\"", "[[1]]"];
+
+fn mutated(valid: &[u8], edits: &[Edit]) -> Vec<u8> {
+    let mut bytes = valid.to_vec();
+    for &(kind, place, value) in edits {
+        let at = (place * bytes.len() as f64) as usize;
+        match kind {
+            _ if at >= bytes.len() => bytes.push(value),
+            0 => bytes[at] = value,
+            1 => bytes[at] ^= 1 << (value % 8),
+            2 => drop(bytes.remove(at)),
+            3 => bytes.insert(at, value),
+            4 => bytes.truncate(at),
+            5 => bytes.extend_from_within(at..),
+            6 => drop(bytes.drain(piece(&bytes, at, b"\n"))),
+            7 => {
+                let line = bytes[piece(&bytes, at, b"\n")].to_vec();
+                bytes.splice(at..at, line);
+            }
+            _ => {
+                let field = FIELDS[usize::from(value) % FIELDS.len()];
+                bytes.splice(piece(&bytes, at, b",;= \n"), field.bytes());
+            }
+        }
+    }
+    bytes
+}
+
+/// The line or field around `at`, without the separators that end it.
+fn piece(bytes: &[u8], at: usize, separators: &[u8]) -> std::ops::Range<usize> {
+    let ends = |byte: &u8| separators.contains(byte);
+    let start = bytes[..at].iter().rposition(ends).map_or(0, |k| k + 1);
+    start..bytes[at..].iter().position(ends).map_or(bytes.len(), |k| at + k)
+}
+
+/// The answer, if there is one; an error must name the file.
+fn answer<T, E: std::fmt::Display>(result: Result<T, E>, file: &str) -> Option<T> {
+    result.map_err(|error| assert!(error.to_string().contains(file), "{error}")).ok()
+}
+
+const SCENE: &[u8] = br#"
+reference = "reference.png"
+pixel_size_m = [1e-4, 1e-4]
+[calibration]
+pairs = "pairs.csv"
+[[frames]]
+image = "one.png"
+force_N = 0.8
+[[frames]]
+image = "two.pgm"
+[object]
+shape = "sphere"
+radius_m = 0.02
+poisson_ratio = 0.5
+[waveguide]
+layers = [{ refractive_index = 1.41, thickness_m = 0.1, youngs_modulus_pa = 1e7 }]
+"#;
+
+const TABLE: &[u8] = b"integrated_pixel_value,force_N\n0,0\n50000,0.5\n100000,1.0\n150000,1.5\n";
+
+const CURVE: &[u8] =
+    b"indentation_m,force_N\n0,0\n1e-5,1e-3\n2e-5,3e-3\n3e-5,5e-3\n4e-5,8e-3\n5e-5,1.1e-2\n6e-5,1.4e-2\n7e-5,1.8e-2\n";
+
+const POINTS: &[u8] = b"x,y\n1,2\n3.5,-4e-3\n0,7\n2,2\n5,1\n4,6\n";
+
+const CASES: &[u8] = b"case q 2 4 4\nm 0 0\nm 3 0\nm 3 2\nm 0 1\nt 3 2\nt 0 0\nt 3 0\nt 0 1\n";
+
+/// A small image in the format of the file name's ending.
+fn image(name: &str) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    let pixels = ndarray::Array2::from_shape_fn((9, 12), |(r, c)| (20 * r + c) as u8);
+    write_grey_image(&path, pixels.view()).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+/// Two columns of a table written to a file and read back.
+fn columns(bytes: &[u8], names: [&str; 2]) -> Option<[Vec<f64>; 2]> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("table.csv");
+    std::fs::write(&path, bytes).unwrap();
+    let table = answer(read_table(&path), "table.csv")?;
+    let column = |k: usize| answer(table.column(names[k], k, &path), "table.csv");
+    Some([column(0)?, column(1)?])
+}
+
+proptest! {
+    #[test]
+    fn scenes(edits in edits()) {
+        let text = String::from_utf8_lossy(&mutated(SCENE, &edits)).into_owned();
+        answer(Scene::parse(&text, "scene.toml"), "scene.toml");
+    }
+
+    /// The readable ones go on into a spline, whatever values their points have.
+    #[test]
+    fn points(edits in edits()) {
+        answer(parse_points::<3>(&mutated(POINTS, &edits), "a.csv"), "a.csv");
+        let Some(points) = answer(parse_points::<2>(&mutated(POINTS, &edits), "a.csv"), "a.csv") else { return Ok(()) };
+        let targets: Vec<Point<f64, 2>> = points.iter().map(|p| p * 1.01).collect();
+        if let Ok(spline) = ThinPlateSpline::<f64, 2>::fit(&points, &targets, &Default::default()) {
+            let _ = spline.apply(&points[0]);
+        }
+    }
+
+    #[test]
+    fn grids_and_cases(edits in edits()) {
+        answer(parse_grid(&mutated(b"1,2,nan\n,5,6\n7,8,-9e9\n", &edits), "grid.csv"), "grid.csv");
+        answer(parse_cases(&mutated(CASES, &edits), "cases.txt"), "cases.txt");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn images(edits in edits()) {
+        for name in ["a.png", "a.pgm"] {
+            answer(parse_grey_image(&mutated(&image(name), &edits), name), name);
+        }
+    }
+
+    /// A scene whose files are there, one of them damaged, is measured or refused with a sentence.
+    #[test]
+    fn scenes_with_their_files(edits in edits(), which in 0..5_usize) {
+        let folder = tempfile::tempdir().unwrap();
+        let names = ["scene.toml", "pairs.csv", "reference.png", "one.png", "two.pgm"];
+        for (k, name) in names.iter().enumerate() {
+            let valid = match k { 0 => SCENE.to_vec(), 1 => TABLE.to_vec(), _ => image(name) };
+            let bytes = if k == which { mutated(&valid, &edits) } else { valid };
+            std::fs::write(folder.path().join(name), bytes).unwrap();
+        }
+        let measured = Scene::measure_file(folder.path().join("scene.toml"));
+        answer(measured, &folder.path().file_name().unwrap().to_string_lossy());
+    }
+
+    /// A table from a file goes into every calibration; one that is made gives no NaN within its range.
+    #[test]
+    fn calibration_tables(edits in edits()) {
+        let Some([values, forces]) = columns(&mutated(TABLE, &edits), ["integrated_pixel_value", "force_N"]) else { return Ok(()) };
+        let pairs: Vec<_> = values.iter().zip(&forces).map(|(&v, &f)| CalibrationPair::loading(v, f)).collect();
+        let options = CalibrationOptions::default();
+        let fitted: [Option<Box<dyn StressCalibration<f64>>>; 3] = [
+            LinearCalibration::fit(&pairs, &options).ok().map(|c| Box::new(c) as _),
+            PolynomialCalibration::fit(&pairs, 2, &options).ok().map(|c| Box::new(c) as _),
+            MonotoneCalibration::fit(&pairs, &options).ok().map(|c| Box::new(c) as _),
+        ];
+        for calibration in fitted.into_iter().flatten() {
+            prop_assert!(!calibration.force_n(calibration.range()[0]).is_nan());
+        }
+    }
+
+    #[test]
+    fn indentation_curves(edits in edits()) {
+        let Some([depths, forces]) = columns(&mutated(CURVE, &edits), ["indentation_m", "force_N"]) else { return Ok(()) };
+        let Ok(curve) = IndentationCurve::new(&depths, &forces) else { return Ok(()) };
+        let punch = Indenter::Punch { radius_m: 1e-3 };
+        if let Ok(selection) = select_model(&curve, &punch, 0.5, Model::Auto, &CurveOptions::default()) {
+            prop_assert!(!selection.chosen().youngs_modulus_pa.is_nan());
+        }
+    }
+}
+
+#[test]
+fn the_unchanged_files_are_read() {
+    assert!(Scene::parse(std::str::from_utf8(SCENE).unwrap(), "scene.toml").is_ok());
+    assert_eq!(parse_points::<2>(POINTS, "a").unwrap().len(), 6);
+    assert_eq!(parse_cases(CASES, "a").unwrap().len(), 1);
+    let [depths, forces] = columns(CURVE, ["indentation_m", "force_N"]).unwrap();
+    assert!(IndentationCurve::new(&depths, &forces).is_ok());
+    assert!(parse_grey_image(&image("a.png"), "a").is_ok());
+    assert_eq!(columns(TABLE, ["integrated_pixel_value", "force_N"]).unwrap()[0][3], 150_000.0);
+}
