@@ -1,0 +1,10 @@
+//! The tests of `tactile-elasticity`, in one program: the generic code is compiled once for all of them.
+
+mod common;
+mod curve;
+mod hertz_reference;
+mod modulus;
+mod stability;
+mod stability_scale;
+mod strain_reference;
+mod uncertainty;

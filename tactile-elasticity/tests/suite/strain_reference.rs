@@ -1,0 +1,116 @@
+//! Every case of the strain reference (90-digit arithmetic), 10⁻¹² where cond F ≤ 10², else 100 ε cond F.
+
+#![allow(clippy::print_stdout)]
+
+use crate::common::{number, reference};
+use nalgebra::Matrix3;
+use serde_json::Value;
+use tactile_elasticity::strain::{
+    Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, PrincipalStretches, StrainMeasure,
+    von_mises_strain,
+};
+
+fn matrix(v: &Value) -> Option<Matrix3<f64>> {
+    v.as_array().map(|rows| Matrix3::from_fn(|i, j| number(&rows[i][j])))
+}
+
+fn deformation(case: &Value) -> Deformation<f64> {
+    match matrix(&case["H"]) {
+        Some(h) => Deformation::from_displacement_gradient(h),
+        None => Deformation::from_deformation_gradient(matrix(&case["F"]).expect("F or H")),
+    }
+}
+
+fn tolerance(case: &Value) -> f64 {
+    let cond = case["cond_F"].as_f64().unwrap_or(1.0);
+    if cond <= 100.0 { 1e-12 } else { 100.0 * f64::EPSILON * cond }
+}
+
+/// Largest error relative to the largest entry.
+fn error(found: &Matrix3<f64>, expected: &Matrix3<f64>) -> f64 {
+    let size = expected.amax();
+    let gap = (found - expected).amax();
+    if size > 0.0 { gap / size } else { gap }
+}
+
+#[test]
+fn every_measure_of_every_case() {
+    let Some(cases) = reference("strain.json") else { return };
+    let measures: [(&str, &dyn StrainMeasure<f64>); 5] = [
+        ("green_lagrange", &GreenLagrange),
+        ("almansi", &EulerAlmansi),
+        ("hencky", &Hencky),
+        ("biot", &Biot),
+        ("infinitesimal", &Infinitesimal),
+    ];
+    let mut worst = 0.0f64;
+    for case in &cases {
+        let d = deformation(case);
+        for (key, measure) in measures {
+            match matrix(&case["expected"][key]) {
+                Some(expected) => {
+                    let e = error(&measure.of(&d).expect("exists"), &expected) / tolerance(case);
+                    assert!(e <= 1.0, "{} {key}: {e:.2e} of the tolerance", case["id"]);
+                    worst = worst.max(e);
+                }
+                None => assert!(measure.of(&d).is_err(), "{} {key} does not exist", case["id"]),
+            }
+        }
+    }
+    println!("{} cases, worst error {worst:.2e} of the tolerance", cases.len());
+}
+
+#[test]
+fn every_scalar_of_every_case() {
+    let Some(cases) = reference("strain.json") else { return };
+    for case in &cases {
+        let (d, expected, tol) = (deformation(case), &case["expected"], tolerance(case));
+        // The deviator of a near-dilation is a difference of the tensor's entries: relative to these.
+        let deviatoric = |key: &str, e: Matrix3<f64>| {
+            let Some(expected) = expected[key].as_f64() else { return };
+            let gap = (von_mises_strain(&e) - expected).abs();
+            assert!(gap <= tol * expected.max(e.amax()), "{} {key}: off by {gap:e}", case["id"]);
+        };
+        let check = |key: &str, found: f64, index: Option<usize>| {
+            let v = index.map_or(&expected[key], |i| &expected[key][i]);
+            let Some(e) = v.as_f64() else { return };
+            // A zero of the reference is a zero of the mathematics; rounding may leave an ulp of one.
+            let gap = (found - e).abs() / if e == 0.0 { 1.0 } else { e.abs() };
+            assert!(gap <= tol, "{} {key} {index:?}: {found:e} for {e:e}", case["id"]);
+        };
+        check("J", d.jacobian(), None);
+        check("J_minus_1", d.volume_change(), None);
+        let principal = PrincipalStretches::of(&d);
+        (0..3).for_each(|i| check("principal_stretches", principal.stretches[i], Some(i)));
+        deviatoric("von_mises_infinitesimal", Infinitesimal.of(&d).unwrap());
+        deviatoric("von_mises_green_lagrange", GreenLagrange.of(&d).unwrap());
+        if let Ok(hencky) = Hencky.of(&d) {
+            deviatoric("von_mises_hencky", hencky);
+        }
+    }
+}
+
+#[test]
+fn cauchy_stress_of_every_case() {
+    use tactile_elasticity::stress::{SecondPiolaKirchhoff, Stress};
+    let Some(cases) = reference("strain.json") else { return };
+    for case in &cases {
+        let d = deformation(case);
+        let second = Stress::<SecondPiolaKirchhoff, f64>::new(matrix(&case["S"]).expect("S"));
+        match (matrix(&case["expected"]["cauchy"]), second.to_cauchy(&d)) {
+            (Some(expected), Ok(found)) => {
+                let e = error(found.tensor_pa(), &expected);
+                assert!(e <= tolerance(case), "{}: {e:.2e}", case["id"]);
+                if tolerance(case) < 1e-9 {
+                    let back = found.to_second(&d).expect("upright");
+                    assert!(error(back.tensor_pa(), second.tensor_pa()) < 1e-9, "{}", case["id"]);
+                    let first = second.to_first(&d).unwrap().to_second(&d).unwrap();
+                    assert!(error(first.tensor_pa(), second.tensor_pa()) < 1e-9, "{}", case["id"]);
+                    let kirchhoff = found.to_kirchhoff(&d).unwrap().to_cauchy(&d).unwrap();
+                    assert!(error(kirchhoff.tensor_pa(), found.tensor_pa()) < 1e-15);
+                }
+            }
+            (expected, found) => assert!(expected.is_none() && found.is_err(), "{}", case["id"]),
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! What every [`PointMatcher`] must do, in 2-D and 3-D, single and double precision.
+
+use crate::common::{Stream, assert_consistent, bend, grid, largest_step, matchers, reordered, scattered};
+use nalgebra::{Point, SVector};
+use tactile_match::{MatchError, PointMatcher, PointSet};
+use tactile_tps::Scalar;
+
+/// Runs a check for every matcher, scalar and dimension.
+macro_rules! for_all {
+    ($check:ident) => {
+        for_all!(@one $check, f64, 2);
+        for_all!(@one $check, f64, 3);
+        for_all!(@one $check, f32, 2);
+        for_all!(@one $check, f32, 3);
+    };
+    (@one $check:ident, $t:ty, $d:literal) => {
+        for (name, matcher) in matchers::<$t, $d>() {
+            $check::<$t, $d>(&format!("{name}, {}, {}-D", stringify!($t), $d), &*matcher);
+        }
+    };
+}
+
+/// A match that must succeed and be consistent.
+fn run<T: Scalar, const D: usize>(
+    name: &str,
+    matcher: &dyn PointMatcher<T, D>,
+    model: &[Point<T, D>],
+    target: &[Point<T, D>],
+) -> tactile_match::Matching<T, D> {
+    let matching = matcher.match_points(model, target).unwrap_or_else(|error| panic!("{name}: {error}"));
+    assert_consistent(name, model, target, &matching);
+    matching
+}
+
+#[test]
+fn identical_sets_match_themselves() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let points = scattered::<T, D>(40, 1);
+        let matching = run(name, matcher, &points, &points);
+        let expected: Vec<_> = (0..40).map(Some).collect();
+        assert_eq!(matching.assignment, expected, "{name}");
+        // A tenth of the spacing 1/7: what a registration that stops early may leave.
+        assert!(largest_step(&matching.warped, &points) < 0.014, "{name}");
+    }
+    for_all!(check);
+}
+
+#[test]
+fn the_order_of_the_points_does_not_matter() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let model = scattered::<T, D>(40, 2);
+        let target = bend(&model, 0.02);
+        let plain = run(name, matcher, &model, &target);
+        let mut stream = Stream::new(3);
+        let (rows, columns) = (stream.permutation(40), stream.permutation(40));
+        let shuffled = run(name, matcher, &reordered(&model, &rows), &reordered(&target, &columns));
+        let place: Vec<_> = (0..40).map(|j| columns.iter().position(|&c| c == j)).collect();
+        let expected: Vec<_> = rows.iter().map(|&i| plain.assignment[i].and_then(|j| place[j])).collect();
+        assert_eq!(shuffled.assignment, expected, "{name}");
+        // Sums in another order differ by rounding, which iterations may enlarge.
+        let tolerance = if std::mem::size_of::<T>() == 4 { 1e-3 } else { 1e-6 };
+        assert!(largest_step(&shuffled.warped, &reordered(&plain.warped, &rows)) < tolerance, "{name}");
+    }
+    for_all!(check);
+}
+
+#[test]
+fn a_small_deformation_is_found() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let model = scattered::<T, D>(60, 4);
+        let target = bend(&model, 0.02);
+        let order = Stream::new(5).permutation(60);
+        let matching = run(name, matcher, &model, &reordered(&target, &order));
+        let right = (0..60).filter(|&i| matching.assignment[i].is_some_and(|j| order[j] == i)).count();
+        assert_eq!(right, 60, "{name}");
+    }
+    for_all!(check);
+}
+
+#[test]
+fn sets_of_different_size_are_matched() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let points = scattered::<T, D>(50, 6);
+        for (model, target) in [(&points[..], &points[..45]), (&points[..45], &points[..])] {
+            let matching = run(name, matcher, model, target);
+            let right = (0..45).filter(|&i| matching.assignment[i] == Some(i)).count();
+            // What the leftover points lie on has no answer of its own; nine tenths of the rest must be right.
+            assert!(right >= 41, "{name}: {right} of 45");
+        }
+    }
+    for_all!(check);
+}
+
+#[test]
+fn few_points_are_answered() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let points = scattered::<T, D>(9, 7);
+        for rows in 1..=4 {
+            for columns in (1..=4).chain([9]) {
+                run(&format!("{name}, {rows} to {columns}"), matcher, &points[..rows], &points[..columns]);
+                run(&format!("{name}, {columns} to {rows}"), matcher, &points[..columns], &points[..rows]);
+            }
+        }
+    }
+    for_all!(check);
+}
+
+#[test]
+fn coincident_and_collinear_points_are_answered() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let all = scattered::<T, D>(12, 8);
+        let same = vec![all[0]; 12];
+        let line: Vec<_> =
+            (0..12).map(|k| all[0] + (all[1] - all[0]) * nalgebra::convert::<f64, T>(f64::from(k))).collect();
+        let twice = [&all[..6], &all[..6]].concat();
+        let sets = [("scattered", &all), ("coincident", &same), ("collinear", &line), ("twice", &twice)];
+        for (a, model) in sets {
+            for (b, target) in sets {
+                run(&format!("{name}, {a} to {b}"), matcher, model, target);
+            }
+        }
+    }
+    for_all!(check);
+}
+
+#[test]
+fn regular_grids_match_themselves() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let points = grid::<T, D>(if D == 2 { 6 } else { 4 });
+        let matching = run(name, matcher, &points, &points);
+        assert!(
+            (0..points.len()).all(|i| matching.assignment[i] == Some(i)),
+            "{name}: {:?}",
+            matching.assignment
+        );
+    }
+    for_all!(check);
+}
+
+#[test]
+fn empty_sets_and_numbers_that_are_none_are_typed_errors() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let good = scattered::<T, D>(5, 9);
+        let empty = |set| MatchError::Empty { set };
+        assert_eq!(matcher.match_points(&[], &good).err(), Some(empty(PointSet::Model)), "{name}");
+        assert_eq!(matcher.match_points(&good, &[]).err(), Some(empty(PointSet::Target)), "{name}");
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let mut points = good.clone();
+            points[3] = Point::from(SVector::from_element(nalgebra::convert(bad)));
+            let not_finite = |set| MatchError::NotFinite { set, row: 3 };
+            assert_eq!(
+                matcher.match_points(&points, &good).err(),
+                Some(not_finite(PointSet::Model)),
+                "{name}"
+            );
+            assert_eq!(
+                matcher.match_points(&good, &points).err(),
+                Some(not_finite(PointSet::Target)),
+                "{name}"
+            );
+        }
+    }
+    for_all!(check);
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits() {
+    fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
+        let model = scattered::<T, D>(30, 10);
+        let target = bend(&model, 0.05);
+        let (a, b) = (run(name, matcher, &model, &target), run(name, matcher, &model, &target));
+        assert_eq!(a.warped, b.warped, "{name}");
+        assert_eq!((a.assignment, a.confidence, a.energy), (b.assignment, b.confidence, b.energy), "{name}");
+    }
+    for_all!(check);
+}

@@ -1,0 +1,277 @@
+//! Coherent point drift against its equations written out slowly, and against what it must not depend on.
+
+use crate::common::{Stream, bend, reordered, rotation, scattered};
+use nalgebra::{DMatrix, Point, Point2, Point3, SVector, Vector3};
+use proptest::prelude::*;
+use tactile_match::{
+    CoherentPointDrift, DriftOptions, DriftWorkspace, MatchError, Matching, Motion, Normalization,
+    PointMatcher, StopReason,
+};
+use tactile_tps::Warp;
+
+fn drift<const D: usize>(
+    options: DriftOptions,
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+) -> Matching<f64, D> {
+    CoherentPointDrift::new(options)
+        .expect("valid options")
+        .match_points(model, target)
+        .expect("valid points")
+}
+
+/// Eq. 22–23 and figure 4 of Myronenko & Song with whole matrices and an LU factorisation in every iteration. Ends early where σ²
+/// has shrunk to a ten-thousandth: collapsing onto the targets is a matter of rounding. Returns the iterations too.
+fn slow_non_rigid<const D: usize>(
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+    (beta, lambda, w): (f64, f64, f64),
+    iterations: usize,
+) -> (Vec<Point<f64, D>>, usize) {
+    let (m, n) = (model.len(), target.len());
+    let columns = |points: &[Point<f64, D>]| DMatrix::from_fn(points.len(), D, |i, d| points[i][d]);
+    let (y, x) = (columns(model), columns(target));
+    let squared =
+        |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| (a.row(i) - b.row(j)).norm_squared();
+    let g = DMatrix::from_fn(m, m, |i, j| (-squared(&y, i, &y, j) / (2.0 * beta * beta)).exp());
+    let mut moved = y.clone();
+    let mut sigma2 =
+        (0..m).flat_map(|i| (0..n).map(move |j| (i, j))).map(|(i, j)| squared(&y, i, &x, j)).sum::<f64>()
+            / (D * m * n) as f64;
+    let (first, mut done) = (sigma2, 0);
+    while done < iterations && sigma2 > 1e-4 * first {
+        done += 1;
+        let c =
+            (2.0 * std::f64::consts::PI * sigma2).powf(D as f64 / 2.0) * w / (1.0 - w) * m as f64 / n as f64;
+        let mut p = DMatrix::from_fn(m, n, |i, j| (-squared(&moved, i, &x, j) / (2.0 * sigma2)).exp());
+        for mut column in p.column_iter_mut() {
+            let sum = column.sum() + c;
+            column /= sum;
+        }
+        let p1 = DMatrix::from_diagonal(&p.column_sum());
+        let a = &p1 * &g + DMatrix::identity(m, m) * (lambda * sigma2);
+        let b = &p * &x - &p1 * &y;
+        moved = &y + &g * a.lu().solve(&b).expect("regular");
+        sigma2 = (0..m)
+            .flat_map(|i| (0..n).map(move |j| (i, j)))
+            .map(|(i, j)| p[(i, j)] * squared(&moved, i, &x, j))
+            .sum::<f64>()
+            / (D as f64 * p.sum());
+    }
+    ((0..m).map(|i| Point::from(SVector::from_fn(|d, _| moved[(i, d)]))).collect(), done)
+}
+
+fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, D>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+/// The tolerance is that of the kernel's factorisation, 1e-12, over the ridge λσ² ≥ 1e-4 of the first iterations.
+fn check_against_slow<const D: usize>(
+    seed: u64,
+    rows: usize,
+    columns: usize,
+    beta: f64,
+    lambda: f64,
+    w: f64,
+) {
+    let model = scattered::<f64, D>(rows, seed);
+    let target =
+        reordered(&bend(&scattered::<f64, D>(columns, seed), 0.1), &Stream::new(seed).permutation(columns));
+    let options = DriftOptions {
+        motion: Motion::NonRigid { beta, lambda, rank: None },
+        outlier_weight: w,
+        tolerance: 0.0,
+        max_iterations: 1,
+        normalization: Normalization::Off,
+    };
+    let (expected, iterations) = slow_non_rigid(&model, &target, (beta, lambda, w), 8);
+    let found = drift(DriftOptions { max_iterations: iterations, ..options }, &model, &target);
+    assert!(largest_step(&found.warped, &expected) <= 1e-7, "{}", largest_step(&found.warped, &expected));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn non_rigid_motion_solves_its_equations(
+        seed in 0..1000_u64, rows in 2..40_usize, columns in 2..40_usize,
+        beta in 0.3..3.0_f64, lambda in 0.5..30.0_f64, w in 0.01..0.5_f64,
+    ) {
+        check_against_slow::<2>(seed, rows, columns, beta, lambda, w);
+        check_against_slow::<3>(seed, rows, columns, beta, lambda, w);
+    }
+
+    #[test]
+    fn units_and_origin_do_not_matter(
+        seed in 0..1000_u64, exponent in -9..=9_i32, offset in -1e3..1e3_f64, each in any::<bool>(), motion in 0..4_usize,
+    ) {
+        let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
+        let normalization = if each { Normalization::Each } else { Normalization::Model };
+        let options = DriftOptions { motion, normalization, ..Default::default() };
+        let model = scattered::<f64, 3>(30, seed);
+        let target = bend(&model, 0.05);
+        let scale = 10_f64.powi(exponent);
+        let moved = |points: &[Point3<f64>]| points.iter().map(|p| (p + Vector3::repeat(offset)) * scale).collect::<Vec<_>>();
+        let plain = drift(options, &model, &target);
+        let other = drift(options, &moved(&model), &moved(&target));
+        prop_assert_eq!(&other.assignment, &plain.assignment);
+        prop_assert_eq!(other.report.iterations, plain.report.iterations);
+        // Points 1e3 from the origin have lost three digits, which the iterations may enlarge.
+        prop_assert!(largest_step(&other.warped, &moved(&plain.warped)) <= 1e-8 * scale);
+    }
+
+    #[test]
+    fn a_common_rotation_turns_the_answer(seed in 0..1000_u64, angle in -3.0..3.0_f64, motion in 0..4_usize) {
+        let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
+        let options = DriftOptions { motion, ..Default::default() };
+        let model = scattered::<f64, 2>(30, seed);
+        let target = bend(&model, 0.05);
+        let turn = rotation::<f64, 2>(angle);
+        let turned = |points: &[Point2<f64>]| points.iter().map(|p| turn * p).collect::<Vec<_>>();
+        let (plain, other) = (drift(options, &model, &target), drift(options, &turned(&model), &turned(&target)));
+        prop_assert_eq!(&other.assignment, &plain.assignment);
+        prop_assert!(largest_step(&other.warped, &turned(&plain.warped)) <= 1e-8);
+    }
+
+    #[test]
+    fn rigid_similar_and_affine_motions_are_recovered(seed in 0..1000_u64, angle in -0.3..0.3_f64, size in 0.5..2.0_f64) {
+        let model = scattered::<f64, 3>(40, seed);
+        let turn = rotation::<f64, 3>(angle);
+        let shear = nalgebra::Matrix3::new(1.0, 0.2, 0.0, 0.0, 0.9, 0.1, 0.1, 0.0, 1.1);
+        for (motion, map) in [(Motion::Rigid, turn), (Motion::Similarity, turn * size), (Motion::Affine, shear)] {
+            let target: Vec<_> = model.iter().map(|p| map * p + Vector3::new(3.0, -1.0, 0.5)).collect();
+            let options = DriftOptions { motion, tolerance: 1e-12, ..Default::default() };
+            let order = Stream::new(seed).permutation(40);
+            let found = drift(options, &model, &reordered(&target, &order));
+            prop_assert!(largest_step(&found.warped, &target) <= 1e-5, "{:?}: {}", motion, largest_step(&found.warped, &target));
+            prop_assert!((0..40).all(|i| found.assignment[i].map(|j| order[j]) == Some(i)));
+        }
+    }
+}
+
+#[test]
+fn single_precision_gives_the_same_answer() {
+    let model = scattered::<f64, 3>(50, 1);
+    let target = bend(&model, 0.05);
+    let single = |points: &[Point3<f64>]| points.iter().map(|p| p.map(|c| c as f32)).collect::<Vec<_>>();
+    let double = drift(DriftOptions::default(), &model, &target);
+    let found = CoherentPointDrift::default().match_points(&single(&model), &single(&target)).unwrap();
+    assert_eq!(found.assignment, double.assignment);
+    let widened: Vec<_> = found.warped.iter().map(|p| p.map(f64::from)).collect();
+    assert!(largest_step(&widened, &double.warped) < 1e-5, "rounding of the input to f32");
+}
+
+#[test]
+fn a_low_rank_kernel_is_close() {
+    let model = scattered::<f64, 2>(100, 2);
+    let target = bend(&model, 0.05);
+    let motion = |rank| Motion::NonRigid { beta: 2.0, lambda: 3.0, rank };
+    let [whole, thirty] = [None, Some(30)]
+        .map(|rank| drift(DriftOptions { motion: motion(rank), ..Default::default() }, &model, &target));
+    assert_eq!(whole.assignment, thirty.assignment);
+    assert!(
+        largest_step(&whole.warped, &thirty.warped) < 1e-4,
+        "{}",
+        largest_step(&whole.warped, &thirty.warped)
+    );
+}
+
+#[test]
+fn outliers_are_left_without_a_partner() {
+    let model = scattered::<f64, 2>(60, 3);
+    let mut target = bend(&model, 0.03);
+    let mut stream = Stream::new(4);
+    target.extend((0..15).map(|_| Point2::new(1.5 + stream.next(), 3.0 * stream.next())));
+    let options =
+        DriftOptions { outlier_weight: 0.2, normalization: Normalization::Model, ..Default::default() };
+    let found = drift(options, &model, &target);
+    assert!((0..60).all(|i| found.assignment[i] == Some(i)), "{:?}", found.assignment);
+    assert_eq!(found.unmatched_target, (60..75).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_workspace_forgets_the_last_match_and_registers_without_allocating() {
+    let matcher = CoherentPointDrift::default();
+    let mut workspace = DriftWorkspace::new();
+    let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
+        .into_iter()
+        .map(|(n, seed)| (scattered::<f64, 3>(n, seed), bend(&scattered::<f64, 3>(n, seed), 0.05)))
+        .collect();
+    for (model, target) in &sets {
+        let again = matcher.match_with(&mut workspace, model, target).unwrap();
+        assert_eq!(again.warped, matcher.match_points(model, target).unwrap().warped);
+    }
+    let counted = allocation_counter::measure(|| {
+        for (model, target) in &sets {
+            matcher.register_with(&mut workspace, model, target).unwrap();
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+}
+
+#[test]
+fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
+    let model = scattered::<f64, 3>(40, 9);
+    let target = bend(&model, 0.05);
+    let mut workspace = DriftWorkspace::new();
+    for motion in [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID] {
+        let matcher = CoherentPointDrift::new(DriftOptions { motion, ..Default::default() }).unwrap();
+        let found = matcher.match_with(&mut workspace, &model, &target).unwrap();
+        let warp = workspace.warp();
+        let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
+        // The pivots' triangular system has about the square root of the kernel's condition, 1e6.
+        assert!(
+            largest_step(&images, &found.warped) < 1e-9,
+            "{motion:?} {}",
+            largest_step(&images, &found.warped)
+        );
+        let (at, h) = (Point3::new(0.4, 0.3, 0.6), 1e-5);
+        let jacobian = warp.jacobian(&at);
+        for axis in 0..3 {
+            let step = Vector3::ith(axis, h);
+            let slope = (warp.apply(&(at + step)) - warp.apply(&(at - step))) / (2.0 * h);
+            assert!(
+                (slope - jacobian.column(axis)).norm() < 1e-7,
+                "central difference of order h², rounding 1e-16/h"
+            );
+        }
+    }
+}
+
+#[test]
+fn options_out_of_range_are_typed_errors() {
+    let good = DriftOptions::default();
+    let non_rigid =
+        |beta, lambda| DriftOptions { motion: Motion::NonRigid { beta, lambda, rank: None }, ..good };
+    for bad in [f64::NAN, f64::INFINITY, -1.0] {
+        for (name, options) in [
+            ("outlier_weight", DriftOptions { outlier_weight: bad, ..good }),
+            ("tolerance", DriftOptions { tolerance: bad, ..good }),
+            ("beta", non_rigid(bad, 1.0)),
+            ("lambda", non_rigid(1.0, bad)),
+        ] {
+            let error = CoherentPointDrift::new(options).unwrap_err();
+            assert!(matches!(error, MatchError::InvalidOption { option, .. } if option == name), "{error}");
+        }
+    }
+    let rank = Motion::NonRigid { beta: 1.0, lambda: 1.0, rank: Some(0) };
+    for options in [
+        DriftOptions { outlier_weight: 1.0, ..good },
+        DriftOptions { max_iterations: 0, ..good },
+        DriftOptions { motion: rank, ..good },
+        non_rigid(0.0, 1.0),
+        non_rigid(1.0, 0.0),
+    ] {
+        assert!(CoherentPointDrift::new(options).is_err(), "{options:?}");
+    }
+}
+
+#[test]
+fn the_report_says_why_it_stopped() {
+    let model = scattered::<f64, 2>(20, 8);
+    let target = bend(&model, 0.05);
+    let few = DriftOptions { max_iterations: 2, ..Default::default() };
+    assert_eq!(drift(few, &model, &target).report.stop, StopReason::IterationLimit);
+    assert_eq!(drift(DriftOptions::default(), &model, &target).report.stop, StopReason::Converged);
+    assert_eq!(drift(DriftOptions::default(), &model[..1], &target[..1]).report.stop, StopReason::Exact);
+}

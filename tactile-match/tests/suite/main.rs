@@ -1,0 +1,15 @@
+//! The tests of `tactile-match`, in one program: the generic code is compiled once for all of them.
+
+mod allocation;
+mod assignment;
+mod common;
+mod conformance;
+mod dense;
+mod drift;
+mod hostile;
+mod labelling_against_dense;
+mod reference;
+mod relaxation;
+mod serialtrack;
+mod stability;
+mod stability_scale;

@@ -1,0 +1,80 @@
+//! The fast matcher on tracked particles of a stretched volume and plane (data of FranckLab/SerialTrack, MIT, Jin Yang 2022), of
+//! which some leave the field of view and others enter: at least 99 % of the true pairs found, under half a percent wrong.
+#![allow(clippy::print_stdout)] // what was found, beside the bars
+
+use crate::common::{Stream, reordered};
+use nalgebra::Point;
+use std::path::PathBuf;
+use tactile_match::{PointMatcher, RelaxationMatcher};
+
+/// Rows of `C` numbers; none where the file is not there. The line of names is no row.
+fn read<const C: usize>(file: &str) -> Option<Vec<[f64; C]>> {
+    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
+        PathBuf::from,
+    );
+    let text = std::fs::read_to_string(folder.join("serialtrack").join(file)).ok()?;
+    let row = |line: &str| {
+        let mut fields = line.split(',').map(|field| field.trim().parse::<f64>());
+        let mut row = [0.0; C];
+        for value in &mut row {
+            *value = fields.next()?.ok()?;
+        }
+        Some(row)
+    };
+    Some(text.lines().filter_map(row).collect())
+}
+
+/// Matches frame 0 to frame `k`; checks the shares of the true pairs found and of the pairs found that are wrong.
+fn check<const D: usize>(kind: &str, k: usize) {
+    let files = (
+        read::<D>(&format!("{kind}_frame00.csv")),
+        read::<D>(&format!("{kind}_frame{k:02}.csv")),
+        read::<1>(&format!("{kind}_truth{k:02}.csv")),
+    );
+    let (Some(model), Some(target), Some(truth)) = files else {
+        println!("skipped: no serialtrack/{kind}_*.csv");
+        return;
+    };
+    let points = |rows: &[[f64; D]]| rows.iter().map(|row| Point::from(*row)).collect::<Vec<Point<f64, D>>>();
+    let (model, target) = (points(&model), points(&target));
+    let order = Stream::new(1).permutation(target.len()); // the file keeps the order of frame 0
+    let matching =
+        RelaxationMatcher::default().match_points(&model, &reordered(&target, &order)).expect("good points");
+    let partner = |i: usize| matching.assignment[i].map(|j| order[j] as f64);
+    let pairs = truth.iter().filter(|t| t[0] >= 0.0).count();
+    let found = (0..model.len()).filter(|&i| partner(i).is_some()).count();
+    let right = (0..model.len()).filter(|&i| partner(i) == Some(truth[i][0])).count();
+    let (recall, wrong) = (right as f64 / pairs as f64, (found - right) as f64 / found.max(1) as f64);
+    println!(
+        "{kind} 0→{k}: {:.2} % of {pairs} pairs found, {:.2} % of {found} wrong",
+        100.0 * recall,
+        100.0 * wrong
+    );
+    assert!(recall >= 0.99 && wrong < 0.005, "{kind} 0→{k}: {recall} found, {wrong} wrong");
+}
+
+#[test]
+fn volume_stretched_by_5_percent() {
+    check::<3>("stretch3d", 1);
+}
+
+#[test]
+fn volume_stretched_by_10_percent() {
+    check::<3>("stretch3d", 2);
+}
+
+#[test]
+fn volume_stretched_by_25_percent() {
+    check::<3>("stretch3d", 5);
+}
+
+#[test]
+fn plane_stretched_by_5_percent() {
+    check::<2>("stretch2d", 1);
+}
+
+#[test]
+fn plane_stretched_by_10_percent() {
+    check::<2>("stretch2d", 2);
+}

@@ -1,0 +1,37 @@
+//! Angles at every scale and within a few units in the last place of the edges, against 80-digit numbers.
+#![allow(clippy::print_stdout)]
+
+#[path = "../../../evidence/worst.rs"]
+mod worst;
+
+use tactile_optics::{AcceptanceAngle, Angle, CriticalAngle, acceptance_angle, critical_angle};
+use worst::{Worst, cases};
+
+/// A dozen roundings, each of which the result follows at most once: differences of indices are taken before anything rounds.
+const ALLOWED: f64 = 4.0;
+
+#[test]
+fn angles_have_all_their_digits() {
+    let mut table = Worst::new("optics");
+    for case in cases(include_str!("../reference/angles.json")) {
+        let at = |key: &str| case[key].as_f64().unwrap_or(f64::NAN);
+        let name = case["name"].as_str().unwrap();
+        let mut enter = |angle: Angle<f64>, which: &str| {
+            for (found, key) in [(angle.radians(), "rad"), (angle.complement(), "complement_rad")] {
+                let expected = at(&format!("{which}_{key}"));
+                let units = (found / expected - 1.0).abs() / f64::EPSILON;
+                table.enter(&format!("{which} angle, {name}"), units, ALLOWED);
+            }
+        };
+        match critical_angle(at("n"), at("n0")).unwrap() {
+            CriticalAngle::Beyond(angle) => enter(angle, "critical"),
+            CriticalAngle::Never => panic!("{name}: n is above n0"),
+        }
+        match acceptance_angle(at("n"), at("n0")).unwrap() {
+            AcceptanceAngle::Below(angle) => enter(angle, "acceptance"),
+            AcceptanceAngle::AllTrapped => assert!(case["acceptance_rad"].is_null(), "{name}"),
+            AcceptanceAngle::NoneTrapped => panic!("{name}: n is above n0"),
+        }
+    }
+    table.finish();
+}

@@ -1,0 +1,168 @@
+//! Properties that hold for any contact: where it lies in the frame and what is outside its mask do not matter; and the
+//! estimates and error functions against cases worked out by hand.
+
+use crate::common::{Sampled, sphere};
+use ndarray::{Array2, array, s};
+use proptest::prelude::*;
+use tactile_sfs::*;
+
+/// A lumpy frame, its slopes and a mask of the given ellipse, all placed at (top, left) of a larger frame.
+struct Placed {
+    image: Array2<f64>,
+    p: Array2<f64>,
+    q: Array2<f64>,
+    mask: Array2<bool>,
+}
+
+const PATCH: (usize, usize) = (17, 23);
+
+impl Placed {
+    fn new(frame: (usize, usize), [top, left]: [usize; 2], axes: [f64; 2], outside: f64) -> Self {
+        let inside =
+            |r: usize, c: usize| ((r as f64 - 8.0) / axes[1]).hypot((c as f64 - 11.0) / axes[0]) <= 1.0;
+        let place = |value: &dyn Fn(usize, usize) -> f64| {
+            let mut placed = Array2::from_elem(frame, outside);
+            for r in 0..PATCH.0 {
+                for c in 0..PATCH.1 {
+                    if inside(r, c) {
+                        placed[[top + r, left + c]] = value(r, c);
+                    }
+                }
+            }
+            placed
+        };
+        let mut mask = Array2::from_elem(frame, false);
+        let patch = Array2::from_shape_fn(PATCH, |(r, c)| inside(r, c));
+        mask.slice_mut(s![top..top + PATCH.0, left..left + PATCH.1]).assign(&patch);
+        Self {
+            image: place(&|r, c| 0.7 + 0.2 * (0.9 * r as f64).sin() * (0.4 * c as f64).cos()),
+            p: place(&|r, c| (0.3 * c as f64).sin() + 0.1 * r as f64),
+            q: place(&|r, c| (0.5 * r as f64).cos() - 0.05 * c as f64),
+            mask,
+        }
+    }
+
+    /// Heights in the patch by every method.
+    fn heights(&self, [top, left]: [usize; 2]) -> Vec<(&'static str, Array2<f64>)> {
+        let domain = Domain::pixels().with_mask(self.mask.view());
+        let light = Lighting::new([0.3, -0.2, 1.0]).unwrap();
+        let rim = |light| Eikonal::new(light).with_rim(Rim::Height(0.0)).unwrap();
+        let methods: [(_, Box<dyn SurfaceReconstruction<f64>>); 5] = [
+            ("eikonal", Box::new(rim(Lighting::frontal()))),
+            ("eikonal oblique", Box::new(rim(light))),
+            ("tsai-shah", Box::new(TsaiShah::new(light))),
+            ("pentland", Box::new(Pentland::new(light))),
+            ("brooks-horn", Box::new(BrooksHorn::new(light).with_iterations(20, 5).unwrap())),
+        ];
+        let integrators: [(_, Box<dyn SlopeIntegrator<f64>>); 3] = [
+            ("poisson", Box::new(CosinePoisson::new())),
+            ("frankot-chellappa", Box::new(FrankotChellappa::new())),
+            ("least squares", Box::new(MaskedLeastSquares::new())),
+        ];
+        let patch = |surface: Surface<f64>| {
+            assert_eq!(surface.mask, self.mask);
+            assert!(surface.heights.indexed_iter().all(|(at, z)| self.mask[at] || z.is_nan()));
+            surface.heights.slice(s![top..top + PATCH.0, left..left + PATCH.1]).to_owned()
+        };
+        let images = methods
+            .iter()
+            .map(|(name, m)| (*name, patch(m.reconstruct(self.image.view(), &domain).unwrap())));
+        let slopes = integrators
+            .iter()
+            .map(|(name, m)| (*name, patch(m.integrate(self.p.view(), self.q.view(), &domain).unwrap())));
+        images.chain(slopes).collect()
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn neither_the_place_nor_what_is_outside_the_mask_matters(
+        top in 0usize..20, left in 0usize..20, rows in 37usize..50, columns in 43usize..60,
+        a in 2.0f64..11.0, b in 2.0f64..8.0, outside in prop_oneof![Just(f64::NAN), Just(1e300), -3.0f64..3.0],
+    ) {
+        let here = Placed::new(PATCH, [0, 0], [a, b], 0.0).heights([0, 0]);
+        let there = Placed::new((rows, columns), [top, left], [a, b], outside).heights([top, left]);
+        for ((name, here), (_, there)) in here.iter().zip(&there) {
+            // The box is solved by the same operations wherever it lies: the same bits.
+            let same = here.iter().zip(there).all(|(x, y)| x.to_bits() == y.to_bits() || x.is_nan() && y.is_nan());
+            prop_assert!(same, "{}", name);
+        }
+    }
+
+    #[test]
+    fn integration_is_linear(scale in -50.0f64..50.0) {
+        let case = Placed::new(PATCH, [0, 0], [11.0, 8.0], 0.0);
+        let domain = Domain::pixels();
+        let integrators: [Box<dyn SlopeIntegrator<f64>>; 2] =
+            [Box::new(CosinePoisson::new()), Box::new(FrankotChellappa::new())];
+        for method in integrators {
+            let once = method.integrate(case.p.view(), case.q.view(), &domain).unwrap().heights;
+            let scaled = method.integrate((&case.p * scale).view(), (&case.q * scale).view(), &domain).unwrap();
+            let largest = once.iter().fold(0.0f64, |m, z| m.max(z.abs()));
+            for (z, s) in once.iter().zip(&scaled.heights) {
+                // Rounding only: some hundred operations.
+                prop_assert!((scale * z - s).abs() <= 1e-12 * scale.abs() * largest + f64::MIN_POSITIVE);
+            }
+        }
+    }
+}
+
+#[test]
+fn slope_errors_worked_out_by_hand() {
+    let (p, q) = (array![[1.0, 2.0, f64::NAN]], array![[0.0, -1.0, 0.0]]);
+    let (true_p, true_q) = (array![[4.0, 2.0, 0.0]], array![[4.0, -2.0, 0.0]]);
+    let error = slope_error([p.view(), q.view()], [true_p.view(), true_q.view()]).unwrap();
+    assert_eq!(error.p.pixels, 2);
+    assert_eq!((error.p.mean_absolute, error.p.max), (1.5, 3.0));
+    assert_eq!((error.q.mean_absolute, error.q.max), (2.5, 4.0));
+    assert_eq!((error.vector.mean_absolute, error.vector.max), (3.0, 5.0));
+    assert!((error.vector.rms - 13.0f64.sqrt()).abs() < 1e-15);
+
+    let other = Array2::zeros((2, 3));
+    let refused = slope_error([p.view(), other.view()], [true_p.view(), true_q.view()]);
+    assert!(matches!(refused, Err(SfsError::ShapeMismatch { .. })));
+    let missing = array![[f64::NAN; 3]];
+    let refused = slope_error([missing.view(), q.view()], [true_p.view(), true_q.view()]);
+    assert!(matches!(refused, Err(SfsError::EmptyMask)));
+}
+
+#[test]
+fn normal_intensity_of_a_sphere_is_that_of_its_pole() {
+    let case = Sampled::new(64, sphere);
+    let image = case.image.mapv(|value| 20.0 + 180.0 * value);
+    let domain = Domain::pixels().with_mask(case.mask.view());
+    let at = |quantile| estimate_normal_intensity(Frame::Real(image.view()), &domain, 20.0, quantile);
+    // The brightest pixel lies within half a pixel of the pole: 1 − cos θ < 10⁻³.
+    assert!((at(1.0).unwrap() - 180.0).abs() < 0.2);
+    assert!(at(0.995).unwrap() <= at(1.0).unwrap());
+    for quantile in [0.0, 1.1, f64::NAN] {
+        assert!(matches!(at(quantile), Err(SfsError::InvalidOption { .. })), "{quantile}");
+    }
+}
+
+#[test]
+fn light_of_a_sphere_is_found_roughly() {
+    // A hemisphere up to its rim is what the estimate assumes.
+    let n = 101;
+    let at = |v: usize| (v as f64 - 50.0) / 48.0;
+    let mask = Array2::from_shape_fn((n, n), |(r, c)| at(r).hypot(at(c)) < 0.999);
+    for (x, y) in [(0.5, 0.0), (-0.4, 0.3), (0.0, -0.6)] {
+        let light = Lighting::new([x, y, 1.0]).unwrap().with_albedo(0.8).unwrap();
+        let image = Array2::from_shape_fn((n, n), |(r, c)| {
+            let z = (1.0 - at(r).powi(2) - at(c).powi(2)).max(1e-6).sqrt();
+            light.shade(-at(c) / z, -at(r) / z).max(0.0)
+        });
+        let domain = Domain::pixels().with_mask(mask.view());
+        let found = estimate_lighting(Frame::Real(image.view()), &domain).unwrap();
+        let (a, b) = (light.direction(), found.direction());
+        let cosine: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
+        let degrees = cosine.min(1.0).acos().to_degrees();
+        // The documented expectation for objects that are not quite as assumed.
+        assert!(degrees < 20.0, "({x}, {y}): {degrees:.1}° off, {b:?}");
+    }
+    let few = Array2::from_elem((3, 5), 0.5);
+    let refused = estimate_lighting(Frame::Real(few.view()), &Domain::pixels());
+    assert!(matches!(refused, Err(SfsError::TooFewPixels { needed: 16, available: 15 })));
+}

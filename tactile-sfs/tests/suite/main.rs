@@ -1,0 +1,9 @@
+//! The tests of `tactile-sfs`, in one program: the generic code is compiled once for all of them.
+
+mod behaviour;
+mod common;
+mod invariants;
+mod large;
+mod measured;
+mod order;
+mod stability_scale;

@@ -1,0 +1,45 @@
+//! Refits and evaluation allocate nothing once their memory has grown, counted by the allocator.
+
+use crate::common::{Uniform, bend};
+use nalgebra::{Matrix3, Point, SVector};
+use tactile_tps::{Factorization, FitOptions, NegR, Smoothing, Spline, Workspace};
+
+#[test]
+fn refits_and_evaluation_allocate_nothing() {
+    let mut random = Uniform(1);
+    let sources = random.points::<3>(105);
+    let targets: Vec<_> = sources.iter().map(bend).collect();
+    let queries = random.points::<3>(333);
+    let weights: Vec<f64> = (0..105).map(|i| f64::from(i % 5)).collect();
+    let near: Vec<f64> = (0..105).map(|i| 1.0 + 1e-4 * f64::from(i % 5)).collect();
+    let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
+    let (mut workspace, mut spline) = (Workspace::new(), Spline::<_, 3, 3, _>::empty(NegR));
+    let (mut values, mut jacobians) = (vec![Point::origin(); 333], vec![Matrix3::zeros(); 333]);
+    let mut hessians = vec![[Matrix3::zeros(); 3]; 333];
+    let (mut influence, mut slopes) = (vec![0.0; 7 * 105], vec![SVector::zeros(); 7 * 105]);
+    let mut round = |lambda: f64| {
+        factorization.fit_with(&mut workspace, &targets, &mut spline).expect("a fit");
+        for weights in [None, Some(&weights[..]), Some(&near)] {
+            for smoothing in [Smoothing::None, Smoothing::Lambda(lambda)] {
+                factorization
+                    .refit_with(&mut workspace, &targets, weights, smoothing, &mut spline)
+                    .expect("a refit");
+            }
+        }
+        assert!(spline.report().iterations > 0);
+        factorization
+            .refit_with(&mut workspace, &targets, None, Smoothing::Gcv, &mut spline)
+            .expect("a refit");
+        spline.apply_into(&queries, &mut values).expect("equal lengths");
+        spline.apply_and_jacobian_into(&queries, &mut values, &mut jacobians).expect("equal lengths");
+        spline.hessian_into(&queries, &mut hessians).expect("equal lengths");
+        values[0] = spline.apply(&queries[0]);
+        factorization.influence_into(&mut workspace, &queries[..7], &mut influence).expect("a linear map");
+        factorization
+            .jacobian_influence_into(&mut workspace, &queries[..7], &mut slopes)
+            .expect("a linear map");
+    };
+    round(0.5);
+    let counted = allocation_counter::measure(|| round(0.25));
+    assert_eq!(counted.count_total, 0);
+}

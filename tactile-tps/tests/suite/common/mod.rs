@@ -1,0 +1,32 @@
+//! Points and maps that the tests share.
+
+use nalgebra::{Point, SVector};
+
+/// Uniform numbers in [-1, 1) from a fixed seed (xorshift, Marsaglia 2003).
+pub(crate) struct Uniform(pub(crate) u64);
+
+impl Uniform {
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    pub(crate) fn point<const D: usize>(&mut self) -> Point<f64, D> {
+        Point::from(SVector::from_fn(|_, _| self.next()))
+    }
+
+    pub(crate) fn points<const D: usize>(&mut self, n: usize) -> Vec<Point<f64, D>> {
+        (0..n).map(|_| self.point()).collect()
+    }
+}
+
+/// A smooth map that no affine map comes near.
+pub(crate) fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
+    Point::from(SVector::from_fn(|k, _| p[k] + 0.2 * (2.0 * p[(k + 1) % D] + k as f64).sin()))
+}
+
+pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |m, x| f64::max(m, x.abs()))
+}

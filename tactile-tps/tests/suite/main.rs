@@ -1,0 +1,11 @@
+//! The tests of `tactile-tps`, in one program: the generic code is compiled once for all of them.
+
+mod allocation;
+mod common;
+mod duals;
+mod influence;
+mod iterative;
+mod properties;
+mod reference;
+mod reweight;
+mod stability_scale;
