@@ -5,6 +5,14 @@ use nalgebra::{Point, SMatrix, SVector};
 use crate::{Scalar, TpsError, Warp, WarpModel, error::Input, options::validate_weights, sites::finite};
 
 /// The affine map f(x) = A x + b.
+///
+/// ```
+/// # use nalgebra::{Matrix2, Point2, Vector2};
+/// # use tactile_tps::{Affine, Warp};
+/// let shear = Affine::new(Matrix2::new(1.0, 0.5, 0.0, 1.0), Vector2::new(0.0, 2.0));
+/// assert_eq!(shear.apply(&Point2::new(1.0, 4.0)), Point2::new(3.0, 6.0));
+/// assert_eq!(shear.jacobian(&Point2::origin()), shear.linear);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned"))]
@@ -17,11 +25,25 @@ pub struct Affine<T: Scalar, const D: usize> {
 
 impl<T: Scalar, const D: usize> Affine<T, D> {
     /// The map x ↦ `linear` x + `offset`.
+    ///
+    /// ```
+    /// # use nalgebra::{Matrix2, Point2, Vector2};
+    /// # use tactile_tps::{Affine, Warp};
+    /// let quarter_turn = Affine::new(Matrix2::new(0.0, -1.0, 1.0, 0.0), Vector2::zeros());
+    /// assert_eq!(quarter_turn.apply(&Point2::new(1.0, 0.0)), Point2::new(0.0, 1.0));
+    /// ```
     pub fn new(linear: SMatrix<T, D, D>, offset: SVector<T, D>) -> Self {
         Self { linear, offset }
     }
 
     /// The map that leaves every point where it is.
+    ///
+    /// ```
+    /// # use nalgebra::Point3;
+    /// # use tactile_tps::{Affine, Warp};
+    /// let point = Point3::new(1.0, 2.0, 3.0);
+    /// assert_eq!(Affine::identity().apply(&point), point);
+    /// ```
     pub fn identity() -> Self {
         Self::new(SMatrix::identity(), SVector::zeros())
     }
@@ -37,6 +59,14 @@ impl<T: Scalar, const D: usize> Warp<T, D> for Affine<T, D> {
 }
 
 /// The rigid motion f(x) = R x + b with R a rotation (no reflection).
+///
+/// ```
+/// # use nalgebra::{Point2, Rotation2, Vector2};
+/// # use tactile_tps::{Rigid, Warp};
+/// let turn = Rigid { rotation: *Rotation2::new(0.3).matrix(), translation: Vector2::new(1.0, 0.0) };
+/// let (a, b) = (Point2::<f64>::new(0.2, 0.7), Point2::new(3.0, 1.0));
+/// assert!(((turn.apply(&a) - turn.apply(&b)).norm() - (a - b).norm()).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned"))]
@@ -49,6 +79,13 @@ pub struct Rigid<T: Scalar, const D: usize> {
 
 impl<T: Scalar, const D: usize> Rigid<T, D> {
     /// The motion that leaves every point where it is.
+    ///
+    /// ```
+    /// # use nalgebra::Point3;
+    /// # use tactile_tps::{Rigid, Warp};
+    /// let point = Point3::new(1.0, 2.0, 3.0);
+    /// assert_eq!(Rigid::identity().apply(&point), point);
+    /// ```
     pub fn identity() -> Self {
         Self { rotation: SMatrix::identity(), translation: SVector::zeros() }
     }
@@ -66,11 +103,35 @@ impl<T: Scalar, const D: usize> Warp<T, D> for Rigid<T, D> {
 /// Fits an [`Affine`] map: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
 ///
 /// Along directions the points do not span the map moves points with their mean (the pseudo-inverse S⁺).
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{AffineModel, Warp, WarpModel};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let targets = sources.map(|p| Point2::new(2.0 * p.x - p.y, p.y + 3.0));
+/// let warp = AffineModel.fit(&sources, &targets, None)?;
+/// assert!((warp.apply(&Point2::new(5.0, 1.0)) - Point2::new(9.0, 4.0)).norm() < 1e-14);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AffineModel;
 
 /// Fits a [`Rigid`] motion: the rotation nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991).
+///
+/// ```
+/// # use nalgebra::{Point2, Rotation2};
+/// # use tactile_tps::{RigidModel, WarpModel};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let turn = Rotation2::new(0.3);
+/// let warp = RigidModel.fit(&sources, &sources.map(|p| turn * p), None)?;
+/// assert!((warp.rotation - turn.matrix()).norm() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RigidModel;

@@ -3,6 +3,14 @@
 use thiserror::Error;
 
 /// The argument an error speaks of.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{FitOptions, Input, ThinPlateSpline, TpsError};
+/// let points = [[0.0, 0.0], [1.0, f64::NAN]].map(Point2::from);
+/// let error = ThinPlateSpline::fit(&points, &points, &FitOptions::default()).unwrap_err();
+/// assert_eq!(error, TpsError::NotFinite { input: Input::Sources, index: 1 });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Input {
@@ -31,6 +39,16 @@ impl core::fmt::Display for Input {
 }
 
 /// Everything that can go wrong in this crate.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{FitOptions, ThinPlateSpline, TpsError};
+/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]].map(Point2::from);
+/// let targets = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]].map(Point2::from);
+/// let error = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default()).unwrap_err();
+/// assert_eq!(error, TpsError::Conflict { first: 0, second: 2 });
+/// assert_eq!(error.to_string(), "source points 0 and 2 coincide but their targets differ: smooth, or drop one");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TpsError {

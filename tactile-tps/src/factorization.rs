@@ -6,12 +6,11 @@ use std::sync::OnceLock;
 use nalgebra::Point;
 
 use crate::{
-    FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, Spline, TpsError,
+    FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, TpsError,
     iterative::Iterative,
     refine::Buffers,
     sites::Sites,
     system::{Setting, System},
-    task::Task,
 };
 
 /// Source points with their kernel matrix factored: splines to any targets follow in O(n²).
@@ -47,6 +46,23 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
 }
 
 /// Memory that refits use again and again.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{Factorization, FitOptions, R2LogR, Spline, Workspace};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+/// let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(R2LogR));
+/// for step in 1..=3 {
+///     // From the second round on no memory is asked for.
+///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
+///     factorization.fit_with(&mut workspace, &targets, &mut spline)?;
+///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Workspace<const D: usize> {
     pub(crate) buffers: Buffers,
@@ -57,6 +73,12 @@ pub struct Workspace<const D: usize> {
 
 impl<const D: usize> Workspace<D> {
     /// An empty workspace; it grows at its first use.
+    ///
+    /// ```
+    /// # use tactile_tps::Workspace;
+    /// let workspace = Workspace::<3>::new();
+    /// # let _ = workspace;
+    /// ```
     pub fn new() -> Self {
         Self::default()
     }
@@ -68,6 +90,19 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// With [`Smoothing::Gcv`] the matrix is decomposed instead, at some thirty times the cost. Thousands of points, or
     /// [`Solver::Iterative`](crate::Solver), are prepared for iteration: O(n²) time, O(n) memory.
     ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, NegR, TpsError};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::new(&sources, &FitOptions::new(NegR))?;
+    /// assert_eq!(factorization.len(), 5);
+    /// let bad = FitOptions::new(NegR).weights(vec![1.0, 1.0, -1.0, 1.0, 1.0]);
+    /// assert_eq!(Factorization::new(&sources, &bad).unwrap_err(), TpsError::Weight { index: 2, value: -1.0 });
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// [`TpsError`] for bad input, or a kernel that is not definite on these points.
     pub fn new(sources: &[Point<T, D>], options: &FitOptions<T, K>) -> Result<Self, TpsError> {
@@ -75,6 +110,19 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// As [`new`](Self::new), telling `watch` how the preparation for an iteration gets on. A direct solver runs without.
+    ///
+    /// ```
+    /// # use core::ops::ControlFlow;
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, Solver, TpsError};
+    /// let sources: Vec<Point2<f64>> =
+    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+    /// let options = FitOptions::default().solver(Solver::Iterative);
+    /// let stopped = Factorization::new_watched(&sources, &options, |progress| {
+    ///     if 2 * progress.done > progress.total { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    /// });
+    /// assert_eq!(stopped.unwrap_err(), TpsError::Stopped);
+    /// ```
     ///
     /// # Errors
     /// Those of [`new`](Self::new), and [`TpsError::Stopped`] if `watch` breaks off.
@@ -124,6 +172,17 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// Number of source points.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
+    /// assert_eq!((factorization.len(), factorization.is_empty()), (5, false));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn len(&self) -> usize {
         self.sites.inputs()
     }
@@ -137,70 +196,30 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// targets; some 10 n³ operations, once.
     ///
     /// Up to 256 points, and for cross-validation, the first refit that can use it does this unasked.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, R2LogR, Smoothing, Spline, Workspace};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
+    /// factorization.decompose();
+    /// let (mut workspace, mut spline, mut energy) = (Workspace::new(), Spline::empty(R2LogR), f64::INFINITY);
+    /// for lambda in [1e-4, 1e-3, 1e-2] {
+    ///     factorization.refit_with(&mut workspace, &targets, None, Smoothing::Lambda(lambda), &mut spline)?;
+    ///     assert!(spline.bending_energy() < energy);
+    ///     energy = spline.bending_energy();
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn decompose(&self) {
         self.spectral.get_or_init(|| {
             let mut system = System::default();
             system.decompose(&self.setting(), &self.site_weights);
             system
         });
-    }
-
-    /// The spline to these targets, with the weights and smoothing of the factorisation.
-    ///
-    /// Measures the residual, and refines the solution where the condition number asks for it.
-    ///
-    /// # Errors
-    /// [`TpsError`] for bad targets.
-    pub fn fit<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<Spline<T, D, M, K>, TpsError> {
-        self.fit_watched(targets, |_| ControlFlow::Continue(()))
-    }
-
-    /// As [`fit`](Self::fit), telling `watch` how an iteration gets on. If `watch` breaks off the spline is the best so far,
-    /// and its report says how good it is. A direct solver runs without.
-    ///
-    /// ```
-    /// use core::ops::ControlFlow;
-    /// use nalgebra::Point2;
-    /// use tactile_tps::{Factorization, FitOptions, Solver};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources: Vec<Point2<f64>> =
-    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
-    /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
-    /// let options = FitOptions::default().solver(Solver::Iterative);
-    /// let spline = Factorization::new(&sources, &options)?.fit_watched(&targets, |progress| {
-    ///     // Good enough for a first look.
-    ///     if progress.residual < Some(1e-3) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    /// })?;
-    /// assert!(!spline.report().converged && spline.report().residual < Some(1e-2));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError`] for bad targets.
-    pub fn fit_watched<const M: usize>(
-        &self,
-        targets: &[Point<T, M>],
-        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<Spline<T, D, M, K>, TpsError> {
-        let mut spline = Spline::empty(self.kernel.clone());
-        let task = Task { careful: true, ..self.task() };
-        self.watched(&task, &mut Buffers::default(), targets, &mut spline, &mut watch)?;
-        Ok(spline)
-    }
-
-    /// As [`fit`](Self::fit), into a spline that is already there: two triangular solves, and no allocation once
-    /// workspace and spline have grown. Refines only where the condition number exceeds 10⁸.
-    ///
-    /// # Errors
-    /// [`TpsError`] for bad targets; the spline is then left as it was.
-    pub fn fit_with<const M: usize>(
-        &self,
-        workspace: &mut Workspace<D>,
-        targets: &[Point<T, M>],
-        spline: &mut Spline<T, D, M, K>,
-    ) -> Result<(), TpsError> {
-        self.finish(&self.task(), &mut workspace.buffers, targets, spline).map(drop)
     }
 
     pub(crate) fn setting(&self) -> Setting<'_, K, D> {

@@ -76,6 +76,21 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// [`influence`](Self::influence) at many points, into the caller's memory: row by row, [`len`](Self::len) entries a
     /// point. Allocates nothing once the workspace has grown.
     ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, Workspace};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), sources[1]];
+    /// let mut influence = [0.0; 2 * 5];
+    /// factorization.influence_into(&mut Workspace::new(), &queries, &mut influence)?;
+    /// // At a source point the spline follows its target alone.
+    /// assert!((influence[5 + 1] - 1.0).abs() < 1e-14 && influence[5 + 2].abs() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// Those of [`influence`](Self::influence), and [`TpsError::Length`] if `influence` is not of that length.
     pub fn influence_into(
@@ -99,6 +114,20 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
 
     /// [`jacobian_influence`](Self::jacobian_influence) at many points, into the caller's memory: row by row,
     /// [`len`](Self::len) entries a point. Allocates nothing once the workspace has grown.
+    ///
+    /// ```
+    /// # use nalgebra::{Point2, Vector2};
+    /// # use tactile_tps::{Factorization, FitOptions, Workspace};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
+    /// let mut influence = [Vector2::zeros(); 5];
+    /// factorization.jacobian_influence_into(&mut Workspace::new(), &[Point2::new(0.5, 0.5)], &mut influence)?;
+    /// // Targets moved together leave the Jacobian as it is.
+    /// assert!(influence.iter().sum::<Vector2<f64>>().norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// Those of [`influence`](Self::influence), and [`TpsError::Length`] if `influence` is not of that length.

@@ -5,6 +5,12 @@ use crate::real::Real;
 /// A kernel's value and derivatives with respect to the **squared** distance s = r².
 ///
 /// With d = x − xᵢ the term U(|d|) has the gradient `2 first d` and the Hessian `2 first I + 4 second d dᵀ`.
+///
+/// ```
+/// # use tactile_tps::{Jet, Kernel, R3};
+/// // U = s^(3/2) at s = r² = 4.
+/// assert_eq!(R3.jet(4.0), Jet { value: 8.0, first: 3.0, second: 0.375 });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jet<R> {
     /// U.
@@ -57,16 +63,34 @@ pub trait Kernel: Clone + Send + Sync {
 /// U(r) = r² ln r with U(0) = 0: the thin plate of the plane (m = 2, D = 2).
 ///
 /// Bookstein's r² ln r² is twice this: with it the weights halve, and λ must be doubled for the same spline.
+///
+/// ```
+/// # use tactile_tps::{Kernel, R2LogR};
+/// let r = 2.0f64;
+/// assert!((R2LogR.value(r * r) - r * r * r.ln()).abs() < 1e-15);
+/// assert_eq!(R2LogR.value(0.0), 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct R2LogR;
 
 /// U(r) = −r: the same energy in space (m = 2, D = 3). Its gradient has a cusp at each source point.
+///
+/// ```
+/// # use tactile_tps::{Kernel, NegR};
+/// assert_eq!(NegR.value(9.0), -3.0);
+/// assert_eq!(NegR.jet(0.0).first, 0.0); // the cusp, left out
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NegR;
 
 /// U(r) = r³: one derivative smoother than −r (m = 3 in space, with an affine polynomial).
+///
+/// ```
+/// # use tactile_tps::{Kernel, R3};
+/// assert_eq!((R3.value(4.0), R3.degree()), (8.0, Some(3)));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct R3;

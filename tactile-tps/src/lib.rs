@@ -30,6 +30,7 @@ mod error;
 mod evaluate;
 mod factorization;
 mod far;
+mod fit;
 mod influence;
 mod iterative;
 mod kernel;
@@ -39,6 +40,7 @@ mod options;
 mod packed;
 #[cfg(feature = "rayon")]
 mod parallel;
+mod parts;
 mod precise;
 mod product;
 mod progress;

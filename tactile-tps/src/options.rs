@@ -3,6 +3,21 @@
 use crate::{R2LogR, Scalar, TpsError, error::Input};
 
 /// How closely the spline keeps to its targets.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources: Vec<Point2<f64>> = (0..25).map(|i| Point2::new(f64::from(i % 5), f64::from(i / 5))).collect();
+/// let noise = |i: usize| 0.01 * ((i * 7919 % 101) as f64 / 50.0 - 1.0);
+/// let targets: Vec<_> = sources.iter().enumerate().map(|(i, p)| Point2::new(p.x + noise(i), p.y)).collect();
+/// let options = FitOptions::default().smoothing(Smoothing::Gcv);
+/// let smooth = ThinPlateSpline::fit(&sources, &targets, &options)?;
+/// let through = ThinPlateSpline::fit(&sources, &targets, &options.smoothing(Smoothing::None))?;
+/// assert!(smooth.report().lambda > 0.0 && smooth.bending_energy() < through.bending_energy());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -17,6 +32,22 @@ pub enum Smoothing<T> {
 }
 
 /// How the equations are solved.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources: Vec<Point2<f64>> =
+///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+/// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
+/// let fit = |solver| ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().solver(solver));
+/// let (direct, iterative) = (fit(Solver::Direct)?, fit(Solver::Iterative)?);
+/// let query = Point2::new(7.3, 11.9);
+/// assert!((direct.apply(&query) - iterative.apply(&query)).norm() < 1e-8);
+/// assert!(iterative.report().iterations > 0 && direct.report().iterations == 0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -59,6 +90,12 @@ impl<T: Scalar> Default for FitOptions<T, R2LogR> {
 
 impl<T: Scalar, K> FitOptions<T, K> {
     /// Interpolation with this kernel, all points alike.
+    ///
+    /// ```
+    /// # use tactile_tps::{FitOptions, R3};
+    /// let options = FitOptions::<f64, _>::new(R3);
+    /// assert_eq!(options.kernel(), &R3);
+    /// ```
     pub fn new(kernel: K) -> Self {
         Self {
             kernel,
@@ -71,6 +108,19 @@ impl<T: Scalar, K> FitOptions<T, K> {
     }
 
     /// Sets the smoothing.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let options = FitOptions::default().smoothing(Smoothing::Lambda(0.5));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &options)?;
+    /// assert!((warp.report().lambda - 0.5).abs() < 1e-15 && warp.bending_energy() < 1e-3);
+    /// # Ok(())
+    /// # }
+    /// ```
     #[must_use]
     pub fn smoothing(mut self, smoothing: Smoothing<T>) -> Self {
         self.smoothing = smoothing;
@@ -80,6 +130,18 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// Gives every point a weight of at least zero; zero leaves the point out.
     ///
     /// Weights act against λ: an interpolating spline passes through every point of positive weight.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().weights(vec![1.0, 1.0, 1.0, 1.0, 0.0]))?;
+    /// assert_eq!(warp.report().ignored, 1);
+    /// # Ok(())
+    /// # }
+    /// ```
     #[must_use]
     pub fn weights(mut self, weights: Vec<T>) -> Self {
         self.weights = Some(weights);
@@ -90,6 +152,19 @@ impl<T: Scalar, K> FitOptions<T, K> {
     ///
     /// The default 0 drops those that rounding of the coordinates alone could have made. A surface that is nearly
     /// flat deserves more: across it the spline's gradient is noise over thickness.
+    ///
+    /// ```
+    /// # use nalgebra::Point3;
+    /// # use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 1e-5], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.4, 0.6, 1e-5]].map(Point3::from);
+    /// let rank = |tolerance| {
+    ///     ThinPlateSpline::fit(&sources, &sources, &FitOptions::new(NegR).rank_tolerance(tolerance)).map(|s| s.report().rank)
+    /// };
+    /// assert_eq!((rank(0.0)?, rank(1e-3)?), (4, 3));
+    /// # Ok(())
+    /// # }
+    /// ```
     #[must_use]
     pub fn rank_tolerance(mut self, tolerance: T) -> Self {
         self.rank_tolerance = tolerance;
@@ -97,6 +172,12 @@ impl<T: Scalar, K> FitOptions<T, K> {
     }
 
     /// Sets how the equations are solved.
+    ///
+    /// ```
+    /// # use tactile_tps::{FitOptions, Solver};
+    /// let to_rounding = FitOptions::<f64>::default().solver(Solver::Direct);
+    /// assert_ne!(to_rounding, FitOptions::default());
+    /// ```
     #[must_use]
     pub fn solver(mut self, solver: Solver) -> Self {
         self.solver = solver;
@@ -106,6 +187,20 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// The residual at which an iterative solver stops: the largest at a point, relative to the largest target.
     ///
     /// The default is 10⁻¹⁰. The spline's values are off by about as much; its report says how far it came.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, Solver, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources: Vec<Point2<f64>> =
+    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+    /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
+    /// let options = FitOptions::default().solver(Solver::Iterative).tolerance(1e-4);
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &options)?;
+    /// assert!(warp.report().converged && warp.report().residual <= Some(1e-4));
+    /// # Ok(())
+    /// # }
+    /// ```
     #[must_use]
     pub fn tolerance(mut self, tolerance: T) -> Self {
         self.tolerance = tolerance;
@@ -123,6 +218,11 @@ impl<T: Scalar, K> FitOptions<T, K> {
     }
 
     /// The kernel.
+    ///
+    /// ```
+    /// # use tactile_tps::{FitOptions, R2LogR};
+    /// assert_eq!(FitOptions::<f64>::default().kernel(), &R2LogR);
+    /// ```
     pub fn kernel(&self) -> &K {
         &self.kernel
     }

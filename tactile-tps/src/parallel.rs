@@ -11,6 +11,21 @@ const CHUNK: usize = 8 * BLOCK;
 impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// As [`apply_into`](Self::apply_into), over the threads of the current rayon pool.
     ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
+    /// let mut values = vec![Point2::origin(); 1000];
+    /// warp.par_apply_into(&queries, &mut values)?;
+    /// assert_eq!(values[999], warp.apply(&queries[999]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
     pub fn par_apply_into(&self, points: &[Point<T, D>], values: &mut [Point<T, M>]) -> Result<(), TpsError> {
@@ -20,6 +35,22 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// As [`apply_and_jacobian_into`](Self::apply_and_jacobian_into), over the threads of the current rayon pool.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries: Vec<_> = (0..1000).map(|i| Point2::new(f64::from(i) / 1000.0, 0.5)).collect();
+    /// let mut values = vec![Point2::origin(); 1000];
+    /// let mut jacobians = vec![nalgebra::Matrix2::zeros(); 1000];
+    /// warp.par_apply_and_jacobian_into(&queries, &mut values, &mut jacobians)?;
+    /// assert_eq!(jacobians[7], warp.jacobian(&queries[7]));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.

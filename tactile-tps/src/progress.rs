@@ -3,6 +3,27 @@
 /// How far a fit has come, given to the caller's watch.
 ///
 /// Units of `done` and `total` are points while the stage is preparation, steps of the iteration after.
+///
+/// ```
+/// # use core::ops::ControlFlow;
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{Factorization, FitOptions, Solver};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources: Vec<Point2<f64>> =
+///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+/// let options = FitOptions::<f64>::default().solver(Solver::Iterative);
+/// let (mut steps, mut residuals) = (0, Vec::new());
+/// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
+/// Factorization::new(&sources, &options)?.fit_watched(&targets, |progress| {
+///     eprintln!("step {} of at most {}", progress.done, progress.total);
+///     steps = progress.done;
+///     residuals.extend(progress.residual);
+///     ControlFlow::Continue(())
+/// })?;
+/// assert!(residuals.len() == steps + 1 && residuals.last() < residuals.first());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Progress {
@@ -17,6 +38,24 @@ pub struct Progress {
 }
 
 /// A part of a fit.
+///
+/// ```
+/// # use core::ops::ControlFlow;
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{Factorization, FitOptions, Solver, Stage};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources: Vec<Point2<f64>> =
+///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+/// let options = FitOptions::<f64>::default().solver(Solver::Iterative);
+/// let mut stages = Vec::new();
+/// Factorization::new_watched(&sources, &options, |progress| {
+///     stages.push(progress.stage);
+///     ControlFlow::Continue(())
+/// })?;
+/// assert!(!stages.is_empty() && stages.iter().all(|&stage| stage == Stage::Preparation));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stage {

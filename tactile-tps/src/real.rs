@@ -12,6 +12,15 @@ use crate::logarithm::{ln_f32, ln_f64};
 /// vectorised forms, and twice the working precision where digits would be lost.
 ///
 /// Comparison is allowed; keep both branches free of side effects and the compiler turns them into a select.
+///
+/// ```
+/// # use tactile_tps::Real;
+/// /// ln(1 + eˣ), in whatever arithmetic it is called.
+/// fn softplus<R: Real>(x: R) -> R {
+///     (R::from_f64(1.0) + x.exp()).ln()
+/// }
+/// assert!((softplus(0.0f64) - 2f64.ln()).abs() < 1e-15 && (softplus(0.0f32) - 2f32.ln()).abs() < 1e-6);
+/// ```
 pub trait Real:
     Copy
     + PartialOrd
@@ -57,6 +66,12 @@ mod sealed {
 /// The scalar type of points: `f32` or `f64`.
 ///
 /// Fits are always computed in `f64`; the type decides in which precision the spline is kept and evaluated.
+///
+/// ```
+/// # use tactile_tps::Scalar;
+/// assert_eq!(f32::narrow(0.1).widen(), f64::from(0.1f32));
+/// assert_eq!(<f64 as Scalar>::UNIT_ROUNDOFF, 0.5 * f64::EPSILON);
+/// ```
 pub trait Scalar: RealField + Copy + Default + sealed::Sealed {
     /// Arithmetic without a hardware fused multiply-add.
     #[doc(hidden)]

@@ -23,6 +23,26 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// by conjugate gradients on the decomposed matrix, to 1e-13 of the targets; weights far apart, or of zero, cost a
     /// factorisation. An iterative solver builds its preconditioner anew for another λ, or other weights beside one.
     ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, R2LogR, Smoothing, Spline, Workspace};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let factorization = Factorization::new(&sources, &FitOptions::default().smoothing(Smoothing::Lambda(0.01)))?;
+    /// let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(R2LogR));
+    /// let mut miss = |weight: f64| {
+    ///     let weights = [1.0, 1.0, 1.0, 1.0, weight];
+    ///     factorization
+    ///         .refit_with(&mut workspace, &targets, Some(&weights), Smoothing::Lambda(0.01), &mut spline)
+    ///         .map(|()| (spline.apply(&sources[4]) - targets[4]).norm())
+    /// };
+    /// // Trusted more, the point is met more closely.
+    /// assert!(miss(100.0)? < 0.1 * miss(1.0)?);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// [`TpsError`] for bad targets, weights or smoothing; the spline is then left as it was.
     pub fn refit_with<const M: usize>(

@@ -1,6 +1,20 @@
 //! What a fit has to say about itself.
 
 /// How a spline was fitted and how far it can be trusted.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{FitOptions, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// // Three points on a line: nothing is known across it.
+/// let sources = [[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 3.0]].map(Point2::from);
+/// let warp = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?;
+/// let report = warp.report();
+/// assert_eq!((report.points, report.merged, report.rank), (4, 1, 2));
+/// assert!(report.extents[1] < 1e-15 && report.residual < Some(1e-14) && report.digits > 14.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

@@ -1,10 +1,10 @@
 //! The fitted spline: its parts, its report, its energy.
 
-use nalgebra::{Point, SMatrix, SVector};
+use nalgebra::Point;
 
 use crate::{
-    Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError, Warp,
-    far::{Parts, Terms},
+    Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError,
+    far::Terms,
     product::energy,
     refine::{Buffers, Solution},
     sample::Linear,
@@ -20,7 +20,7 @@ pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     pub(crate) kernel: K,
     pub(crate) frame: Frame<D>,
     /// Centres in the frame, axis by axis.
-    centres: Vec<T>,
+    pub(crate) centres: Vec<T>,
     /// Weights in the frame, output by output.
     pub(crate) weights: Vec<T>,
     pub(crate) affine: Linear<T, D, M>,
@@ -29,6 +29,18 @@ pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
 }
 
 /// A spline that maps space onto itself.
+///
+/// ```
+/// # use nalgebra::Point3;
+/// # use tactile_tps::{FitOptions, NegR, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.3, 0.4, 0.2]].map(Point3::from);
+/// let targets = sources.map(|p| p * 2.0);
+/// let warp: ThinPlateSpline<f64, 3, NegR> = ThinPlateSpline::fit(&sources, &targets, &FitOptions::new(NegR))?;
+/// assert!((warp.jacobian(&Point3::new(0.5, 0.5, 0.5)) - nalgebra::Matrix3::identity() * 2.0).norm() < 1e-13);
+/// # Ok(())
+/// # }
+/// ```
 pub type ThinPlateSpline<T, const D: usize, K = R2LogR> = Spline<T, D, D, K>;
 
 /// A solution and what it was found with.
@@ -77,6 +89,13 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// A spline that is zero everywhere, for a refit to fill.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{R2LogR, ThinPlateSpline};
+    /// let spline = ThinPlateSpline::<f64, 2>::empty(R2LogR);
+    /// assert_eq!(spline.apply(&Point2::new(3.0, 4.0)), Point2::origin());
+    /// ```
     pub fn empty(kernel: K) -> Self {
         Self {
             kernel,
@@ -137,54 +156,20 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// How the fit went.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert!(warp.report().rank == 3 && warp.report().condition < 1e3);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn report(&self) -> &FitReport {
         &self.report
-    }
-
-    /// Number of distinct centres.
-    fn count(&self) -> usize {
-        self.centres.len() / D
-    }
-
-    /// The distinct centres, in the order of the source points.
-    pub fn centres(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + '_ {
-        let n = self.count();
-        (0..n).map(move |j| {
-            let inside = |k: usize| self.centres[k * n + j].widen();
-            Point::from(SVector::from_fn(|k, _| {
-                T::narrow(inside(k) * self.frame.scale + self.frame.centre[k])
-            }))
-        })
-    }
-
-    /// The weight wᵢ of every centre, in the kernel's own units.
-    pub fn weights(&self) -> impl ExactSizeIterator<Item = SVector<f64, M>> + '_ {
-        let (n, unit) = (self.count(), self.unit());
-        (0..n).map(move |j| SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit))
-    }
-
-    /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' own units.
-    ///
-    /// Kernels are scaled to unit size inside; what that leaves of a kernel like r² ln r, a multiple of r², is
-    /// affine by the side conditions and is accounted for here.
-    pub fn affine(&self) -> (SMatrix<f64, M, D>, SVector<f64, M>) {
-        let Frame { centre, scale } = self.frame;
-        let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j].widen() / scale);
-        let kernel = |s: f64| self.kernel.value(s);
-        let square = kernel(scale * scale) / self.unit() - kernel(1.0);
-        let n = self.count();
-        let offset = SVector::from_fn(|i, _| {
-            let norm = |j: usize| (0..D).map(|k| self.centres[k * n + j].widen().powi(2)).sum::<f64>();
-            let second: f64 = (0..n).map(|j| self.weights[i * n + j].widen() * norm(j)).sum();
-            let shift: f64 = (0..D).map(|k| self.affine.gradient[i][k].widen() * (centre[k] / scale)).sum();
-            self.affine.constant[i].widen() - shift - square * second
-        });
-        (linear, offset)
-    }
-
-    /// How much larger the kernel is outside than in the frame.
-    fn unit(&self) -> f64 {
-        self.frame.scale.powi(self.kernel.degree().unwrap_or(0))
     }
 
     /// Squared distance from the frame's centre, in the frame.
@@ -193,25 +178,25 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.frame.inside(point).iter().map(|x| x * x).sum()
     }
 
-    /// Coordinates of the centres and their weights, column by column.
-    pub(crate) fn columns(&self) -> ([&[T]; D], [&[T]; M]) {
-        let n = self.count();
-        (
-            core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
-            core::array::from_fn(|m| &self.weights[m * n..(m + 1) * n]),
-        )
-    }
-
-    pub(crate) fn parts(&self) -> Parts<'_, T, K, D, M> {
-        let (centres, weights) = self.columns();
-        Parts { kernel: &self.kernel, frame: self.frame, centres, weights, affine: &self.affine }
-    }
-
     /// Decimal digits that a plain sum of the spline's terms keeps at a point: −log₁₀ of the rounding error to expect,
     /// relative to the value or the targets, whichever is larger.
     ///
     /// Below eight (four in `f32`) the spline is evaluated in twice the working precision, so that its own digits are lost
     /// only where those of its weights are. Far from the points the number falls: the terms grow faster than the sum.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let near = warp.digits(&Point2::new(0.5, 0.5));
+    /// let far = warp.digits(&Point2::new(1e6, 1e6));
+    /// assert!(near > 14.0 && far < near);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn digits(&self, point: &Point<T, D>) -> f64 {
         let mut size = 0.0;
         self.each::<0>(core::slice::from_ref(point), |_, sample| size = sample.size());
@@ -222,6 +207,19 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// wᵀKw, summed over the outputs, in the kernel's own units; O(n²).
     ///
     /// In the plane with r² ln r, and in space with −r, the integral ∫ |∂²f|² of all second derivatives is 8π times this.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let straight = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?;
+    /// assert!(warp.bending_energy() > 1e-4 && straight.bending_energy() < 1e-25);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn bending_energy(&self) -> f64 {
         let n = self.count();
         let axis = |k: usize| self.centres[k * n..(k + 1) * n].iter().map(|x| x.widen()).collect();
@@ -234,41 +232,5 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
             weights.each_ref().map(|w| &w[..]),
         );
         energy / self.unit()
-    }
-}
-
-impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
-        Spline::apply(self, point)
-    }
-    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
-        Spline::jacobian(self, point)
-    }
-    fn apply_into(&self, points: &[Point<T, D>], images: &mut [Point<T, D>]) -> Result<(), TpsError> {
-        Spline::apply_into(self, points, images)
-    }
-    fn jacobian_into(
-        &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, D, D>],
-    ) -> Result<(), TpsError> {
-        Spline::jacobian_into(self, points, jacobians)
-    }
-}
-
-impl<T: Scalar, const D: usize, K: Kernel> crate::WarpModel<T, D> for FitOptions<T, K> {
-    type Warp = ThinPlateSpline<T, D, K>;
-
-    /// The options' own weights are replaced by `weights` where these are given.
-    fn fit(
-        &self,
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
-    ) -> Result<Self::Warp, TpsError> {
-        match weights {
-            None => Spline::fit(sources, targets, self),
-            Some(weights) => Spline::fit(sources, targets, &self.clone().weights(weights.to_vec())),
-        }
     }
 }

@@ -12,6 +12,18 @@ use crate::{
 
 impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// f(x).
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert!((warp.apply(&sources[4]) - targets[4]).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
         let mut value = [Point::origin()];
         self.each::<0>(core::slice::from_ref(point), |_, sample| value[0] = sample.point());
@@ -19,6 +31,20 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// The Jacobian ∂fᵢ/∂xⱼ (row i, column j). At a centre of −r, which has a cusp there, its own term is left out.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let (x, h) = (Point2::new(0.5, 0.5), nalgebra::Vector2::new(1e-5, 0.0));
+    /// let difference = (warp.apply(&(x + h)) - warp.apply(&(x - h))) / 2e-5;
+    /// assert!((warp.jacobian(&x).column(0) - difference).norm() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
         let mut jacobian = SMatrix::zeros();
         self.each::<1>(core::slice::from_ref(point), |_, sample| jacobian = sample.jacobian());
@@ -26,6 +52,21 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// The Hessian of every output. At a centre where the kernel has none its own term is left out.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let (x, h) = (Point2::<f64>::new(0.5, 0.5), nalgebra::Vector2::new(0.0, 1e-5));
+    /// let difference = (warp.jacobian(&(x + h)) - warp.jacobian(&(x - h))) / 2e-5;
+    /// // ∂²fₓ/∂x∂y.
+    /// assert!((warp.hessian(&x)[0][(0, 1)] - difference[(0, 0)]).abs() < 1e-8);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
         let mut hessian = [SMatrix::zeros(); M];
         self.each::<2>(core::slice::from_ref(point), |_, sample| hessian = sample.hessian());
@@ -33,6 +74,21 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// f at many points, into the caller's memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
+    /// let mut values = [Point2::origin(); 2];
+    /// warp.apply_into(&queries, &mut values)?;
+    /// assert_eq!(values[1], warp.apply(&queries[1]));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
@@ -43,6 +99,21 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// Jacobians at many points, into the caller's memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
+    /// let mut jacobians = [nalgebra::Matrix2::zeros(); 2];
+    /// warp.jacobian_into(&queries, &mut jacobians)?;
+    /// assert_eq!(jacobians[1], warp.jacobian(&queries[1]));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
@@ -57,6 +128,22 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// Values and Jacobians at many points in one pass, into the caller's memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
+    /// let (mut values, mut jacobians) = ([Point2::origin(); 2], [nalgebra::Matrix2::zeros(); 2]);
+    /// warp.apply_and_jacobian_into(&queries, &mut values, &mut jacobians)?;
+    /// // Where the warp keeps orientation and does not fold, the determinant is positive.
+    /// assert!(jacobians.iter().all(|j| j.determinant() > 0.5) && (values[0] - queries[0]).norm() < 0.1);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
@@ -76,6 +163,21 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     }
 
     /// Hessians of every output at many points, into the caller's memory.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
+    /// let mut hessians = [[nalgebra::Matrix2::zeros(); 2]; 2];
+    /// warp.hessian_into(&queries, &mut hessians)?;
+    /// assert_eq!(hessians[1], warp.hessian(&queries[1]));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.

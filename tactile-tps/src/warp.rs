@@ -2,7 +2,7 @@
 
 use nalgebra::{Point, SMatrix};
 
-use crate::{Scalar, TpsError, error::Input};
+use crate::{FitOptions, Kernel, Scalar, Spline, ThinPlateSpline, TpsError, error::Input};
 
 /// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<f64, 3>>` is a warp.
 ///
@@ -64,6 +64,24 @@ impl<T: Scalar, const D: usize, W: Warp<T, D> + ?Sized> Warp<T, D> for Box<W> {
 }
 
 /// A family of warps with a rule to choose one from weighted pairs of points.
+///
+/// ```
+/// # use nalgebra::Point2;
+/// # use tactile_tps::{AffineModel, FitOptions, TpsError, Warp, WarpModel};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// /// Root mean square distance that a model leaves between images and targets.
+/// fn misfit<W: WarpModel<f64, 2>>(model: &W, from: &[Point2<f64>], to: &[Point2<f64>]) -> Result<f64, TpsError> {
+///     let warp = model.fit(from, to, None)?;
+///     let sum: f64 = from.iter().zip(to).map(|(x, y)| (warp.apply(x) - y).norm_squared()).sum();
+///     Ok((sum / from.len() as f64).sqrt())
+/// }
+/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+/// let (affine, spline) = (misfit(&AffineModel, &sources, &targets)?, misfit(&FitOptions::default(), &sources, &targets)?);
+/// assert!(spline < 1e-14 && affine > 1e-3);
+/// # Ok(())
+/// # }
+/// ```
 pub trait WarpModel<T: Scalar, const D: usize> {
     /// The warp it fits.
     type Warp: Warp<T, D>;
@@ -78,6 +96,42 @@ pub trait WarpModel<T: Scalar, const D: usize> {
         targets: &[Point<T, D>],
         weights: Option<&[T]>,
     ) -> Result<Self::Warp, TpsError>;
+}
+
+impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
+    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+        Spline::apply(self, point)
+    }
+    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
+        Spline::jacobian(self, point)
+    }
+    fn apply_into(&self, points: &[Point<T, D>], images: &mut [Point<T, D>]) -> Result<(), TpsError> {
+        Spline::apply_into(self, points, images)
+    }
+    fn jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        jacobians: &mut [SMatrix<T, D, D>],
+    ) -> Result<(), TpsError> {
+        Spline::jacobian_into(self, points, jacobians)
+    }
+}
+
+impl<T: Scalar, const D: usize, K: Kernel> WarpModel<T, D> for FitOptions<T, K> {
+    type Warp = ThinPlateSpline<T, D, K>;
+
+    /// The options' own weights are replaced by `weights` where these are given.
+    fn fit(
+        &self,
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self::Warp, TpsError> {
+        match weights {
+            None => Spline::fit(sources, targets, self),
+            Some(weights) => Spline::fit(sources, targets, &self.clone().weights(weights.to_vec())),
+        }
+    }
 }
 
 /// The output must be as long as the input.

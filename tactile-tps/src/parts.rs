@@ -1,0 +1,110 @@
+//! What a spline is made of: its centres, their weights, the affine part.
+
+use nalgebra::{Point, SMatrix, SVector};
+
+use crate::{Kernel, Scalar, Spline, far::Parts, sites::Frame};
+
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
+    /// Number of distinct centres.
+    pub(crate) fn count(&self) -> usize {
+        self.centres.len() / D
+    }
+
+    /// The distinct centres, in the order of the source points.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// assert_eq!(warp.centres().len(), 5);
+    /// assert!(warp.centres().zip(&sources).all(|(centre, source)| (centre - source).norm() < 1e-15));
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn centres(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + '_ {
+        let n = self.count();
+        (0..n).map(move |j| {
+            let inside = |k: usize| self.centres[k * n + j].widen();
+            Point::from(SVector::from_fn(|k, _| {
+                T::narrow(inside(k) * self.frame.scale + self.frame.centre[k])
+            }))
+        })
+    }
+
+    /// The weight wᵢ of every centre, in the kernel's own units.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let sum: nalgebra::Vector2<f64> = warp.weights().sum();
+    /// let moment: nalgebra::Matrix2<f64> = warp.weights().zip(warp.centres()).map(|(w, x)| w * x.coords.transpose()).sum();
+    /// assert!(sum.norm() < 1e-15 && moment.norm() < 1e-15);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn weights(&self) -> impl ExactSizeIterator<Item = SVector<f64, M>> + '_ {
+        let (n, unit) = (self.count(), self.unit());
+        (0..n).map(move |j| SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit))
+    }
+
+    /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' own units.
+    ///
+    /// Kernels are scaled to unit size inside; what that leaves of a kernel like r² ln r, a multiple of r², is
+    /// affine by the side conditions and is accounted for here.
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, Kernel, R2LogR, ThinPlateSpline};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
+    /// let (linear, offset) = warp.affine();
+    /// let x = Point2::new(0.7, 0.2);
+    /// let term = |(w, c): (nalgebra::Vector2<f64>, Point2<f64>)| w * R2LogR.value((x - c).norm_squared());
+    /// let by_hand = linear * x.coords + offset + warp.weights().zip(warp.centres()).map(term).sum::<nalgebra::Vector2<f64>>();
+    /// assert!((warp.apply(&x).coords - by_hand).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn affine(&self) -> (SMatrix<f64, M, D>, SVector<f64, M>) {
+        let Frame { centre, scale } = self.frame;
+        let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j].widen() / scale);
+        let kernel = |s: f64| self.kernel.value(s);
+        let square = kernel(scale * scale) / self.unit() - kernel(1.0);
+        let n = self.count();
+        let offset = SVector::from_fn(|i, _| {
+            let norm = |j: usize| (0..D).map(|k| self.centres[k * n + j].widen().powi(2)).sum::<f64>();
+            let second: f64 = (0..n).map(|j| self.weights[i * n + j].widen() * norm(j)).sum();
+            let shift: f64 = (0..D).map(|k| self.affine.gradient[i][k].widen() * (centre[k] / scale)).sum();
+            self.affine.constant[i].widen() - shift - square * second
+        });
+        (linear, offset)
+    }
+
+    /// How much larger the kernel is outside than in the frame.
+    pub(crate) fn unit(&self) -> f64 {
+        self.frame.scale.powi(self.kernel.degree().unwrap_or(0))
+    }
+
+    /// Coordinates of the centres and their weights, column by column.
+    pub(crate) fn columns(&self) -> ([&[T]; D], [&[T]; M]) {
+        let n = self.count();
+        (
+            core::array::from_fn(|k| &self.centres[k * n..(k + 1) * n]),
+            core::array::from_fn(|m| &self.weights[m * n..(m + 1) * n]),
+        )
+    }
+
+    pub(crate) fn parts(&self) -> Parts<'_, T, K, D, M> {
+        let (centres, weights) = self.columns();
+        Parts { kernel: &self.kernel, frame: self.frame, centres, weights, affine: &self.affine }
+    }
+}
