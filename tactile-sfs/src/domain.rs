@@ -132,6 +132,12 @@ impl BoundingBox {
         self.rows * self.columns
     }
 
+    /// Row and column of its pixels, in reading order.
+    pub(crate) fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
+        let columns = self.left..self.left + self.columns;
+        (self.top..self.top + self.rows).flat_map(move |row| columns.clone().map(move |column| (row, column)))
+    }
+
     /// Whether every pixel of `other` lies in this box.
     pub(crate) fn holds(&self, other: Self) -> bool {
         self.top <= other.top

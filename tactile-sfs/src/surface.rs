@@ -2,9 +2,11 @@
 
 use core::ops::{BitOr, BitOrAssign};
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 
-use crate::{BoundingBox, Domain, Scalar};
+use crate::domain::same_shape;
+use crate::error::Input;
+use crate::{BoundingBox, Domain, Scalar, SfsError};
 
 /// Why a computation ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,6 +42,19 @@ impl PixelFlags {
     pub const UNREACHED: Self = Self(8);
     /// Outside the range of a calibration; the nearest end was taken.
     pub const OUT_OF_RANGE: Self = Self(16);
+
+    /// Flags of a reflectance that the model does not explain: above 1, below `least`, not finite.
+    pub(crate) fn of_reflectance<T: Scalar>(reflectance: T, least: T) -> Self {
+        if !reflectance.is_finite() {
+            Self::NON_FINITE
+        } else if reflectance > T::one() {
+            Self::SATURATED
+        } else if reflectance < least {
+            Self::DARK
+        } else {
+            Self::NONE
+        }
+    }
 
     /// Whether every flag of `other` is set here.
     pub fn contains(self, other: Self) -> bool {
@@ -122,8 +137,33 @@ impl<T: Scalar> Surface<T> {
         self.heights.mapv(|height| if height.is_nan() { value } else { height })
     }
 
+    /// Where every reconstruction enters: checks the domain against an image of this size, empties the surface for it and
+    /// returns the mask's box. On an error the surface is left as it was.
+    pub(crate) fn enter(
+        &mut self,
+        (rows, columns): (usize, usize),
+        domain: &Domain<'_, T>,
+    ) -> Result<BoundingBox, SfsError> {
+        let area = domain.validate(rows, columns)?;
+        self.prepare(rows, columns, area);
+        Ok(area)
+    }
+
+    /// The same for the integrators.
+    pub(crate) fn enter_slopes(
+        &mut self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<BoundingBox, SfsError> {
+        let (rows, columns) = p.dim();
+        domain.validate(rows, columns)?;
+        same_shape(Input::SlopeY, [rows, columns], q.dim())?;
+        self.enter((rows, columns), domain)
+    }
+
     /// Makes the surface `rows` × `columns` and empty, at the cost of the rectangles concerned.
-    pub(crate) fn prepare(&mut self, rows: usize, columns: usize, bounding_box: BoundingBox) {
+    fn prepare(&mut self, rows: usize, columns: usize, bounding_box: BoundingBox) {
         if self.heights.dim() == (rows, columns) {
             self.clear(self.bounding_box);
             self.bounding_box = bounding_box;
@@ -161,13 +201,10 @@ impl<T: Scalar> Surface<T> {
 
     /// Counts solved and flagged pixels.
     pub(crate) fn finish(&mut self, domain: &Domain<'_, T>) {
-        let BoundingBox { top, left, rows, columns } = self.bounding_box;
         let (mut solved, mut flagged) = (0, 0);
-        for row in top..top + rows {
-            for column in left..left + columns {
-                solved += usize::from(self.mask[[row, column]]);
-                flagged += usize::from(!self.flags[[row, column]].is_empty() && domain.contains(row, column));
-            }
+        for at in self.bounding_box.pixels() {
+            solved += usize::from(self.mask[at]);
+            flagged += usize::from(!self.flags[at].is_empty() && domain.contains(at.0, at.1));
         }
         self.report.solved = solved;
         self.report.flagged = flagged;

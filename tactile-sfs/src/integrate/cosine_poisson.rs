@@ -17,9 +17,7 @@ use super::cosine_transform::CosineTransform;
 use super::divergence::{Divergence, Lines};
 use super::shift::write_levelled;
 use super::tridiagonal::Tridiagonal;
-use crate::domain::same_shape;
-use crate::error::Input;
-use crate::{Domain, Scalar, SfsError, Surface, Workspace};
+use crate::{BoundingBox, Domain, Scalar, SfsError, Surface, Workspace};
 
 /// Poisson integration over the whole rectangle by a cosine transform and tridiagonal solves.
 ///
@@ -67,27 +65,16 @@ impl<T: Scalar> SlopeIntegrator<T> for CosinePoisson {
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        let (rows, columns) = p.dim();
-        let area = domain.validate(rows, columns)?;
-        same_shape(Input::SlopeY, [rows, columns], q.dim())?;
-        surface.prepare(rows, columns, area);
+        let area = surface.enter_slopes(p, q, domain)?;
         let buffers = &mut workspace.poisson;
-        let source = Divergence::new(p.view(), q.view(), domain, area);
+        let source = Divergence::new(p, q, domain, area);
         resize(&mut buffers.grid, area.area());
         let [hx, hy] = domain.pixel_size_m;
         if transform_cost(area.columns) <= 2.0 * transform_cost(area.rows) {
             buffers.solve(area.rows, area.columns, hy / hx, Some(&source))?;
         } else {
             source.fill(&mut buffers.lines, &mut buffers.grid)?;
-            resize(&mut buffers.turned, area.area());
-            turn(&buffers.grid, area.columns, &mut buffers.turned);
-            core::mem::swap(&mut buffers.grid, &mut buffers.turned);
-            buffers.solve(area.columns, area.rows, hx / hy, None)?;
-            turn(&buffers.grid, area.rows, &mut buffers.turned);
-            core::mem::swap(&mut buffers.grid, &mut buffers.turned);
-            // The right-hand side was in units of h_y², the turned problem wants h_x².
-            let unit = (hx / hy) * (hx / hy);
-            buffers.grid.iter_mut().for_each(|z| *z *= unit);
+            buffers.solve_turned(area, hx / hy)?;
         }
         write_levelled(&buffers.grid, domain, surface);
         surface.finish(domain);
@@ -96,6 +83,19 @@ impl<T: Scalar> SlopeIntegrator<T> for CosinePoisson {
 }
 
 impl<T: Scalar> PoissonBuffers<T> {
+    /// Solves with rows and columns exchanged; the right-hand side is in `grid`, `aspect` = h_x/h_y.
+    fn solve_turned(&mut self, area: BoundingBox, aspect: T) -> Result<(), SfsError> {
+        resize(&mut self.turned, area.area());
+        turn(&self.grid, area.columns, &mut self.turned);
+        core::mem::swap(&mut self.grid, &mut self.turned);
+        self.solve(area.columns, area.rows, aspect, None)?;
+        turn(&self.grid, area.rows, &mut self.turned);
+        core::mem::swap(&mut self.grid, &mut self.turned);
+        // The right-hand side was in units of h_y², the turned problem wants h_x².
+        self.grid.iter_mut().for_each(|z| *z *= aspect * aspect);
+        Ok(())
+    }
+
     /// Solves (aspect² δ_x² + δ_y²) z = f in place of `grid`; f comes from `source` line by line, or is in `grid`.
     fn solve(
         &mut self,

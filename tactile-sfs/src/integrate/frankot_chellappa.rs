@@ -11,10 +11,8 @@ use rustfft::num_complex::Complex;
 use super::SlopeIntegrator;
 use super::cosine_poisson::resize;
 use super::shift::write_levelled;
-use crate::domain::same_shape;
-use crate::error::Input;
 use crate::scalar::LineFft;
-use crate::{Domain, Scalar, SfsError, Surface, Workspace};
+use crate::{BoundingBox, Domain, Scalar, SfsError, Surface, Workspace};
 
 /// Integration by Fourier projection, periodic in both directions.
 ///
@@ -66,31 +64,9 @@ impl<T: Scalar> SlopeIntegrator<T> for FrankotChellappa {
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        let (rows, columns) = p.dim();
-        let area = domain.validate(rows, columns)?;
-        same_shape(Input::SlopeY, [rows, columns], q.dim())?;
-        surface.prepare(rows, columns, area);
+        let area = surface.enter_slopes(p, q, domain)?;
         let buffers = &mut workspace.fourier;
-        let mut wrong = None;
-        let slopes = (area.top..area.top + area.rows)
-            .flat_map(|row| (area.left..area.left + area.columns).map(move |column| (row, column)));
-        buffers.fill(
-            area.rows,
-            area.columns,
-            slopes.map(|(row, column)| {
-                if !domain.contains(row, column) {
-                    return Complex::new(T::zero(), T::zero());
-                }
-                let (p, q) = (p[[row, column]], q[[row, column]]);
-                if !(p.is_finite() && q.is_finite()) {
-                    wrong = wrong.or(Some((row, column)));
-                }
-                Complex::new(p, q)
-            }),
-        );
-        if let Some((row, column)) = wrong {
-            return Err(SfsError::NonFiniteSlope { row, column });
-        }
+        buffers.load(p, q, domain, area)?;
         buffers.integrate(domain.pixel_size_m);
         write_levelled(buffers.heights(), domain, surface);
         surface.finish(domain);
@@ -99,6 +75,29 @@ impl<T: Scalar> SlopeIntegrator<T> for FrankotChellappa {
 }
 
 impl<T: Scalar> FourierBuffers<T> {
+    /// Fills the field with p + i q, 0 outside the mask; refuses slopes that are not finite.
+    fn load(
+        &mut self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        area: BoundingBox,
+    ) -> Result<(), SfsError> {
+        let mut wrong = None;
+        let slopes = area.pixels().map(|(row, column)| {
+            if !domain.contains(row, column) {
+                return Complex::new(T::zero(), T::zero());
+            }
+            let (p, q) = (p[[row, column]], q[[row, column]]);
+            if !(p.is_finite() && q.is_finite()) {
+                wrong = wrong.or(Some((row, column)));
+            }
+            Complex::new(p, q)
+        });
+        self.fill(area.rows, area.columns, slopes);
+        wrong.map_or(Ok(()), |(row, column)| Err(SfsError::NonFiniteSlope { row, column }))
+    }
+
     /// Fills the field and prepares transforms of its size.
     pub(crate) fn fill(&mut self, rows: usize, columns: usize, values: impl Iterator<Item = Complex<T>>) {
         self.field.clear();

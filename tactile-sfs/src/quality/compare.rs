@@ -96,11 +96,15 @@ pub fn height_error<T: Scalar>(
     }
     let (scale, offset) = align(&pairs, alignment);
     let error = ErrorSummary::of(pairs.iter().map(|(z, t)| scale * z + offset - t));
-    let mut truths: Vec<f64> = pairs.iter().map(|pair| pair.1).collect();
-    truths.sort_by(f64::total_cmp);
-    let median = truths[truths.len() / 2];
-    let constant_guess = truths.iter().map(|t| (t - median).abs()).sum::<f64>() / truths.len() as f64;
-    Ok(HeightError { error, scale, offset, constant_guess, range: truths[truths.len() - 1] - truths[0] })
+    let [lowest, median, highest] = order_statistics(pairs.iter().map(|pair| pair.1).collect());
+    let constant_guess = pairs.iter().map(|pair| (pair.1 - median).abs()).sum::<f64>() / pairs.len() as f64;
+    Ok(HeightError { error, scale, offset, constant_guess, range: highest - lowest })
+}
+
+/// Lowest, median and highest of some values.
+fn order_statistics(mut values: Vec<f64>) -> [f64; 3] {
+    values.sort_by(f64::total_cmp);
+    [values[0], values[values.len() / 2], values[values.len() - 1]]
 }
 
 fn align(pairs: &[(f64, f64)], alignment: Alignment) -> (f64, f64) {

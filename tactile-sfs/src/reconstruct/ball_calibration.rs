@@ -6,13 +6,29 @@
 use ndarray::Array2;
 
 use super::depth_table::{DepthTable, Signal};
-use crate::error::positive;
+use crate::error::{in_range, positive};
 use crate::{Domain, Frame, Scalar, SfsError};
 
 /// Fewest pixels of contact a calibration makes sense for.
 const FEWEST: usize = 100;
 
-/// A depth table and how well the ball fits it.
+/// A depth table and how well the ball fits it; what [`DepthTable::from_ball`] returns.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{BallCalibration, DepthTable, Domain, Frame, Signal};
+/// // A ball of 4 mm pressed to a contact of 2 mm; the image brightens by 100 a millimetre.
+/// let depth = |r: usize, c: usize| {
+///     let r2 = ((r as f64 - 30.0).powi(2) + (c as f64 - 30.0).powi(2)) * 1e-8;
+///     (16e-6_f64 - r2).sqrt() - 12e-6_f64.sqrt()
+/// };
+/// let image = Array2::from_shape_fn((61, 61), |(r, c)| (1e5 * depth(r, c)).max(0.0));
+/// let domain = Domain::new([1e-4, 1e-4])?;
+/// let BallCalibration { contact_radius_m, indentation_m, .. } =
+///     DepthTable::from_ball(Frame::Real(image.view()), Signal::Intensity, &domain, 4e-3, 1.0, None)?;
+/// assert!((contact_radius_m - 2e-3).abs() < 5e-5 && (indentation_m - 0.536e-3).abs() < 3e-5);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallCalibration<T> {
     /// The table, ready to use with the same signal.
@@ -35,6 +51,20 @@ impl<T: Scalar> DepthTable<T> {
     /// The contact is where the signal exceeds `threshold`; the domain's mask should leave out whatever else does, and
     /// may leave out part of the contact (to test the table on the rest) if `circle` gives centre (px) and radius (m).
     ///
+    /// Lengths in metres, signals in grey levels; O(pixels log pixels).
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{DepthTable, Domain, Frame, Signal};
+    /// let square = |r: usize, c: usize| (r as f64 - 30.0).powi(2) + (c as f64 - 30.0).powi(2);
+    /// let depth = |r, c| (1600.0 - square(r, c)).sqrt() - 1200.0_f64.sqrt();
+    /// let image = Array2::from_shape_fn((61, 61), |(r, c)| 20.0 * depth(r, c).max(0.0));
+    /// let (frame, circle) = (Frame::Real(image.view()), ([30.0, 30.0], 20.0));
+    /// let found = DepthTable::from_ball(frame, Signal::Intensity, &Domain::pixels(), 40.0, 1.0, Some(circle))?;
+    /// assert!((found.table.depth(60.0).0 - 3.0).abs() < 0.05 && found.mean_residual_m < 0.05);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
     /// # Errors
     /// Those of a wrong domain; [`SfsError::InvalidOption`] for a radius or threshold that is not positive, or a contact
     /// wider than the ball; [`SfsError::TooFewPixels`] below 100 pixels of contact.
@@ -48,50 +78,67 @@ impl<T: Scalar> DepthTable<T> {
     ) -> Result<BallCalibration<T>, SfsError> {
         positive("ball radius", ball_radius_m.as_f64())?;
         positive("contact threshold", threshold.as_f64())?;
-        let (rows, columns) = frame.dim();
-        domain.validate(rows, columns)?;
-        // The table is replaced at the end; until then only its signal counts.
-        let mut table =
-            DepthTable::new(&[(T::zero(), T::zero()), (T::one(), T::zero())])?.with_signal(signal);
-        table.check_reference((rows, columns))?;
-        let signals = Array2::from_shape_fn((rows, columns), |(row, column)| {
-            let inside = domain.contains(row, column);
-            if inside { table.signal_at(&frame, row, column).as_f64() } else { f64::NAN }
-        });
+        let signals = signals(&frame, &signal, domain)?;
         let step = domain.pixel_size_m.map(Scalar::as_f64);
-        let (centre, radius) = match circle {
-            Some(circle) => circle,
-            None => contact_circle(&signals, threshold.as_f64(), step)?,
-        };
+        let found = || contact_circle(&signals, threshold.as_f64(), step);
+        let (centre_px, radius) = circle.map_or_else(found, Ok)?;
         let ball = ball_radius_m.as_f64();
-        crate::error::in_range("contact radius", "less than the ball's radius", radius, radius < ball)?;
-        let rim = (ball * ball - radius * radius).sqrt();
-        let samples: Vec<(f64, f64)> = signals
-            .indexed_iter()
-            .filter_map(|((row, column), &signal)| {
-                let (x, y) = ((column as f64 - centre[0]) * step[0], (row as f64 - centre[1]) * step[1]);
-                let r2 = x * x + y * y;
-                (signal.is_finite() && r2 < radius * radius)
-                    .then(|| (signal, (ball * ball - r2).sqrt() - rim))
-            })
-            .collect();
-        if samples.len() < FEWEST {
-            return Err(SfsError::TooFewPixels { needed: FEWEST, available: samples.len() });
-        }
-        let entries: Vec<(T, T)> =
-            monotone_means(&samples).iter().map(|&(s, d)| (T::of(s), T::of(d))).collect();
-        table = DepthTable::new(&entries)?.with_signal(table.signal().clone());
-        let residual = |&(signal, depth): &(f64, f64)| (table.depth(T::of(signal)).0.as_f64() - depth).abs();
-        let mean_residual_m = samples.iter().map(residual).sum::<f64>() / samples.len() as f64;
+        in_range("contact radius", "less than the ball's radius", radius, radius < ball)?;
+        let samples = cap_depths(&signals, step, centre_px, radius, ball)?;
+        let entries = monotone_means(&samples).into_iter().map(|(s, d)| (T::of(s), T::of(d)));
+        let table = DepthTable::new(&entries.collect::<Vec<_>>())?.with_signal(signal);
+        let mean_residual_m = mean_residual(&table, &samples);
         Ok(BallCalibration {
             table,
-            centre_px: centre,
+            centre_px,
             contact_radius_m: radius,
-            indentation_m: ball - rim,
+            indentation_m: ball - (ball * ball - radius * radius).sqrt(),
             mean_residual_m,
             pixels: samples.len(),
         })
     }
+}
+
+/// Mean |depth of the table − depth of the ball|.
+fn mean_residual<T: Scalar>(table: &DepthTable<T>, samples: &[(f64, f64)]) -> f64 {
+    let residual = |&(signal, depth): &(f64, f64)| (table.depth(T::of(signal)).0.as_f64() - depth).abs();
+    samples.iter().map(residual).sum::<f64>() / samples.len() as f64
+}
+
+/// The signal of each pixel, NaN outside the mask.
+fn signals<T: Scalar>(
+    frame: &Frame<'_, T>,
+    signal: &Signal<T>,
+    domain: &Domain<'_, T>,
+) -> Result<Array2<f64>, SfsError> {
+    domain.validate(frame.dim().0, frame.dim().1)?;
+    signal.check_reference(frame.dim())?;
+    Ok(Array2::from_shape_fn(frame.dim(), |(row, column)| {
+        let inside = domain.contains(row, column);
+        if inside { signal.of_pixel(frame, row, column).as_f64() } else { f64::NAN }
+    }))
+}
+
+/// Signal and depth √(R² − r²) − √(R² − a²) of the pixels inside the contact circle.
+fn cap_depths(
+    signals: &Array2<f64>,
+    step: [f64; 2],
+    centre: [f64; 2],
+    radius: f64,
+    ball: f64,
+) -> Result<Vec<(f64, f64)>, SfsError> {
+    let rim = (ball * ball - radius * radius).sqrt();
+    let depth = |(row, column): (usize, usize)| {
+        let r2 =
+            ((column as f64 - centre[0]) * step[0]).powi(2) + ((row as f64 - centre[1]) * step[1]).powi(2);
+        (r2 < radius * radius).then(|| (ball * ball - r2).sqrt() - rim)
+    };
+    let finite = signals.indexed_iter().filter(|(_, signal)| signal.is_finite());
+    let samples: Vec<_> = finite.filter_map(|(at, &signal)| Some((signal, depth(at)?))).collect();
+    if samples.len() < FEWEST {
+        return Err(SfsError::TooFewPixels { needed: FEWEST, available: samples.len() });
+    }
+    Ok(samples)
 }
 
 /// Centroid (px) and radius of equal area (m) of the pixels above the threshold. Stray pixels are kept from counting by

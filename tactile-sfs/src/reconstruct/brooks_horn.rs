@@ -7,6 +7,7 @@
 
 use rustfft::num_complex::Complex;
 
+use super::FieldBuffers;
 use crate::error::{non_negative, positive};
 use crate::integrate::shift::write_levelled;
 use crate::{BoundingBox, Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface};
@@ -84,28 +85,14 @@ impl<T: Scalar> SurfaceReconstruction<T> for BrooksHorn<T> {
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        let (rows, columns) = frame.dim();
-        let area = domain.validate(rows, columns)?;
-        surface.prepare(rows, columns, area);
+        let area = surface.enter(frame.dim(), domain)?;
         workspace.field.load(&frame, domain, &self.lighting, surface)?;
         let start = [T::zero(), T::zero(), T::one()];
         for normals in [&mut workspace.field.normals, &mut workspace.field.next] {
             normals.clear();
             normals.resize(area.area(), start);
         }
-        surface.report.stop = StopReason::IterationLimit;
-        for step in 1..=self.iterations {
-            let misfit = self.relax(&mut workspace.field, area, [rows, columns]);
-            surface.report.iterations = step;
-            surface.report.residual = misfit;
-            if step % self.project_every == 0 || step == self.iterations {
-                self.project(workspace, domain, area, step == self.iterations);
-                if let Some(stop) = workspace.report(step, self.iterations, misfit) {
-                    surface.report.stop = stop;
-                    break;
-                }
-            }
-        }
+        self.solve(workspace, frame.dim(), domain, surface);
         write_levelled(workspace.fourier.heights(), domain, surface);
         surface.finish(domain);
         Ok(())
@@ -113,44 +100,78 @@ impl<T: Scalar> SurfaceReconstruction<T> for BrooksHorn<T> {
 }
 
 impl<T: Scalar> BrooksHorn<T> {
+    /// Steps and projections; the heights of the last one are left in the Fourier buffers.
+    fn solve(
+        &self,
+        workspace: &mut Workspace<T>,
+        frame: (usize, usize),
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) {
+        let area = surface.bounding_box;
+        let report = &mut surface.report;
+        report.stop = StopReason::IterationLimit;
+        for step in 1..=self.iterations {
+            report.iterations = step;
+            report.residual = self.relax(&mut workspace.field, area, frame);
+            if step % self.project_every == 0 || step == self.iterations {
+                self.project(workspace, domain, area);
+                if let Some(stop) = workspace.report(step, self.iterations, report.residual) {
+                    report.stop = stop;
+                    break;
+                }
+                if step < self.iterations {
+                    follow(workspace, domain.pixel_size_m, area);
+                }
+            }
+        }
+    }
+
     /// One Jacobi step on the normals; returns the misfit before it.
-    fn relax(&self, field: &mut super::FieldBuffers<T>, area: BoundingBox, frame: [usize; 2]) -> T {
+    fn relax(&self, field: &mut FieldBuffers<T>, area: BoundingBox, frame: (usize, usize)) -> T {
         let light = self.lighting.direction();
         let weight = T::one() / (T::one() + T::of(4.0) * self.smoothness);
         let (mut sum, mut count) = (T::zero(), 0usize);
-        for r in 0..area.rows {
-            for c in 0..area.columns {
-                let i = r * area.columns + c;
-                let reflectance = field.reflectance[i];
-                if reflectance.is_nan() {
-                    continue;
-                }
-                let n = field.normals[i];
-                let (mut mean, mut outward) = neighbours(&field.normals, &field.reflectance, area, r, c);
-                // Where the frame cuts the surface off there is no rim.
-                let (row, column) = (area.top + r, area.left + c);
-                let cut = [column == 0 || column + 1 == frame[1], row == 0 || row + 1 == frame[0]];
-                (0..2).filter(|&axis| cut[axis]).for_each(|axis| outward[axis] = 0);
-                if self.occluding_rim && outward != [0, 0] {
-                    let length = T::of(f64::from(outward[0]).hypot(f64::from(outward[1])));
-                    let out = outward.map(|d| T::of(f64::from(d)) / length);
-                    mean = [mean[0] + out[0], mean[1] + out[1], mean[2]];
-                }
-                mean = unit(mean);
-                let misfit = reflectance - dot(n, light);
-                sum += misfit * misfit;
-                count += 1;
-                let pull = weight * (reflectance - dot(mean, light));
-                field.next[i] =
-                    unit([mean[0] + pull * light[0], mean[1] + pull * light[1], mean[2] + pull * light[2]]);
+        for (i, at) in area.pixels().enumerate() {
+            let reflectance = field.reflectance[i];
+            if reflectance.is_nan() {
+                continue;
             }
+            let mean = self.mean(field, area, at, frame);
+            let misfit = reflectance - dot(field.normals[i], light);
+            sum += misfit * misfit;
+            count += 1;
+            let pull = weight * (reflectance - dot(mean, light));
+            field.next[i] =
+                unit([mean[0] + pull * light[0], mean[1] + pull * light[1], mean[2] + pull * light[2]]);
         }
         core::mem::swap(&mut field.normals, &mut field.next);
         (sum / T::of(count.max(1) as f64)).sqrt()
     }
 
-    /// Projects the slopes on the integrable ones; unless it is the last time, the normals follow.
-    fn project(&self, workspace: &mut Workspace<T>, domain: &Domain<'_, T>, area: BoundingBox, last: bool) {
+    /// Mean normal around a pixel of the frame, that of the occluding rim among them.
+    fn mean(
+        &self,
+        field: &FieldBuffers<T>,
+        area: BoundingBox,
+        (row, column): (usize, usize),
+        (rows, columns): (usize, usize),
+    ) -> [T; 3] {
+        let at = [row - area.top, column - area.left];
+        let (mut mean, mut outward) = neighbours(&field.normals, &field.reflectance, area, at);
+        // Where the frame cuts the surface off there is no rim.
+        let cut = [column == 0 || column + 1 == columns, row == 0 || row + 1 == rows];
+        (0..2).filter(|&axis| cut[axis]).for_each(|axis| outward[axis] = 0);
+        if self.occluding_rim && outward != [0, 0] {
+            let length = T::of(f64::from(outward[0]).hypot(f64::from(outward[1])));
+            let out = outward.map(|d| T::of(f64::from(d)) / length);
+            mean = [mean[0] + out[0], mean[1] + out[1], mean[2]];
+        }
+        unit(mean)
+    }
+
+    /// Projects the slopes on the integrable ones.
+    fn project(&self, workspace: &mut Workspace<T>, domain: &Domain<'_, T>, area: BoundingBox) {
         let (field, fourier) = (&mut workspace.field, &mut workspace.fourier);
         let least = T::one() / (T::one() + self.max_slope * self.max_slope).sqrt();
         let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
@@ -163,24 +184,24 @@ impl<T: Scalar> BrooksHorn<T> {
         };
         fourier.fill(area.rows, area.columns, field.normals.iter().zip(&field.reflectance).map(slope));
         fourier.integrate(domain.pixel_size_m);
-        if last {
-            return;
-        }
-        let (hx, hy) = (domain.pixel_size_m[0], domain.pixel_size_m[1]);
-        let z = fourier.heights();
-        let two = T::of(2.0);
-        for r in 0..area.rows {
-            for c in 0..area.columns {
-                let i = r * area.columns + c;
-                if field.reflectance[i].is_nan() {
-                    continue;
-                }
-                let (left, right) = (i - usize::from(c > 0), i + usize::from(c + 1 < area.columns));
-                let up = if r > 0 { i - area.columns } else { i };
-                let down = if r + 1 < area.rows { i + area.columns } else { i };
-                let (p, q) = ((z[right] - z[left]) / (two * hx), (z[down] - z[up]) / (two * hy));
-                field.normals[i] = unit([-p, -q, T::one()]);
+    }
+}
+
+/// Takes the normals of the heights of the last projection.
+fn follow<T: Scalar>(workspace: &mut Workspace<T>, [hx, hy]: [T; 2], area: BoundingBox) {
+    let (field, z) = (&mut workspace.field, workspace.fourier.heights());
+    let two = T::of(2.0);
+    for r in 0..area.rows {
+        for c in 0..area.columns {
+            let i = r * area.columns + c;
+            if field.reflectance[i].is_nan() {
+                continue;
             }
+            let (left, right) = (i - usize::from(c > 0), i + usize::from(c + 1 < area.columns));
+            let up = if r > 0 { i - area.columns } else { i };
+            let down = if r + 1 < area.rows { i + area.columns } else { i };
+            let (p, q) = ((z[right] - z[left]) / (two * hx), (z[down] - z[up]) / (two * hy));
+            field.normals[i] = unit([-p, -q, T::one()]);
         }
     }
 }
@@ -190,8 +211,7 @@ fn neighbours<T: Scalar>(
     normals: &[[T; 3]],
     reflectance: &[T],
     area: BoundingBox,
-    r: usize,
-    c: usize,
+    [r, c]: [usize; 2],
 ) -> ([T; 3], [i32; 2]) {
     let (mut sum, mut outward) = ([T::zero(); 3], [0, 0]);
     for (dr, dc) in [(0, -1), (0, 1), (-1, 0), (1, 0)] {

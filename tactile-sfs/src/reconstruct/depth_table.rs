@@ -4,7 +4,7 @@
 //! calibrated table, linearly between the entries. No neighbour is involved, so nothing accumulates; the price is a
 //! calibration and even illumination.
 
-use ndarray::{Array2, ArrayViewMut2};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::domain::same_shape;
 use crate::error::{Input, non_negative};
@@ -22,6 +22,26 @@ pub enum Signal<T> {
     Darkening(Array2<T>),
     /// Image minus reference: sensors that grow brighter with depth.
     Brightening(Array2<T>),
+}
+
+impl<T: Scalar> Signal<T> {
+    pub(super) fn check_reference(&self, (rows, columns): (usize, usize)) -> Result<(), SfsError> {
+        match self {
+            Signal::Intensity => Ok(()),
+            Signal::Darkening(reference) | Signal::Brightening(reference) => {
+                same_shape(Input::Reference, [rows, columns], reference.dim())
+            }
+        }
+    }
+
+    pub(super) fn of_pixel(&self, frame: &Frame<'_, T>, row: usize, column: usize) -> T {
+        let intensity = frame.at(row, column);
+        match self {
+            Signal::Intensity => intensity,
+            Signal::Darkening(reference) => reference[[row, column]] - intensity,
+            Signal::Brightening(reference) => intensity - reference[[row, column]],
+        }
+    }
 }
 
 /// Depth from a calibration table of (signal, depth) pairs.
@@ -103,24 +123,6 @@ impl<T: Scalar> DepthTable<T> {
         (d0 + (d1 - d0) * (signal - s0) / (s1 - s0), true)
     }
 
-    pub(super) fn check_reference(&self, (rows, columns): (usize, usize)) -> Result<(), SfsError> {
-        match &self.signal {
-            Signal::Intensity => Ok(()),
-            Signal::Darkening(reference) | Signal::Brightening(reference) => {
-                same_shape(Input::Reference, [rows, columns], reference.dim())
-            }
-        }
-    }
-
-    pub(super) fn signal_at(&self, frame: &Frame<'_, T>, row: usize, column: usize) -> T {
-        let intensity = frame.at(row, column);
-        match &self.signal {
-            Signal::Intensity => intensity,
-            Signal::Darkening(reference) => reference[[row, column]] - intensity,
-            Signal::Brightening(reference) => intensity - reference[[row, column]],
-        }
-    }
-
     fn pixel(&self, signal: T) -> (T, PixelFlags) {
         if !signal.is_finite() {
             (T::nan(), PixelFlags::NON_FINITE)
@@ -143,7 +145,7 @@ impl<T: Scalar> SurfaceReconstruction<T> for DepthTable<T> {
     ) -> Result<(), SfsError> {
         let (rows, columns) = frame.dim();
         let area = domain.validate(rows, columns)?;
-        self.check_reference((rows, columns))?;
+        self.signal.check_reference((rows, columns))?;
         surface.prepare_to_overwrite(rows, columns, area);
         match frame {
             Frame::Real(_) => self.look_up(&frame, domain, surface, |signal| self.pixel(signal)),
@@ -181,14 +183,7 @@ impl<T: Scalar> DepthTable<T> {
                 (*height, *flag) = pixel(*height);
                 *solved = height.is_finite();
             }
-            if let Some(wanted) = domain.mask {
-                let out = heights.iter_mut().zip(&mut mask).zip(&mut flags);
-                for (((height, solved), flag), &wanted) in out.zip(line.view(wanted)) {
-                    if !wanted {
-                        (*height, *solved, *flag) = (T::nan(), false, PixelFlags::NONE);
-                    }
-                }
-            }
+            keep_inside(domain.mask.map(|wanted| line.view(wanted)), &mut heights, &mut mask, &mut flags);
             report.solved += mask.iter().map(|&solved| usize::from(solved)).sum::<usize>();
             report.flagged += flags.iter().map(|flag| usize::from(!flag.is_empty())).sum::<usize>();
         }
@@ -215,12 +210,24 @@ impl<T: Scalar> DepthTable<T> {
     }
 }
 
+/// Empties the pixels of a line that are not wanted.
+fn keep_inside<T: Scalar>(
+    wanted: Option<ArrayView2<'_, bool>>,
+    heights: &mut ArrayViewMut2<'_, T>,
+    mask: &mut ArrayViewMut2<'_, bool>,
+    flags: &mut ArrayViewMut2<'_, PixelFlags>,
+) {
+    let Some(wanted) = wanted else { return };
+    for (((height, solved), flag), &wanted) in heights.iter_mut().zip(mask).zip(flags).zip(wanted) {
+        if !wanted {
+            (*height, *solved, *flag) = (T::nan(), false, PixelFlags::NONE);
+        }
+    }
+}
+
 /// Known heights replace those of the table.
 fn keep_known<T: Scalar>(domain: &Domain<'_, T>, surface: &mut Surface<T>) {
-    let BoundingBox { top, left, rows, columns } = surface.bounding_box;
-    for (row, column) in
-        (top..top + rows).flat_map(|row| (left..left + columns).map(move |column| (row, column)))
-    {
+    for (row, column) in surface.bounding_box.pixels() {
         if let Some(height) = domain.known(row, column).filter(|_| domain.contains(row, column)) {
             surface.report.solved += usize::from(!surface.mask[[row, column]]);
             surface.set(row, column, height);

@@ -55,27 +55,22 @@ impl<T: Scalar> SurfaceReconstruction<T> for Pentland<T> {
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        let (rows, columns) = frame.dim();
-        let area = domain.validate(rows, columns)?;
         if self.lighting.is_frontal() {
             return Err(SfsError::FrontalLight { method: "Pentland's method" });
         }
-        surface.prepare(rows, columns, area);
+        let area = surface.enter(frame.dim(), domain)?;
         workspace.field.load(&frame, domain, &self.lighting, surface)?;
         let [sx, sy, sz] = self.lighting.direction();
         let [hx, hy] = domain.pixel_size_m;
-        let zero = T::zero();
-        let flat = |reflectance: &T| {
-            let value = if reflectance.is_nan() { zero } else { *reflectance - sz };
-            Complex::new(value, zero)
-        };
+        let flat = |&reflectance: &T| if reflectance.is_nan() { T::zero() } else { reflectance - sz };
+        let flat = |reflectance| Complex::new(flat(reflectance), T::zero());
         let fourier = &mut workspace.fourier;
         fourier.fill(area.rows, area.columns, workspace.field.reflectance.iter().map(flat));
         let epsilon = self.regularisation / hx;
         fourier.filter([hx, hy], |u, v| {
             // D = −i d, hence D̄/(|D|² + ε²) = i d/(d² + ε²).
             let d = sx * u + sy * v;
-            Complex::new(zero, d / (d * d + epsilon * epsilon))
+            Complex::new(T::zero(), d / (d * d + epsilon * epsilon))
         });
         write_levelled(fourier.heights(), domain, surface);
         surface.finish(domain);

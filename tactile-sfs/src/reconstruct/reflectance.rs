@@ -8,17 +8,28 @@ use crate::{Domain, Frame, Lighting, PixelFlags, Scalar, SfsError, Surface};
 pub(crate) struct FieldBuffers<T> {
     /// Reflectance in [0, 1]; NaN outside the mask and where the input is not finite.
     pub(super) reflectance: Vec<T>,
-    /// Heights.
+    /// Heights, their variances and their next values.
     pub(super) heights: Vec<T>,
-    /// Two further fields.
-    pub(super) first: Vec<T>,
-    pub(super) second: Vec<T>,
+    pub(super) variance: Vec<T>,
+    pub(super) next_heights: Vec<T>,
     /// Unit normals and their next values.
     pub(super) normals: Vec<[T; 3]>,
     pub(super) next: Vec<[T; 3]>,
 }
 
 impl<T: Scalar> FieldBuffers<T> {
+    /// Heights 0 with variance 1.
+    pub(super) fn reset_heights(&mut self, length: usize) {
+        for (vector, value) in [
+            (&mut self.heights, T::zero()),
+            (&mut self.variance, T::one()),
+            (&mut self.next_heights, T::zero()),
+        ] {
+            vector.clear();
+            vector.resize(length, value);
+        }
+    }
+
     /// Loads the reflectance and flags saturated, dark and non-finite pixels.
     ///
     /// # Errors
@@ -30,29 +41,18 @@ impl<T: Scalar> FieldBuffers<T> {
         lighting: &Lighting<T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        let area = surface.bounding_box;
         self.reflectance.clear();
         let mut usable = false;
-        for row in area.top..area.top + area.rows {
-            for column in area.left..area.left + area.columns {
-                if !domain.contains(row, column) {
-                    self.reflectance.push(T::nan());
-                    continue;
-                }
-                let value = lighting.reflectance(frame.at(row, column));
-                surface.flags[[row, column]] = if !value.is_finite() {
-                    PixelFlags::NON_FINITE
-                } else if value > T::one() {
-                    PixelFlags::SATURATED
-                } else if value <= T::zero() {
-                    PixelFlags::DARK
-                } else {
-                    PixelFlags::NONE
-                };
-                usable |= value.is_finite();
-                let clamped = value.max(T::zero()).min(T::one());
-                self.reflectance.push(if value.is_finite() { clamped } else { T::nan() });
+        for (row, column) in surface.bounding_box.pixels() {
+            if !domain.contains(row, column) {
+                self.reflectance.push(T::nan());
+                continue;
             }
+            let value = lighting.reflectance(frame.at(row, column));
+            surface.flags[[row, column]] = PixelFlags::of_reflectance(value, T::min_positive_value());
+            usable |= value.is_finite();
+            let clamped = value.max(T::zero()).min(T::one());
+            self.reflectance.push(if value.is_finite() { clamped } else { T::nan() });
         }
         if usable { Ok(()) } else { Err(SfsError::EmptyMask) }
     }

@@ -14,6 +14,7 @@
 //! It is a local method: a few iterations write the fine relief on the start, and the large shape remains that of the
 //! start. The eikonal method is better wherever a height is known, Brooks–Horn where none is.
 
+use super::FieldBuffers;
 use crate::error::{in_range, positive};
 use crate::integrate::shift::write_levelled;
 use crate::{
@@ -90,7 +91,7 @@ impl<T: Scalar> TsaiShah<T> {
 
     /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses of the centre and covariance C of the pixels that
     /// carry data (a uniform ellipse ends at xᵀC⁻¹x = 4), s its slope at the ends of the minor half axis a = 2 √λ_min(C).
-    fn start(&self, field: &mut super::FieldBuffers<T>, grid: &Grid<T>) {
+    fn start(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>) {
         let aspect = grid.step[1].as_f64();
         let at = |i: usize| ((i % grid.columns) as f64, (i / grid.columns) as f64 * aspect);
         let inside = || field.reflectance.iter().enumerate().filter(|(_, r)| !r.is_nan()).map(|(i, _)| at(i));
@@ -133,26 +134,37 @@ impl<T: Scalar> SurfaceReconstruction<T> for TsaiShah<T> {
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        let (rows, columns) = frame.dim();
-        let area = domain.validate(rows, columns)?;
-        surface.prepare(rows, columns, area);
+        surface.enter(frame.dim(), domain)?;
         let mut field = core::mem::take(&mut workspace.field);
-        field.load(&frame, domain, &self.lighting, surface)?;
-        let length = area.area();
-        // Heights in widths of a pixel; `first` is the variance of each, `second` its next height.
-        for (vector, value) in
-            [(&mut field.heights, T::zero()), (&mut field.first, T::one()), (&mut field.second, T::zero())]
-        {
-            vector.clear();
-            vector.resize(length, value);
+        let loaded = field.load(&frame, domain, &self.lighting, surface);
+        if loaded.is_ok() {
+            self.solve(&mut field, workspace, domain, surface);
+            write_levelled(&field.heights, domain, surface);
+            surface.finish(domain);
         }
+        workspace.field = field;
+        loaded
+    }
+}
+
+impl<T: Scalar> TsaiShah<T> {
+    /// Start and iterations, in widths of a pixel; heights in the domain's unit at the end.
+    fn solve(
+        &self,
+        field: &mut FieldBuffers<T>,
+        workspace: &mut Workspace<T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) {
+        let area = surface.bounding_box;
         let [hx, hy] = domain.pixel_size_m;
         let grid = Grid { rows: area.rows, columns: area.columns, step: [T::one(), hy / hx] };
-        self.start(&mut field, &grid);
+        field.reset_heights(area.area());
+        self.start(field, &grid);
         surface.report.stop = StopReason::IterationLimit;
         for iteration in 0..self.iterations {
-            let misfit = self.iterate(&mut field, &grid, iteration);
-            core::mem::swap(&mut field.heights, &mut field.second);
+            let misfit = self.iterate(field, &grid, iteration);
+            core::mem::swap(&mut field.heights, &mut field.next_heights);
             surface.report.iterations = iteration + 1;
             surface.report.residual = misfit;
             if let Some(stop) = workspace.report(iteration + 1, self.iterations, misfit) {
@@ -161,46 +173,45 @@ impl<T: Scalar> SurfaceReconstruction<T> for TsaiShah<T> {
             }
         }
         field.heights.iter_mut().for_each(|z| *z *= hx);
-        write_levelled(&field.heights, domain, surface);
-        workspace.field = field;
-        surface.finish(domain);
-        Ok(())
     }
-}
 
-impl<T: Scalar> TsaiShah<T> {
-    fn iterate(&self, field: &mut super::FieldBuffers<T>, grid: &Grid<T>, iteration: usize) -> T {
-        let [sx, sy, sz] = self.lighting.direction();
+    /// One step at every pixel; the root mean square misfit before it.
+    fn iterate(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>, iteration: usize) -> T {
         let sign = |back: bool| if back { T::one() } else { -T::one() };
-        let (back_x, back_y) = (iteration & 1 == 0, iteration & 2 == 0);
-        let (ax, ay) = (sign(back_x) / grid.step[0], sign(back_y) / grid.step[1]);
+        let back = [iteration & 1 == 0, iteration & 2 == 0];
+        let per = [sign(back[0]) / grid.step[0], sign(back[1]) / grid.step[1]];
+        let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
         let (mut sum, mut count) = (T::zero(), 0usize);
-        for r in 0..grid.rows {
-            for c in 0..grid.columns {
-                let i = r * grid.columns + c;
-                let (z, reflectance) = (field.heights[i], field.reflectance[i]);
-                if reflectance.is_nan() {
-                    field.second[i] = z;
-                    continue;
-                }
-                let beside = neighbour(&field.heights, i, c, grid.columns, 1, back_x);
-                let above = neighbour(&field.heights, i, r, grid.rows, grid.columns, back_y);
-                let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
-                let (p, q) = (cut(ax * (z - beside)), cut(ay * (z - above)));
-                let w2 = T::one() + p * p + q * q;
-                let w = w2.sqrt();
-                let cosine = (sz - sx * p - sy * q) / w;
-                let f = reflectance - cosine.max(T::zero());
-                let slope = (sx * ax + sy * ay) / w + cosine * (p * ax + q * ay) / w2;
-                let variance = field.first[i];
-                let gain = variance * slope / (self.noise + slope * slope * variance);
-                field.first[i] = (T::one() - gain * slope) * variance;
-                field.second[i] = z - gain * f;
-                sum += f * f;
-                count += 1;
+        for i in 0..grid.rows * grid.columns {
+            let (r, c) = (i / grid.columns, i % grid.columns);
+            let (z, reflectance) = (field.heights[i], field.reflectance[i]);
+            field.next_heights[i] = z;
+            if reflectance.is_nan() {
+                continue;
             }
+            let beside = neighbour(&field.heights, i, c, grid.columns, 1, back[0]);
+            let above = neighbour(&field.heights, i, r, grid.rows, grid.columns, back[1]);
+            let slopes = [cut(per[0] * (z - beside)), cut(per[1] * (z - above))];
+            let (f, slope) = self.residual(reflectance, slopes, per);
+            let variance = field.variance[i];
+            let gain = variance * slope / (self.noise + slope * slope * variance);
+            field.variance[i] = (T::one() - gain * slope) * variance;
+            field.next_heights[i] = z - gain * f;
+            sum += f * f;
+            count += 1;
         }
         (sum / T::of(count.max(1) as f64)).sqrt()
+    }
+
+    /// f = R − n·s, and its derivative by the pixel's own height, of which the slopes change by `per` each.
+    #[inline(always)]
+    fn residual(&self, reflectance: T, [p, q]: [T; 2], [ax, ay]: [T; 2]) -> (T, T) {
+        let [sx, sy, sz] = self.lighting.direction();
+        let w2 = T::one() + p * p + q * q;
+        let w = w2.sqrt();
+        let cosine = (sz - sx * p - sy * q) / w;
+        let slope = (sx * ax + sy * ay) / w + cosine * (p * ax + q * ay) / w2;
+        (reflectance - cosine.max(T::zero()), slope)
     }
 }
 

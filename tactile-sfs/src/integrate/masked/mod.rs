@@ -81,6 +81,10 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
         Ok(Self { max_iterations, ..self })
     }
 
+    fn limits(&self) -> Limits {
+        Limits { tolerance: self.tolerance.as_f64(), iterations: self.max_iterations }
+    }
+
     /// Whether the fit is Poisson's equation on a rectangle: equal weights, no height known, no hole in the mask.
     fn is_plain(&self, domain: &Domain<'_, T>, area: BoundingBox) -> bool {
         let full = |mask: ArrayView2<'_, bool>| area.view(mask.view()).iter().all(|&inside| inside);
@@ -133,20 +137,17 @@ impl<T: Scalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
     ) -> Result<(), SfsError> {
         let (rows, columns) = p.dim();
         let area = domain.validate(rows, columns)?;
-        same_shape(Input::SlopeY, [rows, columns], q.dim())?;
         if let Some(weights) = self.weights {
             same_shape(Input::Weights, [rows, columns], weights.dim())?;
         }
         if self.is_plain(domain, area) && solve_directly(workspace, [p, q], domain, surface)? {
             return Ok(());
         }
-        surface.prepare(rows, columns, area);
+        surface.enter_slopes(p, q, domain)?;
         let slopes = system::Slopes { p, q, weights: self.weights };
         let mut buffers = core::mem::take(&mut workspace.masked);
         system::assemble(&mut buffers, &slopes, domain, surface);
-        buffers.components.label(&buffers.system);
-        let limits = Limits { tolerance: self.tolerance.as_f64(), iterations: self.max_iterations };
-        solve::conjugate_gradients(&mut buffers, workspace, &limits, &mut surface.report);
+        solve::conjugate_gradients(&mut buffers, workspace, &self.limits(), &mut surface.report);
         buffers.level(surface);
         buffers.write(domain, surface);
         workspace.masked = buffers;
@@ -177,6 +178,7 @@ fn solve_directly<T: Scalar>(
 impl<T: Scalar> MaskedBuffers<T> {
     /// Gives parts without a known height mean 0 and reports all parts.
     fn level(&mut self, surface: &mut Surface<T>) {
+        self.components.label(&self.system);
         self.sum_up(surface);
         for (part, component) in self.parts.iter().zip(&mut surface.report.components) {
             component.pixels = part.pixels;
@@ -210,14 +212,10 @@ impl<T: Scalar> MaskedBuffers<T> {
 
     fn write(&self, domain: &Domain<'_, T>, surface: &mut Surface<T>) {
         let area = surface.bounding_box;
-        let system = &self.system;
-        for r in 0..area.rows {
-            for c in 0..area.columns {
-                let i = (r + 1) * system.width + c + 1;
-                if system.inside[i] {
-                    let (row, column) = (area.top + r, area.left + c);
-                    surface.set(row, column, domain.known(row, column).unwrap_or(T::of(self.z[i])));
-                }
+        for (row, column) in area.pixels() {
+            let i = (row - area.top + 1) * self.system.width + column - area.left + 1;
+            if self.system.inside[i] {
+                surface.set(row, column, domain.known(row, column).unwrap_or(T::of(self.z[i])));
             }
         }
     }

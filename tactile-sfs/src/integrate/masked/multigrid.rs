@@ -87,40 +87,50 @@ fn coarsen(fine: &Level, coarse: &mut Level) {
     }
 }
 
-/// Hands the residual to the coarser grid. After one sweep from zero it is what the sweep did not feel: the right and the
-/// lower neighbours.
-fn restrict(fine: &Level, coarse: &mut Level, [own, near, sides]: &mut [Vec<f32>; 3]) {
+/// Hands the residual to the coarser grid, the transpose of [`prolong`].
+fn restrict(fine: &Level, coarse: &mut Level, lines: &mut [Vec<f32>; 3]) {
     coarse.rhs.fill(0.0);
-    let (w, n, cw) = (fine.width, fine.width - 2, coarse.width);
+    let (n, cw) = (fine.width - 2, coarse.width);
+    let m = n.div_ceil(2);
     for r in 1..=fine.rows {
-        let at = r * w + 1;
-        let (next, under) = (&fine.x[at + 1..][..n], &fine.x[at + w..][..n]);
-        let (right, lower) = (&fine.right[at..][..n], &fine.below[at..][..n]);
-        let (lean_x, lean_y) = (&fine.lean_x[at..][..n], &fine.lean_y[at..][..n]);
-        let (own, near, sides) = (&mut own[..n + 1], &mut near[..n + 1], &mut sides[..n + 1]);
-        for i in 0..n {
-            let residual = right[i] * next[i] + lower[i] * under[i];
-            near[i] = residual * lean_y[i];
-            sides[i] = residual * lean_x[i];
-            own[i] = residual - near[i] - sides[i];
-        }
-        for line in [&mut *own, &mut *near, &mut *sides] {
-            line[n] = 0.0;
-        }
-        let block = r.div_ceil(2);
-        let beyond = if r % 2 == 1 { block - 1 } else { block + 1 };
-        let m = n.div_ceil(2);
+        share_residual(fine, r, lines);
+        let [own, near, sides] = lines.each_ref().map(|line| line[..2 * m].chunks_exact(2));
+        let (block, beyond) = blocks(r);
         let to = &mut coarse.rhs[block * cw..][..m + 2];
-        for (j, (own, sides)) in own.chunks_exact(2).zip(sides.chunks_exact(2)).take(m).enumerate() {
+        for (j, (own, sides)) in own.zip(sides).enumerate() {
             to[j + 1] += own[0] + own[1];
             to[j] += sides[0];
             to[j + 2] += sides[1];
         }
-        let to = &mut coarse.rhs[beyond * cw + 1..][..m];
-        for (to, near) in to.iter_mut().zip(near.chunks_exact(2)) {
+        for (to, near) in coarse.rhs[beyond * cw + 1..][..m].iter_mut().zip(near) {
             *to += near[0] + near[1];
         }
     }
+}
+
+/// The residual of a row, parted between the node's block and those next to it in y and x. After one sweep from zero it
+/// is what the sweep did not feel: the right and the lower neighbours.
+fn share_residual(fine: &Level, r: usize, [own, near, sides]: &mut [Vec<f32>; 3]) {
+    let (w, n) = (fine.width, fine.width - 2);
+    let at = r * w + 1;
+    let (next, under) = (&fine.x[at + 1..][..n], &fine.x[at + w..][..n]);
+    let (right, lower) = (&fine.right[at..][..n], &fine.below[at..][..n]);
+    let (lean_x, lean_y) = (&fine.lean_x[at..][..n], &fine.lean_y[at..][..n]);
+    let (own, near, sides) = (&mut own[..n + 1], &mut near[..n + 1], &mut sides[..n + 1]);
+    for i in 0..n {
+        let residual = right[i] * next[i] + lower[i] * under[i];
+        near[i] = residual * lean_y[i];
+        sides[i] = residual * lean_x[i];
+        own[i] = residual - near[i] - sides[i];
+    }
+    // The second node of a block cut in half.
+    (own[n], near[n], sides[n]) = (0.0, 0.0, 0.0);
+}
+
+/// Rows of blocks a row of nodes leans on: its own and the one nearest to it.
+fn blocks(r: usize) -> (usize, usize) {
+    let block = r.div_ceil(2);
+    (block, if r % 2 == 1 { block - 1 } else { block + 1 })
 }
 
 /// Adds the correction of the coarser grid.
@@ -128,8 +138,7 @@ fn prolong(fine: &mut Level, coarse: &Level, [own, near, sides]: &mut [Vec<f32>;
     let (w, n, cw) = (fine.width, fine.width - 2, coarse.width);
     let m = n.div_ceil(2);
     for r in 1..=fine.rows {
-        let block = r.div_ceil(2);
-        let beyond = if r % 2 == 1 { block - 1 } else { block + 1 };
+        let (block, beyond) = blocks(r);
         let from = &coarse.x[block * cw..][..m + 2];
         let (own, near, sides) = (&mut own[..2 * m], &mut near[..2 * m], &mut sides[..2 * m]);
         for (j, (own, sides)) in own.chunks_exact_mut(2).zip(sides.chunks_exact_mut(2)).enumerate() {

@@ -21,30 +21,9 @@ pub(super) fn conjugate_gradients<T: Scalar>(
     report: &mut Report<T>,
 ) {
     report.stop = StopReason::Converged;
-    let Some(mut steps) = Steps::start(buffers) else { return };
-    let (mut best, mut waited) = (f64::INFINITY, 0);
-    for iteration in 1..=limits.iterations {
-        let Some(relative) = steps.next(buffers) else {
-            report.stop = StopReason::Stagnated;
-            return;
-        };
-        report.iterations = iteration;
-        report.residual = T::of(relative);
-        if relative <= limits.tolerance {
-            return;
-        }
-        waited = if relative < best { 0 } else { waited + 1 };
-        best = best.min(relative);
-        if waited >= PATIENCE {
-            report.stop = StopReason::Stagnated;
-            return;
-        }
-        if let Some(stop) = workspace.report(iteration, limits.iterations, report.residual) {
-            report.stop = stop;
-            return;
-        }
+    if let Some(mut steps) = Steps::start(buffers) {
+        report.stop = steps.run(buffers, workspace, limits, report);
     }
-    report.stop = StopReason::IterationLimit;
 }
 
 /// What one step leaves to the next.
@@ -68,6 +47,34 @@ impl Steps {
             *to = (from / unit) as f32;
         }
         (unit > 0.0).then_some(Self { unit, last: f64::INFINITY })
+    }
+
+    /// Steps until one of the limits is met.
+    fn run<T: Scalar>(
+        &mut self,
+        buffers: &mut MaskedBuffers<T>,
+        workspace: &mut Workspace<T>,
+        limits: &Limits,
+        report: &mut Report<T>,
+    ) -> StopReason {
+        let (mut best, mut waited) = (f64::INFINITY, 0);
+        for iteration in 1..=limits.iterations {
+            let Some(relative) = self.next(buffers) else { return StopReason::Stagnated };
+            report.iterations = iteration;
+            report.residual = T::of(relative);
+            if relative <= limits.tolerance {
+                return StopReason::Converged;
+            }
+            waited = if relative < best { 0 } else { waited + 1 };
+            best = best.min(relative);
+            if waited >= PATIENCE {
+                return StopReason::Stagnated;
+            }
+            if let Some(stop) = workspace.report(iteration, limits.iterations, report.residual) {
+                return stop;
+            }
+        }
+        StopReason::IterationLimit
     }
 
     /// One step; the relative residual after it, `None` where rounding allows no further one.

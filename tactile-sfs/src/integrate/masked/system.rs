@@ -92,20 +92,7 @@ pub(super) fn assemble<T: Scalar>(
         vector.resize(system.inside.len(), 0.0);
     }
     system.mark(z, slopes, domain, surface);
-    let ([hx, hy], width) = (domain.pixel_size_m, system.width);
-    let x = Axis { slopes: slopes.p, step: [0, 1], stride: 1, weight: (hy / hx) * (hy / hx), length: hx };
-    let y = Axis { slopes: slopes.q, step: [1, 0], stride: width, weight: T::one(), length: hy };
-    for r in 0..area.rows {
-        for c in 0..area.columns {
-            let (at, i) = ([area.top + r, area.left + c], (r + 1) * width + c + 1);
-            for axis in [&x, &y] {
-                if system.inside[i] && system.inside[i + axis.stride] {
-                    let (slope, weight) = slopes.edge(axis.slopes, system.line(axis, i, at));
-                    system.add(z, residual, axis, i, weight * axis.weight, slope * axis.length);
-                }
-            }
-        }
-    }
+    system.add_edges(z, residual, slopes, domain.pixel_size_m, area);
     hierarchy.reset(area.rows, area.columns);
     system.copy_to(&mut hierarchy.levels[0]);
     hierarchy.build();
@@ -147,6 +134,29 @@ impl<T: Scalar> System<T> {
                 }
                 if !(slopes.p[[row, column]].is_finite() && slopes.q[[row, column]].is_finite()) {
                     surface.flags[[row, column]] |= PixelFlags::NON_FINITE;
+                }
+            }
+        }
+    }
+
+    /// Adds all edges of the mask to the fit.
+    fn add_edges(
+        &mut self,
+        z: &[f64],
+        rhs: &mut [f64],
+        slopes: &Slopes<'_, T>,
+        [hx, hy]: [T; 2],
+        area: BoundingBox,
+    ) {
+        let (width, weight) = (self.width, (hy / hx) * (hy / hx));
+        let x = Axis { slopes: slopes.p, step: [0, 1], stride: 1, weight, length: hx };
+        let y = Axis { slopes: slopes.q, step: [1, 0], stride: width, weight: T::one(), length: hy };
+        for (row, column) in area.pixels() {
+            let i = (row - area.top + 1) * width + column - area.left + 1;
+            for axis in [&x, &y] {
+                if self.inside[i] && self.inside[i + axis.stride] {
+                    let (slope, weight) = slopes.edge(axis.slopes, self.line(axis, i, [row, column]));
+                    self.add(z, rhs, axis, i, weight * axis.weight, slope * axis.length);
                 }
             }
         }

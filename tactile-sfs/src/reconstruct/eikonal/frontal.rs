@@ -63,14 +63,7 @@ fn visit<T: Scalar>(grid: &mut EikonalBuffers<T>, i: usize, width: usize, tolera
     let edge = |j: usize, metric: T| Edge { value: value[j], metric, along_x: along_x[j] };
     let x = upwind(edge(i - 1, edges[i - 1][0]), edge(i + 1, edges[i][0]));
     let y = upwind(edge(i - width, edges[i - width][1]), edge(i + width, edges[i][1]));
-    let k = if grid.corrected {
-        // Means of the node and its neighbours: half of the difference of the neighbours is left. Where the direction
-        // turns within a pixel (along ridges) such means say nothing, and the first order is better.
-        let turn = T::of(0.5) * (x.along_x - y.along_x);
-        if turn.abs() < T::of(0.1) { T::one() + turn } else { T::one() }
-    } else {
-        T::one()
-    };
+    let k = if grid.corrected { correction(x, y) } else { T::one() };
     let (old, new) = (value[i], update(x, y, k));
     if new >= old {
         return T::zero();
@@ -84,6 +77,14 @@ fn visit<T: Scalar>(grid: &mut EikonalBuffers<T>, i: usize, width: usize, tolera
         }
     }
     change
+}
+
+/// k of the second solve, from means of the node and its neighbours: half of the difference of the neighbours is left. Where
+/// the direction turns within a pixel (along ridges) such means say nothing, and the first order is better.
+#[inline(always)]
+fn correction<T: Scalar>(x: Edge<T>, y: Edge<T>) -> T {
+    let turn = T::of(0.5) * (x.along_x - y.along_x);
+    if turn.abs() < T::of(0.1) { T::one() + turn } else { T::one() }
 }
 
 #[inline(always)]

@@ -25,15 +25,16 @@
 mod branch;
 mod frontal;
 mod grid;
+mod load;
 mod oblique;
 mod rim;
 
 pub(crate) use grid::EikonalBuffers;
 
 use crate::error::{in_range, positive};
-use crate::{Domain, Frame, Lighting, PixelFlags, Scalar, SfsError, StopReason, Surface};
+use crate::{Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface};
 use crate::{SurfaceReconstruction, Workspace};
-use grid::Slopes;
+use load::Input;
 
 /// The height at the border of the mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,6 +146,23 @@ impl<T: Scalar> Eikonal<T> {
         Ok(Self { max_sweeps, ..self })
     }
 
+    /// Solves the branch asked for, or both and keeps the better; tells whether it rises.
+    fn choose(&self, workspace: &mut Workspace<T>, known_inside: bool) -> (Outcome<T>, bool) {
+        let rising = self.branch != Branch::Falling;
+        let first = self.solve(workspace, rising);
+        if self.branch != Branch::Auto || !known_inside || first.stop == StopReason::Cancelled {
+            return (first, rising);
+        }
+        workspace.eikonal.keep();
+        let second = self.solve(workspace, false);
+        let sweeps = first.sweeps + second.sweeps;
+        if workspace.eikonal.kept_is_better(&self.lighting) {
+            workspace.eikonal.restore();
+            return (Outcome { sweeps, ..first }, true);
+        }
+        (Outcome { sweeps, ..second }, false)
+    }
+
     /// Solves one branch into the buffers' values; under frontal light twice, the second time with the directions of the
     /// first.
     fn solve(&self, workspace: &mut Workspace<T>, rising: bool) -> Outcome<T> {
@@ -204,25 +222,17 @@ impl<T: Scalar> SurfaceReconstruction<T> for Eikonal<T> {
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
-        let (rows, columns) = frame.dim();
-        let area = domain.validate(rows, columns)?;
-        surface.prepare(rows, columns, area);
-        let rim = if let Rim::Height(height) = self.rim { Some(height) } else { None };
-        let slopes = Slopes { lighting: &self.lighting, max_slope: self.max_slope };
-        let known = workspace.eikonal.load(&frame, domain, &slopes, rim, surface)?;
-        let first = self.solve(workspace, self.branch != Branch::Falling);
-        let mut rising = self.branch != Branch::Falling;
-        let mut outcome = first;
-        if self.branch == Branch::Auto && known.inside > 0 && first.stop != StopReason::Cancelled {
-            workspace.eikonal.keep();
-            let second = self.solve(workspace, false);
-            outcome = Outcome { sweeps: first.sweeps + second.sweeps, ..second };
-            rising = workspace.eikonal.kept_is_better(&self.lighting);
-            if rising {
-                workspace.eikonal.restore();
-                outcome = Outcome { sweeps: outcome.sweeps, ..first };
-            }
-        }
+        surface.enter(frame.dim(), domain)?;
+        let slope2 = self.max_slope * self.max_slope;
+        let input = Input {
+            frame: &frame,
+            domain,
+            lighting: &self.lighting,
+            least: (T::one() + slope2).sqrt().recip(),
+            rim: if let Rim::Height(height) = self.rim { Some(height) } else { None },
+        };
+        let known = workspace.eikonal.load(&input, surface)?;
+        let (outcome, rising) = self.choose(workspace, known.inside > 0);
         let width = domain.pixel_size_m[0];
         surface.report.stop = outcome.stop;
         surface.report.iterations = outcome.sweeps;
@@ -230,18 +240,5 @@ impl<T: Scalar> SurfaceReconstruction<T> for Eikonal<T> {
         workspace.eikonal.store(if rising { width } else { -width }, domain, surface);
         surface.finish(domain);
         Ok(())
-    }
-}
-
-/// Flags of a reflectance outside what the model explains.
-fn flags_of<T: Scalar>(reflectance: T, least: T) -> PixelFlags {
-    if !reflectance.is_finite() {
-        PixelFlags::NON_FINITE
-    } else if reflectance > T::one() {
-        PixelFlags::SATURATED
-    } else if reflectance < least {
-        PixelFlags::DARK
-    } else {
-        PixelFlags::NONE
     }
 }

@@ -1,6 +1,6 @@
 //! One Gauss–Seidel sweep of the oblique equation R √(1 + |∇z|²) + s_x p + s_y q = s_z.
 
-use super::grid::EikonalBuffers;
+use super::grid::{EikonalBuffers, Node};
 use crate::Scalar;
 
 /// Sweeps in one of four orders; returns the largest change.
@@ -29,34 +29,39 @@ pub(super) fn sweep<T: Scalar>(
     change
 }
 
+/// Updates a node, and wakes its neighbours if it has improved.
 fn visit<T: Scalar>(grid: &mut EikonalBuffers<T>, i: usize, light: [T; 3], tolerance: T) -> T {
-    use super::grid::Node;
     grid.active[i] = false;
-    let width = grid.width;
-    let old = grid.value[i];
-    let mut new = old;
-    for (jx, sx) in [(i - 1, T::one()), (i + 1, -T::one())] {
-        let ex = Edge { value: grid.value[jx], step: sx, reflectance: middle(grid, i, jx) };
-        new = new.min(ex.value + straight(ex.reflectance, light, [sx, T::zero()]));
-        for (jy, sy) in [(i - width, T::one()), (i + width, -T::one())] {
-            let ey = Edge { value: grid.value[jy], step: sy * grid.aspect, reflectance: middle(grid, i, jy) };
-            new = new.min(ey.value + straight(ey.reflectance, light, [T::zero(), sy]) * grid.aspect);
-            if ex.value.is_finite() && ey.value.is_finite() {
-                new = new.min(triangle(light, ex, ey));
-            }
-        }
-    }
+    let (old, new) = (grid.value[i], update(grid, i, light));
     if new >= old {
         return T::zero();
     }
     grid.value[i] = new;
     let change = old - new;
     if change > tolerance {
-        for j in [i - 1, i + 1, i - width, i + width] {
+        for j in [i - 1, i + 1, i - grid.width, i + grid.width] {
             grid.active[j] |= grid.node[j] == Node::Unknown;
         }
     }
     change
+}
+
+/// Least height the four neighbours and the four triangles between them give a node.
+fn update<T: Scalar>(grid: &EikonalBuffers<T>, i: usize, light: [T; 3]) -> T {
+    let width = grid.width;
+    let mut least = grid.value[i];
+    for (jx, sx) in [(i - 1, T::one()), (i + 1, -T::one())] {
+        let ex = Edge { value: grid.value[jx], step: sx, reflectance: middle(grid, i, jx) };
+        least = least.min(ex.value + straight(ex.reflectance, light, [sx, T::zero()]));
+        for (jy, sy) in [(i - width, T::one()), (i + width, -T::one())] {
+            let ey = Edge { value: grid.value[jy], step: sy * grid.aspect, reflectance: middle(grid, i, jy) };
+            least = least.min(ey.value + straight(ey.reflectance, light, [T::zero(), sy]) * grid.aspect);
+            if ex.value.is_finite() && ey.value.is_finite() {
+                least = least.min(triangle(light, ex, ey));
+            }
+        }
+    }
+    least
 }
 
 /// A neighbour: its value, the signed step from it to the node, and the reflectance half way.
@@ -70,7 +75,7 @@ struct Edge<T> {
 /// Reflectance half way between two nodes: the cosine of the mean angle to the light.
 #[inline(always)]
 fn middle<T: Scalar>(grid: &EikonalBuffers<T>, i: usize, j: usize) -> T {
-    if grid.node[j] == super::grid::Node::Outside {
+    if grid.node[j] == Node::Outside {
         return grid.cosine[i];
     }
     let (c, s) = (grid.cosine[i] + grid.cosine[j], grid.sine[i] + grid.sine[j]);
@@ -112,16 +117,8 @@ fn triangle<T: Scalar>([x, y, z]: [T; 3], ex: Edge<T>, ey: Edge<T>) -> T {
     let qa = r2 * (px * px + qy * qy) - m * m;
     let qb = r2 * qy * qy * d - k * m;
     let qc = r2 * (T::one() + qy * qy * d * d) - k * k;
-    let discriminant = qb * qb - qa * qc;
-    if discriminant < T::zero() {
-        return T::infinity();
-    }
-    let root = discriminant.sqrt();
-    // Both roots without cancellation.
-    let far = if qb >= T::zero() { qb + root } else { qb - root };
-    let roots = [far / qa, if far == T::zero() { T::infinity() } else { qc / far }];
     let mut best = T::infinity();
-    for u in roots {
+    for u in roots(qa, qb, qc) {
         let (p, q) = (px * u, qy * (u - d));
         let w = (T::one() + p * p + q * q).sqrt();
         let upwind_x = (r * p / w + x) * ex.step >= T::zero();
@@ -131,4 +128,16 @@ fn triangle<T: Scalar>([x, y, z]: [T; 3], ex: Edge<T>, ey: Edge<T>) -> T {
         }
     }
     best
+}
+
+/// Both roots of a u² − 2 b u + c without cancellation, infinite where there are none.
+#[inline(always)]
+fn roots<T: Scalar>(a: T, b: T, c: T) -> [T; 2] {
+    let discriminant = b * b - a * c;
+    if discriminant < T::zero() {
+        return [T::infinity(); 2];
+    }
+    let root = discriminant.sqrt();
+    let far = if b >= T::zero() { b + root } else { b - root };
+    [far / a, if far == T::zero() { T::infinity() } else { c / far }]
 }
