@@ -1,6 +1,13 @@
 //! What can be wrong with the input, one variant each.
 
 /// Why a strain, a stress or a modulus cannot be given.
+///
+/// ```
+/// use tactile_elasticity::{ElasticityError, modulus::HertzSphere};
+///
+/// let error = HertzSphere::new(3e-3_f64, 0.7).unwrap_err();
+/// assert_eq!(error, ElasticityError::PoissonRatio { found: 0.7 });
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -117,6 +124,14 @@ pub enum ElasticityError {
 }
 
 /// The quantities that errors speak of.
+///
+/// ```
+/// use tactile_elasticity::{ElasticityError, Quantity, contact::flat_punch};
+///
+/// let error = flat_punch(1e5_f64, -2e-3, 1e-3).unwrap_err();
+/// assert_eq!(error, ElasticityError::NotPositive { quantity: Quantity::Radius, found: -2e-3 });
+/// assert!(error.to_string().starts_with("radius"));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]

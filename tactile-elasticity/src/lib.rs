@@ -20,7 +20,7 @@
 //! - Flat punch: $F = 2 E^{\ast} a \delta$. Cone: $F = \frac{2}{\pi} E^{\ast} \tan\alpha \delta^2$.
 //! - Thin layer: $\varphi(s) - \frac{2}{\pi} \int_0^a K(s, t) \varphi(t) dt = \frac{E^{\ast}}{\pi} (\delta - s^2/R)$, $F = 2\pi \int_0^a \varphi$; O(n³) with some
 //!   24 + 6 a/h nodes, tabulated by the estimators.
-//! - Model choice: $AICc = \chi^2 + 2k + 2k(k + 1)/(n - k - 1)$.
+//! - Model choice: $AICc = -2 \ln L + 2k + 2k(k + 1)/(n - k - 1)$.
 //!
 //! Errors are [`ElasticityError`]; what weakens an estimate without forbidding it is a [`modulus::Warning`].
 #![forbid(unsafe_code)]

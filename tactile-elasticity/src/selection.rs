@@ -1,6 +1,18 @@
 //! Choice among laws by an information criterion.
 
 /// Why a law was chosen.
+///
+/// ```
+/// use tactile_elasticity::modulus::SelectionReason;
+///
+/// let says = |reason| match reason {
+///     SelectionReason::BetterFit { margin } if margin > 10.0 => "decisive",
+///     SelectionReason::BetterFit { .. } => "likely",
+///     SelectionReason::MostGeneral { .. } => "the data cannot tell",
+///     _ => "no choice",
+/// };
+/// assert_eq!(says(SelectionReason::MostGeneral { behind: 1.2 }), "the data cannot tell");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]

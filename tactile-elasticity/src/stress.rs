@@ -32,27 +32,98 @@ use core::marker::PhantomData;
 use nalgebra::{Matrix3, RealField};
 
 /// A measure of stress.
+///
+/// ```
+/// use tactile_elasticity::strain::GreenLagrange;
+/// use tactile_elasticity::stress::{SecondPiolaKirchhoff, StressMeasure};
+///
+/// // Each stress names the strain it works on: these are one type.
+/// let partner: <SecondPiolaKirchhoff as StressMeasure>::Conjugate = GreenLagrange;
+/// assert_eq!(std::mem::size_of_val(&partner), 0);
+/// ```
 pub trait StressMeasure {
     /// The strain it works on.
     type Conjugate;
 }
 
 /// σ: force over area, both of the deformed state.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::stress::{Cauchy, Stress};
+///
+/// // A bar under 100 kPa along x: von Mises' stress is the same.
+/// let stress = Stress::<Cauchy, f64>::new(Matrix3::from_partial_diagonal(&[1e5]));
+/// assert!((stress.von_mises_pa() - 1e5).abs() < 1e-9);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cauchy;
 /// τ = J σ.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::{strain::Deformation, stress::{Cauchy, Kirchhoff, Stress}};
+///
+/// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0));
+/// let stress: Stress<Kirchhoff, f64> = Stress::<Cauchy, f64>::new(Matrix3::identity()).to_kirchhoff(&twice)?;
+/// assert_eq!(stress.tensor_pa()[(0, 0)], 8.0);
+/// assert_eq!(stress.to_cauchy(&twice)?.tensor_pa()[(0, 0)], 1.0);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kirchhoff;
 /// P = τ F⁻ᵀ, the nominal stress: force now over area before; not symmetric.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::{strain::Deformation, stress::{FirstPiolaKirchhoff, Stress}};
+///
+/// // 1 N on an undeformed 1 m², stretched twofold: half as much by the second measure.
+/// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0));
+/// let nominal = Stress::<FirstPiolaKirchhoff, f64>::new(Matrix3::identity());
+/// assert_eq!(nominal.to_second(&twice)?.tensor_pa()[(0, 0)], 0.5);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FirstPiolaKirchhoff;
 /// S = F⁻¹ τ F⁻ᵀ, the stress of equation (31).
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::{strain::Deformation, stress::{SecondPiolaKirchhoff, Stress}};
+///
+/// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0));
+/// let second = Stress::<SecondPiolaKirchhoff, f64>::new(Matrix3::identity());
+/// assert_eq!(second.to_first(&twice)?.tensor_pa()[(0, 0)], 2.0);
+/// assert_eq!(second.to_cauchy(&twice)?.tensor_pa()[(0, 0)], 0.5);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SecondPiolaKirchhoff;
 /// sym(Rᵀ P) = sym(U S).
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::{strain::Deformation, stress::{BiotStress, SecondPiolaKirchhoff, Stress}};
+///
+/// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0));
+/// let biot: Stress<BiotStress, f64> =
+///     Stress::<SecondPiolaKirchhoff, f64>::new(Matrix3::identity()).to_biot(&twice)?;
+/// assert!((biot.tensor_pa()[(0, 0)] - 2.0).abs() < 1e-14);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BiotStress;
 /// The deformation gradient as the partner of the first Piola–Kirchhoff stress.
+///
+/// ```
+/// use tactile_elasticity::stress::{FirstPiolaKirchhoff, Gradient, StressMeasure};
+///
+/// fn works_on<S: StressMeasure<Conjugate = Gradient>>() -> &'static str {
+///     "the deformation gradient"
+/// }
+/// assert_eq!(works_on::<FirstPiolaKirchhoff>(), "the deformation gradient");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Gradient;
 
@@ -73,6 +144,16 @@ impl StressMeasure for BiotStress {
 }
 
 /// A strain tensor that knows its measure.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::{strain::{Deformation, GreenLagrange}, stress::Strain};
+///
+/// let deformation = Deformation::from_displacement_gradient(Matrix3::from_diagonal_element(0.1));
+/// let strain = Strain::<GreenLagrange, f64>::of(&deformation)?;
+/// assert!((strain.tensor()[(0, 0)] - 0.105).abs() < 1e-16);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strain<M, T> {
     tensor: Matrix3<T>,
@@ -80,6 +161,21 @@ pub struct Strain<M, T> {
 }
 
 /// A stress tensor (Pa) that knows its measure.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::{strain::Deformation, stress::{Cauchy, Stress}};
+///
+/// // There and back again.
+/// let deformation = Deformation::from_displacement_gradient(Matrix3::new(0.1, 0.2, 0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 0.3));
+/// let stress = Stress::<Cauchy, f64>::new(Matrix3::new(3.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0));
+/// let back = stress.to_second(&deformation)?.to_cauchy(&deformation)?;
+/// assert!((back.tensor_pa() - stress.tensor_pa()).norm() < 1e-14);
+/// assert!((stress.to_kirchhoff(&deformation)?.von_mises_pa() / stress.von_mises_pa() - deformation.jacobian()).abs() < 1e-14);
+/// assert!((stress.to_second(&deformation)?.to_first(&deformation)?.to_second(&deformation)?.to_biot(&deformation)?.tensor_pa()
+///     - stress.to_second(&deformation)?.to_biot(&deformation)?.tensor_pa()).norm() < 1e-14);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stress<M, T> {
     tensor: Matrix3<T>,
@@ -243,6 +339,18 @@ pub fn uniaxial_second_piola_pa<T: RealField + Copy>(
 ///
 /// # Errors
 /// [`ElasticityError::ZeroStrain`], [`ElasticityError::OppositeSigns`].
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Deformation, GreenLagrange};
+/// use tactile_elasticity::stress::{SecondPiolaKirchhoff, Strain, Stress, secant_modulus_pa};
+///
+/// let squeezed = Deformation::from_displacement_gradient(Matrix3::from_diagonal_element(-0.1));
+/// let strain = Strain::<GreenLagrange, f64>::of(&squeezed)?;
+/// let stress = Stress::<SecondPiolaKirchhoff, f64>::new(strain.tensor() * 60e3);
+/// assert!((secant_modulus_pa(&stress, &strain, 2)? - 60e3).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn secant_modulus_pa<M: StressMeasure, T: RealField + Copy>(
     stress: &Stress<M, T>,
     strain: &Strain<M::Conjugate, T>,
@@ -263,6 +371,19 @@ pub fn secant_modulus_pa<M: StressMeasure, T: RealField + Copy>(
 ///
 /// # Errors
 /// [`ElasticityError::NotPositive`] modulus, [`ElasticityError::PoissonRatio`] for ν outside (−1, ½).
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Deformation, GreenLagrange};
+/// use tactile_elasticity::stress::{Strain, saint_venant_kirchhoff};
+///
+/// // The same strain along all axes: 3K e with K = E/(3(1 − 2ν)).
+/// let grown = Deformation::from_displacement_gradient(Matrix3::from_diagonal_element(0.01));
+/// let strain = Strain::<GreenLagrange, f64>::of(&grown)?;
+/// let stress = saint_venant_kirchhoff(&strain, 60e3, 0.25)?;
+/// assert!((stress.tensor_pa()[(0, 0)] - 60e3 / 0.5 * strain.tensor()[(0, 0)]).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn saint_venant_kirchhoff<T: RealField + Copy>(
     strain: &Strain<GreenLagrange, T>,
     youngs_modulus_pa: T,

@@ -5,6 +5,15 @@ use crate::scalar::{narrow, widen};
 use nalgebra::RealField;
 
 /// An isotropic elastic body, or a rigid one.
+///
+/// ```
+/// use tactile_elasticity::contact::Body;
+///
+/// let rubber = Body::elastic(1e6_f64, 0.5)?;
+/// assert_eq!(rubber.compliance_per_pa(), 0.75e-6);
+/// assert_eq!(Body::<f64>::rigid().compliance_per_pa(), 0.0);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Body<T> {
@@ -159,6 +168,15 @@ impl<T: RealField + Copy> HertzContact<T> {
     }
 
     /// Pressure at distance r (m) from the centre, p₀√(1 − r²/a²), zero outside.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::HertzContact;
+    ///
+    /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
+    /// assert_eq!(contact.pressure_pa(0.0), contact.peak_pressure_pa);
+    /// assert_eq!(contact.pressure_pa(1.01 * contact.contact_radius_m), 0.0);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn pressure_pa(&self, r: T) -> T {
         let a = self.contact_radius_m;
         if r.abs() < a {
@@ -169,6 +187,16 @@ impl<T: RealField + Copy> HertzContact<T> {
     }
 
     /// Normal displacement of the surface at distance r (m), for the modulus E* taken as this body's own.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::HertzContact;
+    ///
+    /// // Under a rigid sphere the rim has sunk half as deep as the centre.
+    /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
+    /// assert!((contact.surface_displacement_m(0.0) / contact.indentation_m - 1.0).abs() < 1e-14);
+    /// assert!((contact.surface_displacement_m(contact.contact_radius_m) / contact.indentation_m - 0.5).abs() < 1e-14);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn surface_displacement_m(&self, r: T) -> T {
         hertz_surface_displacement_m(r, self.contact_radius_m, self.peak_pressure_pa, self.reduced_modulus_pa)
     }
@@ -232,6 +260,15 @@ fn far_series<T: RealField + Copy>(x: T) -> T {
 ///
 /// # Errors
 /// [`ElasticityError::NotPositive`].
+///
+/// ```
+/// use tactile_elasticity::contact::{HertzContact, reduced_modulus_from_contact_radius};
+///
+/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
+/// let back = reduced_modulus_from_contact_radius(1e-3, 5e-3, contact.contact_radius_m)?;
+/// assert!((back - 50e3).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn reduced_modulus_from_contact_radius<T: RealField + Copy>(
     force_n: T,
     radius_m: T,
@@ -248,6 +285,15 @@ pub fn reduced_modulus_from_contact_radius<T: RealField + Copy>(
 ///
 /// # Errors
 /// [`ElasticityError::NotPositive`].
+///
+/// ```
+/// use tactile_elasticity::contact::{HertzContact, reduced_modulus_from_indentation};
+///
+/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
+/// let back = reduced_modulus_from_indentation(1e-3, 5e-3, contact.indentation_m)?;
+/// assert!((back - 50e3).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn reduced_modulus_from_indentation<T: RealField + Copy>(
     force_n: T,
     radius_m: T,

@@ -15,6 +15,16 @@ use nalgebra::{DMatrix, DVector};
 use std::f64::consts::FRAC_2_PI;
 
 /// The contact of a sphere with a layer at one ratio of contact radius to thickness.
+///
+/// ```
+/// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
+///
+/// // A contact small beside the layer is Hertz's.
+/// let contact = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5)?).solve(1e-4)?;
+/// assert!((contact.force_ratio - 1.0_f64).abs() < 2e-4 && (contact.indentation_ratio - 1.0).abs() < 2e-4);
+/// assert!((contact.chi / contact.a_over_h - 1.0).abs() < 2e-4);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LayerContact {
@@ -49,6 +59,16 @@ impl LayerEquation {
     /// Of a sphere that yields too: `share` is the layer's part of 1/E*, in [0, 1].
     ///
     /// A share outside is taken as its nearer end.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
+    ///
+    /// // The more the sphere itself yields, the less the layer's depth matters.
+    /// let layer = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5)?);
+    /// let half = layer.clone().with_share(0.5).solve(1.0)?.force_ratio;
+    /// assert!(1.0 < half && half < layer.solve(1.0)?.force_ratio);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn with_share(mut self, share: f64) -> Self {
         self.share = share.clamp(0.0, 1.0);
         self

@@ -9,6 +9,15 @@ use crate::scalar::widen;
 use nalgebra::RealField;
 
 /// How the layer sits on its rigid base.
+///
+/// ```
+/// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
+///
+/// // Glued to its base a layer is stiffer than one that slides.
+/// let ratio = |bond| LayerEquation::new(&LayerKernel::new(bond, 0.5)?).solve(1.0).map(|contact| contact.force_ratio);
+/// assert!(ratio(Bond::Bonded)? > 1.5 * ratio(Bond::Free)?);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Bond {
@@ -38,6 +47,15 @@ impl LayerKernel {
     }
 
     /// 1 − L(s), in [0, 1]-ish, without cancellation or overflow.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::{Bond, LayerKernel};
+    ///
+    /// // Long waves feel the base and move nothing; short ones do not know of it.
+    /// let kernel = LayerKernel::new(Bond::Bonded, 0.5)?;
+    /// assert!((kernel.deficit(0.0) - 1.0_f64).abs() < 1e-15 && kernel.deficit(30.0) < 1e-20);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn deficit(&self, s: f64) -> f64 {
         let e2 = (-2.0 * s).exp();
         match self.bond {

@@ -50,6 +50,16 @@ impl LayerSeries {
     /// + 2m₀(715m₀³ − 72π²m₂)/(45π⁴)χ⁴. Within 1 % up to χ = 0.5 (ν = ½, bonded).
     ///
     /// `share` is the layer's share of the whole compliance: 1 where the other body is rigid.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel, LayerSeries};
+    ///
+    /// let kernel = LayerKernel::new(Bond::Bonded, 0.5)?;
+    /// let exact = LayerEquation::new(&kernel).solve(0.5)?;
+    /// let series = LayerSeries::corrected(&kernel, 1.0).force_ratio(exact.chi);
+    /// assert!((series / exact.force_ratio - 1.0_f64).abs() < 0.01);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn corrected(kernel: &LayerKernel, share: f64) -> Self {
         let (m0, m2) = kernel.moments();
         let (m0, m2) = (share * m0, share * m2);

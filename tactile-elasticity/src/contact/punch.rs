@@ -5,6 +5,14 @@ use crate::scalar::{narrow, widen};
 use nalgebra::RealField;
 
 /// A flat circular punch: F = 2E*aδ.
+///
+/// ```
+/// use tactile_elasticity::contact::flat_punch;
+///
+/// let contact = flat_punch(1e5_f64, 2e-3, 1e-3)?;
+/// assert!((contact.mean_pressure_pa - contact.force_n / (std::f64::consts::PI * 4e-6)).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PunchContact<T> {
@@ -37,6 +45,16 @@ pub fn flat_punch<T: RealField + Copy>(
 }
 
 /// A cone: F = (2/π)E* tan α δ².
+///
+/// ```
+/// use tactile_elasticity::contact::cone;
+///
+/// // Twice as deep, four times the force, the same pressure.
+/// let [once, twice] = [cone(1e5_f64, 1.0, 1e-4)?, cone(1e5, 1.0, 2e-4)?];
+/// assert!((twice.force_n / once.force_n - 4.0).abs() < 1e-14);
+/// assert_eq!(twice.mean_pressure_pa, once.mean_pressure_pa);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ConeContact<T> {
@@ -81,6 +99,16 @@ pub fn cone<T: RealField + Copy>(
 ///
 /// # Errors
 /// [`ElasticityError::OutOfRange`], [`ElasticityError::NotPositive`].
+///
+/// ```
+/// use tactile_elasticity::contact::tangent_of_degrees;
+///
+/// // A needle of 10⁻¹⁰ degrees from the surface: tan(π/2 − x) = 1/x.
+/// let blunt = tangent_of_degrees(90.0_f64 - f64::powi(2.0, -33))?;
+/// assert!((blunt * (f64::powi(2.0, -33) * std::f64::consts::PI / 180.0) - 1.0).abs() < 1e-15);
+/// assert!(tangent_of_degrees(90.0_f64).is_err());
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn tangent_of_degrees<T: RealField + Copy>(degrees: T) -> Result<T, ElasticityError> {
     let found = positive(widen(degrees), Quantity::HalfAngle)?;
     let right: T = narrow(90.0);

@@ -6,6 +6,14 @@ use crate::scalar::{narrow, widen};
 use nalgebra::RealField;
 
 /// One elastic layer of the waveguide.
+///
+/// ```
+/// use tactile_elasticity::contact::{Layer, Waveguide};
+///
+/// let glass = Layer { thickness_m: 1e-3, youngs_modulus_pa: 64e9_f64, poisson_ratio: 0.2 };
+/// assert!(Waveguide::new(vec![glass]).is_ok());
+/// assert!(Waveguide::new(vec![Layer { poisson_ratio: 0.6, ..glass }]).is_err());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Layer<T> {
@@ -51,6 +59,22 @@ impl<T: RealField + Copy> Waveguide<T> {
     }
 
     /// The layers, the touched one first.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::{Layer, Waveguide};
+    ///
+    /// let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.48_f64 };
+    /// let waveguide = Waveguide::new(vec![layer(2e-3, 1.36e5), layer(8e-3, 5.0e4)])?;
+    /// assert_eq!(waveguide.layers().len(), 2);
+    /// // In series, side by side, and held sideways: the bounds on how stiff it may look.
+    /// assert!(waveguide.series_modulus_pa() < waveguide.parallel_modulus_pa());
+    /// assert!(waveguide.confined_modulus_pa() > 8.0 * waveguide.series_modulus_pa());
+    /// assert!((waveguide.poisson_ratio() - 0.48).abs() < 1e-15);
+    /// // As one deep body.
+    /// let plane_strain = (1.0 - 0.48 * 0.48) / waveguide.series_modulus_pa();
+    /// assert!((waveguide.as_body().compliance_per_pa() / plane_strain - 1.0).abs() < 1e-14);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn layers(&self) -> &[Layer<T>] {
         &self.layers
     }

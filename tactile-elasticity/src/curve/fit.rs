@@ -6,6 +6,14 @@ use crate::error::{ElasticityError, Quantity, finite, poisson};
 use crate::modulus::{ContactLaw, EstimatorKind, FitStatistics, Interval, Warning, quantile_95};
 
 /// Whether the force before contact is zero.
+///
+/// ```
+/// use tactile_elasticity::curve::{Baseline, CurveOptions};
+///
+/// // A gauge that was tared before contact.
+/// let options = CurveOptions { baseline: Baseline::Zero, ..CurveOptions::default() };
+/// assert_ne!(options, CurveOptions::default());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Baseline {
@@ -19,6 +27,19 @@ pub enum Baseline {
 }
 
 /// Where contact begins.
+///
+/// ```
+/// use tactile_elasticity::curve::{ContactPoint, CurveOptions, IndentationCurve, Indenter, fit_curve};
+/// use tactile_elasticity::modulus::EstimatorKind;
+///
+/// let z: Vec<f64> = (0..50).map(|i| i as f64 * 2e-5).collect();
+/// let f: Vec<f64> = z.iter().map(|z| 2.0 * 20e3 / 0.75 * 1e-3 * (z - 2e-4).max(0.0)).collect();
+/// let known = CurveOptions { contact_point: ContactPoint::At(2e-4), ..CurveOptions::default() };
+/// let punch = Indenter::Punch { radius_m: 1e-3 };
+/// let fit = fit_curve(&IndentationCurve::new(&z, &f)?, &punch, 0.5, EstimatorKind::FlatPunch, &known)?;
+/// assert_eq!(fit.contact_point_m, 2e-4);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ContactPoint {
@@ -30,6 +51,13 @@ pub enum ContactPoint {
 }
 
 /// How a curve is fitted.
+///
+/// ```
+/// use tactile_elasticity::curve::{Baseline, ContactPoint, CurveOptions};
+///
+/// let options = CurveOptions { baseline: Baseline::Offset, contact_point: ContactPoint::At(1e-4) };
+/// assert_ne!(options, CurveOptions::default());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CurveOptions {
@@ -40,6 +68,21 @@ pub struct CurveOptions {
 }
 
 /// A law fitted to a curve.
+///
+/// ```
+/// use tactile_elasticity::curve::{CurveOptions, IndentationCurve, Indenter, fit_curve};
+/// use tactile_elasticity::modulus::EstimatorKind;
+///
+/// // A cone of 45° on 20 kPa, its readings rounded to 10 µN.
+/// let z: Vec<f64> = (0..60).map(|i| i as f64 * 1e-5).collect();
+/// let force = |d: f64| std::f64::consts::FRAC_2_PI * 20e3 / 0.75 * d * d;
+/// let f: Vec<f64> = z.iter().map(|d| (force(*d) * 1e5).round() / 1e5).collect();
+/// let cone = Indenter::Cone { half_angle_tangent: 1.0 };
+/// let fit = fit_curve(&IndentationCurve::new(&z, &f)?, &cone, 0.5, EstimatorKind::Cone, &CurveOptions::default())?;
+/// assert!((fit.youngs_modulus_pa - 20e3).abs() < 4.0 * fit.standard_error_pa);
+/// assert!(fit.residual_sd_n < 1e-5 && fit.fitted_n.len() == 60);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CurveFit {

@@ -5,6 +5,16 @@ use crate::error::ElasticityError;
 use crate::modulus::{ConeLaw, ContactLaw, EstimatorKind, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw};
 
 /// A rigid indenter and its sample. Lengths in m.
+///
+/// ```
+/// use tactile_elasticity::contact::Bond;
+/// use tactile_elasticity::curve::Indenter;
+/// use tactile_elasticity::modulus::EstimatorKind;
+///
+/// let on_a_layer = Indenter::Sphere { radius_m: 5e-3, thickness_m: Some(2e-3), bond: Bond::Bonded };
+/// assert_eq!(on_a_layer.candidates()[0], EstimatorKind::LayerIntegralEquation);
+/// assert_eq!(Indenter::Punch { radius_m: 1e-3 }.candidates(), [EstimatorKind::FlatPunch]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Indenter {
@@ -35,6 +45,14 @@ pub enum Indenter {
 }
 
 /// Which law to fit.
+///
+/// ```
+/// use tactile_elasticity::curve::Model;
+/// use tactile_elasticity::modulus::EstimatorKind;
+///
+/// assert_eq!(Model::default(), Model::Auto);
+/// assert_ne!(Model::Named(EstimatorKind::HertzSphere), Model::Named(EstimatorKind::TataraSphere));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Model {
     /// The information criterion's choice among those that apply.

@@ -22,6 +22,15 @@ use crate::scalar::widen;
 use nalgebra::RealField;
 
 /// Forces over positions, widened to f64.
+///
+/// ```
+/// use tactile_elasticity::curve::IndentationCurve;
+///
+/// // In any order: a curve is sorted by position.
+/// let curve = IndentationCurve::new(&[3e-6, 1e-6, 2e-6, 0.0, 5e-6, 4e-6], &[3e-4, 1e-4, 2e-4, 0.0, 5e-4, 4e-4])?;
+/// assert_eq!((curve.position_m()[1], curve.force_n()[1]), (1e-6, 1e-4));
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct IndentationCurve {
     position_m: Vec<f64>,

@@ -6,6 +6,22 @@ pub use crate::selection::SelectionReason;
 use crate::selection::{akaike_weights, rank};
 
 /// All laws tried, the best first.
+///
+/// ```
+/// use tactile_elasticity::contact::Bond;
+/// use tactile_elasticity::curve::{CurveOptions, IndentationCurve, Indenter, Model, SelectionReason, select_model};
+/// use tactile_elasticity::modulus::EstimatorKind;
+///
+/// // A 5 mm sphere on 30 kPa, deep: Hertz's law is asked for by name.
+/// let z: Vec<f64> = (0..40).map(|i| i as f64 * 5e-6).collect();
+/// let f: Vec<f64> = z.iter().map(|d| 4.0 / 3.0 * 40e3 * 5e-3_f64.sqrt() * d.powf(1.5)).collect();
+/// let sphere = Indenter::Sphere { radius_m: 5e-3, thickness_m: None, bond: Bond::Bonded };
+/// let hertz = Model::Named(EstimatorKind::HertzSphere);
+/// let selection = select_model(&IndentationCurve::new(&z, &f)?, &sphere, 0.5, hertz, &CurveOptions::default())?;
+/// assert_eq!(selection.reason, SelectionReason::Asked);
+/// assert!((selection.chosen().youngs_modulus_pa / 30e3 - 1.0).abs() < 1e-6);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CurveSelection {
@@ -29,6 +45,17 @@ impl CurveSelection {
 ///
 /// # Errors
 /// As [`fit_curve`], where no law can be fitted.
+///
+/// ```
+/// use tactile_elasticity::curve::{CurveOptions, IndentationCurve, Indenter, Model, select_model};
+///
+/// let z: Vec<f64> = (0..40).map(|i| i as f64 * 5e-6).collect();
+/// let f: Vec<f64> = z.iter().map(|d| 2.0 * 40e3 * 1e-3 * d).collect();
+/// let punch = Indenter::Punch { radius_m: 1e-3 };
+/// let selection = select_model(&IndentationCurve::new(&z, &f)?, &punch, 0.5, Model::Auto, &CurveOptions::default())?;
+/// assert!((selection.chosen().youngs_modulus_pa / 30e3 - 1.0).abs() < 1e-6);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn select_model(
     curve: &IndentationCurve,
     indenter: &Indenter,

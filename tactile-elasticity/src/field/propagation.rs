@@ -10,6 +10,15 @@ use nalgebra::{Matrix3, Matrix6, RealField, SMatrix, Vector3};
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 /// Covariance of the Green–Lagrange strain (xx, yy, zz, xy, xz, yz) from that of H, whose nine entries are taken column by column.
+///
+/// ```
+/// use nalgebra::{Matrix3, SMatrix};
+/// use tactile_elasticity::field::strain_covariance;
+///
+/// // Small strains: xx follows its own entry, xy the mean of two.
+/// let covariance = strain_covariance(&Matrix3::zeros(), &(SMatrix::<f64, 9, 9>::identity() * 1e-8));
+/// assert_eq!((covariance[(0, 0)], covariance[(3, 3)]), (1e-8, 0.5e-8));
+/// ```
 pub fn strain_covariance<T: RealField + Copy>(
     gradient: &Matrix3<T>,
     covariance: &SMatrix<T, 9, 9>,
@@ -33,6 +42,18 @@ pub fn strain_covariance<T: RealField + Copy>(
 ///
 /// # Errors
 /// [`ElasticityError::LengthMismatch`], [`ElasticityError::NotPositive`] where the weights add up to nothing.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tactile_elasticity::field::mean_strain_covariance;
+///
+/// // A bar of length 1 whose gradient is the difference of its two ends' displacements, each known to 10⁻⁴.
+/// let influence = |_, end| Vector3::new(if end == 0 { -1.0 } else { 1.0 }, 0.0, 0.0);
+/// let ends = [Matrix3::from_diagonal_element(1e-8); 2];
+/// let covariance = mean_strain_covariance(&[Matrix3::zeros()], &[1.0], influence, &ends)?;
+/// assert!((covariance[(0, 0)] - 2e-8_f64).abs() < 1e-22);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn mean_strain_covariance<T: RealField + Copy>(
     gradients: &[Matrix3<T>],
     weights: &[T],

@@ -3,6 +3,21 @@
 use nalgebra::RealField;
 
 /// How a field is averaged.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::field::{Averaging, StrainField};
+/// use tactile_elasticity::strain::Infinitesimal;
+///
+/// // One mismatched point among ten.
+/// let mut gradients = vec![Matrix3::from_diagonal_element(0.01_f64); 10];
+/// gradients[4] *= 100.0;
+/// let field = StrainField::from_gradients(&gradients, None, &Infinitesimal)?;
+/// let mean = |averaging| field.summary_with(averaging).mean[(0, 0)];
+/// assert!((mean(Averaging::Mean) - 0.109).abs() < 1e-12);
+/// assert!((mean(Averaging::Median) - 0.01).abs() < 1e-12);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Averaging {

@@ -5,6 +5,15 @@ use crate::scalar::{narrow, widen};
 use nalgebra::{Matrix3, Point3, RealField};
 
 /// A field of displacement gradients H = ∂u/∂X. Any closure `Fn(&Point3<T>) -> Matrix3<T>` is one.
+///
+/// ```
+/// use nalgebra::{Matrix3, Point3};
+/// use tactile_elasticity::field::DisplacementGradient;
+///
+/// // Shear that grows with depth, as a closure.
+/// let shear = |p: &Point3<f64>| Matrix3::new(0.0, 0.0, 0.2 * p.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+/// assert_eq!(shear.displacement_gradient(&Point3::new(0.0, 0.0, 0.5))[(0, 2)], 0.1);
+/// ```
 pub trait DisplacementGradient<T: RealField + Copy> {
     /// H at a point of the undeformed material.
     fn displacement_gradient(&self, point: &Point3<T>) -> Matrix3<T>;
@@ -17,6 +26,15 @@ impl<T: RealField + Copy, F: Fn(&Point3<T>) -> Matrix3<T>> DisplacementGradient<
 }
 
 /// The Jacobian of a map of positions, such as a spline's, as a displacement gradient: H = ∇f − I.
+///
+/// ```
+/// use nalgebra::{Matrix3, Point3};
+/// use tactile_elasticity::field::{DisplacementGradient, JacobianOf};
+///
+/// // A map that stretches by 5 % has the displacement gradient 0.05.
+/// let stretch = JacobianOf(|_: &Point3<f64>| Matrix3::from_diagonal_element(1.05));
+/// assert!((stretch.displacement_gradient(&Point3::origin())[(1, 1)] - 0.05).abs() < 1e-15);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct JacobianOf<F>(
     /// The Jacobian.
@@ -45,6 +63,16 @@ impl<T: RealField + Copy> Samples<T> {
     ///
     /// # Errors
     /// [`ElasticityError::NotFinite`] corners, [`ElasticityError::TooFewLoads`] where a count is zero.
+    ///
+    /// ```
+    /// use nalgebra::Point3;
+    /// use tactile_elasticity::field::Samples;
+    ///
+    /// let block = Samples::grid(Point3::origin(), Point3::new(2.0, 1.0, 1.0), [4, 2, 2])?;
+    /// assert_eq!((block.points.len(), block.points[0]), (16, Point3::new(0.25, 0.25, 0.25)));
+    /// assert!((block.weights.iter().sum::<f64>() - 2.0).abs() < 1e-14);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn grid(low: Point3<T>, high: Point3<T>, counts: [usize; 3]) -> Result<Self, ElasticityError> {
         if low.iter().chain(high.iter()).any(|x| !x.is_finite()) {
             return Err(ElasticityError::NotFinite { quantity: Quantity::Distance });

@@ -7,6 +7,18 @@ use crate::strain::{Deformation, StrainMeasure};
 use nalgebra::{Matrix3, RealField};
 
 /// Averages of a strain field, component by component.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::field::StrainField;
+/// use tactile_elasticity::strain::Infinitesimal;
+///
+/// let gradients = [0.01_f64, 0.03].map(Matrix3::from_diagonal_element);
+/// let summary = StrainField::from_gradients(&gradients, None, &Infinitesimal)?.summary();
+/// assert!((summary.mean[(0, 0)] - 0.02).abs() < 1e-15);
+/// assert!((summary.standard_error[(0, 0)] - summary.spread[(0, 0)] / 2.0_f64.sqrt()).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
@@ -125,6 +137,18 @@ impl<T: RealField + Copy> StrainField<T> {
     }
 
     /// Strain at every point; zero where folded.
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::field::StrainField;
+    /// use tactile_elasticity::strain::Infinitesimal;
+    ///
+    /// let gradients = [0.01_f64, 0.03].map(Matrix3::from_diagonal_element);
+    /// let field = StrainField::from_gradients(&gradients, Some(&[1.0, 3.0]), &Infinitesimal)?;
+    /// assert_eq!(field.strains()[1][(0, 0)], 0.03);
+    /// assert_eq!(field.weights(), [1.0, 3.0]);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn strains(&self) -> &[Matrix3<T>] {
         &self.strains
     }

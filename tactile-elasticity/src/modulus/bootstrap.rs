@@ -18,6 +18,16 @@ pub struct Bootstrap {
 }
 
 /// What the repetitions say.
+///
+/// ```
+/// use tactile_elasticity::modulus::Bootstrap;
+///
+/// // An experiment that fails in one of six repetitions.
+/// let summary = Bootstrap { replicates: 2000, seed: 1 }.run(|normal| Some(normal()).filter(|x| *x < 0.97))?;
+/// assert!(summary.failed > 250 && summary.failed < 420);
+/// assert!(summary.interval_95[0] < summary.mean && summary.interval_95[1].is_infinite());
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct BootstrapSummary {

@@ -33,10 +33,23 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError>;
 
     /// Which estimator this is.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{EstimatorKind, ModulusEstimator, PaperRatio};
+    ///
+    /// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(PaperRatio::new());
+    /// assert_eq!(estimator.kind(), EstimatorKind::PaperRatio);
+    /// ```
     fn kind(&self) -> EstimatorKind;
 }
 
 /// The estimators, by name.
+///
+/// ```
+/// use tactile_elasticity::modulus::EstimatorKind;
+///
+/// assert_eq!(EstimatorKind::PaperRatio.to_string(), "stress over mean strain");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -76,6 +89,13 @@ impl core::fmt::Display for EstimatorKind {
 }
 
 /// A range that holds the truth with a stated probability.
+///
+/// ```
+/// use tactile_elasticity::modulus::Interval;
+///
+/// let at_least = Interval { lower: 20e3_f64, upper: None };
+/// assert!(at_least.contains(1e9) && !at_least.contains(19e3));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Interval<T> {
@@ -93,6 +113,19 @@ impl<T: RealField + Copy> Interval<T> {
 }
 
 /// Young's modulus with its error and all that bears on trusting it.
+///
+/// ```
+/// use tactile_elasticity::contact::HertzContact;
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator, Warning};
+///
+/// let contact = HertzContact::from_force(0.05_f64, 3e-3, 40e3)?;
+/// let load = LoadState::new(Estimate::new(0.05, 1e-4)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
+/// let modulus: ModulusEstimate<f64> = HertzSphere::new(3e-3, 0.5)?.estimate(&[load])?;
+/// assert!(modulus.interval_95.contains(30e3));
+/// // The number stands, with the warning that a/R = 0.47 is much.
+/// assert!(matches!(modulus.warnings[0], Warning::LargeContact { load: 0, ratio, .. } if ratio > 0.4));
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ModulusEstimate<T> {
@@ -113,6 +146,19 @@ pub struct ModulusEstimate<T> {
 }
 
 /// How one load fared.
+///
+/// ```
+/// use tactile_elasticity::contact::HertzContact;
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+///
+/// // The second load carries nothing but its force.
+/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
+/// let force = LoadState::new(Estimate::new(1e-3, 1e-5));
+/// let loads = [force.with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6)), force];
+/// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&loads)?;
+/// assert!(modulus.loads[0].used && !modulus.loads[1].used);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LoadDiagnostics<T> {
@@ -133,6 +179,24 @@ impl<T: RealField + Copy> LoadDiagnostics<T> {
 }
 
 /// How a law fits the data. Smaller information criteria are better; they compare laws on the same data only.
+///
+/// ```
+/// use tactile_elasticity::contact::HertzContact;
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+///
+/// let loads: Vec<LoadState<f64>> = [1e-3, 2e-3, 4e-3]
+///     .into_iter()
+///     .map(|force| {
+///         let contact = HertzContact::from_force(force, 5e-3, 40e3)?;
+///         let radius = Estimate::new(contact.contact_radius_m, 1e-6);
+///         Ok(LoadState::new(Estimate::new(force, 1e-5)).with_contact_radius(radius))
+///     })
+///     .collect::<Result<_, tactile_elasticity::ElasticityError>>()?;
+/// let fit = HertzSphere::new(5e-3, 0.5)?.estimate(&loads)?.fit;
+/// assert_eq!((fit.observations, fit.parameters), (3, 1));
+/// assert!(fit.chi_squared < 1e-12);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FitStatistics<T> {

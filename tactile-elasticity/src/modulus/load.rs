@@ -118,12 +118,30 @@ impl<T: RealField + Copy> LoadState<T> {
     }
 
     /// With the contact's area (m²), where it is not a disc.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Estimate, LoadState};
+    ///
+    /// // A block of 1 cm²: its stress, and an approach of 0.2 mm.
+    /// let load = LoadState::new(Estimate::exact(0.12))
+    ///     .with_contact_area(Estimate::exact(1e-4))
+    ///     .with_indentation(Estimate::new(0.2e-3, 1e-6));
+    /// assert!((load.stress_pa().unwrap() - 1200.0_f64).abs() < 1e-9);
+    /// ```
     pub fn with_contact_area(mut self, area_m2: Estimate<T>) -> Self {
         self.contact_area_m2 = Some(area_m2);
         self
     }
 
     /// With the indentation (m).
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Estimate, LoadState};
+    ///
+    /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_indentation(Estimate::new(4e-5, 1e-7));
+    /// assert_eq!(load.indentation_m.map(|d| d.value), Some(4e-5));
+    /// assert_eq!(load.stress_pa(), None); // no area yet
+    /// ```
     pub fn with_indentation(mut self, indentation_m: Estimate<T>) -> Self {
         self.indentation_m = Some(indentation_m);
         self

@@ -15,6 +15,21 @@ use nalgebra::{DMatrix, RealField};
 pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 
 /// What the strain of a load is counted from.
+///
+/// ```
+/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, PaperRatio, StrainReference};
+///
+/// // Two pressed frames: the strain between them belongs to the difference of their stresses.
+/// let load = |force, strain| {
+///     LoadState::new(Estimate::new(force, 1e-4))
+///         .with_contact_area(Estimate::exact(1e-4))
+///         .with_mean_strain(Estimate::exact(strain))
+/// };
+/// let loads = [load(0.7, 0.0), load(1.2, 0.05)];
+/// let modulus = PaperRatio::new().with_reference(StrainReference::FirstLoad).estimate(&loads)?;
+/// assert!((modulus.youngs_modulus_pa - (1.2 - 0.7) / 1e-4 / 0.05_f64).abs() < 1e-6);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum StrainReference {
@@ -33,6 +48,29 @@ pub enum StrainReference {
 /// and use [`HertzSphere`](super::HertzSphere) for a number.
 ///
 /// Several loads are averaged with the weights of their relative errors.
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, PaperRatio, StrainReference, Warning};
+///
+/// let load = LoadState::new(Estimate::new(0.12, 0.001))
+///     .with_contact_area(Estimate::exact(1e-4))
+///     .with_contact_radius(Estimate::exact(5.64e-3))
+///     .with_mean_strain(Estimate::new(0.02, 1e-4));
+/// let plain = PaperRatio::new().with_reference(StrainReference::Unloaded).estimate(&[load])?;
+/// assert!((plain.youngs_modulus_pa - 60e3_f64).abs() < 1e-6);
+///
+/// // Errors that loads share come as covariances; on a sphere the ratio is biased, and says so.
+/// let careful = PaperRatio::new()
+///     .with_sphere_radius(3e-3)?
+///     .with_stress_scale_error(0.01)?
+///     .with_force_covariance(&DMatrix::from_element(1, 1, 1e-6))?
+///     .with_strain_covariance(&DMatrix::from_element(1, 1, 1e-8))?
+///     .estimate(&[load])?;
+/// assert!(careful.standard_error_pa > plain.standard_error_pa);
+/// assert!(careful.warnings.iter().any(|w| matches!(w, Warning::RatioOnSphere { .. })));
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PaperRatio {
     reference: StrainReference,

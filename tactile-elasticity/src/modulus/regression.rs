@@ -12,6 +12,24 @@ use crate::scalar::{narrow, widen};
 use nalgebra::RealField;
 
 /// Whether the line may miss the origin.
+///
+/// ```
+/// use tactile_elasticity::modulus::{Estimate, Intercept, LoadState, ModulusEstimator, StressStrainRegression, Warning};
+///
+/// // Stress that starts at 300 Pa: a gauge that was not tared.
+/// let loads: Vec<_> = [0.01, 0.02, 0.03, 0.04]
+///     .map(|strain: f64| {
+///         LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
+///             .with_contact_area(Estimate::exact(1e-4))
+///             .with_mean_strain(Estimate::exact(strain))
+///     })
+///     .to_vec();
+/// let tested = StressStrainRegression::new().estimate(&loads)?;
+/// assert!(tested.warnings.iter().any(|w| matches!(w, Warning::Intercept { .. })));
+/// let forced = StressStrainRegression::new().with_intercept(Intercept::Zero).estimate(&loads)?;
+/// assert!(forced.youngs_modulus_pa > tested.youngs_modulus_pa);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Intercept {
@@ -72,6 +90,19 @@ impl StressStrainRegression {
     }
 
     /// How the intercept is treated.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Estimate, Intercept, LoadState, ModulusEstimator, StressStrainRegression};
+    ///
+    /// let load = |strain: f64| {
+    ///     LoadState::new(Estimate::new(60e3 * strain * 1e-4, 1e-4))
+    ///         .with_contact_area(Estimate::exact(1e-4))
+    ///         .with_mean_strain(Estimate::exact(strain))
+    /// };
+    /// let line = StressStrainRegression::new().with_intercept(Intercept::Zero);
+    /// assert!((line.estimate(&[load(0.01), load(0.02)])?.youngs_modulus_pa - 60e3).abs() < 1e-6);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn with_intercept(mut self, intercept: Intercept) -> Self {
         self.intercept = intercept;
         self
@@ -81,6 +112,23 @@ impl StressStrainRegression {
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, StressStrainRegression};
+    ///
+    /// // However many loads, one calibration known to 2 % gives a modulus known to 2 %.
+    /// let loads: Vec<_> = (1..100)
+    ///     .map(|k| 1e-3 * f64::from(k))
+    ///     .map(|strain| {
+    ///         LoadState::new(Estimate::new(6.0 * strain, 1e-4))
+    ///             .with_contact_area(Estimate::exact(1e-4))
+    ///             .with_mean_strain(Estimate::exact(strain))
+    ///     })
+    ///     .collect();
+    /// let modulus = StressStrainRegression::new().with_stress_scale_error(0.02)?.estimate(&loads)?;
+    /// assert!(modulus.standard_error_pa >= 0.02 * modulus.youngs_modulus_pa);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn with_stress_scale_error<T: RealField + Copy>(
         mut self,
         relative: T,

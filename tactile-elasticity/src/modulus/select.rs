@@ -11,9 +11,33 @@ use crate::selection::{SelectionReason, akaike_weights, rank};
 use nalgebra::RealField;
 
 /// Estimators by name, boxed for a choice at run time.
+///
+/// ```
+/// use tactile_elasticity::modulus::{Candidates, HertzSphere, TataraSphere};
+///
+/// let candidates: Candidates<f64> =
+///     vec![Box::new(TataraSphere::new(3e-3, 0.5)?), Box::new(HertzSphere::new(3e-3, 0.5)?)];
+/// assert_eq!(candidates[0].kind().to_string(), "Tatara's sphere");
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub type Candidates<T> = Vec<Box<dyn ModulusEstimator<T>>>;
 
 /// All estimators tried on the same loads, the best first.
+///
+/// ```
+/// use tactile_elasticity::contact::HertzContact;
+/// use tactile_elasticity::modulus::*;
+///
+/// // One load cannot tell laws apart: the most general candidate is the answer.
+/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
+/// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
+/// let candidates: Candidates<f64> =
+///     vec![Box::new(TataraSphere::new(5e-3, 0.5)?), Box::new(HertzSphere::new(5e-3, 0.5)?)];
+/// let selection: ModulusSelection<f64> = select_estimator(&candidates, &[load])?;
+/// assert_eq!(selection.chosen().estimator, EstimatorKind::TataraSphere);
+/// assert!(selection.left_out.is_empty());
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ModulusSelection<T> {
@@ -98,6 +122,15 @@ fn criterion<T: RealField + Copy>(estimate: &ModulusEstimate<T>) -> f64 {
 ///
 /// # Errors
 /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+///
+/// ```
+/// use tactile_elasticity::modulus::sphere_on_sample;
+///
+/// // Bonded layer, sliding layer, half-space; without a thickness the last alone.
+/// assert_eq!(sphere_on_sample(5e-3_f64, 0.5, Some(2e-3))?.len(), 3);
+/// assert_eq!(sphere_on_sample(5e-3_f64, 0.5, None)?.len(), 1);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn sphere_on_sample<T: RealField + Copy>(
     radius_m: T,
     poisson_ratio: T,
@@ -117,6 +150,16 @@ pub fn sphere_on_sample<T: RealField + Copy>(
 ///
 /// # Errors
 /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+///
+/// ```
+/// use tactile_elasticity::contact::{Layer, Waveguide};
+/// use tactile_elasticity::modulus::{EstimatorKind, sphere_as_sample};
+///
+/// let gel = Waveguide::new(vec![Layer { thickness_m: 10e-3, youngs_modulus_pa: 50e3_f64, poisson_ratio: 0.5 }])?;
+/// let kinds: Vec<_> = sphere_as_sample(3e-3, 0.5, &gel)?.iter().map(|c| c.kind()).collect();
+/// assert_eq!((kinds[0], kinds.len()), (EstimatorKind::SphereOnWaveguide, 4));
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub fn sphere_as_sample<T: RealField + Copy>(
     radius_m: T,
     poisson_ratio: T,

@@ -1,6 +1,13 @@
 //! Where an estimator's assumptions fail.
 
 /// A typed caution; the estimate stands, but not unconditionally.
+///
+/// ```
+/// use tactile_elasticity::modulus::Warning;
+///
+/// let warning = Warning::LargeContact { load: 1, ratio: 0.5, limit: 0.3 };
+/// assert!(warning.to_string().contains("0.5"));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]

@@ -35,6 +35,18 @@ pub fn green_lagrange_into<T: RealField + Copy>(
 ///
 /// # Errors
 /// As [`green_lagrange_into`].
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{green_lagrange_into, green_lagrange_par_into};
+///
+/// let gradients = vec![Matrix3::from_diagonal_element(0.1_f64); 10_000];
+/// let (mut serial, mut parallel) = (vec![Matrix3::zeros(); 10_000], vec![Matrix3::zeros(); 10_000]);
+/// green_lagrange_into(&gradients, &mut serial)?;
+/// green_lagrange_par_into(&gradients, &mut parallel)?;
+/// assert_eq!(serial, parallel);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[cfg(feature = "rayon")]
 pub fn green_lagrange_par_into<T: RealField + Copy>(
     gradients: &[Matrix3<T>],

@@ -35,6 +35,18 @@ impl<T: RealField + Copy> Deformation<T> {
     }
 
     /// From F = ∂x/∂X, the Jacobian of a map of positions.
+    ///
+    /// ```
+    /// use nalgebra::{Matrix2, Matrix3};
+    /// use tactile_elasticity::strain::Deformation;
+    ///
+    /// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0_f64));
+    /// assert!(twice.is_finite() && twice.jacobian() == 8.0);
+    /// assert_eq!(twice.displacement_gradient(), Matrix3::identity());
+    /// assert_eq!(twice.inverse(), Some(Matrix3::from_diagonal_element(0.5)));
+    /// let in_the_plane = Deformation::from_plane_displacement_gradient(Matrix2::new(0.1, 0.0, 0.0, -0.1));
+    /// assert_eq!(in_the_plane.deformation_gradient()[(2, 2)], 1.0_f64);
+    /// ```
     pub fn from_deformation_gradient(f: Matrix3<T>) -> Self {
         Self { f, h: f - Matrix3::identity(), given: Given::F }
     }

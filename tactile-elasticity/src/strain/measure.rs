@@ -29,6 +29,13 @@ pub trait StrainMeasure<T: RealField + Copy> {
     fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError>;
 
     /// The measure's name, as the field writes it.
+    ///
+    /// ```
+    /// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
+    ///
+    /// let measures: [&dyn StrainMeasure<f64>; 2] = [&GreenLagrange, &Hencky];
+    /// assert_eq!(measures.map(|m| m.name()), ["Green-Lagrange", "Hencky"]);
+    /// ```
     fn name(&self) -> &'static str;
 
     /// The strain of a displacement gradient H (F = I + H). Errors as [`of`](Self::of).
@@ -40,22 +47,72 @@ pub trait StrainMeasure<T: RealField + Copy> {
 /// E = ½(FᵀF − I) = ½(H + Hᵀ + HᵀH): Lagrangian, conjugate to the second Piola–Kirchhoff stress.
 ///
 /// (26)–(30) of the paper print the exponents 3 for 2, and f for the map of positions, so that ∇u = ∇f − I.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Deformation, GreenLagrange, StrainMeasure};
+///
+/// // A stretch of λ: ½(λ² − 1).
+/// let stretched = Deformation::from_displacement_gradient(Matrix3::from_diagonal_element(0.1));
+/// assert!((GreenLagrange.of(&stretched)?[(0, 0)] - 0.105_f64).abs() < 1e-16);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GreenLagrange;
 
 /// e = ½(I − F⁻ᵀF⁻¹) = F⁻ᵀ E F⁻¹: Eulerian, of the deformed state.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{EulerAlmansi, StrainMeasure};
+///
+/// // A stretch of λ: ½(1 − λ⁻²).
+/// let strain = EulerAlmansi.strain(&Matrix3::from_diagonal_element(1.0))?;
+/// assert!((strain[(0, 0)] - 0.375_f64).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct EulerAlmansi;
 
 /// ln U, the logarithmic strain in material axes: its trace is ln J, and coaxial steps add up.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Hencky, StrainMeasure};
+///
+/// // Steps that stretch the same axes add up: 10 % twice is 21 % once.
+/// let strain = |stretch: f64| Hencky.strain(&Matrix3::from_diagonal_element(stretch)).map(|e| e[(0, 0)]);
+/// assert!((2.0 * strain(0.10)? - strain(0.21)?).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Hencky;
 
 /// U − I: relative elongations along the principal directions, conjugate to the Biot stress.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::{Biot, StrainMeasure};
+///
+/// // A turn by a right angle with 5 % of stretch: the turn does not count.
+/// let turned = Matrix3::new(0.0, -1.05, 0.0, 1.05, 0.0, 0.0, 0.0, 0.0, 1.05) - Matrix3::identity();
+/// assert!((Biot.strain(&turned)?[(0, 0)] - 0.05_f64).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Biot;
 
 /// ε = ½(H + Hᵀ): linear in the displacement, wrong by the rotation squared.
+///
+/// ```
+/// use nalgebra::{Matrix3, Rotation3, Vector3};
+/// use tactile_elasticity::strain::{Infinitesimal, StrainMeasure};
+///
+/// // A mere turn by 0.1 rad is taken for a squeeze of 1 − cos 0.1.
+/// let turn = Rotation3::new(Vector3::z() * 0.1_f64).into_inner() - Matrix3::identity();
+/// assert!((Infinitesimal.strain(&turn)?[(0, 0)] - (0.1_f64.cos() - 1.0)).abs() < 1e-15);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Infinitesimal;
 

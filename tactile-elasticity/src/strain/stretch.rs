@@ -4,6 +4,17 @@ use super::deformation::Deformation;
 use nalgebra::{Matrix3, RealField, Vector3};
 
 /// The right stretch U in its principal axes, largest stretch first.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tactile_elasticity::strain::{Deformation, PrincipalStretches};
+///
+/// let deformation = Deformation::from_displacement_gradient(Matrix3::from_diagonal(&Vector3::new(0.0, 1e-20, -0.05)));
+/// let principal = PrincipalStretches::of(&deformation);
+/// assert!((principal.elongations[0] / 1e-20_f64 - 1.0).abs() < 1e-12);
+/// assert!((principal.stretches[2] - 0.95).abs() < 1e-15);
+/// assert!((principal.directions.column(2)[2].abs() - 1.0).abs() < 1e-15);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]

@@ -23,6 +23,13 @@ pub struct LogForce {
 /// A law F = E* f(x), implemented by this crate's indenters.
 ///
 /// `share` is the other body's part of 1/E*, in [0, 1): 0 where it is rigid. Most laws do not depend on it.
+///
+/// ```
+/// use tactile_elasticity::modulus::{ContactLaw, EstimatorKind, FlatPunch};
+///
+/// assert_eq!(FlatPunch::new(1e-3_f64, 0.5)?.law().kind(), EstimatorKind::FlatPunch);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 pub trait ContactLaw {
     /// Which estimator the law makes.
     fn kind(&self) -> EstimatorKind;
