@@ -111,6 +111,17 @@ impl<T: RealField + Copy> StrainField<T> {
     ///
     /// The robust standard error is that of the mean over the estimator's efficiency on normal data: √(π/2) for the median,
     /// 1/√0.95 for Huber's mean.
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::field::{Averaging, StrainField};
+    /// use tactile_elasticity::strain::Infinitesimal;
+    ///
+    /// let gradients = [0.01_f64, 0.02, 0.9].map(Matrix3::from_diagonal_element);
+    /// let field = StrainField::from_gradients(&gradients, None, &Infinitesimal)?;
+    /// assert_eq!(field.summary_with(Averaging::Median).mean[(0, 0)], 0.02);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn summary_with(&self, averaging: Averaging) -> StrainSummary<T> {
         let mut summary = self.summary();
         let loss: f64 = match averaging {

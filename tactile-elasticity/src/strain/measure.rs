@@ -26,6 +26,15 @@ pub trait StrainMeasure<T: RealField + Copy> {
     /// # Errors
     /// [`ElasticityError::NotFinite`]; and for the measures that need F⁻¹ or U to exist,
     /// [`ElasticityError::SingularDeformation`] and [`ElasticityError::InvertedDeformation`].
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::strain::{Deformation, Hencky, StrainMeasure};
+    ///
+    /// // Inside out there is no logarithm.
+    /// let inverted = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(-1.0_f64));
+    /// assert!(Hencky.of(&inverted).is_err());
+    /// ```
     fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError>;
 
     /// The measure's name, as the field writes it.

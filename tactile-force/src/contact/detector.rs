@@ -80,6 +80,13 @@ impl ContactDetector {
     }
 
     /// The options.
+    ///
+    /// ```
+    /// use tactile_force::{ContactDetector, ContactOptions};
+    ///
+    /// assert_eq!(*ContactDetector::new(ContactOptions::default())?.options(), ContactOptions::default());
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn options(&self) -> &ContactOptions {
         &self.options
     }

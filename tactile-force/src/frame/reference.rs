@@ -116,6 +116,18 @@ impl ReferenceFrame {
     ///
     /// # Errors
     /// The reference is too dark to tell: its mean is below one grey level.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::ReferenceFrame;
+    ///
+    /// let even = ReferenceFrame::new(Array2::from_elem((80, 120), 40_u8).view())?;
+    /// assert!(even.flat_field().is_none());
+    /// assert!((even.with_flat_field()?.flat_field().expect("asked for").at(3.0, 70.0) - 1.0).abs() < 1e-9);
+    /// // A dark reference cannot tell.
+    /// assert!(ReferenceFrame::new(Array2::zeros((80, 120)).view())?.with_flat_field().is_err());
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn with_flat_field(mut self) -> Result<Self, ForceError> {
         let mean = self.sums.sum as f64 / self.image.len() as f64;
         let too_dark = ForceError::ReferenceTooDark { mean, required: 1.0 };

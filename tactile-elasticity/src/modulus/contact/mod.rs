@@ -302,6 +302,15 @@ impl<L: ContactLaw> ContactEstimator<L> {
     }
 
     /// Which observations to use.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{Estimate, Evidence, HertzSphere, LoadState, ModulusEstimator};
+    ///
+    /// // Only the radius was measured, and only the indentation is to be used.
+    /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(0.45e-3_f64, 1e-6));
+    /// assert!(HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::Indentation).estimate(&[load]).is_err());
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
     pub fn with_evidence(mut self, evidence: Evidence) -> Self {
         self.evidence = evidence;
         self
