@@ -27,8 +27,10 @@ impl Scale {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Legend {
-    /// Above the data, on the right.
+    /// In the corner where it hides the least.
     #[default]
+    Emptiest,
+    /// Above the data, on the right.
     UpperRight,
     /// Above the data, on the left.
     UpperLeft,

@@ -55,12 +55,7 @@ pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
     for (i, frame) in measurement.frames.iter().enumerate() {
         let (f, a) = (frame.force_n, frame.contact_radius_m);
         lines.push(format!("force {}\t{} N", i + 1, with_error(f.value, f.standard_error, 1.0)));
-        lines.push(format!(
-            "contact radius {}\t{:.4} ± {:.4} mm",
-            i + 1,
-            a.value * MM,
-            a.standard_error * MM
-        ));
+        lines.push(format!("contact radius {}\t{} mm", i + 1, with_error(a.value, a.standard_error, MM)));
         if let Some(ratio) = frame.contact_ratio {
             lines.push(format!("a/R {}\t{ratio:.3}", i + 1));
         }
@@ -204,7 +199,6 @@ fn summary_page(press: &mut Press<'_>, lines: Vec<String>) -> Result<Page, Press
     let growth = Panel::new("Contact radius against force")
         .x_label("force (N)")
         .y_label("contact radius (mm)")
-        .legend(Legend::LowerRight)
         .dashed(law, Colour::GREY, "a ∝ F^(1/3)")
         .error_bars(at.clone(), errors, Colour::BLUE)
         .points(at, Colour::BLUE, "measured");
