@@ -1,5 +1,5 @@
 //! The pages of a press: frames, surfaces, matches, displacement, strain, summary.
-use super::{Colour, HeatMap, Legend, Marker, Page, Panel, PlotError};
+use super::{Colour, HeatMap, Marker, Page, Panel, PlotError};
 use crate::pipeline::{Measurement, PipelineError, Press, with_error};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
