@@ -4,7 +4,7 @@
 //! whether it comes alone or among thousands, so the bits are the same.
 
 use crate::{
-    Kernel,
+    Jet, Kernel,
     real::{Lane, Scalar},
 };
 
@@ -36,6 +36,48 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
         let zero = [T::zero(); W];
         Self { value: [zero; M], gradient: [[zero; D]; M], hessian: [[[zero; D]; D]; M] }
     }
+
+    #[inline(always)]
+    fn add_value<L: Lane<T>>(&mut self, l: usize, weight: &[L; M], value: L) {
+        for m in 0..M {
+            add(&mut self.value[m][l], weight[m], value);
+        }
+    }
+
+    /// Adds a term's value, gradient 2U'd and, at second order, Hessian 2U' I + 4U'' d dᵀ (derivatives by s = |d|²).
+    #[inline(always)]
+    fn add_jet<L: Lane<T>, const ORDER: usize>(
+        &mut self,
+        l: usize,
+        weight: &[L; M],
+        d: &[L; D],
+        jet: Jet<L>,
+    ) {
+        self.add_value(l, weight, jet.value);
+        let slope = L::from_f64(2.0) * jet.first;
+        for k in 0..D {
+            let along = slope * d[k];
+            for m in 0..M {
+                add(&mut self.gradient[m][k][l], weight[m], along);
+            }
+        }
+        if ORDER == 2 {
+            self.add_hessian(l, weight, d, slope, L::from_f64(4.0) * jet.second);
+        }
+    }
+
+    #[inline(always)]
+    fn add_hessian<L: Lane<T>>(&mut self, l: usize, weight: &[L; M], d: &[L; D], slope: L, bend: L) {
+        for k in 0..D {
+            for i in 0..=k {
+                let own = if i == k { slope } else { L::zero() };
+                let curve = (bend * d[k]).mul_add(d[i], own);
+                for m in 0..M {
+                    add(&mut self.hessian[m][k][i][l], weight[m], curve);
+                }
+            }
+        }
+    }
 }
 
 /// An accumulator's next value.
@@ -55,7 +97,6 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Sum<'_, T, K, D, M> {
         let n = self.centres[0].len();
         let centres = self.centres.map(|axis| &axis[..n]);
         let weights = self.weights.map(|output| &output[..n]);
-        let (two, four) = (L::from_f64(2.0), L::from_f64(4.0));
         for j in 0..n {
             let centre: [L; D] = core::array::from_fn(|k| L::new(centres[k][j]));
             let weight: [L; M] = core::array::from_fn(|m| L::new(weights[m][j]));
@@ -66,34 +107,9 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Sum<'_, T, K, D, M> {
                     s = d[k].mul_add(d[k], s);
                 }
                 if ORDER == 0 {
-                    let value = self.kernel.value(s);
-                    for m in 0..M {
-                        add(&mut sums.value[m][l], weight[m], value);
-                    }
-                    continue;
-                }
-                let jet = self.kernel.jet(s);
-                for m in 0..M {
-                    add(&mut sums.value[m][l], weight[m], jet.value);
-                }
-                let slope = two * jet.first;
-                for k in 0..D {
-                    let slope = slope * d[k];
-                    for m in 0..M {
-                        add(&mut sums.gradient[m][k][l], weight[m], slope);
-                    }
-                }
-                if ORDER == 2 {
-                    let bend = four * jet.second;
-                    for k in 0..D {
-                        for i in 0..=k {
-                            let own = if i == k { slope } else { L::zero() };
-                            let curve = (bend * d[k]).mul_add(d[i], own);
-                            for m in 0..M {
-                                add(&mut sums.hessian[m][k][i][l], weight[m], curve);
-                            }
-                        }
-                    }
+                    sums.add_value(l, &weight, self.kernel.value(s));
+                } else {
+                    sums.add_jet::<L, ORDER>(l, &weight, &d, self.kernel.jet(s));
                 }
             }
         }

@@ -97,6 +97,55 @@ impl<R: Real, const D: usize> Jets<R, D> {
     }
 }
 
+/// The sums over the centres, and what it takes to rid them of the moments that rounding left in the weights.
+struct Sums<const D: usize, const M: usize> {
+    /// Σ wU of each output.
+    jets: [Jets<Twofold, D>; M],
+    /// Σ pU of each affine function p, to be subtracted.
+    shadows: [Jets<f64, D>; MAX],
+    /// Pᵀw of each output.
+    moments: [[Twofold; MAX]; M],
+    /// PᵀP.
+    gram: [[f64; MAX]; MAX],
+}
+
+impl<const D: usize, const M: usize> Sums<D, M> {
+    fn zero() -> Self {
+        Self {
+            jets: [Jets::zero(); M],
+            shadows: [Jets::zero(); MAX],
+            moments: [[Twofold::ZERO; MAX]; M],
+            gram: [[0.0; MAX]; MAX],
+        }
+    }
+
+    fn add(&mut self, weights: &[Twofold; M], centre: &[f64; D], term: &Jets<Twofold, D>) {
+        let affine = |c: usize| if c == 0 { 1.0 } else { centre[c - 1] };
+        for m in 0..M {
+            self.jets[m].add(weights[m], term);
+            for c in 0..=D {
+                self.moments[m][c] = self.moments[m][c] + weights[m] * Twofold::from_f64(affine(c));
+            }
+        }
+        let plain = term.map(|x| x.high);
+        for c in 0..=D {
+            self.shadows[c].add(affine(c), &plain);
+            (0..=D).for_each(|i| self.gram[c][i] += affine(c) * affine(i));
+        }
+    }
+
+    /// Σ wU with the moments taken out of w.
+    fn corrected(mut self) -> [Jets<Twofold, D>; M] {
+        for (jets, moments) in self.jets.iter_mut().zip(&self.moments) {
+            let correction = solve_gram(self.gram, moments.map(|x| x.high), D + 1);
+            for c in 0..=D {
+                jets.add(Twofold::from_f64(-correction[c]), &self.shadows[c].map(Twofold::from_f64));
+            }
+        }
+        self.jets
+    }
+}
+
 impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M> {
     /// The sample at a point in twice the working precision.
     #[cold]
@@ -106,38 +155,13 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M>
             let shifted = two_sum(point[k].widen(), -self.frame.centre[k]);
             Twofold { high: shifted.high / self.frame.scale, low: shifted.low / self.frame.scale }
         });
-        let mut sums = [Jets::<Twofold, D>::zero(); M];
-        let mut shadows = [Jets::<f64, D>::zero(); MAX];
-        let mut moments = [[Twofold::ZERO; MAX]; M];
-        let mut gram = [[0.0; MAX]; MAX];
+        let mut sums = Sums::<D, M>::zero();
         for j in 0..self.centres[0].len() {
-            let centre: [f64; D] = core::array::from_fn(|k| self.centres[k][j].widen());
-            let affine: [f64; MAX] = core::array::from_fn(|c| match c {
-                0 => 1.0,
-                c if c <= D => centre[c - 1],
-                _ => 0.0,
-            });
-            let term = self.term(&x, &centre);
-            for m in 0..M {
-                let weight = Twofold::from_f64(self.weights[m][j].widen());
-                sums[m].add(weight, &term);
-                for c in 0..=D {
-                    moments[m][c] = moments[m][c] + weight * Twofold::from_f64(affine[c]);
-                }
-            }
-            let plain = term.map(|x| x.high);
-            for c in 0..=D {
-                shadows[c].add(affine[c], &plain);
-                (0..=D).for_each(|i| gram[c][i] += affine[c] * affine[i]);
-            }
+            let centre = core::array::from_fn(|k| self.centres[k][j].widen());
+            let weights = core::array::from_fn(|m| Twofold::from_f64(self.weights[m][j].widen()));
+            sums.add(&weights, &centre, &self.term(&x, &centre));
         }
-        for m in 0..M {
-            let correction = solve_gram(gram, moments[m].map(|x| x.high), D + 1);
-            for c in 0..=D {
-                sums[m].add(Twofold::from_f64(-correction[c]), &shadows[c].map(Twofold::from_f64));
-            }
-        }
-        self.finish(&x, &sums)
+        self.finish(&x, &sums.corrected())
     }
 
     /// U and its derivatives about one centre.

@@ -76,41 +76,72 @@ pub(crate) fn solve<const D: usize, const M: usize, K: Kernel>(
     lambda: f64,
     y: &mut [f64],
 ) -> Option<[[f64; MAX]; M]> {
-    let (n, q, count) = (system.active.len(), system.null.q, sites.len());
+    let (n, count) = (system.active.len(), sites.len());
     let scale = |i: usize| Twofold::from_f64(system.scales.get(i).copied().unwrap_or(1.0));
-    let point = |i: usize| sites.precise(system.active[i]);
-    let mut k = kernel_matrix(kernel, n, point, scale, lambda);
-    let mut p = Matrix { rows: n, data: Vec::with_capacity(n * q) };
-    for c in 0..q {
-        p.data.extend((0..n).map(|i| system.span.precise(c, &point(i)) * scale(i)));
-    }
-    let mut reflectors = Vec::with_capacity(q);
-    for c in 0..q {
-        let reflector = Reflector::new(p.column(c), c);
-        (c + 1..q).for_each(|j| reflector.apply(p.column(j)));
-        reflector.apply_both(&mut k);
-        reflectors.push(reflector);
-    }
-    cholesky(&mut k, q)?;
+    let projected = Projected::new(kernel, sites, system, scale, lambda)?;
     let mut affine = [[0.0; MAX]; M];
     for m in 0..M {
         let values = &mut y[m * count..(m + 1) * count];
         let mut b: Vec<_> = (0..n).map(|i| Twofold::from_f64(values[system.active[i]]) * scale(i)).collect();
-        reflectors.iter().for_each(|r| r.apply(&mut b));
-        substitute(&k, q, &mut b);
-        let mut head: Vec<_> =
-            (0..q).map(|i| b[i] - (q..n).fold(Twofold::ZERO, |s, j| s + k.at(i, j) * b[j])).collect();
-        for i in (0..q).rev() {
-            let rest = (i + 1..q).fold(head[i], |rest, j| rest - p.at(i, j) * head[j]);
-            head[i] = rest / p.at(i, i);
-            affine[m][i] = head[i].high;
-        }
-        b[..q].fill(Twofold::ZERO);
-        reflectors.iter().rev().for_each(|r| r.apply(&mut b));
+        affine[m] = projected.solve(&mut b);
         values.fill(0.0);
         (0..n).for_each(|i| values[system.active[i]] = (b[i] * scale(i)).high);
     }
     Some(affine)
+}
+
+/// QᵀKQ with its lower right block factored, and QᵀP.
+struct Projected {
+    k: Matrix,
+    p: Matrix,
+    reflectors: Vec<Reflector>,
+}
+
+impl Projected {
+    /// `None` if the matrix is not definite.
+    fn new<K: Kernel, const D: usize>(
+        kernel: &K,
+        sites: &Sites<D>,
+        system: &System<D>,
+        scale: impl Fn(usize) -> Twofold,
+        lambda: f64,
+    ) -> Option<Self> {
+        let (n, q) = (system.active.len(), system.null.q);
+        let point = |i: usize| sites.precise(system.active[i]);
+        let mut k = kernel_matrix(kernel, n, point, &scale, lambda);
+        let mut p = Matrix { rows: n, data: Vec::with_capacity(n * q) };
+        for c in 0..q {
+            p.data.extend((0..n).map(|i| system.span.precise(c, &point(i)) * scale(i)));
+        }
+        let mut reflectors = Vec::with_capacity(q);
+        for c in 0..q {
+            let reflector = Reflector::new(p.column(c), c);
+            (c + 1..q).for_each(|j| reflector.apply(p.column(j)));
+            reflector.apply_both(&mut k);
+            reflectors.push(reflector);
+        }
+        cholesky(&mut k, q)?;
+        Some(Self { k, p, reflectors })
+    }
+
+    /// Turns scaled targets into scaled weights; returns the affine part.
+    fn solve(&self, b: &mut [Twofold]) -> [f64; MAX] {
+        let Self { k, p, reflectors } = self;
+        let (n, q) = (b.len(), reflectors.len());
+        reflectors.iter().for_each(|r| r.apply(b));
+        substitute(k, q, b);
+        let mut head: Vec<_> =
+            (0..q).map(|i| b[i] - (q..n).fold(Twofold::ZERO, |s, j| s + k.at(i, j) * b[j])).collect();
+        let mut affine = [0.0; MAX];
+        for i in (0..q).rev() {
+            let rest = (i + 1..q).fold(head[i], |rest, j| rest - p.at(i, j) * head[j]);
+            head[i] = rest / p.at(i, i);
+            affine[i] = head[i].high;
+        }
+        b[..q].fill(Twofold::ZERO);
+        reflectors.iter().rev().for_each(|r| r.apply(b));
+        affine
+    }
 }
 
 fn kernel_matrix<K: Kernel, const D: usize>(

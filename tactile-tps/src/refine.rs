@@ -84,35 +84,40 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     /// Solves for the targets in `buffers`, `None` if the kernel is not definite on the sites; `careful` measures the residual and refines from a lower condition number on.
     pub(crate) fn solve<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Option<Solution<M>> {
         let (n, system) = (self.sites.len(), self.system);
-        let condition = system.condition(self.lambda);
-        buffers.weights.clone_from(&buffers.targets);
-        if system.indefinite || self.needs_precision(careful) {
-            if let Some(affine) =
-                precise::solve(self.kernel, self.sites, system, self.lambda, &mut buffers.weights)
-            {
-                let residual = careful.then(|| self.sampled(&affine, buffers));
-                return Some(Solution { residual, precise: true, ..Solution::new(affine, condition) });
-            }
-            if system.indefinite {
-                return None;
-            }
-            buffers.weights.clone_from(&buffers.targets);
+        if let Some(solution) = self.solve_precisely(buffers, careful) {
+            return Some(solution);
         }
+        if system.indefinite {
+            return None;
+        }
+        buffers.weights.clone_from(&buffers.targets);
         let affine =
             system.solve(&mut buffers.weights, n, self.lambda, &mut buffers.work, &mut buffers.spare);
-        let mut solution = Solution::new(affine, condition);
+        let mut solution = Solution::new(affine, system.condition(self.lambda));
         let threshold = match careful {
             true if n <= SMALL_POINTS => 10.0 * n as f64,
             true => 1e6,
             false => 1e8,
         };
-        if condition > threshold {
+        if solution.condition > threshold {
             self.refine(buffers, &mut solution);
         }
         if careful && solution.refinements == 0 {
             solution.residual = Some(self.sampled(&solution.affine, buffers));
         }
         Some(solution)
+    }
+
+    /// In twice the working precision, where that is needed and can be had.
+    fn solve_precisely<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Option<Solution<M>> {
+        if !(self.system.indefinite || self.needs_precision(careful)) {
+            return None;
+        }
+        buffers.weights.clone_from(&buffers.targets);
+        let affine = precise::solve(self.kernel, self.sites, self.system, self.lambda, &mut buffers.weights)?;
+        let residual = careful.then(|| self.sampled(&affine, buffers));
+        let solution = Solution::new(affine, self.system.condition(self.lambda));
+        Some(Solution { residual, precise: true, ..solution })
     }
 
     /// Solves with other weights by the spectrum of the system; `None` if that takes too many steps.

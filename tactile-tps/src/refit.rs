@@ -81,30 +81,45 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         smoothing: Smoothing<T>,
         spline: &mut Spline<T, D, M, K>,
     ) -> Result<(), TpsError> {
-        let Workspace { buffers, system, iterative, site_weights } = workspace;
         let gcv = smoothing == Smoothing::Gcv;
         let spectral = weights.is_none() && (gcv || self.decomposes(smoothing));
         let weights = weights.or(self.weights.as_deref());
-        let mut task = Task { weights, smoothing, ..Task::new(&self.system) };
         if spectral {
             self.decompose();
-            task.system = self.spectral.get().unwrap_or(system);
         } else {
-            self.sites.weigh(weights, site_weights);
-            let lambda = self.inner_lambda(smoothing);
-            match (gcv, &self.iterative) {
-                (true, _) => system.decompose(&self.setting(), site_weights),
-                (false, None) => system.factor(&self.setting(), site_weights, lambda)?,
-                (false, Some(_)) => {
-                    let _ = iterative.build(&self.setting(), site_weights, lambda, system, &mut |_| {
-                        ControlFlow::Continue(())
-                    });
-                    task.iterative = Some(iterative);
-                }
-            }
-            task.system = system;
+            self.build(workspace, weights, smoothing)?;
         }
+        let Workspace { buffers, system, iterative, .. } = workspace;
+        let iterates = !spectral && !gcv && self.iterative.is_some();
+        let task = Task {
+            weights,
+            smoothing,
+            iterative: iterates.then_some(&*iterative),
+            ..Task::new(self.spectral.get().filter(|_| spectral).unwrap_or(system))
+        };
         self.finish(&task, buffers, targets, spline).map(drop)
+    }
+
+    /// A new factor, spectrum or preconditioner in the workspace.
+    fn build(
+        &self,
+        workspace: &mut Workspace<D>,
+        weights: Option<&[T]>,
+        smoothing: Smoothing<T>,
+    ) -> Result<(), TpsError> {
+        let Workspace { system, iterative, site_weights, .. } = workspace;
+        self.sites.weigh(weights, site_weights);
+        let (setting, lambda) = (self.setting(), self.inner_lambda(smoothing));
+        if smoothing == Smoothing::Gcv {
+            system.decompose(&setting, site_weights);
+        } else if self.iterative.is_none() {
+            system.factor(&setting, site_weights, lambda)?;
+        } else {
+            // Nobody watches, so nobody breaks off.
+            let _ =
+                iterative.build(&setting, site_weights, lambda, system, &mut |_| ControlFlow::Continue(()));
+        }
+        Ok(())
     }
 
     /// A fit with other weights by what is already there, if it can be had.

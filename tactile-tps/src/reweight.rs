@@ -92,17 +92,16 @@ impl<'a> Reweighting<'a> {
         let (units, solved) = work.split_at_mut(length);
         spectrum.divide(solved, self.level);
         let t = self.reactions::<M>(excess, units, solved, spare)?;
-        for (m, found) in spare.chunks_exact_mut(stride).enumerate() {
-            for (i, solved) in solved.chunks_exact(stride).enumerate() {
-                found.iter_mut().zip(solved).for_each(|(c, s)| *c -= t[(i, m)] * s);
+        for (found, t) in spare.chunks_exact_mut(stride).zip(t.column_iter()) {
+            for (solved, t) in solved.chunks_exact(stride).zip(&t) {
+                found.iter_mut().zip(solved).for_each(|(c, s)| *c -= t * s);
             }
         }
         work.clear();
         work.resize(2 * M * stride, 0.0);
-        let (x, product) = work.split_at_mut(M * stride);
+        let [x, product] = split(work, M * stride);
         spectrum.combine::<M>(spare, x);
-        self.diagonal(excess, x, product);
-        take_heads(x, product, stride);
+        self.complete(excess, x, product);
         Some(())
     }
 
@@ -175,50 +174,67 @@ impl<'a> Reweighting<'a> {
         work: &mut Vec<f64>,
         spare: &mut Vec<f64>,
     ) -> Option<usize> {
-        let (stride, length) = (self.null.stride, b.len());
-        let tail = HEAD..HEAD + self.null.n - self.null.q;
         work.clear();
-        work.resize(5 * length, 0.0);
-        let (x, rest) = work.split_at_mut(length);
-        let (p, rest) = rest.split_at_mut(length);
-        let (s, rest) = rest.split_at_mut(length);
-        let (product, c) = rest.split_at_mut(length);
-        let column = |m: usize| m * stride + tail.start..m * stride + tail.end;
-        let inner = |a: &[f64], b: &[f64]| -> [f64; M] {
-            core::array::from_fn(|m| dot(&a[column(m)], &b[column(m)]))
-        };
-        let start = inner(b, b);
-        let mut size = [f64::INFINITY; M];
+        work.resize(5 * b.len(), 0.0);
+        let [x, p, s, product, c] = split(work, b.len());
+        let (start, mut size) = (self.inner::<M>(b, b), [f64::INFINITY; M]);
         for step in 1..=self.steps {
             c.copy_from_slice(b);
             self.spectrum.solve::<M>(c, self.level, spare);
-            let new = inner(b, c);
-            for m in 0..M {
-                let beta = ratio(new[m], size[m]);
-                for i in column(m) {
-                    p[i] = c[i] + beta * p[i];
-                    s[i] = b[i] + beta * s[i];
-                }
-            }
+            let new = self.inner::<M>(b, c);
+            let beta = core::array::from_fn(|m| ratio(new[m], size[m]));
+            self.turn::<M>(&beta, c, p);
+            self.turn::<M>(&beta, b, s);
             size = new;
             self.diagonal(excess, p, product);
-            for m in 0..M {
-                let curvature = dot(&p[column(m)], &s[column(m)]) + dot(&p[column(m)], &product[column(m)]);
-                let alpha = ratio(size[m], curvature);
-                for i in column(m) {
-                    x[i] += alpha * p[i];
-                    b[i] -= alpha * (s[i] + product[i]);
-                }
-            }
-            let left = inner(b, b);
-            let residual = (0..M).map(|m| ratio(left[m], start[m]).sqrt()).fold(0.0, f64::max);
-            if residual <= TOLERANCE {
-                self.diagonal(excess, x, product);
-                take_heads(x, product, stride);
+            product.iter_mut().zip(&*s).for_each(|(product, s)| *product += s);
+            let curvature = self.inner::<M>(p, product);
+            let alpha: [f64; M] = core::array::from_fn(|m| ratio(size[m], curvature[m]));
+            self.advance::<M>(&alpha, p, x);
+            self.advance::<M>(&alpha.map(|a| -a), product, b);
+            let left = self.inner::<M>(b, b);
+            if (0..M).all(|m| ratio(left[m], start[m]).sqrt() <= TOLERANCE) {
+                self.complete(excess, x, product);
                 return Some(step);
             }
         }
         None
+    }
+
+    /// The places of the complement in column `m`.
+    fn tail(&self, m: usize) -> core::ops::Range<usize> {
+        let start = m * self.null.stride + HEAD;
+        start..start + self.null.n - self.null.q
+    }
+
+    /// Inner products of the columns.
+    fn inner<const M: usize>(&self, a: &[f64], b: &[f64]) -> [f64; M] {
+        core::array::from_fn(|m| dot(&a[self.tail(m)], &b[self.tail(m)]))
+    }
+
+    /// p ← c + βp.
+    fn turn<const M: usize>(&self, beta: &[f64; M], c: &[f64], p: &mut [f64]) {
+        for (m, beta) in beta.iter().enumerate() {
+            let pairs = p[self.tail(m)].iter_mut().zip(&c[self.tail(m)]);
+            pairs.for_each(|(p, c)| *p = c + beta * *p);
+        }
+    }
+
+    /// x ← x + αp.
+    fn advance<const M: usize>(&self, alpha: &[f64; M], p: &[f64], x: &mut [f64]) {
+        for (m, alpha) in alpha.iter().enumerate() {
+            let pairs = x[self.tail(m)].iter_mut().zip(&p[self.tail(m)]);
+            pairs.for_each(|(x, p)| *x += alpha * p);
+        }
+    }
+
+    /// Writes Q₁ᵀEQ₂z into the places before the complement's, column by column; `product` is overwritten.
+    fn complete(&self, excess: &[f64], z: &mut [f64], product: &mut [f64]) {
+        self.diagonal(excess, z, product);
+        let stride = self.null.stride;
+        for (z, product) in z.chunks_exact_mut(stride).zip(product.chunks_exact(stride)) {
+            z[..HEAD].copy_from_slice(&product[..HEAD]);
+        }
     }
 
     /// QᵀEQ₂p, column by column.
@@ -234,11 +250,13 @@ impl<'a> Reweighting<'a> {
     }
 }
 
-/// Copies the places before the complement's, column by column.
-fn take_heads(x: &mut [f64], from: &[f64], stride: usize) {
-    for (x, from) in x.chunks_exact_mut(stride).zip(from.chunks_exact(stride)) {
-        x[..HEAD].copy_from_slice(&from[..HEAD]);
-    }
+/// The first pieces of this length.
+fn split<const N: usize>(mut rest: &mut [f64], length: usize) -> [&mut [f64]; N] {
+    core::array::from_fn(|_| {
+        let (piece, others) = core::mem::take(&mut rest).split_at_mut(length);
+        rest = others;
+        piece
+    })
 }
 
 /// a / b, zero where b is zero or not finite: that output has converged or not begun.

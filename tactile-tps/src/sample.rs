@@ -107,29 +107,23 @@ where
         sums: &Lanes<T, D, M, W>,
         l: usize,
     ) -> Sample<T, D, M> {
-        let scale = T::narrow(self.frame.scale);
-        let affine = self.affine;
-        let value = core::array::from_fn(|m| {
-            let mut value = L::new(sums.value[m][l]) + L::new(affine.constant[m]);
-            for k in 0..D {
-                value = L::new(affine.gradient[m][k]).mul_add(L::new(x[k]), value);
-            }
-            value.get()
-        });
-        let mut gradient = [[T::zero(); D]; M];
-        let mut hessian = [[[T::zero(); D]; D]; M];
+        let (affine, scale) = (self.affine, T::narrow(self.frame.scale));
+        let mut sample = Sample {
+            value: [T::zero(); M],
+            gradient: [[T::zero(); D]; M],
+            hessian: [[[T::zero(); D]; D]; M],
+        };
         for m in 0..M {
-            for k in 0..D {
-                if ORDER > 0 {
-                    gradient[m][k] = (affine.gradient[m][k] + sums.gradient[m][k][l]) / scale;
-                }
-                for i in 0..=k {
-                    if ORDER > 1 {
-                        hessian[m][k][i] = sums.hessian[m][k][i][l] / scale / scale;
-                    }
+            let start = L::new(sums.value[m][l]) + L::new(affine.constant[m]);
+            let along = |sum: L, k: usize| L::new(affine.gradient[m][k]).mul_add(L::new(x[k]), sum);
+            sample.value[m] = (0..D).fold(start, along).get();
+            for k in (0..D).filter(|_| ORDER > 0) {
+                sample.gradient[m][k] = (affine.gradient[m][k] + sums.gradient[m][k][l]) / scale;
+                for i in (0..=k).filter(|_| ORDER > 1) {
+                    sample.hessian[m][k][i] = sums.hessian[m][k][i][l] / scale / scale;
                 }
             }
         }
-        Sample { value, gradient, hessian }
+        sample
     }
 }

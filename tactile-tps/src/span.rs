@@ -126,24 +126,15 @@ impl<const D: usize> Span<D> {
 /// singular values to their own relative precision.
 fn singular<const D: usize>(mut columns: [[f64; D]; D]) -> ([f64; D], [[f64; D]; D]) {
     let mut vectors = core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));
-    let dot = |a: &[f64; D], b: &[f64; D]| (0..D).map(|i| a[i] * b[i]).sum::<f64>();
     // Three columns need a handful of sweeps; convergence is quadratic.
     for _ in 0..20 {
         let mut turned = false;
         for p in 0..D {
             for q in p + 1..D {
-                let (a, b, c) = (
-                    dot(&columns[p], &columns[p]),
-                    dot(&columns[q], &columns[q]),
-                    dot(&columns[p], &columns[q]),
-                );
-                if c.abs() > f64::EPSILON * (a * b).sqrt() {
+                if let Some((cosine, sine)) = rotation(&columns[p], &columns[q]) {
                     turned = true;
-                    let zeta = (b - a) / (2.0 * c);
-                    let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
-                    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
-                    rotate(&mut columns, p, q, cosine, cosine * tangent);
-                    rotate(&mut vectors, p, q, cosine, cosine * tangent);
+                    rotate(&mut columns, p, q, cosine, sine);
+                    rotate(&mut vectors, p, q, cosine, sine);
                 }
             }
         }
@@ -151,10 +142,27 @@ fn singular<const D: usize>(mut columns: [[f64; D]; D]) -> ([f64; D], [[f64; D];
             break;
         }
     }
-    let sizes = columns.map(|c| dot(&c, &c).sqrt());
+    let sizes = columns.map(|c| inner(&c, &c).sqrt());
     let mut order: [usize; D] = core::array::from_fn(|k| k);
     order.sort_unstable_by(|&i, &j| sizes[j].total_cmp(&sizes[i]));
     (order.map(|k| sizes[k]), order.map(|k| vectors[k]))
+}
+
+/// Cosine and sine of the rotation that makes two columns orthogonal, `None` if they are.
+fn rotation<const D: usize>(p: &[f64; D], q: &[f64; D]) -> Option<(f64, f64)> {
+    let (a, b, c) = (inner(p, p), inner(q, q), inner(p, q));
+    if c.abs() > f64::EPSILON * (a * b).sqrt() {
+        let zeta = (b - a) / (2.0 * c);
+        let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+        let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
+        Some((cosine, cosine * tangent))
+    } else {
+        None
+    }
+}
+
+fn inner<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|i| a[i] * b[i]).sum()
 }
 
 fn rotate<const D: usize>(columns: &mut [[f64; D]; D], p: usize, q: usize, cosine: f64, sine: f64) {

@@ -124,7 +124,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// Takes over a solution, in memory that is already there where it suffices.
     pub(crate) fn assign(&mut self, fitted: &Fitted<'_, D, M>, buffers: &Buffers) {
-        let Fitted { sites, system, lambda, unit, solution, origin, level } = fitted;
+        let Fitted { sites, system, solution, origin, level, .. } = fitted;
         self.frame = sites.frame;
         self.centres.clear();
         sites.axes.iter().for_each(|axis| self.centres.extend(axis.iter().map(|&x| T::narrow(x))));
@@ -137,6 +137,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         let weight = self.columns().1.map(|w| w.iter().map(|x| x.widen().abs()).sum::<f64>());
         let weight = weight.iter().fold(0.0, |m: f64, &x| m.max(x));
         self.terms = Terms::new::<T, K>(&self.kernel, weight, *level);
+        self.record(fitted);
+    }
+
+    /// Takes a solution down in the report.
+    fn record(&mut self, fitted: &Fitted<'_, D, M>) {
+        let Fitted { sites, system, lambda, unit, solution, level, .. } = fitted;
         let rounding = self.terms.rounding::<T, K>(&self.kernel, 0.0);
         let report = &mut self.report;
         report.digits = digits::<T>(if *level > 0.0 { rounding / level } else { 0.0 });

@@ -70,16 +70,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         spline: &mut Spline<T, D, M, K>,
         watch: &mut Watch<'_>,
     ) -> Result<bool, TpsError> {
-        if targets.len() != self.len() {
-            let (expected, found) = (self.len(), targets.len());
-            return Err(TpsError::Length { input: Input::Targets, expected, found });
-        }
-        finite(targets, Input::Targets)?;
         let (system, lambda) = (task.system, self.inner_lambda(task.smoothing));
         let gcv = task.smoothing == Smoothing::Gcv;
-        if lambda == 0.0 && !gcv {
-            self.sites.agree(targets, task.weights)?;
-        }
+        self.check(targets, task.weights, lambda == 0.0 && !gcv)?;
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
         self.sites.gather(targets, task.weights, &origin, buffers);
         let lambda = if gcv { self.validated::<M>(system, buffers)? } else { lambda };
@@ -90,6 +83,21 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let (sites, unit) = (&self.sites, self.unit());
         spline.assign(&Fitted { sites, system, lambda, unit, solution, origin, level }, buffers);
         Ok(true)
+    }
+
+    /// One finite target for each source, and the same one for coinciding sources if the spline is to go `through` them.
+    fn check<const M: usize>(
+        &self,
+        targets: &[Point<T, M>],
+        weights: Option<&[T]>,
+        through: bool,
+    ) -> Result<(), TpsError> {
+        if targets.len() != self.len() {
+            let (expected, found) = (self.len(), targets.len());
+            return Err(TpsError::Length { input: Input::Targets, expected, found });
+        }
+        finite(targets, Input::Targets)?;
+        if through { self.sites.agree(targets, weights) } else { Ok(()) }
     }
 
     /// Solves for the targets in `buffers` by what the task has.

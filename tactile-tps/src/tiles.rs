@@ -38,9 +38,7 @@ impl Strips {
         let (left, right) = l.split_at_mut(columns.start * stride);
         let left = &left[earlier.start * stride..earlier.end * stride];
         for (panel, block) in columns.clone().step_by(PANEL).zip(self.block.chunks_exact_mut(PANEL * DEPTH)) {
-            for (to, from) in block.chunks_exact_mut(PANEL).zip(left.chunks_exact(stride)) {
-                to.copy_from_slice(&from[panel..panel + PANEL]);
-            }
+            pack(block, PANEL, left, stride, panel);
         }
         let tall = 3 * S::F64_LANES;
         let mut row = columns.start;
@@ -48,21 +46,28 @@ impl Strips {
             let whole = row + tall <= order;
             let height = if whole { tall } else { S::F64_LANES };
             let strip = &mut self.strip[..depth * height];
-            for (to, from) in strip.chunks_exact_mut(height).zip(left.chunks_exact(stride)) {
-                to.copy_from_slice(&from[row..row + height]);
-            }
+            pack(strip, height, left, stride, row);
             // Panels that begin below the strip's last row lie above the diagonal.
             let panels = columns.clone().step_by(PANEL).take_while(|&column| column < row + height);
             for (column, block) in panels.zip(self.block.chunks_exact(PANEL * DEPTH)) {
-                let panel = &mut right[(column - columns.start) * stride..];
+                let (block, panel) =
+                    (&block[..depth * PANEL], &mut right[(column - columns.start) * stride..]);
                 if whole {
-                    wide::<S, 3>(simd, strip, &block[..depth * PANEL], panel, stride, row);
+                    wide::<S, 3>(simd, strip, block, panel, stride, row);
                 } else {
-                    wide::<S, 1>(simd, strip, &block[..depth * PANEL], panel, stride, row);
+                    wide::<S, 1>(simd, strip, block, panel, stride, row);
                 }
             }
             row += height;
         }
+    }
+}
+
+/// Copies `height` rows from `row` on of each column next to each other.
+#[inline(always)]
+fn pack(to: &mut [f64], height: usize, columns: &[f64], stride: usize, row: usize) {
+    for (to, from) in to.chunks_exact_mut(height).zip(columns.chunks_exact(stride)) {
+        to.copy_from_slice(&from[row..row + height]);
     }
 }
 

@@ -52,20 +52,10 @@ impl<const D: usize> Iterative<D> {
         system: &mut System<D>,
         watch: &mut Watch<'_>,
     ) -> ControlFlow<()> {
-        let Sites { axes, .. } = setting.sites;
-        let gathered = |order: &[usize]| -> Vec<Vec<f64>> {
-            axes.iter().map(|axis| order.iter().map(|&i| axis[i]).collect()).collect()
-        };
         system.choose(setting.sites.len(), weights, false);
-        self.axes = gathered(&system.active);
-        let (mut near, mut order, mut spacing) = (Vec::new(), Vec::new(), Vec::new());
-        ordering::coarse_to_fine(self.axes(), &mut near, &mut order, &mut spacing);
-        order.iter_mut().for_each(|i| *i = system.active[*i]);
-        self.axes = gathered(&order);
-        system.active = order;
+        let spacing = self.arrange(setting.sites, system);
         system.outline(setting);
-        let weights: Vec<f64> =
-            if weights.is_empty() { Vec::new() } else { system.active.iter().map(|&i| weights[i]).collect() };
+        let weights: Vec<f64> = system.active.iter().filter_map(|&i| weights.get(i).copied()).collect();
         self.diagonal.clear();
         if lambda > 0.0 {
             let inverse = |i: usize| lambda / weights.get(i).copied().unwrap_or(1.0);
@@ -83,6 +73,20 @@ impl<const D: usize> Iterative<D> {
         let total = system.active.len();
         let mut tell = |done| watch(&Progress { stage: Stage::Preparation, done, total, residual: None });
         self.preconditioner.build(&ordered, &mut tell)
+    }
+
+    /// Orders the active points from coarse to fine; returns the squared distance of each to the nearest before it.
+    fn arrange(&mut self, sites: &Sites<D>, system: &mut System<D>) -> Vec<f64> {
+        let gathered = |order: &[usize]| -> Vec<Vec<f64>> {
+            sites.axes.iter().map(|axis| order.iter().map(|&i| axis[i]).collect()).collect()
+        };
+        self.axes = gathered(&system.active);
+        let (mut near, mut order, mut spacing) = (Vec::new(), Vec::new(), Vec::new());
+        ordering::coarse_to_fine(self.axes(), &mut near, &mut order, &mut spacing);
+        order.iter_mut().for_each(|i| *i = system.active[*i]);
+        self.axes = gathered(&order);
+        system.active = order;
+        spacing
     }
 
     fn axes(&self) -> [&[f64]; D] {

@@ -107,18 +107,7 @@ impl Nearest {
     ) {
         self.distances.resize(i, 0.0);
         dispatch(Distances { axes, from: axes.map(|axis| axis[i]), distances: &mut self.distances });
-        let mut reach = f64::max(self.reach, 1.0);
-        loop {
-            let within = self.distances.iter().copied().enumerate().filter(|&(_, d)| d <= reach * spacing);
-            self.candidates.clear();
-            self.candidates.extend(within.map(|(j, d)| (d, j)));
-            if self.candidates.len() >= count.min(i) || reach > 1e300 {
-                break;
-            }
-            reach *= 1.5;
-        }
-        // Slowly down again, so that one point in a corner does not set the pace for all.
-        self.reach = 0.98 * reach;
+        self.gather(spacing, count.min(i));
         if self.candidates.len() > count {
             self.candidates.select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             self.candidates.truncate(count);
@@ -126,5 +115,21 @@ impl Nearest {
         found.clear();
         found.extend(self.candidates.iter().map(|c| c.1));
         found.sort_unstable();
+    }
+
+    /// Makes the points within a distance candidates that leaves at least `count` of them.
+    fn gather(&mut self, spacing: f64, count: usize) {
+        let mut reach = f64::max(self.reach, 1.0);
+        loop {
+            let within = self.distances.iter().copied().enumerate().filter(|&(_, d)| d <= reach * spacing);
+            self.candidates.clear();
+            self.candidates.extend(within.map(|(j, d)| (d, j)));
+            if self.candidates.len() >= count || reach > 1e300 {
+                break;
+            }
+            reach *= 1.5;
+        }
+        // Slowly down again, so that one point in a corner does not set the pace for all.
+        self.reach = 0.98 * reach;
     }
 }

@@ -66,6 +66,35 @@ impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
     }
 }
 
+/// Splines of value one at the last of a few points and zero at the others, one after the other.
+struct Cardinal<'a, K, const D: usize> {
+    points: &'a Ordered<'a, K, D>,
+    local: Sites<D>,
+    local_weights: Vec<f64>,
+    system: System<D>,
+    unit: Vec<f64>,
+    work: Vec<f64>,
+}
+
+impl<'a, K: Kernel, const D: usize> Cardinal<'a, K, D> {
+    fn new(points: &'a Ordered<'a, K, D>) -> Self {
+        let (local, system) = (points.sites.clone(), System::default());
+        Self { points, local, local_weights: Vec::new(), system, unit: Vec::new(), work: Vec::new() }
+    }
+
+    /// The weights of the spline of the points at these places; the unit vector itself where there is none.
+    fn weights(&mut self, places: &[usize]) -> &[f64] {
+        let Self { points, local, local_weights, system, unit, work } = self;
+        unit.clear();
+        unit.resize(places.len(), 0.0);
+        unit[places.len() - 1] = 1.0;
+        if points.factor(places, local, local_weights, system) {
+            system.solve::<1>(unit, places.len(), 0.0, work, &mut Vec::new());
+        }
+        unit
+    }
+}
+
 impl<const D: usize> Preconditioner<D> {
     /// Builds the factor; O(n m³ + n²) for m neighbours. Breaks off if `watch`, told how many points are done, says so.
     pub(crate) fn build<K: Kernel>(
@@ -74,30 +103,22 @@ impl<const D: usize> Preconditioner<D> {
         watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let n = points.order.len();
-        let (mut local, mut weights, mut system) = (points.sites.clone(), Vec::new(), System::default());
         self.coarse_points = n.min(COARSE);
         let first: Vec<usize> = (0..self.coarse_points).collect();
-        if !points.factor(&first, &mut local, &mut weights, &mut self.coarse) {
+        if !points.factor(&first, &mut points.sites.clone(), &mut Vec::new(), &mut self.coarse) {
             self.coarse_points = 0;
         }
         self.row = NEIGHBOURS + 1;
         self.places.clear();
         self.weights.clear();
-        let (mut nearest, mut places, mut unit, mut work) =
-            (Nearest::default(), Vec::new(), Vec::new(), Vec::new());
+        let (mut cardinal, mut nearest, mut places) = (Cardinal::new(points), Nearest::default(), Vec::new());
         for i in self.coarse_points.max(D + 2)..n {
             if i % 64 == 0 {
                 watch(i)?;
             }
             nearest.find(points.axes, i, points.spacing[i], NEIGHBOURS, &mut places);
             places.push(i);
-            unit.clear();
-            unit.resize(places.len(), 0.0);
-            unit[places.len() - 1] = 1.0;
-            if points.factor(&places, &mut local, &mut weights, &mut system) {
-                system.solve::<1>(&mut unit, places.len(), 0.0, &mut work, &mut Vec::new());
-            }
-            self.push(&places, &unit);
+            self.push(&places, cardinal.weights(&places));
         }
         ControlFlow::Continue(())
     }

@@ -3,8 +3,11 @@
 mod allocation;
 mod common;
 mod duals;
+mod evaluation;
 mod influence;
+mod input;
 mod iterative;
+mod models;
 mod properties;
 mod reference;
 mod reweight;

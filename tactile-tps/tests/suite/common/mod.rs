@@ -1,6 +1,7 @@
 //! Points and maps that the tests share.
 
 use nalgebra::{Point, SVector};
+use tactile_tps::{FitOptions, Kernel, ThinPlateSpline};
 
 /// Uniform numbers in [-1, 1) from a fixed seed (xorshift, Marsaglia 2003).
 pub(crate) struct Uniform(pub(crate) u64);
@@ -30,3 +31,23 @@ pub(crate) fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
 pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |m, x| f64::max(m, x.abs()))
 }
+
+pub(crate) fn fit<const D: usize, K: Kernel>(
+    sources: &[Point<f64, D>],
+    targets: &[Point<f64, D>],
+    options: &FitOptions<f64, K>,
+) -> ThinPlateSpline<f64, D, K> {
+    ThinPlateSpline::fit(sources, targets, options).expect("a spline")
+}
+
+/// Runs a check with every kernel in both dimensions.
+macro_rules! for_all {
+    ($check:ident $(, $argument:expr)*) => {
+        $check::<2, _>(R2LogR $(, $argument)*);
+        $check::<2, _>(R3 $(, $argument)*);
+        $check::<3, _>(R2LogR $(, $argument)*);
+        $check::<3, _>(NegR $(, $argument)*);
+        $check::<3, _>(R3 $(, $argument)*);
+    };
+}
+pub(crate) use for_all;

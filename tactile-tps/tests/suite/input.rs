@@ -1,0 +1,82 @@
+//! Points as they come: coinciding, flat, broken.
+
+use crate::common::{Uniform, bend, fit};
+use nalgebra::{Point2, Point3, SVector};
+use tactile_tps::{FitOptions, NegR, Smoothing, ThinPlateSpline, TpsError};
+
+/// Twice the same place with one value is one point; with two values it is their weighted mean, smoothed.
+#[test]
+fn coinciding_points_are_merged() {
+    let mut random = Uniform(11);
+    let mut sources = random.points::<2>(12);
+    let mut targets: Vec<_> = sources.iter().map(bend).collect();
+    let apart = fit(&sources, &targets, &FitOptions::default());
+    sources.push(sources[3]);
+    targets.push(targets[3]);
+    let merged = fit(&sources, &targets, &FitOptions::default());
+    let query = random.point();
+    assert_eq!((merged.report().merged, merged.apply(&query)), (1, apart.apply(&query)));
+    targets[12].x += 0.2;
+    let conflict = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default());
+    assert_eq!(conflict.err(), Some(TpsError::Conflict { first: 3, second: 12 }));
+    let options = FitOptions::default().smoothing(Smoothing::Lambda(0.1));
+    let smoothed = fit(&sources, &targets, &options);
+    // One point of weight two at the mean is the same problem.
+    targets[3].x += 0.1;
+    let weights = (0..12).map(|i| if i == 3 { 2.0 } else { 1.0 }).collect();
+    let single = fit(&sources[..12], &targets[..12], &options.weights(weights));
+    assert!((smoothed.apply(&query) - single.apply(&query)).norm() < 1e-12);
+}
+
+/// A flat set in space warps along itself; a tolerance decides what counts as flat.
+#[test]
+fn directions_that_are_not_spanned_are_dropped() {
+    let mut random = Uniform(5);
+    let flat = |thickness: f64, random: &mut Uniform| {
+        let points = random.points::<3>(25);
+        points
+            .iter()
+            .map(|p| Point3::new(p.x, p.y, 0.5 * p.x - 0.25 * p.y + thickness * p.z))
+            .collect::<Vec<_>>()
+    };
+    let exact = flat(0.0, &mut random);
+    let targets: Vec<_> = exact.iter().map(bend).collect();
+    let spline = fit(&exact, &targets, &FitOptions::new(NegR));
+    assert_eq!(spline.report().rank, 3);
+    let normal = SVector::<f64, 3>::new(0.5, -0.25, -1.0).normalize();
+    assert!((spline.jacobian(&(exact[0] + normal * 0.0)) * normal).norm() < 1e-10);
+    let thin = flat(1e-4, &mut random);
+    assert_eq!(fit(&thin, &targets, &FitOptions::new(NegR)).report().rank, 4);
+    let dropped = fit(&thin, &targets, &FitOptions::new(NegR).rank_tolerance(1e-2));
+    assert_eq!(dropped.report().rank, 3);
+    assert!(dropped.report().extents[2] < 1e-3);
+}
+
+#[test]
+fn bad_input_is_named() {
+    let points = Uniform(3).points::<2>(6);
+    let fit = |sources: &[Point2<f64>], targets: &[Point2<f64>], options| {
+        ThinPlateSpline::fit(sources, targets, &options).expect_err("an error").to_string()
+    };
+    let plain = FitOptions::<f64>::default;
+    assert_eq!(fit(&[], &[], plain()), "no source points to fit");
+    let mut bad = points.clone();
+    bad[4].y = f64::NAN;
+    assert_eq!(fit(&bad, &points, plain()), "source points: number 4 (from zero) is not finite");
+    assert_eq!(fit(&points, &bad, plain()), "target points: number 4 (from zero) is not finite");
+    assert_eq!(fit(&points, &points[1..], plain()), "target points: expected 6 of them, found 5");
+    for lambda in [-1.0, f64::NAN, f64::INFINITY] {
+        assert!(fit(&points, &points, plain().smoothing(Smoothing::Lambda(lambda))).starts_with("smoothing"));
+    }
+    for tolerance in [-0.1, 1.0, f64::NAN] {
+        assert!(fit(&points, &points, plain().rank_tolerance(tolerance)).starts_with("rank tolerance"));
+    }
+    let weights = |bad| vec![1.0, 1.0, bad, 1.0, 1.0, 1.0];
+    for weight in [-1.0, f64::NAN, f64::INFINITY] {
+        assert!(fit(&points, &points, plain().weights(weights(weight))).starts_with("weight 2 "));
+    }
+    assert_eq!(fit(&points, &points, plain().weights(vec![0.0; 6])), "no weights to fit");
+    assert!(fit(&points, &points, plain().weights(vec![1.0; 5])).starts_with("weights: expected 6"));
+    let few = fit(&points[..3], &points[..3], plain().smoothing(Smoothing::Gcv));
+    assert!(few.starts_with("cross-validation needs more than 3"));
+}
