@@ -36,6 +36,7 @@ mod session;
 mod shear;
 mod source;
 mod stages;
+mod strain_spline;
 mod surface;
 #[cfg(feature = "simulate")]
 mod trial;
@@ -59,6 +60,7 @@ pub use source::FrameSource;
 #[cfg(feature = "scene")]
 pub use source::ImageFolder;
 pub use stages::{BoxedWarp, DEFAULT_CONTROL_POINTS, Pipeline, Settings, Skips, Stages};
+pub use strain_spline::StrainSpline;
 pub use surface::{ContactSurface, SurfaceInput};
 #[cfg(feature = "simulate")]
 pub use trial::{FrameTruth, Trial, Truth};

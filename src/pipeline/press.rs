@@ -164,13 +164,17 @@ impl<'a> Press<'a> {
     /// [`PipelineError::NoContact`], [`PipelineError::Surface`], and those of [`contact`](Self::contact).
     pub fn surface(&mut self, frame: usize) -> Result<&ContactSurface, PipelineError> {
         self.reading(frame)?;
+        self.contact(0)?;
         let at = self.twin(frame)?;
         if self.frames[at].surface.is_none() {
             let start = Instant::now();
             let loaded = &self.frames[at];
             let contact = loaded.contact.as_ref().ok_or(PipelineError::NoContact { frame })?;
             let images = [loaded.image, self.reference.image()];
-            let surface = surface::reconstruct(self.stages, &mut self.surface, images, contact)
+            // All surfaces have the first one's grid, so that what the grid does to them leaves no strain.
+            let first = self.frames[0].contact.as_ref().unwrap_or(contact);
+            let pixels = first.mask.iter().filter(|m| **m).count();
+            let surface = surface::reconstruct(self.stages, &mut self.surface, images, contact, pixels)
                 .map_err(|source| PipelineError::Surface { frame, source })?;
             self.report.ran(Stage::Surface, start.elapsed());
             self.frames[at].surface = Some(surface);

@@ -4,13 +4,14 @@ use super::contact::{ContactStage, LightContact};
 use super::error::PipelineError;
 use super::object::Object;
 use super::press::Press;
+use super::strain_spline::StrainSpline;
 use super::surface::SurfaceInput;
 use crate::elasticity::contact::Waveguide;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
 use crate::matching::{PointMatcher, RelaxationMatcher, RelaxationOptions, Search};
 use crate::sfs::{ControlPointSampler, Eikonal, EquallySpaced, Lighting, Rim, SurfaceReconstruction};
-use crate::tps::{FitOptions, NegR, Smoothing, TpsError, Warp, WarpModel};
+use crate::tps::{TpsError, Warp, WarpModel};
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 use std::sync::Arc;
@@ -98,7 +99,7 @@ pub trait Stages: Send + Sync {
 /// | `R` | image to surface | [`Eikonal`], frontal light, zero height at the rim |
 /// | `P` | surface to control points | [`EquallySpaced`] |
 /// | `M` | points to matches | [`RelaxationMatcher`] |
-/// | `W` | weighted matches to the warp whose gradient is strained | thin-plate spline, kernel −r, smoothed by cross-validation |
+/// | `W` | weighted matches to the warp whose gradient is strained | [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation |
 /// | `S` | displacement gradient to strain | [`GreenLagrange`] |
 #[derive(Clone, Debug)]
 pub struct Pipeline<
@@ -106,7 +107,7 @@ pub struct Pipeline<
     R = Eikonal<f64>,
     P = EquallySpaced,
     M = RelaxationMatcher,
-    W = FitOptions<f64, NegR>,
+    W = StrainSpline,
     S = GreenLagrange,
 > {
     contact: C,
@@ -142,7 +143,7 @@ impl<C> Pipeline<C> {
             sampler: EquallySpaced::new(),
             // Two loads of one contact lie near each other: one run from where they are.
             matcher: RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near)),
-            warp: FitOptions::new(NegR).smoothing(Smoothing::Gcv),
+            warp: StrainSpline,
             strain: GreenLagrange,
             settings: Settings {
                 object,

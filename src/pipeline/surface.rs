@@ -47,6 +47,7 @@ pub(super) struct SurfaceWorkspace {
     signal: Array2<f64>,
     smoothed: Array2<f64>,
     mask: Array2<bool>,
+    whole_mask: Array2<bool>,
     line: Vec<f64>,
 }
 
@@ -57,6 +58,7 @@ impl SurfaceWorkspace {
             signal: Array2::default((0, 0)),
             smoothed: Array2::default((0, 0)),
             mask: Array2::default((0, 0)),
+            whole_mask: Array2::default((0, 0)),
             line: Vec::new(),
         }
     }
@@ -73,6 +75,9 @@ impl SurfaceWorkspace {
         let whole = binning::whole_blocks(region, side, frame.dim());
         binning::mean_difference(frame, reference, whole, side, scale, &mut self.signal);
         binning::block_mask(contact.mask.view(), region, whole, side, &mut self.mask);
+        if side == 1 && settings.surface_input == SurfaceInput::Shading {
+            binning::erode(&mut self.mask, &mut self.whole_mask);
+        }
         let ceiling = settings.surface_input.ceiling();
         // The width is that in the frame: a block has smoothed already.
         let width = (settings.smoothing_px / side) | 1;
@@ -95,12 +100,13 @@ impl SurfaceInput {
     }
 }
 
-/// Reconstructs the surface of a contact.
+/// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks for.
 pub(super) fn reconstruct(
     stages: &dyn Stages,
     workspace: &mut SurfaceWorkspace,
     images: [ArrayView2<'_, u8>; 2],
     contact: &FrameContact,
+    pixels: usize,
 ) -> Result<ContactSurface, SfsError> {
     let (Some(region), Some(reading)) = (contact.region, contact.reading) else {
         return Err(SfsError::EmptyMask);
@@ -111,7 +117,6 @@ pub(super) fn reconstruct(
         SurfaceInput::Signal => 1.0,
     };
     let scale = if stages.contact().polarity() == Polarity::Darker { -scale } else { scale };
-    let pixels = contact.mask.iter().filter(|m| **m).count();
     let side = settings.binning.side(pixels, settings.control_points);
     let region = workspace.load(settings, images, contact, (region, scale, side));
     let pixel_size_m = stages.contact().pixel_size_m().map(|size| size * side as f64);
