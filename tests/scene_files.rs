@@ -3,11 +3,16 @@
 use ndarray::Array2;
 use std::fs;
 use std::path::Path;
+use tactile_imaging::Pipeline;
+use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::io::write_grey_image;
-use tactile_imaging::scene::Scene;
+use tactile_imaging::pipeline::Stages;
+use tactile_imaging::scene::{LoadedCalibration, Scene};
+use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::simulate::{
-    CalibrationOptions, Elastic, PressOptions, PressScene, Sphere, write_folder,
+    CalibrationOptions, Camera, Elastic, PressOptions, PressScene, Sphere, write_folder,
 };
+use tactile_imaging::tps::AffineModel;
 
 /// The paper's error: ±5.38 % on both polymers.
 const PAPER_ERROR: f64 = 0.0538;
@@ -181,6 +186,32 @@ const MISTAKES: &[(&str, &str, &[&str])] = &[
         &["`waveguide.layers` is missing"],
     ),
     ("shape = \"sphere\"", "shape = sphere", &["line 12"]),
+    (
+        "[calibration]",
+        "flat_field = true\n[calibration]",
+        &["`flat_field` must be \"reference\"", "found true"],
+    ),
+    ("[calibration]", "flat_field = \"flat.png\"\n[calibration]", &["`flat_field` must be", "\"flat.png\""]),
+    (
+        "[object]",
+        "[stages]\nmatcher = \"icp\"\n[object]",
+        &["`stages.matcher` must be one of \"relaxation\"", "\"icp\""],
+    ),
+    (
+        "[object]",
+        "[stages]\nreconstruction = 3\n[object]",
+        &["`stages.reconstruction` must be", "\"tsai-shah\"", "found 3"],
+    ),
+    (
+        "[object]",
+        "[stages]\nmatch = \"relaxation\"\n[object]",
+        &["unknown field `stages.match`", "`matcher`"],
+    ),
+    (
+        "pairs = \"pairs.csv\"",
+        "depth_table = \"depth.csv\"\n[stages]\nreconstruction = \"eikonal\"",
+        &["`stages.reconstruction` must be absent"],
+    ),
 ];
 
 #[test]
@@ -227,4 +258,55 @@ fn a_depth_table_needs_gauge_readings() {
 fn a_missing_scene_file_is_named() {
     let error = Scene::read("/no/such/scene.toml").unwrap_err().to_string();
     assert!(error.contains("/no/such/scene.toml"), "{error}");
+}
+
+/// Everything measured of a scene, as text, but for the times.
+fn measured(scene: &Scene, stages: &dyn Stages) -> String {
+    let data = scene.load().unwrap();
+    let mut press = scene.press(stages, &data).unwrap();
+    let points: Vec<_> = press.control_points(1).unwrap().to_vec();
+    let strain = press.strain(1).unwrap().summary.clone();
+    format!("{points:?} {strain:?} {:?}", press.modulus().unwrap())
+}
+
+#[test]
+fn stages_by_name_are_those_of_the_typed_pipeline() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    let made = PressScene::new(PressOptions { camera, ..PressOptions::default() }).unwrap();
+    let path = write_folder(&made, &CalibrationOptions::default(), folder.path()).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    let by_name = |table: &str| {
+        let scene = Scene::parse(&format!("{text}\n[stages]\n{table}"), &path).unwrap();
+        measured(&scene, scene.stages(&scene.load().unwrap()).unwrap().as_ref())
+    };
+    let scene = Scene::read(&path).unwrap();
+    let LoadedCalibration::Pairs(pairs) = scene.load().unwrap().calibration else { panic!("pairs") };
+    let boxed = scene.stages(&scene.load().unwrap()).unwrap();
+    let typed = Pipeline::from_pairs(&pairs, scene.pixel_size_m, scene.object).unwrap();
+    let typed = typed.with_waveguide(boxed.settings().waveguide.clone().unwrap());
+    // `{:?}` prints every bit of a number.
+    assert_eq!(by_name(""), measured(&scene, &typed));
+    let named = by_name("sampler = \"curvature\"\nwarp = \"affine\"\nstrain = \"hencky\"");
+    let swapped = typed.with_sampler(CurvatureAdaptive::new(4.0).unwrap());
+    assert_eq!(named, measured(&scene, &swapped.with_warp(AffineModel).with_strain(Hencky)));
+    let data = scene.load().unwrap();
+    let heights = |name: &str| {
+        let scene = Scene::parse(&format!("{text}\n[stages]\nreconstruction = \"{name}\""), &path).unwrap();
+        let stages = scene.stages(&data).unwrap();
+        let mut press = scene.press(stages.as_ref(), &data).unwrap();
+        press.surface(1).unwrap().surface.heights.clone()
+    };
+    assert!(heights("tsai-shah") != heights("eikonal") && heights("brooks-horn") != heights("eikonal"));
+}
+
+#[test]
+fn a_flat_field_is_asked_for_by_its_key() {
+    let folder = tempfile::tempdir().unwrap();
+    small_scene(folder.path());
+    for (text, wanted) in [(VALID.to_string(), false), (format!("flat_field = \"reference\"{VALID}"), true)] {
+        let scene = Scene::parse(&text, folder.path().join("scene.toml")).unwrap();
+        assert_eq!(scene.flat_field, wanted);
+        assert_eq!(scene.stages(&scene.load().unwrap()).unwrap().settings().flat_field, wanted);
+    }
 }

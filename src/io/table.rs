@@ -46,13 +46,7 @@ pub fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
 
 /// Parses the bytes of a table; `path` is the name that errors give.
 pub(crate) fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<Table, ReadError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .delimiter(delimiter(bytes))
-        .from_reader(bytes);
+    let mut reader = reader(bytes);
     let (mut header, mut values, mut columns) = (Vec::new(), Vec::new(), None);
     for record in reader.byte_records() {
         let record = record.map_err(|e| ReadError::Open { path: path.into(), source: e.into() })?;
@@ -67,21 +61,44 @@ pub(crate) fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<T
             header = fields.iter().map(|f| shorten(f)).collect();
             continue;
         }
-        for (i, field) in fields.iter().enumerate() {
-            values.push(number(field, &cell).ok_or_else(|| ReadError::Field {
-                path: path.into(),
-                line,
-                column: i + 1,
-                expected: cell.clone(),
-                found: shorten(field),
-            })?);
-        }
+        push_numbers(&fields, &cell, path, line, &mut values)?;
     }
     let columns = columns.filter(|_| !values.is_empty());
     let empty = || ReadError::Empty { path: path.into(), expected: Expected::Rows };
     let columns = columns.ok_or_else(empty)?;
     let values = Array2::from_shape_vec((values.len() / columns, columns), values).map_err(|_| empty())?;
     Ok(Table { header, values })
+}
+
+/// Rows of trimmed fields, of whatever length; `#` starts a comment.
+fn reader(bytes: &[u8]) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .delimiter(delimiter(bytes))
+        .from_reader(bytes)
+}
+
+/// Appends a row's numbers.
+fn push_numbers(
+    fields: &[std::borrow::Cow<'_, str>],
+    cell: &Expected,
+    path: &Path,
+    line: u64,
+    values: &mut Vec<f64>,
+) -> Result<(), ReadError> {
+    for (i, field) in fields.iter().enumerate() {
+        values.push(number(field, cell).ok_or_else(|| ReadError::Field {
+            path: path.into(),
+            line,
+            column: i + 1,
+            expected: cell.clone(),
+            found: shorten(field),
+        })?);
+    }
+    Ok(())
 }
 
 /// A first line is a header when it has a word that is no number, and no number.

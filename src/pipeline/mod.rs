@@ -5,7 +5,8 @@
 //!                  └─ surface ─ control points ─ match ─ warp ─ strain ─┴─ modulus
 //! ```
 //!
-//! A [`Pipeline`] holds the stages (type parameters with defaults, see its docs) and is `Send + Sync`. A [`Press`]
+//! A [`Pipeline`] holds the stages (type parameters with defaults, see its docs; [`BoxedPipeline`]: by name, from a
+//! configuration) and is `Send + Sync`. A [`Press`]
 //! holds frames and computes what it is asked for, with what that needs and nothing else: [`Press::contact`] touches no
 //! surface, [`Press::modulus`] of a ball none either, [`Press::measure`] everything. The [`Report`] says what ran,
 //! for how long, and what was skipped for which reason.
@@ -21,9 +22,12 @@
 mod ball;
 mod batch;
 mod binning;
+mod boxed;
+mod choice;
 mod contact;
 mod depth;
 mod display;
+mod display_stream;
 mod error;
 mod flag;
 mod loads;
@@ -44,6 +48,11 @@ mod trial;
 pub use ball::BallFit;
 pub use batch::contacts;
 pub use binning::Binning;
+pub use boxed::{BoxedPipeline, StagesConfig};
+pub use choice::{
+    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, FitWarp, MatcherChoice,
+    ReconstructionChoice, SamplerChoice, StrainChoice, UnknownStage, WarpChoice,
+};
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
 pub use display::with_error;

@@ -24,6 +24,7 @@ pub const DRIFT_LIMIT_GREY: f64 = 0.5;
 
 /// What one frame of a stream says.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Update {
     /// Number of the frame, counted from 0.
     pub frame: u64,

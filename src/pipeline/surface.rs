@@ -6,6 +6,7 @@ use crate::force::{BoundingBox, Polarity};
 use crate::sfs::{Domain, Frame, SfsError, Surface, Workspace};
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2, Axis};
+use std::sync::{Mutex, PoisonError};
 
 /// What of the frame the surface stage looks at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,7 +44,8 @@ impl ContactSurface {
 /// What the surface stage reuses from frame to frame.
 #[derive(Debug)]
 pub(super) struct SurfaceWorkspace {
-    sfs: Workspace<f64>,
+    /// Behind a mutex, never locked, so that what holds it is `Sync` though progress callbacks are not.
+    sfs: Mutex<Workspace<f64>>,
     signal: Array2<f64>,
     smoothed: Array2<f64>,
     mask: Array2<bool>,
@@ -54,7 +56,7 @@ pub(super) struct SurfaceWorkspace {
 impl SurfaceWorkspace {
     pub(super) fn new() -> Self {
         Self {
-            sfs: Workspace::new(),
+            sfs: Mutex::new(Workspace::new()),
             signal: Array2::default((0, 0)),
             smoothed: Array2::default((0, 0)),
             mask: Array2::default((0, 0)),
@@ -123,7 +125,8 @@ pub(super) fn reconstruct(
     let domain = Domain::new(pixel_size_m)?.with_mask(workspace.mask.view());
     let mut surface = Surface::new();
     let frame = Frame::Real(workspace.signal.view());
-    stages.surface().reconstruct_with(&mut workspace.sfs, frame, &domain, &mut surface)?;
+    let sfs = workspace.sfs.get_mut().unwrap_or_else(PoisonError::into_inner);
+    stages.surface().reconstruct_with(sfs, frame, &domain, &mut surface)?;
     Ok(ContactSurface { surface, region, binning: side, pixel_size_m })
 }
 

@@ -2,7 +2,8 @@
 use super::{LoadedCalibration, Scene, SceneData, SceneError};
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::pipeline::{
-    DEFAULT_CONTROL_POINTS, DarkContact, Measurement, Pipeline, PipelineError, Press, Stages, SurfaceInput,
+    BoxedPipeline, ContactStage, DEFAULT_CONTROL_POINTS, DarkContact, LightContact, Measurement, Pipeline,
+    PipelineError, Press, Stages, SurfaceInput,
 };
 
 impl Scene {
@@ -18,7 +19,7 @@ impl Scene {
         press.measure().map_err(|e| scene.measure_error(e))
     }
 
-    /// The default pipeline for this scene's sensor and object.
+    /// The pipeline for this scene's sensor and object, of the stages it names.
     ///
     /// # Errors
     /// [`SceneError::Measure`] where the calibration or the waveguide is not usable.
@@ -58,17 +59,24 @@ impl Scene {
         };
         let layers = self.layers.iter().map(layer).collect();
         let waveguide = Waveguide::new(layers).map_err(PipelineError::Material)?;
+        let settings = Pipeline::new((), self.object)
+            .with_waveguide(waveguide)
+            .with_control_points(points)
+            .with_flat_field(self.flat_field);
+        let boxed = |contact: Box<dyn ContactStage>| {
+            BoxedPipeline::from_config(contact, self.object, &self.stages).map_err(PipelineError::DepthTable)
+        };
         Ok(match &data.calibration {
             LoadedCalibration::Pairs(pairs) => {
-                let pipeline = Pipeline::from_pairs(pairs, self.pixel_size_m, self.object)?;
-                Box::new(pipeline.with_waveguide(waveguide).with_control_points(points))
+                let contact = LightContact::from_pairs(pairs, self.pixel_size_m)?;
+                Box::new(boxed(Box::new(contact))?.with_settings(settings.settings().clone()))
             }
             LoadedCalibration::DepthTable(table) => {
                 let contact = DarkContact::new(table, self.pixel_size_m)?;
                 let depth = DarkContact::depth_table(table)?;
-                let pipeline = Pipeline::new(contact, self.object).with_waveguide(waveguide);
-                let pipeline = pipeline.with_control_points(points);
-                Box::new(pipeline.with_surface(depth, SurfaceInput::Signal))
+                let settings = settings.with_surface(depth.clone(), SurfaceInput::Signal);
+                let pipeline = boxed(Box::new(contact))?.with_settings(settings.settings().clone());
+                Box::new(pipeline.with_surface(Box::new(depth)))
             }
         })
     }

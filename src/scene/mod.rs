@@ -27,18 +27,32 @@
 //! ]
 //! ```
 //!
+//! Two more may stand there (`flat_field` above the first table):
+//!
+//! ```toml
+//! flat_field = "reference"               # divides by the reference's own brightness: corrects vignetting; not by default
+//!
+//! [stages]                               # each by name; these are the defaults
+//! reconstruction = "eikonal"             # or "tsai-shah", "brooks-horn"; not with a depth table
+//! sampler = "equally-spaced"             # or "curvature", "random"
+//! matcher = "relaxation"                 # or "dense-relaxation", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
+//! warp = "thin-plate-spline"             # or "cubic-spline", "affine", "rigid"
+//! strain = "green-lagrange"              # or "euler-almansi", "hencky", "biot", "infinitesimal"
+//! ```
+//!
 //! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`io::image`](crate::io::image)).
 //! Relative paths are relative to the scene file. Fields counted in errors (`frames[2]`) start at 1.
 mod error;
 mod fields;
 mod load;
 mod measure;
+mod stages;
 
 pub use error::SceneError;
 pub use load::{LoadedCalibration, SceneData};
 
 use crate::io::ReadError;
-use crate::pipeline::Object;
+use crate::pipeline::{Object, StagesConfig};
 use fields::{Fields, poisson, positive};
 use std::path::{Path, PathBuf};
 
@@ -82,6 +96,8 @@ pub struct Scene {
     pub reference: PathBuf,
     /// Size of a pixel on the sensing surface in metres, x and y.
     pub pixel_size_m: [f64; 2],
+    /// Whether vignetting is corrected by the reference's own brightness.
+    pub flat_field: bool,
     /// How grey levels become force or depth.
     pub calibration: CalibrationSource,
     /// The frames, in the order of the file.
@@ -90,6 +106,8 @@ pub struct Scene {
     pub object: Object,
     /// The waveguide's layers from the object's side; empty: taken as rigid.
     pub layers: Vec<SceneLayer>,
+    /// The stages, by name.
+    pub stages: StagesConfig,
 }
 
 impl Scene {
@@ -116,18 +134,35 @@ impl Scene {
             message: e.message().lines().next().unwrap_or("not TOML").into(),
         })?;
         let fields = Fields::new(file, &table);
-        fields.only(&["reference", "pixel_size_m", "calibration", "frames", "object", "waveguide"])?;
+        fields.only(&FIELDS)?;
         let folder = file.parent().unwrap_or(Path::new(""));
         Ok(Self {
             file: file.into(),
             reference: folder.join(fields.string("reference", "the path of the image without contact")?),
             pixel_size_m: fields
                 .positive_pair("pixel_size_m", "two positive numbers [x, y] (metres per pixel)")?,
+            flat_field: flat_field(&fields)?,
             calibration: calibration(&fields, folder)?,
             frames: frames(&fields, folder)?,
             object: object(&fields)?,
             layers: layers(&fields)?,
+            stages: stages::read(&fields)?,
         })
+    }
+}
+
+/// What may stand at the top of a scene file.
+const FIELDS: [&str; 8] =
+    ["reference", "pixel_size_m", "flat_field", "calibration", "frames", "object", "waveguide", "stages"];
+
+fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
+    const EXPECTED: &str = "\"reference\", or absent for no correction";
+    if !fields.has("flat_field") {
+        return Ok(false);
+    }
+    match fields.string("flat_field", EXPECTED)? {
+        "reference" => Ok(true),
+        other => Err(fields.wrong("flat_field", EXPECTED, &toml::Value::String(other.into()))),
     }
 }
 

@@ -183,6 +183,23 @@ impl Camera {
         frame
     }
 
+    /// An exposure without contact; each `repeat` has its own noise.
+    pub(super) fn expose_reference(&self, seed: u64, repeat: u32) -> Array2<u8> {
+        let dark = self.compose(&[], &Illumination::default());
+        self.expose(dark.view(), seed, u64::from(repeat) << 16)
+    }
+
+    /// An exposure of the light of load `load`; each `repeat` has its own noise.
+    pub(super) fn expose_load(
+        &self,
+        light: ArrayView2<'_, f64>,
+        seed: u64,
+        load: usize,
+        repeat: u32,
+    ) -> Array2<u8> {
+        self.expose(light, seed, u64::from(repeat) << 16 | (load as u64 + 1))
+    }
+
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
         at_least("shape", self.shape[0].min(self.shape[1]), 1)?;
         within("shape", self.shape[0].max(self.shape[1]) as f64, 1.0, 65535.0)?;

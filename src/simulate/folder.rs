@@ -76,34 +76,37 @@ fn write_image(path: &Path, frame: ArrayView2<'_, u8>) -> Result<(), FolderError
 /// The scene's description as the command line reads it.
 fn description(scene: &PressScene) -> Table {
     let options = scene.options();
-    let pair = |v: [f64; 2]| Value::Array(v.map(Value::Float).to_vec());
-    let table = |entries: Vec<(&str, Value)>| -> Table {
-        entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
-    };
+    let size = Value::Array(options.camera.pixel_size_m.map(Value::Float).to_vec());
     let frame = |(k, load): (usize, &super::press::Load)| {
         let image = Value::String(format!("frame_{}.png", k + 1));
-        Value::Table(table(vec![("image", image), ("force_N", Value::Float(load.force_n))]))
+        Value::Table(table([("image", image), ("force_N", Value::Float(load.force_n))]))
     };
-    let layer = |l: &super::material::WaveguideLayer| {
-        Value::Table(table(vec![
-            ("refractive_index", Value::Float(l.refractive_index)),
-            ("thickness_m", Value::Float(l.thickness_m)),
-            ("youngs_modulus_pa", Value::Float(l.material.youngs_modulus_pa)),
-            ("poisson_ratio", Value::Float(l.material.poisson_ratio)),
-        ]))
-    };
-    let object = vec![
+    let object = table([
         ("shape", Value::String("sphere".to_owned())),
         ("radius_m", Value::Float(options.object.radius_m)),
         ("poisson_ratio", Value::Float(options.object.material.poisson_ratio)),
-    ];
+    ]);
     let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
-    table(vec![
+    table([
         ("reference", Value::String("reference.png".to_owned())),
-        ("pixel_size_m", pair(options.camera.pixel_size_m)),
-        ("calibration", Value::Table(table(vec![("pairs", Value::String("calibration.csv".to_owned()))]))),
+        ("pixel_size_m", size),
+        ("calibration", Value::Table(table([("pairs", Value::String("calibration.csv".to_owned()))]))),
         ("frames", Value::Array(options.loads.iter().enumerate().map(frame).collect())),
-        ("object", Value::Table(table(object))),
-        ("waveguide", Value::Table(table(vec![("layers", layers)]))),
+        ("object", Value::Table(object)),
+        ("waveguide", Value::Table(table([("layers", layers)]))),
     ])
+}
+
+fn table<const N: usize>(entries: [(&str, Value); N]) -> Table {
+    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+/// A layer of the waveguide.
+fn layer(l: &super::material::WaveguideLayer) -> Value {
+    Value::Table(table([
+        ("refractive_index", Value::Float(l.refractive_index)),
+        ("thickness_m", Value::Float(l.thickness_m)),
+        ("youngs_modulus_pa", Value::Float(l.material.youngs_modulus_pa)),
+        ("poisson_ratio", Value::Float(l.material.poisson_ratio)),
+    ]))
 }

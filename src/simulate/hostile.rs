@@ -60,47 +60,52 @@ impl Hostile {
     /// # Errors
     /// As [`PressScene::new`] for a `base` without meaning.
     pub fn simulate(self, base: &PressOptions) -> Result<PressSimulation, super::SimulateError> {
+        let (options, force_n) = self.options(base)?;
+        if self == Self::SeveralContacts {
+            return several(&options, force_n);
+        }
+        let mut made = PressScene::new(options)?.simulate();
+        match self {
+            Self::AllBlack => {
+                made.reference.fill(0);
+                made.frames[0].fill(0);
+            }
+            Self::PressedReference => std::mem::swap(&mut made.reference, &mut made.frames[0]),
+            _ => {}
+        }
+        Ok(made)
+    }
+
+    /// The scene's options, and the force of its common contact: a fifth of the frame's shorter side in radius.
+    fn options(self, base: &PressOptions) -> Result<(PressOptions, f64), super::SimulateError> {
         let camera = base.camera;
         let middle = camera.middle_px();
-        // A force whose contact is a fifth of the frame's shorter side in radius: F = 4E*a³/(3R).
         let side = (camera.shape[0] as f64 * camera.pixel_size_m[1])
             .min(camera.shape[1] as f64 * camera.pixel_size_m[0]);
         let unit = PressScene::new(PressOptions { loads: vec![Load::normal(1.0)], ..base.clone() })?;
         let unit_radius = unit.contact(0).contact_radius_m;
+        // F = 4E*a³/(3R).
         let force = |radius_m: f64| (radius_m / unit_radius).powi(3);
-        let load = Load::normal(force(0.2 * side));
         let mut options = PressOptions {
-            loads: vec![load],
+            loads: vec![Load::normal(force(0.2 * side))],
             centre_px: Some([middle[0] + 0.3, middle[1] - 0.2]),
             gain: Gain::PeakGrey(200.0),
             ..base.clone()
         };
         match self {
-            Self::SeveralContacts => return several(&options, load.force_n),
             Self::NoiseOnly => options.loads = vec![Load::normal(0.0)],
             Self::AllSaturated => options.camera.background_grey = 1000.0,
             Self::AllBlack => options.loads[0].illumination.level = 0.0,
             Self::SaturatedContact => options.gain = Gain::PeakGrey(2000.0),
             Self::CutByEdge => options.centre_px = Some([-0.5, middle[1]]),
             Self::InCorner => options.centre_px = Some([-0.5, -0.5]),
-            Self::SubPixelContact => {
-                options.loads = vec![Load::normal(force(0.3 * camera.pixel_size_m[0]))];
-            }
-            Self::FillsFrame => options.loads = vec![Load::normal(force(3.0 * side))],
+            Self::SubPixelContact => options.loads[0] = Load::normal(force(0.3 * camera.pixel_size_m[0])),
+            Self::FillsFrame => options.loads[0] = Load::normal(force(3.0 * side)),
             Self::BrighterLamps => options.loads[0].illumination.level = 1.05,
             Self::MovedLamps => options.loads[0].illumination.tilt = [0.2, 0.0],
-            Self::PressedReference => {}
+            Self::SeveralContacts | Self::PressedReference => {}
         }
-        let mut made = PressScene::new(options)?.simulate();
-        match self {
-            Self::AllBlack => made.reference.fill(0),
-            Self::PressedReference => std::mem::swap(&mut made.reference, &mut made.frames[0]),
-            _ => {}
-        }
-        if self == Self::AllBlack {
-            made.frames[0].fill(0);
-        }
-        Ok(made)
+        Ok((options, force(0.2 * side)))
     }
 }
 

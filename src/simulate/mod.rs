@@ -48,6 +48,7 @@ mod relief;
 mod stream;
 mod truth;
 mod uniaxial;
+mod uniaxial_state;
 
 pub use calibration::{Branch, CalibrationOptions, CalibrationPoint, CalibrationSeries};
 pub use camera::Camera;
@@ -62,4 +63,5 @@ pub use press::{Gain, Load, PressOptions, PressScene, PressSimulation};
 pub use relief::SurfacePattern;
 pub use stream::{FrameStream, LoadCycle, StreamedFrame};
 pub use truth::{PressTruth, SurfaceScaling};
-pub use uniaxial::{UniaxialIncrement, UniaxialOptions, UniaxialScene, UniaxialState};
+pub use uniaxial::{UniaxialOptions, UniaxialScene};
+pub use uniaxial_state::{UniaxialIncrement, UniaxialState};

@@ -21,6 +21,14 @@ pub enum Gain {
     GreyPerPascal(f64),
 }
 
+impl Gain {
+    pub(super) fn validate(self) -> Result<(), SimulateError> {
+        match self {
+            Self::PeakGrey(value) | Self::GreyPerPascal(value) => not_negative("gain", value),
+        }
+    }
+}
+
 /// One state of load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -170,8 +178,7 @@ impl PressScene {
 
     /// An exposure without contact; each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
-        let dark = self.options.camera.compose(&[], &Illumination::default());
-        self.options.camera.expose(dark.view(), self.options.seed, u64::from(repeat) << 16)
+        self.options.camera.expose_reference(self.options.seed, repeat)
     }
 
     /// An exposure of load `load`; each `repeat` has its own noise.
@@ -180,11 +187,7 @@ impl PressScene {
     /// If there is no such load.
     pub fn frame(&self, load: usize, repeat: u32) -> Array2<u8> {
         let light = self.expected_frame(load);
-        self.options.camera.expose(
-            light.view(),
-            self.options.seed,
-            u64::from(repeat) << 16 | (load as u64 + 1),
-        )
+        self.options.camera.expose_load(light.view(), self.options.seed, load, repeat)
     }
 
     /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`] to draw many
@@ -264,8 +267,5 @@ fn validate(options: &PressOptions) -> Result<(), SimulateError> {
             finite("centre_px", options.centre_px.map_or(0.0, |c| c[k]))?;
         }
     }
-    match options.gain {
-        Gain::PeakGrey(grey) => not_negative("gain", grey),
-        Gain::GreyPerPascal(gain) => not_negative("gain", gain),
-    }
+    options.gain.validate()
 }

@@ -14,7 +14,7 @@
 //!
 //! The frame shows pressure in proportion to the pattern's height, normalised to carry the force.
 
-use nalgebra::{Matrix3, Point3};
+use nalgebra::Point3;
 use ndarray::Array2;
 
 use super::camera::Camera;
@@ -24,6 +24,7 @@ use super::material::Elastic;
 use super::pixel_average::Patch;
 use super::press::Gain;
 use super::relief::{Relief, SurfacePattern};
+use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
 
 /// Everything that describes the squeezed block; [`UniaxialScene::new`] checks it.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,37 +62,6 @@ impl Default for UniaxialOptions {
             seed: 1,
         }
     }
-}
-
-/// Stretch, strain and stress at one force. Compression is negative.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct UniaxialState {
-    /// Compressive force in newton.
-    pub force_n: f64,
-    /// λ_z.
-    pub stretch_z: f64,
-    /// λ_t.
-    pub stretch_lateral: f64,
-    /// Green–Lagrange strain e_zz.
-    pub strain_zz: f64,
-    /// Second Piola–Kirchhoff stress S_zz in pascal.
-    pub second_piola_zz_pa: f64,
-    /// Cauchy stress in pascal: the negative of force over the deformed face.
-    pub cauchy_zz_pa: f64,
-    /// Deformed face in square metres.
-    pub area_m2: f64,
-}
-
-/// From one state to another, the first being the reference.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UniaxialIncrement {
-    /// F₁₂ − I, the displacement gradient.
-    pub displacement_gradient: Matrix3<f64>,
-    /// Green–Lagrange strain e₁₂ in zz.
-    pub strain_zz: f64,
-    /// S₁₂ in pascal: over `strain_zz` it is Young's modulus exactly.
-    pub stress_zz_pa: f64,
 }
 
 /// A checked scene of uniaxial compression.
@@ -159,21 +129,12 @@ impl UniaxialScene {
     /// # Panics
     /// If there is no such state.
     pub fn increment(&self, from: usize, to: usize) -> UniaxialIncrement {
-        let (a, b) = (&self.states[from], &self.states[to]);
-        let square = a.stretch_z * a.stretch_z;
-        let lateral = b.stretch_lateral / a.stretch_lateral - 1.0;
-        let axial = b.stretch_z / a.stretch_z - 1.0;
-        UniaxialIncrement {
-            displacement_gradient: Matrix3::from_diagonal(&[lateral, lateral, axial].into()),
-            strain_zz: (b.strain_zz - a.strain_zz) / square,
-            stress_zz_pa: (b.second_piola_zz_pa - a.second_piola_zz_pa) / square,
-        }
+        UniaxialIncrement::between(&self.states[from], &self.states[to])
     }
 
     /// An exposure without contact; each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
-        let dark = self.options.camera.compose(&[], &Illumination::default());
-        self.options.camera.expose(dark.view(), self.options.seed, u64::from(repeat) << 16)
+        self.options.camera.expose_reference(self.options.seed, repeat)
     }
 
     /// An exposure of state `load`; each `repeat` has its own noise.
@@ -182,11 +143,7 @@ impl UniaxialScene {
     /// If there is no such state.
     pub fn frame(&self, load: usize, repeat: u32) -> Array2<u8> {
         let light = self.expected_frame(load);
-        self.options.camera.expose(
-            light.view(),
-            self.options.seed,
-            u64::from(repeat) << 16 | (load as u64 + 1),
-        )
+        self.options.camera.expose_load(light.view(), self.options.seed, load, repeat)
     }
 
     /// Expected grey levels of state `load`, before noise and rounding.
@@ -297,32 +254,6 @@ impl UniaxialScene {
     }
 }
 
-impl UniaxialState {
-    fn new(material: &Elastic, area0_m2: f64, force_n: f64) -> Result<Self, SimulateError> {
-        let e = material.youngs_modulus_pa;
-        // Nominal stress over modulus: λ(1 − λ²)/2, greatest at 1/√3.
-        let load = force_n / (e * area0_m2);
-        let limit = 1.0 / 27.0_f64.sqrt();
-        if load >= limit {
-            return Err(SimulateError::Overload { force_n, limit_n: limit * e * area0_m2 });
-        }
-        // λ³ − λ + 2·load = 0: the largest of three real roots by the cosine formula.
-        let stretch = 2.0 / 3.0_f64.sqrt() * ((-load / limit).acos() / 3.0).cos();
-        let strain_zz = 0.5 * (stretch - 1.0) * (stretch + 1.0);
-        let stretch_lateral = (1.0 - 2.0 * material.poisson_ratio * strain_zz).sqrt();
-        let area_m2 = area0_m2 * stretch_lateral * stretch_lateral;
-        Ok(Self {
-            force_n,
-            stretch_z: stretch,
-            stretch_lateral,
-            strain_zz,
-            second_piola_zz_pa: e * strain_zz,
-            cauchy_zz_pa: -force_n / area_m2,
-            area_m2,
-        })
-    }
-}
-
 /// values += height · column ⊗ line, where both differ from zero.
 fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f64]) {
     let first = line.iter().position(|&v| v != 0.0).unwrap_or(line.len());
@@ -347,7 +278,5 @@ fn validate(options: &UniaxialOptions) -> Result<(), SimulateError> {
         positive("face_m", options.face_m[k])?;
         finite("centre_px", options.centre_px.map_or(0.0, |c| c[k]))?;
     }
-    match options.gain {
-        Gain::PeakGrey(value) | Gain::GreyPerPascal(value) => not_negative("gain", value),
-    }
+    options.gain.validate()
 }

@@ -5,11 +5,14 @@ mod streams;
 
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2};
+use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
+use tactile_imaging::io::write_grey_image;
 use tactile_imaging::pipeline::{
-    Object, PipelineError, Press, Session, SkipReason, Skips, Stage, Stages, Trial, contacts,
+    BallFit, BoxedPipeline, FrameSource, ImageFolder, Object, PipelineError, Press, Report, Session,
+    SkipReason, Skips, Stage, Stages, Trial, Update, contacts,
 };
 use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
@@ -201,8 +204,54 @@ fn everything_can_cross_threads() {
     crosses::<Session>();
     crosses::<PipelineError>();
     crosses::<tactile_imaging::pipeline::Measurement>();
-    fn moves<T: Send>() {}
-    moves::<Press<'_>>();
+    crosses::<Press<'_>>();
+    crosses::<BoxedPipeline>();
+    crosses::<Box<dyn Stages>>();
+    crosses::<Update>();
+    crosses::<Report>();
+    crosses::<ImageFolder>();
+    crosses::<tactile_imaging::simulate::FrameStream>();
+}
+
+/// The sentence of a result; it must be writable as JSON.
+fn told<T: std::fmt::Display + serde::Serialize>(result: &T) -> String {
+    assert!(!serde_json::to_value(result).unwrap().is_null());
+    result.to_string()
+}
+
+#[test]
+fn every_result_can_be_read_by_people_and_programs() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let mut session = Session::new(Arc::new(pipeline.clone()), trial.simulation.reference.view()).unwrap();
+    let empty = trial.scene.reference(3);
+    assert_eq!(told(&session.push(empty.view()).unwrap()), "frame 1: no contact");
+    assert!(told(&session.drift()).ends_with("1 frame without contact"), "{}", session.drift());
+    let update = session.push(trial.simulation.frames[0].view()).unwrap();
+    let line = told(&update);
+    assert!(line.starts_with("frame 2: force 0.") && line.contains(" ± "), "{line}");
+    assert!(told(&update.contact.unwrap()).contains(" mm   centroid ("));
+    let mut press = trial.press(&pipeline).unwrap();
+    let measured = press.measure().unwrap();
+    assert!(told(&measured).contains("cautions:"));
+    assert!(told(&measured.youngs_modulus_pa).contains(" kPa"));
+    assert!(told(&measured.frames[0]).contains("contact radius"));
+    assert!(told(measured.matching.as_ref().unwrap()).contains("control points matched"));
+    assert!(told(measured.strain.as_ref().unwrap()).contains("e_zz"));
+    assert!(measured.flags.iter().all(|flag| !told(flag).is_empty()));
+    assert!(told(press.report()).contains("surface"));
+    assert!(press.report().skips.iter().all(|skip| told(skip).ends_with("saved)")));
+    let ball = BallFit {
+        radius_m: 3e-3,
+        centre_m: [1e-3, 2e-3],
+        contact_radius_m: 1.5e-3,
+        mean_absolute_error_m: 28e-6,
+        pixels: 900,
+        iterations: 4,
+    };
+    assert!(told(&ball).starts_with("ball of radius 3.000 mm at (1.000, 2.000) mm"), "{ball}");
+    let truth = trial.truth();
+    assert!(told(&truth).contains("103.0000 kPa") && told(&truth.frames[1]).starts_with("force 1.2000 N"));
 }
 
 #[test]
@@ -215,4 +264,22 @@ fn a_batch_reads_as_frames_one_by_one() {
     for (i, reading) in batch.iter().enumerate() {
         assert_eq!(reading.as_ref().unwrap().as_ref(), press.contact(i).unwrap());
     }
+}
+
+#[test]
+fn a_folder_of_images_streams_as_the_frames_it_was_written_from() {
+    let trial = trial(&[0.4, 0.9], 12);
+    let folder = tempfile::tempdir().unwrap();
+    for (i, frame) in trial.simulation.frames.iter().enumerate() {
+        write_grey_image(folder.path().join(format!("{i}.png")), frame.view()).unwrap();
+    }
+    std::fs::write(folder.path().join("notes.txt"), "no image").unwrap();
+    let mut source = ImageFolder::open(folder.path(), 80.0).unwrap();
+    let mut frame = Array2::zeros((0, 0));
+    for (i, written) in trial.simulation.frames.iter().enumerate() {
+        assert_eq!(source.next_frame(&mut frame).unwrap(), Some(i as f64 / 80.0));
+        assert_eq!(frame, written);
+    }
+    assert_eq!(source.next_frame(&mut frame).unwrap(), None);
+    assert!(ImageFolder::open(folder.path().join("none"), 80.0).is_err());
 }

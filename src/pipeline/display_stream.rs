@@ -1,0 +1,106 @@
+//! What a person at a bench wants to read of single frames, streams, fits and truths.
+use super::ball::BallFit;
+use super::contact::ContactReading;
+use super::display::estimate;
+#[cfg(feature = "simulate")]
+use super::display::with_error;
+use super::report::{Skip, Work};
+use super::session::{DriftWatch, Update};
+#[cfg(feature = "simulate")]
+use super::trial::{FrameTruth, Truth};
+use std::fmt::{self, Display, Formatter};
+
+impl Display for ContactReading {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self.force_n {
+            Some(force) => write!(f, "force {} N", estimate(force, 1.0))?,
+            None => f.write_str("force unknown")?,
+        }
+        write!(f, "   contact radius {} mm", estimate(self.contact_radius_m, 1e3))?;
+        if let Some(depth) = self.indentation_m {
+            write!(f, "   indentation {} mm", estimate(depth, 1e3))?;
+        }
+        let [x, y] = self.centroid_px.map(|c| estimate(c, 1.0));
+        write!(f, "   centroid ({x}, {y}) px")?;
+        self.flags(0).try_for_each(|flag| match flag.to_string().strip_prefix("frame 1: ") {
+            Some(caution) => write!(f, "   [{caution}]"),
+            None => write!(f, "   [{flag}]"),
+        })
+    }
+}
+
+impl Display for Update {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "frame {}: ", self.frame + 1)?;
+        match &self.contact {
+            Some(contact) => write!(f, "{contact}")?,
+            None => f.write_str("no contact")?,
+        }
+        if let Some(shear) = &self.shear {
+            let [x, y] = shear.force_n.map(|e| estimate(e, 1.0));
+            write!(f, "   shear ({x}, {y}) N")?;
+        }
+        if self.repeated { f.write_str("   (equals the frame before)") } else { Ok(()) }
+    }
+}
+
+impl Display for DriftWatch {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { frames, last_grey, greatest_grey } = self;
+        let s = if *frames == 1 { "" } else { "s" };
+        write!(f, "light {last_grey:+.2} grey levels from the reference, {greatest_grey:+.2} at most, in ")?;
+        write!(f, "{frames} frame{s} without contact")
+    }
+}
+
+impl Display for BallFit {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let [x, y] = self.centre_m.map(|v| v * 1e3);
+        write!(f, "ball of radius {:.3} mm at ({x:.3}, {y:.3}) mm", self.radius_m * 1e3)?;
+        let (a, error) = (self.contact_radius_m * 1e3, self.mean_absolute_error_m * 1e6);
+        write!(
+            f,
+            "   contact radius {a:.3} mm   mean absolute error {error:.1} µm over {} pixels",
+            self.pixels
+        )
+    }
+}
+
+impl Display for Skip {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of frame {}: {} ({} saved)", self.stage, self.frame + 1, self.reason, self.saved)
+    }
+}
+
+impl Display for Work {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let s = if self.runs == 1 { "" } else { "s" };
+        write!(f, "{:.3} ms in {} run{s}", self.time.as_secs_f64() * 1e3, self.runs)
+    }
+}
+
+#[cfg(feature = "simulate")]
+impl Display for FrameTruth {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let [x, y] = self.centroid_px;
+        let (a, depth) = (self.contact_radius_m * 1e3, self.indentation_m * 1e3);
+        write!(f, "force {:.4} N   contact radius {a:.4} mm   a/R {:.3}", self.force_n, self.contact_ratio)?;
+        write!(f, "   indentation {depth:.4} mm   centroid ({x:.2}, {y:.2}) px")
+    }
+}
+
+#[cfg(feature = "simulate")]
+impl Display for Truth {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "Young's modulus  {} kPa", with_error(self.youngs_modulus_pa, 0.0, 1e-3))?;
+        for (i, frame) in self.frames.iter().enumerate() {
+            write!(f, "\nframe {:<10} {frame}", i + 1)?;
+        }
+        match self.strain {
+            Some(e) => {
+                write!(f, "\nstrain           e_xx {:.4}  e_yy {:.4}  e_zz {:.4}", e[0][0], e[1][1], e[2][2])
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Stretch, strain and stress of the squeezed block in closed form; the equations are in [`uniaxial`](super::uniaxial).
+use super::error::SimulateError;
+use super::material::Elastic;
+use nalgebra::Matrix3;
+
+/// Stretch, strain and stress at one force. Compression is negative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct UniaxialState {
+    /// Compressive force in newton.
+    pub force_n: f64,
+    /// λ_z.
+    pub stretch_z: f64,
+    /// λ_t.
+    pub stretch_lateral: f64,
+    /// Green–Lagrange strain e_zz.
+    pub strain_zz: f64,
+    /// Second Piola–Kirchhoff stress S_zz in pascal.
+    pub second_piola_zz_pa: f64,
+    /// Cauchy stress in pascal: the negative of force over the deformed face.
+    pub cauchy_zz_pa: f64,
+    /// Deformed face in square metres.
+    pub area_m2: f64,
+}
+
+/// From one state to another, the first being the reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UniaxialIncrement {
+    /// F₁₂ − I, the displacement gradient.
+    pub displacement_gradient: Matrix3<f64>,
+    /// Green–Lagrange strain e₁₂ in zz.
+    pub strain_zz: f64,
+    /// S₁₂ in pascal: over `strain_zz` it is Young's modulus exactly.
+    pub stress_zz_pa: f64,
+}
+
+impl UniaxialState {
+    pub(super) fn new(material: &Elastic, area0_m2: f64, force_n: f64) -> Result<Self, SimulateError> {
+        let e = material.youngs_modulus_pa;
+        // Nominal stress over modulus: λ(1 − λ²)/2, greatest at 1/√3.
+        let load = force_n / (e * area0_m2);
+        let limit = 1.0 / 27.0_f64.sqrt();
+        if load >= limit {
+            return Err(SimulateError::Overload { force_n, limit_n: limit * e * area0_m2 });
+        }
+        // λ³ − λ + 2·load = 0: the largest of three real roots by the cosine formula.
+        let stretch = 2.0 / 3.0_f64.sqrt() * ((-load / limit).acos() / 3.0).cos();
+        let strain_zz = 0.5 * (stretch - 1.0) * (stretch + 1.0);
+        let stretch_lateral = (1.0 - 2.0 * material.poisson_ratio * strain_zz).sqrt();
+        let area_m2 = area0_m2 * stretch_lateral * stretch_lateral;
+        Ok(Self {
+            force_n,
+            stretch_z: stretch,
+            stretch_lateral,
+            strain_zz,
+            second_piola_zz_pa: e * strain_zz,
+            cauchy_zz_pa: -force_n / area_m2,
+            area_m2,
+        })
+    }
+}
+
+impl UniaxialIncrement {
+    pub(super) fn between(a: &UniaxialState, b: &UniaxialState) -> Self {
+        let square = a.stretch_z * a.stretch_z;
+        let lateral = b.stretch_lateral / a.stretch_lateral - 1.0;
+        let axial = b.stretch_z / a.stretch_z - 1.0;
+        Self {
+            displacement_gradient: Matrix3::from_diagonal(&[lateral, lateral, axial].into()),
+            strain_zz: (b.strain_zz - a.strain_zz) / square,
+            stress_zz_pa: (b.second_piola_zz_pa - a.second_piola_zz_pa) / square,
+        }
+    }
+}
