@@ -8,6 +8,7 @@
 //! | [`tatara_indentation_m`] | sphere squeezed between two plates, large deformation |
 //! | [`Waveguide`] | elastic layers in series |
 
+mod body;
 mod hertz;
 mod layer_equation;
 mod layer_kernel;
@@ -17,9 +18,10 @@ mod quadrature;
 mod tatara;
 mod waveguide;
 
+pub use body::{Body, reduced_modulus_pa, relative_radius_m, sample_modulus_pa};
 pub use hertz::{
-    Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_from_contact_radius,
-    reduced_modulus_from_indentation, reduced_modulus_pa, relative_radius_m, sample_modulus_pa,
+    HertzContact, hertz_surface_displacement_m, reduced_modulus_from_contact_radius,
+    reduced_modulus_from_indentation,
 };
 pub use layer_equation::{LayerContact, LayerEquation};
 pub use layer_kernel::{Bond, LayerKernel};

@@ -7,13 +7,16 @@
 //! open above where it reaches C.
 
 mod fit;
+mod indenters;
 
-use super::law::{
-    ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw, WaveguideLaw,
+pub use indenters::{
+    BondedLayer, Cone, FlatPunch, HertzSphere, SphereBetweenPlates, SphereOnWaveguide, TataraSphere,
 };
+
+use super::law::ContactLaw;
 use super::source::finite;
-use crate::contact::{Body, Bond, Waveguide};
-use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
+use crate::contact::{Body, Waveguide};
+use crate::error::{ElasticityError, Quantity, not_negative, poisson};
 use crate::scalar::widen;
 use nalgebra::{DMatrix, RealField};
 
@@ -84,191 +87,6 @@ pub struct ContactEstimator<L> {
     force_scale_error: f64,
     length_scale_error: f64,
     size_error: f64,
-}
-
-/// Hertz's sphere: a = (3FR/4E*)^⅓, δ = a²/R. Right for a/R up to 0.3; beyond, the estimate carries a warning.
-///
-/// ```
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
-///
-/// // 1 mN on a 5 mm sphere makes a contact of 0.4543 mm: 30 kPa.
-/// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(0.4543e-3, 1e-6));
-/// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&[load])?;
-/// assert!((modulus.youngs_modulus_pa / 30e3 - 1.0_f64).abs() < 1e-3);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type HertzSphere = ContactEstimator<Sphere>;
-/// A flat circular punch, F = 2E*aδ.
-///
-/// ```
-/// use tactile_elasticity::modulus::{Estimate, FlatPunch, LoadState, ModulusEstimator};
-///
-/// // F = 2E*aδ with E* = 40 kPa, a = 1 mm, δ = 0.1 mm.
-/// let load = LoadState::new(Estimate::new(8e-3, 1e-5)).with_indentation(Estimate::new(0.1e-3, 1e-7));
-/// let modulus = FlatPunch::new(1e-3, 0.5)?.estimate(&[load])?;
-/// assert!((modulus.youngs_modulus_pa - 30e3_f64).abs() < 1e-6);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type FlatPunch = ContactEstimator<Punch>;
-/// A cone, F = (2/π)E* tan α δ².
-///
-/// ```
-/// use tactile_elasticity::contact::cone;
-/// use tactile_elasticity::modulus::{Cone, Estimate, LoadState, ModulusEstimator};
-///
-/// let contact = cone(40e3_f64, 1.0, 0.2e-3)?;
-/// let load = LoadState::new(Estimate::new(contact.force_n, 1e-6)).with_indentation(Estimate::new(0.2e-3, 1e-7));
-/// let modulus = Cone::new(std::f64::consts::FRAC_PI_4, 0.5)?.estimate(&[load])?;
-/// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type Cone = ContactEstimator<ConeLaw>;
-/// A sphere pressed into a thin sample on a rigid base.
-///
-/// ```
-/// use tactile_elasticity::contact::{Bond, HertzContact};
-/// use tactile_elasticity::modulus::*;
-///
-/// // Read as a half-space, a sample 1 mm thin looks far too stiff.
-/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = [LoadState::new(Estimate::new(1e-3, 1e-5)).with_indentation(Estimate::new(contact.indentation_m, 1e-7))];
-/// let layer = BondedLayer::new(5e-3, 1e-3, 0.5, Bond::Bonded, LayerTheory::IntegralEquation)?.estimate(&load)?;
-/// assert!(layer.youngs_modulus_pa < 0.7 * HertzSphere::new(5e-3, 0.5)?.estimate(&load)?.youngs_modulus_pa);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type BondedLayer = ContactEstimator<LayerLaw>;
-/// A soft sphere squeezed beyond Hertz's reach.
-///
-/// ```
-/// use tactile_elasticity::contact::tatara_indentation_m;
-/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, TataraSphere};
-///
-/// // A ball of 3 mm squeezed to a/R = 0.5: Hertz's force for E* = 40 kPa at that radius, and Tatara's indentation.
-/// let (radius, a) = (3e-3_f64, 1.5e-3_f64);
-/// let force = 4.0 / 3.0 * 40e3 * a.powi(3) / radius;
-/// let load = LoadState::new(Estimate::new(force, 1e-5))
-///     .with_indentation(Estimate::new(tatara_indentation_m(a, radius, 0.5)?, 1e-7));
-/// let modulus = TataraSphere::new(radius, 0.5)?.estimate(&[load])?;
-/// assert!((modulus.youngs_modulus_pa / 30e3 - 1.0).abs() < 1e-6);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type TataraSphere = ContactEstimator<TataraLaw>;
-/// A soft sphere squeezed between the other body and a rigid plate: both contacts flatten.
-///
-/// ```
-/// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, SphereBetweenPlates};
-///
-/// // Between two rigid plates each contact takes half of the approach.
-/// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_indentation(Estimate::new(2.0 * contact.indentation_m, 1e-7));
-/// let modulus = SphereBetweenPlates::new(5e-3, 0.5)?.estimate(&[load])?;
-/// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type SphereBetweenPlates = ContactEstimator<TwoContactsLaw>;
-/// A soft sphere on a waveguide that is not deep beside the contact: the integral equation with both bodies yielding.
-///
-/// ```
-/// use tactile_elasticity::contact::{Bond, Layer, Waveguide};
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator, SphereOnWaveguide};
-///
-/// // On a gel of 2 mm the depth is felt: as on a deep one the ball would be called stiffer.
-/// let gel = Waveguide::new(vec![Layer { thickness_m: 2e-3, youngs_modulus_pa: 100e3, poisson_ratio: 0.5 }])?;
-/// let load = [LoadState::new(Estimate::new(5e-3, 1e-5)).with_contact_radius(Estimate::new(0.8e-3_f64, 1e-6))];
-/// let layered = SphereOnWaveguide::new(5e-3, 0.5, &gel, Bond::Bonded)?.estimate(&load)?;
-/// let deep = HertzSphere::new(5e-3, 0.5)?.with_waveguide(&gel).estimate(&load)?;
-/// assert!(layered.youngs_modulus_pa < deep.youngs_modulus_pa);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type SphereOnWaveguide = ContactEstimator<WaveguideLaw>;
-
-impl ContactEstimator<Sphere> {
-    /// A sphere of relative radius R (m); the sample, with Poisson ratio ν, is either the sphere or what it is pressed into.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        Self::from_law(Sphere::new(radius_m)?, poisson_ratio)
-    }
-}
-
-impl ContactEstimator<Punch> {
-    /// A rigid punch of radius a (m) on a sample with Poisson ratio ν.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        Self::from_law(Punch::new(radius_m)?, poisson_ratio)
-    }
-}
-
-impl ContactEstimator<ConeLaw> {
-    /// A cone of half opening angle α (rad, from the axis) on a sample with Poisson ratio ν.
-    ///
-    /// # Errors
-    /// [`ElasticityError::OutOfRange`] for an angle outside (0, π/2), [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(half_angle_rad: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        let (angle, limit) = (widen(half_angle_rad), std::f64::consts::FRAC_PI_2);
-        positive(angle, Quantity::HalfAngle)?;
-        if angle >= limit {
-            return Err(ElasticityError::OutOfRange { quantity: Quantity::HalfAngle, found: angle, limit });
-        }
-        Self::from_law(ConeLaw::new(angle.tan())?, poisson_ratio)
-    }
-}
-
-impl ContactEstimator<LayerLaw> {
-    /// A sphere of radius R (m) on a sample of thickness h (m) and Poisson ratio ν, glued to or sliding on its rigid base.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        thickness_m: T,
-        poisson_ratio: T,
-        bond: Bond,
-        theory: LayerTheory,
-    ) -> Result<Self, ElasticityError> {
-        Self::from_law(LayerLaw::new(radius_m, thickness_m, poisson_ratio, bond, theory)?, poisson_ratio)
-    }
-}
-
-impl ContactEstimator<TataraLaw> {
-    /// A soft sphere of radius R (m) and Poisson ratio ν.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        Self::from_law(TataraLaw::new(radius_m, poisson_ratio)?, poisson_ratio)
-    }
-}
-
-impl ContactEstimator<TwoContactsLaw> {
-    /// A soft sphere of radius R (m) and Poisson ratio ν between the other body and a rigid plate.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        Self::from_law(TwoContactsLaw::new(radius_m)?, poisson_ratio)
-    }
-}
-
-impl ContactEstimator<WaveguideLaw> {
-    /// A soft sphere of radius R (m) and Poisson ratio ν on a waveguide whose layers, taken in series, are one layer of their
-    /// whole thickness.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-        waveguide: &Waveguide<T>,
-        bond: Bond,
-    ) -> Result<Self, ElasticityError> {
-        let law = WaveguideLaw::new(radius_m, waveguide, bond)?;
-        Ok(Self::from_law(law, poisson_ratio)?.with_waveguide(waveguide))
-    }
 }
 
 impl<L: ContactLaw> ContactEstimator<L> {

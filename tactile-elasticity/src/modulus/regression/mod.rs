@@ -1,14 +1,17 @@
 //! Young's modulus as the slope of stress over strain.
 
-use super::estimate::{
+mod line;
+
+use crate::error::{ElasticityError, Quantity, not_negative};
+use crate::modulus::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-use super::load::{Estimate, LoadState};
-use super::ratio::{strain_warnings, stress};
-use super::statistics::{chi_squared_tail, effective_degrees, fewest, quantile_95, t_tail};
-use super::warning::Warning;
-use crate::error::{ElasticityError, Quantity, not_negative};
+use crate::modulus::load::LoadState;
+use crate::modulus::ratio::{strain_warnings, stress};
+use crate::modulus::statistics::{effective_degrees, fewest, quantile_95, t_tail};
+use crate::modulus::warning::Warning;
 use crate::scalar::{narrow, widen};
+use line::{Line, Point};
 use nalgebra::RealField;
 
 /// Whether the line may miss the origin.
@@ -62,25 +65,6 @@ pub enum Intercept {
 pub struct StressStrainRegression {
     intercept: Intercept,
     stress_scale_error: f64,
-}
-
-/// A straight line with its errors.
-#[derive(Debug, Clone, Copy)]
-struct Line {
-    slope: f64,
-    intercept: f64,
-    slope_error: f64,
-    intercept_error: f64,
-    chi_squared: f64,
-    degrees: usize,
-    learnt: bool,
-    excess: Option<f64>,
-}
-
-struct Point {
-    load: usize,
-    strain: Estimate<f64>,
-    stress: Estimate<f64>,
 }
 
 impl StressStrainRegression {
@@ -174,57 +158,6 @@ impl StressStrainRegression {
         Ok(())
     }
 
-    fn fit(&self, points: &[Point], known: bool) -> Line {
-        let mut line = self.weighted(points, |_| 1.0, false);
-        if !known {
-            return line;
-        }
-        for _ in 0..50 {
-            let slope = line.slope;
-            let variance =
-                |p: &Point| p.stress.standard_error.powi(2) + (slope * p.strain.standard_error).powi(2);
-            let floor = points.iter().map(variance).fold(0.0, f64::max) * 1e-12;
-            line = self.weighted(points, |p| 1.0 / variance(p).max(floor), true);
-            if (line.slope - slope).abs() <= 1e-12 * slope.abs() {
-                break;
-            }
-        }
-        line
-    }
-
-    /// Weighted least squares about the weighted centre, which keeps the two parameters apart.
-    fn weighted(&self, points: &[Point], weight: impl Fn(&Point) -> f64, known: bool) -> Line {
-        let free = self.intercept == Intercept::Tested;
-        let sum = |f: &dyn Fn(&Point) -> f64| points.iter().map(|p| weight(p) * f(p)).sum::<f64>();
-        let total = sum(&|_| 1.0);
-        let (cx, cy) = if free {
-            (sum(&|p| p.strain.value) / total, sum(&|p| p.stress.value) / total)
-        } else {
-            (0.0, 0.0)
-        };
-        let sxx = sum(&|p| (p.strain.value - cx).powi(2));
-        let slope = sum(&|p| (p.strain.value - cx) * (p.stress.value - cy)) / sxx;
-        let intercept = cy - slope * cx;
-        let chi_squared = sum(&|p| (p.stress.value - intercept - slope * p.strain.value).powi(2));
-        let degrees = points.len() - if free { 2 } else { 1 };
-        let reduced = chi_squared / degrees.max(1) as f64;
-        let excess =
-            (known && degrees > 0 && chi_squared_tail(chi_squared, degrees) < 1e-3).then_some(reduced);
-        let learnt = !known || excess.is_some();
-        let unit = if learnt { reduced } else { 1.0 };
-        let intercept_variance = if free { unit * (1.0 / total + cx * cx / sxx) } else { 0.0 };
-        Line {
-            slope,
-            intercept,
-            slope_error: (unit / sxx).sqrt(),
-            intercept_error: intercept_variance.sqrt(),
-            chi_squared,
-            degrees,
-            learnt,
-            excess,
-        }
-    }
-
     /// Degrees of freedom of the slope's error: those of the scatter, or of the sources, the stresses counted as one.
     fn degrees(&self, points: &[Point], line: &Line) -> Option<f64> {
         if line.learnt {
@@ -264,7 +197,7 @@ impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
         let points = Self::points(&loads)?;
         let known = points.iter().any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0);
         self.check(&points, known)?;
-        let line = self.fit(&points, known);
+        let line = Line::fit(&points, self.intercept == Intercept::Tested, known);
         if line.slope <= 0.0 || !line.slope.is_finite() {
             let p = points.last().map_or((0.0, 0.0), |p| (p.stress.value, p.strain.value));
             return Err(ElasticityError::OppositeSigns { stress_pa: p.0, strain: p.1 });

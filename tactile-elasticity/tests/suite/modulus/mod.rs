@@ -1,0 +1,64 @@
+//! Every estimator finds what its own law was fed, says how well, and refuses what it cannot use.
+
+mod intervals;
+mod laws;
+mod stress_over_strain;
+
+use nalgebra::DMatrix;
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::StandardNormal;
+use tactile_elasticity::contact::{
+    Body, Bond, HertzContact, Layer, LayerEquation, LayerKernel, Waveguide, cone, flat_punch,
+    reduced_modulus_pa, tatara_indentation_m,
+};
+use tactile_elasticity::modulus::*;
+use tactile_elasticity::{ElasticityError, Quantity};
+
+const SAMPLE: f64 = 60e3;
+const NU: f64 = 0.48;
+
+fn exact(x: f64) -> Estimate<f64> {
+    Estimate::exact(x)
+}
+
+fn waveguide() -> Waveguide<f64> {
+    let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.5 };
+    Waveguide::new(vec![layer(2e-3, 1.36e5), layer(3e-3, 8.0e4), layer(5e-3, 3.4e4)]).unwrap()
+}
+
+fn reduced() -> f64 {
+    reduced_modulus_pa(Body::rigid(), Body::elastic(SAMPLE, NU).unwrap()).unwrap()
+}
+
+/// Hertz loads of a 4 mm sphere of the sample on `other`.
+fn hertz_loads(other: Body<f64>, forces: &[f64]) -> Vec<LoadState<f64>> {
+    let e = reduced_modulus_pa(other, Body::elastic(SAMPLE, NU).unwrap()).unwrap();
+    (forces.iter())
+        .map(|&f| {
+            let c = HertzContact::from_force(f, 4e-3, e).unwrap();
+            LoadState::new(exact(f))
+                .with_contact_radius(exact(c.contact_radius_m))
+                .with_indentation(exact(c.indentation_m))
+        })
+        .collect()
+}
+
+/// The same, with the indentation that of both contacts: the waveguide's and a rigid plate's. Relative error as stated.
+fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState<f64>> {
+    let far = hertz_loads(Body::rigid(), forces);
+    (hertz_loads(waveguide().as_body(), forces).into_iter().zip(far))
+        .map(|(near, far)| {
+            let indentation = near.indentation_m.unwrap().value + far.indentation_m.unwrap().value;
+            let a = near.contact_radius_m.unwrap().value;
+            LoadState::new(Estimate::new(near.force_n.value, relative * near.force_n.value))
+                .with_contact_radius(Estimate::new(a, relative * a))
+                .with_indentation(Estimate::new(indentation, relative * indentation))
+        })
+        .collect()
+}
+
+fn finds(estimator: &dyn ModulusEstimator<f64>, loads: &[LoadState<f64>]) {
+    let found = estimator.estimate(loads).unwrap();
+    let gap = (found.youngs_modulus_pa / SAMPLE - 1.0).abs();
+    assert!(gap < 1e-9, "{}: off by {gap:e}", found.estimator);
+}
