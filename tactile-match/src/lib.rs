@@ -37,8 +37,8 @@ pub use error::{MatchError, PointSet};
 pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
 pub use nearest::NearestNeighbour;
 pub use relaxation::{
-    Labelling, Outliers, RelaxationMatch, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace,
-    Rotation, Search,
+    Labelling, Outliers, PointSets, RelaxationMatch, RelaxationMatcher, RelaxationOptions,
+    RelaxationWorkspace, Rotation, Search,
 };
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;

@@ -20,11 +20,13 @@
 
 mod anneal;
 mod axes;
+mod batch;
 mod blocks;
 mod correspond;
 mod finish;
 mod frame;
 mod labelling;
+mod lanes;
 mod options;
 mod prior;
 mod regression;
@@ -32,6 +34,7 @@ mod search;
 mod soft_assign;
 mod starts;
 
+pub use batch::PointSets;
 pub use labelling::Labelling;
 pub use options::{Outliers, RelaxationOptions, Rotation, Search};
 

@@ -2,8 +2,8 @@
 use nalgebra::{Point, Point2, Point3, Rotation2};
 use std::ops::ControlFlow;
 use tactile_match::{
-    MatchError, PointMatcher, PointSet, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace, Rotation,
-    StopReason,
+    MatchError, Outliers, PointMatcher, PointSet, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace,
+    Rotation, StopReason,
 };
 
 /// Fractional part of a multiple of the golden ratio: points without pattern, the same on every machine.
@@ -204,4 +204,59 @@ fn a_used_workspace_gives_the_same_bits() {
     let fresh = matcher.match_points(&a, &target_a).unwrap();
     assert_eq!(again.warped::<f64>().collect::<Vec<_>>(), fresh.warped);
     assert_eq!(again.assignment(), fresh.assignment);
+}
+
+/// Clean, noisy and unusable pairs of different sizes: a workspace that has seen one must not colour the next.
+#[test]
+fn a_batch_gives_the_bits_of_single_matches() {
+    let models = [cloud::<2>(31), cloud::<2>(24), Vec::new(), cloud::<2>(37)];
+    let targets: Vec<Vec<Point2<f64>>> = models
+        .iter()
+        .enumerate()
+        .map(|(k, model)| {
+            let noise = if k == 1 { 0.02 } else { 0.0 };
+            model
+                .iter()
+                .enumerate()
+                .map(|(i, p)| bend(p).map(|c| c + noise * (7.3 * i as f64).sin()))
+                .collect()
+        })
+        .collect();
+    let pairs: Vec<_> = models.iter().zip(&targets).map(|(m, t)| (&m[..], &t[..])).collect();
+    let matcher = RelaxationMatcher::default();
+    let check = |batch: Vec<Result<tactile_match::Matching<f64, 2>, MatchError>>| {
+        assert_eq!(batch.len(), pairs.len());
+        for (found, (model, target)) in batch.into_iter().zip(&pairs) {
+            match (found, matcher.match_points(model, target)) {
+                (Ok(found), Ok(single)) => {
+                    assert_eq!(found.warped, single.warped);
+                    assert_eq!((found.assignment, found.confidence), (single.assignment, single.confidence));
+                    assert_eq!((found.energy, found.report), (single.energy, single.report));
+                }
+                (found, single) => assert!(found.is_err() && single.is_err() && model.is_empty()),
+            }
+        }
+    };
+    check(matcher.match_all(&pairs));
+    #[cfg(feature = "rayon")]
+    check(matcher.match_all_in_parallel(&pairs));
+}
+
+/// Where no stray points are expected every point gets a partner; where they are, a far point is left without.
+#[test]
+fn the_outliers_option_says_which_side_may_stay_alone() {
+    let model = cloud::<2>(31);
+    let (mut target, partner) = shuffled(&model);
+    target.push(Point2::new(2.5, 2.5));
+    for side in [Outliers::Both, Outliers::Target] {
+        let options = RelaxationOptions::default().outliers(side);
+        let found = RelaxationMatcher::new(options).match_points(&model, &target).unwrap();
+        assert_eq!(found.assignment, partner.iter().map(|&j| Some(j)).collect::<Vec<_>>());
+        assert_eq!(found.unmatched_target, [31]);
+        // The sides change places: now it is a model point that has no partner.
+        let other = if side == Outliers::Target { Outliers::Model } else { side };
+        let options = RelaxationOptions::default().outliers(other);
+        let found = RelaxationMatcher::new(options).match_points(&target, &model).unwrap();
+        assert_eq!((found.unmatched_model, found.unmatched_target), (vec![31], vec![]));
+    }
 }

@@ -1,71 +1,17 @@
-//! Linear assignment: which column for which row, at the least total cost.
-//!
-//! Given costs `c_ij` of `n` rows and `m` columns, choose distinct columns `j(i)` with `Σ c_i,j(i)` least; of a matrix that is
-//! not square, `min(n, m)` rows get a column. The method is Jonker and Volgenant's (Computing 38, 325–340, 1987) in its
-//! rectangular form: augmenting row reduction assigns most rows, shortest augmenting paths (Dijkstra's, on the
-//! reduced costs `c_ij − u_i − v_j ≥ 0`) the rest. `O(min(n, m)² max(n, m))` at worst, on point sets close to `O(n m)`.
-//!
-//! The prices `u`, `v` prove the answer: `u_i + v_j ≤ c_ij`, equal on the chosen pairs; they are nought for rows and columns
-//! left over. To maximise, negate the costs; to forbid a pair, let it cost `+∞`.
+//! The search: augmenting row reduction, then shortest augmenting paths on the reduced costs.
 
-use crate::MatchError;
 use nalgebra::RealField;
 
-const NONE: usize = usize::MAX;
-
-/// Columns for the rows of a cost matrix (`rows × columns`, row-major) at the least total cost.
-///
-/// `None` for the rows left over where there are more rows than columns, or that only forbidden pairs (`+∞`) could serve; the number
-/// of pairs is the largest possible. The same input gives the same answer, also among ties.
-///
-/// # Errors
-/// [`MatchError::Shape`] if `costs` has not `rows · columns` entries, [`MatchError::Cost`] for NaN and `−∞`.
-///
-/// ```
-/// use tactile_match::linear_assignment;
-/// let costs = [
-///     4.0, 1.0, 3.0, //
-///     2.0, 0.0, 5.0,
-/// ];
-/// assert_eq!(linear_assignment(&costs, 2, 3)?, [Some(1), Some(0)]); // 1 + 2; the greedy 0 + 3 costs as much
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-pub fn linear_assignment<T: RealField + Copy>(
-    costs: &[T],
-    rows: usize,
-    columns: usize,
-) -> Result<Vec<Option<usize>>, MatchError> {
-    let mut workspace = AssignmentWorkspace::new();
-    workspace.solve(costs, rows, columns)?;
-    Ok(workspace.assignment)
-}
-
-/// [`linear_assignment`] with its memory kept: no allocation once it has seen the largest matrix.
-///
-/// ```
-/// use tactile_match::AssignmentWorkspace;
-/// let mut workspace = AssignmentWorkspace::new();
-/// assert_eq!(workspace.solve(&[2.0, 1.0, 1.0, 5.0], 2, 2)?, [Some(1), Some(0)]);
-/// assert_eq!(workspace.row_prices().iter().chain(workspace.column_prices()).sum::<f64>(), 2.0);
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Debug)]
-pub struct AssignmentWorkspace<T> {
-    assignment: Vec<Option<usize>>,
-    row_prices: Vec<T>,
-    column_prices: Vec<T>,
-    /// The matrix turned so that it is not taller than wide.
-    turned: Vec<T>,
-    search: Search<T>,
-}
+/// No row, no column.
+pub(super) const NONE: usize = usize::MAX;
 
 /// Memory of the algorithm proper, for a matrix that is not taller than wide.
 #[derive(Clone, Debug, Default)]
-struct Search<T> {
-    column_of: Vec<usize>,
-    row_of: Vec<usize>,
+pub(super) struct Search<T> {
+    pub(super) column_of: Vec<usize>,
+    pub(super) row_of: Vec<usize>,
     /// v; u follows from it.
-    prices: Vec<T>,
+    pub(super) prices: Vec<T>,
     free: Vec<usize>,
     waiting: Vec<usize>,
     /// Length of the shortest path to every column, and the row before it.
@@ -75,90 +21,21 @@ struct Search<T> {
     order: Vec<usize>,
 }
 
-impl<T: RealField + Copy> Default for AssignmentWorkspace<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<T: RealField + Copy> AssignmentWorkspace<T> {
-    /// Without memory yet.
-    #[must_use]
-    pub fn new() -> Self {
-        Self {
-            assignment: Vec::new(),
-            row_prices: Vec::new(),
-            column_prices: Vec::new(),
-            turned: Vec::new(),
-            search: Search {
-                column_of: Vec::new(),
-                row_of: Vec::new(),
-                prices: Vec::new(),
-                free: Vec::new(),
-                waiting: Vec::new(),
-                distance: Vec::new(),
-                before: Vec::new(),
-                order: Vec::new(),
-            },
-        }
-    }
-
-    /// As [`linear_assignment`].
-    ///
-    /// # Errors
-    /// As [`linear_assignment`].
-    pub fn solve(
-        &mut self,
-        costs: &[T],
-        rows: usize,
-        columns: usize,
-    ) -> Result<&[Option<usize>], MatchError> {
-        check(costs, rows, columns)?;
-        self.assignment.clear();
-        self.row_prices.clear();
-        self.column_prices.clear();
-        if rows <= columns {
-            self.search.run(costs, rows, columns);
-            self.assignment.extend(self.search.column_of.iter().map(|&j| (j != NONE).then_some(j)));
-            self.row_prices.extend((0..rows).map(|i| self.search.row_price(costs, i)));
-            self.column_prices.extend_from_slice(&self.search.prices);
-        } else {
-            self.turned.clear();
-            self.turned.extend((0..columns).flat_map(|j| (0..rows).map(move |i| costs[i * columns + j])));
-            self.search.run(&self.turned, columns, rows);
-            self.assignment.extend(self.search.row_of.iter().map(|&j| (j != NONE).then_some(j)));
-            self.row_prices.extend_from_slice(&self.search.prices);
-            self.column_prices.extend((0..columns).map(|j| self.search.row_price(&self.turned, j)));
-        }
-        Ok(&self.assignment)
-    }
-
-    /// `u` of the last solution.
-    #[must_use]
-    pub fn row_prices(&self) -> &[T] {
-        &self.row_prices
-    }
-
-    /// `v` of the last solution.
-    #[must_use]
-    pub fn column_prices(&self) -> &[T] {
-        &self.column_prices
-    }
-}
-
-fn check<T: RealField + Copy>(costs: &[T], rows: usize, columns: usize) -> Result<(), MatchError> {
-    let expected = rows.saturating_mul(columns);
-    if costs.len() != expected {
-        return Err(MatchError::Shape { what: "costs", expected, found: costs.len() });
-    }
-    match costs.iter().position(|&c| !(c.is_finite() || c > T::zero())) {
-        Some(at) => Err(MatchError::Cost { row: at / columns, column: at % columns }),
-        None => Ok(()),
-    }
-}
-
 impl<T: RealField + Copy> Search<T> {
-    fn run(&mut self, costs: &[T], rows: usize, columns: usize) {
+    pub(super) fn new() -> Self {
+        Self {
+            column_of: Vec::new(),
+            row_of: Vec::new(),
+            prices: Vec::new(),
+            free: Vec::new(),
+            waiting: Vec::new(),
+            distance: Vec::new(),
+            before: Vec::new(),
+            order: Vec::new(),
+        }
+    }
+
+    pub(super) fn run(&mut self, costs: &[T], rows: usize, columns: usize) {
         reset(&mut self.column_of, rows, NONE);
         reset(&mut self.row_of, columns, NONE);
         reset(&mut self.prices, columns, T::zero());
@@ -285,7 +162,7 @@ impl<T: RealField + Copy> Search<T> {
     }
 
     /// `u_i` from complementary slackness; nought for a row left over.
-    fn row_price(&self, costs: &[T], row: usize) -> T {
+    pub(super) fn row_price(&self, costs: &[T], row: usize) -> T {
         match self.column_of[row] {
             NONE => T::zero(),
             column => costs[row * self.prices.len() + column] - self.prices[column],
