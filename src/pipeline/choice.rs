@@ -1,4 +1,5 @@
 //! Stages by name: what a configuration may say, and the default stage behind every name.
+use super::strain_spline::StrainSpline;
 use crate::elasticity::strain::{Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure};
 use crate::matching::{
     CoherentPointDrift, DenseRelaxation, LinearAssignment, NearestNeighbour, PointMatcher, RelaxationMatcher,
@@ -8,7 +9,7 @@ use crate::sfs::{
     BrooksHorn, ControlPointSampler, CurvatureAdaptive, Eikonal, EquallySpaced, Lighting, Random, Rim,
     SfsError, SurfaceReconstruction, TsaiShah,
 };
-use crate::tps::{AffineModel, FitOptions, NegR, R3, RigidModel, Smoothing, TpsError, WarpModel};
+use crate::tps::{AffineModel, FitOptions, R3, RigidModel, Smoothing, TpsError, WarpModel};
 use nalgebra::Point3;
 use std::fmt;
 
@@ -133,7 +134,7 @@ choice! {
     /// assert_eq!(WarpChoice::Affine.to_string(), "affine");
     /// ```
     WarpChoice, "warp":
-    /// The thin-plate spline of kernel −r, smoothed by cross-validation.
+    /// [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation.
     ThinPlateSpline = "thin-plate-spline",
     /// The spline of kernel r³, smoothed by cross-validation.
     CubicSpline = "cubic-spline",
@@ -253,7 +254,7 @@ impl MatcherChoice {
 impl WarpChoice {
     pub(super) fn boxed(self) -> BoxedWarpModel {
         match self {
-            Self::ThinPlateSpline => Box::new(FitOptions::new(NegR).smoothing(Smoothing::Gcv)),
+            Self::ThinPlateSpline => Box::new(StrainSpline),
             Self::CubicSpline => Box::new(FitOptions::new(R3).smoothing(Smoothing::Gcv)),
             Self::Affine => Box::new(AffineModel),
             Self::Rigid => Box::new(RigidModel),
