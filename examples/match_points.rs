@@ -16,7 +16,7 @@ use std::time::Instant;
 use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
     CoherentPointDrift, DenseRelaxation, LinearAssignment, MatchError, Matching, NearestNeighbour, Outliers,
-    PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation,
+    PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation, SparseRelaxation,
 };
 
 /// Matches the point sets of case files and writes result files.
@@ -65,6 +65,8 @@ enum Method {
     Relaxation,
     /// The paper's dense relaxation as printed: slow.
     Dense,
+    /// The same over ten candidates a point.
+    Sparse,
     /// Coherent point drift.
     Drift,
     /// Each model point to the nearest target point.
@@ -92,6 +94,7 @@ impl Arguments {
         match if self.dense { Method::Dense } else { self.method } {
             Method::Relaxation => Box::new(RelaxationMatcher::new(self.options())),
             Method::Dense => Box::new(DenseRelaxation::default()),
+            Method::Sparse => Box::new(SparseRelaxation::default()),
             Method::Drift => Box::new(CoherentPointDrift::default()),
             Method::Nearest => Box::new(NearestNeighbour::default()),
             Method::Assignment => Box::new(LinearAssignment::default()),

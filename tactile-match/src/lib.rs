@@ -32,7 +32,7 @@ mod validate;
 pub use assignment::{AssignmentWorkspace, linear_assignment};
 pub use assignment_matcher::LinearAssignment;
 pub use cpd::{CoherentPointDrift, DriftOptions, DriftWarp, DriftWorkspace, Motion, Normalization};
-pub use dense::{DenseOptions, DenseRelaxation};
+pub use dense::{DenseOptions, DenseRelaxation, SparseRelaxation};
 pub use error::{MatchError, PointSet};
 pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
 pub use nearest::NearestNeighbour;

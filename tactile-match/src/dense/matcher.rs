@@ -108,24 +108,70 @@ impl DenseRelaxation {
     ) -> MatchMatrix<T> {
         let options = &self.options;
         let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
-        let longest = match options.maximum {
+        let compatibilities = Compatibilities::new(&graphs, options.rule(&graphs));
+        let first = first_matches(model, target, options.temperature, options.slack);
+        relax_with(options, first, |m| support_by(m, &graphs[0], &graphs[1], |x, y| compatibilities.of(x, y)))
+    }
+}
+
+impl DenseOptions {
+    /// How edges of these two graphs are compared.
+    pub(super) fn rule<T: Scalar, const D: usize>(
+        &self,
+        graphs: &[NeighbourGraph<T, D>; 2],
+    ) -> CompatibilityRule<T> {
+        let longest = match self.maximum {
             LengthMaximum::PerPair => None,
             LengthMaximum::Global => Some(graphs[0].longest().max(graphs[1].longest())),
         };
-        let compatibilities =
-            Compatibilities::new(&graphs, CompatibilityRule { factors: options.factors, longest });
-        let mut m = first_matches(model, target, options.temperature, options.slack);
-        for _ in 0..options.sweeps {
-            let before = m.clone();
-            let support = support_by(&m, &graphs[0], &graphs[1], |x, y| compatibilities.of(x, y));
-            update(&mut m, &support, slack_gain(&support, target.len(), options.slack));
-            sinkhorn(&mut m, options.sinkhorn_sweeps, T::zero());
-            if m.largest_change(&before) <= nalgebra::convert(options.settled) {
-                break;
-            }
-        }
-        m
+        CompatibilityRule { factors: self.factors, longest }
     }
+}
+
+/// (19), (20) and (15) in turn until M stands still.
+pub(super) fn relax_with<T: Scalar>(
+    options: &DenseOptions,
+    mut m: MatchMatrix<T>,
+    support: impl Fn(&MatchMatrix<T>) -> Vec<T>,
+) -> MatchMatrix<T> {
+    for _ in 0..options.sweeps {
+        let before = m.clone();
+        let support = support(&m);
+        let gain = slack_gain(&support, m.columns(), options.slack);
+        update(&mut m, &support, gain);
+        sinkhorn(&mut m, options.sinkhorn_sweeps, T::zero());
+        if m.largest_change(&before) <= nalgebra::convert(options.settled) {
+            break;
+        }
+    }
+    m
+}
+
+/// The outer iterations: `relax` gives the match matrix of the warped model and the target, the spline warps the model, and again.
+pub(super) fn match_with<T: Scalar, const D: usize>(
+    options: &DenseOptions,
+    model: &[Point<T, D>],
+    target: &[Point<T, D>],
+    relax: impl Fn(&[Point<T, D>], &[Point<T, D>]) -> MatchMatrix<T>,
+) -> Result<Matching<T, D>, MatchError> {
+    point_sets(model, target)?;
+    let frames = [Frame::of(model), Frame::of(target)];
+    let enter = |frame: &Frame<D>, points: &[Point<T, D>]| -> Vec<Point<T, D>> {
+        points.iter().map(|p| Point::from(frame.inside(p).map(nalgebra::convert))).collect()
+    };
+    let (start, goal) = (enter(&frames[0], model), enter(&frames[1], target));
+    let mut run = super::outcome::Run::new(start, goal, frames[1]);
+    for k in 0..options.max_iterations {
+        run.matches = relax(&run.warped, &run.target);
+        run.record_energy(options.neighbourhood);
+        let lambda = options.smoothing * 0.5_f64.powi(i32::try_from(k).unwrap_or(i32::MAX));
+        let step = run.fit(Smoothing::Lambda(nalgebra::convert(lambda)));
+        if step <= nalgebra::convert(1e-3) {
+            run.stop = StopReason::Converged;
+            break;
+        }
+    }
+    Ok(run.finish(model, target))
 }
 
 /// Gain of the slack: a share of what the best partners get, so that it means the same for every neighbourhood.
@@ -167,23 +213,6 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for DenseRelaxation {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        point_sets(model, target)?;
-        let frames = [Frame::of(model), Frame::of(target)];
-        let enter = |frame: &Frame<D>, points: &[Point<T, D>]| -> Vec<Point<T, D>> {
-            points.iter().map(|p| Point::from(frame.inside(p).map(nalgebra::convert))).collect()
-        };
-        let (start, goal) = (enter(&frames[0], model), enter(&frames[1], target));
-        let mut run = super::outcome::Run::new(start, goal, frames[1]);
-        for k in 0..self.options.max_iterations {
-            run.matches = self.relax(&run.warped, &run.target);
-            run.record_energy(self.options.neighbourhood);
-            let lambda = self.options.smoothing * 0.5_f64.powi(i32::try_from(k).unwrap_or(i32::MAX));
-            let step = run.fit(Smoothing::Lambda(nalgebra::convert(lambda)));
-            if step <= nalgebra::convert(1e-3) {
-                run.stop = StopReason::Converged;
-                break;
-            }
-        }
-        Ok(run.finish(model, target))
+        match_with(&self.options, model, target, |model, target| self.relax(model, target))
     }
 }

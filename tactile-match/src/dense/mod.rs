@@ -22,7 +22,7 @@
 //!
 //! One sweep costs `O(I J A B)` for `A` and `B` neighbours a point, and with neighbourhoods of the median radius
 //! `A ≈ I/2`, `B ≈ J/2`: fourth order, not the third the paper claims. [`RelaxationMatcher`](crate::RelaxationMatcher)
-//! is what to use; [`DenseRelaxation`] is what to check it against.
+//! is what to use; [`DenseRelaxation`] is what to check it against, and [`SparseRelaxation`] is the same method over few candidates.
 
 mod compatibility;
 mod match_matrix;
@@ -30,6 +30,7 @@ mod matcher;
 mod neighbourhood;
 mod outcome;
 mod shape_context;
+mod sparse;
 mod support;
 mod update;
 
@@ -38,5 +39,6 @@ pub use match_matrix::MatchMatrix;
 pub use matcher::{DenseOptions, DenseRelaxation};
 pub use neighbourhood::{Edge, NeighbourGraph, Neighbourhood, median_pairwise_distance};
 pub use shape_context::first_matches;
+pub use sparse::SparseRelaxation;
 pub use support::{energy, support, support_by};
 pub use update::{SinkhornReport, sinkhorn, sweep, update};

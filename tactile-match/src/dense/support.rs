@@ -47,7 +47,7 @@ pub fn support_by<T: RealField + Copy, const D: usize>(
 }
 
 /// The energy (14), `Σ_i Σ_{a∈N(i)} Σ_j Σ_{b∈N(j)} M_ij M_ab`: how many edges the match keeps, each counted from both
-/// ends, the slack left out. `O(I J A B)`.
+/// ends, the slack left out. `O(A B)` for each of the at most `I J` entries that are not nought.
 ///
 /// # Panics
 /// If `m` has not the size of the graphs.
@@ -57,9 +57,17 @@ pub fn energy<T: RealField + Copy, const D: usize>(
     model: &NeighbourGraph<T, D>,
     target: &NeighbourGraph<T, D>,
 ) -> T {
-    let kept = support_by(m, model, target, |_, _| T::one());
-    (0..m.rows()).fold(T::zero(), |sum, i| {
-        let row = &kept[i * m.columns()..];
-        m.row(i)[..m.columns()].iter().zip(row).fold(sum, |sum, (&m, &s)| sum + m * s)
-    })
+    assert_eq!((m.rows(), m.columns()), (model.points(), target.points()), "size of M");
+    let mut energy = T::zero();
+    for i in 0..m.rows() {
+        for j in (0..m.columns()).filter(|&j| m[(i, j)] > T::zero()) {
+            let mut kept = T::zero();
+            for a in model.of(i) {
+                let row = m.row(a.to);
+                kept = target.of(j).iter().fold(kept, |sum, b| sum + row[b.to]);
+            }
+            energy += m[(i, j)] * kept;
+        }
+    }
+    energy
 }

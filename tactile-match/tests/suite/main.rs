@@ -11,5 +11,6 @@ mod labelling_against_dense;
 mod reference;
 mod relaxation;
 mod serialtrack;
+mod sparse_against_dense;
 mod stability;
 mod stability_scale;

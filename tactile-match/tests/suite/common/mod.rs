@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use tactile_match::dense::Neighbourhood;
 use tactile_match::{
     CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Matching, Motion,
-    NearestNeighbour, PointMatcher, RelaxationMatcher,
+    NearestNeighbour, PointMatcher, RelaxationMatcher, SparseRelaxation,
 };
 use tactile_tps::Scalar;
 
@@ -22,6 +22,7 @@ pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
     vec![
         ("relaxation", Box::new(RelaxationMatcher::default())),
         ("dense relaxation", Box::new(dense)),
+        ("sparse relaxation", Box::new(SparseRelaxation::default())),
         ("nearest neighbour", Box::new(NearestNeighbour::new())),
         ("linear assignment", Box::new(LinearAssignment::new())),
         ("coherent point drift", Box::new(CoherentPointDrift::default())),
