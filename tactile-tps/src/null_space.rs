@@ -209,6 +209,11 @@ impl NullSpace {
     }
 }
 
+/// a / b, zero where b is zero or not finite: to conjugate gradients an output that has converged or not begun.
+pub(crate) fn ratio(a: f64, b: f64) -> f64 {
+    if b > 0.0 && b.is_finite() { a / b } else { 0.0 }
+}
+
 /// Inner product in eight partial sums, which the compiler turns into vectors.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];

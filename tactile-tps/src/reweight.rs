@@ -13,7 +13,7 @@ use nalgebra::SMatrix;
 
 use crate::{
     cholesky::HEAD,
-    null_space::{NullSpace, dot},
+    null_space::{NullSpace, dot, ratio},
     spectrum::Spectrum,
 };
 
@@ -257,11 +257,6 @@ fn split<const N: usize>(mut rest: &mut [f64], length: usize) -> [&mut [f64]; N]
         rest = others;
         piece
     })
-}
-
-/// a / b, zero where b is zero or not finite: that output has converged or not begun.
-fn ratio(a: f64, b: f64) -> f64 {
-    if b > 0.0 && b.is_finite() { a / b } else { 0.0 }
 }
 
 /// The middle of `values`, which it reorders.

@@ -61,21 +61,24 @@ impl<const R: usize> Solve<'_, R> {
     fn backward<S: Simd>(&mut self, simd: S, start: usize) {
         let Self { l, stride, reciprocal, .. } = *self;
         let columns = &l[start * stride..];
-        let known = [self.below(simd, start, 0), self.below(simd, start, PANEL / 2)];
+        let mut known = [[0.0; PANEL]; R];
+        for half in [0, PANEL / 2] {
+            self.below(simd, start, half, &mut known);
+        }
         for r in 0..R {
             let b = &mut self.b[r * stride..];
             for c in (0..PANEL).rev() {
-                let known = known[c / (PANEL / 2)][r][c % (PANEL / 2)];
                 let own = &columns[c * stride + start..c * stride + start + PANEL];
-                let rest = (c + 1..PANEL).fold(b[start + c] - known, |sum, d| sum - own[d] * b[start + d]);
+                let rest =
+                    (c + 1..PANEL).fold(b[start + c] - known[r][c], |sum, d| sum - own[d] * b[start + d]);
                 b[start + c] = rest * reciprocal[start + c];
             }
         }
     }
 
-    /// What the rows below a panel contribute to half of its columns, from column `half` of the panel on.
+    /// What the rows below a panel contribute to half of its columns, from column `half` of the panel on, into `known`.
     #[inline(always)]
-    fn below<S: Simd>(&self, simd: S, start: usize, half: usize) -> [[f64; PANEL / 2]; R] {
+    fn below<S: Simd>(&self, simd: S, start: usize, half: usize, known: &mut [[f64; PANEL]; R]) {
         let columns = &self.l[(start + half) * self.stride..];
         let mut sum = [[simd.splat_f64s(0.0); PANEL / 2]; R];
         for row in (start + PANEL..self.order).step_by(S::F64_LANES) {
@@ -88,12 +91,10 @@ impl<const R: usize> Solve<'_, R> {
                 }
             }
         }
-        let mut known = [[0.0; PANEL / 2]; R];
         for r in 0..R {
             for c in 0..PANEL / 2 {
-                known[r][c] = simd.reduce_sum_f64s(sum[r][c]);
+                known[r][half + c] = simd.reduce_sum_f64s(sum[r][c]);
             }
         }
-        known
     }
 }

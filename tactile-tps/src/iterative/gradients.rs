@@ -7,7 +7,7 @@ use crate::{
     Kernel, Progress, Stage,
     cholesky::HEAD,
     evaluate::Sum,
-    null_space::{MAX, NullSpace, dot},
+    null_space::{MAX, NullSpace, dot, ratio},
     product::Subtract,
     progress::Watch,
     refine::{Buffers, Solution, largest, relative},
@@ -178,9 +178,4 @@ fn without_head(null: &NullSpace, values: &mut [f64], column: &mut Vec<f64>) -> 
     null.apply(column);
     values.copy_from_slice(&column[null.rows()]);
     head
-}
-
-/// a / b, zero where b is zero or not finite: that output has converged or not begun.
-fn ratio(a: f64, b: f64) -> f64 {
-    if b > 0.0 && b.is_finite() { a / b } else { 0.0 }
 }
