@@ -41,6 +41,8 @@ pub(crate) struct Schedule {
     pub(crate) least: f64,
     /// Most iterations.
     pub(crate) limit: usize,
+    /// Iterations after which a temperature that no longer falls is the last.
+    pub(crate) patience: usize,
     /// Sinkhorn sweeps an iteration.
     pub(crate) sweeps: usize,
     /// What is expected of points without a partner.
@@ -115,6 +117,7 @@ impl<const D: usize> Annealer<D> {
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let mut variance = schedule.sigma * schedule.sigma;
+        let mut standing = 0;
         state.settled = false;
         self.predicted.clone_from(&state.warped);
         for iteration in 0..schedule.limit {
@@ -128,8 +131,10 @@ impl<const D: usize> Annealer<D> {
             let lowest = fall(if decided { DECIDED_RATE } else { schedule.rate }).max(floor);
             let next = residual.min(fall(schedule.least)).max(lowest).min(variance);
             let still = if decided { 1e-3 } else { 1e-4 };
-            state.settled =
-                variance <= floor || (iteration > 5 && (residual - variance).abs() < still * variance);
+            standing = if next < variance { 0 } else { standing + 1 };
+            state.settled = variance <= floor
+                || standing > schedule.patience
+                || (iteration > 5 && (residual - variance).abs() < still * variance);
             if state.settled {
                 break;
             }

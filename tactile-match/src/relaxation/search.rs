@@ -17,17 +17,18 @@ struct Pace {
     sigma: f64,
     rate: f64,
     least: f64,
+    patience: usize,
     sweeps: usize,
 }
 
 /// The first try: most scenes are easy.
-const FAST: Pace = Pace { sigma: 0.3, rate: 0.75, least: 0.9, sweeps: 3 };
+const FAST: Pace = Pace { sigma: 0.3, rate: 0.75, least: 0.9, patience: usize::MAX, sweeps: 3 };
 /// From the best answer so far.
-const REHEAT: Pace = Pace { sigma: 0.1, rate: 0.9, least: 1.0, sweeps: 5 };
-/// The only try between sets that lie near each other.
-const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, sweeps: 3 };
+const REHEAT: Pace = Pace { sigma: 0.1, rate: 0.9, least: 1.0, patience: usize::MAX, sweeps: 5 };
+/// The only try between sets that lie near each other. Residuals that stay above the temperature, whatever else moves, end it.
+const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, patience: 12, sweeps: 3 };
 /// Further tries.
-const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, sweeps: 5 };
+const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, patience: usize::MAX, sweeps: 5 };
 /// So many points that an incomplete exact answer is not worth a second try.
 const MANY: usize = 500;
 /// First temperatures of further reheats of so many points, in spacings of the targets.
@@ -152,6 +153,7 @@ impl RelaxationMatcher {
             floor: 1e-3,
             rate: pace.rate,
             least: pace.least,
+            patience: pace.patience,
             limit: self.options.max_iterations,
             sweeps: pace.sweeps,
             slack: self.options.slack(),
