@@ -38,6 +38,7 @@ pub struct Workspace<T> {
     pub(crate) field: crate::reconstruct::FieldBuffers<T>,
     pub(crate) fourier: crate::integrate::FourierBuffers<T>,
     pub(crate) masked: crate::integrate::MaskedBuffers<T>,
+    pub(crate) points: crate::sample::SampleBuffers,
     callback: Option<Callback>,
 }
 

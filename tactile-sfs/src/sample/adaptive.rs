@@ -7,7 +7,7 @@ use super::ControlPointSampler;
 use super::equally_spaced::spread;
 use super::lattice::Lattice;
 use crate::error::in_range;
-use crate::{Scalar, SfsError};
+use crate::{Scalar, SfsError, Workspace};
 
 /// Control points whose density grows with curvature: density ∝ 1 + emphasis · √(κ/κ̄), κ the root of the sum of squares
 /// of the second derivatives and κ̄ its mean (the root because a linear interpolant's error goes as κ · spacing²).
@@ -46,17 +46,38 @@ impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
         pixel_size_m: [T; 2],
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
-        let mut lattice = Lattice::sparse(surface, mask, pixel_size_m, count)?;
+        let mut points = Vec::with_capacity(count);
+        self.sample_with(&mut Workspace::new(), surface, mask, pixel_size_m, count, &mut points)?;
+        Ok(points)
+    }
+
+    fn sample_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+        points: &mut Vec<Point3<T>>,
+    ) -> Result<(), SfsError> {
+        points.clear();
+        let buffers = &mut workspace.points;
+        let weight = core::mem::take(&mut buffers.weight);
+        let mut lattice = Lattice::sparse(surface, mask, pixel_size_m, count, weight)?;
         let step = pixel_size_m.map(Scalar::as_f64);
-        let nodes: Vec<usize> = lattice.nodes().collect();
-        let bends: Vec<f64> = nodes.iter().map(|&node| bend(surface, lattice.pixel(node), step)).collect();
+        let bends = &mut buffers.bends;
+        bends.clear();
+        bends.extend(lattice.nodes().map(|node| bend(surface, lattice.pixel(node), step)));
         let mean = bends.iter().sum::<f64>() / bends.len() as f64;
         if mean > 0.0 {
-            for (node, bend) in nodes.into_iter().zip(bends) {
-                lattice.weight[node] *= 1.0 + self.emphasis * (bend / mean).sqrt();
+            let nodes = lattice.weight.iter_mut().filter(|weight| **weight > 0.0);
+            for (weight, bend) in nodes.zip(bends) {
+                *weight *= 1.0 + self.emphasis * (*bend / mean).sqrt();
             }
         }
-        Ok(spread(&lattice, count))
+        spread(&lattice, count, buffers, points);
+        buffers.weight = lattice.weight;
+        Ok(())
     }
 }
 

@@ -3,15 +3,21 @@
 use super::lattice::Lattice;
 use crate::Scalar;
 
-/// One node from the middle of each of `points` cells of equal weight.
-pub(super) fn cut<T: Scalar>(lattice: &Lattice<'_, T>, points: usize) -> Vec<usize> {
-    let mut all: Vec<usize> = lattice.nodes().collect();
+/// Chooses one node from the middle of each of `points` cells of equal weight; `all` is a buffer for the nodes.
+pub(super) fn cut<T: Scalar>(
+    lattice: &Lattice<'_, T>,
+    points: usize,
+    all: &mut Vec<usize>,
+    chosen: &mut Vec<usize>,
+) {
+    all.clear();
+    all.extend(lattice.nodes());
+    chosen.clear();
     let weight = |node: &usize| lattice.weight[*node];
     let total: f64 = all.iter().map(weight).sum();
     let width = all.len() as f64 / lattice.rows as f64;
     let bands = (points as f64 * lattice.rows as f64 * lattice.aspect() / width).sqrt().round() as usize;
     let bands = bands.clamp(1, points);
-    let mut chosen = Vec::with_capacity(points);
     let (mut start, mut done) = (0, 0.0);
     for band in 0..bands {
         // The band gets its share of points and of weight, and leaves a node for every point still to come.
@@ -25,10 +31,9 @@ pub(super) fn cut<T: Scalar>(lattice: &Lattice<'_, T>, points: usize) -> Vec<usi
         }
         let cells = &mut all[start..end];
         cells.sort_unstable_by_key(|node| (node % lattice.columns, node / lattice.columns));
-        pick(lattice, cells, after - before, &mut chosen);
+        pick(lattice, cells, after - before, chosen);
         start = end;
     }
-    chosen
 }
 
 /// The middle node of each of `points` runs of equal weight.

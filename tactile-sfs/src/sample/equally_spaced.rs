@@ -4,8 +4,8 @@ use nalgebra::Point3;
 use ndarray::ArrayView2;
 
 use super::lattice::Lattice;
-use super::{ControlPointSampler, crowded, strips};
-use crate::{Scalar, SfsError};
+use super::{ControlPointSampler, SampleBuffers, crowded};
+use crate::{Scalar, SfsError, Workspace};
 
 /// Equally spaced control points: each stands for the same area of the surface (not of its projection).
 ///
@@ -31,26 +31,61 @@ impl<T: Scalar> ControlPointSampler<T> for EquallySpaced {
         pixel_size_m: [T; 2],
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
-        Ok(spread(&Lattice::sparse(surface, mask, pixel_size_m, count)?, count))
+        let mut points = Vec::with_capacity(count);
+        self.sample_with(&mut Workspace::new(), surface, mask, pixel_size_m, count, &mut points)?;
+        Ok(points)
+    }
+
+    fn sample_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+        points: &mut Vec<Point3<T>>,
+    ) -> Result<(), SfsError> {
+        points.clear();
+        let buffers = &mut workspace.points;
+        let weight = core::mem::take(&mut buffers.weight);
+        let lattice = Lattice::sparse(surface, mask, pixel_size_m, count, weight)?;
+        spread(&lattice, count, buffers, points);
+        buffers.weight = lattice.weight;
+        Ok(())
     }
 }
 
-/// `count` points, each standing for the same weight.
-pub(super) fn spread<T: Scalar>(lattice: &Lattice<'_, T>, count: usize) -> Vec<Point3<T>> {
-    if count == 0 {
-        return Vec::new();
+/// Adds `count` points, each standing for the same weight.
+pub(super) fn spread<T: Scalar>(
+    lattice: &Lattice<'_, T>,
+    count: usize,
+    buffers: &mut SampleBuffers,
+    points: &mut Vec<Point3<T>>,
+) {
+    if count == 0 || lattice.has_room_for(count) && at_centroids(lattice, count, buffers, points) {
+        return;
     }
-    let even = if lattice.has_room_for(count) { at_centroids(lattice, count) } else { None };
-    even.unwrap_or_else(|| {
-        crowded::cut(lattice, count).into_iter().map(|node| lattice.point(lattice.pixel(node))).collect()
-    })
+    let SampleBuffers { nodes, chosen, .. } = buffers;
+    crowded::cut(lattice, count, nodes, chosen);
+    points.clear();
+    points.extend(chosen.iter().map(|&node| lattice.point(lattice.pixel(node))));
 }
 
-/// The centroids of the cells; `None` if two of them share a pixel.
-fn at_centroids<T: Scalar>(lattice: &Lattice<'_, T>, count: usize) -> Option<Vec<Point3<T>>> {
-    let places = strips::centroids(lattice, count);
-    let (mut pixels, points): (Vec<_>, Vec<_>) =
-        places.into_iter().map(|place| lattice.point_near(place)).unzip();
+/// Adds the centroids of the cells; false if two of them share a pixel.
+fn at_centroids<T: Scalar>(
+    lattice: &Lattice<'_, T>,
+    count: usize,
+    buffers: &mut SampleBuffers,
+    points: &mut Vec<Point3<T>>,
+) -> bool {
+    let SampleBuffers { strips, pixels, .. } = buffers;
+    strips.find(lattice, count);
+    pixels.clear();
+    for &place in &strips.places {
+        let (pixel, point) = lattice.point_near(place);
+        pixels.push(pixel);
+        points.push(point);
+    }
     pixels.sort_unstable();
-    pixels.windows(2).all(|pair| pair[0] != pair[1]).then_some(points)
+    pixels.windows(2).all(|pair| pair[0] != pair[1])
 }

@@ -30,17 +30,18 @@ pub(super) struct Lattice<'a, T> {
 }
 
 impl<'a, T: Scalar> Lattice<'a, T> {
-    /// All pixels.
+    /// All pixels; `weight` is a buffer to be used again.
     pub(super) fn dense(
         surface: ArrayView2<'a, T>,
         mask: Option<ArrayView2<'a, bool>>,
         pixel_size_m: [T; 2],
         points: usize,
+        weight: Vec<f64>,
     ) -> Result<Self, SfsError> {
         let (rows, columns) = surface.dim();
         let domain = Domain { mask, pixel_size_m, known_heights: None };
         let area = domain.validate(rows, columns)?;
-        Self::with_stride(surface, domain, area, 1).enough_for(points)
+        Self::with_stride(surface, domain, area, 1, weight).enough_for(points)
     }
 
     /// As few pixels as measure the spacing of `points` well, all of them if there is no room to move.
@@ -49,6 +50,7 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         mask: Option<ArrayView2<'a, bool>>,
         pixel_size_m: [T; 2],
         points: usize,
+        mut weight: Vec<f64>,
     ) -> Result<Self, SfsError> {
         let (rows, columns) = surface.dim();
         let domain = Domain { mask, pixel_size_m, known_heights: None };
@@ -56,11 +58,12 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         let wanted = NODES_PER_POINT * points.max(1);
         let mut stride = (area.area() / wanted).isqrt().max(1);
         loop {
-            let lattice = Self::with_stride(surface, domain, area, stride);
+            let lattice = Self::with_stride(surface, domain, area, stride, weight);
             if stride == 1 || lattice.has_room_for(points) {
                 return lattice.enough_for(points);
             }
             stride /= 2;
+            weight = lattice.weight;
         }
     }
 
@@ -69,10 +72,11 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         domain: Domain<'a, T>,
         area: BoundingBox,
         stride: usize,
+        mut weight: Vec<f64>,
     ) -> Self {
         let [rows, columns] =
             [area.rows, area.columns].map(|length| (length - 1 - Self::first(stride, length)) / stride + 1);
-        let weight = Vec::with_capacity(rows * columns);
+        weight.clear();
         let mut lattice = Self { surface, domain, area, stride, columns, rows, weight, count: 0 };
         for node in 0..rows * columns {
             let at @ [row, column] = lattice.pixel(node);

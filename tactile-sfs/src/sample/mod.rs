@@ -14,7 +14,7 @@ pub use adaptive::CurvatureAdaptive;
 pub use equally_spaced::EquallySpaced;
 pub use random::Random;
 
-use crate::{Scalar, SfsError};
+use crate::{Scalar, SfsError, Workspace};
 
 /// A way to choose control points on a surface.
 ///
@@ -33,6 +33,15 @@ use crate::{Scalar, SfsError};
 pub trait ControlPointSampler<T: Scalar> {
     /// Chooses `count` points on `surface` inside `mask`.
     ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::{ControlPointSampler, EquallySpaced};
+    /// let z = array![[5.0, 5.0], [5.0, f64::NAN]];
+    /// let points = EquallySpaced::new().sample(z.view(), None, [1.0, 2.0], 3)?;
+    /// assert!(points.iter().all(|point| point.z == 5.0 && (point.x, point.y) != (1.0, 2.0)));
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`],
     /// [`SfsError::InvalidOption`] for a pixel size, [`SfsError::TooManyPoints`] for more points than pixels.
@@ -43,4 +52,49 @@ pub trait ControlPointSampler<T: Scalar> {
         pixel_size_m: [T; 2],
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError>;
+
+    /// The same into `points`, whose contents are replaced, with the buffers of `workspace`. The samplers of this crate
+    /// allocate nothing once both have grown; without an override this calls [`sample`](Self::sample).
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{ControlPointSampler, Random, Workspace};
+    /// let (z, mut workspace, mut points) = (Array2::<f64>::zeros((9, 9)), Workspace::new(), Vec::new());
+    /// for count in [20, 5] {
+    ///     Random::new(1).sample_with(&mut workspace, z.view(), None, [1.0, 1.0], count, &mut points)?;
+    ///     assert_eq!(points.len(), count);
+    /// }
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`sample`](Self::sample); `points` is then empty.
+    fn sample_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+        points: &mut Vec<Point3<T>>,
+    ) -> Result<(), SfsError> {
+        let _ = workspace;
+        points.clear();
+        points.extend(self.sample(surface, mask, pixel_size_m, count)?);
+        Ok(())
+    }
+}
+
+/// Buffers of the samplers, kept between calls.
+#[derive(Debug, Default)]
+pub(crate) struct SampleBuffers {
+    /// Weights of the lattice's nodes.
+    weight: Vec<f64>,
+    /// Nodes in the order they are cut or drawn, and the key of each.
+    nodes: Vec<usize>,
+    keys: Vec<(f64, usize)>,
+    bends: Vec<f64>,
+    chosen: Vec<usize>,
+    strips: strips::Strips,
+    pixels: Vec<[usize; 2]>,
 }

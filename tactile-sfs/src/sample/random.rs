@@ -5,7 +5,7 @@ use ndarray::ArrayView2;
 
 use super::ControlPointSampler;
 use super::lattice::Lattice;
-use crate::{Scalar, SfsError};
+use crate::{Scalar, SfsError, Workspace};
 
 /// Random control points: every pixel is drawn with a probability proportional to the surface area over it, without
 /// repetition. The same seed gives the same points on every platform and in every version of the library: the generator
@@ -40,19 +40,40 @@ impl<T: Scalar> ControlPointSampler<T> for Random {
         pixel_size_m: [T; 2],
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
-        let lattice = Lattice::dense(surface, mask, pixel_size_m, count)?;
+        let mut points = Vec::with_capacity(count);
+        self.sample_with(&mut Workspace::new(), surface, mask, pixel_size_m, count, &mut points)?;
+        Ok(points)
+    }
+
+    fn sample_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+        points: &mut Vec<Point3<T>>,
+    ) -> Result<(), SfsError> {
+        points.clear();
+        let buffers = &mut workspace.points;
+        let weight = core::mem::take(&mut buffers.weight);
+        let lattice = Lattice::dense(surface, mask, pixel_size_m, count, weight)?;
         // The `count` least of exponential variates with rates = areas are a draw without repetition (Efraimidis &
         // Spirakis 2006).
         let mut state = self.seed;
         let mut key = |node: usize| -(1.0 - unit(&mut state)).ln() / lattice.weight[node];
-        let mut keys: Vec<(f64, usize)> = lattice.nodes().map(|node| (key(node), node)).collect();
+        let keys = &mut buffers.keys;
+        keys.clear();
+        keys.extend(lattice.nodes().map(|node| (key(node), node)));
         let order = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if count < keys.len() {
             keys.select_nth_unstable_by(count, order);
             keys.truncate(count);
         }
         keys.sort_unstable_by(order);
-        Ok(keys.into_iter().map(|(_, node)| lattice.point(lattice.pixel(node))).collect())
+        points.extend(keys.iter().map(|&(_, node)| lattice.point(lattice.pixel(node))));
+        buffers.weight = lattice.weight;
+        Ok(())
     }
 }
 

@@ -8,27 +8,57 @@ use super::lattice::Lattice;
 use crate::Scalar;
 
 /// Weight of a piece of a column, and its moment along the column.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Piece {
     weight: f64,
     moment: f64,
 }
 
-/// The centroids (x, y) of `points` cells of equal weight, in units of the lattice.
-pub(super) fn centroids<T: Scalar>(lattice: &Lattice<'_, T>, points: usize) -> Vec<[f64; 2]> {
-    let row_weight = |row: usize| lattice.weight[row * lattice.columns..][..lattice.columns].iter().sum();
-    let rows: Vec<f64> = (0..lattice.rows).map(row_weight).collect();
-    let bands = bands(lattice, points);
-    let shares: Vec<f64> = (1..=bands).map(|band| (band * points / bands) as f64 / points as f64).collect();
-    let cuts = cuts(&rows, &shares);
-    let mut strip = vec![Piece::default(); lattice.columns];
-    let mut found = Vec::with_capacity(points);
-    for band in 0..bands {
-        let top = if band == 0 { 0.0 } else { cuts[band - 1] };
-        gather(lattice, top, cuts[band], &mut strip);
-        split(&strip, (band + 1) * points / bands - band * points / bands, &mut found);
+/// Buffers, and the centroids found.
+#[derive(Debug, Default)]
+pub(super) struct Strips {
+    rows: Cuts,
+    cells: Cuts,
+    pieces: Vec<Piece>,
+    /// Centroids (x, y) in units of the lattice.
+    pub(super) places: Vec<[f64; 2]>,
+}
+
+impl Strips {
+    /// Finds the centroids of `points` cells of equal weight.
+    pub(super) fn find<T: Scalar>(&mut self, lattice: &Lattice<'_, T>, points: usize) {
+        let row_weight = |row: usize| lattice.weight[row * lattice.columns..][..lattice.columns].iter().sum();
+        let bands = bands(lattice, points);
+        let share = |band: usize| (band * points / bands) as f64 / points as f64;
+        self.rows.find((0..lattice.rows).map(row_weight), (1..=bands).map(share));
+        self.pieces.clear();
+        self.pieces.resize(lattice.columns, Piece::default());
+        self.places.clear();
+        let mut top = 0.0;
+        for band in 0..bands {
+            let bottom = self.rows.at[band];
+            gather(lattice, top, bottom, &mut self.pieces);
+            self.split((band + 1) * points / bands - band * points / bands);
+            top = bottom;
+        }
     }
-    found
+
+    /// Cuts the strip gathered last into `cells` of equal weight; their centroids.
+    fn split(&mut self, cells: usize) {
+        let shares = (1..=cells).map(|cell| cell as f64 / cells as f64);
+        self.cells.find(self.pieces.iter().map(|piece| piece.weight), shares);
+        let mut from = 0.0;
+        for &to in &self.cells.at {
+            let (mut weight, mut x, mut y) = (0.0, 0.0, 0.0);
+            for (column, share, middle) in parts(from, to, self.pieces.len()) {
+                weight += share * self.pieces[column].weight;
+                x += share * self.pieces[column].weight * middle;
+                y += share * self.pieces[column].moment;
+            }
+            self.places.push([x / weight, y / weight]);
+            from = to;
+        }
+    }
 }
 
 /// Number of strips that makes cells about as wide as high.
@@ -38,19 +68,31 @@ fn bands<T: Scalar>(lattice: &Lattice<'_, T>, points: usize) -> usize {
     (square.sqrt().round() as usize).clamp(1, points)
 }
 
-/// Where the running sum of `weights` reaches each of the rising `shares` of its total: node k covers [k, k + 1].
-fn cuts(weights: &[f64], shares: &[f64]) -> Vec<f64> {
-    let total: f64 = weights.iter().sum();
-    let (mut node, mut before) = (0, 0.0);
-    let reach = |share: &f64| {
-        while node + 1 < weights.len() && before + weights[node] < share * total {
-            before += weights[node];
-            node += 1;
-        }
-        let part = if weights[node] > 0.0 { (share * total - before) / weights[node] } else { 1.0 };
-        node as f64 + part.clamp(0.0, 1.0)
-    };
-    shares.iter().map(reach).collect()
+/// Cuts of a line of nodes: node k covers [k, k + 1].
+#[derive(Debug, Default)]
+struct Cuts {
+    weights: Vec<f64>,
+    at: Vec<f64>,
+}
+
+impl Cuts {
+    /// Where the running sum of `weights` reaches each of the rising `shares` of its total.
+    fn find(&mut self, weights: impl Iterator<Item = f64>, shares: impl Iterator<Item = f64>) {
+        let Self { weights: line, at } = self;
+        line.clear();
+        line.extend(weights);
+        at.clear();
+        let total: f64 = line.iter().sum();
+        let (mut node, mut before) = (0, 0.0);
+        at.extend(shares.map(|share| {
+            while node + 1 < line.len() && before + line[node] < share * total {
+                before += line[node];
+                node += 1;
+            }
+            let part = if line[node] > 0.0 { (share * total - before) / line[node] } else { 1.0 };
+            node as f64 + part.clamp(0.0, 1.0)
+        }));
+    }
 }
 
 /// Parts of the nodes between two cuts: node, share of it, middle of that share.
@@ -73,37 +115,22 @@ fn gather<T: Scalar>(lattice: &Lattice<'_, T>, top: f64, bottom: f64, strip: &mu
     }
 }
 
-/// Cuts a strip into `cells` of equal weight; their centroids.
-fn split(strip: &[Piece], cells: usize, found: &mut Vec<[f64; 2]>) {
-    let weights: Vec<f64> = strip.iter().map(|piece| piece.weight).collect();
-    let shares: Vec<f64> = (1..=cells).map(|cell| cell as f64 / cells as f64).collect();
-    let mut from = 0.0;
-    for to in cuts(&weights, &shares) {
-        let (mut weight, mut x, mut y) = (0.0, 0.0, 0.0);
-        for (column, share, middle) in parts(from, to, strip.len()) {
-            weight += share * strip[column].weight;
-            x += share * strip[column].weight * middle;
-            y += share * strip[column].moment;
-        }
-        found.push([x / weight, y / weight]);
-        from = to;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn cuts_run_through_nodes() {
-        assert_eq!(cuts(&[1.0, 0.0, 2.0, 1.0], &[0.125, 0.25, 0.5, 1.0]), [0.5, 1.0, 2.5, 4.0]);
+        let mut cuts = Cuts::default();
+        cuts.find([1.0, 0.0, 2.0, 1.0].into_iter(), [0.125, 0.25, 0.5, 1.0].into_iter());
+        assert_eq!(cuts.at, [0.5, 1.0, 2.5, 4.0]);
     }
 
     #[test]
     fn the_centroid_of_one_cell_is_that_of_all() {
-        let strip = [1.0, 3.0].map(|weight| Piece { weight, moment: 2.0 * weight });
-        let mut found = Vec::new();
-        split(&strip, 1, &mut found);
-        assert_eq!(found, [[0.75, 2.0]]);
+        let pieces = [1.0, 3.0].map(|weight| Piece { weight, moment: 2.0 * weight }).to_vec();
+        let mut strips = Strips { pieces, ..Strips::default() };
+        strips.split(1);
+        assert_eq!(strips.places, [[0.75, 2.0]]);
     }
 }

@@ -78,6 +78,27 @@ fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
 }
 
 #[test]
+fn samplers_with_a_workspace_do_not_allocate() {
+    let case = Sampled::new(60, sphere);
+    let samplers: [Box<dyn ControlPointSampler<f64>>; 3] = [
+        Box::new(EquallySpaced::new()),
+        Box::new(Random::new(3)),
+        Box::new(CurvatureAdaptive::new(2.0).unwrap()),
+    ];
+    for (sampler, count) in samplers.iter().flat_map(|sampler| [(sampler, 40), (sampler, 900)]) {
+        let (z, mask, step) = (case.z.view(), Some(case.mask.view()), [case.pixel; 2]);
+        let (mut workspace, mut points) = (Workspace::new(), Vec::new());
+        let mut run = || sampler.sample_with(&mut workspace, z, mask, step, count, &mut points).unwrap();
+        run();
+        assert_eq!(allocation_counter::measure(&mut run).count_total, 0, "{count}");
+        // 40 points move freely, 900 are nearly as dense as the pixels.
+        assert_eq!(points, sampler.sample(z, mask, step, count).unwrap());
+        assert!(sampler.sample_with(&mut workspace, z, mask, step, 9000, &mut points).is_err());
+        assert!(points.is_empty());
+    }
+}
+
+#[test]
 fn nothing_outside_the_mask_matters() {
     let case = Sampled::new(40, sphere);
     let spoiled = Array2::from_shape_fn((40, 40), |at| if case.mask[at] { case.image[at] } else { f64::NAN });
