@@ -50,6 +50,16 @@ pub struct StagesConfig {
 /// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
 /// let pipeline = BoxedPipeline::from_config(Box::new(contact), Object::sphere(3e-3), &config)?;
 /// assert!(pipeline.strain().name().contains("Hencky"));
+///
+/// // Stages without a name in configurations, your own among them, are put in one by one.
+/// use tactile_imaging::{elasticity::strain::Biot, matching::NearestNeighbour, sfs, tps::AffineModel};
+/// let pipeline = pipeline
+///     .with_surface(Box::new(sfs::TsaiShah::new(sfs::Lighting::frontal())))
+///     .with_sampler(Box::new(sfs::Random::new(1)))
+///     .with_matcher(Box::new(NearestNeighbour::new()))
+///     .with_warp(Box::new(AffineModel))
+///     .with_strain(Box::new(Biot));
+/// assert!(pipeline.strain().name().contains("Biot"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct BoxedPipeline {

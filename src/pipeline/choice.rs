@@ -14,6 +14,13 @@ use nalgebra::Point3;
 use std::fmt;
 
 /// A name that no stage of this kind has.
+///
+/// ```
+/// use tactile_imaging::pipeline::{ReconstructionChoice, UnknownStage};
+/// let error: UnknownStage = "taylor".parse::<ReconstructionChoice>().unwrap_err();
+/// assert_eq!(error.found, "taylor");
+/// assert!(error.to_string().contains("tsai-shah"));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("stage `{stage}` must be {expected}, found \"{found}\"")]
 pub struct UnknownStage {
@@ -48,6 +55,13 @@ macro_rules! choice {
             pub const EXPECTED: &str = concat!("one of \"", $text, "\"", $(", \"", $other, "\""),+);
 
             /// The name in configurations.
+            ///
+            /// ```
+            #[doc = concat!("use tactile_imaging::pipeline::", stringify!($name), ";")]
+            #[doc = concat!("let choice: ", stringify!($name), " = \"", $text, "\".parse()?;")]
+            #[doc = concat!("assert_eq!(choice.name(), \"", $text, "\");")]
+            /// # Ok::<(), tactile_imaging::pipeline::UnknownStage>(())
+            /// ```
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self { Self::$first => $text, $(Self::$variant => $other),+ }
@@ -165,14 +179,57 @@ choice! {
 }
 
 /// A way from image to surface, of whatever kind.
+///
+/// ```
+/// use tactile_imaging::{pipeline::BoxedReconstruction, sfs::{Domain, Eikonal, Lighting, Rim}};
+/// let surface: BoxedReconstruction = Box::new(Eikonal::new(Lighting::frontal()).with_rim(Rim::Height(0.0))?);
+/// // Inside a disc of 15 pixels, n·s = 1/√2 everywhere: a cone of slope 1.
+/// let inside = |(r, c): (usize, usize)| (r as f64 - 20.0).hypot(c as f64 - 20.0) < 15.0;
+/// let (mask, image) = (ndarray::Array2::from_shape_fn((41, 41), inside), ndarray::Array2::from_elem((41, 41), 0.5_f64.sqrt()));
+/// let found = surface.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?;
+/// assert!((found.heights[[20, 20]] - 15.0).abs() < 1.5);
+/// # Ok::<(), tactile_imaging::sfs::SfsError>(())
+/// ```
 pub type BoxedReconstruction = Box<dyn SurfaceReconstruction<f64> + Send + Sync>;
 /// A choice of control points, of whatever kind.
+///
+/// ```
+/// use tactile_imaging::{pipeline::BoxedSampler, sfs::{EquallySpaced, Random}};
+/// let samplers: [BoxedSampler; 2] = [Box::new(EquallySpaced::new()), Box::new(Random::new(1))];
+/// let flat = ndarray::Array2::<f64>::zeros((9, 9));
+/// assert!(samplers.iter().all(|s| s.sample(flat.view(), None, [1.0; 2], 5).unwrap().len() == 5));
+/// ```
 pub type BoxedSampler = Box<dyn ControlPointSampler<f64> + Send + Sync>;
 /// A matcher, of whatever kind.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use tactile_imaging::{matching::NearestNeighbour, pipeline::BoxedMatcher};
+/// let matcher: BoxedMatcher = Box::new(NearestNeighbour::new());
+/// let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]].map(Point3::from);
+/// assert_eq!(matcher.match_points(&points, &points).unwrap().assignment, [Some(0), Some(1)]);
+/// ```
 pub type BoxedMatcher = Box<dyn PointMatcher<f64, 3> + Send + Sync>;
 /// A measure of strain, of whatever kind.
+///
+/// ```
+/// use tactile_imaging::{elasticity::strain::Hencky, pipeline::BoxedStrain};
+/// let strain: BoxedStrain = Box::new(Hencky);
+/// assert!(strain.name().contains("Hencky"));
+/// ```
 pub type BoxedStrain = Box<dyn StrainMeasure<f64> + Send + Sync>;
 /// A family of warps, of whatever kind.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use tactile_imaging::{pipeline::BoxedWarpModel, tps::AffineModel};
+/// let warp: BoxedWarpModel = Box::new(AffineModel);
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Point3::from);
+/// let doubled = corners.map(|p| p * 2.0);
+/// let fitted = warp.fit_warp(&corners, &doubled, &[1.0; 4])?;
+/// assert!((fitted.apply(&Point3::new(1.0, 1.0, 1.0)) - Point3::new(2.0, 2.0, 2.0)).norm() < 1e-9);
+/// # Ok::<(), tactile_imaging::tps::TpsError>(())
+/// ```
 pub type BoxedWarpModel = Box<dyn FitWarp>;
 
 /// A family of warps whose warps are boxed: [`WarpModel`] for objects. Every model whose warps can cross threads is one.

@@ -7,6 +7,14 @@ use std::ops::ControlFlow;
 use tactile_tps::Scalar;
 
 /// A model and its target.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{PointSets, RelaxationMatcher};
+/// let points = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0]].map(Point2::from);
+/// let pair: PointSets<'_, f64, 2> = (&points, &points);
+/// assert_eq!(RelaxationMatcher::default().match_all(&[pair])[0].as_ref().unwrap().assignment, [Some(0), Some(1), Some(2)]);
+/// ```
 pub type PointSets<'a, T, const D: usize> = (&'a [Point<T, D>], &'a [Point<T, D>]);
 
 impl RelaxationMatcher {
