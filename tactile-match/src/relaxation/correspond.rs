@@ -1,12 +1,8 @@
-//! A start from the points' surroundings: shape contexts propose, relaxation labelling decides, a robust fit keeps what
-//! agrees.
+//! Pairs from the points' surroundings: shape contexts propose, relaxation labelling decides.
 
-use super::anneal::{Annealer, State};
-use super::axes::Axes;
 use super::labelling::Labelling;
-use super::prior::{Prior, PriorScales};
 use crate::shape_context::ShapeContexts;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Candidates a model point.
 const CANDIDATES: usize = 10;
@@ -20,13 +16,10 @@ const COST_SCALE: f64 = 0.05;
 const SLACK: f64 = 0.1;
 const SLACK_GAIN: f64 = 0.05;
 const SWEEPS: usize = 12;
-/// Rounds of the robust fit; the first half with a nearly affine warp.
-const ROUNDS: usize = 12;
-const STIFF: f64 = 0.05;
 
-/// Memory of the start.
+/// Memory of the search for pairs.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Correspondence<const D: usize> {
+pub(crate) struct Correspondence {
     model_contexts: ShapeContexts,
     target_contexts: ShapeContexts,
     costs: Vec<f32>,
@@ -34,29 +27,26 @@ pub(crate) struct Correspondence<const D: usize> {
     labels: Labelling,
     neighbours: Vec<usize>,
     reach: Vec<f64>,
-    prior: Prior,
-    weights: Vec<f64>,
-    trust: Vec<f64>,
-    wanted: Axes<D>,
+    /// The likeliest target of every model point, with its probability.
+    pub(crate) pairs: Vec<(usize, f64)>,
 }
 
-impl<const D: usize> Correspondence<D> {
-    /// Finds a first warp of `base` from the surroundings of the points, into `state.warped`.
-    pub(crate) fn start(
-        &mut self,
-        annealer: &mut Annealer<D>,
-        scales: PriorScales,
-        model: &[[f64; D]],
-        target: &[[f64; D]],
-        state: &mut State<D>,
-    ) {
-        self.propose(&state.base, target);
-        self.relax(&state.base, target);
-        self.consensus(annealer, scales, model, target, state);
+impl Correspondence {
+    /// Finds `pairs` for model points as they lie.
+    pub(crate) fn find<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
+        self.propose(model, target);
+        self.relax(model, target);
+        let likeliest = |i| {
+            self.labels
+                .row(i)
+                .fold((0, 0.0), |best: (usize, f64), entry| if entry.1 > best.1 { entry } else { best })
+        };
+        self.pairs.clear();
+        self.pairs.extend((0..model.len()).map(likeliest));
     }
 
     /// The candidates of least shape-context cost, with first probabilities.
-    fn propose(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
+    fn propose<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
         self.model_contexts.build(model, RADIUS);
         self.target_contexts.build(target, RADIUS);
         self.labels.reset(target.len(), SLACK);
@@ -79,7 +69,7 @@ impl<const D: usize> Correspondence<D> {
     }
 
     /// Relaxation with the paper's compatibilities over nearest neighbours.
-    fn relax(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
+    fn relax<const D: usize>(&mut self, model: &[[f64; D]], target: &[[f64; D]]) {
         let kept = self.find_neighbours(model);
         let (neighbours, reach) = (&self.neighbours, &self.reach);
         let near = |i: usize| &neighbours[i * kept..(i + 1) * kept];
@@ -101,7 +91,7 @@ impl<const D: usize> Correspondence<D> {
     }
 
     /// Lists the nearest neighbours of every model point and the distance to the farthest of them.
-    fn find_neighbours(&mut self, model: &[[f64; D]]) -> usize {
+    fn find_neighbours<const D: usize>(&mut self, model: &[[f64; D]]) -> usize {
         let kept = NEIGHBOURS.min(model.len() - 1);
         self.neighbours.clear();
         self.reach.clear();
@@ -119,56 +109,6 @@ impl<const D: usize> Correspondence<D> {
             self.neighbours.extend_from_slice(&self.order);
         }
         kept
-    }
-
-    /// Robust regression of the likeliest pairs: those far from the common warp lose their say, round by round.
-    fn consensus(
-        &mut self,
-        annealer: &mut Annealer<D>,
-        scales: PriorScales,
-        model: &[[f64; D]],
-        target: &[[f64; D]],
-        state: &mut State<D>,
-    ) {
-        self.prior.build(model, PriorScales { bending: STIFF, ..scales });
-        let stride = self.prior.stride;
-        self.trust.clear();
-        let (labels, trust, base) = (&self.labels, &mut self.trust, &state.base);
-        self.wanted.fill(
-            stride,
-            (0..model.len()).map(|i| {
-                let best =
-                    labels.row(i).fold((0, 0.0), |best, entry| if entry.1 > best.1 { entry } else { best });
-                trust.push(best.1.clamp(0.05, 0.95));
-                difference(&target[best.0], &base[i])
-            }),
-        );
-        self.weights.clone_from(&self.trust);
-        self.weights.resize(stride, 0.0);
-        let mut variance = 1.0;
-        for round in 0..ROUNDS {
-            let prior = if round < ROUNDS / 2 { &self.prior } else { &annealer.prior };
-            annealer.regression.fit(prior, &self.weights, &self.wanted, f64::max(variance, 1e-4));
-            variance = self.reweigh(&annealer.regression.displacement, variance, annealer.volume);
-        }
-        for (i, warped) in state.warped.iter_mut().enumerate() {
-            *warped = std::array::from_fn(|k| state.base[i][k] + annealer.regression.displacement.0[k][i]);
-        }
-    }
-
-    /// New weights from the residuals; the residual variance of those that agree, at most halved a round.
-    fn reweigh(&mut self, displacement: &Axes<D>, last: f64, volume: f64) -> f64 {
-        let square =
-            |i: usize| (0..D).map(|k| (displacement.0[k][i] - self.wanted.0[k][i]).powi(2)).sum::<f64>();
-        let weight: f64 = self.weights.iter().sum();
-        let sum: f64 = (0..self.trust.len()).map(|i| self.weights[i] * square(i)).sum();
-        let variance = (sum / (D as f64 * weight.max(1e-9))).max(0.5 * last).clamp(1e-6, last);
-        let stray = (TAU * variance).powf(0.5 * D as f64) / volume;
-        for (i, &trust) in self.trust.iter().enumerate() {
-            let agree = (-0.5 * square(i) / variance).exp() * trust;
-            self.weights[i] = agree / (agree + (1.0 - trust) * stray).max(f64::MIN_POSITIVE);
-        }
-        variance
     }
 }
 

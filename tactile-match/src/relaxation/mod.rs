@@ -2,13 +2,15 @@
 //!
 //! Given where the warp puts the model points, `m_ij ∝ exp(−|yᵢ − tⱼ|²/2σ²)` made doubly stochastic with slack (15) says
 //! softly who is whom; given that, the warp is the posterior mean of a smooth random field through the soft partners. Both
-//! alternate while the temperature σ falls. Three things make this sure and quick:
+//! alternate while the temperature σ falls. Four things make this sure and quick:
 //!
 //! - Distances are taken from the *leave-one-out* prediction of the warp, so that a wrong match does not confirm itself.
 //! - The field's covariance has few modes: a fit costs `O(I r²)` with r near 30, and its leverages come with it.
 //! - Most scenes are easy and end with the first run (`search`). Others get further starts: from shape contexts and
 //!   relaxation labelling with the paper's α, β, γ over few candidates (`correspond`, [`Labelling`]), and from the moments.
 //!   The start of least energy wins: minus the logarithm of the targets' likelihood and of the warp's prior.
+//! - In a dense set a part may lie one point aside, and no temperature mends that: the patterns of the neighbours do
+//!   (`constellation`).
 //!
 //! Where the residuals are rounding the data are clean, and matched points go exactly onto their partners. Where they are
 //! noise the scales of the field are averaged over by their evidence, unless the matches themselves are undecided. The
@@ -22,6 +24,9 @@ mod anneal;
 mod axes;
 mod batch;
 mod blocks;
+mod cells;
+mod consensus;
+mod constellation;
 mod correspond;
 mod finish;
 mod frame;
@@ -42,6 +47,8 @@ use crate::{
     MatchError, MatchReport, Matching, PointMatcher, SoftMatches, StopReason, hard, unmatched_rows, validate,
 };
 use anneal::{Annealer, State};
+use consensus::Consensus;
+use constellation::Constellations;
 use correspond::Correspondence;
 use finish::Answer;
 use frame::Frame;
@@ -82,7 +89,9 @@ pub struct RelaxationWorkspace<const D: usize> {
     state: State<D>,
     best: State<D>,
     answer: Answer<D>,
-    correspondence: Correspondence<D>,
+    correspondence: Correspondence,
+    constellations: Constellations<D>,
+    consensus: Consensus<D>,
     start: State<D>,
     mean: Vec<[f64; D]>,
     starts: usize,

@@ -1,8 +1,8 @@
 //! The search: which starts are tried, in which order, and when it is over.
 //!
 //! Most scenes are easy and end with the first, fast run. Where the answer is not exact and complete, further starts
-//! follow: warmer and slower, from shape contexts and relaxation labelling, from the moments. The start with the least
-//! energy wins; noisy scenes then choose the scales of the prior by their evidence.
+//! follow: from the patterns of a dense set, warmer and slower, from shape contexts and relaxation labelling, from the
+//! moments. The start with the least energy wins; noisy scenes then choose the scales of the prior by their evidence.
 
 use super::anneal::Schedule;
 use super::prior::PriorScales;
@@ -31,8 +31,11 @@ const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, patience: 12, sweep
 const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, patience: usize::MAX, sweeps: 5 };
 /// So many points that an incomplete exact answer is not worth a second try.
 const MANY: usize = 500;
-/// First temperatures of further reheats of so many points, in spacings of the targets.
-const MENDS: [f64; 5] = [0.5, 0.15, 0.15, 0.5, 0.15];
+/// Most times that the patterns of so many points are looked at, and the temperature that follows, in spacings.
+const PATTERNS: usize = 3;
+const PATTERN_SIGMA: f64 = 0.3;
+/// Residuals of so many points below this many spacings leave no doubt: one point aside, they would be larger.
+const PLAIN: f64 = 0.15;
 /// Share of the smaller set that an exact answer should match.
 const COMPLETE: f64 = 0.98;
 /// Residuals are judged no finer than this.
@@ -76,17 +79,19 @@ impl RelaxationMatcher {
         mut flow: ControlFlow<()>,
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        if flow.is_continue() && !self.is_exact(ws) {
+        if flow.is_continue() && !self.is_done(ws) {
             flow = self.mend(ws, observe);
         }
-        if flow.is_continue() && !self.is_exact(ws) {
+        if flow.is_continue() && !self.is_done(ws) {
             starts::centred(&ws.model, &ws.target, &mut ws.state.base);
             flow = self.attempt(ws, SLOW, observe);
         }
-        if self.options.rotation == Rotation::Limited && flow.is_continue() && !self.is_exact(ws) {
+        if self.options.rotation == Rotation::Limited && flow.is_continue() && !self.is_done(ws) {
             starts::centred(&ws.model, &ws.target, &mut ws.state.base);
             ws.state.warped.clone_from(&ws.state.base);
-            ws.correspondence.start(&mut ws.annealer, SCALES, &ws.model, &ws.target, &mut ws.state);
+            ws.correspondence.find(&ws.state.base, &ws.target);
+            let sets = (&*ws.model, &*ws.target);
+            ws.consensus.fit(&mut ws.annealer, SCALES, sets, &ws.correspondence.pairs, &mut ws.state);
             flow = self.refine(ws, Pace { sigma: 0.15, ..SLOW }, observe);
         }
         let rotations = match self.options.rotation {
@@ -94,13 +99,13 @@ impl RelaxationMatcher {
             Rotation::Limited => starts::LIMITED,
         };
         for rotation in starts::rotations::<D>(rotations) {
-            if flow.is_break() || self.is_exact(ws) {
+            if flow.is_break() || self.is_done(ws) {
                 break;
             }
             starts::moments(&ws.model, &ws.target, &rotation, &mut ws.state.base);
             flow = self.attempt(ws, SLOW, observe);
         }
-        if flow.is_continue() && !self.is_exact(ws) && ws.starts > 2 {
+        if flow.is_continue() && !self.is_done(ws) && ws.starts > 2 {
             flow = self.reheat(ws, REHEAT.sigma, observe);
         }
         if flow.is_continue() && ws.best.sigma > finish::CLEAN {
@@ -160,6 +165,19 @@ impl RelaxationMatcher {
         }
     }
 
+    /// Whether no further start can do better.
+    fn is_done<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
+        self.is_exact(ws) || self.is_plain(ws)
+    }
+
+    /// Whether the residuals of a dense set are so far below its spacing, for nearly all points, that no part can lie aside.
+    fn is_plain<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
+        let points = ws.model.len().min(ws.target.len());
+        points >= MANY
+            && ws.best.sigma <= PLAIN * ws.constellations.spacing
+            && ws.best.matched >= 0.8 * points as f64
+    }
+
     /// Whether the best run so far explains nearly every point of the smaller set to rounding.
     fn is_exact<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
@@ -167,22 +185,42 @@ impl RelaxationMatcher {
         ws.best.sigma <= finish::CLEAN && ws.best.matched >= wanted * points as f64
     }
 
-    /// Reheats. A dense set again and again, below the targets' spacing, so that it does not slip by one point: what is right
-    /// then spreads from its border.
+    /// Mends parts that went astray: by the patterns of the points in a dense set, by a reheat elsewhere.
     fn mend<const D: usize>(
         &self,
         ws: &mut RelaxationWorkspace<D>,
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let points = ws.model.len().min(ws.target.len());
-        let spacing = (ws.annealer.volume / ws.target.len() as f64).powf(1.0 / D as f64);
-        let dense = if points < MANY { &[][..] } else { &MENDS };
-        self.reheat(ws, REHEAT.sigma, observe)?;
-        for part in dense {
-            if ws.best.matched >= COMPLETE * points as f64 {
+        if ws.model.len().min(ws.target.len()) >= MANY {
+            self.follow_patterns(ws, observe)?;
+            if self.is_done(ws) {
+                return ControlFlow::Continue(());
+            }
+        }
+        self.reheat(ws, REHEAT.sigma, observe)
+    }
+
+    /// Short runs from where the patterns of a dense set put it, as long as each matches more points.
+    fn follow_patterns<const D: usize>(
+        &self,
+        ws: &mut RelaxationWorkspace<D>,
+        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let points = ws.model.len().min(ws.target.len()) as f64;
+        for _ in 0..PATTERNS {
+            let before = (ws.best.matched, ws.best.sigma);
+            ws.state.copy_from(&ws.best);
+            if !ws.constellations.propose(&ws.state.warped, &ws.target) {
                 break;
             }
-            self.reheat(ws, REHEAT.sigma.min(part * spacing), observe)?;
+            let sets = (&*ws.model, &*ws.target);
+            ws.consensus.fit(&mut ws.annealer, SCALES, sets, &ws.constellations.pairs, &mut ws.state);
+            let sigma = PATTERN_SIGMA * ws.constellations.spacing;
+            self.refine(ws, Pace { sigma, ..REHEAT }, observe)?;
+            let (matched, sigma) = (ws.best.matched, ws.best.sigma);
+            if matched >= COMPLETE * points || (matched < 1.01 * before.0 && sigma > 0.99 * before.1) {
+                break;
+            }
         }
         ControlFlow::Continue(())
     }

@@ -5,6 +5,7 @@ mod assignment;
 mod common;
 mod conformance;
 mod dense;
+mod dense_sets;
 mod drift;
 mod hostile;
 mod labelling_against_dense;
