@@ -4,7 +4,7 @@ use crate::frame::Frame;
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
 use tactile_tps::{
-    Affine, AffineModel, FitOptions, NegR, R2LogR, Scalar, Smoothing, Spline, Warp, WarpModel,
+    Affine, AffineModel, Factorization, FitOptions, NegR, R2LogR, Scalar, Smoothing, Warp, WarpModel,
 };
 
 /// Soft matches below this weight are left out.
@@ -130,36 +130,69 @@ fn through<T: Scalar, const D: usize>(
     (Box::new(Affine::identity()), model.to_vec())
 }
 
-/// The thin-plate spline through these pairs (`r² ln r²` in the plane, `−r` in space); an affine map where they determine no
-/// spline, the identity where there are none.
+/// The factorised thin-plate system of some sources: `r² ln r²` in the plane, `−r` in space.
+#[derive(Clone, Debug)]
+enum System<T: Scalar, const D: usize> {
+    Plane(Box<Factorization<T, D, R2LogR>>),
+    Space(Box<Factorization<T, D, NegR>>),
+}
+
+/// Interpolation between one set of sources and any images of them: factorised once.
+#[derive(Clone, Debug)]
+pub(crate) struct Interpolation<T: Scalar, const D: usize> {
+    /// None where the sources determine no spline.
+    system: Option<System<T, D>>,
+    weights: Option<Vec<T>>,
+    smoothing: Smoothing<T>,
+}
+
+impl<T: Scalar, const D: usize> Interpolation<T, D> {
+    pub(crate) fn new(sources: &[Point<T, D>], weights: Option<Vec<T>>, smoothing: Smoothing<T>) -> Self {
+        fn options<T: Scalar, K>(
+            kernel: K,
+            smoothing: Smoothing<T>,
+            weights: &Option<Vec<T>>,
+        ) -> FitOptions<T, K> {
+            let options = FitOptions::new(kernel).smoothing(smoothing);
+            weights.iter().fold(options, |options, weights| options.weights(weights.clone()))
+        }
+        let system = if D == 2 {
+            let plane = Factorization::new(sources, &options(R2LogR, smoothing, &weights));
+            plane.ok().map(|plane| System::Plane(Box::new(plane)))
+        } else {
+            let space = Factorization::new(sources, &options(NegR, smoothing, &weights));
+            space.ok().map(|space| System::Space(Box::new(space)))
+        };
+        Self { system, weights, smoothing }
+    }
+
+    /// The spline through these pairs; an affine map where they determine none, the identity where there are none.
+    pub(crate) fn through(
+        &self,
+        sources: &[Point<T, D>],
+        images: &[Point<T, D>],
+    ) -> Box<dyn Warp<T, D> + Send + Sync> {
+        let spline: Option<Box<dyn Warp<T, D> + Send + Sync>> = match &self.system {
+            Some(System::Plane(plane)) => plane.fit(images).ok().map(|spline| Box::new(spline) as _),
+            Some(System::Space(space)) => space.fit(images).ok().map(|spline| Box::new(spline) as _),
+            None => None,
+        };
+        let exact = self.smoothing == Smoothing::None;
+        spline.filter(|spline| follows(&**spline, sources, images, exact)).unwrap_or_else(|| {
+            let affine = AffineModel.fit(sources, images, self.weights.as_deref());
+            Box::new(affine.unwrap_or_else(|_| Affine::identity()))
+        })
+    }
+}
+
+/// The thin-plate spline through these pairs; see [`Interpolation`].
 pub(crate) fn spline<T: Scalar, const D: usize>(
     sources: &[Point<T, D>],
     images: &[Point<T, D>],
     weights: Option<Vec<T>>,
     smoothing: Smoothing<T>,
 ) -> Box<dyn Warp<T, D> + Send + Sync> {
-    fn options<T: Scalar, K>(
-        kernel: K,
-        smoothing: Smoothing<T>,
-        weights: &Option<Vec<T>>,
-    ) -> FitOptions<T, K> {
-        let options = FitOptions::new(kernel).smoothing(smoothing);
-        weights.iter().fold(options, |options, weights| options.weights(weights.clone()))
-    }
-    let exact = smoothing == Smoothing::None;
-    let spline: Option<Box<dyn Warp<T, D> + Send + Sync>> = if D == 2 {
-        let fit = Spline::<T, D, D, R2LogR>::fit(sources, images, &options(R2LogR, smoothing, &weights));
-        fit.ok().map(|spline| Box::new(spline) as _)
-    } else {
-        let fit = Spline::<T, D, D, NegR>::fit(sources, images, &options(NegR, smoothing, &weights));
-        fit.ok().map(|spline| Box::new(spline) as _)
-    };
-    match spline.filter(|spline| follows(&**spline, sources, images, exact)) {
-        Some(spline) => spline,
-        None => Box::new(
-            AffineModel.fit(sources, images, weights.as_deref()).unwrap_or_else(|_| Affine::identity()),
-        ),
-    }
+    Interpolation::new(sources, weights, smoothing).through(sources, images)
 }
 
 /// Whether the spline is any good: where sources nearly coincide and their images do not, no digit is left in it.

@@ -25,6 +25,7 @@ mod hard;
 mod matching;
 mod nearest;
 mod relaxation;
+mod series;
 mod shape_context;
 mod soft;
 mod validate;
@@ -40,5 +41,6 @@ pub use relaxation::{
     Labelling, Outliers, PointSets, RelaxationMatch, RelaxationMatcher, RelaxationOptions,
     RelaxationWorkspace, Rotation, Search,
 };
+pub use series::MatchSeries;
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;

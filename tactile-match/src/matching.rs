@@ -1,6 +1,6 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
-use crate::{MatchError, SoftMatches};
+use crate::{MatchError, MatchSeries, SoftMatches};
 use nalgebra::{Point, SMatrix};
 use tactile_tps::{Scalar, Warp};
 
@@ -18,6 +18,35 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError>;
+
+    /// As [`match_points`](Self::match_points), for the next target of a series: a matcher may begin where the last match of
+    /// the same model ended ([`MatchSeries`]). The others match anew.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{LinearAssignment, MatchSeries, PointMatcher};
+    /// let model = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]].map(Point2::from);
+    /// let (matcher, mut series) = (LinearAssignment::new(), MatchSeries::new());
+    /// for step in [0.1, 0.2] {
+    ///     let target = model.map(|p| Point2::new(p.x + step, p.y));
+    ///     assert_eq!(matcher.match_next(&mut series, &model, &target)?.assignment[2], Some(2));
+    /// }
+    /// assert!((series.last_for(&model).unwrap()[0] - Point2::new(0.2, 0.0)).norm() < 1e-12);
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`match_points`](Self::match_points).
+    fn match_next(
+        &self,
+        series: &mut MatchSeries<T, D>,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
+        let found = self.match_points(model, target)?;
+        series.remember(model, &found);
+        Ok(found)
+    }
 }
 
 /// Why a matcher stopped.

@@ -6,7 +6,7 @@
 //! weighted fit costs `O(I r²)`.
 
 /// Scales of the prior, in radii of the model.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PriorScales {
     /// Length ℓ over which the warp bends.
     pub(crate) length: f64,
@@ -37,12 +37,21 @@ pub(crate) struct Prior {
     left: Vec<f64>,
     pivots: Vec<usize>,
     diagonal: Vec<f64>,
+    /// What it was built for: the same again costs nothing.
+    points: Vec<f64>,
+    scales: PriorScales,
 }
 
 impl Prior {
     /// Factors the covariance at `points` (in the frame's units): `O(I r²)`.
     pub(crate) fn build<const D: usize>(&mut self, points: &[[f64; D]], scales: PriorScales) {
         let n = points.len();
+        if self.scales == scales && self.points == points.as_flattened() {
+            return;
+        }
+        self.scales = scales;
+        self.points.clear();
+        self.points.extend_from_slice(points.as_flattened());
         let gaussian = -0.5 / scales.length.powi(2);
         let (bending, affine) = (scales.bending.powi(2), scales.affine.powi(2));
         let covariance = |a: &[f64; D], b: &[f64; D]| {

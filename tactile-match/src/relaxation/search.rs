@@ -27,6 +27,8 @@ const FAST: Pace = Pace { sigma: 0.3, rate: 0.75, least: 0.9, patience: usize::M
 const REHEAT: Pace = Pace { sigma: 0.1, rate: 0.9, least: 1.0, patience: usize::MAX, sweeps: 5 };
 /// The only try between sets that lie near each other. Residuals that stay above the temperature, whatever else moves, end it.
 const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, patience: 12, sweeps: 3 };
+/// Least first temperature of a run from the last answer of a series.
+const COOLEST: f64 = 0.03;
 /// Further tries.
 const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, patience: usize::MAX, sweeps: 5 };
 /// So many points that an incomplete exact answer is not worth a second try.
@@ -50,12 +52,7 @@ impl RelaxationMatcher {
         ws: &mut RelaxationWorkspace<D>,
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) {
-        ws.annealer.volume = bounding_volume(&ws.target);
-        ws.annealer.prior.build(&ws.model, SCALES);
-        ws.annealer.soft.set_targets(&ws.target);
-        (ws.starts, ws.stopped) = (0, false);
-        ws.best.energy = f64::INFINITY;
-        starts::centred(&ws.model, &ws.target, &mut ws.state.base);
+        begin(ws);
         let flow = match self.options.search {
             Search::Near => self.attempt(ws, NEAR, observe),
             Search::Thorough => {
@@ -63,12 +60,34 @@ impl RelaxationMatcher {
                 self.try_further(ws, flow, observe)
             }
         };
+        ws.stopped = flow.is_break();
+        self.conclude(ws);
+    }
+
+    /// One short run from `start`, at first as warm as `sigma`, between the coldest that lets points change their partners and
+    /// that of sets near each other.
+    pub(super) fn solve_from<const D: usize>(
+        &self,
+        ws: &mut RelaxationWorkspace<D>,
+        start: &[[f64; D]],
+        sigma: f64,
+    ) {
+        begin(ws);
+        ws.state.warped.clear();
+        ws.state.warped.extend_from_slice(start);
+        let pace = Pace { sigma: sigma.clamp(COOLEST, NEAR.sigma), ..NEAR };
+        // Nobody listens, so nobody breaks off.
+        let _ = self.refine(ws, pace, &mut |_, _| ControlFlow::Continue(()));
+        self.conclude(ws);
+    }
+
+    /// Reads the answer from the best run.
+    fn conclude<const D: usize>(&self, ws: &mut RelaxationWorkspace<D>) {
         if ws.starts > 1 || !self.is_exact(ws) {
             // Later runs have left their own fit behind.
             let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
             ws.annealer.look(&ws.best, &mut ws.state, &schedule);
         }
-        ws.stopped = flow.is_break();
         ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
     }
 
@@ -271,6 +290,16 @@ impl RelaxationMatcher {
         }
         flow
     }
+}
+
+/// Prepares a search: nothing is found yet, the sets lie with their centroids on each other.
+fn begin<const D: usize>(ws: &mut RelaxationWorkspace<D>) {
+    ws.annealer.volume = bounding_volume(&ws.target);
+    ws.annealer.prior.build(&ws.model, SCALES);
+    ws.annealer.soft.set_targets(&ws.target);
+    (ws.starts, ws.stopped) = (0, false);
+    ws.best.energy = f64::INFINITY;
+    starts::centred(&ws.model, &ws.target, &mut ws.state.base);
 }
 
 /// Volume of the bounding box; thin sides count as a tenth of the model's radius.

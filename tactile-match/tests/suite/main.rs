@@ -12,6 +12,7 @@ mod labelling_against_dense;
 mod reference;
 mod relaxation;
 mod serialtrack;
+mod series;
 mod sparse_against_dense;
 mod stability;
 mod stability_scale;
