@@ -3,6 +3,14 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// What a reader wanted to find at the place that [`ReadError`] names.
+///
+/// ```
+/// use tactile_imaging::io::{Expected, ReadError, points::parse_points};
+/// let error = parse_points::<2>(b"0.5,1.5\n2,x\n", "points.csv").unwrap_err();
+/// let ReadError::Field { line, column, expected, .. } = error else { unreachable!() };
+/// assert_eq!((line, column, expected), (2, 2, Expected::FiniteNumber));
+/// assert_eq!(Expected::TaggedRows('m', 3).to_string(), "3 rows tagged m");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Expected {
@@ -47,6 +55,15 @@ impl fmt::Display for Expected {
 }
 
 /// Why a file could not be read or written. Every message names the file.
+///
+/// ```
+/// use tactile_imaging::io::{ReadError, grid::parse_grid, read_grid};
+/// let ragged = parse_grid(b"0.1,0.2\n0.3\n", "depth.csv").unwrap_err();
+/// assert_eq!(ragged.to_string(), "depth.csv, line 2: expected 2 columns, found 1");
+/// let absent = read_grid("nowhere/depth.csv").unwrap_err();
+/// assert!(matches!(absent, ReadError::Open { .. }));
+/// assert!(absent.to_string().starts_with("cannot read nowhere/depth.csv: "));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {

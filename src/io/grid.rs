@@ -7,6 +7,18 @@ use std::path::Path;
 
 /// Reads a matrix `[row, column]`; empty cells and `nan` are NaN.
 ///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::read_grid;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("height_mm.csv");
+/// std::fs::write(&path, "0.1,0.2,0.3\n0.4,,nan\n")?;
+/// let height = read_grid(&path)?;
+/// assert_eq!((height.dim(), height[[0, 2]]), ((2, 3), 0.3));
+/// assert!(height[[1, 1]].is_nan() && height[[1, 2]].is_nan());
+/// # Ok(()) }
+/// ```
+///
 /// # Errors
 /// [`ReadError`], see the [module](super).
 pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, ReadError> {
@@ -16,6 +28,13 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, ReadError> {
 
 /// Parses a matrix from the bytes of a CSV file; `name` stands for the file in errors.
 ///
+/// ```
+/// use tactile_imaging::io::grid::parse_grid;
+/// let pressure_pa = parse_grid(b"0;1.5e4\n2e4;0\n", "pressure.csv")?;
+/// assert_eq!(pressure_pa, ndarray::array![[0.0, 1.5e4], [2e4, 0.0]]);
+/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// ```
+///
 /// # Errors
 /// As [`read_grid`].
 pub fn parse_grid(bytes: &[u8], name: impl AsRef<Path>) -> Result<Array2<f64>, ReadError> {
@@ -23,6 +42,18 @@ pub fn parse_grid(bytes: &[u8], name: impl AsRef<Path>) -> Result<Array2<f64>, R
 }
 
 /// Writes a matrix without a header; reading it again gives the same bits (NaN stays NaN).
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{read_grid, write_grid};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("made/for/it/depth.csv");
+/// let depth = ndarray::array![[0.1 + 0.2, 1e-300], [f64::NAN, -0.0]];
+/// write_grid(&path, depth.view())?;
+/// let same = read_grid(&path)?.iter().zip(&depth).all(|(a, b)| a.to_bits() == b.to_bits());
+/// assert!(same);
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`ReadError::Write`].

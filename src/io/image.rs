@@ -10,12 +10,38 @@ use std::io::Cursor;
 use std::path::Path;
 
 /// Weights of red, green and blue in grey: the luma of Rec. 601.
+///
+/// ```
+/// use tactile_imaging::io::image::REC_601;
+/// let grey = |rgb: [f64; 3]| (0..3).map(|i| REC_601[i] * rgb[i]).sum::<f64>();
+/// assert!((grey([255.0; 3]) - 255.0).abs() < 1e-12, "white stays white");
+/// assert!(grey([0.0, 255.0, 0.0]) > grey([255.0, 0.0, 255.0]), "green weighs most");
+/// ```
 pub const REC_601: [f64; 3] = [0.299, 0.587, 0.114];
 
 /// Largest width and height that is read, px: beyond it a file is taken for broken.
+///
+/// ```
+/// use tactile_imaging::io::image::{LARGEST_SIDE, parse_grey_image};
+/// let line = |width: u32| {
+///     let header = format!("P5\n{width} 1\n255\n").into_bytes();
+///     [header, vec![0; width as usize]].concat()
+/// };
+/// assert!(parse_grey_image(&line(LARGEST_SIDE), "line.pgm").is_ok());
+/// assert!(parse_grey_image(&line(LARGEST_SIDE + 1), "line.pgm").is_err());
+/// ```
 pub const LARGEST_SIDE: u32 = 30_000;
 
 /// A grey image, `[row, column]`.
+///
+/// ```
+/// use tactile_imaging::io::image::parse_grey_image;
+/// let image = parse_grey_image(b"P6\n2 1\n255\n\xff\x00\x00\x0a\x0a\x0a", "red_and_grey.ppm")?;
+/// assert!(image.colour && image.bits == 8);
+/// assert!((image.levels[[0, 0]] - 0.299 * 255.0).abs() < 1e-12);
+/// assert_eq!(image.to_u8(), ndarray::array![[76, 10]]);
+/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct GreyImage {
     /// Grey levels from 0 to 255, not rounded (colour and 16-bit samples have fractions).
@@ -55,6 +81,15 @@ pub fn read_grey_image(path: impl AsRef<Path>) -> Result<GreyImage, ReadError> {
 
 /// Decodes a grey image from the bytes of a file; `name` stands for the file in errors.
 ///
+/// ```
+/// use tactile_imaging::io::image::parse_grey_image;
+/// let image = parse_grey_image(b"P5\n2 1\n65535\n\x80\x80\xff\xff", "frame.pgm")?;
+/// assert_eq!((image.bits, image.levels), (16, ndarray::array![[128.0, 255.0]]));
+/// let error = parse_grey_image(b"force_N\n0.7\n", "frame.png").unwrap_err();
+/// assert!(error.to_string().starts_with("cannot decode the image frame.png"));
+/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// ```
+///
 /// # Errors
 /// [`ReadError::Image`].
 pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImage, ReadError> {
@@ -71,6 +106,16 @@ pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImag
 }
 
 /// Writes an 8-bit grey image: PGM where the name ends in `.pgm`, else PNG.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::write_grey_image;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("frame.pgm");
+/// write_grey_image(&path, ndarray::array![[10, 20, 30]].view())?;
+/// assert_eq!(std::fs::read(&path)?, b"P5\n3 1\n255\n\x0a\x14\x1e");
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`ReadError::Write`] and [`ReadError::Image`].

@@ -7,6 +7,22 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Points of a file whose number of columns is not known beforehand.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{PointTable, read_point_table};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("points.csv");
+/// for (text, dimension) in [("0.5,1.5\n2,3\n", 2), ("0.5,1.5,0.1\n2,3,0.2\n", 3)] {
+///     std::fs::write(&path, text)?;
+///     let (found, points) = match read_point_table(&path)? {
+///         PointTable::Plane(points) => (2, points.len()),
+///         PointTable::Space(points) => (3, points.len()),
+///     };
+///     assert_eq!((found, points), (dimension, 2));
+/// }
+/// # Ok(()) }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum PointTable {
     /// The file has two columns.
@@ -16,6 +32,18 @@ pub enum PointTable {
 }
 
 /// Reads points with two or three coordinates, as many as the file has columns.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{PointTable, read_point_table};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("points.csv");
+/// std::fs::write(&path, "x_m,y_m,z_m\n1e-3,2e-3,5e-4\n")?;
+/// assert_eq!(read_point_table(&path)?, PointTable::Space(vec![[1e-3, 2e-3, 5e-4].into()]));
+/// std::fs::write(&path, "1e-3\n")?;
+/// assert!(read_point_table(&path).unwrap_err().to_string().ends_with("expected 2 or 3 columns, found 1"));
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`ReadError`], see the [module](super).
@@ -55,6 +83,15 @@ pub fn read_points<const D: usize>(path: impl AsRef<Path>) -> Result<Vec<Point<f
 
 /// Parses points from the bytes of a CSV file; `name` stands for the file in errors.
 ///
+/// ```
+/// use nalgebra::Point3;
+/// use tactile_imaging::io::points::parse_points;
+/// let points = parse_points::<3>(b"x_mm;y_mm;z_mm\n# rim\n1;2;0.5\n", "points.csv")?;
+/// assert_eq!(points, [Point3::new(1.0, 2.0, 0.5)]);
+/// assert!(parse_points::<2>(b"1,2,0.5\n", "points.csv").is_err());
+/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// ```
+///
 /// # Errors
 /// As [`read_points`].
 pub fn parse_points<const D: usize>(
@@ -70,6 +107,17 @@ pub fn parse_points<const D: usize>(
 }
 
 /// Writes points with a header; reading them again gives the same bits.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use nalgebra::Point2;
+/// use tactile_imaging::io::write_points;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("points.csv");
+/// write_points(&path, &["x_m", "y_m"], &[Point2::new(1e-3, 0.25), Point2::new(0.1 + 0.2, 0.0)])?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "x_m,y_m\n0.001,0.25\n0.30000000000000004,0.0\n");
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`ReadError::Write`].

@@ -7,6 +7,19 @@ use ndarray::Array2;
 use std::path::Path;
 
 /// A rectangular table of numbers with the names of its columns, if it has a header.
+///
+/// ```
+/// use std::path::Path;
+/// use tactile_imaging::io::{ReadError, Table};
+/// let path = Path::new("calibration.csv");
+/// let values = ndarray::array![[5e4, 0.5], [1e5, 1.0]];
+/// let table = Table { header: vec!["integrated_pixel_value".into(), "force_N".into()], values };
+/// assert_eq!(table.column("force_n", 0, path)?, [0.5, 1.0], "a header counts, whatever its case");
+/// let bare = Table { header: vec![], ..table.clone() };
+/// assert_eq!(bare.column("force_n", 1, path)?, [0.5, 1.0], "without one the position does");
+/// assert!(matches!(table.column("depth_mm", 0, path), Err(ReadError::MissingColumn { .. })));
+/// # Ok::<(), ReadError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// Names of the columns; empty where the file has no header line.
@@ -36,6 +49,18 @@ impl Table {
 }
 
 /// Reads a table of finite numbers.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::read_table;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("calibration.csv");
+/// std::fs::write(&path, "# sensor 3\nintegrated_pixel_value\tforce_N\n5e4\t0.5\n1e5\t1\n")?;
+/// let table = read_table(&path)?;
+/// assert_eq!(table.header, ["integrated_pixel_value", "force_N"]);
+/// assert_eq!(table.values, ndarray::array![[5e4, 0.5], [1e5, 1.0]]);
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`ReadError`] where the file cannot be read, a field is no finite number, rows differ in length, or there are none.

@@ -1,6 +1,15 @@
 //! Colours for categories (readable for the colour-blind) and perceptually uniform colour maps.
 
 /// An opaque sRGB colour.
+///
+/// ```
+/// use tactile_imaging::plot::{Colour, Page, Panel};
+/// let line = [[0.0, 0.0], [1.0, 2.0]];
+/// let panel = Panel::new("").line(line, Colour(18, 52, 86), "").line(line, Colour::CATEGORIES[0], "");
+/// let svg = Page::new("").panel(panel).to_svg()?;
+/// assert!(svg.contains("#123456") && svg.contains("#0072B2"), "the second is Colour::BLUE");
+/// # Ok::<(), tactile_imaging::plot::PlotError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Colour(pub u8, pub u8, pub u8);
 
@@ -30,6 +39,15 @@ impl Colour {
 }
 
 /// A map from the unit interval to colours.
+///
+/// ```
+/// use tactile_imaging::plot::{ColorMap, Colour};
+/// assert_eq!(ColorMap::Grey.at(1.0), Colour::WHITE);
+/// assert_eq!(ColorMap::Viridis.at(-3.0), Colour(68, 1, 84), "held to [0, 1]");
+/// let (low, high) = (ColorMap::Diverging.at(0.0), ColorMap::Diverging.at(1.0));
+/// assert!(low.2 > low.0 && high.0 > high.2, "blue for negative, red for positive");
+/// assert_eq!(ColorMap::Viridis.at(f64::NAN), ColorMap::Grey.at(f64::NAN));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ColorMap {

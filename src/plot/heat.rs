@@ -5,6 +5,23 @@ use ndarray::{Array2, ArrayView2};
 use std::ops::Range;
 
 /// Values on a regular grid, `[row, column]`; NaN is left light grey.
+///
+/// ```
+/// use tactile_imaging::plot::{ColorMap, HeatMap, Page, Panel};
+/// let strain = ndarray::array![[-0.02, 0.0, 0.01], [f64::NAN, 0.01, 0.02]];
+/// let map = HeatMap::of_pixels(strain.view(), [0.5, 0.5], "strain e_zz")
+///     .origin([10.0, 20.0])
+///     .colours(ColorMap::Diverging)
+///     .range([-0.05, 0.05]);
+/// let frame = ndarray::Array2::from_elem((8, 8), 15_u8);
+/// let frame = HeatMap::of_frame(frame.view(), [0.1, 0.1]);
+/// let page = Page::new("").panel(Panel::new("").heat_map(map)).panel(Panel::new("").heat_map(frame));
+/// let svg = page.to_svg()?;
+/// for label in ["strain e_zz", "-0.04", "10.5", "grey level", "250"] {
+///     assert!(svg.contains(label), "{label}");
+/// }
+/// # Ok::<(), tactile_imaging::plot::PlotError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct HeatMap {
     pub(super) values: Array2<f64>,

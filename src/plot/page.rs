@@ -6,6 +6,16 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::{Path, PathBuf};
 
 /// Why a page could not be drawn or written.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::plot::{Page, PlotError};
+/// let file = tempfile::NamedTempFile::new()?;
+/// let error = Page::new("Frames").save(file.path().join("frames.svg")).unwrap_err();
+/// assert!(matches!(error, PlotError::Write { .. }), "a file is no folder");
+/// assert!(error.to_string().starts_with("cannot write "));
+/// # Ok(()) }
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
@@ -28,6 +38,20 @@ pub enum PlotError {
 }
 
 /// Panels in rows and columns under one title.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::plot::{Colour, Page, Panel};
+/// let panel = |k: u32| Panel::new(format!("frame {k}")).points([[0.0, f64::from(k)]], Colour::BLUE, "");
+/// let page = Page::new("Frames").columns(2).panel_size(300, 200);
+/// let page = (1..=3).fold(page, |page, k| page.panel(panel(k)));
+/// let svg = page.to_svg()?;
+/// assert!(svg.starts_with(r#"<svg width="600" height="444""#), "two rows under a title of 44 px");
+/// let folder = tempfile::tempdir()?;
+/// page.save(folder.path().join("plots/frames.svg"))?;
+/// assert_eq!(std::fs::read_to_string(folder.path().join("plots/frames.svg"))?, svg);
+/// # Ok(()) }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Page {
     title: String,

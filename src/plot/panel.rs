@@ -4,6 +4,16 @@ use super::heat::HeatMap;
 use super::layer::{Layer, Marker};
 
 /// How an axis counts.
+///
+/// ```
+/// use tactile_imaging::plot::{Colour, Page, Panel, Scale};
+/// let decades = [[0.0, 1e2], [1.0, 1e4], [2.0, 1e8]]; // depth (mm), modulus (Pa)
+/// let panel = Panel::new("").y_label("modulus (Pa)").line(decades, Colour::BLUE, "");
+/// let svg = |y| Page::new("").panel(panel.clone().scales(Scale::Linear, y)).to_svg();
+/// assert!(svg(Scale::Linear)?.contains("0.2×10⁸"));
+/// assert!(svg(Scale::Log10)?.contains("1×10⁶"));
+/// # Ok::<(), tactile_imaging::plot::PlotError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Scale {
@@ -24,6 +34,16 @@ impl Scale {
 }
 
 /// Where the legend stands.
+///
+/// ```
+/// use tactile_imaging::plot::{Colour, Legend, Page, Panel};
+/// let rising = [[0.0, 0.0], [1e6, 1.0], [2e6, 2.0]];
+/// let panel = Panel::new("Calibration").line(rising, Colour::BLUE, "fit");
+/// let svg = |legend| Page::new("").panel(panel.clone().legend(legend)).to_svg();
+/// assert_eq!(svg(Legend::Emptiest)?, svg(Legend::UpperLeft)?, "a rising line leaves that corner free");
+/// assert_ne!(svg(Legend::UpperLeft)?, svg(Legend::LowerRight)?);
+/// # Ok::<(), tactile_imaging::plot::PlotError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Legend {
@@ -41,6 +61,23 @@ pub enum Legend {
 }
 
 /// One set of axes and what is drawn in it.
+///
+/// ```
+/// use tactile_imaging::plot::{Colour, Marker, Page, Panel};
+/// let (loads, radii) = ([0.2, 0.7, 1.2], [2.1, 3.3, 3.9]);
+/// let at = || loads.into_iter().zip(radii).map(|(f, a)| [f, a]);
+/// let law = (0..=20).map(|i| 0.07 * f64::from(i)).map(|f: f64| [f, 3.7 * f.cbrt()]);
+/// let panel = Panel::new("Contact radius against force")
+///     .x_label("force (N)")
+///     .y_label("contact radius (mm)")
+///     .dashed(law, Colour::GREY, "a ∝ F^(1/3)")
+///     .error_bars(at(), [0.1; 3], Colour::BLUE)
+///     .points(at(), Colour::BLUE, "measured")
+///     .marked([[1.0, 3.0]], Marker::Cross, Colour::RED, "left out");
+/// let svg = Page::new("").panel(panel).to_svg()?;
+/// assert!(svg.contains("contact radius (mm)") && svg.contains("left out"));
+/// # Ok::<(), tactile_imaging::plot::PlotError>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
     pub(super) title: String,
@@ -77,6 +114,18 @@ impl Panel {
     }
 
     /// Gives both axes the same scale on the page.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{Colour, HeatMap, Page, Panel};
+    /// let panel = Panel::new("").arrows([[[0.0, 0.0], [9.0, 1.0]]], Colour::BLUE, "displacement");
+    /// let svg = |panel: Panel| Page::new("").panel(panel).to_svg();
+    /// assert_ne!(svg(panel.clone())?, svg(panel.clone().equal_aspect())?);
+    /// // Over a frame the y axis points down as well; a heat map sees to it.
+    /// let frame = HeatMap::of_frame(ndarray::array![[10, 20], [30, 40]].view(), [5.0, 5.0]);
+    /// let over = Panel::new("").heat_map(frame).arrows([[[0.0, 0.0], [5.0, 1.0]]], Colour::RED, "");
+    /// assert_eq!(svg(over.clone())?, svg(over.image_axes())?);
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn equal_aspect(mut self) -> Self {
         self.equal_aspect = true;
@@ -105,6 +154,15 @@ impl Panel {
     }
 
     /// Sets the range of the x axis.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{Colour, Page, Panel};
+    /// let panel = Panel::new("").line([[0.1, 0.2], [0.4, 0.8]], Colour::BLUE, "");
+    /// let svg = |panel: Panel| Page::new("").panel(panel).to_svg();
+    /// assert!(!svg(panel.clone())?.contains("120"));
+    /// assert!(svg(panel.x_range([0.0, 120.0]).y_range([0.0, 1.0]))?.contains("120"));
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn x_range(mut self, range: [f64; 2]) -> Self {
         self.x_range = Some(range);
@@ -145,6 +203,16 @@ impl Panel {
     }
 
     /// Adds points coloured by a value, with a colour bar.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{Page, Panel};
+    /// let (points, rise) = ([[0.0, 0.0], [1.0, 0.5], [2.0, 0.0]], [0.0, 12.0, 40.0]);
+    /// let panel = Panel::new("Along z").coloured_points(points, rise, "displacement (µm)");
+    /// let svg = Page::new("").panel(panel).to_svg()?;
+    /// assert!(svg.contains("#440154") && svg.contains("#FDE725"), "both ends of viridis");
+    /// assert!(svg.contains("displacement (µm)"), "the colour bar's label");
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn coloured_points(
         self,
@@ -191,6 +259,17 @@ impl Panel {
     }
 
     /// Adds plain segments, such as the matches between two point sets.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{Colour, Page, Panel};
+    /// let pairs = [[[0.0, 0.0], [1.0, 0.2]], [[0.0, 1.0], [1.0, 1.2]]];
+    /// let svg = |panel: Panel| Page::new("").panel(panel).to_svg();
+    /// let heads = |text: String| text.matches("<polygon").count();
+    /// let plain = heads(svg(Panel::new("").segments(pairs, Colour::GREY, "match"))?);
+    /// let arrows = heads(svg(Panel::new("").arrows(pairs, Colour::GREY, "match"))?);
+    /// assert_eq!(arrows, plain + 2);
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn segments(
         self,
@@ -209,6 +288,14 @@ impl Panel {
     }
 
     /// Makes the panel a block of text lines instead of axes. A tab in a line starts the second column.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{Page, Panel};
+    /// let panel = Panel::new("Results").text(["Young's modulus\t103 ± 4 kPa".to_owned()]);
+    /// let svg = Page::new("").panel(panel).to_svg()?;
+    /// assert!(svg.contains("103 ± 4 kPa") && !svg.contains('\t'));
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn text(mut self, lines: impl IntoIterator<Item = String>) -> Self {
         self.text.extend(lines);

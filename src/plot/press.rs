@@ -8,6 +8,22 @@ const MM: f64 = 1e3;
 const UM: f64 = 1e6;
 
 /// Why the pages of a press could not be made.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::Pipeline;
+/// use tactile_imaging::force::CalibrationPair;
+/// use tactile_imaging::pipeline::{LightContact, Object};
+/// use tactile_imaging::plot::{PressPlotError, save_press_pages};
+/// let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f));
+/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, [20e-6, 20e-6])?, Object::sphere(3e-3));
+/// let (reference, small) = (ndarray::Array2::from_elem((20, 30), 10), ndarray::Array2::from_elem((8, 8), 10));
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(small.view());
+/// let error = save_press_pages(&mut press, vec![], std::env::temp_dir()).unwrap_err();
+/// assert!(matches!(error, PressPlotError::Measure(_)), "the frame is not of the reference's size");
+/// # Ok(()) }
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PressPlotError {
@@ -21,6 +37,30 @@ pub enum PressPlotError {
 
 /// Writes every page that the press has results for to `folder`, as SVG; returns their paths. The lines of `summary` (a tab
 /// between name and value) make the last page.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # use tactile_imaging::force::CalibrationPair;
+/// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
+/// use tactile_imaging::Pipeline;
+/// use tactile_imaging::pipeline::{LightContact, Object};
+/// use tactile_imaging::plot::{save_press_pages, summary_lines};
+/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let scene = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
+/// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
+/// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
+/// # let made = scene.simulate();
+/// let contact = LightContact::from_pairs(&pairs, made.pixel_size_m)?;
+/// let pipeline = Pipeline::new(contact, Object::sphere(3e-3)).with_control_points(40);
+/// let mut press = pipeline.press(made.reference.view())?;
+/// press.add_frame(made.frames[0].view());
+/// let summary = summary_lines(&press.measure()?);
+/// let folder = tempfile::tempdir()?;
+/// let paths = save_press_pages(&mut press, summary, folder.path())?;
+/// let names: Vec<_> = paths.iter().filter_map(|p| p.file_name()).collect();
+/// assert_eq!(names, ["frames.svg", "surfaces.svg", "summary.svg"], "strain takes two frames");
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`PressPlotError`].
@@ -47,6 +87,27 @@ pub fn save_press_pages(
 }
 
 /// What every measurement says, as lines for the summary page.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # use tactile_imaging::force::CalibrationPair;
+/// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
+/// use tactile_imaging::Pipeline;
+/// use tactile_imaging::pipeline::{LightContact, Object};
+/// use tactile_imaging::plot::summary_lines;
+/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let scene = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
+/// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
+/// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
+/// # let made = scene.simulate();
+/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, made.pixel_size_m)?, Object::sphere(3e-3));
+/// let mut press = pipeline.press(made.reference.view())?;
+/// press.add_frame(made.frames[0].view());
+/// let lines = summary_lines(&press.measure()?);
+/// assert!(lines[0].starts_with("Young's modulus\t") && lines[0].ends_with(" kPa"));
+/// assert!(lines.iter().any(|line| line.starts_with("force 1\t0.7")));
+/// # Ok(()) }
+/// ```
 pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
     let modulus = &measurement.youngs_modulus_pa;
     let value = with_error(modulus.value, modulus.standard_error, 1e-3);

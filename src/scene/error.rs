@@ -4,6 +4,17 @@ use crate::pipeline::PipelineError;
 use std::path::PathBuf;
 
 /// Why a scene could not be read. Every message is one sentence that names the file and the field.
+///
+/// ```
+/// use tactile_imaging::scene::{Scene, SceneError};
+/// let broken = Scene::parse("reference = \"a.png\"\npixel_size_m = [2e-5,\n", "scene.toml").unwrap_err();
+/// assert!(matches!(broken, SceneError::Syntax { .. }));
+/// let unknown = Scene::parse("referense = \"a.png\"\n", "scene.toml").unwrap_err();
+/// assert!(unknown.to_string().starts_with("scene.toml: unknown field `referense`, expected one of `reference`"));
+/// let wrong = Scene::parse("reference = 3\n", "scene.toml").unwrap_err();
+/// let SceneError::Wrong { field, found, .. } = wrong else { unreachable!() };
+/// assert_eq!((field.as_str(), found.as_str()), ("reference", "3"));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {

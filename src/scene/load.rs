@@ -6,6 +6,18 @@ use ndarray::Array2;
 use std::path::Path;
 
 /// A scene's calibration, read.
+///
+/// ```
+/// use tactile_imaging::force::CalibrationPair;
+/// use tactile_imaging::scene::LoadedCalibration;
+/// let name = |calibration: &LoadedCalibration| match calibration {
+///     LoadedCalibration::Pairs(pairs) => format!("{} readings, the last of {} N", pairs.len(), pairs[1].force_n),
+///     LoadedCalibration::DepthTable(rows) => format!("down to {} m", rows[1].1),
+/// };
+/// let pairs = [0.0, 1.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
+/// assert_eq!(name(&LoadedCalibration::Pairs(pairs)), "2 readings, the last of 1 N");
+/// assert_eq!(name(&LoadedCalibration::DepthTable(vec![(0.0, 0.0), (60.0, 1.9e-3)])), "down to 0.0019 m");
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoadedCalibration {
     /// Integrated pixel value and force.
@@ -15,6 +27,22 @@ pub enum LoadedCalibration {
 }
 
 /// A scene's images and calibration.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// use tactile_imaging::scene::{LoadedCalibration, Scene};
+/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// # let folder = tempfile::tempdir()?;
+/// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
+/// # let path = write_folder(&made, &calibration, folder.path())?;
+/// let data = Scene::read(&path)?.load()?; // a calibration up to 2 N in 8 steps and back
+/// assert!(data.frames.iter().all(|frame| frame.dim() == data.reference.dim()));
+/// let LoadedCalibration::Pairs(pairs) = &data.calibration else { unreachable!() };
+/// assert!(pairs.len() == 17 && (pairs[8].force_n - 2.0).abs() < 0.01);
+/// # Ok(()) }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneData {
     /// The frame without contact.

@@ -9,6 +9,22 @@ use crate::pipeline::{
 impl Scene {
     /// Reads a scene file with its images and measures everything.
     ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene, write_folder};
+    /// use tactile_imaging::scene::Scene;
+    /// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// # let made = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
+    /// # let folder = tempfile::tempdir()?;
+    /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
+    /// # let path = write_folder(&made, &calibration, folder.path())?;
+    /// let measured = Scene::measure_file(&path)?; // one frame, of a ball pressed with 0.7 N
+    /// assert!((measured.frames[0].force_n.value / 0.7 - 1.0).abs() < 0.03);
+    /// assert_eq!(measured.youngs_modulus_pa.estimator, "Hertz sphere");
+    /// assert!(measured.strain.is_none(), "strain takes two frames");
+    /// # Ok(()) }
+    /// ```
+    ///
     /// # Errors
     /// [`SceneError`]: one sentence that names the file and the field.
     pub fn measure_file(path: impl AsRef<std::path::Path>) -> Result<Measurement, SceneError> {
@@ -28,6 +44,30 @@ impl Scene {
     }
 
     /// As [`stages`](Self::stages), with a number of control points.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # use tactile_imaging::scene::{LoadedCalibration, Scene, SceneData};
+    /// # let scene = Scene::parse(r#"
+    /// #     reference = "reference.png"
+    /// #     pixel_size_m = [2e-5, 2e-5]
+    /// #     calibration = { pairs = "pairs.csv" }
+    /// #     frames = [{ image = "one.png" }]
+    /// #     object = { shape = "unknown" }
+    /// #     stages = { strain = "hencky" }
+    /// #     [waveguide]
+    /// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5 }]
+    /// # "#, "scene.toml")?;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
+    /// # let frame = ndarray::Array2::from_elem((20, 30), 10);
+    /// # let calibration = LoadedCalibration::Pairs(pairs);
+    /// # let data = SceneData { reference: frame.clone(), frames: vec![frame], calibration };
+    /// let stages = scene.stages_with(&data, 60)?; // the scene says: strain = "hencky"
+    /// assert_eq!(stages.settings().control_points, 60);
+    /// assert!(stages.strain().name().contains("Hencky"));
+    /// # Ok(()) }
+    /// ```
     ///
     /// # Errors
     /// As [`stages`](Self::stages).

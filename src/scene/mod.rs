@@ -57,6 +57,24 @@ use fields::{Fields, poisson, positive};
 use std::path::{Path, PathBuf};
 
 /// The calibration of a scene.
+///
+/// ```
+/// use tactile_imaging::scene::{CalibrationSource, Scene};
+/// # let rest = r#"
+/// #     [[frames]]
+/// #     image = "frame.png"
+/// #     [object]
+/// #     shape = "unknown"
+/// #     [waveguide]
+/// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
+/// # "#;
+/// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]\n[calibration]\n";
+/// let source = |line: &str| Scene::parse(&format!("{head}{line}{rest}"), "scene.toml").map(|s| s.calibration);
+/// assert_eq!(source("pairs = \"pairs.csv\"")?, CalibrationSource::Pairs("pairs.csv".into()));
+/// assert_eq!(source("depth_table = \"depth.csv\"")?, CalibrationSource::DepthTable("depth.csv".into()));
+/// assert!(source("pairs = \"pairs.csv\"\ndepth_table = \"depth.csv\"").is_err(), "one of the two");
+/// # Ok::<(), tactile_imaging::scene::SceneError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum CalibrationSource {
     /// Pairs of integrated pixel value and force.
@@ -66,6 +84,24 @@ pub enum CalibrationSource {
 }
 
 /// A frame with contact.
+///
+/// ```
+/// use tactile_imaging::scene::{Scene, SceneFrame};
+/// # let rest = r#"
+/// #     [calibration]
+/// #     pairs = "pairs.csv"
+/// #     [object]
+/// #     shape = "unknown"
+/// #     [waveguide]
+/// #     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1e5 }]
+/// # "#;
+/// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]";
+/// let frames = "[[frames]]\nimage = \"one.png\"\nforce_N = 0.7\n[[frames]]\nimage = \"two.png\"";
+/// let scene = Scene::parse(&format!("{head}\n{frames}\n{rest}"), "press/scene.toml")?;
+/// assert_eq!(scene.frames[0], SceneFrame { image: "press/one.png".into(), force_n: Some(0.7) });
+/// assert_eq!(scene.frames[1].force_n, None, "no gauge: the calibration tells the force");
+/// # Ok::<(), tactile_imaging::scene::SceneError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFrame {
     /// The image.
@@ -75,6 +111,28 @@ pub struct SceneFrame {
 }
 
 /// A layer of the waveguide.
+///
+/// ```
+/// use tactile_imaging::scene::Scene;
+/// # let head = r#"
+/// #     reference = "reference.png"
+/// #     pixel_size_m = [2e-5, 2e-5]
+/// #     [calibration]
+/// #     pairs = "pairs.csv"
+/// #     [[frames]]
+/// #     image = "frame.png"
+/// #     [object]
+/// #     shape = "unknown"
+/// # "#;
+/// let waveguide = "[waveguide]\nlayers = [
+///     { refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5, poisson_ratio = 0.48 },
+///     { refractive_index = 1.40, thickness_m = 3e-3, youngs_modulus_pa = 8.0e4 },
+/// ]";
+/// let layers = Scene::parse(&format!("{head}\n{waveguide}"), "scene.toml")?.layers;
+/// assert_eq!(layers[0].youngs_modulus_pa, 136e3, "the layer that the object touches");
+/// assert_eq!((layers[1].thickness_m, layers[1].poisson_ratio), (3e-3, 0.5), "incompressible if not said");
+/// # Ok::<(), tactile_imaging::scene::SceneError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneLayer {
     /// Refractive index.
@@ -88,6 +146,27 @@ pub struct SceneLayer {
 }
 
 /// A scene file, checked; paths are resolved, the files they name not yet read.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// # use tactile_imaging::simulate::{Elastic, Sphere};
+/// use tactile_imaging::scene::Scene;
+/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let object = Sphere { radius_m: 20e-3, material: Elastic::CL2000X };
+/// # let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
+/// # let folder = tempfile::tempdir()?;
+/// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
+/// # let path = write_folder(&made, &calibration, folder.path())?;
+/// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
+/// let data = scene.load()?;
+/// let stages = scene.stages(&data)?;
+/// let mut press = scene.press(stages.as_ref(), &data)?;
+/// let modulus = press.modulus().map_err(|e| scene.measure_error(e))?; // errors name file and field
+/// let (low, high) = (modulus.interval_95.lower, modulus.interval_95.upper);
+/// assert!(low < 103e3 && high.is_none_or(|high| high > 103e3));
+/// # Ok(()) }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The file itself.
@@ -123,6 +202,23 @@ impl Scene {
     }
 
     /// Checks the text of a scene file; `file` is its name, to whose folder relative paths are relative.
+    ///
+    /// ```
+    /// use tactile_imaging::{pipeline::Object, scene::Scene};
+    /// let text = r#"
+    ///     reference = "reference.png"
+    ///     pixel_size_m = [21.55e-6, 21.55e-6]
+    ///     calibration = { pairs = "pairs.csv" }
+    ///     frames = [{ image = "one.png" }, { image = "two.png", force_N = 1.2 }]
+    ///     object = { shape = "sphere", radius_m = 3e-3, poisson_ratio = 0.5 }
+    ///     [waveguide]
+    ///     layers = [{ refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5 }]
+    /// "#;
+    /// let scene = Scene::parse(text, "press/scene.toml")?;
+    /// assert_eq!(scene.object, Object::Sphere { radius_m: 3e-3, poisson_ratio: 0.5 });
+    /// assert_eq!(scene.reference, std::path::Path::new("press/reference.png"));
+    /// # Ok::<(), tactile_imaging::scene::SceneError>(())
+    /// ```
     ///
     /// # Errors
     /// As [`read`](Self::read).

@@ -9,6 +9,16 @@ use super::press::{Load, PressScene};
 use super::random::{Purpose, row_stream};
 
 /// How a calibration is run.
+///
+/// ```
+/// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let options = CalibrationOptions { largest_force_n: 1.0, steps: 4, ..CalibrationOptions::default() };
+/// let forces: Vec<_> = scene.calibrate(&options)?.points.iter().map(|p| p.true_force_n).collect();
+/// assert_eq!(forces, [0.0, 0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0]);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CalibrationOptions {
@@ -34,6 +44,18 @@ impl Default for CalibrationOptions {
 }
 
 /// Whether the force was rising or falling.
+///
+/// ```
+/// use tactile_imaging::simulate::{Branch, CalibrationOptions, Camera, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let options = CalibrationOptions { steps: 2, hysteresis: 0.1, ..CalibrationOptions::default() };
+/// let series = scene.calibrate(&options)?;
+/// let half = |branch| series.points.iter().find(|p| p.branch == branch && p.true_force_n == 1.0);
+/// let [up, down] = [Branch::Loading, Branch::Unloading].map(|b| half(b).map_or(0.0, |p| p.integrated_pixel_value));
+/// assert!((down / up - 1.2).abs() < 0.02, "a tenth of the range of 2 N more light on the way back");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Branch {
@@ -44,6 +66,18 @@ pub enum Branch {
 }
 
 /// One reading of camera and gauge.
+///
+/// ```
+/// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let options = CalibrationOptions { steps: 4, gauge_noise_n: 2e-3, ..CalibrationOptions::default() };
+/// for point in scene.calibrate(&options)?.points {
+///     let error_n = point.force_n - point.true_force_n;
+///     assert!(error_n != 0.0 && error_n.abs() < 5.0 * 2e-3, "the gauge's noise");
+/// }
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CalibrationPoint {
@@ -58,6 +92,18 @@ pub struct CalibrationPoint {
 }
 
 /// A whole calibration.
+///
+/// ```
+/// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
+/// let (light, force) = series.pairs().fold((0.0, 0.0), |sum, (v, f)| (sum.0 + v, sum.1 + f));
+/// let lens = 1.0 - camera.vignetting; // the most that the corners lose
+/// let slope = force / light / series.newton_per_grey;
+/// assert!((0.99..1.01 / lens).contains(&slope));
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CalibrationSeries {
@@ -77,6 +123,25 @@ impl CalibrationSeries {
 impl PressScene {
     /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter; every reading is the sum
     /// over a simulated frame. The reference frame is exposed once.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// use tactile_imaging::Pipeline;
+    /// use tactile_imaging::force::CalibrationPair;
+    /// use tactile_imaging::pipeline::{LightContact, Object};
+    /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+    /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
+    /// let pairs: Vec<_> = series.pairs().map(|(light, force)| CalibrationPair::loading(light, force)).collect();
+    /// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, camera.pixel_size_m)?, Object::sphere(3e-3));
+    /// let (reference, frame) = (scene.reference(0), scene.frame(0, 0));
+    /// let mut press = pipeline.press(reference.view())?;
+    /// press.add_frame(frame.view());
+    /// let force = press.contact(0)?.and_then(|contact| contact.force_n);
+    /// assert!(force.is_some_and(|f| (f.value / 0.7 - 1.0).abs() < 0.03));
+    /// # Ok(()) }
+    /// ```
     ///
     /// # Errors
     /// [`SimulateError::OutOfRange`] for an option without meaning.

@@ -23,6 +23,19 @@ struct NoiseLaw {
 }
 
 /// Camera, lens and stray light.
+///
+/// ```
+/// use tactile_imaging::simulate::Camera;
+/// let camera = Camera { shape: [200, 300], ..Camera::default() };
+/// assert_eq!(camera.middle_px(), [149.5, 99.5]); // x, y
+/// assert!((camera.pixel_area_m2() - 4.644e-10).abs() < 1e-13, "21.55 µm square");
+/// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5.
+/// assert!((camera.noise_sd_grey(200.0) - 1.911).abs() < 1e-3);
+/// let light = ndarray::Array2::from_elem((200, 300), 200.0);
+/// let mean = |camera: Camera| camera.expose(light.view(), 1, 0).mapv(f64::from).mean();
+/// assert_eq!(mean(camera.ideal()), Some(200.0));
+/// assert!(mean(camera).is_some_and(|m| m != 200.0 && (m - 200.0).abs() < 5.0 * 1.93 / 60e3_f64.sqrt()));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Camera {

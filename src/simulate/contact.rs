@@ -5,6 +5,19 @@ use std::f64::consts::PI;
 use super::material::{Sphere, Waveguide};
 
 /// How force, contact radius and indentation hang together.
+///
+/// ```
+/// use tactile_imaging::simulate::{ContactLaw, PressOptions, PressScene};
+/// let contact = |law| {
+///     let scene = PressScene::new(PressOptions { law, ..PressOptions::default() })?;
+///     Ok::<_, tactile_imaging::simulate::SimulateError>(scene.truth(0).contact)
+/// };
+/// let (hertz, tatara) = (contact(ContactLaw::Hertz)?, contact(ContactLaw::Tatara)?);
+/// assert_eq!(hertz.indentation_m, hertz.contact_radius_m.powi(2) / hertz.sphere_radius_m);
+/// assert_eq!(tatara.contact_radius_m, hertz.contact_radius_m);
+/// assert!(tatara.indentation_m < hertz.indentation_m);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -23,6 +36,22 @@ pub enum ContactLaw {
 }
 
 /// The contact at one load.
+///
+/// ```
+/// use std::f64::consts::PI;
+/// use tactile_imaging::simulate::{Load, PressOptions, PressScene};
+/// let scene = PressScene::new(PressOptions { loads: vec![Load::normal(0.01)], ..PressOptions::default() })?;
+/// let contact = scene.truth(0).contact;
+/// let (a, r, e) = (contact.contact_radius_m, contact.sphere_radius_m, contact.effective_modulus_pa);
+/// let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-12;
+/// assert!(near(a.powi(3), 0.75 * 0.01 * r / e) && contact.contact_ratio() < 0.3, "a³ = 3FR/(4E*)");
+/// assert!(near(contact.mean_pressure_pa() * PI * a * a, 0.01));
+/// assert!(near(contact.pressure_pa(0.0), 1.5 * contact.mean_pressure_pa()) && contact.pressure_pa(a) == 0.0);
+/// assert!(near(contact.apparent_height_m(0.6 * a), 0.8 * a), "a hemisphere");
+/// let [_, _, sink] = contact.waveguide_displacement_m(0.0, 0.0);
+/// assert!(near(-sink, contact.waveguide_share * contact.indentation_m));
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Contact {

@@ -1,6 +1,15 @@
 //! What can be wrong with the description of a scene.
 
 /// A scene's description was rejected.
+///
+/// ```
+/// use tactile_imaging::simulate::{PressOptions, PressScene, SimulateError, UniaxialOptions, UniaxialScene};
+/// let none = PressScene::new(PressOptions { loads: vec![], ..PressOptions::default() }).unwrap_err();
+/// assert_eq!(none, SimulateError::TooFew { field: "loads", expected: 1, found: 0 });
+/// let crushed = UniaxialOptions { forces_n: vec![5.0], ..UniaxialOptions::default() };
+/// let Err(SimulateError::Overload { limit_n, .. }) = UniaxialScene::new(crushed) else { unreachable!() };
+/// assert!((limit_n - 103e3 * 144e-6 / 27f64.sqrt()).abs() < 1e-9, "E A₀/(3√3)");
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {

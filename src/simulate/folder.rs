@@ -11,6 +11,19 @@ use super::error::SimulateError;
 use super::press::PressScene;
 
 /// A scene could not be written.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::simulate::{CalibrationOptions, Camera, FolderError, PressOptions, PressScene, write_folder};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let (file, few) = (tempfile::NamedTempFile::new()?, CalibrationOptions { steps: 1, ..Default::default() });
+/// assert!(matches!(write_folder(&scene, &few, file.path()), Err(FolderError::Write { .. })), "not a folder");
+/// let none = CalibrationOptions { steps: 0, ..few };
+/// let error = write_folder(&scene, &none, file.path()).unwrap_err();
+/// assert!(matches!(error, FolderError::Calibration(_)) && error.to_string().starts_with("steps is 0"));
+/// # Ok(()) }
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FolderError {
@@ -37,6 +50,21 @@ pub enum FolderError {
 
 /// Writes `reference.png`, `frame_1.png` …, `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml`
 /// to `folder`, which is made if need be. Returns the path of `scene.toml`.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::scene::Scene;
+/// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let folder = tempfile::tempdir()?;
+/// let calibration = CalibrationOptions { steps: 4, ..CalibrationOptions::default() };
+/// let path = write_folder(&scene, &calibration, folder.path())?;
+/// let (read, data) = (Scene::read(&path)?, Scene::read(&path)?.load()?);
+/// assert_eq!(read.frames[1].force_n, Some(1.2));
+/// assert_eq!(data.frames[1], scene.frame(1, 0));
+/// # Ok(()) }
+/// ```
 ///
 /// # Errors
 /// [`FolderError`] naming the file that could not be written.

@@ -8,6 +8,20 @@ use super::pixel_average::Patch;
 use super::press::{Gain, Load, PressOptions, PressScene, PressSimulation};
 
 /// What is wrong with the scene.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, Hostile, PressOptions};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let base = PressOptions { camera, ..PressOptions::default() };
+/// let bright = Hostile::SaturatedContact.simulate(&base)?;
+/// assert!(bright.truth[0].saturated_pixels > 0 && bright.frames[0].iter().any(|&v| v == 255));
+/// let cut = &Hostile::CutByEdge.simulate(&base)?.truth[0];
+/// assert!((cut.visible_force_n / cut.contact.force_n - 0.5).abs() < 0.01);
+/// for kind in Hostile::ALL {
+///     assert_eq!(kind.simulate(&base)?.frames.len(), 1);
+/// }
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Hostile {

@@ -4,6 +4,21 @@ use super::error::{SimulateError, finite, not_negative, within};
 
 /// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. Both are monotone up to the
 /// largest peak pressure p_max of the scene and exactly averaged over pixels.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, PressOptions, PressScene, Response};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// // The light at 1.2 N over that at 0.7 N.
+/// let ratio = |response| {
+///     let scene = PressScene::new(PressOptions { camera, response, ..PressOptions::default() })?;
+///     Ok::<_, tactile_imaging::simulate::SimulateError>(
+///         scene.truth(1).integrated_pixel_value / scene.truth(0).integrated_pixel_value,
+///     )
+/// };
+/// assert!((ratio(Response::Linear)? - 1.2 / 0.7).abs() < 1e-9);
+/// assert!(ratio(Response::Quadratic { droop: 0.3 })? < 1.2 / 0.7);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -33,6 +48,18 @@ impl Response {
 }
 
 /// The lamps' state during one frame, relative to the reference frame. It scales background and leaked light alike.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, Illumination, Load, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() }.ideal();
+/// let illumination = Illumination { level: 1.2, tilt: [0.1, 0.0] };
+/// let loads = vec![Load { illumination, ..Load::normal(0.0) }];
+/// let light = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?.expected_frame(0);
+/// for (column, share) in [(0, 1.15), (43, 1.2), (86, 1.25)] {
+///     assert!((light[[0, column]] - share * camera.background_grey).abs() < 1e-9);
+/// }
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Illumination {

@@ -3,6 +3,17 @@
 use super::error::{SimulateError, at_least, positive, within};
 
 /// A linear elastic, isotropic material.
+///
+/// ```
+/// use tactile_imaging::simulate::{Elastic, PressOptions, PressScene, Waveguide};
+/// assert_eq!(Elastic::CL2000X.plane_strain_compliance(), 0.75 / 103e3);
+/// assert_eq!(Elastic::RIGID.plane_strain_compliance(), 0.0);
+/// let contact = PressScene::new(PressOptions::default())?.truth(0).contact;
+/// let waveguide = Waveguide::default().series();
+/// let sum = Elastic::CL2000X.plane_strain_compliance() + waveguide.plane_strain_compliance();
+/// assert!((contact.effective_modulus_pa * sum - 1.0).abs() < 1e-12, "1/E* of both bodies");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Elastic {
@@ -32,6 +43,17 @@ impl Elastic {
 }
 
 /// The object: an elastic sphere.
+///
+/// ```
+/// use tactile_imaging::simulate::{Elastic, PressOptions, PressScene, Sphere};
+/// let radius = |radius_m| {
+///     let object = Sphere { radius_m, material: Elastic::CL2003X };
+///     let scene = PressScene::new(PressOptions { object, ..PressOptions::default() })?;
+///     Ok::<_, tactile_imaging::simulate::SimulateError>(scene.truth(0).contact.contact_radius_m)
+/// };
+/// assert!((radius(8e-3)? / radius(1e-3)? - 2.0).abs() < 1e-12, "a grows as ∛R");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sphere {
@@ -49,6 +71,17 @@ impl Sphere {
 }
 
 /// One layer of the waveguide.
+///
+/// ```
+/// use tactile_imaging::simulate::{Elastic, Waveguide, WaveguideLayer};
+/// let layer = |thickness_m, youngs_modulus_pa| WaveguideLayer {
+///     refractive_index: 1.41,
+///     thickness_m,
+///     material: Elastic { youngs_modulus_pa, poisson_ratio: 0.5 },
+/// };
+/// let waveguide = Waveguide { layers: vec![layer(1e-3, 200e3), layer(3e-3, 100e3)] };
+/// assert!((waveguide.series().youngs_modulus_pa - 4e-3 / (1e-3 / 200e3 + 3e-3 / 100e3)).abs() < 1e-6);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WaveguideLayer {
@@ -98,6 +131,11 @@ impl Waveguide {
     }
 
     /// Thickness of the whole stack in metres.
+    ///
+    /// ```
+    /// let waveguide = tactile_imaging::simulate::Waveguide::default();
+    /// assert!((waveguide.thickness_m() - 10e-3).abs() < 1e-15, "2, 3 and 5 mm");
+    /// ```
     pub fn thickness_m(&self) -> f64 {
         self.layers.iter().map(|l| l.thickness_m).sum()
     }

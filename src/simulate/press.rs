@@ -11,6 +11,21 @@ use super::pixel_average::{Disc, Patch, Profile};
 use super::truth::PressTruth;
 
 /// How many grey levels a pascal makes.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, Gain, Load, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = |force_n, gain| {
+///     PressScene::new(PressOptions { camera, gain, loads: vec![Load::normal(force_n)], ..Default::default() })
+/// };
+/// let first = scene(1.2, Gain::PeakGrey(200.0))?;
+/// let peak_pa = first.truth(0).contact.peak_pressure_pa;
+/// assert!((first.grey_per_pascal() * peak_pa - 200.0).abs() < 1e-9);
+/// let same_sensor = scene(0.3, Gain::GreyPerPascal(first.grey_per_pascal()))?;
+/// let light = |scene: &PressScene| scene.truth(0).integrated_pixel_value;
+/// assert!((light(&first) / light(&same_sensor) - 4.0).abs() < 1e-9, "light in proportion to force");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -30,6 +45,16 @@ impl Gain {
 }
 
 /// One state of load.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, Load, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let loads = vec![Load::normal(0.7), Load { shear_n: [0.276, 0.0], ..Load::normal(0.7) }];
+/// let scene = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?;
+/// let [x, sheared] = [0, 1].map(|k| scene.truth(k).centre_px[0]);
+/// assert!((sheared - x - 2.0).abs() < 1e-9, "0.276 N over 400 N/m are 0.69 mm, two pixels");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Load {
@@ -49,6 +74,21 @@ impl Load {
 }
 
 /// Everything that describes a press; [`PressScene::new`] checks it.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, Elastic, Load, PressOptions, PressScene, Sphere};
+/// let options = PressOptions {
+///     object: Sphere { radius_m: 20e-3, material: Elastic::CL2003X },
+///     loads: vec![Load::normal(0.2), Load::normal(0.4)],
+///     camera: Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() },
+///     seed: 7,
+///     ..PressOptions::default()
+/// };
+/// let made = PressScene::new(options.clone())?.simulate();
+/// assert!(made.truth.iter().all(|t| t.contact.contact_ratio() < 0.3), "inside Hertz's range");
+/// assert_eq!(PressScene::new(options)?.simulate().frames, made.frames, "one seed, the same bits");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PressOptions {
@@ -117,6 +157,17 @@ pub struct PressScene {
 }
 
 /// The frames of a scene and their truth.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?.simulate();
+/// let sum = |frame: &ndarray::Array2<u8>| frame.iter().map(|&v| f64::from(v)).sum::<f64>();
+/// let light = made.frames.iter().map(|frame| sum(frame) - sum(&made.reference)).collect::<Vec<_>>();
+/// assert!((light[1] / light[0] / (1.2 / 0.7) - 1.0).abs() < 0.02, "light in proportion to force");
+/// assert_eq!(made.youngs_modulus_pa, 103e3);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct PressSimulation {
     /// The frame without contact.
@@ -160,6 +211,21 @@ impl PressScene {
     }
 
     /// κ/p_max of the response g·p·(1 − κ p/p_max), in 1/Pa.
+    ///
+    /// ```
+    /// use std::f64::consts::PI;
+    /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene, Response};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let response = Response::Quadratic { droop: 0.2 };
+    /// let scene = PressScene::new(PressOptions { camera, response, ..PressOptions::default() })?;
+    /// let contact = scene.truth(0).contact;
+    /// // ∫ p² dS = π a² p₀²/2: what the bend takes from the force's light.
+    /// let squared = 0.5 * PI * (contact.contact_radius_m * contact.peak_pressure_pa).powi(2);
+    /// let seen_n = contact.force_n - scene.droop_per_pascal() * squared;
+    /// let light = scene.grey_per_pascal() * seen_n / camera.pixel_area_m2();
+    /// assert!((scene.truth(0).integrated_pixel_value / light - 1.0).abs() < 1e-9);
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
     pub fn droop_per_pascal(&self) -> f64 {
         if self.peak_pressure_pa == 0.0 { 0.0 } else { self.options.response.droop() / self.peak_pressure_pa }
     }
@@ -192,6 +258,20 @@ impl PressScene {
 
     /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`] to draw many
     /// exposures of the same light.
+    ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+    /// let light = scene.expected_frame(1);
+    /// let frames: Vec<_> = (0..50).map(|repeat| scene.frame(1, repeat)).collect();
+    /// let at = [32, 43]; // the middle of the contact
+    /// let mean = frames.iter().map(|frame| f64::from(frame[at])).sum::<f64>() / 50.0;
+    /// let sd = scene.options().camera.noise_sd_grey(light[at]);
+    /// assert!((mean - light[at]).abs() < 5.0 * sd / 50_f64.sqrt());
+    /// assert_ne!(scene.reference(0), scene.reference(1), "another exposure, other noise");
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
     ///
     /// # Panics
     /// If there is no such load.

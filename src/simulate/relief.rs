@@ -12,6 +12,17 @@ use super::error::{SimulateError, at_least, not_negative, positive};
 use super::random::{Purpose, row_stream};
 
 /// Bumps on a plain face.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, SurfacePattern, UniaxialOptions, UniaxialScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let pattern = SurfacePattern { bumps: [3, 3], bump_height_m: [0.4e-3, 0.4e-3], ..SurfacePattern::default() };
+/// let scene = UniaxialScene::new(UniaxialOptions { camera, pattern, ..UniaxialOptions::default() })?;
+/// let heights = scene.material_points(60, 60).into_iter().map(|p| p.z);
+/// let (low, high) = heights.fold((f64::MAX, 0.0_f64), |(l, h), z| (l.min(z), h.max(z)));
+/// assert!(low == 0.5e-3 && high > 0.89e-3 && high <= 0.9e-3, "0.4 mm bumps on a 0.5 mm base");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SurfacePattern {

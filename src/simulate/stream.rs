@@ -10,6 +10,18 @@ use super::press::{Load, PressScene};
 use super::truth::PressTruth;
 
 /// How the load runs through time: rest, then cycles of F(t) = F_max sin²(πt/T).
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let cycle = LoadCycle { cycles: 2, rest_s: 0.5, light_drift_per_s: 0.01, ..LoadCycle::default() };
+/// let stream = scene.stream(cycle)?;
+/// assert_eq!(stream.len(), 200, "2.5 s at 80 frames per second");
+/// assert!((stream.load_at(1.0).force_n - 1.2).abs() < 1e-12, "half a period after the rest");
+/// assert_eq!(stream.load_at(2.0).illumination.level, 1.02);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoadCycle {
@@ -48,6 +60,17 @@ impl Default for LoadCycle {
 }
 
 /// One frame of a stream.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let cycle = LoadCycle { rest_s: 0.0, frame_rate_hz: 8.0, ..LoadCycle::default() };
+/// let frames: Vec<_> = scene.stream(cycle)?.collect();
+/// assert_eq!((frames[4].time_s, frames[4].frame.dim()), (0.5, (65, 87)));
+/// assert!(frames.windows(2).take(4).all(|f| f[0].truth.contact.force_n < f[1].truth.contact.force_n));
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct StreamedFrame {
     /// When it was taken, in seconds.
@@ -59,6 +82,18 @@ pub struct StreamedFrame {
 }
 
 /// Iterator over the frames of a [`LoadCycle`], made one by one.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let mut stream = scene.stream(LoadCycle { frame_rate_hz: 10.0, ..LoadCycle::default() })?;
+/// assert_eq!(stream.len(), 11);
+/// let first = stream.next().map(|f| f.truth.contact.force_n);
+/// assert_eq!((first, stream.len()), (Some(0.0), 10), "at rest; made one by one");
+/// assert_eq!(stream.load_at(0.35).force_n, 1.2 * (0.25 * std::f64::consts::PI).sin().powi(2));
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct FrameStream {
     scene: PressScene,

@@ -8,6 +8,23 @@ use super::pixel_average::{Disc, Profile};
 use super::press::{Load, PressScene};
 
 /// The truth of one frame.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let (truth, later) = (scene.truth(0), scene.truth(1));
+/// assert!((truth.pressure_pa().sum() * camera.pixel_area_m2() - 0.7).abs() < 1e-9, "the force");
+/// let pixels = truth.contact_mask().iter().filter(|&&inside| inside).count() as f64;
+/// let circle = std::f64::consts::PI * truth.contact.contact_radius_m.powi(2) / camera.pixel_area_m2();
+/// assert!((pixels / circle - 1.0).abs() < 0.05);
+/// let middle = [32, 43];
+/// assert_eq!(truth.apparent_height_m()[middle], truth.contact.contact_radius_m);
+/// assert!(later.waveguide_height_m()[middle] < truth.waveguide_height_m()[middle], "pressed deeper");
+/// assert_eq!(truth.centre_m(), later.centre_m());
+/// assert!((truth.scaling_to(&later).scale - (1.2_f64 / 0.7).cbrt()).abs() < 1e-12);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PressTruth {
@@ -161,6 +178,16 @@ fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
 ///
 /// The surface read from a press is a hemisphere of the contact's radius, which grows by (F₂/F₁)^⅓ whatever the object's
 /// modulus: the apparent strain says nothing about it.
+///
+/// ```
+/// use nalgebra::Point3;
+/// use tactile_imaging::simulate::SurfaceScaling;
+/// let map = SurfaceScaling { from_centre_m: [5e-3, 5e-3], to_centre_m: [6e-3, 5e-3], scale: 1.2 };
+/// let moved = map.apply(&Point3::new(7e-3, 5e-3, 1e-3));
+/// assert!((moved - Point3::new(8.4e-3, 5e-3, 1.2e-3)).norm() < 1e-15);
+/// let strain = map.green_lagrange_strain();
+/// assert!((strain[(2, 2)] - 0.22).abs() < 1e-15 && strain[(0, 1)] == 0.0, "½(1.2² − 1) I");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SurfaceScaling {

@@ -27,6 +27,20 @@ use super::relief::{Relief, SurfacePattern};
 use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
 
 /// Everything that describes the squeezed block; [`UniaxialScene::new`] checks it.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
+/// let options = UniaxialOptions {
+///     material: Elastic::CL2003X,
+///     face_m: [10e-3, 14e-3],
+///     forces_n: vec![0.1, 0.4],
+///     camera: Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() },
+///     ..UniaxialOptions::default()
+/// };
+/// let step = UniaxialScene::new(options)?.increment(0, 1);
+/// assert!((step.stress_zz_pa / step.strain_zz - 62e3).abs() < 1e-6, "Young's modulus");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UniaxialOptions {
@@ -148,6 +162,17 @@ impl UniaxialScene {
 
     /// Expected grey levels of state `load`, before noise and rounding.
     ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() }.ideal();
+    /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
+    /// let (light, dark) = (scene.expected_frame(1), scene.reference(0).mapv(f64::from));
+    /// let seen_n = (&light - &dark).sum() / scene.grey_per_pascal() * camera.pixel_area_m2();
+    /// assert!((seen_n - scene.options().forces_n[1]).abs() < 1e-9);
+    /// assert!((scene.pressure_pa(1).sum() * camera.pixel_area_m2() - 0.7).abs() < 1e-9);
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
+    ///
     /// # Panics
     /// If there is no such state.
     pub fn expected_frame(&self, load: usize) -> Array2<f64> {
@@ -178,6 +203,16 @@ impl UniaxialScene {
 
     /// Deformed heights in metres at pixel centres, 0 off the face.
     ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
+    /// let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
+    /// let (height, middle) = (scene.height_m(2), [64, 86]);
+    /// let from_light = scene.pressure_pa(2)[middle] * scene.height_per_pascal_m(2);
+    /// assert!((from_light / height[middle] - 1.0).abs() < 0.05, "a pixel's mean and its centre");
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
+    ///
     /// # Panics
     /// If there is no such state.
     pub fn height_m(&self, load: usize) -> Array2<f64> {
@@ -205,6 +240,18 @@ impl UniaxialScene {
     }
 
     /// Where a material point of the undeformed surface lies in state `load`.
+    ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
+    /// let (points, state) = (scene.material_points(4, 3), scene.states()[2]);
+    /// let moved: Vec<_> = points.iter().map(|p| scene.deform(2, p)).collect();
+    /// assert!((moved[5].z / points[5].z - state.stretch_z).abs() < 1e-12);
+    /// let width = |p: &[nalgebra::Point3<f64>]| p[3].x - p[0].x;
+    /// assert!((width(&moved) / width(&points) - state.stretch_lateral).abs() < 1e-12, "it spreads");
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
     ///
     /// # Panics
     /// If there is no such state.

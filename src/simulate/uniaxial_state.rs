@@ -4,6 +4,17 @@ use super::material::Elastic;
 use nalgebra::Matrix3;
 
 /// Stretch, strain and stress at one force. Compression is negative.
+///
+/// ```
+/// use tactile_imaging::simulate::{UniaxialOptions, UniaxialScene};
+/// let scene = UniaxialScene::new(UniaxialOptions::default())?;
+/// let state = scene.states()[2]; // 1.2 N on a block of 103 kPa
+/// assert!((state.second_piola_zz_pa - 103e3 * state.strain_zz).abs() < 1e-9, "S = E e");
+/// assert!((state.cauchy_zz_pa * state.area_m2 + 1.2).abs() < 1e-12, "compression is negative");
+/// let volume = state.stretch_z * state.stretch_lateral.powi(2);
+/// assert!(state.stretch_z < 1.0 && (volume - 1.0).abs() < 0.02, "ν = ½ in small strain");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct UniaxialState {
@@ -24,6 +35,18 @@ pub struct UniaxialState {
 }
 
 /// From one state to another, the first being the reference.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_imaging::simulate::{UniaxialOptions, UniaxialScene};
+/// let scene = UniaxialScene::new(UniaxialOptions::default())?;
+/// let step = scene.increment(0, 2);
+/// let f = step.displacement_gradient + Matrix3::identity();
+/// let strain = 0.5 * (f.transpose() * f - Matrix3::identity());
+/// assert!((strain[(2, 2)] - step.strain_zz).abs() < 1e-12, "e = ½(FᵀF − I)");
+/// assert!((step.stress_zz_pa / step.strain_zz / 103e3 - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UniaxialIncrement {
     /// F₁₂ − I, the displacement gradient.
