@@ -140,6 +140,15 @@ impl Panel {
     }
 
     /// Moves the legend.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{Colour, Legend, Page, Panel};
+    /// let panel = Panel::new("").line([[0.0, 2.0], [1.0, 1.0]], Colour::BLUE, "falling");
+    /// let svg = |panel: Panel| Page::new("").panel(panel).to_svg();
+    /// let placed = svg(panel.clone().legend(Legend::LowerLeft))?;
+    /// assert_ne!(placed, svg(panel)?, "left to itself it stands at the upper right");
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn legend(mut self, legend: Legend) -> Self {
         self.legend = legend;
@@ -147,6 +156,15 @@ impl Panel {
     }
 
     /// Sets how the axes count.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{Colour, Page, Panel, Scale};
+    /// let times = [[1e2, 2e-3], [1e3, 0.3], [1e4, 40.0]]; // points, seconds
+    /// let panel = Panel::new("").scales(Scale::Log10, Scale::Log10).points(times, Colour::BLUE, "");
+    /// let svg = Page::new("").panel(panel.points([[0.0, 1.0]], Colour::RED, "")).to_svg()?;
+    /// assert_eq!(svg.matches("<circle").count(), 3, "zero has no logarithm");
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn scales(mut self, x: Scale, y: Scale) -> Self {
         self.scales = [x, y];
@@ -177,6 +195,20 @@ impl Panel {
     }
 
     /// Adds any layer.
+    ///
+    /// ```
+    /// use tactile_imaging::plot::{ColorMap, Layer, Page, Panel};
+    /// let layer = Layer::ColouredPoints {
+    ///     points: vec![[0.0, 0.0], [1.0, 1.0]],
+    ///     values: vec![-0.02, 0.02],
+    ///     map: ColorMap::Diverging, // what `coloured_points` does not offer
+    ///     radius: 5.0,
+    ///     label: "strain e_zz".into(),
+    /// };
+    /// let svg = Page::new("").panel(Panel::new("").layer(layer)).to_svg()?;
+    /// assert!(svg.contains("#2166AC") && svg.contains("#B2182B"));
+    /// # Ok::<(), tactile_imaging::plot::PlotError>(())
+    /// ```
     #[must_use]
     pub fn layer(mut self, layer: Layer) -> Self {
         self.layers.push(layer);

@@ -105,6 +105,18 @@ pub struct FrameStream {
 impl PressScene {
     /// The frames of `cycle` with this scene's object, sensor, light and gain (its own loads set the gain only).
     ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+    /// let cycle = LoadCycle { rest_s: 0.0, frame_rate_hz: 8.0, ..LoadCycle::default() };
+    /// let forces = scene.stream(cycle)?.map(|f| f.truth.contact.force_n);
+    /// let largest = forces.fold(0.0, f64::max);
+    /// assert!((largest - 1.2).abs() < 1e-12, "half-way through the cycle");
+    /// assert!(scene.stream(LoadCycle { period_s: 0.0, ..cycle }).is_err());
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SimulateError::OutOfRange`] for a cycle without meaning.
     pub fn stream(&self, cycle: LoadCycle) -> Result<FrameStream, SimulateError> {
