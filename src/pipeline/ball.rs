@@ -3,6 +3,15 @@ use super::surface::ContactSurface;
 use nalgebra::{Matrix3, Vector3};
 
 /// A spherical cap z = √(R² − ρ²) − √(R² − a²), ρ the distance from the centre, fitted to a surface.
+///
+/// ```
+/// use tactile_imaging::pipeline::BallFit;
+/// // A ball of 4 mm radius in contact up to 2.4 mm from its axis: 4 − √(4² − 2.4²) = 0.8 mm deep.
+/// let (radius_m, centre_m, contact_radius_m) = (4e-3, [5e-3, 6e-3], 2.4e-3);
+/// let fit = BallFit { radius_m, centre_m, contact_radius_m, mean_absolute_error_m: 0.0, pixels: 0, iterations: 0 };
+/// assert!((fit.depth_m(centre_m) - 0.8e-3).abs() < 1e-15);
+/// assert_eq!(fit.depth_m([8e-3, 6e-3]), 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct BallFit {

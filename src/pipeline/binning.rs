@@ -11,6 +11,26 @@ use ndarray::{Array2, ArrayView2};
 const PIXELS_PER_POINT: usize = 16;
 
 /// The grid of the surface stage.
+///
+/// ```
+/// use tactile_imaging::pipeline::{Binning, Object, Pipeline};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// // A contact of some 1250 pixels. Ten points leave each 125 of them: blocks of 2 × 2 keep more than 16 a point.
+/// let ten = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(10);
+/// let (reference, frame) = (hertz(0.0), hertz(120.0));
+/// for (binning, side) in [(Binning::Auto, 2), (Binning::Blocks(4), 4)] {
+///     let pipeline = ten.clone().with_binning(binning);
+///     let mut press = pipeline.press(reference.view())?;
+///     press.add_frame(frame.view());
+///     assert_eq!(press.surface(0)?.binning, side);
+/// }
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Binning {

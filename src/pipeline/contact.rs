@@ -7,6 +7,27 @@ use crate::force::{
 use ndarray::{Array2, ArrayView2};
 
 /// What a frame says of its contact.
+///
+/// ```
+/// use tactile_imaging::pipeline::{ContactReading, Object, Pipeline};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// // 1.005 N over a disc of 1 mm radius.
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let (reference, frame) = (hertz(0.0), hertz(120.0));
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(frame.view());
+/// let contact: ContactReading = *press.contact(0)?.expect("a contact");
+/// assert!((contact.contact_radius_m.value / 1e-3 - 1.0).abs() < 0.01);
+/// let stress = contact.mean_stress_pa().expect("a force");
+/// assert!((stress.value / 320e3 - 1.0).abs() < 0.02, "F/(π a²)");
+/// assert_eq!(contact.flags(0).count(), 0, "nothing to caution of");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ContactReading {
@@ -68,6 +89,28 @@ impl ContactReading {
 }
 
 /// What the first stage leaves behind: the reading, and where in the frame the contact is.
+///
+/// ```
+/// use tactile_imaging::force::{ForceWorkspace, ReferenceFrame};
+/// use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let stage = LightContact::from_pairs(&pairs, [50e-6; 2])?;
+/// let reference = ReferenceFrame::new(hertz(0.0).view())?;
+/// let (mut workspace, mut contact) = (ForceWorkspace::default(), FrameContact::default());
+/// stage.measure(&mut workspace, hertz(120.0).view(), &reference, None, &mut contact)?;
+/// let region = contact.region.expect("a contact");
+/// assert_eq!(contact.mask.dim(), (region.rows(), region.columns()));
+/// assert!(region.row_start <= 12 && region.row_end >= 52, "20 pixels around row 32");
+/// // Without contact: how far the light is from the reference's.
+/// stage.measure(&mut workspace, hertz(0.0).view(), &reference, None, &mut contact)?;
+/// assert_eq!((contact.reading, contact.background_step_grey), (None, Some(0.0)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct FrameContact {
     /// The reading; `None` without contact.
@@ -81,6 +124,40 @@ pub struct FrameContact {
 }
 
 /// One frame to contact and force.
+///
+/// ```
+/// use ndarray::ArrayView2;
+/// use tactile_imaging::force::{Estimate, ForceError, ForceWorkspace, Polarity, ReferenceFrame};
+/// use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, Object, Pipeline};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// /// The contact by its light, the force by a gauge good to 1 mN.
+/// struct Gauged(LightContact);
+/// impl ContactStage for Gauged {
+///     fn measure(
+///         &self, workspace: &mut ForceWorkspace, frame: ArrayView2<'_, u8>, reference: &ReferenceFrame,
+///         gauge_n: Option<f64>, contact: &mut FrameContact,
+///     ) -> Result<(), ForceError> {
+///         self.0.measure(workspace, frame, reference, gauge_n, contact)?;
+///         if let Some(reading) = &mut contact.reading {
+///             reading.force_n = gauge_n.map(|value| Estimate { value, standard_error: 1e-3 });
+///         }
+///         Ok(())
+///     }
+///     fn polarity(&self) -> Polarity { self.0.polarity() }
+///     fn pixel_size_m(&self) -> [f64; 2] { self.0.pixel_size_m() }
+/// }
+/// let (reference, frame) = (hertz(0.0), hertz(120.0));
+/// let pipeline = Pipeline::new(Gauged(LightContact::from_pairs(&pairs, [50e-6; 2])?), Object::sphere(3e-3));
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_gauged_frame(frame.view(), Some(0.98));
+/// assert_eq!(press.contact(0)?.and_then(|c| c.force_n).map(|f| f.value), Some(0.98));
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 pub trait ContactStage: Send + Sync {
     /// Measures `frame` against `reference`. `gauge_n` is a gauge's reading of the force, if there was one.
     ///
@@ -103,6 +180,20 @@ pub trait ContactStage: Send + Sync {
 }
 
 /// Light that leaks where an object presses: brightness is force, through a calibration.
+///
+/// ```
+/// use tactile_imaging::force::{CalibrationOptions, CalibrationPair, ForceOptions, LinearCalibration, StressCalibration};
+/// use tactile_imaging::pipeline::LightContact;
+/// let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let line = LightContact::from_pairs(&pairs, [50e-6; 2])?;
+/// assert!((line.calibration().force_n(5e4) - 0.5).abs() < 1e-12);
+/// // The same, with the contact's radius read off its mask instead of fitted.
+/// let calibration = LinearCalibration::fit(&pairs, &CalibrationOptions::default())?;
+/// let options = ForceOptions { skip_profile: true, ..ForceOptions::default() };
+/// let quick = LightContact::new(calibration, [50e-6; 2], &options)?;
+/// assert!((quick.calibration().sensitivity_n(5e4) - 1e-5).abs() < 1e-17, "newtons per grey level");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct LightContact<C = LinearCalibration<f64>> {
     meter: ForceMeter<f64>,

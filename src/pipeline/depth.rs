@@ -8,6 +8,27 @@ use crate::sfs::DepthTable;
 use ndarray::{Array2, ArrayView2};
 
 /// Contact is the largest connected patch that is darker than the reference by more than a threshold.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_imaging::pipeline::{ContactStage, DarkContact, Object, Pipeline, SurfaceInput};
+/// // A hundred grey levels darker is half a millimetre deep.
+/// let table = [(0.0, 0.0), (100.0, 0.5e-3)];
+/// let contact = DarkContact::new(&table, [0.1e-3; 2])?;
+/// assert_eq!(contact.pixel_size_m(), [0.1e-3; 2]);
+/// let pipeline = Pipeline::new(contact, Object::sphere(4e-3))
+///     .with_surface(DarkContact::depth_table(&table)?, SurfaceInput::Signal);
+/// // A stamp of 20 × 20 pixels, 0.3 mm deep.
+/// let reference = Array2::from_elem((64, 64), 200_u8);
+/// let mut frame = reference.clone();
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(140);
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(frame.view());
+/// let depth = press.contact(0)?.and_then(|c| c.indentation_m).expect("a depth");
+/// assert!((depth.value - 0.3e-3).abs() < 1e-9);
+/// assert!((press.surface(0)?.surface.heights[[10, 10]] - 0.3e-3).abs() < 1e-9);
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct DarkContact {
     pixel_size_m: [f64; 2],

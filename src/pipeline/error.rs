@@ -6,6 +6,27 @@ use crate::sfs::SfsError;
 use crate::tps::TpsError;
 
 /// Why a measurement could not be made. Frames are counted from 0 in the fields and from 1 in the sentences.
+///
+/// ```
+/// use tactile_imaging::pipeline::{Object, Pipeline, PipelineError};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let empty = hertz(0.0);
+/// let mut press = pipeline.press(empty.view())?;
+/// press.add_frame(empty.view());
+/// let error = press.surface(0).unwrap_err();
+/// assert_eq!(error, PipelineError::NoContact { frame: 0 });
+/// assert!(error.to_string().starts_with("frame 1 shows no contact"));
+/// let error = press.contact(7).unwrap_err();
+/// assert_eq!(error.frame(), Some(7));
+/// assert_eq!(error.to_string(), "there is no frame 8: 1 frames were given");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PipelineError {

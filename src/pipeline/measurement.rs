@@ -9,6 +9,18 @@ use crate::matching::StopReason;
 use nalgebra::Matrix3;
 
 /// A modulus with its error.
+///
+/// ```
+/// use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+/// use tactile_imaging::pipeline::ModulusResult;
+/// // A ball of 3 mm radius under 10 mN, in contact up to 0.5 mm: E = (1 − ν²) 3FR/(4a³) = 135 kPa.
+/// let load = LoadState::new(Estimate::new(10e-3, 0.1e-3)).with_contact_radius(Estimate::new(0.5e-3, 1e-6));
+/// let modulus = ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&[load])?);
+/// assert!((modulus.value - 135e3).abs() < 1.0);
+/// assert!(modulus.interval_95.0 < modulus.value && modulus.warnings.is_empty());
+/// assert!(modulus.to_string().starts_with("135.0 ± 1.6 kPa"));
+/// # Ok::<(), tactile_imaging::elasticity::ElasticityError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ModulusResult {
@@ -37,6 +49,24 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
 }
 
 /// What one frame says.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::FrameResult;
+/// let pipeline = trial.pipeline()?;
+/// let frames: Vec<FrameResult> = trial.press(&pipeline)?.measure()?.frames;
+/// // A ball of 3 mm radius under 0.7 N and 1.2 N.
+/// for (frame, force_n) in frames.iter().zip([0.7, 1.2]) {
+///     assert!((frame.force_n.value / force_n - 1.0).abs() < 0.02);
+///     let radius = frame.contact_radius_m.value;
+///     assert!((frame.contact_ratio.expect("a ball") - radius / 3e-3).abs() < 1e-12);
+///     let stress = frame.mean_stress_pa.expect("a force").value;
+///     assert!((stress * std::f64::consts::PI * radius * radius - frame.force_n.value).abs() < 1e-12);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FrameResult {
@@ -61,6 +91,19 @@ pub struct FrameResult {
 }
 
 /// How the control points of the first and the last frame were matched.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::MatchResult;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let matching: MatchResult = trial.press(&pipeline)?.measure()?.matching.expect("two frames");
+/// assert_eq!(matching.points, 60);
+/// assert!(matching.matched > 50 && matching.mean_confidence > 0.5);
+/// assert!(matching.residual_m < matching.mean_displacement_m, "the warp takes points to their partners");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MatchResult {
@@ -81,6 +124,19 @@ pub struct MatchResult {
 }
 
 /// The strain between the first and the last frame.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::StrainResult;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let strain: StrainResult = trial.press(&pipeline)?.measure()?.strain.expect("two frames");
+/// // From 0.7 N to 1.2 N the apparent surface grows by s = (1.2/0.7)^⅓: e_zz = (s² − 1)/2 = 0.216.
+/// assert!((strain.mean[2][2] - 0.216).abs() < 0.03);
+/// assert_eq!(strain.mean[0][2], strain.mean[2][0], "symmetric");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct StrainResult {
@@ -99,6 +155,21 @@ pub struct StrainResult {
 }
 
 /// All results of a press.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::Measurement;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let measurement: Measurement = trial.press(&pipeline)?.measure()?;
+/// let modulus = &measurement.youngs_modulus_pa;
+/// assert!((modulus.value / 103e3 - 1.0).abs() < 0.0538, "the ball's 103 kPa");
+/// assert_eq!(measurement.frames.len(), 2);
+/// assert!(measurement.estimators.contains(modulus), "beside the paper's ratio");
+/// assert!(measurement.to_string().starts_with(&format!("Young's modulus  {modulus}")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Measurement {
@@ -121,6 +192,19 @@ pub struct Measurement {
 
 impl Press<'_> {
     /// Measures everything: all stages on all frames.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let measurement = trial.press(&pipeline)?.measure()?;
+    /// let height = measurement.frames[0].surface_height_m.expect("a surface");
+    /// assert!((height / trial.truth().frames[0].surface_height_m - 1.0).abs() < 0.1);
+    /// // At 0.7 N the ball is in contact beyond its own radius: Hertz holds for a/R up to 0.3.
+    /// assert!(measurement.flags.iter().any(|flag| flag.to_string().contains("small-contact theory does not hold")));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`PipelineError`]: a frame without contact or force, loads that do not determine a modulus. Where the modulus

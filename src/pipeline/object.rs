@@ -8,6 +8,16 @@ use crate::elasticity::modulus::{
 };
 
 /// The pressed object, as far as it is known.
+///
+/// ```
+/// use tactile_imaging::Object;
+/// // A ball's modulus comes from the contact alone; a punch's needs the strain, and so surfaces and matches.
+/// let ball = Object::sphere(3e-3);
+/// assert_eq!((ball.sphere_radius_m(), ball.needs_strain()), (Some(3e-3), false));
+/// let punch = Object::FlatPunch { radius_m: 2e-3, poisson_ratio: 0.48 };
+/// assert_eq!((punch.sphere_radius_m(), punch.needs_strain()), (None, true));
+/// assert_eq!(ball, Object::Sphere { radius_m: 3e-3, poisson_ratio: Object::DEFAULT_POISSON_RATIO });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "shape", rename_all = "snake_case"))]
 #[non_exhaustive]

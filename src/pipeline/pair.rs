@@ -7,9 +7,35 @@ use crate::tps::Warp;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Fewest matches from which a three-dimensional strain can be told.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::{LEAST_MATCHES, PipelineError};
+/// let pipeline = trial.pipeline()?.with_control_points(LEAST_MATCHES - 1);
+/// let mut press = trial.press(&pipeline)?;
+/// assert!(matches!(press.strain(1), Err(PipelineError::TooFewMatches { expected: LEAST_MATCHES, .. })));
+/// assert!(press.modulus().is_ok(), "a ball's modulus does without strain");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub const LEAST_MATCHES: usize = 8;
 
 /// The strain between two frames.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::PairStrain;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let mut press = trial.press(&pipeline)?;
+/// let strain: &PairStrain = press.strain(1)?;
+/// assert_eq!(strain.field.strains().len(), 60, "one at every control point of the first frame");
+/// let found = strain.summary.mean[(2, 2)];
+/// assert!((found - trial.truth().strain.expect("two frames")[2][2]).abs() < 0.03);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct PairStrain {
     /// Name of the measure.

@@ -31,6 +31,23 @@ struct Loaded<'a> {
 /// and kept. Matches, displacements and strains are from the first frame to a later one.
 ///
 /// Made by [`Pipeline::press`](super::Pipeline::press).
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::Stage;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let mut press = trial.press(&pipeline)?;
+/// assert_eq!((press.frames(), press.report().work(Stage::Contact).runs), (2, 0), "nothing is asked for yet");
+/// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
+/// assert!((force.value / 0.7 - 1.0).abs() < 0.02);
+/// assert!((press.modulus()?.youngs_modulus_pa / 103e3 - 1.0).abs() < 0.0538, "Hertz, from both contacts");
+/// assert_eq!(press.report().work(Stage::Surface).runs, 0, "no surface so far");
+/// press.strain(1)?;
+/// assert_eq!(press.report().work(Stage::Surface).runs, 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Press<'a> {
     stages: &'a dyn Stages,
     reference: Arc<ReferenceFrame>,
@@ -45,6 +62,25 @@ pub struct Press<'a> {
 impl<'a> Press<'a> {
     /// Starts a press with stages as an object; see [`Pipeline::press`](super::Pipeline::press).
     ///
+    /// ```
+    /// use tactile_imaging::pipeline::{BoxedPipeline, LightContact, Object, Press, StagesConfig};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let light = Box::new(LightContact::from_pairs(&pairs, [50e-6; 2])?);
+    /// let stages = BoxedPipeline::from_config(light, Object::sphere(3e-3), &StagesConfig::default())?;
+    /// let (reference, frame) = (hertz(0.0), hertz(120.0));
+    /// let mut press = Press::new(&stages, reference.view())?;
+    /// press.add_frame(frame.view());
+    /// assert_eq!(press.stages().settings().object, Object::sphere(3e-3));
+    /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
+    /// assert!((force.value / 1.005 - 1.0).abs() < 0.01);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
     pub fn new(stages: &'a dyn Stages, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
@@ -52,6 +88,27 @@ impl<'a> Press<'a> {
     }
 
     /// Starts a press on a reference made before: its noise is measured once for many presses.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::force::ReferenceFrame;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Press};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let (empty, frame) = (hertz(0.0), hertz(120.0));
+    /// // The mean of several exposures has less noise than one.
+    /// let reference = Arc::new(ReferenceFrame::from_frames(&[empty.view(), empty.view(), empty.view()])?);
+    /// let mut press = Press::with_reference(&pipeline, reference);
+    /// press.add_frame(frame.view());
+    /// let radius = press.contact(0)?.expect("a contact").contact_radius_m;
+    /// assert!((radius.value / 1e-3 - 1.0).abs() < 0.01);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn with_reference(stages: &'a dyn Stages, reference: Arc<ReferenceFrame>) -> Self {
         Self {
             stages,
@@ -65,6 +122,20 @@ impl<'a> Press<'a> {
     }
 
     /// The same frames on the same reference, of which nothing is computed yet: to time it again.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::pipeline::Stage;
+    /// let pipeline = trial.pipeline()?;
+    /// let mut press = trial.press(&pipeline)?;
+    /// let modulus = press.modulus()?;
+    /// let mut again = press.renewed();
+    /// assert_eq!((again.frames(), again.report().work(Stage::Contact).runs), (2, 0));
+    /// assert_eq!(again.modulus()?, modulus);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn renewed(&self) -> Self {
         let mut press = Self::with_reference(self.stages, Arc::clone(&self.reference));
@@ -80,6 +151,25 @@ impl<'a> Press<'a> {
     }
 
     /// Adds a frame with a gauge's reading of the force; returns its number.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, PipelineError};
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// // A sensor that darkens knows depth, not force.
+    /// let contact = DarkContact::new(&[(0.0, 0.0), (150.0, 0.5e-3)], [50e-6; 2])?;
+    /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3));
+    /// let (reference, frame) = (hertz(0.0).mapv(|v| 255 - v), hertz(120.0).mapv(|v| 255 - v));
+    /// let mut press = pipeline.press(reference.view())?;
+    /// assert_eq!(press.add_gauged_frame(frame.view(), Some(0.9)), 0);
+    /// assert_eq!((press.gauge_n(0), press.image(0)), (Some(0.9), Some(frame.view())));
+    /// assert!(press.modulus().is_ok());
+    /// press.add_frame(frame.view());
+    /// assert_eq!(press.modulus().unwrap_err(), PipelineError::NoForce { frame: 1 });
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
     pub fn add_gauged_frame(&mut self, image: ArrayView2<'a, u8>, gauge_n: Option<f64>) -> usize {
         let index = self.frames.len();
         let equal = |f: &Loaded<'_>| f.gauge_n == gauge_n && f.image == image;
@@ -160,6 +250,20 @@ impl<'a> Press<'a> {
 
     /// The surface of a frame's contact.
     ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?;
+    /// let mut press = trial.press(&pipeline)?;
+    /// let surface = press.surface(0)?;
+    /// let top = surface.surface.heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
+    /// // Hertz's pressure read as shading is a hemisphere as high as the contact's radius.
+    /// let radius = trial.truth().frames[0].contact_radius_m;
+    /// assert!((top / radius - 1.0).abs() < 0.1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`PipelineError::NoContact`], [`PipelineError::Surface`], and those of [`contact`](Self::contact).
     pub fn surface(&mut self, frame: usize) -> Result<&ContactSurface, PipelineError> {
@@ -184,6 +288,20 @@ impl<'a> Press<'a> {
 
     /// Control points on a frame's surface, in metres from the frame's first pixel.
     ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let mut press = trial.press(&pipeline)?;
+    /// let points = press.control_points(0)?;
+    /// assert_eq!(points.len(), 60);
+    /// // All within the contact, whose middle is the frame's: (86.5, 64.5) pixels.
+    /// let radius = 1.1 * trial.truth().frames[0].contact_radius_m;
+    /// assert!(points.iter().all(|p| (p.x - 86.5 * 172.4e-6).hypot(p.y - 64.5 * 172.4e-6) < radius));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// Those of [`surface`](Self::surface).
     pub fn control_points(&mut self, frame: usize) -> Result<&[Point3<f64>], PipelineError> {
@@ -201,6 +319,19 @@ impl<'a> Press<'a> {
     }
 
     /// The matches of the first frame's control points to those of a later frame.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let mut press = trial.press(&pipeline)?;
+    /// let matching = press.matching(1)?;
+    /// let partners: Vec<_> = matching.assignment.iter().flatten().copied().collect();
+    /// assert!(partners.len() > 50);
+    /// assert_eq!(matching.warped.len(), 60, "where the first frame's points have gone");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`PipelineError::Match`] and those of [`control_points`](Self::control_points).
@@ -253,6 +384,20 @@ impl<'a> Press<'a> {
     }
 
     /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::elasticity::modulus::EstimatorKind;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let mut press = trial.press(&pipeline)?;
+    /// let estimates = press.estimates()?;
+    /// assert_eq!(estimates[0].estimator, EstimatorKind::PaperRatio, "stress over strain");
+    /// let best = press.modulus()?;
+    /// assert!(estimates.contains(&best) && best.estimator == EstimatorKind::HertzSphere);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// Those of the contacts; what an estimator cannot do is left out.

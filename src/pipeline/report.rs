@@ -3,6 +3,21 @@ use std::fmt;
 use std::time::Duration;
 
 /// A stage of the pipeline.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::Stage;
+/// // What a ball's modulus takes: both contacts, and no surface.
+/// let pipeline = trial.pipeline()?;
+/// let mut press = trial.press(&pipeline)?;
+/// press.modulus()?;
+/// let ran: Vec<_> = Stage::ALL.into_iter().filter(|stage| press.report().work(*stage).runs > 0).collect();
+/// assert_eq!(ran, [Stage::Contact, Stage::Modulus]);
+/// assert_eq!(Stage::Contact.to_string(), "contact and force");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
@@ -41,6 +56,28 @@ impl fmt::Display for Stage {
 }
 
 /// Why work was left out.
+///
+/// ```
+/// use tactile_imaging::pipeline::{Object, Pipeline, SkipReason};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let (empty, frame) = (hertz(0.0), hertz(120.0));
+/// let mut press = pipeline.press(empty.view())?;
+/// for image in [&empty, &frame, &frame] {
+///     press.add_frame(image.view());
+/// }
+/// press.contact(0)?;
+/// press.contact(1)?;
+/// let reasons: Vec<_> = press.report().skips.iter().map(|s| s.reason).collect();
+/// assert_eq!(reasons, [SkipReason::EqualFrame, SkipReason::NoContact, SkipReason::OutsideContact]);
+/// assert_eq!(SkipReason::EqualFrame.to_string(), "the frame equals an earlier one");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
@@ -67,6 +104,13 @@ impl fmt::Display for SkipReason {
 }
 
 /// One piece of work that was left out.
+///
+/// ```
+/// use tactile_imaging::pipeline::{Skip, SkipReason, Stage};
+/// let skip = Skip { stage: Stage::Contact, frame: 1, reason: SkipReason::EqualFrame, saved: 64 * 64 };
+/// let text = skip.to_string();
+/// assert_eq!(text, "contact and force of frame 2: the frame equals an earlier one (4096 saved)");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Skip {
@@ -81,6 +125,13 @@ pub struct Skip {
 }
 
 /// How often a stage ran, and for how long.
+///
+/// ```
+/// use std::time::Duration;
+/// use tactile_imaging::pipeline::Work;
+/// let work = Work { runs: 4, time: Duration::from_micros(1250) };
+/// assert_eq!(work.to_string(), "1.250 ms in 4 runs");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Work {
     /// Number of runs.
@@ -90,6 +141,24 @@ pub struct Work {
 }
 
 /// What was computed, what was skipped and why.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::{Report, Stage};
+/// let pipeline = trial.pipeline()?;
+/// let mut press = trial.press(&pipeline)?;
+/// press.surface(1)?;
+/// let mut report = press.report().clone();
+/// // The second surface has the grid of the first, which needs both contacts.
+/// assert_eq!((report.work(Stage::Contact).runs, report.work(Stage::Surface).runs), (2, 1));
+/// assert!(report.total_time() >= report.work(Stage::Surface).time);
+/// assert!(report.to_string().contains("in 2 runs"));
+/// report.clear();
+/// assert_eq!(report, Report::default());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     work: [Work; 6],

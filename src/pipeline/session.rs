@@ -20,9 +20,48 @@ use std::time::Instant;
 
 /// Grey levels by which frames without contact may differ from the reference in the mean before a session speaks of drift:
 /// half the camera's step.
+///
+/// ```
+/// use std::sync::Arc;
+/// use tactile_imaging::pipeline::{DRIFT_LIMIT_GREY, Object, Pipeline, Session};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+/// // The lamp loses a grey level in one row out of four, then everywhere.
+/// let fading = ndarray::Array2::from_shape_fn((64, 64), |(r, _)| if r % 4 == 0 { 9 } else { 10 });
+/// session.push(fading.view())?;
+/// assert!(session.drift().last_grey.abs() < DRIFT_LIMIT_GREY && session.drift_flag().is_none());
+/// session.push(hertz(0.0).mapv(|v| v - 1).view())?;
+/// assert!(session.drift().last_grey.abs() > DRIFT_LIMIT_GREY && session.drift_flag().is_some());
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 pub const DRIFT_LIMIT_GREY: f64 = 0.5;
 
 /// What one frame of a stream says.
+///
+/// ```
+/// use std::sync::Arc;
+/// use tactile_imaging::pipeline::{Object, Pipeline, Session, Update};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+/// let first: Update = session.push(hertz(120.0).view())?;
+/// let again = session.push(hertz(120.0).view())?;
+/// assert_eq!((again.frame, again.repeated), (1, true), "the same image: not measured again");
+/// assert_eq!(again.contact, first.contact);
+/// assert!(first.to_string().starts_with("frame 1: force 1.00"));
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Update {
@@ -38,6 +77,25 @@ pub struct Update {
 
 /// What frames without contact say of the light since the reference was taken, in grey levels: the mean of frame minus
 /// reference.
+///
+/// ```
+/// use std::sync::Arc;
+/// use tactile_imaging::pipeline::{DriftWatch, Object, Pipeline, Session};
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+/// # });
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+/// // The lamp fades by two grey levels and recovers by one.
+/// for loss in [0, 2, 1] {
+///     session.push(hertz(0.0).mapv(|v| v - loss).view())?;
+/// }
+/// assert_eq!(session.drift(), DriftWatch { frames: 3, last_grey: -1.0, greatest_grey: -2.0 });
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct DriftWatch {
@@ -101,6 +159,23 @@ impl Session {
 
     /// A session whose reference is the mean of frames without contact, from which the noise is measured too.
     ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let empty = hertz(0.0);
+    /// let mut session = Session::from_frames(Arc::new(pipeline), &[empty.view(), empty.view(), empty.view()])?;
+    /// let force = session.push(hertz(60.0).view())?.contact.and_then(|c| c.force_n).expect("a force");
+    /// assert!((force.value / 0.503 - 1.0).abs() < 0.01);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`PipelineError::Sensor`] for no frames, or frames that differ in size.
     pub fn from_frames(
@@ -123,6 +198,28 @@ impl Session {
     }
 
     /// Follows shear too: F_x = K_x u_x, F_y = K_y u_y, u the way of the centroid since contact began.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use std::sync::Arc;
+    /// use tactile_imaging::force::{Estimate, ShearCalibration};
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// // A contact that slides along x by two pixels of 50 µm, held by 400 N/m.
+    /// let press = |x: f64| Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - x) / 20.0).min(1.0);
+    ///     10 + (120.0 * (1.0 - d * d).sqrt()).round() as u8
+    /// });
+    /// let stiffness_n_per_m = [Estimate { value: 400.0, standard_error: 4.0 }; 2];
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(Arc::new(pipeline), Array2::from_elem((64, 64), 10).view())?
+    ///     .with_shear(ShearCalibration { stiffness_n_per_m, residual_sd_n: [0.0; 2] });
+    /// session.push(press(32.0).view())?;
+    /// let shear = session.push(press(34.0).view())?.shear.expect("stiffnesses are known");
+    /// assert!((shear.force_n[0].value - 0.04).abs() < 1e-3 && shear.force_n[1].value.abs() < 1e-3);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
     #[must_use]
     pub fn with_shear(mut self, calibration: ShearCalibration<f64>) -> Self {
         self.shear = Some(ShearFollower::new(calibration));
@@ -192,23 +289,100 @@ impl Session {
     }
 
     /// Loads kept apart so far, at most [`SESSION_LOADS`](super::SESSION_LOADS).
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// for peak in [120.0, 60.0, 120.0] {
+    ///     session.push(hertz(peak).view())?;
+    ///     session.push(hertz(0.0).view())?;
+    /// }
+    /// assert_eq!((session.frames(), session.loads()), (6, 3), "frames without contact are no load");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
     pub fn loads(&self) -> usize {
         self.loads.len()
     }
 
     /// What frames without contact say of the light.
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
+    /// session.push(hertz(120.0).view())?;
+    /// let drift = session.drift();
+    /// assert_eq!((drift.frames, drift.last_grey), (1, -2.0), "contacts say nothing of the light");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
     pub fn drift(&self) -> DriftWatch {
         self.drift
     }
 
     /// A caution if the light has drifted by more than [`DRIFT_LIMIT_GREY`] when the sensor was last free: the reference
     /// should be taken anew, or the contact stage told to correct drift.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::Flag;
+    /// # use std::sync::Arc;
+    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
+    /// assert_eq!(session.drift_flag(), Some(Flag::LightDrifted { grey: -2.0 }));
+    /// session.push(hertz(0.0).view())?;
+    /// assert_eq!(session.drift_flag(), None, "the lamp is back");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
     pub fn drift_flag(&self) -> Option<Flag> {
         let grey = self.drift.last_grey;
         (grey.abs() > DRIFT_LIMIT_GREY).then_some(Flag::LightDrifted { grey })
     }
 
     /// What ran and what was skipped so far; skips of one kind are added up.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session, SkipReason, Stage};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// for peak in [0.0, 120.0, 120.0, 120.0] {
+    ///     session.push(hertz(peak).view())?;
+    /// }
+    /// let report = session.report();
+    /// assert_eq!(report.work(Stage::Contact).runs, 2);
+    /// let equal = report.skips.iter().find(|s| s.reason == SkipReason::EqualFrame).expect("two equal frames");
+    /// assert_eq!(equal.saved, 2 * 64 * 64, "pixels of both");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
     pub fn report(&self) -> &Report {
         &self.report
     }

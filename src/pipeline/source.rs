@@ -44,6 +44,22 @@ impl FrameSource for crate::simulate::FrameStream {
 }
 
 /// The images of a folder in the order of their names, at a given rate.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_imaging::{io::write_grey_image, pipeline::{FrameSource, ImageFolder}};
+/// let folder = tempfile::tempdir()?;
+/// for grey in [30, 40_u8] {
+///     write_grey_image(folder.path().join(format!("{grey}.png")), Array2::from_elem((4, 6), grey).view())?;
+/// }
+/// let mut camera = ImageFolder::open(folder.path(), 80.0)?;
+/// let mut frame = Array2::zeros((0, 0));
+/// assert_eq!(camera.next_frame(&mut frame)?, Some(0.0));
+/// assert_eq!(camera.next_frame(&mut frame)?, Some(1.0 / 80.0));
+/// assert_eq!((frame.dim(), frame[[0, 0]]), ((4, 6), 40));
+/// assert_eq!(camera.next_frame(&mut frame)?, None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[cfg(feature = "scene")]
 #[derive(Clone, Debug)]
 pub struct ImageFolder {

@@ -9,6 +9,17 @@ use ndarray::{Array2, ArrayView2, Axis};
 use std::sync::{Mutex, PoisonError};
 
 /// What of the frame the surface stage looks at.
+///
+/// ```
+/// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
+/// // A table of depths wants grey levels; shape from shading, the default, the cosine of the slope.
+/// let shading = Pipeline::new((), Object::sphere(4e-3));
+/// assert_eq!(shading.settings().surface_input, SurfaceInput::Shading);
+/// let table = DarkContact::depth_table(&[(0.0, 0.0), (100.0, 0.5e-3)])?;
+/// let depth = shading.with_surface(table, SurfaceInput::Signal);
+/// assert_eq!(depth.settings().smoothing_px, 1, "heights as they are measured");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SurfaceInput {
     /// Signal over its greatest value, from 0 to 1: the cosine of the slope under frontal light.
@@ -19,6 +30,25 @@ pub enum SurfaceInput {
 }
 
 /// A reconstructed surface and its place in the frame.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
+/// // A grey level is 5 µm, a pixel 0.1 mm; a ball of 4 mm radius lies 0.8 mm deep around pixel (32, 32).
+/// let table = [(0.0, 0.0), (200.0, 1e-3)];
+/// let depth_mm = |x: f64, y: f64| (16.0 - 0.01 * (x * x + y * y)).sqrt() - 3.2;
+/// let grey = |(r, c): (usize, usize)| 220 - (depth_mm(c as f64 - 32.0, r as f64 - 32.0) / 5e-3).round() as u8;
+/// let (reference, frame) = (Array2::from_elem((64, 64), 220_u8), Array2::from_shape_fn((64, 64), grey));
+/// let pipeline = Pipeline::new(DarkContact::new(&table, [1e-4; 2])?, Object::sphere(4e-3))
+///     .with_surface(DarkContact::depth_table(&table)?, SurfaceInput::Signal);
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(frame.view());
+/// let surface = press.surface(0)?;
+/// let ball = surface.fit_ball(4e-3).expect("a cap");
+/// assert!((ball.contact_radius_m - 2.4e-3).abs() < 5e-6);
+/// assert!((ball.centre_m[0] - 3.2e-3).abs() < 5e-6 && surface.origin_m()[0] < 0.9e-3);
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ContactSurface {
     /// Heights over the box, in metres.

@@ -10,6 +10,20 @@ use crate::simulate::{
 };
 
 /// The truth of one simulated frame.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::FrameTruth;
+/// let frames: Vec<FrameTruth> = trial.truth().frames;
+/// assert_eq!(frames[0].force_n, 0.7);
+/// // Hertz: the contact's radius grows as the cube root of the force.
+/// let growth = frames[1].contact_radius_m / frames[0].contact_radius_m;
+/// assert!((growth.powi(3) - 1.2 / 0.7).abs() < 1e-9);
+/// assert!((frames[0].contact_ratio - frames[0].contact_radius_m / 3e-3).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FrameTruth {
@@ -28,6 +42,20 @@ pub struct FrameTruth {
 }
 
 /// The truth of a simulated press.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::Truth;
+/// let truth: Truth = trial.truth();
+/// assert_eq!((truth.youngs_modulus_pa, truth.frames.len()), (103e3, 2));
+/// // The apparent surface grows by s = (1.2/0.7)^⅓ in all directions.
+/// let strain = truth.strain.expect("two frames");
+/// let s = (1.2_f64 / 0.7).cbrt();
+/// assert!((strain[2][2] - 0.5 * (s * s - 1.0)).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Truth {
@@ -40,6 +68,17 @@ pub struct Truth {
 }
 
 /// A simulated press with the calibration of its sensor: the frames to measure and the truth to compare with.
+///
+/// ```
+/// use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// // A coarse camera: 174 × 130 pixels on 30 mm.
+/// let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// let pipeline = trial.pipeline()?;
+/// let modulus = trial.press(&pipeline)?.modulus()?;
+/// assert!((modulus.youngs_modulus_pa / trial.truth().youngs_modulus_pa - 1.0).abs() < 0.0538);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// The scene.
