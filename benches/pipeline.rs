@@ -1,7 +1,7 @@
 //! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both results asserted, and a
 //! table of times and errors over 500 simulated scenes (two with `--test` or `--quick`) whose contacts cover 1 to 15 % of
 //! the frame: ten sensors, each calibrated once, and on each presses at random places with random forces and noise. Beside
-//! them what is skipped: a frame without contact, and the second of two equal frames.
+//! them what is skipped: a frame without contact, the second of two equal frames, and what a stream keeps from frame to frame.
 #![allow(clippy::print_stdout)]
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
@@ -46,6 +46,18 @@ fn press(c: &mut Criterion) {
     let mut same = session();
     group.bench_function("force_of_an_equal_frame", |b| {
         b.iter(|| same.push(black_box(one).view()).expect("a contact"));
+    });
+    let mut strained = session();
+    for frame in [one, two] {
+        strained.push(frame.view()).and_then(|_| strained.strain().map(drop)).expect("a strain");
+    }
+    let third = trial.scene.frame(1, 11);
+    group.bench_function("strain_of_a_frame", |b| {
+        b.iter(|| {
+            side = !side;
+            strained.push(black_box(if side { &third } else { two }).view()).expect("a contact");
+            strained.strain().expect("a strain").map(|found| found.strain.summary.mean)
+        });
     });
     let (mut quiet, other) = (session(), trial.scene.reference(10));
     group.bench_function("frame_without_contact", |b| {

@@ -6,7 +6,7 @@ use std::path::Path;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::io::write_grey_image;
-use tactile_imaging::pipeline::Stages;
+use tactile_imaging::pipeline::{EstimatorChoice, Stages};
 use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::simulate::{
@@ -204,6 +204,11 @@ const MISTAKES: &[(&str, &str, &[&str])] = &[
     ),
     (
         "[object]",
+        "[stages]\nestimator = \"hertz\"\n[object]",
+        &["`stages.estimator` must be one of \"best\"", "\"hertz\""],
+    ),
+    (
+        "[object]",
         "[stages]\nmatch = \"relaxation\"\n[object]",
         &["unknown field `stages.match`", "`matcher`"],
     ),
@@ -290,6 +295,11 @@ fn stages_by_name_are_those_of_the_typed_pipeline() {
     let named = by_name("sampler = \"curvature\"\nwarp = \"affine\"\nstrain = \"hencky\"");
     let swapped = typed.with_sampler(CurvatureAdaptive::new(4.0).unwrap());
     assert_eq!(named, measured(&scene, &swapped.with_warp(AffineModel).with_strain(Hencky)));
+    let ratio = Scene::parse(&format!("{text}\n[stages]\nestimator = \"paper-ratio\""), &path).unwrap();
+    assert_eq!(
+        ratio.stages(&ratio.load().unwrap()).unwrap().settings().estimator,
+        EstimatorChoice::PaperRatio
+    );
     let data = scene.load().unwrap();
     let heights = |name: &str| {
         let scene = Scene::parse(&format!("{text}\n[stages]\nreconstruction = \"{name}\""), &path).unwrap();

@@ -1,11 +1,12 @@
 //! The pipeline whose stages are chosen at run time.
 use super::choice::{
-    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, MatcherChoice,
-    ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice,
+    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, EstimatorChoice,
+    MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice,
 };
 use super::contact::ContactStage;
 use super::object::Object;
-use super::stages::{BoxedWarp, Pipeline, Settings, Stages};
+use super::settings::Settings;
+use super::stages::{BoxedWarp, Stages};
 use crate::elasticity::strain::StrainMeasure;
 use crate::matching::PointMatcher;
 use crate::sfs::{ControlPointSampler, SfsError, SurfaceReconstruction};
@@ -37,6 +38,8 @@ pub struct StagesConfig {
     pub warp: WarpChoice,
     /// Displacement gradient to strain.
     pub strain: StrainChoice,
+    /// Loads to the modulus.
+    pub estimator: EstimatorChoice,
 }
 
 /// A pipeline of boxed stages: as [`Pipeline`], but chosen at run time. The default configuration gives the default
@@ -89,7 +92,7 @@ impl BoxedPipeline {
             matcher: config.matcher.boxed(),
             warp: config.warp.boxed(),
             strain: config.strain.boxed(),
-            settings: Pipeline::new((), object).settings().clone(),
+            settings: Settings { estimator: config.estimator, ..Settings::new(object) },
         })
     }
 

@@ -123,6 +123,19 @@ pub struct FrameContact {
     pub background_step_grey: Option<f64>,
 }
 
+impl FrameContact {
+    /// Gives up the saving of the contact's box: the mask is laid out over the whole frame.
+    pub(super) fn widened(&self, (rows, columns): (usize, usize)) -> Self {
+        let Some(region) = self.region else { return self.clone() };
+        let mut mask = Array2::from_elem((rows, columns), false);
+        for ((row, column), inside) in self.mask.indexed_iter() {
+            mask[[region.row_start + row, region.column_start + column]] = *inside;
+        }
+        let region = Some(BoundingBox { row_start: 0, row_end: rows, column_start: 0, column_end: columns });
+        Self { reading: self.reading, region, mask, background_step_grey: self.background_step_grey }
+    }
+}
+
 /// One frame to contact and force.
 ///
 /// ```

@@ -4,7 +4,7 @@ use super::contact::ContactReading;
 use super::display::estimate;
 #[cfg(feature = "simulate")]
 use super::display::with_error;
-use super::report::{Skip, Work};
+use super::report::{Skip, Stage, Work};
 use super::session::{DriftWatch, Update};
 #[cfg(feature = "simulate")]
 use super::trial::{FrameTruth, Truth};
@@ -68,7 +68,12 @@ impl Display for BallFit {
 
 impl Display for Skip {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "{} of frame {}: {} ({} saved)", self.stage, self.frame + 1, self.reason, self.saved)
+        write!(f, "{}", self.stage)?;
+        if let Some(frame) = self.frame {
+            write!(f, " of frame {}", frame + 1)?;
+        }
+        let what = if self.stage == Stage::Match { "iterations" } else { "pixels" };
+        write!(f, ": {} ({} {what} saved)", self.reason, self.saved)
     }
 }
 

@@ -1,4 +1,5 @@
 //! Why a measurement could not be made.
+use super::choice::EstimatorChoice;
 use crate::elasticity::ElasticityError;
 use crate::force::ForceError;
 use crate::matching::MatchError;
@@ -24,7 +25,7 @@ use crate::tps::TpsError;
 /// assert!(error.to_string().starts_with("frame 1 shows no contact"));
 /// let error = press.contact(7).unwrap_err();
 /// assert_eq!(error.frame(), Some(7));
-/// assert_eq!(error.to_string(), "there is no frame 8: 1 frames were given");
+/// assert_eq!(error.to_string(), "there is no frame 8: the press has 1");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,7 +44,7 @@ pub enum PipelineError {
     #[error("the waveguide or the object is not physical: {0}")]
     Material(#[source] ElasticityError),
     /// There is no frame of this number.
-    #[error("there is no frame {}: {frames} frames were given", frame + 1)]
+    #[error("there is no frame {}: the press has {frames}", frame + 1)]
     NoSuchFrame {
         /// The frame asked for.
         frame: usize,
@@ -119,6 +120,14 @@ pub enum PipelineError {
         to: usize,
         /// Why.
         source: ElasticityError,
+    },
+    /// The estimator that was chosen is for another object.
+    #[error("the estimator \"{estimator}\" needs {needs} as the object")]
+    WrongEstimator {
+        /// The estimator.
+        estimator: EstimatorChoice,
+        /// The object it is for.
+        needs: &'static str,
     },
     /// The loads do not determine a modulus.
     #[error("the loads do not determine the modulus: {0}")]

@@ -11,7 +11,8 @@
 //! surface, [`Press::modulus`] of a ball none either, [`Press::measure`] everything. The [`Report`] says what ran,
 //! for how long, and what was skipped for which reason.
 //!
-//! A [`Session`] follows a stream from a [`FrameSource`] with constant memory; [`contacts`] reads a batch of frames.
+//! A [`Session`] follows a stream from a [`FrameSource`] with constant memory, force and modulus and, for who asks, strain;
+//! [`contacts`] reads a batch of frames.
 //!
 //! # Which modulus
 //! For a ball, Hertz's pressure p₀√(1 − r²/a²) read as frontal Lambertian shading is a hemisphere of radius a, and a grows
@@ -30,14 +31,13 @@ mod display;
 mod display_stream;
 mod error;
 mod flag;
-mod loads;
 mod measurement;
 mod object;
 mod pair;
 mod press;
 mod report;
 mod session;
-mod shear;
+mod settings;
 mod source;
 mod stages;
 mod strain_spline;
@@ -50,25 +50,25 @@ pub use batch::contacts;
 pub use binning::Binning;
 pub use boxed::{BoxedPipeline, StagesConfig};
 pub use choice::{
-    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, FitWarp, MatcherChoice,
-    ReconstructionChoice, SamplerChoice, StrainChoice, UnknownStage, WarpChoice,
+    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, EstimatorChoice, FitWarp,
+    MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, UnknownStage, WarpChoice,
 };
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
 pub use display::with_error;
 pub use error::PipelineError;
 pub use flag::Flag;
-pub use loads::SESSION_LOADS;
 pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 pub use object::Object;
 pub use pair::{LEAST_MATCHES, PairStrain};
 pub use press::Press;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
-pub use session::{DRIFT_LIMIT_GREY, DriftWatch, Session, Update};
+pub use session::{DRIFT_LIMIT_GREY, DriftWatch, SESSION_LOADS, Session, SessionStrain, Update};
+pub use settings::{DEFAULT_CONTROL_POINTS, Settings, Skips};
 pub use source::FrameSource;
 #[cfg(feature = "scene")]
 pub use source::ImageFolder;
-pub use stages::{BoxedWarp, DEFAULT_CONTROL_POINTS, Pipeline, Settings, Skips, Stages};
+pub use stages::{BoxedWarp, Pipeline, Stages};
 pub use strain_spline::StrainSpline;
 pub use surface::{ContactSurface, SurfaceInput};
 #[cfg(feature = "simulate")]

@@ -1,5 +1,7 @@
 //! What is pressed, and the modulus estimators that fit it.
-use super::stages::Settings;
+use super::choice::EstimatorChoice;
+use super::error::PipelineError;
+use super::settings::Settings;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::Waveguide;
 use crate::elasticity::modulus::{
@@ -110,19 +112,32 @@ pub(crate) fn radius_with_floor(value: f64, standard_error: f64, pixel_size_m: [
 
 type Attempt = Result<ModulusEstimate<f64>, ElasticityError>;
 
-/// The estimate that fits the object best.
-pub(crate) fn best_estimate(
-    object: &Object,
-    waveguide: Option<&Waveguide<f64>>,
+/// The estimate that the settings ask for.
+pub(crate) fn chosen_estimate(
+    settings: &Settings,
     loads: &[LoadState<f64>],
     shared: SharedErrors,
-) -> Attempt {
-    match *object {
-        Object::Sphere { radius_m, poisson_ratio } => {
-            hertz(radius_m, poisson_ratio, waveguide, shared, Evidence::All)?.estimate(loads)
+) -> Result<ModulusEstimate<f64>, PipelineError> {
+    let (object, waveguide, choice) = (settings.object, settings.waveguide.as_ref(), settings.estimator);
+    let attempt = match (choice, object) {
+        (EstimatorChoice::Best | EstimatorChoice::Sphere, Object::Sphere { radius_m, poisson_ratio }) => {
+            hertz(radius_m, poisson_ratio, waveguide, shared, Evidence::All).and_then(|e| e.estimate(loads))
         }
-        _ => paper_ratio(object, shared)?.estimate(loads),
-    }
+        (EstimatorChoice::FlatPunch, Object::FlatPunch { radius_m, poisson_ratio }) => {
+            flat_punch(radius_m, poisson_ratio, waveguide, shared).and_then(|e| e.estimate(loads))
+        }
+        (EstimatorChoice::Best | EstimatorChoice::PaperRatio, _) => {
+            paper_ratio(&object, shared).and_then(|e| e.estimate(loads))
+        }
+        (EstimatorChoice::Regression, _) => regression(shared).and_then(|e| e.estimate(loads)),
+        (EstimatorChoice::Sphere, _) => {
+            return Err(PipelineError::WrongEstimator { estimator: choice, needs: "a ball" });
+        }
+        (EstimatorChoice::FlatPunch, _) => {
+            return Err(PipelineError::WrongEstimator { estimator: choice, needs: "a flat punch" });
+        }
+    };
+    attempt.map_err(PipelineError::Modulus)
 }
 
 /// Every estimate that the loads allow: the paper's ratio first, then the others that make sense for the object. What an
@@ -140,18 +155,12 @@ pub(crate) fn all_estimates(
             attempts.push(both.and_then(|e| e.estimate(loads)));
         }
         Object::FlatPunch { radius_m, poisson_ratio } => {
-            let punch =
-                FlatPunch::new(radius_m, poisson_ratio).and_then(|p| p.with_force_scale_error(shared.force));
-            let punch = punch.map(|p| match waveguide {
-                Some(w) => p.with_waveguide(w),
-                None => p,
-            });
+            let punch = flat_punch(radius_m, poisson_ratio, waveguide, shared);
             attempts.push(punch.and_then(|e| e.estimate(loads)));
         }
         Object::Unknown { .. } => {}
     }
-    let regression = StressStrainRegression::new().with_stress_scale_error(shared.force);
-    attempts.push(regression.and_then(|e| e.estimate(loads)));
+    attempts.push(regression(shared).and_then(|e| e.estimate(loads)));
     attempts.into_iter().filter_map(Result::ok).collect()
 }
 
@@ -170,6 +179,23 @@ fn hertz(
         Some(waveguide) => estimator.with_waveguide(waveguide),
         None => estimator,
     })
+}
+
+fn flat_punch(
+    radius_m: f64,
+    poisson_ratio: f64,
+    waveguide: Option<&Waveguide<f64>>,
+    shared: SharedErrors,
+) -> Result<FlatPunch, ElasticityError> {
+    let punch = FlatPunch::new(radius_m, poisson_ratio)?.with_force_scale_error(shared.force)?;
+    Ok(match waveguide {
+        Some(waveguide) => punch.with_waveguide(waveguide),
+        None => punch,
+    })
+}
+
+fn regression(shared: SharedErrors) -> Result<StressStrainRegression, ElasticityError> {
+    StressStrainRegression::new().with_stress_scale_error(shared.force)
 }
 
 /// Stress over strain, counted from the first load, as the paper matches two pressed frames.

@@ -2,7 +2,7 @@
 use super::error::PipelineError;
 use super::stages::Stages;
 use crate::elasticity::field::{StrainField, StrainSummary};
-use crate::matching::Matching;
+use crate::matching::{MatchSeries, Matching};
 use crate::tps::Warp;
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -54,6 +54,19 @@ pub(super) fn match_points(
 ) -> Result<Matching<f64, 3>, PipelineError> {
     let [from, to] = frames;
     stages.matcher().match_points(model, target).map_err(|source| PipelineError::Match { from, to, source })
+}
+
+/// As [`match_points`], from where the last match of a series ended.
+pub(super) fn match_next(
+    stages: &dyn Stages,
+    frames: [usize; 2],
+    series: &mut MatchSeries<f64, 3>,
+    model: &[Point3<f64>],
+    target: &[Point3<f64>],
+) -> Result<Matching<f64, 3>, PipelineError> {
+    let [from, to] = frames;
+    let found = stages.matcher().match_next(series, model, target);
+    found.map_err(|source| PipelineError::Match { from, to, source })
 }
 
 /// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.

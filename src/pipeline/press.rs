@@ -2,17 +2,17 @@
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
 use super::object::{
-    LoadReading, SharedErrors, all_estimates, best_estimate, radius_with_floor, split_errors,
+    LoadReading, SharedErrors, all_estimates, chosen_estimate, radius_with_floor, split_errors,
 };
 use super::pair::{self, PairStrain};
 use super::report::{Report, SkipReason, Stage};
 use super::stages::{Stages, reference_frame};
 use super::surface::{self, ContactSurface, SurfaceWorkspace};
 use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate};
-use crate::force::{BoundingBox, ForceWorkspace, ReferenceFrame};
+use crate::force::{ForceWorkspace, ReferenceFrame};
 use crate::matching::Matching;
 use nalgebra::Point3;
-use ndarray::{Array2, ArrayView2};
+use ndarray::ArrayView2;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -116,7 +116,7 @@ impl<'a> Press<'a> {
             frames: Vec::new(),
             twins: Vec::new(),
             force: ForceWorkspace::default(),
-            surface: SurfaceWorkspace::new(),
+            surface: SurfaceWorkspace::default(),
             report: Report::default(),
         }
     }
@@ -235,7 +235,7 @@ impl<'a> Press<'a> {
                     let saved = pixels - region.rows() * region.columns();
                     self.report.skipped(Stage::Surface, frame, SkipReason::OutsideContact, saved);
                 }
-                Some(_) => widen(&mut contact, loaded.image.dim()),
+                Some(_) => contact = contact.widened(loaded.image.dim()),
             }
             self.report.ran(Stage::Contact, start.elapsed());
             self.frames[at].contact = Some(contact);
@@ -368,19 +368,39 @@ impl<'a> Press<'a> {
         self.frames[at].strain.as_ref().ok_or(PipelineError::NoContact { frame })
     }
 
-    /// Young's modulus by the estimator that fits the object best. For a ball that takes the contacts alone: no surface is
-    /// reconstructed.
+    /// Young's modulus by the estimator of the settings: unless another was chosen, the one that fits the object best. For a
+    /// ball that takes the contacts alone: no surface is reconstructed.
     ///
     /// # Errors
     /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
-        let with_strain = self.stages.settings().object.needs_strain();
+        let with_strain = self.stages.settings().needs_strain();
         let (loads, shared) = self.loads(with_strain)?;
         let start = Instant::now();
-        let settings = self.stages.settings();
-        let estimate = best_estimate(&settings.object, settings.waveguide.as_ref(), &loads, shared);
+        let estimate = chosen_estimate(self.stages.settings(), &loads, shared);
         self.report.ran(Stage::Modulus, start.elapsed());
-        estimate.map_err(PipelineError::Modulus)
+        estimate
+    }
+
+    /// What every frame says of its load, with the strain since the first: what an estimator of your own needs
+    /// ([`ModulusEstimator`](crate::elasticity::modulus::ModulusEstimator)).
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::Trial;
+    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let pipeline = trial.pipeline()?;
+    /// let loads = trial.press(&pipeline)?.load_states()?;
+    /// assert!((loads[1].force_n.value - 1.2).abs() < 0.01);
+    /// assert!(loads[0].mean_strain.is_none() && loads[1].mean_strain.is_some());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoForce`], and those of the contacts and of [`strain`](Self::strain).
+    pub fn load_states(&mut self) -> Result<Vec<LoadState<f64>>, PipelineError> {
+        Ok(self.loads(true)?.0)
     }
 
     /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
@@ -445,15 +465,4 @@ impl<'a> Press<'a> {
         }
         Ok((loads, shared))
     }
-}
-
-/// Gives up the saving of the contact's box: the mask is laid out over the whole frame.
-fn widen(contact: &mut FrameContact, (rows, columns): (usize, usize)) {
-    let Some(region) = contact.region else { return };
-    let mut mask = Array2::from_elem((rows, columns), false);
-    for ((row, column), inside) in contact.mask.indexed_iter() {
-        mask[[region.row_start + row, region.column_start + column]] = *inside;
-    }
-    contact.mask = mask;
-    contact.region = Some(BoundingBox { row_start: 0, row_end: rows, column_start: 0, column_end: columns });
 }

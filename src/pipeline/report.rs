@@ -90,6 +90,10 @@ pub enum SkipReason {
     EqualFrame,
     /// Only the contact's box was worked on, not the whole frame.
     OutsideContact,
+    /// The surface, points and spline of the load that strain is counted from are kept.
+    KeptFromBefore,
+    /// The match began where the last one ended.
+    NearLastAnswer,
 }
 
 impl fmt::Display for SkipReason {
@@ -99,6 +103,8 @@ impl fmt::Display for SkipReason {
             Self::NoContact => "no contact",
             Self::EqualFrame => "the frame equals an earlier one",
             Self::OutsideContact => "outside the contact",
+            Self::KeptFromBefore => "kept from an earlier load",
+            Self::NearLastAnswer => "begun from the last answer",
         })
     }
 }
@@ -107,20 +113,20 @@ impl fmt::Display for SkipReason {
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Skip, SkipReason, Stage};
-/// let skip = Skip { stage: Stage::Contact, frame: 1, reason: SkipReason::EqualFrame, saved: 64 * 64 };
+/// let skip = Skip { stage: Stage::Contact, frame: Some(1), reason: SkipReason::EqualFrame, saved: 64 * 64 };
 /// let text = skip.to_string();
-/// assert_eq!(text, "contact and force of frame 2: the frame equals an earlier one (4096 saved)");
+/// assert_eq!(text, "contact and force of frame 2: the frame equals an earlier one (4096 pixels saved)");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Skip {
     /// The stage.
     pub stage: Stage,
-    /// The frame, counted from 0.
-    pub frame: usize,
+    /// The frame, counted from 0; `None` for a stream, whose skips of one kind are added up.
+    pub frame: Option<usize>,
     /// Why.
     pub reason: SkipReason,
-    /// How many pixels (or control points, for a match) need not be looked at.
+    /// How many pixels need not be looked at; iterations, for a match.
     pub saved: usize,
 }
 
@@ -189,16 +195,16 @@ impl Report {
         work.time += time;
     }
 
-    /// Counts a skip of a stream: those of one kind are one entry, of frame 0, with the sum of what was saved.
+    /// Counts a skip of a stream: those of one kind are one entry, of no frame, with the sum of what was saved.
     pub(crate) fn count_skip(&mut self, stage: Stage, reason: SkipReason, saved: usize) {
         match self.skips.iter_mut().find(|s| s.stage == stage && s.reason == reason) {
             Some(skip) => skip.saved += saved,
-            None => self.skipped(stage, 0, reason, saved),
+            None => self.skips.push(Skip { stage, frame: None, reason, saved }),
         }
     }
 
     pub(crate) fn skipped(&mut self, stage: Stage, frame: usize, reason: SkipReason, saved: usize) {
-        self.skips.push(Skip { stage, frame, reason, saved });
+        self.skips.push(Skip { stage, frame: Some(frame), reason, saved });
     }
 }
 
@@ -215,10 +221,7 @@ impl fmt::Display for Report {
                 )?;
             }
         }
-        for Skip { stage, frame, reason, saved } in &self.skips {
-            writeln!(f, "  skipped: {stage} of frame {}: {reason} ({saved} saved)", frame + 1)?;
-        }
-        Ok(())
+        self.skips.iter().try_for_each(|skip| writeln!(f, "  skipped: {skip}"))
     }
 }
 

@@ -1,9 +1,11 @@
 //! The pipeline: its stages, chosen at compile time or, boxed, at run time, and its settings.
 use super::binning::Binning;
+use super::choice::EstimatorChoice;
 use super::contact::{ContactStage, LightContact};
 use super::error::PipelineError;
 use super::object::Object;
 use super::press::Press;
+use super::settings::{Settings, Skips};
 use super::strain_spline::StrainSpline;
 use super::surface::SurfaceInput;
 use crate::elasticity::contact::Waveguide;
@@ -15,82 +17,6 @@ use crate::tps::{TpsError, Warp, WarpModel};
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 use std::sync::Arc;
-
-/// Control points on each surface where nothing else is asked for: the paper's number.
-///
-/// ```
-/// use tactile_imaging::{Object, Pipeline, pipeline::DEFAULT_CONTROL_POINTS};
-/// assert_eq!(Pipeline::new((), Object::sphere(3e-3)).settings().control_points, DEFAULT_CONTROL_POINTS);
-/// ```
-pub const DEFAULT_CONTROL_POINTS: usize = 200;
-
-/// What the pipeline may leave out. Each skip leaves the results the same; each can be turned off.
-///
-/// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-/// use tactile_imaging::pipeline::Skips;
-/// let everything = trial.pipeline()?.with_skips(Skips { equal_frames: false, outside_contact: false });
-/// let mut press = trial.press(&everything)?;
-/// let region = press.surface(0)?.region;
-/// assert_eq!((region.rows(), region.columns()), (130, 174), "the whole frame");
-/// assert!(press.report().skips.is_empty());
-/// // The contact is the same.
-/// let pipeline = trial.pipeline()?;
-/// assert_eq!(trial.press(&pipeline)?.contact(0)?, press.contact(0)?);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Skips {
-    /// Frames that equal an earlier frame bit for bit take over its results.
-    pub equal_frames: bool,
-    /// Surfaces are reconstructed inside the contact's box alone.
-    pub outside_contact: bool,
-}
-
-impl Default for Skips {
-    fn default() -> Self {
-        Self { equal_frames: true, outside_contact: true }
-    }
-}
-
-/// What a pipeline knows beside its stages.
-///
-/// ```
-/// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
-/// let pipeline = Pipeline::new((), Object::sphere(3e-3)).with_control_points(80).with_smoothing(3);
-/// let settings: &Settings = pipeline.settings();
-/// assert_eq!((settings.control_points, settings.smoothing_px), (80, 3));
-/// assert_eq!(settings.binning, Binning::Auto);
-/// assert!(settings.waveguide.is_none(), "rigid beside the ball");
-/// ```
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// What is pressed.
-    pub object: Object,
-    /// The sensor's layers; `None`: rigid beside the object.
-    pub waveguide: Option<Waveguide<f64>>,
-    /// Number of control points on each surface; the paper's 200 by default.
-    pub control_points: usize,
-    /// What of the frame the surface stage looks at.
-    pub surface_input: SurfaceInput,
-    /// Width in pixels (odd) of the box that smooths the signal, twice along each axis, before the surface stage; 1 for
-    /// none. Where the surface is nearly level its slope √(1/I² − 1) turns noise of the shading I into height.
-    pub smoothing_px: usize,
-    /// Grid of the surface stage.
-    pub binning: Binning,
-    /// Whether differences are divided by the brightness that the reference has there: vignetting then costs no force. Right
-    /// where stray light and signal come through the same lens, and the calibration was taken in the frame's middle.
-    pub flat_field: bool,
-    /// Relative error common to all forces beside the calibration's scatter. Light that is uneven over the frame reads
-    /// contacts of another size than the calibration's with another gain.
-    pub force_scale_error: f64,
-    /// Relative error common to all lengths: that of the pixel size.
-    pub length_scale_error: f64,
-    /// What may be left out.
-    pub skips: Skips,
-}
 
 /// A warp of space, of whatever kind.
 ///
@@ -242,18 +168,7 @@ impl<C> Pipeline<C> {
             matcher: RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near)),
             warp: StrainSpline,
             strain: GreenLagrange,
-            settings: Settings {
-                object,
-                waveguide: None,
-                control_points: DEFAULT_CONTROL_POINTS,
-                surface_input: SurfaceInput::Shading,
-                smoothing_px: 5,
-                binning: Binning::default(),
-                flat_field: false,
-                force_scale_error: 1e-3,
-                length_scale_error: 0.0,
-                skips: Skips::default(),
-            },
+            settings: Settings::new(object),
         }
     }
 }
@@ -418,6 +333,42 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     #[must_use]
     pub fn with_waveguide(mut self, waveguide: Waveguide<f64>) -> Self {
         self.settings.waveguide = Some(waveguide);
+        self
+    }
+
+    /// Says what is pressed.
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::{Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1e5, 2e5].map(|value| CalibrationPair::loading(value, 1e-5 * value));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [21.55e-6; 2], Object::sphere(3e-3))?;
+    /// assert!(!pipeline.settings().object.needs_strain());
+    /// let unknown = pipeline.with_object(Object::Unknown { poisson_ratio: 0.5 });
+    /// assert!(unknown.settings().object.needs_strain());
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    #[must_use]
+    pub fn with_object(mut self, object: Object) -> Self {
+        self.settings.object = object;
+        self
+    }
+
+    /// Takes another estimator of the modulus. For one of your own see [`Press::load_states`].
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::{EstimatorChoice, Trial};
+    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let ratio = trial.pipeline()?.with_estimator(EstimatorChoice::PaperRatio);
+    /// let modulus = trial.press(&ratio)?.modulus()?;
+    /// assert_eq!(modulus.estimator.to_string(), "stress over mean strain");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_estimator(mut self, estimator: EstimatorChoice) -> Self {
+        self.settings.estimator = estimator;
         self
     }
 

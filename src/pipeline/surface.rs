@@ -1,7 +1,8 @@
 //! From a frame's contact to its surface and the control points on it.
 use super::binning;
 use super::contact::FrameContact;
-use super::stages::{Settings, Stages};
+use super::settings::Settings;
+use super::stages::Stages;
 use crate::force::{BoundingBox, Polarity};
 use crate::sfs::{Domain, Frame, SfsError, Surface, Workspace};
 use nalgebra::Point3;
@@ -83,8 +84,8 @@ pub(super) struct SurfaceWorkspace {
     line: Vec<f64>,
 }
 
-impl SurfaceWorkspace {
-    pub(super) fn new() -> Self {
+impl Default for SurfaceWorkspace {
+    fn default() -> Self {
         Self {
             sfs: Mutex::new(Workspace::new()),
             signal: Array2::default((0, 0)),
@@ -94,7 +95,9 @@ impl SurfaceWorkspace {
             line: Vec::new(),
         }
     }
+}
 
+impl SurfaceWorkspace {
     /// The signal and the mask on the grid; returns the grid's box.
     fn load(
         &mut self,

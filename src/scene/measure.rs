@@ -102,7 +102,8 @@ impl Scene {
         let settings = Pipeline::new((), self.object)
             .with_waveguide(waveguide)
             .with_control_points(points)
-            .with_flat_field(self.flat_field);
+            .with_flat_field(self.flat_field)
+            .with_estimator(self.stages.estimator);
         let boxed = |contact: Box<dyn ContactStage>| {
             BoxedPipeline::from_config(contact, self.object, &self.stages).map_err(PipelineError::DepthTable)
         };

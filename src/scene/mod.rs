@@ -38,6 +38,7 @@
 //! matcher = "relaxation"                 # or "dense-relaxation", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
 //! warp = "thin-plate-spline"             # or "cubic-spline", "affine", "rigid"
 //! strain = "green-lagrange"              # or "euler-almansi", "hencky", "biot", "infinitesimal"
+//! estimator = "best"                     # or "paper-ratio", "regression", "sphere" (a ball's), "flat-punch"
 //! ```
 //!
 //! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`io::image`](crate::io::image)).

@@ -2,7 +2,8 @@
 use super::SceneError;
 use super::fields::Fields;
 use crate::pipeline::{
-    MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig, StrainChoice, UnknownStage, WarpChoice,
+    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig, StrainChoice,
+    UnknownStage, WarpChoice,
 };
 use std::str::FromStr;
 
@@ -11,7 +12,7 @@ pub(super) fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
         return Ok(StagesConfig::default());
     }
     let fields = scene.table("stages", "a table of stages by name")?;
-    fields.only(&["reconstruction", "sampler", "matcher", "warp", "strain"])?;
+    fields.only(&["reconstruction", "sampler", "matcher", "warp", "strain", "estimator"])?;
     if fields.has("reconstruction") && scene.table("calibration", "a table")?.has("depth_table") {
         let given =
             toml::Value::String(fields.string("reconstruction", ReconstructionChoice::EXPECTED)?.into());
@@ -23,6 +24,7 @@ pub(super) fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
         matcher: choice(&fields, "matcher", MatcherChoice::EXPECTED)?,
         warp: choice(&fields, "warp", WarpChoice::EXPECTED)?,
         strain: choice(&fields, "strain", StrainChoice::EXPECTED)?,
+        estimator: choice(&fields, "estimator", EstimatorChoice::EXPECTED)?,
     })
 }
 

@@ -161,7 +161,24 @@ impl<T: Real> ShearTracker<T> {
     /// Takes the next frame. The first frame of a contact has zero shear by definition; without contact there is none, and
     /// the next contact starts anew.
     pub fn update(&mut self, measurement: &ForceMeasurement<T>) -> Option<ShearMeasurement<T>> {
-        let Some(now) = measurement.centroid_m else {
+        self.update_centroid(measurement.centroid_m)
+    }
+
+    /// As [`update`](Self::update), from the centroid [x, y] in metres alone, however it was measured; `None` without contact.
+    ///
+    /// ```
+    /// use tactile_force::{Estimate, ShearCalibration, ShearPair, ShearTracker};
+    /// let pairs = [1e-5, 2e-5].map(|u| ShearPair { centroid_step_m: [u, u], force_n: [2e3 * u; 2] });
+    /// let mut tracker = ShearTracker::new(ShearCalibration::fit(&pairs)?);
+    /// let at = |x: f64| Some([x, 1e-3].map(|value| Estimate { value, standard_error: 1e-8 }));
+    /// assert_eq!(tracker.update_centroid(at(0.0)).unwrap().force_n[0].value, 0.0);
+    /// let pulled = tracker.update_centroid(at(3e-5)).unwrap();
+    /// assert!((pulled.force_n[0].value - 0.06_f64).abs() < 1e-12);
+    /// assert!(tracker.update_centroid(None).is_none());
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn update_centroid(&mut self, centroid_m: Option<[Estimate<T>; 2]>) -> Option<ShearMeasurement<T>> {
+        let Some(now) = centroid_m else {
             (self.first, self.last) = (None, None);
             return None;
         };

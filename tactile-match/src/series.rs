@@ -71,7 +71,20 @@ impl<T: Scalar, const D: usize> MatchSeries<T, D> {
         (!self.last.is_empty() && self.model == model).then_some(&self.last)
     }
 
-    /// Takes note of a match, for the next.
+    /// Takes note of a match, for the next: what a matcher of one's own does at the end of its
+    /// [`match_next`](crate::PointMatcher::match_next).
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{LinearAssignment, MatchSeries, PointMatcher};
+    /// let model = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]].map(Point2::from);
+    /// let found = LinearAssignment::new().match_points(&model, &model)?;
+    /// let mut series = MatchSeries::<f64, 2>::new();
+    /// assert!(series.last_for(&model).is_none());
+    /// series.remember(&model, &found);
+    /// assert_eq!(series.last_for(&model), Some(&*found.warped));
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
     pub fn remember(&mut self, model: &[Point<T, D>], found: &Matching<T, D>) {
         if self.model != model {
             self.model.clear();

@@ -77,6 +77,9 @@ fn stream(stages: Arc<dyn Stages>, reference: &Array2<u8>, frames: [&Array2<u8>;
             let force = contact.force_n.unwrap();
             let finite = [force.value, force.standard_error, contact.contact_radius_m.value];
             assert!(finite.iter().all(|v| v.is_finite()) || contact.flags(0).next().is_some(), "{contact:?}");
+            if let Ok(Some(found)) = session.strain() {
+                assert!(found.strain.summary.mean.iter().all(|v| v.is_finite()), "{found:?}");
+            }
         }
     }
     if let Ok(modulus) = session.modulus() {

@@ -1,6 +1,7 @@
 //! The pipeline pulls: what is not asked for is not computed, what is skipped changes no answer, stages can be swapped.
 #![allow(missing_docs)]
 mod hostile;
+mod strain_stream;
 mod streams;
 
 use nalgebra::Point3;

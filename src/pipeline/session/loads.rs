@@ -1,6 +1,7 @@
 //! The loads that a session has seen: a bounded number, similar ones merged.
-use super::contact::ContactReading;
-use super::object::{LoadReading, radius_with_floor};
+use crate::elasticity::modulus::Estimate;
+use crate::pipeline::contact::ContactReading;
+use crate::pipeline::object::{LoadReading, radius_with_floor};
 
 /// Loads that a session keeps apart; more are merged.
 ///
@@ -32,10 +33,11 @@ struct MergedLoad {
     force_variance: f64,
     radius_variance: f64,
     calibration: f64,
+    strain: Option<Estimate<f64>>,
 }
 
 impl MergedLoad {
-    fn of(reading: &ContactReading) -> Option<Self> {
+    fn of(reading: &ContactReading, strain: Option<Estimate<f64>>) -> Option<Self> {
         let force = reading.force_n?;
         Some(Self {
             frames: 1.0,
@@ -44,6 +46,7 @@ impl MergedLoad {
             force_variance: reading.force_noise_n.powi(2),
             radius_variance: reading.contact_radius_m.standard_error.powi(2),
             calibration: (reading.force_calibration_n / force.value).abs(),
+            strain,
         })
     }
 
@@ -58,6 +61,10 @@ impl MergedLoad {
             force_variance: a * a * self.force_variance + b * b * other.force_variance,
             radius_variance: a * a * self.radius_variance + b * b * other.radius_variance,
             calibration: a * self.calibration + b * other.calibration,
+            strain: self.strain.zip(other.strain).map(|(s, o)| {
+                let error = (a * s.standard_error).hypot(b * o.standard_error);
+                Estimate::new(a * s.value + b * o.value, error)
+            }),
         }
     }
 
@@ -89,12 +96,19 @@ impl SeenLoads {
         self.0.iter().map(move |load| load.reading(pixel_size_m))
     }
 
+    /// The strains of all loads, in the same order.
+    pub(super) fn strains(&self) -> impl Iterator<Item = Option<Estimate<f64>>> + '_ {
+        self.0.iter().map(|load| load.strain)
+    }
+
     /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its profile fitted.
-    pub(super) fn learn(&mut self, reading: &ContactReading) {
+    pub(super) fn learn(&mut self, reading: &ContactReading, strain: Option<Estimate<f64>>) {
         let whole = !reading.touches_edge && reading.other_contacts == 0;
         let trusted = whole && !reading.out_of_calibration && reading.converged;
         let trusted = trusted && reading.saturated_share == 0.0;
-        let Some(load) = MergedLoad::of(reading).filter(|l| trusted && l.force_n > 0.0) else { return };
+        let Some(load) = MergedLoad::of(reading, strain).filter(|l| trusted && l.force_n > 0.0) else {
+            return;
+        };
         let at = self.0.partition_point(|l| l.force_n < load.force_n);
         self.0.insert(at, load);
         if self.0.len() > SESSION_LOADS {

@@ -2,45 +2,29 @@
 //!
 //! The first frames without contact make the reference; then every frame gives its contact and force, and every contact
 //! refines the modulus. Shear is followed where its stiffnesses are known, drift of the light watched in frames without
-//! contact. Memory is constant: similar loads are merged. [`Session::push`] allocates nothing once its buffers have their
-//! size.
+//! contact. Strain is followed for who asks ([`Session::strain`]), from the load where that began: its surface, points and
+//! spline are kept, and each match begins where the last one ended. Memory is constant: similar loads are merged.
+//! [`Session::push`] allocates nothing once its buffers have their size.
+mod drift;
+mod loads;
+mod strain;
+
 use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
 use super::flag::Flag;
-use super::loads::SeenLoads;
-use super::object::{best_estimate, split_errors};
+use super::object::{chosen_estimate, split_errors};
 use super::report::{Report, SkipReason, Stage};
-use super::shear::ShearFollower;
 use super::stages::{Stages, reference_frame};
 use crate::elasticity::modulus::ModulusEstimate;
-use crate::force::{ForceWorkspace, ReferenceFrame, ShearCalibration, ShearMeasurement};
+use crate::force::{ForceWorkspace, ReferenceFrame, ShearCalibration, ShearMeasurement, ShearTracker};
+pub use drift::{DRIFT_LIMIT_GREY, DriftWatch};
+pub use loads::SESSION_LOADS;
+use loads::SeenLoads;
 use ndarray::{Array2, ArrayView2};
 use std::sync::Arc;
 use std::time::Instant;
-
-/// Grey levels by which frames without contact may differ from the reference in the mean before a session speaks of drift:
-/// half the camera's step.
-///
-/// ```
-/// use std::sync::Arc;
-/// use tactile_imaging::pipeline::{DRIFT_LIMIT_GREY, Object, Pipeline, Session};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
-/// // The lamp loses a grey level in one row out of four, then everywhere.
-/// let fading = ndarray::Array2::from_shape_fn((64, 64), |(r, _)| if r % 4 == 0 { 9 } else { 10 });
-/// session.push(fading.view())?;
-/// assert!(session.drift().last_grey.abs() < DRIFT_LIMIT_GREY && session.drift_flag().is_none());
-/// session.push(hertz(0.0).mapv(|v| v - 1).view())?;
-/// assert!(session.drift().last_grey.abs() > DRIFT_LIMIT_GREY && session.drift_flag().is_some());
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
-pub const DRIFT_LIMIT_GREY: f64 = 0.5;
+use strain::FollowedStrain;
+pub use strain::SessionStrain;
 
 /// What one frame of a stream says.
 ///
@@ -75,48 +59,6 @@ pub struct Update {
     pub shear: Option<ShearMeasurement<f64>>,
 }
 
-/// What frames without contact say of the light since the reference was taken, in grey levels: the mean of frame minus
-/// reference.
-///
-/// ```
-/// use std::sync::Arc;
-/// use tactile_imaging::pipeline::{DriftWatch, Object, Pipeline, Session};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
-/// // The lamp fades by two grey levels and recovers by one.
-/// for loss in [0, 2, 1] {
-///     session.push(hertz(0.0).mapv(|v| v - loss).view())?;
-/// }
-/// assert_eq!(session.drift(), DriftWatch { frames: 3, last_grey: -1.0, greatest_grey: -2.0 });
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct DriftWatch {
-    /// Frames without contact so far.
-    pub frames: u64,
-    /// In the last of them.
-    pub last_grey: f64,
-    /// The greatest so far, with its sign.
-    pub greatest_grey: f64,
-}
-
-impl DriftWatch {
-    fn watch(&mut self, grey: f64) {
-        self.frames += 1;
-        self.last_grey = grey;
-        if grey.abs() > self.greatest_grey.abs() {
-            self.greatest_grey = grey;
-        }
-    }
-}
-
 /// Follows a stream of frames from one sensor pressed on one object. `Send`: one session a thread.
 ///
 /// ```
@@ -139,11 +81,13 @@ pub struct Session {
     workspace: ForceWorkspace,
     contact: FrameContact,
     last: Array2<u8>,
-    /// Whether `contact` is that of `last`.
+    /// Whether `contact` is that of `last`, and which frame that was.
     measured: bool,
+    measured_frame: u64,
     frames: u64,
     loads: SeenLoads,
-    shear: Option<ShearFollower>,
+    shear: Option<ShearTracker<f64>>,
+    strain: FollowedStrain,
     drift: DriftWatch,
     report: Report,
 }
@@ -189,9 +133,11 @@ impl Session {
             contact: FrameContact::default(),
             last: Array2::default((0, 0)),
             measured: false,
+            measured_frame: 0,
             frames: 0,
             loads: SeenLoads::new(),
             shear: None,
+            strain: FollowedStrain::default(),
             drift: DriftWatch::default(),
             report: Report::default(),
         })
@@ -222,7 +168,7 @@ impl Session {
     /// ```
     #[must_use]
     pub fn with_shear(mut self, calibration: ShearCalibration<f64>) -> Self {
-        self.shear = Some(ShearFollower::new(calibration));
+        self.shear = Some(ShearTracker::new(calibration));
         self
     }
 
@@ -243,7 +189,8 @@ impl Session {
         }
         let contact = self.contact.reading;
         let size = self.stages.contact().pixel_size_m();
-        let shear = self.shear.as_mut().and_then(|follower| follower.update(contact.as_ref(), size));
+        let centroid = contact.map(|c| std::array::from_fn(|k| c.centroid_px[k].scaled(size[k])));
+        let shear = self.shear.as_mut().and_then(|tracker| tracker.update_centroid(centroid));
         Ok(Update { frame: number, contact, repeated, shear })
     }
 
@@ -257,10 +204,11 @@ impl Session {
             .measure(&mut self.workspace, frame, &self.reference, None, &mut self.contact)
             .map_err(|source| PipelineError::Contact { frame: number as usize, source })?;
         self.measured = true;
+        self.measured_frame = number;
         self.report.ran(Stage::Contact, start.elapsed());
         match self.contact.reading {
             None => self.report.count_skip(Stage::Surface, SkipReason::NoContact, frame.len()),
-            Some(reading) => self.loads.learn(&reading),
+            Some(reading) => self.loads.learn(&reading, None),
         }
         if let Some(grey) = self.contact.background_step_grey {
             self.drift.watch(grey);
@@ -268,8 +216,68 @@ impl Session {
         Ok(())
     }
 
-    /// Young's modulus from all loads so far, by the estimator that fits the object best. Objects whose modulus needs
-    /// strain need two whole frames: give them to a [`Press`](super::Press).
+    /// Strain of the last frame against the load where strain began to be asked for; that load's own answer is `None`.
+    ///
+    /// The first call makes its frame's load the one that strains are counted from, until [`restart_strain`](Self::restart_strain).
+    /// Costs the surface, control points, match and strain of one frame; a call without a new frame costs nothing.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::pipeline::{Session, Trial};
+    /// use tactile_imaging::simulate::{Camera, CalibrationOptions, Load, PressOptions};
+    /// let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+    /// let loads = [0.7, 1.0, 1.2].map(Load::normal).to_vec();
+    /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let mut session = Session::new(Arc::new(trial.pipeline()?), trial.simulation.reference.view())?;
+    /// let mut across = Vec::new();
+    /// for frame in &trial.simulation.frames {
+    ///     session.push(frame.view())?;
+    ///     across.extend(session.strain()?.map(|found| found.strain.summary.mean[(0, 0)]));
+    /// }
+    /// // From 0.7 N the surface of a ball grows with the cube root of the load.
+    /// let truth = |force: f64| 0.5 * ((force / 0.7_f64).powf(2.0 / 3.0) - 1.0);
+    /// assert_eq!(across.len(), 2);
+    /// assert!((across[0] - truth(1.0)).abs() < 0.02 && (across[1] - truth(1.2)).abs() < 0.02);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoContact`] where nothing touches; those of a [`Press`](super::Press)'s strain.
+    pub fn strain(&mut self) -> Result<Option<&SessionStrain>, PipelineError> {
+        let Some(reading) = self.contact.reading.filter(|_| self.measured) else {
+            return Err(PipelineError::NoContact { frame: self.frames.saturating_sub(1) as usize });
+        };
+        let frame = strain::Frame {
+            number: self.measured_frame,
+            image: self.last.view(),
+            reference: &self.reference,
+            contact: &self.contact,
+            reading,
+        };
+        self.strain.follow(self.stages.as_ref(), &frame, &mut self.report)
+    }
+
+    /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.
+    ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use tactile_imaging::pipeline::{Session, Trial};
+    /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let mut session = Session::new(Arc::new(trial.pipeline()?), trial.simulation.reference.view())?;
+    /// session.push(trial.simulation.frames[0].view())?;
+    /// assert!(session.strain()?.is_none());
+    /// session.push(trial.simulation.frames[1].view())?;
+    /// session.restart_strain();
+    /// assert!(session.strain()?.is_none(), "strain is now counted from this frame");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn restart_strain(&mut self) {
+        self.strain = FollowedStrain::default();
+    }
+
+    /// Young's modulus from all loads so far, by the estimator of the settings. Where that needs strain the loads are those whose [`strain`](Self::strain) was asked for.
     ///
     /// # Errors
     /// [`PipelineError::Modulus`].
@@ -277,10 +285,14 @@ impl Session {
         let start = Instant::now();
         let settings = self.stages.settings();
         let size = self.stages.contact().pixel_size_m();
-        let (loads, shared) = split_errors(self.loads.readings(size), settings);
-        let estimate = best_estimate(&settings.object, settings.waveguide.as_ref(), &loads, shared);
+        let (loads, shared) = if settings.needs_strain() {
+            self.strain.loads(size, settings)
+        } else {
+            split_errors(self.loads.readings(size), settings)
+        };
+        let estimate = chosen_estimate(settings, &loads, shared);
         self.report.ran(Stage::Modulus, start.elapsed());
-        estimate.map_err(PipelineError::Modulus)
+        estimate
     }
 
     /// Frames seen so far.
@@ -357,8 +369,7 @@ impl Session {
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     pub fn drift_flag(&self) -> Option<Flag> {
-        let grey = self.drift.last_grey;
-        (grey.abs() > DRIFT_LIMIT_GREY).then_some(Flag::LightDrifted { grey })
+        self.drift.flag()
     }
 
     /// What ran and what was skipped so far; skips of one kind are added up.

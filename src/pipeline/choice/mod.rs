@@ -1,0 +1,191 @@
+//! Stages by name: what a configuration may say, and the default stage behind every name.
+mod boxed;
+
+pub use boxed::{BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, FitWarp};
+use std::fmt;
+
+/// A name that no stage of this kind has.
+///
+/// ```
+/// use tactile_imaging::pipeline::{ReconstructionChoice, UnknownStage};
+/// let error: UnknownStage = "taylor".parse::<ReconstructionChoice>().unwrap_err();
+/// assert_eq!(error.found, "taylor");
+/// assert!(error.to_string().contains("tsai-shah"));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("stage `{stage}` must be {expected}, found \"{found}\"")]
+pub struct UnknownStage {
+    /// The stage.
+    pub stage: &'static str,
+    /// The names that it knows.
+    pub expected: &'static str,
+    /// The name given.
+    pub found: String,
+}
+
+/// An enum whose variants have names in configurations; the first is the default.
+macro_rules! choice {
+    ($(#[$meta:meta])* $name:ident, $stage:literal:
+        $(#[$one:meta])* $first:ident = $text:literal, $($(#[$more:meta])* $variant:ident = $other:literal),+ $(,)?) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[non_exhaustive]
+        pub enum $name {
+            $(#[$one])*
+            #[default]
+            #[cfg_attr(feature = "serde", serde(rename = $text))]
+            $first,
+            $($(#[$more])* #[cfg_attr(feature = "serde", serde(rename = $other))] $variant,)+
+        }
+
+        impl $name {
+            /// All of them, the default first.
+            pub const ALL: &[Self] = &[Self::$first, $(Self::$variant),+];
+            /// The names, as a sentence says them.
+            pub const EXPECTED: &str = concat!("one of \"", $text, "\"", $(", \"", $other, "\""),+);
+
+            /// The name in configurations.
+            ///
+            /// ```
+            #[doc = concat!("use tactile_imaging::pipeline::", stringify!($name), ";")]
+            #[doc = concat!("let choice: ", stringify!($name), " = \"", $text, "\".parse()?;")]
+            #[doc = concat!("assert_eq!(choice.name(), \"", $text, "\");")]
+            /// # Ok::<(), tactile_imaging::pipeline::UnknownStage>(())
+            /// ```
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self { Self::$first => $text, $(Self::$variant => $other),+ }
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = UnknownStage;
+
+            fn from_str(name: &str) -> Result<Self, UnknownStage> {
+                let unknown = || UnknownStage { stage: $stage, expected: Self::EXPECTED, found: name.into() };
+                Self::ALL.iter().copied().find(|choice| choice.name() == name).ok_or_else(unknown)
+            }
+        }
+    };
+}
+
+choice! {
+    /// Image to surface, under frontal light. Pentland's method needs oblique light: give it with its light to
+    /// [`BoxedPipeline::with_surface`](super::BoxedPipeline::with_surface).
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::ReconstructionChoice;
+    /// assert_eq!("tsai-shah".parse(), Ok(ReconstructionChoice::TsaiShah));
+    /// let error = "tsai".parse::<ReconstructionChoice>().unwrap_err().to_string();
+    /// assert!(error.starts_with("stage `reconstruction` must be one of \"eikonal\""));
+    /// ```
+    ReconstructionChoice, "reconstruction":
+    /// [`Eikonal`](crate::sfs::Eikonal), zero height at the rim.
+    Eikonal = "eikonal",
+    /// [`TsaiShah`](crate::sfs::TsaiShah): quick, and much too low on the fine frames of a whole contact.
+    TsaiShah = "tsai-shah",
+    /// [`BrooksHorn`](crate::sfs::BrooksHorn), the rim of the contact occluding.
+    BrooksHorn = "brooks-horn",
+}
+
+choice! {
+    /// Surface to control points.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::SamplerChoice;
+    /// assert_eq!(SamplerChoice::default().name(), "equally-spaced");
+    /// ```
+    SamplerChoice, "sampler":
+    /// [`EquallySpaced`](crate::sfs::EquallySpaced).
+    EquallySpaced = "equally-spaced",
+    /// [`CurvatureAdaptive`](crate::sfs::CurvatureAdaptive) of emphasis 4.
+    Curvature = "curvature",
+    /// [`Random`](crate::sfs::Random) from the seed 0.
+    Random = "random",
+}
+
+choice! {
+    /// Points to matches.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::MatcherChoice;
+    /// assert!(MatcherChoice::ALL.iter().all(|m| m.name().parse() == Ok(*m)));
+    /// ```
+    MatcherChoice, "matcher":
+    /// [`RelaxationMatcher`](crate::matching::RelaxationMatcher), searching near by.
+    Relaxation = "relaxation",
+    /// [`DenseRelaxation`](crate::matching::DenseRelaxation): the paper's method as printed.
+    DenseRelaxation = "dense-relaxation",
+    /// [`CoherentPointDrift`](crate::matching::CoherentPointDrift).
+    CoherentPointDrift = "coherent-point-drift",
+    /// [`LinearAssignment`](crate::matching::LinearAssignment).
+    LinearAssignment = "linear-assignment",
+    /// [`NearestNeighbour`](crate::matching::NearestNeighbour).
+    NearestNeighbour = "nearest-neighbour",
+}
+
+choice! {
+    /// Matches to the warp whose gradient is strained.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::WarpChoice;
+    /// assert_eq!(WarpChoice::Affine.to_string(), "affine");
+    /// ```
+    WarpChoice, "warp":
+    /// [`StrainSpline`](super::StrainSpline): thin-plate, kernel −r, smoothed by blocked cross-validation.
+    ThinPlateSpline = "thin-plate-spline",
+    /// The spline of kernel r³, smoothed by cross-validation.
+    CubicSpline = "cubic-spline",
+    /// [`AffineModel`](crate::tps::AffineModel).
+    Affine = "affine",
+    /// [`RigidModel`](crate::tps::RigidModel).
+    Rigid = "rigid",
+}
+
+choice! {
+    /// Displacement gradient to strain.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::StrainChoice;
+    /// assert_eq!("hencky".parse(), Ok(StrainChoice::Hencky));
+    /// ```
+    StrainChoice, "strain":
+    /// [`GreenLagrange`](crate::elasticity::strain::GreenLagrange).
+    GreenLagrange = "green-lagrange",
+    /// [`EulerAlmansi`](crate::elasticity::strain::EulerAlmansi).
+    EulerAlmansi = "euler-almansi",
+    /// [`Hencky`](crate::elasticity::strain::Hencky).
+    Hencky = "hencky",
+    /// [`Biot`](crate::elasticity::strain::Biot).
+    Biot = "biot",
+    /// [`Infinitesimal`](crate::elasticity::strain::Infinitesimal).
+    Infinitesimal = "infinitesimal",
+}
+
+choice! {
+    /// Loads to the modulus.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::EstimatorChoice;
+    /// assert_eq!("paper-ratio".parse(), Ok(EstimatorChoice::PaperRatio));
+    /// assert_eq!(EstimatorChoice::default().name(), "best");
+    /// ```
+    EstimatorChoice, "estimator":
+    /// The one that fits the object best: [`HertzSphere`](crate::elasticity::modulus::HertzSphere) for a ball, else [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
+    Best = "best",
+    /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio): stress over strain, equation (31).
+    PaperRatio = "paper-ratio",
+    /// [`StressStrainRegression`](crate::elasticity::modulus::StressStrainRegression) over three loads or more.
+    Regression = "regression",
+    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere); a ball alone.
+    Sphere = "sphere",
+    /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch); a flat-ended cylinder alone, and from depths (a depth table's).
+    FlatPunch = "flat-punch",
+}

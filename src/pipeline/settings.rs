@@ -1,0 +1,124 @@
+//! What a pipeline knows beside its stages.
+use super::binning::Binning;
+use super::choice::EstimatorChoice;
+use super::object::Object;
+use super::surface::SurfaceInput;
+use crate::elasticity::contact::Waveguide;
+
+/// Control points on each surface where nothing else is asked for: the paper's number.
+///
+/// ```
+/// use tactile_imaging::{Object, Pipeline, pipeline::DEFAULT_CONTROL_POINTS};
+/// assert_eq!(Pipeline::new((), Object::sphere(3e-3)).settings().control_points, DEFAULT_CONTROL_POINTS);
+/// ```
+pub const DEFAULT_CONTROL_POINTS: usize = 200;
+
+/// What the pipeline may leave out. Each skip leaves the results the same; each can be turned off.
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::Skips;
+/// let everything = trial.pipeline()?.with_skips(Skips { equal_frames: false, outside_contact: false, last_answer: false });
+/// let mut press = trial.press(&everything)?;
+/// let region = press.surface(0)?.region;
+/// assert_eq!((region.rows(), region.columns()), (130, 174), "the whole frame");
+/// assert!(press.report().skips.is_empty());
+/// // The contact is the same.
+/// let pipeline = trial.pipeline()?;
+/// assert_eq!(trial.press(&pipeline)?.contact(0)?, press.contact(0)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Skips {
+    /// Frames that equal an earlier frame bit for bit take over its results.
+    pub equal_frames: bool,
+    /// Surfaces are reconstructed inside the contact's box alone.
+    pub outside_contact: bool,
+    /// Matches of a stream begin where the last one ended.
+    pub last_answer: bool,
+}
+
+impl Default for Skips {
+    fn default() -> Self {
+        Self { equal_frames: true, outside_contact: true, last_answer: true }
+    }
+}
+
+/// What a pipeline knows beside its stages.
+///
+/// ```
+/// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
+/// let pipeline = Pipeline::new((), Object::sphere(3e-3)).with_control_points(80).with_smoothing(3);
+/// let settings: &Settings = pipeline.settings();
+/// assert_eq!((settings.control_points, settings.smoothing_px), (80, 3));
+/// assert_eq!(settings.binning, Binning::Auto);
+/// assert!(settings.waveguide.is_none(), "rigid beside the ball");
+/// ```
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// What is pressed.
+    pub object: Object,
+    /// The sensor's layers; `None`: rigid beside the object.
+    pub waveguide: Option<Waveguide<f64>>,
+    /// Number of control points on each surface; the paper's 200 by default.
+    pub control_points: usize,
+    /// What of the frame the surface stage looks at.
+    pub surface_input: SurfaceInput,
+    /// Width in pixels (odd) of the box that smooths the signal, twice along each axis, before the surface stage; 1 for
+    /// none. Where the surface is nearly level its slope √(1/I² − 1) turns noise of the shading I into height.
+    pub smoothing_px: usize,
+    /// Grid of the surface stage.
+    pub binning: Binning,
+    /// Whether differences are divided by the brightness that the reference has there: vignetting then costs no force. Right
+    /// where stray light and signal come through the same lens, and the calibration was taken in the frame's middle.
+    pub flat_field: bool,
+    /// Relative error common to all forces beside the calibration's scatter. Light that is uneven over the frame reads
+    /// contacts of another size than the calibration's with another gain.
+    pub force_scale_error: f64,
+    /// Relative error common to all lengths: that of the pixel size.
+    pub length_scale_error: f64,
+    /// Loads to the modulus.
+    pub estimator: EstimatorChoice,
+    /// What may be left out.
+    pub skips: Skips,
+}
+
+impl Settings {
+    /// The defaults for an object: no waveguide, 200 control points.
+    pub(super) fn new(object: Object) -> Self {
+        Self {
+            object,
+            waveguide: None,
+            control_points: DEFAULT_CONTROL_POINTS,
+            surface_input: SurfaceInput::Shading,
+            smoothing_px: 5,
+            binning: Binning::default(),
+            flat_field: false,
+            force_scale_error: 1e-3,
+            length_scale_error: 0.0,
+            estimator: EstimatorChoice::Best,
+            skips: Skips::default(),
+        }
+    }
+
+    /// Whether the modulus is estimated from strain, and so needs surfaces and matches.
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::{EstimatorChoice, Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1e5, 2e5].map(|value| CalibrationPair::loading(value, 1e-5 * value));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [21.55e-6; 2], Object::sphere(3e-3))?;
+    /// assert!(!pipeline.settings().needs_strain(), "the contact's radius is enough");
+    /// assert!(pipeline.with_estimator(EstimatorChoice::PaperRatio).settings().needs_strain());
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn needs_strain(&self) -> bool {
+        match self.estimator {
+            EstimatorChoice::Best => self.object.needs_strain(),
+            EstimatorChoice::PaperRatio | EstimatorChoice::Regression => true,
+            EstimatorChoice::Sphere | EstimatorChoice::FlatPunch => false,
+        }
+    }
+}

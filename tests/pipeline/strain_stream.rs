@@ -1,0 +1,119 @@
+//! Strain along a stream: the same as a press's, with less work.
+use super::trial;
+use nalgebra::Matrix3;
+use std::sync::Arc;
+use tactile_imaging::elasticity::modulus::EstimatorKind;
+use tactile_imaging::pipeline::{
+    EstimatorChoice, Object, PipelineError, Session, SkipReason, Skips, Stage, Stages, Trial,
+};
+
+fn session(trial: &Trial, stages: impl Stages + 'static) -> Session {
+    Session::new(Arc::new(stages), trial.simulation.reference.view()).unwrap()
+}
+
+/// Mean strains of all frames against the first, and what the matches took.
+fn strains(trial: &Trial, skips: Skips) -> (Vec<Matrix3<f64>>, usize, Session) {
+    let mut session = session(trial, trial.pipeline().unwrap().with_skips(skips));
+    let (mut means, mut iterations) = (Vec::new(), 0);
+    for frame in &trial.simulation.frames {
+        session.push(frame.view()).unwrap();
+        if let Some(found) = session.strain().unwrap() {
+            means.push(found.strain.summary.mean);
+            iterations += found.report.iterations;
+        }
+    }
+    (means, iterations, session)
+}
+
+#[test]
+fn two_frames_of_a_stream_strain_as_two_of_a_press() {
+    let trial = trial(&[0.7, 1.2], 4);
+    let (means, _, session) = strains(&trial, Skips::default());
+    let pipeline = trial.pipeline().unwrap();
+    let mut press = trial.press(&pipeline).unwrap();
+    assert_eq!(means, [press.strain(1).unwrap().summary.mean]);
+    let runs = Stage::ALL.map(|stage| session.report().work(stage).runs);
+    assert_eq!(runs, [2, 2, 2, 1, 1, 0]);
+}
+
+#[test]
+fn matches_that_go_on_from_the_last_one_strain_as_those_made_anew() {
+    let trial = trial(&[0.7, 0.8, 0.9, 1.0, 1.1, 1.2], 5);
+    let (on, few, session) = strains(&trial, Skips::default());
+    let (anew, many, other) = strains(&trial, Skips { last_answer: false, ..Skips::default() });
+    for (a, b) in on.iter().zip(&anew) {
+        // A match may end in another of the pairings that fit alike; strains then differ by less than their own error, 0.01.
+        assert!((a - b).amax() < 5e-3, "{a} {b}");
+    }
+    assert!(few < many, "{few} iterations, {many} without");
+    let saved =
+        |s: &Session, reason| s.report().skips.iter().find(|k| k.reason == reason).map_or(0, |k| k.saved);
+    assert!(saved(&session, SkipReason::NearLastAnswer) > 0);
+    assert_eq!(saved(&other, SkipReason::NearLastAnswer), 0);
+    // Five surfaces of the first load need not be made again.
+    assert!(saved(&session, SkipReason::KeptFromBefore) > 0);
+    assert_eq!(session.report().work(Stage::Surface).runs, 6);
+}
+
+#[test]
+fn an_object_that_needs_strain_gets_its_modulus_from_the_stream() {
+    let trial = trial(&[0.7, 0.9, 1.2], 6);
+    let object = Object::Unknown { poisson_ratio: 0.5 };
+    let mut pipeline = trial.pipeline().unwrap();
+    pipeline = pipeline.with_object(object);
+    let mut press = trial.press(&pipeline).unwrap();
+    let expected = press.modulus().unwrap();
+    let mut session = session(&trial, pipeline.clone());
+    assert!(matches!(session.modulus().unwrap_err(), PipelineError::Modulus(_)), "no strain yet");
+    for frame in &trial.simulation.frames {
+        session.push(frame.view()).unwrap();
+        session.strain().unwrap();
+    }
+    let found = session.modulus().unwrap();
+    assert_eq!(found.estimator, expected.estimator);
+    // The same loads and, to what two equally good matches differ by, the same strains.
+    let ratio = found.youngs_modulus_pa / expected.youngs_modulus_pa;
+    assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+}
+
+#[test]
+fn strain_is_measured_once_a_frame_and_starts_anew_when_told() {
+    let trial = trial(&[0.7, 1.2], 7);
+    let mut session = session(&trial, trial.pipeline().unwrap());
+    assert_eq!(session.strain().unwrap_err(), PipelineError::NoContact { frame: 0 });
+    session.push(trial.scene.reference(9).view()).unwrap();
+    assert_eq!(session.strain().unwrap_err(), PipelineError::NoContact { frame: 0 });
+    let [low, high] = [0, 1].map(|k| trial.simulation.frames[k].view());
+    session.push(low).unwrap();
+    assert!(session.strain().unwrap().is_none() && session.strain().unwrap().is_none());
+    session.push(high).unwrap();
+    let to = |session: &mut Session| session.strain().unwrap().map(|s| (s.from, s.to));
+    assert_eq!([to(&mut session), to(&mut session)], [Some((1, 2)); 2]);
+    // The same frame again: neither contact nor strain is measured anew.
+    session.push(high).unwrap();
+    assert_eq!(to(&mut session), Some((1, 2)));
+    assert_eq!(session.report().work(Stage::Strain).runs, 1);
+    session.restart_strain();
+    assert_eq!(to(&mut session), None);
+    session.push(low).unwrap();
+    assert_eq!(to(&mut session), Some((2, 4)));
+    let eased = session.strain().unwrap().unwrap().strain.summary.mean[(0, 0)];
+    assert!(eased < 0.0, "the surface shrinks when the load falls: {eased}");
+}
+
+#[test]
+fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
+    let trial = trial(&[0.7, 0.9, 1.2], 8);
+    let modulus = |choice| {
+        let pipeline = trial.pipeline().unwrap().with_estimator(choice);
+        let mut press = trial.press(&pipeline).unwrap();
+        let found = press.modulus().map(|m| m.estimator);
+        (found, press.report().work(Stage::Surface).runs)
+    };
+    assert_eq!(modulus(EstimatorChoice::Best), modulus(EstimatorChoice::Sphere));
+    assert_eq!(modulus(EstimatorChoice::Sphere).1, 0, "no surface for a ball");
+    assert_eq!(modulus(EstimatorChoice::PaperRatio), (Ok(EstimatorKind::PaperRatio), 3));
+    assert_eq!(modulus(EstimatorChoice::Regression), (Ok(EstimatorKind::StressStrainRegression), 3));
+    let error = modulus(EstimatorChoice::FlatPunch).0.unwrap_err();
+    assert_eq!(error.to_string(), "the estimator \"flat-punch\" needs a flat punch as the object");
+}
