@@ -15,24 +15,38 @@ pub(crate) fn march<T: Real, S: TopSurface<T> + ?Sized>(
     tolerance: T,
 ) -> Meeting<T> {
     let at = |t: T| -> [T; 3] { core::array::from_fn(|k| position[k] + t * direction[k]) };
-    let gap = |p: [T; 3]| surface.height(p[0], p[1]) - p[2];
+    let gap = |t: T| {
+        let [x, y, z] = at(t);
+        surface.height(x, y) - z
+    };
     let closing = direction[2] + surface.steepest() * direction[0].hypot(direction[1]);
     if closing <= T::zero() {
         return Meeting::Missed;
     }
-    let mut t = from;
-    let start = at(t);
-    let mut g = gap(start);
+    let (mut t, mut g) = (from, gap(from));
     if g <= tolerance {
         // On the surface: it has just been left, or is met here unless the gap opens.
-        let [gx, gy] = surface.gradient(start[0], start[1]);
+        let [x, y, _] = at(t);
+        let [gx, gy] = surface.gradient(x, y);
         let opening = gx * direction[0] + gy * direction[1] - direction[2];
         if opening <= T::zero() {
             return Meeting::At(t);
         }
         t = t + (tolerance + tolerance) / opening;
-        g = gap(at(t));
+        g = gap(t);
     }
+    approach(gap, [t, g], to, closing, tolerance)
+}
+
+/// Steps from the way t, where the gap is g, until the gap is below `tolerance`; it closes no faster than `closing`.
+#[inline]
+fn approach<T: Real>(
+    gap: impl Fn(T) -> T,
+    [mut t, mut g]: [T; 2],
+    to: T,
+    closing: T,
+    tolerance: T,
+) -> Meeting<T> {
     for _ in 0..MAX_STEPS {
         if t > to {
             return Meeting::Missed;
@@ -41,7 +55,7 @@ pub(crate) fn march<T: Real, S: TopSurface<T> + ?Sized>(
             return Meeting::At(t);
         }
         t = t + g / closing;
-        g = gap(at(t));
+        g = gap(t);
     }
     Meeting::Undecided
 }

@@ -46,22 +46,27 @@ pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
     while let (Some(ray), true) = (current, written < vertices.len()) {
         vertices[written] = ray.position;
         written += 1;
-        let mut waiting = Branches::new();
-        let going_on = tracer.advance(ray, &mut waiting);
-        // The strongest of what goes on, and whether more than that has left.
-        let mut best = going_on;
-        while let Some(branch) = waiting.pop() {
-            if best.is_none_or(|b| b.power < branch.power) {
-                best = Some(branch);
-            }
-        }
-        let stays = best.filter(|b| b.power >= ray.power * real(0.5));
-        if stays.is_none() && written < vertices.len() {
+        current = stronger_part(&mut tracer, ray);
+        if current.is_none() && written < vertices.len() {
             let (way, _) = tracer.next(&ray);
             vertices[written] = ray.at(way);
             written += 1;
         }
-        current = stays;
     }
     Ok(written)
+}
+
+/// The strongest of what goes on where the ray meets something; none if more than half has left there.
+fn stronger_part<T: Real, S: TopSurface<T> + ?Sized>(
+    tracer: &mut Tracer<'_, '_, T, S>,
+    ray: Ray<T>,
+) -> Option<Ray<T>> {
+    let mut waiting = Branches::new();
+    let mut best = tracer.advance(ray, &mut waiting);
+    while let Some(branch) = waiting.pop() {
+        if best.is_none_or(|b| b.power < branch.power) {
+            best = Some(branch);
+        }
+    }
+    best.filter(|b| b.power >= ray.power * real(0.5))
 }
