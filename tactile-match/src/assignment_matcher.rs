@@ -35,6 +35,16 @@ impl LinearAssignment {
     /// No pair further apart than `max_distance`, in the units of the points; leaving two points without partner costs as
     /// much as a pair at that distance.
     ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{LinearAssignment, PointMatcher};
+    /// let model = [[0.0, 0.0], [1.0, 0.0]].map(Point2::from);
+    /// let target = [[0.1, 0.0], [9.0, 0.0]].map(Point2::from);
+    /// assert_eq!(LinearAssignment::new().match_points(&model, &target)?.assignment, [Some(0), Some(1)]);
+    /// assert_eq!(LinearAssignment::within(2.0)?.match_points(&model, &target)?.assignment, [Some(0), None]);
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`MatchError::InvalidOption`] unless the distance is positive and finite.
     pub fn within(max_distance: f64) -> Result<Self, MatchError> {

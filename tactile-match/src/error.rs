@@ -3,6 +3,15 @@
 use thiserror::Error;
 
 /// One of the two point sets of a match.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{MatchError, NearestNeighbour, PointMatcher, PointSet};
+/// let points = [Point2::new(0.0, f64::NAN)];
+/// let error = NearestNeighbour::new().match_points(&[Point2::origin()], &points).err();
+/// assert_eq!(error, Some(MatchError::NotFinite { set: PointSet::Target, row: 0 }));
+/// assert_eq!(PointSet::Target.to_string(), "target");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointSet {
     /// The set that is warped.
@@ -21,6 +30,18 @@ impl std::fmt::Display for PointSet {
 }
 
 /// Why a match could not be attempted. Not converging is no error: see [`StopReason`](crate::StopReason).
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{MatchError, NearestNeighbour, PointMatcher, PointSet, linear_assignment};
+/// let points = [Point2::new(1.0, 2.0)];
+/// let empty = NearestNeighbour::new().match_points(&[], &points).err();
+/// assert_eq!(empty, Some(MatchError::Empty { set: PointSet::Model }));
+/// let error = linear_assignment(&[1.0, 2.0, 3.0], 2, 2).unwrap_err();
+/// assert_eq!(error, MatchError::Shape { what: "costs", expected: 4, found: 3 });
+/// let error = NearestNeighbour::within(-1.0).unwrap_err();
+/// assert_eq!(error.to_string(), "option max_distance = -1 is outside (0, ∞)");
+/// ```
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MatchError {

@@ -8,6 +8,23 @@ use tactile_tps::{Scalar, Warp};
 ///
 /// Object safe, so that a user picks the method at run time:
 /// `let matcher: Box<dyn PointMatcher<f64, 2>> = …`.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{CoherentPointDrift, NearestNeighbour, PointMatcher, RelaxationMatcher};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let target = model.map(|p| Point2::new(p.x + 0.05 * p.y, p.y));
+/// let matchers: [Box<dyn PointMatcher<f64, 2>>; 3] = [
+///     Box::new(NearestNeighbour::new()),
+///     Box::new(CoherentPointDrift::default()),
+///     Box::new(RelaxationMatcher::default()),
+/// ];
+/// for matcher in matchers {
+///     let matching = matcher.match_points(&model, &target)?;
+///     assert!((0..6).all(|i| matching.assignment[i] == Some(i)));
+/// }
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 pub trait PointMatcher<T: Scalar, const D: usize> {
     /// Matches `model` (I points) to `target` (J points); I and J may differ and either may be 1.
     ///
@@ -50,6 +67,20 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
 }
 
 /// Why a matcher stopped.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use std::ops::ControlFlow;
+/// use tactile_match::{RelaxationMatcher, RelaxationWorkspace, StopReason};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
+/// let (matcher, mut workspace) = (RelaxationMatcher::default(), RelaxationWorkspace::new());
+/// let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+/// assert_eq!(found.report().stop, StopReason::Exact); // no noise: every pair fits to rounding
+/// let cut = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Break(()))?;
+/// assert_eq!(cut.report().stop, StopReason::Callback);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StopReason {
@@ -67,6 +98,18 @@ pub enum StopReason {
 }
 
 /// How a match went.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, PointMatcher};
+/// let model = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.0, 3.0]].map(Point2::from);
+/// let target = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.2, 3.2]].map(Point2::from); // one corner is drawn out
+/// let options = DriftOptions { motion: Motion::Rigid, ..Default::default() };
+/// let report = CoherentPointDrift::new(options)?.match_points(&model, &target)?.report;
+/// assert!(report.iterations > 0 && report.starts == 1);
+/// assert!(report.residual > 0.05 && report.residual < 0.2); // what no rigid motion explains, in units of the points
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MatchReport<T> {
     /// Why it stopped.
@@ -82,6 +125,19 @@ pub struct MatchReport<T> {
 }
 
 /// The answer of a [`PointMatcher`].
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{NearestNeighbour, PointMatcher};
+/// let model = [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0]].map(Point2::from);
+/// let target = [[0.1, 0.0], [2.1, 0.0], [0.1, 2.0], [2.1, 2.0], [9.0, 9.0]].map(Point2::from);
+/// let matching = NearestNeighbour::within(1.0)?.match_points(&model, &target)?;
+/// assert_eq!(matching.assignment, [Some(0), Some(1), Some(2), Some(3)]);
+/// assert_eq!(matching.unmatched_target, [4]);
+/// assert!((matching.warp.apply(&Point2::new(1.0, 1.0)) - Point2::new(1.1, 1.0)).norm() < 1e-9);
+/// assert!((matching.warped[3] - target[3]).norm() < 1e-9 && matching.confidence[3] > 0.99);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 pub struct Matching<T: Scalar, const D: usize> {
     /// The warp; it takes the model points to [`warped`](Self::warped).
     pub warp: Box<dyn Warp<T, D> + Send + Sync>,
@@ -106,6 +162,12 @@ pub struct Matching<T: Scalar, const D: usize> {
 }
 
 /// Rows without a partner on both sides, `(model, target)`, ascending, for `target_len` target points.
+///
+/// ```
+/// use tactile_match::unmatched_rows;
+/// let assignment = [Some(2), None, Some(0)]; // three model points, four targets
+/// assert_eq!(unmatched_rows(&assignment, 4), (vec![1], vec![1, 3]));
+/// ```
 #[must_use]
 pub fn unmatched_rows(assignment: &[Option<usize>], target_len: usize) -> (Vec<usize>, Vec<usize>) {
     let mut taken = vec![false; target_len];

@@ -2,6 +2,17 @@
 
 /// The match matrix `M` without its slack row and column, in compressed rows: for every model point the target
 /// points that keep some probability, and how much. What a row lacks to one is its probability of having no partner.
+///
+/// ```
+/// use tactile_match::SoftMatches;
+/// let mut soft = SoftMatches::new();
+/// soft.push_row([(3, 0.5), (1, 0.25)]); // model point 0: target 3 or 1, or with probability 0.25 none
+/// soft.push_row([]);
+/// assert_eq!((soft.rows(), soft.entries()), (2, 2));
+/// assert_eq!(1.0 - soft.row(0).map(|(_, p)| p).sum::<f64>(), 0.25);
+/// soft.clear();
+/// assert_eq!(soft.rows(), 0);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SoftMatches<T> {
     starts: Vec<usize>,

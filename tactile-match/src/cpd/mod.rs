@@ -34,6 +34,20 @@ use nalgebra::Point;
 use tactile_tps::Scalar;
 
 /// How the model may move.
+///
+/// ```
+/// use nalgebra::{Point2, Vector2};
+/// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, PointMatcher};
+/// let model: Vec<_> = (0..20).map(f64::from).map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k)).collect();
+/// let target: Vec<_> = model.iter().map(|p| p * 1.2 + Vector2::new(0.0, 3.0)).collect(); // swollen by a fifth
+/// let residual = |motion| {
+///     let matcher = CoherentPointDrift::new(DriftOptions { motion, ..Default::default() })?;
+///     Ok::<_, tactile_match::MatchError>(matcher.match_points(&model, &target)?.report.residual)
+/// };
+/// assert!(residual(Motion::Similarity)? < 1e-6);
+/// assert!(residual(Motion::Rigid)? > 0.1); // has no scale to offer
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Motion {
@@ -60,6 +74,19 @@ impl Motion {
 }
 
 /// How the two sets are brought to size one.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, Normalization, PointMatcher};
+/// let model: Vec<_> = (0..24).map(f64::from).map(|k| Point2::new(k % 6.0 + 0.2 * k.sin(), (k / 6.0).floor())).collect();
+/// let target: Vec<_> = model[..18].iter().map(|p| Point2::new(p.x + 0.1, p.y)).collect(); // the last row is out of sight
+/// let (motion, normalization) = (Motion::Rigid, Normalization::Model);
+/// let options = DriftOptions { motion, normalization, ..Default::default() };
+/// let matching = CoherentPointDrift::new(options)?.match_points(&model, &target)?;
+/// assert!((0..18).all(|i| matching.assignment[i] == Some(i)));
+/// assert_eq!(matching.unmatched_model, [18, 19, 20, 21, 22, 23]);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Normalization {
@@ -77,6 +104,16 @@ pub enum Normalization {
 }
 
 /// Options of [`CoherentPointDrift`]; all are independent of the units of the points.
+///
+/// ```
+/// use tactile_match::{CoherentPointDrift, DriftOptions, MatchError, Motion};
+/// // About a fifth of the target points are clutter, and the object may bend, but gently.
+/// let motion = Motion::NonRigid { beta: 2.0, lambda: 10.0, rank: Some(30) };
+/// let options = DriftOptions { motion, outlier_weight: 0.2, ..DriftOptions::default() };
+/// assert!(CoherentPointDrift::new(options).is_ok());
+/// let all_clutter = CoherentPointDrift::new(DriftOptions { outlier_weight: 1.0, ..options });
+/// assert!(matches!(all_clutter, Err(MatchError::InvalidOption { option: "outlier_weight", .. })));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriftOptions {
     /// How the model may move.
@@ -152,6 +189,20 @@ impl CoherentPointDrift {
     }
 
     /// [`PointMatcher::match_points`] with the memory of the iterations kept between calls.
+    ///
+    /// ```
+    /// use nalgebra::{Point2, Vector2};
+    /// use tactile_match::{CoherentPointDrift, DriftWorkspace};
+    /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor())).collect();
+    /// let (matcher, mut workspace) = (CoherentPointDrift::default(), DriftWorkspace::new());
+    /// for shift in [0.5, 5.0] {
+    ///     let target: Vec<_> = model.iter().map(|p| p + Vector2::new(shift, 0.0)).collect();
+    ///     let matching = matcher.match_with(&mut workspace, &model, &target)?;
+    ///     assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
+    ///     assert!(matching.report.iterations <= matcher.options().max_iterations);
+    /// }
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
     ///
     /// # Errors
     /// As [`PointMatcher::match_points`].

@@ -4,6 +4,17 @@ use super::Edge;
 use nalgebra::{RealField, SVector};
 
 /// What the maximum in α (16) is taken over.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::dense::{DenseOptions, DenseRelaxation, LengthMaximum};
+/// let points = [[0.0, 0.0], [1.0, 0.1], [2.5, 0.0], [0.3, 2.0], [1.6, 1.4]].map(Point2::from);
+/// for maximum in [LengthMaximum::PerPair, LengthMaximum::Global] {
+///     let m = DenseRelaxation::new(DenseOptions { maximum, ..Default::default() })?.relax(&points, &points);
+///     assert!((0..5).all(|i| (0..5).all(|j| m[(i, i)] >= m[(i, j)])));
+/// }
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LengthMaximum {
     /// The two edges compared: [`alpha`].
@@ -14,6 +25,17 @@ pub enum LengthMaximum {
 }
 
 /// Which factors the compatibility of two edges has.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tactile_match::dense::{Compatibility, CompatibilityRule, Edge};
+/// let edge = |x: f64, y: f64| Edge { from: 0, to: 1, vector: Vector2::new(x, y), length: x.hypot(y), gamma: 0.5 };
+/// let rate = |factors| CompatibilityRule { factors, longest: None }.of(&edge(1.0, 0.0), &edge(0.0, 2.0));
+/// assert_eq!(rate(Compatibility::Count), 1.0);
+/// assert_eq!(rate(Compatibility::Length), 0.5);
+/// assert_eq!(rate(Compatibility::LengthDirection), 0.25); // at right angles: β = 0.5
+/// assert_eq!(rate(Compatibility::Full), 0.0625);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compatibility {
     /// One: the support counts neighbours (the method the paper's extends).
@@ -97,6 +119,16 @@ pub fn gamma<T: RealField + Copy>(d: T, longest: T) -> T {
 }
 
 /// A [`Compatibility`] ready to be evaluated: the factors and the maximum in α.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tactile_match::dense::{Compatibility, CompatibilityRule, Edge};
+/// let edge = |x: f64| Edge { from: 0, to: 1, vector: Vector2::new(x, 0.0), length: x, gamma: 1.0 };
+/// let pair = CompatibilityRule { factors: Compatibility::Length, longest: None };
+/// assert_eq!(pair.of(&edge(1.0), &edge(4.0)), 0.25); // 1 − 3/4
+/// let global = CompatibilityRule { longest: Some(8.0), ..pair };
+/// assert_eq!(global.of(&edge(1.0), &edge(4.0)), 0.625); // 1 − 3/8
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompatibilityRule<T> {
     /// The factors.

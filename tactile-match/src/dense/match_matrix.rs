@@ -92,6 +92,14 @@ impl<T: RealField + Copy> MatchMatrix<T> {
     }
 
     /// The largest change of an entry, `max |M − M'|`; the matrices must have the same size.
+    ///
+    /// ```
+    /// use tactile_match::dense::MatchMatrix;
+    /// let m = MatchMatrix::from_fn(2, 2, |i, j| if i == j { 0.75 } else { 0.125 });
+    /// assert_eq!(m.row(0), [0.75, 0.125, 0.125]); // the slack last
+    /// assert_eq!((m.slack_of_column(1), m[(2, 2)]), (0.125, 0.0)); // the corner is not used
+    /// assert_eq!(m.largest_change(&MatchMatrix::zeros(2, 2)), 0.75);
+    /// ```
     #[must_use]
     pub fn largest_change(&self, other: &Self) -> T {
         self.entries.iter().zip(&other.entries).fold(T::zero(), |worst, (&a, &b)| worst.max((a - b).abs()))

@@ -14,6 +14,20 @@ use tactile_tps::{Scalar, Smoothing};
 const TABLE_LIMIT: usize = 1 << 25;
 
 /// Options of [`DenseRelaxation`]. Lengths refer to sets of root mean square radius one.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::dense::{DenseOptions, DenseRelaxation, Neighbourhood};
+/// use tactile_match::{MatchError, PointMatcher};
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
+/// let options = DenseOptions { neighbourhood: Neighbourhood::Nearest(4), max_iterations: 3, ..Default::default() };
+/// let matching = DenseRelaxation::new(options)?.match_points(&model, &target)?;
+/// assert!((0..12).all(|i| matching.assignment[i] == Some(i)) && matching.report.iterations <= 3);
+/// let hot = DenseRelaxation::new(DenseOptions { slack: 2.0, ..options });
+/// assert!(matches!(hot, Err(MatchError::InvalidOption { option: "slack", .. })));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DenseOptions {
     /// (13): which points are neighbours.
@@ -97,6 +111,14 @@ impl DenseRelaxation {
     }
 
     /// One outer iteration's match matrix: first probabilities of `model` (as warped so far) and `target`, then relaxation.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::dense::DenseRelaxation;
+    /// let points = [[0.0, 0.0], [1.0, 0.1], [2.5, 0.0], [0.3, 2.0], [1.6, 1.4]].map(Point2::from);
+    /// let m = DenseRelaxation::default().relax(&points, &points);
+    /// assert!((0..5).all(|i| (0..5).all(|j| m[(i, i)] >= m[(i, j)])));
+    /// ```
     ///
     /// # Panics
     /// Never for finite points.

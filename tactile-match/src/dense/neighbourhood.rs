@@ -4,6 +4,18 @@ use super::gamma;
 use nalgebra::{Point, RealField, SVector};
 
 /// Which points are a point's neighbours.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::dense::{NeighbourGraph, Neighbourhood};
+/// let line = [0.0, 1.0, 2.0, 10.0].map(|x| Point2::new(x, 0.0)); // distances 1, 1, 2, 8, 9, 10: the median is 5
+/// let degrees = |neighbourhood| {
+///     let graph = NeighbourGraph::new(&line, neighbourhood);
+///     [0, 1, 2, 3].map(|i| graph.of(i).len())
+/// };
+/// assert_eq!(degrees(Neighbourhood::MedianRadius), [2, 2, 2, 0]); // the far point stands alone
+/// assert_eq!(degrees(Neighbourhood::Nearest(1)), [1, 1, 1, 1]);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Neighbourhood {
     /// All within the median of all pairwise distances of the set, the median included: the paper's.
@@ -17,6 +29,15 @@ pub enum Neighbourhood {
 }
 
 /// The edge from a point to one of its neighbours.
+///
+/// ```
+/// use nalgebra::{Point2, Vector2};
+/// use tactile_match::dense::{Edge, NeighbourGraph};
+/// let points = [[0.0, 0.0], [3.0, 4.0], [0.0, 10.0]].map(Point2::from);
+/// let graph = NeighbourGraph::from_lists(&points, &[vec![1, 2], vec![], vec![]]);
+/// let near = Edge { from: 0, to: 1, vector: Vector2::new(3.0, 4.0), length: 5.0, gamma: 0.5 };
+/// assert_eq!(graph.of(0)[0], near); // half as long as the longest edge of its point
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge<T, const D: usize> {
     /// Row of the point.
@@ -76,6 +97,15 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
     }
 
     /// The same with neighbour lists of the caller's choice: `lists[i]` holds the neighbours of point `i`.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::dense::NeighbourGraph;
+    /// let points = [[0.0, 0.0], [3.0, 4.0], [0.0, 1.0]].map(Point2::from);
+    /// let graph = NeighbourGraph::from_lists(&points, &[vec![1, 2], vec![0], vec![0]]);
+    /// assert_eq!((graph.points(), graph.edges().len()), (3, 4));
+    /// assert_eq!((graph.longest(), graph.radius()), (5.0, None));
+    /// ```
     ///
     /// # Panics
     /// If a list names a point that does not exist.

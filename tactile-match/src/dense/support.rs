@@ -5,6 +5,16 @@ use nalgebra::RealField;
 
 /// (19) as printed: `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)`, row-major `I × J`; `O(I J A B)`.
 ///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::dense::{Compatibility, CompatibilityRule, MatchMatrix, NeighbourGraph, Neighbourhood, support};
+/// let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]].map(Point2::from);
+/// let graph = NeighbourGraph::new(&points, Neighbourhood::Nearest(2));
+/// let rule = CompatibilityRule { factors: Compatibility::LengthDirection, longest: None };
+/// let s = support(&MatchMatrix::<f64>::uniform(3, 3), &graph, &graph, &rule);
+/// assert!(s[0] > s[1] && s[0] > s[2]); // point 0 has the neighbours of point 0
+/// ```
+///
 /// # Panics
 /// If `m` has not the size of the graphs.
 #[must_use]
@@ -19,6 +29,16 @@ pub fn support<T: RealField + Copy, const D: usize>(
 
 /// [`support`] with a compatibility of the caller's choice: `r(x, y)` of the `x`-th model edge and the `y`-th target edge,
 /// as they stand in [`NeighbourGraph::edges`].
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::dense::{MatchMatrix, NeighbourGraph, support_by};
+/// let points = [[0.0, 0.0], [1.0, 0.0]].map(Point2::from);
+/// let graph = NeighbourGraph::from_lists(&points, &[vec![1], vec![0]]);
+/// let same = MatchMatrix::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 0.0 });
+/// // Every edge pair counts one: a pair hears the probability that its neighbours are a pair.
+/// assert_eq!(support_by(&same, &graph, &graph, |_, _| 1.0), [1.0, 0.0, 0.0, 1.0]);
+/// ```
 ///
 /// # Panics
 /// If `m` has not the size of the graphs.
@@ -48,6 +68,16 @@ pub fn support_by<T: RealField + Copy, const D: usize>(
 
 /// The energy (14), `Σ_i Σ_{a∈N(i)} Σ_j Σ_{b∈N(j)} M_ij M_ab`: how many edges the match keeps, each counted from both
 /// ends, the slack left out. `O(A B)` for each of the at most `I J` entries that are not nought.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::dense::{MatchMatrix, NeighbourGraph, energy};
+/// let points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].map(Point2::from);
+/// let chain = NeighbourGraph::from_lists(&points, &[vec![1], vec![0, 2], vec![1]]);
+/// let matched = |to: [usize; 3]| MatchMatrix::from_fn(3, 3, |i, j| if i < 3 && to[i] == j { 1.0 } else { 0.0 });
+/// assert_eq!(energy(&matched([0, 1, 2]), &chain, &chain), 4.0); // two edges, each from both ends
+/// assert_eq!(energy(&matched([1, 0, 2]), &chain, &chain), 2.0); // one of them is torn
+/// ```
 ///
 /// # Panics
 /// If `m` has not the size of the graphs.

@@ -4,6 +4,15 @@ use super::MatchMatrix;
 use nalgebra::RealField;
 
 /// How far [`sinkhorn`] came.
+///
+/// ```
+/// use tactile_match::dense::{MatchMatrix, sinkhorn};
+/// let start = || MatchMatrix::<f64>::from_fn(2, 2, |i, j| if i == j { 0.9 } else { 0.2 });
+/// let one = sinkhorn(&mut start(), 1, 0.0);
+/// let many = sinkhorn(&mut start(), 50, 0.0);
+/// assert_eq!(one.sweeps, 1);
+/// assert!(many.row_defect < one.row_defect);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SinkhornReport<T> {
     /// Sweeps done.
@@ -16,6 +25,14 @@ pub struct SinkhornReport<T> {
 /// which stay as they were. `support` is row-major `I × J`; the slack row is not touched.
 ///
 /// Each product is taken relative to the largest of its row, so that none under- or overflows on the way.
+///
+/// ```
+/// use tactile_match::dense::{MatchMatrix, update};
+/// let mut m = MatchMatrix::from_fn(1, 2, |i, _| if i == 0 { 0.25 } else { 0.5 });
+/// let without_sum = update(&mut m, &[6.0, 1.0], 1.0);
+/// assert!((m[(0, 0)] - 0.75_f64).abs() < 1e-12 && (m.slack_of_row(0) - 0.125).abs() < 1e-12); // 6, 1, 1 over their sum
+/// assert!(without_sum.is_empty());
+/// ```
 ///
 /// # Panics
 /// If `support` has not `I · J` entries.
@@ -86,6 +103,14 @@ pub fn sinkhorn<T: RealField + Copy>(
 }
 
 /// One sweep of relaxation: [`update`], then [`sinkhorn`] with at most `sinkhorn_sweeps` sweeps and no tolerance.
+///
+/// ```
+/// use tactile_match::dense::{MatchMatrix, sweep};
+/// let mut m = MatchMatrix::<f64>::uniform(2, 2);
+/// let support = [1.0, 0.2, 0.2, 1.0]; // pairs (0, 0) and (1, 1) have the better neighbours
+/// (0..10).for_each(|_| sweep(&mut m, &support, 0.1, 20));
+/// assert!(m[(0, 0)] > 0.95 && m[(1, 1)] > 0.95 && m.slack_of_row(0) < 0.05);
+/// ```
 ///
 /// # Panics
 /// If `support` has not `I · J` entries.

@@ -7,6 +7,23 @@ use nalgebra::{Point, SMatrix};
 use tactile_tps::{Scalar, Smoothing, Warp};
 
 /// The answer in a workspace.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use std::ops::ControlFlow;
+/// use tactile_match::{RelaxationMatcher, RelaxationWorkspace};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
+/// let mut workspace = RelaxationWorkspace::new();
+/// let found = RelaxationMatcher::default()
+///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+/// assert_eq!((found.assignment()[2], found.confidence()[2] > 0.9), (Some(2), true));
+/// assert!(found.warped::<f64>().zip(&target).all(|(w, t)| (w - t).norm() < 1e-9));
+/// assert!(found.report().residual < 1e-9); // units of the points
+/// let matching = found.to_matching(&model);
+/// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6); // areas grow by a tenth
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct RelaxationMatch<'w, const D: usize> {
     pub(super) workspace: &'w RelaxationWorkspace<D>,

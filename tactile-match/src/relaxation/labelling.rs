@@ -142,6 +142,17 @@ impl Labelling {
     }
 
     /// Whether every model point is decided: one candidate, or the slack, has at least `certainty`.
+    ///
+    /// ```
+    /// use tactile_match::Labelling;
+    /// let mut labels = Labelling::new(2, [vec![0, 1], vec![0, 1]], 0.1);
+    /// assert_eq!((labels.rows(), labels.slack_of_row(0)), (2, 0.1));
+    /// assert_eq!(labels.row(1).collect::<Vec<_>>(), [(0, 0.45), (1, 0.45)]);
+    /// assert!(!labels.is_settled(0.9));
+    /// labels.link(|(i, j), (a, b)| if i == j && a == b { 1.0 } else { 0.0 }, |i| vec![1 - i]);
+    /// (0..10).for_each(|_| labels.sweep(0.01, 5));
+    /// assert!(labels.is_settled(0.9));
+    /// ```
     #[must_use]
     pub fn is_settled(&self, certainty: f64) -> bool {
         (0..self.rows()).all(|i| self.row(i).map(|(_, p)| p).fold(self.row_slack[i], f64::max) >= certainty)

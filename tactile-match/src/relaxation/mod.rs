@@ -81,6 +81,21 @@ pub struct RelaxationMatcher {
 }
 
 /// Memory that matches use again and again.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use std::ops::ControlFlow;
+/// use tactile_match::{RelaxationMatcher, RelaxationWorkspace};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let mut workspace = RelaxationWorkspace::new();
+/// for load in [0.02, 0.05, 0.1] { // a sequence of frames: memory is taken once
+///     let target = model.map(|p| Point2::new(p.x + load * p.y, p.y));
+///     let matcher = RelaxationMatcher::default();
+///     let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+///     assert!((0..6).all(|i| found.assignment()[i] == Some(i)));
+/// }
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct RelaxationWorkspace<const D: usize> {
     frame: Frame<D>,
@@ -127,6 +142,12 @@ impl RelaxationMatcher {
     }
 
     /// The options.
+    ///
+    /// ```
+    /// use tactile_match::{RelaxationMatcher, RelaxationOptions, Search};
+    /// let options = RelaxationOptions::default().search(Search::Near);
+    /// assert_eq!(RelaxationMatcher::new(options).options(), &options);
+    /// ```
     #[must_use]
     pub fn options(&self) -> &RelaxationOptions {
         &self.options

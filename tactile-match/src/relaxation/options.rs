@@ -7,6 +7,17 @@ use crate::{MatchError, validate::option_within};
 const RARE: f64 = 0.01;
 
 /// How far the target may be turned against the model.
+///
+/// ```
+/// use nalgebra::{Point2, Rotation2};
+/// use tactile_match::{PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation};
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(|p| Rotation2::new(2.5) * p).collect(); // turned by 143°
+/// let matcher = RelaxationMatcher::new(RelaxationOptions::default().rotation(Rotation::Any));
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rotation {
     /// By up to about half a right angle.
@@ -17,6 +28,19 @@ pub enum Rotation {
 }
 
 /// On which side points without a partner are expected.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let mut target = model.map(|p| Point2::new(1.05 * p.x, p.y)).to_vec();
+/// target.push(Point2::new(6.0, 5.0)); // clutter
+/// let matcher = RelaxationMatcher::new(RelaxationOptions::default().outliers(Outliers::Target));
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!(matching.unmatched_model.is_empty());
+/// assert_eq!(matching.unmatched_target, [6]);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Outliers {
     /// Every point may lack its partner.
@@ -31,6 +55,19 @@ pub enum Outliers {
 }
 
 /// How far the search for the right start goes.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{PointMatcher, RelaxationMatcher, RelaxationOptions, Search};
+/// let loaded = |p: &Point2<f64>| Point2::new(1.02 * p.x, p.y + 0.01 * p.x * p.x); // the same contact at a higher load
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(loaded).collect();
+/// let matcher = RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near));
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
+/// assert_eq!(matching.report.starts, 1);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Search {
     /// Until an answer is exact, or every start is tried and the scales of the prior are fitted to the data: any scene.
@@ -42,6 +79,19 @@ pub enum Search {
 }
 
 /// Options of [`RelaxationMatcher`](crate::RelaxationMatcher); all of them have defaults that suit every scene tried.
+///
+/// ```
+/// use tactile_match::{MatchError, Outliers, RelaxationOptions, Rotation, Search};
+/// let options = RelaxationOptions::default()
+///     .rotation(Rotation::Any)
+///     .outliers(Outliers::Model)
+///     .search(Search::Thorough)
+///     .stray_share(0.3)? // three in ten points are out of sight
+///     .max_iterations(100)?;
+/// assert_ne!(options, RelaxationOptions::default());
+/// assert!(matches!(options.stray_share(0.95), Err(MatchError::InvalidOption { option: "stray_share", .. })));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelaxationOptions {
     pub(crate) rotation: Rotation,

@@ -81,6 +81,19 @@ impl ShapeContexts {
     }
 
     /// The costs of point `i` here and all points of `other`, into `costs`.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::ShapeContexts;
+    /// let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.3, 0.45]].map(Point2::from);
+    /// let contexts = ShapeContexts::new(&points, 2.0)?;
+    /// assert!(contexts.len() == 5 && !contexts.is_empty());
+    /// assert!((contexts.histogram(4).iter().sum::<f32>() - 4.0).abs() < 1e-5); // all four other points within reach
+    /// let mut costs = Vec::new();
+    /// contexts.costs_into(4, &contexts, &mut costs);
+    /// assert!(costs[4] < 1e-6 && costs[..4].iter().all(|&c| c > 0.1));
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
     pub fn costs_into(&self, i: usize, other: &Self, costs: &mut Vec<f32>) {
         costs.clear();
         let (g, total) = (self.row(i), self.totals[i]);
