@@ -52,6 +52,18 @@ impl<'a, T: Scalar> Domain<'a, T> {
     }
 
     /// Fixes the heights that are not NaN.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
+    /// let (p, q) = (Array2::from_elem((4, 5), 0.5), Array2::zeros((4, 5)));
+    /// let mut known = Array2::from_elem((4, 5), f64::NAN);
+    /// known[[0, 0]] = 10.0;
+    /// let domain = Domain::pixels().with_known_heights(known.view());
+    /// let z = CosinePoisson::new().integrate(p.view(), q.view(), &domain)?.heights;
+    /// assert!((z[[0, 0]] - 10.0).abs() < 1e-12 && (z[[3, 4]] - 12.0).abs() < 1e-12);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     pub fn with_known_heights(self, known: ArrayView2<'a, T>) -> Self {
         Self { known_heights: Some(known), ..self }
     }
@@ -101,6 +113,17 @@ pub(crate) fn same_shape(
 }
 
 /// The smallest rectangle that holds a mask.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::BoundingBox;
+/// let mut mask = Array2::from_elem((48, 64), false);
+/// (mask[[10, 20]], mask[[14, 22]]) = (true, true);
+/// let area = BoundingBox::of(mask.view()).ok_or("no pixel")?;
+/// assert_eq!(area, BoundingBox { top: 10, left: 20, rows: 5, columns: 3 });
+/// assert_eq!(area.area(), 15);
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct BoundingBox {
     /// First row.

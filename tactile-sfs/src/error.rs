@@ -3,6 +3,15 @@
 use thiserror::Error;
 
 /// Which input an error speaks of.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{CosinePoisson, Domain, Input, SfsError, SlopeIntegrator};
+/// let (p, q) = (Array2::<f64>::zeros((4, 5)), Array2::zeros((5, 4)));
+/// let error = CosinePoisson::new().integrate(p.view(), q.view(), &Domain::pixels()).unwrap_err();
+/// assert_eq!(error, SfsError::ShapeMismatch { input: Input::SlopeY, expected: [4, 5], found: [5, 4] });
+/// assert_eq!(Input::SlopeY.to_string(), "slopes along y");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Input {
@@ -37,6 +46,18 @@ impl core::fmt::Display for Input {
 }
 
 /// Why a surface, a slope field or a set of control points could not be computed.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{DepthTable, Domain, Lighting, Pentland, SfsError, SurfaceReconstruction};
+/// let error = DepthTable::new(&[(0.0, 0.0), (5.0, 1e-3), (3.0, 2e-3)]).unwrap_err();
+/// assert_eq!(error, SfsError::TableNotIncreasing { index: 2 });
+/// let image = Array2::from_elem((8, 8), 0.5);
+/// let result = Pentland::new(Lighting::frontal()).reconstruct(image.view(), &Domain::pixels());
+/// assert!(matches!(result, Err(SfsError::FrontalLight { .. })));
+/// let error = Domain::new([-1.0, 1.0]).unwrap_err();
+/// assert_eq!(error.to_string(), "pixel width is -1, which is not a positive finite number");
+/// ```
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SfsError {

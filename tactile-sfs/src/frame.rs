@@ -5,6 +5,16 @@ use ndarray::ArrayView2;
 use crate::Scalar;
 
 /// An image as the reconstructions take it: real intensities or 8-bit grey levels (0 … 255, not rescaled).
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::Frame;
+/// let bytes = array![[0_u8, 128, 255]];
+/// let frame = Frame::<f32>::Bytes(bytes.view()); // read in place, not rescaled
+/// assert_eq!((frame.dim(), frame.at(0, 2)), ((1, 3), 255.0));
+/// let real = array![[0.0_f32, 0.5]];
+/// assert_eq!(Frame::from(real.view()).at(0, 1), 0.5);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub enum Frame<'a, T> {
     /// Intensities in the unit of [`Lighting`](crate::Lighting).

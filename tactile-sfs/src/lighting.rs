@@ -103,6 +103,16 @@ impl<T: Scalar> Lighting<T> {
     }
 
     /// Reflectance n·s of an intensity, (I − ambient)/(albedo · I₀): in [0, 1] for a pixel the model explains.
+    ///
+    /// ```
+    /// use tactile_sfs::Lighting;
+    /// let light = Lighting::new([0.0, 0.0, 5.0])?.with_normal_intensity(255.0)?.with_albedo(0.8)?.with_ambient(10.0)?;
+    /// assert_eq!((light.direction(), light.is_frontal()), ([0.0, 0.0, 1.0], true));
+    /// assert_eq!((light.normal_intensity(), light.albedo(), light.ambient()), (255.0, 0.8, 10.0));
+    /// let grey = light.shade(1.0, 0.0); // 45° from the light: 10 + 204/√2
+    /// assert!((light.reflectance(grey) - 0.5_f64.sqrt()).abs() < 1e-12);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     pub fn reflectance(&self, intensity: T) -> T {
         (intensity - self.ambient) / (self.albedo * self.normal_intensity)
     }

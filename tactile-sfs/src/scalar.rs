@@ -56,6 +56,16 @@ pub(crate) mod sealed {
 /// A float the crate computes in: `f32` or `f64`.
 ///
 /// The trait is sealed; its bounds are what generic callers may rely on.
+///
+/// ```
+/// use tactile_sfs::Scalar;
+/// /// Metres of a height in pixels, in whatever precision it comes.
+/// fn metres<T: Scalar>(height_px: T, pixel_size_m: f64) -> f64 {
+///     (height_px * T::of(pixel_size_m)).as_f64()
+/// }
+/// assert_eq!(metres(4.0_f64, 0.5e-4), 2e-4);
+/// assert!((metres(4.0_f32, 0.5e-4) - 2e-4).abs() < 1e-10);
+/// ```
 pub trait Scalar:
     Float
     + FromPrimitive

@@ -9,6 +9,20 @@ use crate::error::Input;
 use crate::{BoundingBox, Domain, Scalar, SfsError};
 
 /// Why a computation ended.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator, StopReason};
+/// let mask = Array2::from_shape_fn((20, 20), |(r, c)| (r as f64 - 9.5).hypot(c as f64 - 9.5) < 8.0);
+/// let p = Array2::from_shape_fn((20, 20), |(r, c)| ((r * c) as f64).sin());
+/// let (q, domain) = (Array2::zeros((20, 20)), Domain::pixels().with_mask(mask.view()));
+/// let stop = |method: MaskedLeastSquares<f64>| {
+///     method.integrate(p.view(), q.view(), &domain).map(|surface| surface.report.stop)
+/// };
+/// assert_eq!(stop(MaskedLeastSquares::new())?, StopReason::Converged);
+/// assert_eq!(stop(MaskedLeastSquares::new().with_max_iterations(1)?)?, StopReason::IterationLimit);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StopReason {
@@ -26,6 +40,17 @@ pub enum StopReason {
 }
 
 /// What happened at one pixel: a set of the constants below.
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{DepthTable, Domain, PixelFlags, SurfaceReconstruction};
+/// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
+/// let surface = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view(), &Domain::new([1e-4, 1e-4])?)?;
+/// assert!(surface.flags[[0, 0]].is_empty());
+/// assert!(surface.flags[[0, 1]].contains(PixelFlags::OUT_OF_RANGE)); // the last depth was taken
+/// assert!((PixelFlags::DARK | PixelFlags::UNREACHED).contains(PixelFlags::DARK));
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelFlags(u8);
 
@@ -81,6 +106,18 @@ impl BitOrAssign for PixelFlags {
 }
 
 /// One connected part of the solved pixels.
+///
+/// ```
+/// use ndarray::{Array2, array};
+/// use tactile_sfs::{Component, Domain, MaskedLeastSquares, SlopeIntegrator};
+/// let mask = array![[true, true, false, true], [true, true, false, true]]; // two contacts
+/// let slopes = Array2::<f64>::zeros((2, 4));
+/// let domain = Domain::pixels().with_mask(mask.view());
+/// let report = MaskedLeastSquares::new().integrate(slopes.view(), slopes.view(), &domain)?.report;
+/// assert_eq!(report.components.len(), 2);
+/// assert_eq!(report.components[1], Component { pixels: 2, first: [0, 3], mean_height: 0.0 });
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Component<T> {
     /// Number of pixels.
@@ -92,6 +129,16 @@ pub struct Component<T> {
 }
 
 /// How a surface was found.
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{DepthTable, Domain, StopReason, SurfaceReconstruction};
+/// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
+/// let report = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view(), &Domain::new([1e-4, 1e-4])?)?.report;
+/// assert_eq!((report.stop, report.iterations), (StopReason::Direct, 0));
+/// assert_eq!((report.solved, report.flagged), (2, 2)); // one pixel out of range, one without a height
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report<T> {
     /// Why the method stopped.
@@ -112,6 +159,19 @@ pub struct Report<T> {
 ///
 /// `heights` is NaN outside `mask`. When a surface is used again as output, only the rectangle written last is
 /// cleared, so that a small contact in a large frame stays cheap; heights edited by hand outside of it stay.
+///
+/// ```
+/// use ndarray::{Array2, array};
+/// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator, Surface, Workspace};
+/// let mask = array![[true, true, true, false], [true, true, true, false]];
+/// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::zeros((2, 4)));
+/// let (mut workspace, mut surface) = (Workspace::new(), Surface::<f64>::new()); // used again for every frame
+/// let domain = Domain::pixels().with_mask(mask.view());
+/// CosinePoisson::new().integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
+/// assert!(surface.heights[[0, 3]].is_nan() && surface.filled(0.0)[[0, 3]] == 0.0);
+/// assert_eq!((surface.report.solved, surface.bounding_box.area()), (6, 6));
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface<T> {
     /// Heights z(row, column), NaN where there is none.

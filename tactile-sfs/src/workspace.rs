@@ -5,6 +5,24 @@ use core::ops::ControlFlow;
 use crate::{Scalar, StopReason};
 
 /// How far a long solve has come.
+///
+/// ```
+/// use core::ops::ControlFlow;
+/// use ndarray::Array2;
+/// use tactile_sfs::{BrooksHorn, Domain, Frame, Lighting, Progress, Surface, SurfaceReconstruction, Workspace};
+/// let (send, receive) = std::sync::mpsc::channel();
+/// let mut workspace = Workspace::new();
+/// workspace.on_progress(move |progress: Progress| match send.send(progress) {
+///     Ok(()) => ControlFlow::Continue(()),
+///     Err(_) => ControlFlow::Break(()), // nobody listens any more
+/// });
+/// let image = Array2::from_elem((8, 8), 0.9);
+/// let method = BrooksHorn::new(Lighting::frontal()).with_iterations(20, 5)?;
+/// method.reconstruct_with(&mut workspace, Frame::Real(image.view()), &Domain::pixels(), &mut Surface::new())?;
+/// let heard: Vec<Progress> = receive.try_iter().collect();
+/// assert!(!heard.is_empty() && heard.iter().all(|p| p.iterations <= p.limit && p.limit == 20));
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Iterations done.
@@ -61,6 +79,22 @@ impl<T: Scalar> Workspace<T> {
     }
 
     /// Removes the callback.
+    ///
+    /// ```
+    /// use core::ops::ControlFlow;
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{BrooksHorn, Domain, Frame, Lighting, StopReason, Surface, SurfaceReconstruction, Workspace};
+    /// let image = Array2::from_shape_fn((16, 16), |(r, c)| 0.9 + 0.1 * ((r * c) as f64).cos());
+    /// let (method, mut surface) = (BrooksHorn::new(Lighting::frontal()), Surface::new());
+    /// let (mut workspace, frame) = (Workspace::new(), Frame::Real(image.view()));
+    /// workspace.on_progress(|_| ControlFlow::Break(()));
+    /// method.reconstruct_with(&mut workspace, frame, &Domain::pixels(), &mut surface)?;
+    /// assert_eq!(surface.report.stop, StopReason::Cancelled);
+    /// workspace.clear_progress();
+    /// method.reconstruct_with(&mut workspace, frame, &Domain::pixels(), &mut surface)?;
+    /// assert_ne!(surface.report.stop, StopReason::Cancelled);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     pub fn clear_progress(&mut self) {
         self.callback = None;
     }

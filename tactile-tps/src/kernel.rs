@@ -55,6 +55,14 @@ pub trait Kernel: Clone + Send + Sync {
     /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0; `None` if there is none.
     ///
     /// Points are scaled to unit size inside when there is one. A kernel with a length of its own has none.
+    ///
+    /// ```
+    /// use tactile_tps::{Kernel, NegR, R2LogR};
+    /// assert_eq!((NegR.degree(), R2LogR.degree()), (Some(1), Some(2)));
+    /// // r² ln r at 3 r is 9 r² ln r, up to 9 ln 3 r².
+    /// let (s, excess) = (2.0_f64, 9.0 * 3_f64.ln() * 2.0);
+    /// assert!((R2LogR.value(9.0 * s) - 9.0 * R2LogR.value(s) - excess).abs() < 1e-12);
+    /// ```
     fn degree(&self) -> Option<i32> {
         None
     }

@@ -41,6 +41,16 @@ pub trait Real:
     /// eˣ.
     fn exp(self) -> Self;
     /// `self · a + b`, rounded once where that costs nothing extra.
+    ///
+    /// ```
+    /// use tactile_tps::Real;
+    /// /// Length of a vector, one rounding a term.
+    /// fn length<R: Real>(components: &[R]) -> R {
+    ///     components.iter().fold(R::zero(), |sum, &c| c.mul_add(c, sum)).sqrt()
+    /// }
+    /// assert_eq!(length(&[3.0_f64, 4.0]), 5.0);
+    /// assert_eq!(length(&[0.6_f32, 0.8]).to_f64(), 1.0);
+    /// ```
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// The number zero.
     #[inline(always)]

@@ -31,6 +31,20 @@ pub trait Warp<T: Scalar, const D: usize> {
 
     /// The Jacobians at many points, into the caller's memory.
     ///
+    /// ```
+    /// use nalgebra::{Matrix2, Point2, Vector2};
+    /// use tactile_tps::{Affine, Warp};
+    /// let shear = Affine::new(Matrix2::new(1.0, 0.2, 0.0, 1.0), Vector2::zeros());
+    /// let points = [[0.0, 0.0], [1.0, 2.0], [3.0, 1.0]].map(Point2::from);
+    /// let (mut images, mut jacobians) = (points, [Matrix2::zeros(); 3]);
+    /// shear.apply_into(&points, &mut images)?;
+    /// shear.jacobian_into(&points, &mut jacobians)?;
+    /// assert_eq!(images[1], Point2::new(1.4, 2.0));
+    /// assert_eq!((jacobians[1], shear.jacobian(&points[1]).determinant()), (jacobians[0], 1.0)); // shear keeps areas
+    /// assert!(shear.apply_into(&points, &mut images[..2]).is_err());
+    /// # Ok::<(), tactile_tps::TpsError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
     fn jacobian_into(

@@ -38,6 +38,19 @@ use crate::{Domain, Scalar, SfsError, Surface, Workspace};
 pub trait SlopeIntegrator<T: Scalar> {
     /// Integrates into `surface`, reusing its arrays and the buffers of `workspace`.
     ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{Domain, FrankotChellappa, CosinePoisson, SlopeIntegrator, Surface, Workspace};
+    /// let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+    /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson::new(), &FrankotChellappa::new()];
+    /// let flat = Array2::zeros((16, 16));
+    /// for method in methods {
+    ///     method.integrate_with(&mut workspace, flat.view(), flat.view(), &Domain::pixels(), &mut surface)?;
+    ///     assert!(surface.heights.iter().all(|z| z.abs() < 1e-12));
+    /// }
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
     /// # Errors
     /// What the method documents: shapes that differ, an empty mask, slopes it cannot skip.
     fn integrate_with(

@@ -7,6 +7,17 @@ use crate::error::Input;
 use crate::{Scalar, SfsError};
 
 /// What is fitted before heights are compared.
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{Alignment, height_error};
+/// let (z, truth) = (array![[0.0, 1.0, 2.0]], array![[1.0, 3.0, 5.0]]); // truth = 2 z + 1
+/// let rms = |alignment| Ok::<_, tactile_sfs::SfsError>(height_error(z.view(), truth.view(), None, alignment)?.error.rms);
+/// assert!((rms(Alignment::None)? - (14.0_f64 / 3.0).sqrt()).abs() < 1e-12);
+/// assert!((rms(Alignment::Offset)? - (2.0_f64 / 3.0).sqrt()).abs() < 1e-12);
+/// assert!(rms(Alignment::Affine)? < 1e-12);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Alignment {
@@ -19,6 +30,16 @@ pub enum Alignment {
 }
 
 /// Mean absolute, root mean square and largest error.
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{Alignment, ErrorSummary, height_error};
+/// let (z, truth) = (array![[3.0, 0.0, 4.0, f64::NAN]], array![[0.0, 0.0, 0.0, 0.0]]);
+/// let error = height_error(z.view(), truth.view(), None, Alignment::None)?.error;
+/// let rms = (25.0_f64 / 3.0).sqrt();
+/// assert_eq!(error, ErrorSummary { mean_absolute: 7.0 / 3.0, rms, max: 4.0, pixels: 3 }); // without the missing height
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorSummary {
     /// Mean of |error|.
@@ -46,6 +67,17 @@ impl ErrorSummary {
 }
 
 /// Error of heights, the alignment that was applied, and what a constant guess would have reached.
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{Alignment, height_error};
+/// let (z, truth) = (array![[0.1, 0.1, 0.2]], array![[1.0, 1.0, 4.0]]);
+/// let result = height_error(z.view(), truth.view(), None, Alignment::Offset)?;
+/// assert!((result.offset - (2.0 - 0.4 / 3.0_f64)).abs() < 1e-12 && result.scale == 1.0);
+/// assert_eq!((result.range, result.constant_guess), (3.0, 1.0)); // the median 1 misses 3 at one pixel of three
+/// assert!(result.error.mean_absolute > result.constant_guess); // this surface says less than a constant
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightError {
     /// Error of scale · z + offset.
@@ -128,6 +160,16 @@ fn align(pairs: &[(f64, f64)], alignment: Alignment) -> (f64, f64) {
 }
 
 /// Errors of slopes: of p, of q, and of their vector difference.
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_sfs::{SlopeError, slope_error};
+/// let (p, q, flat) = (array![[0.3, 0.0]], array![[0.4, 0.0]], array![[0.0, 0.0]]);
+/// let SlopeError { p, q, vector } = slope_error([p.view(), q.view()], [flat.view(), flat.view()])?;
+/// assert_eq!((p.max, q.max), (0.3, 0.4));
+/// assert!((vector.max - 0.5_f64).abs() < 1e-12 && vector.pixels == 2);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlopeError {
     /// Error of p = ∂z/∂x.
@@ -139,6 +181,17 @@ pub struct SlopeError {
 }
 
 /// Compares slopes (p, q) with true ones where all four are finite.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{slope_error, slopes};
+/// let z = Array2::from_shape_fn((5, 9), |(_, c)| (c as f64 - 4.0).powi(2)); // p = 2 (x − 4)
+/// let (p, q) = slopes(z.view(), [1.0, 1.0]);
+/// let truth = Array2::from_shape_fn((5, 9), |(_, c)| 2.0 * (c as f64 - 4.0));
+/// let error = slope_error([p.view(), q.view()], [truth.view(), Array2::zeros((5, 9)).view()])?;
+/// assert_eq!((error.p.max, error.q.max), (1.0, 0.0)); // one-sided at the border, exact inside
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 ///
 /// # Errors
 /// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.

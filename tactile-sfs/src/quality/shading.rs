@@ -64,6 +64,17 @@ pub fn render<T: Scalar>(
 }
 
 /// How far a surface, shaded again, is from the image.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Frame, Lighting, Reprojection, reprojection};
+/// let (z, light) = (Array2::<f64>::zeros((3, 4)), Lighting::frontal().with_normal_intensity(200.0)?);
+/// let image = Array2::<u8>::from_elem((3, 4), 190);
+/// let Reprojection { residual, error } = reprojection(z.view(), Frame::Bytes(image.view()), [1e-4, 1e-4], &light)?;
+/// assert_eq!(residual[[1, 2]], 10.0); // a flat surface renders 200: ten grey levels too bright
+/// assert_eq!((error.rms, error.pixels), (10.0, 12));
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reprojection<T> {
     /// Rendered minus observed intensity, NaN where there is no height.
@@ -75,6 +86,19 @@ pub struct Reprojection<T> {
 /// Renders a surface and compares it with the image it was made from.
 ///
 /// A small residual does not prove the surface right (convex and concave look alike), a large one proves it wrong.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Frame, Lighting, render, reprojection};
+/// let light = Lighting::new([0.3, 0.0, 1.0])?;
+/// let bump = Array2::from_shape_fn((9, 9), |(r, c)| -0.05 * ((r as f64 - 4.0).powi(2) + (c as f64 - 4.0).powi(2)));
+/// let image = render(bump.view(), [1.0, 1.0], &light);
+/// let rms = |z: &Array2<f64>| {
+///     Ok::<_, tactile_sfs::SfsError>(reprojection(z.view(), Frame::Real(image.view()), [1.0, 1.0], &light)?.error.rms)
+/// };
+/// assert!(rms(&bump)? < 1e-12 && rms(&-&bump)? > 0.1); // a hollow shades otherwise under oblique light
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 ///
 /// # Errors
 /// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.

@@ -63,6 +63,24 @@ impl<T: Scalar> BrooksHorn<T> {
     }
 
     /// Whether the mask's border (not the frame's) is an occluding contour of a convex object.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{BrooksHorn, Domain, Lighting, SurfaceReconstruction};
+    /// // A hemisphere of radius 10 px, vertical at its rim.
+    /// let z = Array2::from_shape_fn((25, 25), |(r, c)| {
+    ///     (100.0 - (r as f64 - 12.0).powi(2) - (c as f64 - 12.0).powi(2)).max(0.0).sqrt()
+    /// });
+    /// let (image, mask) = (z.mapv(|z| z / 10.0), z.mapv(|z| z > 0.0));
+    /// let method = BrooksHorn::new(Lighting::frontal())
+    ///     .with_occluding_rim(true)
+    ///     .with_smoothness(0.05)?
+    ///     .with_iterations(100, 20)?
+    ///     .with_max_slope(5.0)?;
+    /// let heights = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?.heights;
+    /// assert!(heights[[12, 12]] - heights[[12, 4]] > 2.0); // a bump: the rim says so, the light does not
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     pub fn with_occluding_rim(self, occluding_rim: bool) -> Self {
         Self { occluding_rim, ..self }
     }

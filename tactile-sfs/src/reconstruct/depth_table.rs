@@ -13,6 +13,17 @@ use crate::{
 };
 
 /// What is looked up in a [`DepthTable`].
+///
+/// ```
+/// use ndarray::{Array2, array};
+/// use tactile_sfs::{DepthTable, Domain, Signal, SurfaceReconstruction};
+/// let (reference, image) = (Array2::from_elem((1, 2), 200.0), array![[200.0, 180.0]]);
+/// let table = DepthTable::new(&[(0.0, 0.0), (40.0, 1e-3)])?; // a millimetre darkens by 40 grey levels
+/// let method = table.with_signal(Signal::Darkening(reference));
+/// let depth = method.reconstruct(image.view(), &Domain::new([1e-4, 1e-4])?)?.heights;
+/// assert_eq!(depth, array![[0.0, 0.5e-3]]);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Signal<T> {
@@ -90,6 +101,20 @@ impl<T: Scalar> DepthTable<T> {
     }
 
     /// Signals up to `threshold` mean no contact: depth 0.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::{DepthTable, Domain, Signal, SurfaceReconstruction};
+    /// let dark = array![[20.0, 20.0]];
+    /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?
+    ///     .with_signal(Signal::Brightening(dark.clone()))
+    ///     .with_contact_threshold(2.0)?; // the camera's noise
+    /// let depth = table.reconstruct(array![[21.5, 25.0]].view(), &Domain::new([1e-4, 1e-4])?)?.heights;
+    /// assert_eq!(depth, array![[0.0, 0.5e-3]]); // 1.5 above the reference is no contact yet
+    /// assert_eq!(table.signal(), &Signal::Brightening(dark));
+    /// assert_eq!(table.entries().last(), Some(&(10.0, 1e-3)));
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] unless finite and not negative.

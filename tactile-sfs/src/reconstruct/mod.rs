@@ -65,6 +65,20 @@ pub trait SurfaceReconstruction<T: Scalar> {
 
     /// Reconstructs from the grey levels of an 8-bit camera.
     ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::{DepthTable, Domain, Frame, Surface, SurfaceReconstruction, Workspace};
+    /// let table = DepthTable::new(&[(0.0, 0.0), (200.0, 1e-3)])?;
+    /// let (image, domain) = (array![[0_u8, 50, 100]], Domain::new([1e-4, 1e-4])?);
+    /// let once = table.reconstruct_u8(image.view(), &domain)?;
+    /// assert_eq!(once.heights, array![[0.0, 0.25e-3, 0.5e-3]]);
+    /// // The same for a stream of frames: no allocation after the first.
+    /// let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+    /// table.reconstruct_with(&mut workspace, Frame::Bytes(image.view()), &domain, &mut surface)?;
+    /// assert_eq!(surface, once);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`reconstruct_with`](Self::reconstruct_with).
     fn reconstruct_u8(

@@ -39,6 +39,21 @@ impl<T: Scalar> Pentland<T> {
 
     /// ε in radians per pixel, below which a wave across the light is damped.
     ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{Domain, Lighting, Pentland, SurfaceReconstruction};
+    /// let light = Lighting::new([1.0, 0.0, 1.0])?;
+    /// let wave = core::f64::consts::TAU / 32.0;
+    /// let image = Array2::from_shape_fn((8, 32), |(_, c)| light.shade(1e-3 * wave * (wave * c as f64).cos(), 0.0));
+    /// let height = |epsilon| {
+    ///     let z = Pentland::new(light).with_regularisation(epsilon)?.reconstruct(image.view(), &Domain::pixels())?.heights;
+    ///     Ok::<f64, tactile_sfs::SfsError>(z[[0, 8]] - z[[0, 24]])
+    /// };
+    /// assert!((height(1e-3)? - 2e-3).abs() < 1e-5);
+    /// assert!(height(0.5)? < 0.5e-3); // damps this wave of 0.2 rad/px, too
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SfsError::InvalidOption`] unless positive and finite.
     pub fn with_regularisation(self, regularisation: T) -> Result<Self, SfsError> {

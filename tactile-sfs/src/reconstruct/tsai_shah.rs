@@ -82,6 +82,20 @@ impl<T: Scalar> TsaiShah<T> {
     /// Slope at the rim of the paraboloid the iteration starts from: positive for a bump, negative for a hollow, 0 for
     /// the plane (which frontal light never leaves).
     ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
+    /// let image = Array2::from_shape_fn((17, 17), |(r, c)| 1.0 - 1e-3 * ((r as f64 - 8.0).powi(2) + (c as f64 - 8.0).powi(2)));
+    /// let rise = |start_slope| {
+    ///     let method = TsaiShah::new(Lighting::frontal()).with_noise(0.05)?.with_max_slope(2.0)?.with_start_slope(start_slope)?;
+    ///     let z = method.reconstruct(image.view(), &Domain::pixels())?.heights;
+    ///     Ok::<f64, tactile_sfs::SfsError>(z[[8, 8]] - z[[8, 1]])
+    /// };
+    /// assert!(rise(0.5)? > 0.0 && rise(-0.5)? < 0.0); // bump or hollow: the caller's choice under frontal light
+    /// assert!(rise(0.0)?.abs() < 1e-9);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SfsError::InvalidOption`] unless finite.
     pub fn with_start_slope(self, start_slope: T) -> Result<Self, SfsError> {

@@ -13,6 +13,17 @@ use crate::{Scalar, SfsError, Workspace};
 /// Cuts and centroids are to a fraction of a pixel: the same surface, larger or shifted, gives the same points of it, so
 /// that the points of two loads correspond. Areas are measured on 100 pixels a point or more, where there are as many.
 /// Deterministic; O(count), and O(pixels) for the mask's box.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{ControlPointSampler, EquallySpaced};
+/// // Level on the left, a roof of slope √3 on the right: twice the area, hence twice the points.
+/// let z = Array2::from_shape_fn((60, 120), |(_, c)| 3.0_f64.sqrt() * (c as f64 - 60.0).max(0.0));
+/// let points = EquallySpaced::new().sample(z.view(), None, [1.0, 1.0], 90)?;
+/// let level = points.iter().filter(|point| point.x < 60.0).count();
+/// assert!((27..=33).contains(&level));
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EquallySpaced;
 

@@ -92,6 +92,18 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
     }
 
     /// Weight of each pixel's slopes, such as the inverse of their variance; 0, NaN or less leave the slopes out.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator};
+    /// let (mut p, mut weights) = (Array2::from_elem((6, 6), 0.5), Array2::from_elem((6, 6), 1.0));
+    /// (p[[2, 3]], weights[[2, 3]]) = (40.0, 0.0); // a false slope, known to be one
+    /// let method = MaskedLeastSquares::new().with_weights(weights.view()).with_tolerance(1e-10)?.with_max_iterations(100)?;
+    /// let surface = method.integrate(p.view(), Array2::zeros((6, 6)).view(), &Domain::pixels())?;
+    /// let z = &surface.heights;
+    /// assert!((z[[2, 5]] - z[[2, 0]] - 2.5_f64).abs() < 0.1 && surface.report.iterations <= 100);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     pub fn with_weights(self, weights: ArrayView2<'a, T>) -> Self {
         Self { weights: Some(weights), ..self }
     }

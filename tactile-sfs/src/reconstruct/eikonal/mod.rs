@@ -37,6 +37,19 @@ use crate::{SurfaceReconstruction, Workspace};
 use load::Input;
 
 /// The height at the border of the mask.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Domain, Eikonal, Lighting, Rim, SfsError, SurfaceReconstruction};
+/// let mask = Array2::from_shape_fn((21, 21), |(r, c)| (r as f64 - 10.0).hypot(c as f64 - 10.0) < 8.0);
+/// let (image, domain) = (Array2::from_elem((21, 21), 0.5_f64.sqrt()), Domain::pixels().with_mask(mask.view()));
+/// let method = Eikonal::new(Lighting::frontal());
+/// let heights = method.with_rim(Rim::Height(3.0))?.reconstruct(image.view(), &domain)?.heights;
+/// assert!((heights[[10, 10]] - 11.0).abs() < 1.0); // slope 1 from the rim, 8 px away
+/// let free = method.with_rim(Rim::Free)?.reconstruct(image.view(), &domain);
+/// assert_eq!(free, Err(SfsError::NoKnownHeight));
+/// # Ok::<(), SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Rim<T> {
@@ -47,6 +60,22 @@ pub enum Rim<T> {
 }
 
 /// Which way heights run from the known ones: convex or concave is a choice the image does not make.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{Branch, Domain, Eikonal, Lighting, SurfaceReconstruction};
+/// // n·s = 1/√2: slope 1 everywhere. The centre is known to be at 10.
+/// let image = Array2::from_elem((15, 15), 0.5_f64.sqrt());
+/// let known = Array2::from_shape_fn((15, 15), |at| if at == (7, 7) { 10.0 } else { f64::NAN });
+/// let border = |branch| {
+///     let method = Eikonal::new(Lighting::frontal()).with_branch(branch);
+///     let surface = method.reconstruct(image.view(), &Domain::pixels().with_known_heights(known.view()))?;
+///     Ok::<_, tactile_sfs::SfsError>(surface.heights[[7, 12]])
+/// };
+/// assert!((border(Branch::Rising)? - 15.0).abs() < 0.1); // a funnel
+/// assert!((border(Branch::Falling)? - 5.0).abs() < 0.1); // a cone
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Branch {
@@ -138,6 +167,22 @@ impl<T: Scalar> Eikonal<T> {
     }
 
     /// Most sweeps of one solve (four directions are four sweeps).
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::{Branch, Domain, Eikonal, Lighting, PixelFlags, SurfaceReconstruction};
+    /// let known = array![[0.0, f64::NAN, f64::NAN, f64::NAN]];
+    /// let method = Eikonal::new(Lighting::frontal())
+    ///     .with_branch(Branch::Rising)
+    ///     .with_max_slope(2.0)? // black would be infinitely steep
+    ///     .with_tolerance(1e-6)?
+    ///     .with_max_sweeps(50)?;
+    /// let domain = Domain::pixels().with_known_heights(known.view());
+    /// let surface = method.reconstruct(array![[1.0, 1.0, 0.0, 1.0]].view(), &domain)?;
+    /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK));
+    /// assert!(surface.heights[[0, 3]].is_finite() && surface.report.iterations <= 100);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] for 0.
