@@ -132,8 +132,8 @@ pub struct MatchResult {
 /// use tactile_imaging::pipeline::StrainResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let strain: StrainResult = trial.press(&pipeline)?.measure()?.strain.expect("two frames");
-/// // From 0.7 N to 1.2 N the apparent surface grows by s = (1.2/0.7)^⅓: e_zz = (s² − 1)/2 = 0.216.
-/// assert!((strain.mean[2][2] - 0.216).abs() < 0.03);
+/// // From 0.7 N to 1.2 N the apparent surface grows by s = (1.2/0.7)^⅓: e_xx = (s² − 1)/2 = 0.216.
+/// assert!((strain.mean[0][0] - 0.216).abs() < 0.03);
 /// assert_eq!(strain.mean[0][2], strain.mean[2][0], "symmetric");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -40,6 +40,7 @@ mod session;
 mod settings;
 mod source;
 mod stages;
+mod strain_error;
 mod strain_spline;
 mod surface;
 #[cfg(feature = "simulate")]

@@ -361,7 +361,9 @@ impl<'a> Press<'a> {
             let start = Instant::now();
             let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
             let matching = self.frames[at].matching.as_ref().ok_or(PipelineError::NoContact { frame })?;
-            let strain = pair::strain(self.stages, [0, frame], points(0), points(at), matching)?;
+            let grid_m =
+                self.frames[at].surface.as_ref().map_or(0.0, |s| s.pixel_size_m[0].max(s.pixel_size_m[1]));
+            let strain = pair::strain(self.stages, [0, frame], points(0), points(at), matching, grid_m)?;
             self.report.ran(Stage::Strain, start.elapsed());
             self.frames[at].strain = Some(strain);
         }

@@ -9,8 +9,8 @@
 use crate::tps::{FitOptions, NegR, Smoothing, ThinPlateSpline, TpsError, Warp, WarpModel};
 use nalgebra::{Point3, Vector3};
 
-/// Neighbours that are left out together.
-const RUN: usize = 10;
+/// Neighbours that share their errors, and are left out together.
+pub(super) const RUN: usize = 10;
 
 /// Fewest pairs that are split; below, generalised cross-validation chooses.
 const LEAST_PAIRS: usize = 4 * RUN;

@@ -63,6 +63,8 @@ struct Anchor {
     /// Pixels of its contact: all surfaces have its grid.
     pixels: usize,
     points: Vec<Point3<f64>>,
+    /// The surfaces' pixel.
+    grid_m: f64,
 }
 
 /// What is kept from frame to frame.
@@ -88,8 +90,9 @@ impl FollowedStrain {
         match &self.anchor {
             None => {
                 let pixels = frame.contact.mask.iter().filter(|m| **m).count();
-                let points = self.points(stages, frame, pixels, report)?;
-                self.anchor = Some(Anchor { frame: frame.number, reading: frame.reading, pixels, points });
+                let (points, grid_m) = self.points(stages, frame, pixels, report)?;
+                let reading = frame.reading;
+                self.anchor = Some(Anchor { frame: frame.number, reading, pixels, points, grid_m });
                 return Ok(None);
             }
             Some(anchor) if anchor.frame == frame.number => return Ok(None),
@@ -102,14 +105,14 @@ impl FollowedStrain {
         Ok(self.last.as_ref())
     }
 
-    /// Control points of a frame's surface.
+    /// Control points of a frame's surface, and its pixel.
     fn points(
         &mut self,
         stages: &dyn Stages,
         frame: &Frame<'_>,
         pixels: usize,
         report: &mut Report,
-    ) -> Result<Vec<Point3<f64>>, PipelineError> {
+    ) -> Result<(Vec<Point3<f64>>, f64), PipelineError> {
         let failed = |source| PipelineError::Surface { frame: frame.number as usize, source };
         let start = Instant::now();
         let images = [frame.image, frame.reference.image()];
@@ -124,7 +127,7 @@ impl FollowedStrain {
         let start = Instant::now();
         let points = surface::sample(stages, &surface).map_err(failed)?;
         report.ran(Stage::ControlPoints, start.elapsed());
-        Ok(points)
+        Ok((points, surface.pixel_size_m[0].max(surface.pixel_size_m[1])))
     }
 
     fn measure(
@@ -134,7 +137,7 @@ impl FollowedStrain {
         report: &mut Report,
     ) -> Result<Option<SessionStrain>, PipelineError> {
         let Some(pixels) = self.anchor.as_ref().map(|anchor| anchor.pixels) else { return Ok(None) };
-        let target = self.points(stages, frame, pixels, report)?;
+        let (target, _) = self.points(stages, frame, pixels, report)?;
         let Some(anchor) = &self.anchor else { return Ok(None) };
         report.count_skip(Stage::Surface, SkipReason::KeptFromBefore, anchor.pixels);
         let frames = [anchor.frame as usize, frame.number as usize];
@@ -152,7 +155,7 @@ impl FollowedStrain {
             report.count_skip(Stage::Match, SkipReason::NearLastAnswer, saved);
         }
         let start = Instant::now();
-        let strain = pair::strain(stages, frames, &anchor.points, &target, &found)?;
+        let strain = pair::strain(stages, frames, &anchor.points, &target, &found, anchor.grid_m)?;
         report.ran(Stage::Strain, start.elapsed());
         let step = force_n(&frame.reading) - force_n(&anchor.reading);
         let zz = |m: &nalgebra::Matrix3<f64>| m[(2, 2)];

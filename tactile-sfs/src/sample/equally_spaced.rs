@@ -7,7 +7,8 @@ use super::lattice::Lattice;
 use super::{ControlPointSampler, SampleBuffers, crowded};
 use crate::{Scalar, SfsError, Workspace};
 
-/// Equally spaced control points: each stands for the same area of the surface (not of its projection).
+/// Equally spaced control points: each stands for the same area of the surface (not of its projection). Ground steeper than
+/// 2 (63°) counts as that steep: the area of a rim depends on the pixels it falls on.
 ///
 /// The surface is cut into strips of rows and the strips into cells of equal area, with a point in the centroid of each.
 /// Cuts and centroids are to a fraction of a pixel: the same surface, larger or shifted, gives the same points of it, so

@@ -9,6 +9,9 @@ use crate::{BoundingBox, Domain, Scalar, SfsError};
 /// Nodes per point the areas are measured with, if the surface filled its box: with every pixel of most surfaces points
 /// follow a surface that grows or moves to a hundredth of a pixel, with every other pixel to a third.
 const NODES_PER_POINT: usize = 100;
+/// Steeper ground counts as this steep (63°). At the rim of a round body the slope has no end: how much of it a lattice sees
+/// depends on the pixels, and points would follow those, not the body.
+const STEEPEST: f64 = 2.0;
 /// Fewest nodes per point that leave points room to move.
 const ROOM: usize = 8;
 
@@ -84,7 +87,7 @@ impl<'a, T: Scalar> Lattice<'a, T> {
             lattice.count += usize::from(there);
             let area = || {
                 let [p, q] = slopes_at(surface, at, domain.pixel_size_m);
-                (T::one() + p * p + q * q).sqrt().as_f64()
+                (T::one() + (p * p + q * q).min(T::of(STEEPEST * STEEPEST))).sqrt().as_f64()
             };
             lattice.weight.push(if there { area() } else { 0.0 });
         }

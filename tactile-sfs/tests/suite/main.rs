@@ -6,4 +6,5 @@ mod invariants;
 mod large;
 mod measured;
 mod order;
+mod rims;
 mod stability_scale;
