@@ -42,7 +42,7 @@ pub struct StagesConfig {
     pub estimator: EstimatorChoice,
 }
 
-/// A pipeline of boxed stages: as [`Pipeline`], but chosen at run time. The default configuration gives the default
+/// A pipeline of boxed stages: as [`Pipeline`](super::Pipeline), but chosen at run time. The default configuration gives the default
 /// pipeline's bits.
 ///
 /// ```
@@ -76,7 +76,7 @@ pub struct BoxedPipeline {
 }
 
 impl BoxedPipeline {
-    /// The stages that `config` names behind any contact stage, with the settings of [`Pipeline::new`].
+    /// The stages that `config` names behind any contact stage, with the settings of [`Pipeline::new`](super::Pipeline::new).
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] where a stage refuses its options.
@@ -96,7 +96,7 @@ impl BoxedPipeline {
         })
     }
 
-    /// Takes other settings, such as those of a [`Pipeline`].
+    /// Takes other settings, such as those of a [`Pipeline`](super::Pipeline).
     ///
     /// ```
     /// # use tactile_imaging::force::CalibrationPair;
