@@ -88,26 +88,20 @@ impl LayerEquation {
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn solve(&self, a_over_h: f64) -> Result<LayerContact, ElasticityError> {
-        let limit = LARGEST_A_OVER_H;
         positive(a_over_h, Quantity::ContactRadius)?;
-        if a_over_h > limit {
-            return Err(ElasticityError::OutOfRange {
-                quantity: Quantity::ContactRadius,
-                found: a_over_h,
-                limit,
-            });
+        let unsolvable = ElasticityError::OutOfRange {
+            quantity: Quantity::ContactRadius,
+            found: a_over_h,
+            limit: LARGEST_A_OVER_H,
+        };
+        if a_over_h > LARGEST_A_OVER_H {
+            return Err(unsolvable);
         }
         let rule = gauss_legendre(24 + (6.0 * a_over_h) as usize);
         let n = rule.len();
         let kernel = self.kernel(&rule, a_over_h);
         let scale = FRAC_2_PI * a_over_h * self.share;
-        let matrix = DMatrix::from_fn(n, n, |i, j| f64::from(i == j) - scale * kernel[(i, j)] * rule[j].1);
-        let ones = DVector::from_element(n, 1.0);
-        let squares = DVector::from_fn(n, |i, _| rule[i].0 * rule[i].0);
-        let lu = matrix.lu();
-        let unsolvable =
-            ElasticityError::OutOfRange { quantity: Quantity::ContactRadius, found: a_over_h, limit };
-        let (flat, round) = (lu.solve(&ones).ok_or(unsolvable)?, lu.solve(&squares).ok_or(unsolvable)?);
+        let (flat, round) = flat_and_round(&rule, &kernel, scale).ok_or(unsolvable)?;
         // φ at the rim by Nyström's own interpolation; the last row of the kernel belongs to s = a.
         let rim = |phi: &DVector<f64>, rhs: f64| {
             rhs + scale * (0..n).map(|j| kernel[(n, j)] * rule[j].1 * phi[j]).sum::<f64>()
@@ -134,6 +128,20 @@ impl LayerEquation {
         let weighted = DMatrix::from_fn(samples.len(), rule.len(), |q, j| cosines[(j, q)] * samples[q].1);
         cosines * weighted
     }
+}
+
+/// φ for the right sides 1 and s², those of a flat punch and of the sphere's roundness.
+fn flat_and_round(
+    rule: &[(f64, f64)],
+    kernel: &DMatrix<f64>,
+    scale: f64,
+) -> Option<(DVector<f64>, DVector<f64>)> {
+    let n = rule.len();
+    let matrix = DMatrix::from_fn(n, n, |i, j| f64::from(i == j) - scale * kernel[(i, j)] * rule[j].1);
+    let ones = DVector::from_element(n, 1.0);
+    let squares = DVector::from_fn(n, |i, _| rule[i].0 * rule[i].0);
+    let lu = matrix.lu();
+    Some((lu.solve(&ones)?, lu.solve(&squares)?))
 }
 
 /// ln(F/F_Hertz) over ln χ, tabulated once and interpolated.

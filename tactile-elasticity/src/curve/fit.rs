@@ -188,12 +188,11 @@ fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions
     let fitted_n: Vec<f64> = curve.position_m().iter().map(|&z| force(law, best, z)).collect();
     let residuals: Vec<f64> = curve.force_n().iter().zip(&fitted_n).map(|(f, g)| f - g).collect();
     let correlation = autocorrelation(&residuals);
-    // n points that follow one another say as much as n(1 − ρ)/(1 + ρ) that do not.
-    let inflation = ((1.0 + correlation.max(0.0)) / (1.0 - correlation.max(0.0))).max(1.0);
     let degrees = n - parameters;
-    let limits = interval(problem, best, degrees, inflation, options.contact_point);
+    let limits = interval(problem, best, degrees, inflation(correlation), options.contact_point);
     let to_modulus = 1.0 - nu * nu;
     let (lower, upper) = (limits.0 * to_modulus, limits.1 * to_modulus);
+    let minus_two_log = n as f64 * (best.squares / n as f64).ln();
     let depth = curve.span().1 - best.contact_m;
     let contact_ratio = law.contact_ratio(None, Some(depth));
     CurveFit {
@@ -208,12 +207,7 @@ fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions
         fitted_n,
         contact_ratio,
         // The variance is a parameter too.
-        statistics: FitStatistics::new(
-            n,
-            parameters + 1,
-            best.squares,
-            n as f64 * (best.squares / n as f64).ln(),
-        ),
+        statistics: FitStatistics::new(n, parameters + 1, best.squares, minus_two_log),
         warnings: warnings(law, depth, contact_ratio, n - 1),
     }
 }
@@ -228,6 +222,11 @@ fn force(law: &dyn ContactLaw, p: &Profile, z: f64) -> f64 {
 fn autocorrelation(r: &[f64]) -> f64 {
     let total: f64 = r.iter().map(|x| x * x).sum();
     if total > 0.0 { r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / total } else { 0.0 }
+}
+
+/// n points that follow one another say as much as n(1 − ρ)/(1 + ρ) that do not.
+fn inflation(correlation: f64) -> f64 {
+    ((1.0 + correlation.max(0.0)) / (1.0 - correlation.max(0.0))).max(1.0)
 }
 
 /// Moduli between which S ≤ S_min (1 + t² inflation/ν), by bisection of the profile on either side.
@@ -249,19 +248,22 @@ fn interval(
         };
         profile.is_some_and(|q| q.squares <= bound)
     };
-    let limit = |sign: f64| {
-        let mut step = 1e-6;
-        while step < 20.0 && inside(sign * step) {
-            step *= 2.0;
-        }
-        let (mut low, mut high) = (0.5 * step, step);
-        for _ in 0..20 {
-            let middle = 0.5 * (low + high);
-            if inside(sign * middle) { low = middle } else { high = middle }
-        }
-        best.modulus * (sign * 0.5 * (low + high)).exp()
-    };
+    let limit = |sign: f64| best.modulus * (sign * reach_of(|step| inside(sign * step))).exp();
     (limit(-1.0), limit(1.0))
+}
+
+/// How far from zero `inside` holds, by doubling and bisection.
+fn reach_of(inside: impl Fn(f64) -> bool) -> f64 {
+    let mut step = 1e-6;
+    while step < 20.0 && inside(step) {
+        step *= 2.0;
+    }
+    let (mut low, mut high) = (0.5 * step, step);
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        if inside(middle) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
 }
 
 fn warnings(law: &dyn ContactLaw, depth: f64, ratio: Option<f64>, load: usize) -> Vec<Warning<f64>> {

@@ -2,6 +2,7 @@
 
 use super::{CurveFit, CurveOptions, IndentationCurve, Indenter, Model, fit_curve};
 use crate::error::ElasticityError;
+use crate::modulus::EstimatorKind;
 pub use crate::selection::SelectionReason;
 use crate::selection::{akaike_weights, rank};
 
@@ -67,9 +68,27 @@ pub fn select_model(
         Model::Named(kind) => vec![kind],
         Model::Auto => indenter.candidates(),
     };
+    let fits = fit_each(curve, indenter, nu, &candidates, options)?;
+    let criteria: Vec<f64> = fits.iter().map(|f| f.statistics.aicc).collect();
+    let (order, reason) = rank(&criteria);
+    let reason = if matches!(model, Model::Named(_)) { SelectionReason::Asked } else { reason };
+    let weights = akaike_weights(order.iter().map(|&k| criteria[k]));
+    let mut taken: Vec<_> = fits.into_iter().map(Some).collect();
+    let fits = order.iter().filter_map(|&k| taken[k].take()).collect();
+    Ok(CurveSelection { fits, weights, reason })
+}
+
+/// The fits of the laws that can be fitted; the first error where none can.
+fn fit_each(
+    curve: &IndentationCurve,
+    indenter: &Indenter,
+    nu: f64,
+    candidates: &[EstimatorKind],
+    options: &CurveOptions,
+) -> Result<Vec<CurveFit>, ElasticityError> {
     let mut first_error = None;
-    let mut fits: Vec<CurveFit> = Vec::new();
-    for kind in candidates {
+    let mut fits = Vec::new();
+    for &kind in candidates {
         match fit_curve(curve, indenter, nu, kind, options) {
             Ok(fit) => fits.push(fit),
             Err(e) => first_error = first_error.or(Some(e)),
@@ -79,11 +98,5 @@ pub fn select_model(
         let missing = ElasticityError::TooFewLoads { expected: super::FEWEST_POINTS, found: 0 };
         return Err(first_error.unwrap_or(missing));
     }
-    let criteria: Vec<f64> = fits.iter().map(|f| f.statistics.aicc).collect();
-    let (order, reason) = rank(&criteria);
-    let reason = if matches!(model, Model::Named(_)) { SelectionReason::Asked } else { reason };
-    let weights = akaike_weights(order.iter().map(|&k| criteria[k]));
-    let mut taken: Vec<_> = fits.into_iter().map(Some).collect();
-    let fits = order.iter().filter_map(|&k| taken[k].take()).collect();
-    Ok(CurveSelection { fits, weights, reason })
+    Ok(fits)
 }

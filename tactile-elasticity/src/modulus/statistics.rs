@@ -90,24 +90,30 @@ pub(crate) fn common_mean(z: &[f64], covariance: &DMatrix<f64>) -> Result<Common
     let learnt = !known || excess;
     let variance = if learnt { scale / information } else { 1.0 / information };
     let unit = if learnt { scale } else { 1.0 };
-    let spread = |i: usize| (if known { covariance[(i, i)] } else { 1.0 } * unit).sqrt();
-    let standardized_residuals =
-        (0..n).map(|i| if spread(i) > 0.0 { residual[i] / spread(i) } else { 0.0 }).collect();
-    let full = (2.0 * std::f64::consts::PI).ln() * n as f64;
     Ok(CommonMean {
         mean,
         standard_error: if !known && degrees == 0 { f64::INFINITY } else { variance.sqrt() },
         chi_squared,
-        minus_two_log_likelihood: if known {
-            full + chi_squared
-        } else {
-            full + n as f64 * (1.0 + (chi_squared / n as f64).ln())
-        },
+        minus_two_log_likelihood: minus_two_log_likelihood(chi_squared, n, known),
         degrees: (learnt && degrees > 0).then_some(degrees as f64),
         excess: excess.then_some(scale),
-        standardized_residuals,
+        standardized_residuals: standardized(&residual, known.then_some(covariance), unit),
         weights: weights / information,
     })
+}
+
+/// Residuals over their standard deviations, the variances times `unit`; without a covariance all have one variance.
+fn standardized(residual: &DVector<f64>, covariance: Option<&DMatrix<f64>>, unit: f64) -> Vec<f64> {
+    let spread = |i: usize| (covariance.map_or(1.0, |c| c[(i, i)]) * unit).sqrt();
+    let over_spread = |i: usize| if spread(i) > 0.0 { residual[i] / spread(i) } else { 0.0 };
+    (0..residual.len()).map(over_spread).collect()
+}
+
+/// Of a normal sample; where the variance is unknown, at its most likely value.
+fn minus_two_log_likelihood(chi_squared: f64, n: usize, known: bool) -> f64 {
+    let n = n as f64;
+    let full = (2.0 * std::f64::consts::PI).ln() * n;
+    if known { full + chi_squared } else { full + n * (1.0 + (chi_squared / n).ln()) }
 }
 
 /// Cholesky of a covariance; perfectly correlated parts get a ridge of 10⁻¹² of the mean variance.

@@ -191,6 +191,33 @@ impl StressStrainRegression {
     }
 }
 
+/// Residuals over their standard errors; over the scatter where no errors are known.
+fn diagnostics<T: RealField + Copy>(
+    points: &[Point],
+    line: &Line,
+    known: bool,
+    loads: usize,
+) -> Vec<LoadDiagnostics<T>> {
+    let mut diagnostics = vec![LoadDiagnostics::unused(); loads];
+    for p in points {
+        let residual = p.stress.value - line.intercept - line.slope * p.strain.value;
+        let spread = if known {
+            p.stress.standard_error.hypot(line.slope * p.strain.standard_error)
+        } else {
+            (line.chi_squared / line.degrees.max(1) as f64).sqrt()
+        };
+        diagnostics[p.load].used = true;
+        diagnostics[p.load].standardized_residual = (spread > 0.0).then(|| narrow(residual / spread));
+    }
+    diagnostics
+}
+
+fn fit_statistics<T: RealField + Copy>(points: &[Point], line: &Line, known: bool) -> FitStatistics<T> {
+    let n = points.len() as f64;
+    let minus_two_log = if known { line.chi_squared } else { n * (line.chi_squared / n).ln() };
+    FitStatistics::new(points.len(), points.len() - line.degrees, line.chi_squared, minus_two_log)
+}
+
 impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
     fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
         let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
@@ -204,19 +231,6 @@ impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
         }
         let error = line.slope_error.hypot(line.slope * self.stress_scale_error);
         let reach = error * quantile_95(self.degrees(&points, &line));
-        let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
-        for p in &points {
-            let residual = p.stress.value - line.intercept - line.slope * p.strain.value;
-            let spread = if known {
-                p.stress.standard_error.hypot(line.slope * p.strain.standard_error)
-            } else {
-                (line.chi_squared / line.degrees.max(1) as f64).sqrt()
-            };
-            diagnostics[p.load].used = true;
-            diagnostics[p.load].standardized_residual = (spread > 0.0).then(|| narrow(residual / spread));
-        }
-        let n = points.len() as f64;
-        let minus_two_log = if known { line.chi_squared } else { n * (line.chi_squared / n).ln() };
         Ok(ModulusEstimate {
             youngs_modulus_pa: narrow(line.slope),
             standard_error_pa: narrow(error),
@@ -225,13 +239,8 @@ impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
                 upper: Some(narrow(line.slope + reach)),
             },
             estimator: EstimatorKind::StressStrainRegression,
-            loads: diagnostics,
-            fit: FitStatistics::new(
-                points.len(),
-                points.len() - line.degrees,
-                line.chi_squared,
-                minus_two_log,
-            ),
+            loads: diagnostics(&points, &line, known, loads.len()),
+            fit: fit_statistics(&points, &line, known),
             warnings: self.warnings(&loads, &line),
         })
     }
