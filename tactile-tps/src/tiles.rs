@@ -43,22 +43,35 @@ impl Strips {
         let tall = 3 * S::F64_LANES;
         let mut row = columns.start;
         while row < order {
-            let whole = row + tall <= order;
-            let height = if whole { tall } else { S::F64_LANES };
-            let strip = &mut self.strip[..depth * height];
-            pack(strip, height, left, stride, row);
-            // Panels that begin below the strip's last row lie above the diagonal.
-            let panels = columns.clone().step_by(PANEL).take_while(|&column| column < row + height);
-            for (column, block) in panels.zip(self.block.chunks_exact(PANEL * DEPTH)) {
-                let (block, panel) =
-                    (&block[..depth * PANEL], &mut right[(column - columns.start) * stride..]);
-                if whole {
-                    wide::<S, 3>(simd, strip, block, panel, stride, row);
-                } else {
-                    wide::<S, 1>(simd, strip, block, panel, stride, row);
-                }
-            }
+            let height = if row + tall <= order { tall } else { S::F64_LANES };
+            pack(&mut self.strip[..depth * height], height, left, stride, row);
+            self.subtract(simd, right, stride, columns.clone(), row, [depth, height]);
             row += height;
+        }
+    }
+
+    /// Subtracts what the packed strip of `height` rows from `row` on contributes to every panel it meets.
+    #[inline(always)]
+    fn subtract<S: Simd>(
+        &self,
+        simd: S,
+        right: &mut [f64],
+        stride: usize,
+        columns: core::ops::Range<usize>,
+        row: usize,
+        [depth, height]: [usize; 2],
+    ) {
+        let strip = &self.strip[..depth * height];
+        let whole = height > S::F64_LANES;
+        // Panels that begin below the strip's last row lie above the diagonal.
+        let panels = columns.clone().step_by(PANEL).take_while(|&column| column < row + height);
+        for (column, block) in panels.zip(self.block.chunks_exact(PANEL * DEPTH)) {
+            let (block, panel) = (&block[..depth * PANEL], &mut right[(column - columns.start) * stride..]);
+            if whole {
+                wide::<S, 3>(simd, strip, block, panel, stride, row);
+            } else {
+                wide::<S, 1>(simd, strip, block, panel, stride, row);
+            }
         }
     }
 }
