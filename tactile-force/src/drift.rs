@@ -211,27 +211,10 @@ fn weight(drift: &Drift, tile: &TileSum) -> f64 {
 impl Drift {
     /// One least-squares step on the given tiles; returns their number.
     fn step(&mut self, tiles: impl Iterator<Item = TileSum>, terms: usize, sd: f64) -> usize {
-        let mut normal = nalgebra::Matrix3::<f64>::identity();
-        normal.view_mut((0, 0), (terms, terms)).fill(0.0);
-        let mut right = nalgebra::Vector3::<f64>::zeros();
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
-        let (mut count, mut reference, mut pixels) = (0, 0.0, 0.0);
-        for tile in tiles {
-            let w = weight(self, &tile);
-            let at = [1.0, (tile.x - self.middle[0]) / scale[1], (tile.y - self.middle[1]) / scale[2]];
-            let residual = self.residual(&tile);
-            for i in 0..terms {
-                right[i] += w * at[i] * residual / tile.pixels;
-                for j in 0..terms {
-                    normal[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
-                }
-            }
-            count += 1;
-            reference += tile.reference;
-            pixels += tile.pixels;
-        }
-        let Some(inverse) = normal.try_inverse() else { return count };
-        let step = inverse * right;
+        let sums = Normal::of(self, tiles, terms, scale);
+        let Some(inverse) = sums.matrix.try_inverse() else { return sums.count };
+        let step = inverse * sums.right;
         for i in 0..terms {
             self.coefficients[i] += step[i] / scale[i];
             for j in 0..terms {
@@ -239,8 +222,41 @@ impl Drift {
             }
         }
         self.standard_error = self.covariance[0][0].sqrt();
-        self.reference = reference / f64::max(pixels, 1.0);
-        count
+        self.reference = sums.reference / f64::max(sums.pixels, 1.0);
+        sums.count
+    }
+}
+
+/// Normal equations of what a correction leaves of the tiles, and the tiles' own sums.
+struct Normal {
+    matrix: nalgebra::Matrix3<f64>,
+    right: nalgebra::Vector3<f64>,
+    count: usize,
+    reference: f64,
+    pixels: f64,
+}
+
+impl Normal {
+    /// Places count from the frame's middle, in units of `scale`.
+    fn of(drift: &Drift, tiles: impl Iterator<Item = TileSum>, terms: usize, scale: [f64; 3]) -> Self {
+        let (mut matrix, right) = (nalgebra::Matrix3::identity(), nalgebra::Vector3::zeros());
+        matrix.view_mut((0, 0), (terms, terms)).fill(0.0);
+        let mut sums = Self { matrix, right, count: 0, reference: 0.0, pixels: 0.0 };
+        for tile in tiles {
+            let w = weight(drift, &tile);
+            let at = [1.0, (tile.x - drift.middle[0]) / scale[1], (tile.y - drift.middle[1]) / scale[2]];
+            let residual = drift.residual(&tile);
+            for i in 0..terms {
+                sums.right[i] += w * at[i] * residual / tile.pixels;
+                for j in 0..terms {
+                    sums.matrix[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
+                }
+            }
+            sums.count += 1;
+            sums.reference += tile.reference;
+            sums.pixels += tile.pixels;
+        }
+        sums
     }
 }
 

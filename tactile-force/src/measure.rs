@@ -195,17 +195,7 @@ impl<T: Real> ForceMeter<T> {
         let [hx, hy] = self.pixel_size_m;
         let pixel_area = hx * hy;
         let reading = calibration.read(contact.integrated_pixel_value);
-        let side = pixel_area.sqrt();
-        let half = T::nearest(0.5) * side;
-        let radius = profile
-            .map_or(Estimate { value: contact.equivalent_radius_px * side, standard_error: half }, |p| {
-                p.radius_m
-            });
-        let pi = T::nearest(std::f64::consts::PI);
-        let mean = reading.force_n.value / (pi * radius.value * radius.value);
-        let two = T::one() + T::one();
-        let relative = |e: Estimate<T>| e.standard_error / e.value;
-        let mean_error = mean * relative(reading.force_n).hypot(two * relative(radius));
+        let radius = contact_radius(&contact, profile, pixel_area.sqrt());
         let step = calibration.stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel_area);
         let peak = profile.map_or(Estimate { value: contact.peak, standard_error: T::one() }, |p| p.peak);
         ForceMeasurement {
@@ -214,7 +204,7 @@ impl<T: Real> ForceMeter<T> {
             centroid_m: Some([contact.centroid_px[0].scaled(hx), contact.centroid_px[1].scaled(hy)]),
             contact_area_m2: Some(T::nearest(contact.area_px as f64) * pixel_area),
             contact_radius_m: Some(radius),
-            mean_stress_pa: Some(Estimate { value: mean, standard_error: mean_error }),
+            mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
             peak_stress_pa: Some(peak.scaled(step)),
             contact: Some(contact),
             profile,
@@ -223,6 +213,22 @@ impl<T: Real> ForceMeter<T> {
             noise: found.noise,
         }
     }
+}
+
+/// The profile's radius, else the mask's with half a pixel as its error; `side` is that of a square pixel of equal area.
+fn contact_radius<T: Real>(contact: &Contact<T>, profile: Option<HertzFit<T>>, side: T) -> Estimate<T> {
+    let half = T::nearest(0.5) * side;
+    let of_mask = Estimate { value: contact.equivalent_radius_px * side, standard_error: half };
+    profile.map_or(of_mask, |p| p.radius_m)
+}
+
+/// F/(π a²) with its standard error.
+fn mean_stress<T: Real>(force: Estimate<T>, radius: Estimate<T>) -> Estimate<T> {
+    let pi = T::nearest(std::f64::consts::PI);
+    let two = T::one() + T::one();
+    let value = force.value / (pi * radius.value * radius.value);
+    let relative = |e: Estimate<T>| e.standard_error / e.value;
+    Estimate { value, standard_error: value * relative(force).hypot(two * relative(radius)) }
 }
 
 impl<T: Real> ForceMeasurement<T> {

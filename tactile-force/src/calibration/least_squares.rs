@@ -53,28 +53,41 @@ pub(crate) fn solve(design: &DMatrix<f64>, y: &[f64], robustness: Robustness) ->
     };
     let mut scale = 0.0;
     for &stage in stages {
-        stop = StopReason::IterationLimit;
-        for _ in 0..SWEEPS {
-            iterations += 1;
-            let residuals = &y - design * &coefficients;
-            scale = robust_scale(residuals.as_slice(), design.ncols());
-            for (w, r) in weights.iter_mut().zip(residuals.iter()) {
-                *w = robust_weight(stage, *r, scale);
-            }
-            let next = weighted(design, &y, &weights)?;
-            let step = (design * (&next - &coefficients)).amax();
-            coefficients = next;
-            if step <= 1e-10 * scale {
-                stop = StopReason::Converged;
-                break;
-            }
-        }
+        let sweeps;
+        (scale, sweeps, stop) = reweighted(design, &y, stage, &mut coefficients, &mut weights)?;
+        iterations += sweeps;
     }
     let residuals: Vec<f64> = (&y - design * &coefficients).iter().copied().collect();
     let (variance, residual_sd) = error_variance(robustness, &residuals, scale, design.ncols());
     let covariance = inverse_gram(design)? * variance;
     let coefficients = coefficients.iter().copied().collect();
     Ok(Fit { coefficients, covariance, residuals, weights, residual_sd, iterations, stop })
+}
+
+/// Solves again and again with the weights of the last residuals until the curve stands still; returns the robust scale, the
+/// number of solves and why they stopped.
+fn reweighted(
+    design: &DMatrix<f64>,
+    y: &DVector<f64>,
+    stage: Robustness,
+    coefficients: &mut DVector<f64>,
+    weights: &mut [f64],
+) -> Result<(f64, usize, StopReason), ForceError> {
+    let mut scale = 0.0;
+    for sweep in 1..=SWEEPS {
+        let residuals = y - design * &*coefficients;
+        scale = robust_scale(residuals.as_slice(), design.ncols());
+        for (w, r) in weights.iter_mut().zip(residuals.iter()) {
+            *w = robust_weight(stage, *r, scale);
+        }
+        let next = weighted(design, y, weights)?;
+        let step = (design * (&next - &*coefficients)).amax();
+        *coefficients = next;
+        if step <= 1e-10 * scale {
+            return Ok((scale, sweep, StopReason::Converged));
+        }
+    }
+    Ok((scale, SWEEPS, StopReason::IterationLimit))
 }
 
 fn weighted(design: &DMatrix<f64>, y: &DVector<f64>, weights: &[f64]) -> Result<DVector<f64>, ForceError> {

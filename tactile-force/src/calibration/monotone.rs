@@ -61,9 +61,7 @@ impl<T: Real> MonotoneCalibration<T> {
     /// rises throughout, so that nothing but a constant is left.
     pub fn fit(pairs: &[CalibrationPair<T>], options: &CalibrationOptions) -> Result<Self, ForceError> {
         check_pairs(pairs, 2)?;
-        let mut points: Vec<(f64, f64)> =
-            pairs.iter().map(|p| (p.integrated_pixel_value.as_f64(), p.force_n.as_f64())).collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let points = sorted(pairs);
         let values: Vec<f64> = points.iter().map(|p| p.0).collect();
         let [low, high] = extremes(&values);
         if low == high {
@@ -81,16 +79,22 @@ impl<T: Real> MonotoneCalibration<T> {
         let weights = residuals.iter().map(|r| robust_weight(options.robustness, *r, scale)).collect();
         let fit = Fit { iterations, stop, ..Fit::without_coefficients(residuals, weights, scale) };
         let shape = shape(&points, &knots)?;
-        let parameters = Parameters::levels(
-            &blocks.iter().map(|b| (b.force, scale, b.count)).collect::<Vec<_>>(),
-            pairs.len(),
-        );
+        let levels: Vec<_> = blocks.iter().map(|b| (b.force, scale, b.count)).collect();
+        let parameters = Parameters::levels(&levels, pairs.len());
         Ok(Self {
             report: report::build(pairs, &fit, parameters, shape),
             knots: knots.iter().map(Knot::cast).collect(),
             range: [T::nearest(low), T::nearest(high)],
         })
     }
+}
+
+/// (pixel value, force), in order.
+fn sorted<T: Real>(pairs: &[CalibrationPair<T>]) -> Vec<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> =
+        pairs.iter().map(|p| (p.integrated_pixel_value.as_f64(), p.force_n.as_f64())).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    points
 }
 
 /// What the report says of the joined cubics.

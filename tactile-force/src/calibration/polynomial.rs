@@ -51,14 +51,8 @@ impl<T: Real> PolynomialCalibration<T> {
         check_pairs(pairs, terms)?;
         let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value.as_f64()).collect();
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
-        let basis = Basis::over(&values, options.through_origin);
-        if basis.half <= 4.0 * f64::EPSILON * basis.middle.abs() {
-            return Err(ForceError::DegeneratePairs { span: 2.0 * basis.half });
-        }
-        let mut design = DMatrix::zeros(values.len(), terms);
-        for (i, &v) in values.iter().enumerate() {
-            basis.each(v, terms, |k, value, _| design[(i, k)] = value);
-        }
+        let basis = spanned(&values, options.through_origin)?;
+        let design = design(&basis, &values, terms);
         let fit = least_squares::solve(&design, &forces, options.robustness)?;
         let [low, high] = extremes(&values);
         let shape = shape(&basis, &fit.coefficients, low, high, &values, &forces)?;
@@ -98,6 +92,24 @@ impl<T: Real> PolynomialCalibration<T> {
         };
         basis.each(v.as_f64(), self.coefficients.len(), each);
     }
+}
+
+/// The basis over values that differ.
+fn spanned(values: &[f64], through_origin: bool) -> Result<Basis, ForceError> {
+    let basis = Basis::over(values, through_origin);
+    if basis.half <= 4.0 * f64::EPSILON * basis.middle.abs() {
+        return Err(ForceError::DegeneratePairs { span: 2.0 * basis.half });
+    }
+    Ok(basis)
+}
+
+/// One row a value, one column a polynomial.
+fn design(basis: &Basis, values: &[f64], terms: usize) -> DMatrix<f64> {
+    let mut design = DMatrix::zeros(values.len(), terms);
+    for (i, &v) in values.iter().enumerate() {
+        basis.each(v, terms, |k, value, _| design[(i, k)] = value);
+    }
+    design
 }
 
 /// Sensitivity, departure from the straight line and whether the curve rises, from its slope on a fine grid.

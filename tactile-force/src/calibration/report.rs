@@ -155,9 +155,6 @@ pub(super) fn build<T: Real>(
     shape: Shape,
 ) -> CalibrationReport<T> {
     let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
-    let mean = forces.iter().sum::<f64>() / forces.len() as f64;
-    let total: f64 = forces.iter().map(|f| (f - mean).powi(2)).sum();
-    let left: f64 = fit.residuals.iter().map(|r| r * r).sum();
     let full_scale = full_scale(&forces);
     let cast = |values: &[f64]| values.iter().map(|&v| T::nearest(v)).collect();
     CalibrationReport {
@@ -165,7 +162,7 @@ pub(super) fn build<T: Real>(
         intervals_95: parameters.intervals(),
         degrees_of_freedom: parameters.degrees_of_freedom,
         parameters: parameters.estimates.iter().map(|(c, v)| Estimate::nearest(*c, *v)).collect(),
-        r_squared: T::nearest(1.0 - left / total),
+        r_squared: T::nearest(r_squared(&forces, &fit.residuals)),
         residual_sd_n: T::nearest(fit.residual_sd),
         residuals_n: cast(&fit.residuals),
         weights: cast(&fit.weights),
@@ -178,6 +175,14 @@ pub(super) fn build<T: Real>(
         iterations: fit.iterations,
         stop: fit.stop,
     }
+}
+
+/// 1 − Σr²/Σ(F − F̄)².
+fn r_squared(forces: &[f64], residuals: &[f64]) -> f64 {
+    let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+    let total: f64 = forces.iter().map(|f| (f - mean).powi(2)).sum();
+    let left: f64 = residuals.iter().map(|r| r * r).sum();
+    1.0 - left / total
 }
 
 pub(super) fn full_scale(forces: &[f64]) -> f64 {

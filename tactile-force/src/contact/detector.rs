@@ -9,7 +9,7 @@ use super::summary::Sums;
 use super::threshold::quantile;
 use super::{Contact, ContactOptions, Detection};
 use crate::drift::{self, Drift};
-use crate::frame::{DifferenceNoise, PassWorkspace, TILE_COLUMNS};
+use crate::frame::{DifferenceNoise, PassWorkspace, TILE_COLUMNS, Tiles};
 use crate::{BoundingBox, DriftCorrection, Estimate, ForceError, FrameStatistics, Real, ReferenceFrame};
 
 /// Finds the contact in frames of one sensor.
@@ -146,30 +146,42 @@ impl ContactDetector {
         sd: f64,
         pixel_limit: f64,
     ) -> Option<BoundingBox> {
-        let tiles = &workspace.pass.tiles;
-        let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
         let size = (statistics.rows, statistics.columns);
-        let sign = f64::from(self.options.polarity.sign());
+        let bright = self.bright_tiles(&workspace.pass.tiles, reference, size, drift, sd);
+        // Pixels were judged before the drift was known: their verdict stands while the drift is small beside it.
+        let pixels = statistics
+            .bounding_box
+            .filter(|_| drift.greatest_grey(statistics, reference) < 0.3 * pixel_limit);
+        bright.into_iter().chain(pixels).reduce(BoundingBox::union)
+    }
+
+    /// Box around every tile whose sum exceeds its noise.
+    fn bright_tiles(
+        &self,
+        tiles: &Tiles,
+        reference: &ReferenceFrame,
+        size: (usize, usize),
+        drift: &Drift,
+        sd: f64,
+    ) -> Option<BoundingBox> {
+        let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
+        let sign = self.options.polarity.sign();
         let stands_out = |k: usize| {
             let tile = reference.tile_sum(tiles, k);
-            sign * drift.residual(&tile) > z * tile.pixels.sqrt()
+            f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
         };
         // The last tile of a band is its smallest: a band that stays below its noise needs no closer look.
         let quiet = |band: usize| {
             drift.is_zero() && {
                 let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
-                f64::from(tiles.greatest(band, self.options.polarity.sign())) <= z * last.pixels.sqrt()
+                f64::from(tiles.greatest(band, sign)) <= z * last.pixels.sqrt()
             }
         };
-        let bright = (0..tiles.rows)
+        (0..tiles.rows)
             .filter(|&band| !quiet(band))
             .flat_map(|band| (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k)))
-            .map(|k| tiles.pixels(k, size));
-        // Pixels were judged before the drift was known: their verdict stands while the drift is small beside it.
-        let pixels = statistics
-            .bounding_box
-            .filter(|_| drift.greatest_grey(statistics, reference) < 0.3 * pixel_limit);
-        bright.chain(pixels).reduce(BoundingBox::union)
+            .map(|k| tiles.pixels(k, size))
+            .reduce(BoundingBox::union)
     }
 
     /// The mask in a region around the suspect pixels, which grows while the aperture meets its border.
@@ -237,11 +249,7 @@ impl ContactDetector {
         let whole =
             BoundingBox { row_start: 0, row_end: frame.nrows(), column_start: 0, column_end: frame.ncols() };
         let place = region.place.unwrap_or(whole);
-        let saturated_px = self.saturated(region, place.of(frame));
-        let share = saturated_px as f64 / extent.area as f64;
-        if share > self.options.saturation_limit {
-            return Err(ForceError::SaturatedContact { share, limit: self.options.saturation_limit });
-        }
+        let saturated_px = self.saturated(region, place.of(frame), extent.area)?;
         let sums = Sums::over(region);
         let local = sums.centroid();
         let origin = [place.column_start as f64, place.row_start as f64];
@@ -261,8 +269,13 @@ impl ContactDetector {
         })
     }
 
-    /// Pixels of the mask at the end of the scale that contact drives them to.
-    fn saturated(&self, region: &Region, frame: ArrayView2<'_, u8>) -> usize {
+    /// Pixels of the mask at the end of the scale that contact drives them to; an error where they are too large a share of it.
+    fn saturated(
+        &self,
+        region: &Region,
+        frame: ArrayView2<'_, u8>,
+        area: usize,
+    ) -> Result<usize, ForceError> {
         let full = if self.options.polarity.sign() > 0 { u8::MAX } else { 0 };
         let in_run = |run: &Run| {
             let row = frame.row(run.row as usize);
@@ -272,7 +285,9 @@ impl ContactDetector {
                 None => row.iter().filter(|p| **p == full).count(),
             }
         };
-        region.mask.iter().map(in_run).sum()
+        let saturated = region.mask.iter().map(in_run).sum();
+        let (share, limit) = (saturated as f64 / area as f64, self.options.saturation_limit);
+        if share > limit { Err(ForceError::SaturatedContact { share, limit }) } else { Ok(saturated) }
     }
 }
 

@@ -124,6 +124,18 @@ impl Components {
         (area, others)
     }
 
+    /// Marks the components of the background that reach the border.
+    fn mark_open(&mut self, background: &[Run], rows: u32, columns: u32) {
+        self.area.clear();
+        self.area.resize(background.len(), 0);
+        for (k, b) in background.iter().enumerate() {
+            if b.row == 0 || b.row == rows - 1 || b.start == 0 || b.end == columns {
+                let root = self.root(k as u32) as usize;
+                self.area[root] = OPEN;
+            }
+        }
+    }
+
     /// Adds everything the runs enclose: the background that no 4-path joins to the border. Returns the area filled.
     pub(super) fn fill_holes(
         &mut self,
@@ -134,21 +146,12 @@ impl Components {
     ) -> usize {
         complement(runs, background, rows, columns);
         self.join(background, false);
-        let (last_row, width) = (rows as u32 - 1, columns as u32);
-        // Areas serve as marks: 1 for background that reaches the border.
-        self.area.clear();
-        self.area.resize(background.len(), 0);
-        for (k, b) in background.iter().enumerate() {
-            if b.row == 0 || b.row == last_row || b.start == 0 || b.end == width {
-                let root = self.root(k as u32) as usize;
-                self.area[root] = 1;
-            }
-        }
+        self.mark_open(background, rows as u32, columns as u32);
         let before = runs.len();
         let mut filled = 0;
         for (k, run) in background.iter().enumerate() {
             let root = self.root(k as u32) as usize;
-            if self.area[root] == 0 {
+            if self.area[root] != OPEN {
                 filled += run.len();
                 runs.push(*run);
             }
@@ -160,6 +163,9 @@ impl Components {
         filled
     }
 }
+
+/// In place of an area: background that reaches the border.
+const OPEN: usize = 1;
 
 /// The runs between the runs.
 fn complement(runs: &[Run], background: &mut Vec<Run>, rows: usize, columns: usize) {

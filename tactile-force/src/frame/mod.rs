@@ -13,5 +13,6 @@ pub use reference::ReferenceFrame;
 pub use statistics::{BoundingBox, FrameStatistics};
 
 pub(crate) use noise::trimmed_variance;
+pub(crate) use pass::Tiles;
 pub(crate) use reference::PassWorkspace;
 pub(crate) use strip::{TILE_COLUMNS, TILE_ROWS};

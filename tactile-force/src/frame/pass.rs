@@ -1,5 +1,7 @@
 //! The pass: every pixel of a frame once.
 
+use std::ops::Range;
+
 use ndarray::{ArrayView2, Axis, Zip};
 
 use super::strip::{Kernel, Rows, STRIP_TILES, Strip};
@@ -52,39 +54,71 @@ pub(super) fn scan(
     tiles: &mut Tiles,
 ) -> FrameStatistics {
     tiles.reset(size);
-    let kernel = Kernel::best();
     let mut s = FrameStatistics::empty(size);
-    let whole = size.1 / TILE_COLUMNS;
     let brightest = reference.map(|(_, b)| b);
     let reference = reference.map(|(r, _)| r);
+    let pass = Pass { kernel: Kernel::best(), frame, reference, size, threshold };
     for band in 0..tiles.rows {
-        let mut above = 0;
         let sums = &mut tiles.sums[band * tiles.columns..(band + 1) * tiles.columns];
-        for first in (0..whole).step_by(STRIP_TILES) {
-            let last = (first + STRIP_TILES).min(whole);
-            let columns = first * TILE_COLUMNS..last * TILE_COLUMNS;
-            let f = rows(frame, size, band, columns.clone());
-            let r = reference
-                .map_or([&ZEROS[..columns.len()]; TILE_ROWS], |r| rows(r, size, band, columns.clone()));
-            let strip = kernel.run(&f, &r, threshold, &mut sums[first..last]);
-            above = above.max(strip.above);
-            s.add(&strip, band, first);
-        }
-        if whole < tiles.columns {
-            let columns = whole * TILE_COLUMNS..size.1;
-            let f = padded(rows(frame, size, band, columns.clone()));
-            let r = padded(reference.map_or([&[]; TILE_ROWS], |r| rows(r, size, band, columns.clone())));
-            let (f, r) = (f.each_ref().map(|p| &p[..]), r.each_ref().map(|p| &p[..]));
-            let strip = kernel.run(&f, &r, threshold, &mut sums[whole..]);
-            above = above.max(strip.above);
-            s.add(&strip, band, whole);
-        }
+        let above = pass.band(band, sums, &mut s);
         if above >= u8::MAX - brightest.map_or(0, |b| b[band]) {
             s.saturated +=
                 pixels_of(band, frame, size.1).iter().map(|&p| usize::from(p == u8::MAX)).sum::<usize>();
         }
     }
     s
+}
+
+/// What stays the same over a pass.
+struct Pass<'a> {
+    kernel: Kernel,
+    frame: &'a [u8],
+    reference: Option<&'a [u8]>,
+    size: (usize, usize),
+    threshold: u8,
+}
+
+impl Pass<'_> {
+    /// Adds a band of eight rows; returns its greatest frame − reference.
+    #[inline]
+    fn band(&self, band: usize, sums: &mut [i32], s: &mut FrameStatistics) -> u8 {
+        let whole = self.size.1 / TILE_COLUMNS;
+        let mut above = 0;
+        for first in (0..whole).step_by(STRIP_TILES) {
+            let last = (first + STRIP_TILES).min(whole);
+            let strip = self.strip(band, first..last, &mut sums[first..last]);
+            above = above.max(strip.above);
+            s.add(&strip, band, first);
+        }
+        if whole < sums.len() {
+            let strip = self.margin(band, whole, &mut sums[whole..]);
+            above = above.max(strip.above);
+            s.add(&strip, band, whole);
+        }
+        above
+    }
+
+    /// A strip of whole tiles.
+    #[inline]
+    fn strip(&self, band: usize, tiles: Range<usize>, sums: &mut [i32]) -> Strip {
+        let columns = tiles.start * TILE_COLUMNS..tiles.end * TILE_COLUMNS;
+        let f = rows(self.frame, self.size, band, columns.clone());
+        let r = match self.reference {
+            Some(r) => rows(r, self.size, band, columns),
+            None => [&ZEROS[..columns.len()]; TILE_ROWS],
+        };
+        self.kernel.run(&f, &r, self.threshold, sums)
+    }
+
+    /// The columns beyond the last whole tile, filled up to one.
+    #[inline]
+    fn margin(&self, band: usize, whole: usize, sums: &mut [i32]) -> Strip {
+        let columns = whole * TILE_COLUMNS..self.size.1;
+        let f = padded(rows(self.frame, self.size, band, columns.clone()));
+        let r = padded(self.reference.map_or([&[]; TILE_ROWS], |r| rows(r, self.size, band, columns)));
+        let (f, r) = (f.each_ref().map(|p| &p[..]), r.each_ref().map(|p| &p[..]));
+        self.kernel.run(&f, &r, self.threshold, sums)
+    }
 }
 
 /// The pixels of a band of eight rows.
@@ -94,12 +128,7 @@ pub(super) fn pixels_of(band: usize, image: &[u8], columns: usize) -> &[u8] {
 }
 
 /// Part of the eight rows of a band; rows below the image are black.
-fn rows(
-    image: &[u8],
-    (height, width): (usize, usize),
-    band: usize,
-    columns: std::ops::Range<usize>,
-) -> Rows<'_> {
+fn rows(image: &[u8], (height, width): (usize, usize), band: usize, columns: Range<usize>) -> Rows<'_> {
     std::array::from_fn(|k| {
         let y = band * TILE_ROWS + k;
         if y < height {

@@ -64,16 +64,8 @@ impl ReferenceFrame {
     /// # Errors
     /// No frame, an empty one, a side longer than 16384 pixels, or frames that differ in size.
     pub fn from_frames(frames: &[ArrayView2<'_, u8>]) -> Result<Self, ForceError> {
-        let size = frames.first().map_or((0, 0), |f| f.dim());
-        check_size(size)?;
-        if let Some(other) = frames.iter().find(|f| f.dim() != size) {
-            return Err(ForceError::SizeMismatch { expected: size, found: other.dim() });
-        }
-        let n = frames.len() as f64;
-        let mean = Array2::from_shape_fn(size, |at| {
-            let total: u32 = frames.iter().map(|f| u32::from(f[at])).sum();
-            (f64::from(total) / n) as f32
-        });
+        let size = common_size(frames)?;
+        let mean = mean_of(frames, size);
         let image = mean.mapv(|m| m.round() as u8);
         let noise = if frames.len() == 1 {
             NoiseModel::of_frame(frames[0])
@@ -237,6 +229,25 @@ impl ReferenceFrame {
         let (expected, found) = (self.image.dim(), frame.dim());
         if expected == found { Ok(()) } else { Err(ForceError::SizeMismatch { expected, found }) }
     }
+}
+
+/// The size that all frames have.
+fn common_size(frames: &[ArrayView2<'_, u8>]) -> Result<(usize, usize), ForceError> {
+    let size = frames.first().map_or((0, 0), |f| f.dim());
+    check_size(size)?;
+    match frames.iter().find(|f| f.dim() != size) {
+        Some(other) => Err(ForceError::SizeMismatch { expected: size, found: other.dim() }),
+        None => Ok(size),
+    }
+}
+
+/// The mean of the frames, pixel by pixel.
+fn mean_of(frames: &[ArrayView2<'_, u8>], size: (usize, usize)) -> Array2<f32> {
+    let n = frames.len() as f64;
+    Array2::from_shape_fn(size, |at| {
+        let total: u32 = frames.iter().map(|f| u32::from(f[at])).sum();
+        (f64::from(total) / n) as f32
+    })
 }
 
 fn check_size((rows, columns): (usize, usize)) -> Result<(), ForceError> {

@@ -71,14 +71,8 @@ impl<T: Real> ImageMoments<T> {
     /// # Errors
     /// An image without pixels, or with a pixel (or background) that is not finite.
     pub fn of(image: ArrayView2<'_, T>, background: T) -> Result<Self, ForceError> {
+        let first = checked(&image, background)?;
         let (rows, columns) = image.dim();
-        let Some(first) = image.first().map(|p| p.as_f64()) else {
-            return Err(ForceError::EmptyImage { rows, columns });
-        };
-        if let Some(((row, column), _)) = image.indexed_iter().find(|(_, p)| !p.is_finite()) {
-            return Err(ForceError::NonFinitePixel { row, column });
-        }
-        crate::Requirement::Finite.check("background", background.as_f64())?;
         let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
         let (mut s, mut raw) = (Sums::default(), [Double::default(); 2]);
         let (mut least, mut greatest) = (T::infinity(), T::neg_infinity());
@@ -104,6 +98,19 @@ impl<T: Real> ImageMoments<T> {
             status,
         })
     }
+}
+
+/// The first pixel of an image that has pixels, all finite.
+fn checked<T: Real>(image: &ArrayView2<'_, T>, background: T) -> Result<f64, ForceError> {
+    let (rows, columns) = image.dim();
+    let Some(first) = image.first() else {
+        return Err(ForceError::EmptyImage { rows, columns });
+    };
+    if let Some(((row, column), _)) = image.indexed_iter().find(|(_, p)| !p.is_finite()) {
+        return Err(ForceError::NonFinitePixel { row, column });
+    }
+    crate::Requirement::Finite.check("background", background.as_f64())?;
+    Ok(first.as_f64())
 }
 
 /// Sums about the image's middle.

@@ -61,62 +61,72 @@ impl Judge {
     }
 }
 
-/// Conditions of the moments of an image whose pixels are exact: 1 for a sum of one sign, else Σ|d|/|Σd| over what double-double
-/// arithmetic has to spare. The variance's and centroid's inputs are exact, too.
-fn moments(
-    judge: &mut Judge,
-    id: &str,
-    pixels: &Array2<f64>,
+/// An image and what its moments should be.
+struct Moments<'a> {
+    id: &'a str,
+    pixels: &'a Array2<f64>,
     background: f64,
     pitch: f64,
-    expected: &Value,
+    expected: &'a Value,
+    /// The pixels are rounded results themselves, and carry eps each.
     rounded: bool,
-) {
-    let m = ImageMoments::of(pixels.view(), background).unwrap();
-    // Pixels that are themselves rounded results carry eps each: the moments' condition is then that of the sums.
-    let n = pixels.len() as f64;
-    let d = pixels.mapv(|p| p - background);
-    let sum_condition = if rounded { d.mapv(f64::abs).sum() / d.sum().abs() } else { 1.0 };
-    let scale = m.greatest.abs().max(m.least.abs());
-    let variance_condition = if rounded { scale * scale / m.variance } else { 1.0 };
-    let relative = |j: &mut Judge, key: &str, found: f64, condition: f64| {
-        if !expected[key].is_null() {
-            j.relative(format!("{id} {key}"), found, number(&expected[key]), condition);
-        }
-    };
-    relative(judge, "sum", m.sum, sum_condition);
-    relative(judge, "force", m.sum * pitch * pitch, sum_condition);
-    relative(judge, "min", m.least, 1.0);
-    relative(judge, "max", m.greatest, 1.0);
-    // An alternating image of 1e16 has a mean of 9: the condition of the mean of exact pixels is 1 in double-double.
-    relative(judge, "mean", m.mean, sum_condition);
-    if number(&expected.get("variance").cloned().unwrap_or(0.0.into())) == 0.0 {
-        assert!(m.variance == 0.0, "{id}: variance of equal pixels {}", m.variance);
-    } else {
-        relative(judge, "variance", m.variance, variance_condition.min(n * variance_condition));
+}
+
+impl Moments<'_> {
+    /// Conditions of the moments of an image whose pixels are exact: 1 for a sum of one sign, else Σ|d|/|Σd| over what double-double
+    /// arithmetic has to spare. The variance's and centroid's inputs are exact, too.
+    fn check(&self, judge: &mut Judge) {
+        let m = ImageMoments::of(self.pixels.view(), self.background).unwrap();
+        let d = self.pixels.mapv(|p| p - self.background);
+        let condition = if self.rounded { d.mapv(f64::abs).sum() / d.sum().abs() } else { 1.0 };
+        self.relative(judge, "sum", m.sum, condition);
+        self.relative(judge, "force", m.sum * self.pitch * self.pitch, condition);
+        self.relative(judge, "min", m.least, 1.0);
+        self.relative(judge, "max", m.greatest, 1.0);
+        // An alternating image of 1e16 has a mean of 9: the condition of the mean of exact pixels is 1 in double-double.
+        self.relative(judge, "mean", m.mean, condition);
+        self.variance(judge, &m);
+        let status = match m.status {
+            MomentStatus::Ok => "ok",
+            MomentStatus::Empty => "empty",
+            MomentStatus::NegativeSecondMoment => "negative_second_moment",
+        };
+        assert_eq!(status, self.expected["status"].as_str().unwrap(), "{}", self.id);
+        self.place(judge, &m, condition);
     }
-    let status = match m.status {
-        MomentStatus::Ok => "ok",
-        MomentStatus::Empty => "empty",
-        MomentStatus::NegativeSecondMoment => "negative_second_moment",
-    };
-    assert_eq!(status, expected["status"].as_str().unwrap(), "{id}");
-    assert_eq!(m.centroid_px.is_none(), expected["centroid"].is_null(), "{id}");
-    if let (Some(c), Some(e)) = (m.centroid_px, expected["centroid"].as_array()) {
-        for (k, axis) in ["x", "y"].iter().enumerate() {
-            judge.relative(
-                format!("{id} centroid {axis}"),
-                (c[k] + 0.5) * pitch,
-                number(&e[k]),
-                sum_condition,
-            );
+
+    fn relative(&self, judge: &mut Judge, key: &str, found: f64, condition: f64) {
+        if !self.expected[key].is_null() {
+            judge.relative(format!("{} {key}", self.id), found, number(&self.expected[key]), condition);
         }
     }
-    if let (Some(r), Some(e)) = (m.radius_of_gyration_px, expected["radius_of_gyration"].as_f64()) {
-        if e == 0.0 {
-            assert_eq!(r, 0.0, "{id}")
+
+    fn variance(&self, judge: &mut Judge, m: &ImageMoments<f64>) {
+        if number(&self.expected.get("variance").cloned().unwrap_or(0.0.into())) == 0.0 {
+            assert!(m.variance == 0.0, "{}: variance of equal pixels {}", self.id, m.variance);
         } else {
-            judge.relative(format!("{id} gyration"), r * pitch, e, sum_condition)
+            let scale = m.greatest.abs().max(m.least.abs());
+            let condition = if self.rounded { scale * scale / m.variance } else { 1.0 };
+            self.relative(judge, "variance", m.variance, condition);
+        }
+    }
+
+    /// Centroid and radius of gyration.
+    fn place(&self, judge: &mut Judge, m: &ImageMoments<f64>, condition: f64) {
+        let (id, expected, pitch) = (self.id, self.expected, self.pitch);
+        assert_eq!(m.centroid_px.is_none(), expected["centroid"].is_null(), "{id}");
+        if let (Some(c), Some(e)) = (m.centroid_px, expected["centroid"].as_array()) {
+            for (k, axis) in ["x", "y"].iter().enumerate() {
+                let what = format!("{id} centroid {axis}");
+                judge.relative(what, (c[k] + 0.5) * pitch, number(&e[k]), condition);
+            }
+        }
+        if let (Some(r), Some(e)) = (m.radius_of_gyration_px, expected["radius_of_gyration"].as_f64()) {
+            if e == 0.0 {
+                assert_eq!(r, 0.0, "{id}")
+            } else {
+                judge.relative(format!("{id} gyration"), r * pitch, e, condition)
+            }
         }
     }
 }
@@ -148,6 +158,86 @@ fn profile(
     );
 }
 
+/// A blob of light: its image, its moments over the plane and over the frame, and the condition of a pixel.
+struct Blob {
+    pixels: Array2<f64>,
+    whole: ProfileMoments<f64>,
+    within: Option<ProfileMoments<f64>>,
+    condition: Condition,
+}
+
+impl Blob {
+    fn of(case: &Value, size: usize, pitch: f64, centre: [f64; 2]) -> Self {
+        let p = &case["params"];
+        let peak = number(&p["amplitude"]);
+        let grid = PixelGrid { rows: size, columns: size, size: [pitch; 2], first: [0.5 * pitch; 2] };
+        let side = [0.0, size as f64 * pitch];
+        let frame = Rectangle { x: side, y: side };
+        if case["kind"] == "gaussian" {
+            let sd = number(&p["sigma"]);
+            let blob = GaussianProfile::new(centre, sd, peak).unwrap();
+            let condition = gaussian_condition(centre, sd);
+            Self { pixels: blob.image(&grid), whole: blob.whole(), within: blob.within(&frame), condition }
+        } else {
+            let a = number(&p["a"]);
+            let blob = HertzProfile::new(centre, a, peak).unwrap();
+            let condition = hertz_condition(centre, a, pitch);
+            Self { pixels: blob.image(&grid), whole: blob.whole(), within: blob.within(&frame), condition }
+        }
+    }
+}
+
+/// d ln g / d ln x = x (x − c)/σ²: rounding of a position, magnified.
+fn gaussian_condition(centre: [f64; 2], sd: f64) -> Condition {
+    Box::new(move |x: f64, y: f64| {
+        let along = |x: f64, c: f64| (x.abs() + c.abs()) * (x - c).abs() / (sd * sd);
+        1.0 + along(x, centre[0]) + along(y, centre[1])
+    })
+}
+
+/// A pixel cut by the rim down to a depth d (of its farthest corner inside) changes as d^1.5 or faster.
+fn hertz_condition(centre: [f64; 2], a: f64, pitch: f64) -> Condition {
+    Box::new(move |x: f64, y: f64| {
+        let far = |x: f64, c: f64| ((x - c).abs() - 0.5 * pitch).max(0.0);
+        let depth = (a - far(x, centre[0]).hypot(far(y, centre[1]))).max(0.0);
+        let reach = x.abs() + y.abs() + centre[0].abs() + centre[1].abs() + pitch;
+        1.0 + 3.0 * reach / depth.min(a).min(pitch)
+    })
+}
+
+/// Every pixel of a blob against the reference's.
+fn check_pixels(judge: &mut Judge, id: &str, blob: &Blob, reference: &Array2<f64>, pitch: f64) {
+    for ((row, column), &e) in reference.indexed_iter() {
+        let (x, y) = ((column as f64 + 0.5) * pitch, (row as f64 + 0.5) * pitch);
+        let what = format!("{id} pixel {row} {column}");
+        if e == 0.0 {
+            assert_eq!(blob.pixels[[row, column]], 0.0, "{what} lies outside");
+            continue;
+        }
+        judge.relative(what, blob.pixels[[row, column]], e, (blob.condition)(x, y));
+    }
+}
+
+fn check_blob(judge: &mut Judge, case: &Value, id: &str, pitch: f64) {
+    let (size, expected) = (case["size"].as_u64().unwrap() as usize, &case["expected"]);
+    let centre = ["cx", "cy"].map(|c| number(&case["params"][c]));
+    let blob = Blob::of(case, size, pitch, centre);
+    profile(judge, &format!("{id} plane"), Some(blob.whole), &expected["plane"], 1.0);
+    let [x, y] = centre.map(|c| 0.0_f64.max(c.min(size as f64 * pitch)));
+    profile(judge, &format!("{id} frame"), blob.within, &expected["frame"], (blob.condition)(x, y));
+    let reference = image(&expected["pixels"]);
+    match &reference {
+        None => assert!(blob.pixels.iter().all(|v| *v == 0.0), "{id}"),
+        Some(reference) => check_pixels(judge, id, &blob, reference, pitch),
+    }
+    let (id, pixels) = match &reference {
+        None => (id.to_owned(), &blob.pixels),
+        Some(reference) => (format!("{id} of pixels"), reference),
+    };
+    let expected = &expected["moments"];
+    Moments { id: &id, pixels, background: 0.0, pitch, expected, rounded: true }.check(judge);
+}
+
 #[test]
 fn every_image_case() {
     let Some(data) = load() else {
@@ -157,76 +247,13 @@ fn every_image_case() {
     let mut judge = Judge { worst: (0.0, String::new()), failed: Vec::new() };
     let cases = data["cases"].as_array().unwrap();
     for case in cases {
-        let id = case["id"].as_str().unwrap();
-        let (size, pitch) = (case["size"].as_u64().unwrap() as usize, number(&case["pitch"]));
-        let expected = &case["expected"];
+        let (id, pitch) = (case["id"].as_str().unwrap(), number(&case["pitch"]));
         if case["kind"] == "given" {
-            moments(
-                &mut judge,
-                id,
-                &image(&case["pixels"]).unwrap(),
-                number(&case["background"]),
-                pitch,
-                &expected["moments"],
-                false,
-            );
-            continue;
-        }
-        let p = &case["params"];
-        let (centre, peak) = ([number(&p["cx"]), number(&p["cy"])], number(&p["amplitude"]));
-        let grid = PixelGrid { rows: size, columns: size, size: [pitch; 2], first: [0.5 * pitch; 2] };
-        let side = [0.0, size as f64 * pitch];
-        let frame = Rectangle { x: side, y: side };
-        let (pixels, whole, within, condition): (Array2<f64>, _, _, Condition) = if case["kind"] == "gaussian"
-        {
-            let sd = number(&p["sigma"]);
-            let blob = GaussianProfile::new(centre, sd, peak).unwrap();
-            // d ln g / d ln x = x (x − c)/σ²: rounding of a position, magnified.
-            let condition = move |x: f64, y: f64| {
-                let along = |x: f64, c: f64| (x.abs() + c.abs()) * (x - c).abs() / (sd * sd);
-                1.0 + along(x, centre[0]) + along(y, centre[1])
-            };
-            (blob.image(&grid), blob.whole(), blob.within(&frame), Box::new(condition))
+            let (pixels, background) = (&image(&case["pixels"]).unwrap(), number(&case["background"]));
+            let expected = &case["expected"]["moments"];
+            Moments { id, pixels, background, pitch, expected, rounded: false }.check(&mut judge);
         } else {
-            let a = number(&p["a"]);
-            let blob = HertzProfile::new(centre, a, peak).unwrap();
-            // A pixel cut by the rim down to a depth d (of its farthest corner inside) changes as d^1.5 or faster.
-            let condition = move |x: f64, y: f64| {
-                let far = |x: f64, c: f64| ((x - c).abs() - 0.5 * pitch).max(0.0);
-                let depth = (a - far(x, centre[0]).hypot(far(y, centre[1]))).max(0.0);
-                let reach = x.abs() + y.abs() + centre[0].abs() + centre[1].abs() + pitch;
-                1.0 + 3.0 * reach / depth.min(a).min(pitch)
-            };
-            (blob.image(&grid), blob.whole(), blob.within(&frame), Box::new(condition))
-        };
-        profile(&mut judge, &format!("{id} plane"), Some(whole), &expected["plane"], 1.0);
-        let edge = condition(side[0].max(centre[0].min(side[1])), side[0].max(centre[1].min(side[1])));
-        profile(&mut judge, &format!("{id} frame"), within, &expected["frame"], edge);
-        match image(&expected["pixels"]) {
-            None => assert!(pixels.iter().all(|v| *v == 0.0), "{id}"),
-            Some(reference) => {
-                for ((row, column), &e) in reference.indexed_iter() {
-                    let (x, y) = ((column as f64 + 0.5) * pitch, (row as f64 + 0.5) * pitch);
-                    let what = format!("{id} pixel {row} {column}");
-                    if e == 0.0 {
-                        assert_eq!(pixels[[row, column]], 0.0, "{what} lies outside");
-                        continue;
-                    }
-                    judge.relative(what, pixels[[row, column]], e, condition(x, y));
-                }
-                moments(
-                    &mut judge,
-                    &format!("{id} of pixels"),
-                    &reference,
-                    0.0,
-                    pitch,
-                    &expected["moments"],
-                    true,
-                );
-            }
-        }
-        if expected["pixels"].is_null() {
-            moments(&mut judge, id, &pixels, 0.0, pitch, &expected["moments"], true);
+            check_blob(&mut judge, case, id, pitch);
         }
     }
     println!("{} cases; worst {:.3} of the allowance: {}", cases.len(), judge.worst.0, judge.worst.1);
