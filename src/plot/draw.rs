@@ -46,21 +46,8 @@ pub(super) fn draw_panel<'a>(area: &Area<'a>, panel: &Panel) -> Result<(), Fail<
         draw_layer(&mut chart, panel, layer)?;
     }
     if let Some((map, range, text)) = bar {
-        let strip = HeatMap {
-            values: ndarray::Array2::from_shape_fn((64, 1), |(i, _)| i as f64 / 63.0),
-            x: [0.0; 2],
-            y: [0.0; 2],
-            map,
-            range: [0.0, 1.0],
-            label: text.into(),
-        };
-        draw_bar(
-            area,
-            &strip,
-            range,
-            [frame.corner[0] + frame.size[0] + 12, frame.corner[1]],
-            frame.size[1],
-        )?;
+        let corner = [frame.corner[0] + frame.size[0] + 12, frame.corner[1]];
+        draw_bar(area, &HeatMap::of_bar(map, text), range, corner, frame.size[1])?;
     }
     draw_legend(&mut chart, panel)
 }

@@ -55,6 +55,12 @@ impl HeatMap {
         Self::of_pixels(values.view(), pixel_size, "grey level").colours(ColorMap::Grey).range([0.0, 255.0])
     }
 
+    /// The colours of a bar, from one end to the other.
+    pub(super) fn of_bar(map: ColorMap, label: &str) -> Self {
+        let values = Array2::from_shape_fn((64, 1), |(i, _)| i as f64 / 63.0);
+        Self { values, x: [0.0; 2], y: [0.0; 2], map, range: [0.0, 1.0], label: label.into() }
+    }
+
     /// Puts the grid's first pixel centre at `origin` instead of (0, 0).
     #[must_use]
     pub fn origin(mut self, origin: [f64; 2]) -> Self {

@@ -1,4 +1,5 @@
 //! Drawing the layers that are points, lines and segments.
+use super::colour::ColorMap;
 use super::draw::{Chart, Fail, rgb};
 use super::layer::{Layer, Marker, range_of};
 use super::panel::Panel;
@@ -9,8 +10,7 @@ pub(super) fn draw_layer<'a>(
     panel: &Panel,
     layer: &Layer,
 ) -> Result<(), Fail<'a>> {
-    let at = |p: [f64; 2]| (panel.scales[0].forward(p[0]), panel.scales[1].forward(p[1]));
-    let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
+    let at = on_scales(panel);
     match layer {
         Layer::Heat(_) => Ok(()),
         Layer::Points { points, colour, marker, radius, .. } => {
@@ -18,38 +18,80 @@ pub(super) fn draw_layer<'a>(
             draw_markers(chart, &positions, *marker, *radius, rgb(*colour))
         }
         Layer::ColouredPoints { points, values, map, radius, .. } => {
-            let [lo, hi] = range_of(values.iter());
-            let discs = points.iter().zip(values).map(|(&p, v)| (at(p), (v - lo) / (hi - lo).max(1e-300)));
-            let discs = discs.filter(|(p, _)| finite(p));
-            let disc = |(p, t): (_, f64)| Circle::new(p, *radius as i32, rgb(map.at(t)).filled());
-            chart.draw_series(discs.map(disc)).map(drop)
+            draw_coloured(chart, panel, points, values, *map, *radius)
         }
-        Layer::Line { points, colour, dashed, .. } => {
-            let positions: Vec<_> = points.iter().map(|&p| at(p)).collect();
-            let pieces = positions.split(|p| !finite(p)).filter(|piece| piece.len() > 1);
-            pieces.into_iter().try_for_each(|piece| {
-                let stroke = rgb(*colour).stroke_width(2);
-                if *dashed {
-                    chart.draw_series(DashedLineSeries::new(piece.iter().copied(), 6, 4, stroke)).map(drop)
-                } else {
-                    chart.draw_series(LineSeries::new(piece.iter().copied(), stroke)).map(drop)
-                }
-            })
-        }
+        Layer::Line { points, colour, dashed, .. } => draw_line(chart, panel, points, rgb(*colour), *dashed),
         Layer::ErrorBars { points, errors, colour } => {
-            let bars = points.iter().zip(errors).map(|(&[x, y], e)| [[x, y - e], [x, y], [x, y + e]].map(at));
-            let bars = bars.filter(|b| b.iter().all(finite));
-            let stroke = rgb(*colour).stroke_width(1);
-            let bar =
-                |[lo, mid, hi]: [(f64, f64); 3]| ErrorBar::new_vertical(mid.0, lo.1, mid.1, hi.1, stroke, 6);
-            chart.draw_series(bars.map(bar)).map(drop)
+            draw_error_bars(chart, panel, points, errors, rgb(*colour))
         }
         Layer::Segments { pairs, colour, arrows, .. } => {
-            let ends = pairs.iter().map(|pair| pair.map(at)).filter(|p| p.iter().all(finite));
+            let ends = pairs.iter().map(|pair| pair.map(&at)).filter(|p| p.iter().all(finite));
             let ends: Vec<_> = ends.collect();
             draw_segments(chart, &ends, rgb(*colour), *arrows)
         }
     }
+}
+
+/// Where a position stands on the panel's axes.
+fn on_scales(panel: &Panel) -> impl Fn([f64; 2]) -> (f64, f64) + use<> {
+    let [x, y] = panel.scales;
+    move |p| (x.forward(p[0]), y.forward(p[1]))
+}
+
+fn finite(p: &(f64, f64)) -> bool {
+    p.0.is_finite() && p.1.is_finite()
+}
+
+fn draw_coloured<'a>(
+    chart: &mut Chart<'_, 'a>,
+    panel: &Panel,
+    points: &[[f64; 2]],
+    values: &[f64],
+    map: ColorMap,
+    radius: f64,
+) -> Result<(), Fail<'a>> {
+    let [lo, hi] = range_of(values.iter());
+    let at = on_scales(panel);
+    let discs = points.iter().zip(values).map(|(&p, v)| (at(p), (v - lo) / (hi - lo).max(1e-300)));
+    let discs = discs.filter(|(p, _)| finite(p));
+    let disc = |(p, t): (_, f64)| Circle::new(p, radius as i32, rgb(map.at(t)).filled());
+    chart.draw_series(discs.map(disc)).map(drop)
+}
+
+/// A line, broken where a position is not finite.
+fn draw_line<'a>(
+    chart: &mut Chart<'_, 'a>,
+    panel: &Panel,
+    points: &[[f64; 2]],
+    colour: RGBColor,
+    dashed: bool,
+) -> Result<(), Fail<'a>> {
+    let positions: Vec<_> = points.iter().copied().map(on_scales(panel)).collect();
+    let stroke = colour.stroke_width(2);
+    for piece in positions.split(|p| !finite(p)).filter(|piece| piece.len() > 1) {
+        let piece = piece.iter().copied();
+        if dashed {
+            chart.draw_series(DashedLineSeries::new(piece, 6, 4, stroke))?;
+        } else {
+            chart.draw_series(LineSeries::new(piece, stroke))?;
+        }
+    }
+    Ok(())
+}
+
+fn draw_error_bars<'a>(
+    chart: &mut Chart<'_, 'a>,
+    panel: &Panel,
+    points: &[[f64; 2]],
+    errors: &[f64],
+    colour: RGBColor,
+) -> Result<(), Fail<'a>> {
+    let at = on_scales(panel);
+    let bars = points.iter().zip(errors).map(|(&[x, y], e)| [[x, y - e], [x, y], [x, y + e]].map(&at));
+    let bars = bars.filter(|b| b.iter().all(finite));
+    let stroke = colour.stroke_width(1);
+    let bar = |[lo, mid, hi]: [(f64, f64); 3]| ErrorBar::new_vertical(mid.0, lo.1, mid.1, hi.1, stroke, 6);
+    chart.draw_series(bars.map(bar)).map(drop)
 }
 
 fn draw_markers<'a>(

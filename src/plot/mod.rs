@@ -31,11 +31,14 @@ mod marks;
 mod page;
 mod panel;
 mod press;
+mod scale;
 mod ticks;
 
 pub use colour::{ColorMap, Colour};
 pub use heat::HeatMap;
 pub use layer::{Layer, Marker};
+pub use legend::Legend;
 pub use page::{Page, PlotError};
-pub use panel::{Legend, Panel, Scale};
+pub use panel::Panel;
 pub use press::{PressPlotError, save_press_pages, summary_lines};
+pub use scale::Scale;

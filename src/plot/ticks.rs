@@ -1,5 +1,5 @@
 //! Axes: tick positions and their labels.
-use super::panel::Scale;
+use super::scale::Scale;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
 use std::ops::Range;

@@ -48,13 +48,14 @@ mod fields;
 mod load;
 mod measure;
 mod stages;
+mod tables;
 
 pub use error::SceneError;
 pub use load::{LoadedCalibration, SceneData};
 
 use crate::io::ReadError;
 use crate::pipeline::{Object, StagesConfig};
-use fields::{Fields, poisson, positive};
+use fields::Fields;
 use std::path::{Path, PathBuf};
 
 /// The calibration of a scene.
@@ -231,110 +232,19 @@ impl Scene {
             message: e.message().lines().next().unwrap_or("not TOML").into(),
         })?;
         let fields = Fields::new(file, &table);
-        fields.only(&FIELDS)?;
+        fields.only(&tables::FIELDS)?;
         let folder = file.parent().unwrap_or(Path::new(""));
         Ok(Self {
             file: file.into(),
             reference: folder.join(fields.string("reference", "the path of the image without contact")?),
             pixel_size_m: fields
                 .positive_pair("pixel_size_m", "two positive numbers [x, y] (metres per pixel)")?,
-            flat_field: flat_field(&fields)?,
-            calibration: calibration(&fields, folder)?,
-            frames: frames(&fields, folder)?,
-            object: object(&fields)?,
-            layers: layers(&fields)?,
+            flat_field: tables::flat_field(&fields)?,
+            calibration: tables::calibration(&fields, folder)?,
+            frames: tables::frames(&fields, folder)?,
+            object: tables::object(&fields)?,
+            layers: tables::layers(&fields)?,
             stages: stages::read(&fields)?,
         })
     }
-}
-
-/// What may stand at the top of a scene file.
-const FIELDS: [&str; 8] =
-    ["reference", "pixel_size_m", "flat_field", "calibration", "frames", "object", "waveguide", "stages"];
-
-fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
-    const EXPECTED: &str = "\"reference\", or absent for no correction";
-    if !fields.has("flat_field") {
-        return Ok(false);
-    }
-    match fields.string("flat_field", EXPECTED)? {
-        "reference" => Ok(true),
-        other => Err(fields.wrong("flat_field", EXPECTED, &toml::Value::String(other.into()))),
-    }
-}
-
-fn calibration(fields: &Fields<'_>, folder: &Path) -> Result<CalibrationSource, SceneError> {
-    const EXPECTED: &str = "a table with `pairs` or `depth_table`";
-    let fields = fields.table("calibration", EXPECTED)?;
-    fields.only(&["pairs", "depth_table"])?;
-    match (fields.has("pairs"), fields.has("depth_table")) {
-        (true, false) => {
-            let path = fields.string("pairs", "the path of a CSV file (integrated_pixel_value,force_N)")?;
-            Ok(CalibrationSource::Pairs(folder.join(path)))
-        }
-        (false, true) => {
-            let path =
-                fields.string("depth_table", "the path of a CSV file (darkness_grey_levels,depth_mm)")?;
-            Ok(CalibrationSource::DepthTable(folder.join(path)))
-        }
-        (false, false) => Err(fields.missing("pairs", "`pairs` or `depth_table`, the path of a CSV file")),
-        (true, true) => {
-            let both = toml::Value::String("both".into());
-            Err(fields.wrong("pairs", "alone: give `pairs` or `depth_table`", &both))
-        }
-    }
-}
-
-fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFrame>, SceneError> {
-    let tables = fields.tables("frames", "one or more [[frames]] tables with `image`")?;
-    let frame = |f: &Fields<'_>| {
-        f.only(&["image", "force_N"])?;
-        let image = folder.join(f.string("image", "the path of an image")?);
-        let force_n = f.optional_number("force_N", "a positive number (newtons)", positive)?;
-        Ok(SceneFrame { image, force_n })
-    };
-    tables.iter().map(frame).collect()
-}
-
-fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
-    const SHAPE: &str = "\"sphere\", \"flat_punch\" or \"unknown\"";
-    let fields = fields.table("object", "a table with `shape`")?;
-    fields.only(&["shape", "radius_m", "poisson_ratio"])?;
-    let shape = fields.string("shape", SHAPE)?;
-    let poisson_ratio = fields
-        .optional_number("poisson_ratio", "a number above -1, at most 0.5", poisson)?
-        .unwrap_or(Object::DEFAULT_POISSON_RATIO);
-    let radius = || fields.number("radius_m", "a positive number (metres)", positive);
-    match shape {
-        "sphere" => Ok(Object::Sphere { radius_m: radius()?, poisson_ratio }),
-        "flat_punch" => Ok(Object::FlatPunch { radius_m: radius()?, poisson_ratio }),
-        "unknown" => {
-            let _ = fields.optional_number("radius_m", "a positive number (metres)", positive)?;
-            Ok(Object::Unknown { poisson_ratio })
-        }
-        other => Err(fields.wrong("shape", SHAPE, &toml::Value::String(other.into()))),
-    }
-}
-
-fn layers(fields: &Fields<'_>) -> Result<Vec<SceneLayer>, SceneError> {
-    if !fields.has("waveguide") {
-        return Err(fields.missing("waveguide", "a table with `layers`"));
-    }
-    let fields = fields.table("waveguide", "a table with `layers`")?;
-    fields.only(&["layers"])?;
-    let tables =
-        fields.tables("layers", "an array of one or more tables, from the object's side to the glass")?;
-    let layer = |f: &Fields<'_>| {
-        f.only(&["refractive_index", "thickness_m", "youngs_modulus_pa", "poisson_ratio"])?;
-        Ok(SceneLayer {
-            refractive_index: f
-                .number("refractive_index", "a number of at least 1", |v| v >= 1.0 && v.is_finite())?,
-            thickness_m: f.number("thickness_m", "a positive number (metres)", positive)?,
-            youngs_modulus_pa: f.number("youngs_modulus_pa", "a positive number (pascals)", positive)?,
-            poisson_ratio: f
-                .optional_number("poisson_ratio", "a number above -1, at most 0.5", poisson)?
-                .unwrap_or(0.5),
-        })
-    };
-    tables.iter().map(layer).collect()
 }

@@ -5,7 +5,8 @@ use rand_distr::{Distribution, StandardNormal};
 use super::error::{SimulateError, not_negative, positive, within};
 use super::light::Illumination;
 use super::material::{Elastic, Sphere};
-use super::press::{Load, PressScene};
+use super::press::PressScene;
+use super::press_options::Load;
 use super::random::{Purpose, row_stream};
 
 /// How a calibration is run.

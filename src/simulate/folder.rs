@@ -105,7 +105,7 @@ fn write_image(path: &Path, frame: ArrayView2<'_, u8>) -> Result<(), FolderError
 fn description(scene: &PressScene) -> Table {
     let options = scene.options();
     let size = Value::Array(options.camera.pixel_size_m.map(Value::Float).to_vec());
-    let frame = |(k, load): (usize, &super::press::Load)| {
+    let frame = |(k, load): (usize, &super::Load)| {
         let image = Value::String(format!("frame_{}.png", k + 1));
         Value::Table(table([("image", image), ("force_N", Value::Float(load.force_n))]))
     };

@@ -5,7 +5,8 @@ use ndarray::Array2;
 use super::camera::Camera;
 use super::light::Illumination;
 use super::pixel_average::Patch;
-use super::press::{Gain, Load, PressOptions, PressScene, PressSimulation};
+use super::press::{PressScene, PressSimulation};
+use super::press_options::{Gain, Load, PressOptions};
 
 /// What is wrong with the scene.
 ///

@@ -6,7 +6,8 @@ use ndarray::Array2;
 
 use super::error::{SimulateError, finite, not_negative, positive, within};
 use super::light::Illumination;
-use super::press::{Load, PressScene};
+use super::press::PressScene;
+use super::press_options::Load;
 use super::truth::PressTruth;
 
 /// How the load runs through time: rest, then cycles of F(t) = F_max sin²(πt/T).

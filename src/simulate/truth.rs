@@ -5,7 +5,8 @@ use ndarray::Array2;
 
 use super::contact::Contact;
 use super::pixel_average::{Disc, Profile};
-use super::press::{Load, PressScene};
+use super::press::PressScene;
+use super::press_options::Load;
 
 /// The truth of one frame.
 ///

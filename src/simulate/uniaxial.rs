@@ -17,66 +17,13 @@
 use nalgebra::Point3;
 use ndarray::Array2;
 
-use super::camera::Camera;
-use super::error::{SimulateError, at_least, finite, not_negative, positive};
+use super::error::SimulateError;
 use super::light::Illumination;
-use super::material::Elastic;
 use super::pixel_average::Patch;
-use super::press::Gain;
-use super::relief::{Relief, SurfacePattern};
+use super::press_options::Gain;
+use super::relief::Relief;
+use super::uniaxial_options::UniaxialOptions;
 use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
-
-/// Everything that describes the squeezed block; [`UniaxialScene::new`] checks it.
-///
-/// ```
-/// use tactile_imaging::simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
-/// let options = UniaxialOptions {
-///     material: Elastic::CL2003X,
-///     face_m: [10e-3, 14e-3],
-///     forces_n: vec![0.1, 0.4],
-///     camera: Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() },
-///     ..UniaxialOptions::default()
-/// };
-/// let step = UniaxialScene::new(options)?.increment(0, 1);
-/// assert!((step.stress_zz_pa / step.strain_zz - 62e3).abs() < 1e-6, "Young's modulus");
-/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct UniaxialOptions {
-    /// What the block is made of.
-    pub material: Elastic,
-    /// Sides of the undeformed face (x, y) in metres.
-    pub face_m: [f64; 2],
-    /// What its surface looks like.
-    pub pattern: SurfacePattern,
-    /// Forces in newton, a frame each; 0 shows no light.
-    pub forces_n: Vec<f64>,
-    /// Centre (x, y) of the face in pixels; the frame's middle if not given.
-    pub centre_px: Option<[f64; 2]>,
-    /// Camera, lens, stray light.
-    pub camera: Camera,
-    /// Grey levels per pascal.
-    pub gain: Gain,
-    /// Seed of noise and pattern.
-    pub seed: u64,
-}
-
-impl Default for UniaxialOptions {
-    /// A CL2000X block of 12 × 12 mm at 0.2, 0.7 and 1.2 N: compressed by 1, 5 and 9 %.
-    fn default() -> Self {
-        Self {
-            material: Elastic::CL2000X,
-            face_m: [12e-3; 2],
-            pattern: SurfacePattern::default(),
-            forces_n: vec![0.2, 0.7, 1.2],
-            centre_px: None,
-            camera: Camera::default(),
-            gain: Gain::PeakGrey(200.0),
-            seed: 1,
-        }
-    }
-}
 
 /// A checked scene of uniaxial compression.
 ///
@@ -106,7 +53,7 @@ impl UniaxialScene {
     /// [`SimulateError::OutOfRange`], [`SimulateError::TooFew`], or [`SimulateError::Overload`] for a force beyond
     /// E A₀/(3√3).
     pub fn new(options: UniaxialOptions) -> Result<Self, SimulateError> {
-        validate(&options)?;
+        options.validate()?;
         let area0 = options.face_m[0] * options.face_m[1];
         let solve = |&f: &f64| UniaxialState::new(&options.material, area0, f);
         let states = options.forces_n.iter().map(solve).collect::<Result<Vec<_>, _>>()?;
@@ -310,20 +257,4 @@ fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f6
             row.iter_mut().zip(line).take(last).skip(first).for_each(|(v, &l)| *v += height * c * l);
         }
     }
-}
-
-fn validate(options: &UniaxialOptions) -> Result<(), SimulateError> {
-    options.material.validate()?;
-    positive("youngs_modulus_pa", options.material.youngs_modulus_pa)?;
-    options.pattern.validate()?;
-    options.camera.validate()?;
-    at_least("forces_n", options.forces_n.len(), 1)?;
-    for &force in &options.forces_n {
-        not_negative("force_n", force)?;
-    }
-    for k in 0..2 {
-        positive("face_m", options.face_m[k])?;
-        finite("centre_px", options.centre_px.map_or(0.0, |c| c[k]))?;
-    }
-    options.gain.validate()
 }

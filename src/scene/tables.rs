@@ -1,0 +1,96 @@
+//! The tables of a scene file, each read and checked.
+use super::fields::{Fields, poisson, positive};
+use super::{CalibrationSource, SceneError, SceneFrame, SceneLayer};
+use crate::pipeline::Object;
+use std::path::Path;
+
+/// What may stand at the top of a scene file.
+pub(super) const FIELDS: [&str; 8] =
+    ["reference", "pixel_size_m", "flat_field", "calibration", "frames", "object", "waveguide", "stages"];
+
+pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
+    const EXPECTED: &str = "\"reference\", or absent for no correction";
+    if !fields.has("flat_field") {
+        return Ok(false);
+    }
+    match fields.string("flat_field", EXPECTED)? {
+        "reference" => Ok(true),
+        other => Err(fields.wrong("flat_field", EXPECTED, &toml::Value::String(other.into()))),
+    }
+}
+
+pub(super) fn calibration(fields: &Fields<'_>, folder: &Path) -> Result<CalibrationSource, SceneError> {
+    const EXPECTED: &str = "a table with `pairs` or `depth_table`";
+    let fields = fields.table("calibration", EXPECTED)?;
+    fields.only(&["pairs", "depth_table"])?;
+    match (fields.has("pairs"), fields.has("depth_table")) {
+        (true, false) => {
+            let path = fields.string("pairs", "the path of a CSV file (integrated_pixel_value,force_N)")?;
+            Ok(CalibrationSource::Pairs(folder.join(path)))
+        }
+        (false, true) => {
+            let path =
+                fields.string("depth_table", "the path of a CSV file (darkness_grey_levels,depth_mm)")?;
+            Ok(CalibrationSource::DepthTable(folder.join(path)))
+        }
+        (false, false) => Err(fields.missing("pairs", "`pairs` or `depth_table`, the path of a CSV file")),
+        (true, true) => {
+            let both = toml::Value::String("both".into());
+            Err(fields.wrong("pairs", "alone: give `pairs` or `depth_table`", &both))
+        }
+    }
+}
+
+pub(super) fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFrame>, SceneError> {
+    let tables = fields.tables("frames", "one or more [[frames]] tables with `image`")?;
+    let frame = |f: &Fields<'_>| {
+        f.only(&["image", "force_N"])?;
+        let image = folder.join(f.string("image", "the path of an image")?);
+        let force_n = f.optional_number("force_N", "a positive number (newtons)", positive)?;
+        Ok(SceneFrame { image, force_n })
+    };
+    tables.iter().map(frame).collect()
+}
+
+pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
+    const SHAPE: &str = "\"sphere\", \"flat_punch\" or \"unknown\"";
+    let fields = fields.table("object", "a table with `shape`")?;
+    fields.only(&["shape", "radius_m", "poisson_ratio"])?;
+    let shape = fields.string("shape", SHAPE)?;
+    let poisson_ratio = fields
+        .optional_number("poisson_ratio", "a number above -1, at most 0.5", poisson)?
+        .unwrap_or(Object::DEFAULT_POISSON_RATIO);
+    let radius = || fields.number("radius_m", "a positive number (metres)", positive);
+    match shape {
+        "sphere" => Ok(Object::Sphere { radius_m: radius()?, poisson_ratio }),
+        "flat_punch" => Ok(Object::FlatPunch { radius_m: radius()?, poisson_ratio }),
+        "unknown" => {
+            let _ = fields.optional_number("radius_m", "a positive number (metres)", positive)?;
+            Ok(Object::Unknown { poisson_ratio })
+        }
+        other => Err(fields.wrong("shape", SHAPE, &toml::Value::String(other.into()))),
+    }
+}
+
+pub(super) fn layers(fields: &Fields<'_>) -> Result<Vec<SceneLayer>, SceneError> {
+    if !fields.has("waveguide") {
+        return Err(fields.missing("waveguide", "a table with `layers`"));
+    }
+    let fields = fields.table("waveguide", "a table with `layers`")?;
+    fields.only(&["layers"])?;
+    let tables =
+        fields.tables("layers", "an array of one or more tables, from the object's side to the glass")?;
+    let layer = |f: &Fields<'_>| {
+        f.only(&["refractive_index", "thickness_m", "youngs_modulus_pa", "poisson_ratio"])?;
+        Ok(SceneLayer {
+            refractive_index: f
+                .number("refractive_index", "a number of at least 1", |v| v >= 1.0 && v.is_finite())?,
+            thickness_m: f.number("thickness_m", "a positive number (metres)", positive)?,
+            youngs_modulus_pa: f.number("youngs_modulus_pa", "a positive number (pascals)", positive)?,
+            poisson_ratio: f
+                .optional_number("poisson_ratio", "a number above -1, at most 0.5", poisson)?
+                .unwrap_or(0.5),
+        })
+    };
+    tables.iter().map(layer).collect()
+}
