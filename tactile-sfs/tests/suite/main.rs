@@ -7,4 +7,5 @@ mod large;
 mod measured;
 mod order;
 mod rims;
+mod samplers;
 mod stability_scale;

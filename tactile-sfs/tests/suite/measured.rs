@@ -74,69 +74,94 @@ fn light_from_the_right_is_bright_on_the_right() {
     assert!(row[88] > row[40] && light.shade(-0.5, 0.0) > light.shade(0.5, 0.0));
 }
 
-#[test]
-fn ball_of_9dtact() {
-    let Some(reference) = channel_mean("9dtact/rectify_crop_ref.png") else { return };
-    let Some(pressed) = channel_mean("9dtact/rectify_crop_sample.png") else { return };
-    let Some(path) = data("9dtact/grey_to_depth_mm.csv") else { return };
-    let pixel = 0.051_015_1e-3;
-    let (centre, radius, ball) = ([243.9, 188.5], 67.6 * pixel, 4e-3_f64);
-    let r = |(row, column): (usize, usize)| (column as f64 - centre[0]).hypot(row as f64 - centre[1]) * pixel;
-    let inside = Array2::from_shape_fn(pressed.dim(), |at| r(at) < radius);
-    let rim = (ball * ball - radius * radius).sqrt();
-    let cap = Array2::from_shape_fn(pressed.dim(), |at| (ball * ball - r(at) * r(at)).max(0.0).sqrt() - rim);
-    let signal = Signal::Darkening(reference);
-    let error = |table: &DepthTable<f64>, mask: &Array2<bool>| {
-        let surface = table
-            .reconstruct(pressed.view(), &Domain::new([pixel, pixel]).unwrap().with_mask(mask.view()))
-            .unwrap();
-        height_error(surface.heights.view(), cap.view(), Some(mask.view()), Alignment::None).unwrap().error
-    };
+/// Size of a pixel of 9DTact's rectified images, in metres.
+const PIXEL: f64 = 0.051_015_1e-3;
+/// Centre in pixels and radius in metres of the contact circle, and the radius of the ball.
+const CENTRE: [f64; 2] = [243.9, 188.5];
+const CONTACT: f64 = 67.6 * PIXEL;
+const BALL: f64 = 4e-3;
 
-    // Each sixteenth of the circle from a table calibrated on the others.
-    let sector = |(row, column): (usize, usize)| {
-        let angle = (row as f64 - centre[1]).atan2(column as f64 - centre[0]) / core::f64::consts::TAU + 0.5;
-        ((angle * 16.0) as usize).min(15)
-    };
-    let mut sum = 0.0;
-    for half in 0..2 {
-        let fit = Array2::from_shape_fn(pressed.dim(), |at| inside[at] && sector(at) % 2 == half);
-        let test = Array2::from_shape_fn(pressed.dim(), |at| inside[at] && sector(at) % 2 != half);
-        let fitted = DepthTable::from_ball(
-            Frame::Real(pressed.view()),
-            signal.clone(),
-            &Domain::new([pixel, pixel]).unwrap().with_mask(fit.view()),
-            ball,
-            3.0,
-            Some((centre, radius)),
-        )
-        .unwrap();
-        let held_out = error(&fitted.table, &test);
-        println!("ball, calibrated on half {half}: {:.4} mm on the other", 1e3 * held_out.mean_absolute);
-        sum += 0.5 * held_out.mean_absolute;
+/// A ball pressed into the gel of 9DTact, and the cap that it makes.
+struct PressedBall {
+    pressed: Array2<f64>,
+    signal: Signal<f64>,
+    inside: Array2<bool>,
+    cap: Array2<f64>,
+}
+
+impl PressedBall {
+    fn read() -> Option<Self> {
+        let reference = channel_mean("9dtact/rectify_crop_ref.png")?;
+        let pressed = channel_mean("9dtact/rectify_crop_sample.png")?;
+        let r =
+            |(row, column): (usize, usize)| (column as f64 - CENTRE[0]).hypot(row as f64 - CENTRE[1]) * PIXEL;
+        let inside = Array2::from_shape_fn(pressed.dim(), |at| r(at) < CONTACT);
+        let rim = (BALL * BALL - CONTACT * CONTACT).sqrt();
+        let cap =
+            Array2::from_shape_fn(pressed.dim(), |at| (BALL * BALL - r(at) * r(at)).max(0.0).sqrt() - rim);
+        Some(Self { pressed, signal: Signal::Darkening(reference), inside, cap })
     }
-    assert!(sum < 0.04e-3, "{sum}");
 
-    // The makers' table, for comparison: its own zero is some 0.06 mm lower than that of the contact circle.
-    let text = std::fs::read_to_string(path).unwrap();
+    /// A table calibrated on the ball: on its contact circle within a mask, or on the contact it finds.
+    fn calibrated(&self, mask: Option<&Array2<bool>>) -> BallCalibration<f64> {
+        let mut domain = Domain::new([PIXEL, PIXEL]).unwrap();
+        if let Some(mask) = mask {
+            domain = domain.with_mask(mask.view());
+        }
+        let known = mask.map(|_| (CENTRE, CONTACT));
+        let frame = Frame::Real(self.pressed.view());
+        DepthTable::from_ball(frame, self.signal.clone(), &domain, BALL, 3.0, known).unwrap()
+    }
+
+    /// Mean absolute error of a table's surface within a mask, in metres.
+    fn error(&self, table: &DepthTable<f64>, mask: &Array2<bool>) -> f64 {
+        let domain = Domain::new([PIXEL, PIXEL]).unwrap().with_mask(mask.view());
+        let surface = table.reconstruct(self.pressed.view(), &domain).unwrap();
+        height_error(surface.heights.view(), self.cap.view(), Some(mask.view()), Alignment::None)
+            .unwrap()
+            .error
+            .mean_absolute
+    }
+
+    /// The contact circle's even or odd sixteenths.
+    fn sectors(&self, half: usize) -> Array2<bool> {
+        Array2::from_shape_fn(self.pressed.dim(), |(row, column)| {
+            let angle = (row as f64 - CENTRE[1]).atan2(column as f64 - CENTRE[0]) / core::f64::consts::TAU;
+            let sector = (((angle + 0.5) * 16.0) as usize).min(15);
+            self.inside[(row, column)] && sector % 2 == half
+        })
+    }
+}
+
+/// The table that 9DTact's makers measured.
+fn makers_table() -> Option<DepthTable<f64>> {
+    let text = std::fs::read_to_string(data("9dtact/grey_to_depth_mm.csv")?).unwrap();
     let row = |line: &str| {
         line.split_once(',').map(|(s, d)| (s.parse().unwrap(), 1e-3 * d.parse::<f64>().unwrap()))
     };
     let mut entries: Vec<(f64, f64)> = text.lines().skip(1).filter_map(row).collect();
     entries[0].1 = 0.0;
-    let makers = DepthTable::new(&entries).unwrap().with_signal(signal.clone());
-    println!("ball, makers' table: {:.4} mm", 1e3 * error(&makers, &inside).mean_absolute);
+    Some(DepthTable::new(&entries).unwrap())
+}
 
-    // The contact found without help.
-    let found = DepthTable::from_ball(
-        Frame::Real(pressed.view()),
-        signal,
-        &Domain::new([pixel, pixel]).unwrap(),
-        ball,
-        3.0,
-        None,
-    )
-    .unwrap();
+#[test]
+fn ball_of_9dtact() {
+    let (Some(ball), Some(makers)) = (PressedBall::read(), makers_table()) else { return };
+    // Each sixteenth of the circle from a table calibrated on the others.
+    let mut sum = 0.0;
+    for half in 0..2 {
+        let fitted = ball.calibrated(Some(&ball.sectors(half)));
+        let held_out = ball.error(&fitted.table, &ball.sectors(1 - half));
+        println!("ball, calibrated on half {half}: {:.4} mm on the other", 1e3 * held_out);
+        sum += 0.5 * held_out;
+    }
+    assert!(sum < 0.04e-3, "{sum}");
+
+    // For comparison: the makers' own zero is some 0.06 mm lower than that of the contact circle.
+    let makers = makers.with_signal(ball.signal.clone());
+    println!("ball, makers' table: {:.4} mm", 1e3 * ball.error(&makers, &ball.inside));
+
+    let found = ball.calibrated(None);
     println!("ball, found: {:?} px, {:.3} mm", found.centre_px, 1e3 * found.contact_radius_m);
 }
 
