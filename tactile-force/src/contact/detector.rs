@@ -9,8 +9,8 @@ use super::summary::Sums;
 use super::threshold::quantile;
 use super::{Contact, ContactOptions, Detection};
 use crate::drift::{self, Drift};
-use crate::frame::{DifferenceNoise, PassWorkspace, TILE_COLUMNS, Tiles};
-use crate::{BoundingBox, DriftCorrection, Estimate, ForceError, FrameStatistics, Real, ReferenceFrame};
+use crate::frame::{DifferenceNoise, PassWorkspace, TILE_COLUMNS};
+use crate::{BoundingBox, DriftCorrection, Estimate, ForceError, Real, ReferenceFrame};
 
 /// Finds the contact in frames of one sensor.
 ///
@@ -109,7 +109,8 @@ impl ContactDetector {
         let statistics = reference.compare_with(&mut workspace.pass, frame, pixel_limit as u8);
         let drift = self.drift(workspace, reference, frame.dim(), sd);
         let none = Detection { statistics, drift, noise: None, contact: None };
-        let Some(suspect) = self.suspect(workspace, reference, &statistics, &drift, sd, pixel_limit) else {
+        let Some(suspect) = self.suspect(&workspace.pass, reference, &statistics, &drift, sd, pixel_limit)
+        else {
             return Ok(none);
         };
         let Some(extent) = self.segment(&mut workspace.region, frame, reference, &drift, suspect, sd) else {
@@ -134,54 +135,6 @@ impl ContactDetector {
         }
         let tiles = reference.tile_sums(&workspace.pass.tiles);
         drift::fit(self.options.drift, size, tiles, sd, &mut workspace.scratch)
-    }
-
-    /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.
-    fn suspect(
-        &self,
-        workspace: &DetectorWorkspace,
-        reference: &ReferenceFrame,
-        statistics: &FrameStatistics,
-        drift: &Drift,
-        sd: f64,
-        pixel_limit: f64,
-    ) -> Option<BoundingBox> {
-        let size = (statistics.rows, statistics.columns);
-        let bright = self.bright_tiles(&workspace.pass.tiles, reference, size, drift, sd);
-        // Pixels were judged before the drift was known: their verdict stands while the drift is small beside it.
-        let pixels = statistics
-            .bounding_box
-            .filter(|_| drift.greatest_grey(statistics, reference) < 0.3 * pixel_limit);
-        bright.into_iter().chain(pixels).reduce(BoundingBox::union)
-    }
-
-    /// Box around every tile whose sum exceeds its noise.
-    fn bright_tiles(
-        &self,
-        tiles: &Tiles,
-        reference: &ReferenceFrame,
-        size: (usize, usize),
-        drift: &Drift,
-        sd: f64,
-    ) -> Option<BoundingBox> {
-        let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
-        let sign = self.options.polarity.sign();
-        let stands_out = |k: usize| {
-            let tile = reference.tile_sum(tiles, k);
-            f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
-        };
-        // The last tile of a band is its smallest: a band that stays below its noise needs no closer look.
-        let quiet = |band: usize| {
-            drift.is_zero() && {
-                let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
-                f64::from(tiles.greatest(band, sign)) <= z * last.pixels.sqrt()
-            }
-        };
-        (0..tiles.rows)
-            .filter(|&band| !quiet(band))
-            .flat_map(|band| (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k)))
-            .map(|k| tiles.pixels(k, size))
-            .reduce(BoundingBox::union)
     }
 
     /// The mask in a region around the suspect pixels, which grows while the aperture meets its border.

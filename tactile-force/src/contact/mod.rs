@@ -11,6 +11,7 @@ mod noise;
 mod region;
 mod runs;
 mod summary;
+mod suspect;
 mod threshold;
 
 pub use detector::{ContactDetector, DetectorWorkspace};

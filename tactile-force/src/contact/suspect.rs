@@ -1,0 +1,57 @@
+//! Where in the frame a contact may be.
+
+use super::ContactDetector;
+use super::threshold::quantile;
+use crate::drift::Drift;
+use crate::frame::{PassWorkspace, Tiles};
+use crate::{BoundingBox, FrameStatistics, ReferenceFrame};
+
+impl ContactDetector {
+    /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.
+    pub(super) fn suspect(
+        &self,
+        pass: &PassWorkspace,
+        reference: &ReferenceFrame,
+        statistics: &FrameStatistics,
+        drift: &Drift,
+        sd: f64,
+        pixel_limit: f64,
+    ) -> Option<BoundingBox> {
+        let size = (statistics.rows, statistics.columns);
+        let bright = self.bright_tiles(&pass.tiles, reference, size, drift, sd);
+        // Pixels were judged before the drift was known: their verdict stands while the drift is small beside it.
+        let pixels = statistics
+            .bounding_box
+            .filter(|_| drift.greatest_grey(statistics, reference) < 0.3 * pixel_limit);
+        bright.into_iter().chain(pixels).reduce(BoundingBox::union)
+    }
+
+    /// Box around every tile whose sum exceeds its noise.
+    fn bright_tiles(
+        &self,
+        tiles: &Tiles,
+        reference: &ReferenceFrame,
+        size: (usize, usize),
+        drift: &Drift,
+        sd: f64,
+    ) -> Option<BoundingBox> {
+        let z = quantile(0.5 * self.options().false_alarm_rate, tiles.sums.len()) * sd;
+        let sign = self.options().polarity.sign();
+        let stands_out = |k: usize| {
+            let tile = reference.tile_sum(tiles, k);
+            f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
+        };
+        // The last tile of a band is its smallest: a band that stays below its noise needs no closer look.
+        let quiet = |band: usize| {
+            drift.is_zero() && {
+                let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
+                f64::from(tiles.greatest(band, sign)) <= z * last.pixels.sqrt()
+            }
+        };
+        (0..tiles.rows)
+            .filter(|&band| !quiet(band))
+            .flat_map(|band| (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k)))
+            .map(|k| tiles.pixels(k, size))
+            .reduce(BoundingBox::union)
+    }
+}
