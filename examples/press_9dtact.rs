@@ -7,10 +7,12 @@
 //! draws them. Data: <https://github.com/linchangyi1/9DTact> (MIT).
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 use clap::Parser;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tactile_imaging::io::{read_grey_image, read_table};
-use tactile_imaging::pipeline::{BallFit, ContactSurface, DarkContact, Object, Pipeline, SurfaceInput};
+use tactile_imaging::io::{ReadError, read_grey_image, read_table};
+use tactile_imaging::pipeline::{
+    BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, SurfaceInput,
+};
 use tactile_imaging::plot::{Colour, HeatMap, Marker, Page, Panel};
 
 const PIXEL_M: f64 = 0.0510151e-3;
@@ -48,12 +50,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     }
     let reference = read_grey_image(folder.join("rectify_crop_ref.png"))?.to_u8();
     let frame = read_grey_image(folder.join("rectify_crop_sample.png"))?.to_u8();
-    let path = folder.join("grey_to_depth_mm.csv");
-    let table = read_table(&path)?;
-    let darkness = table.column("darkness_grey_levels", 0, &path)?;
-    let depth_mm = table.column("depth_mm", 1, &path)?;
-    let entries: Vec<_> = darkness.into_iter().zip(depth_mm.iter().map(|z| z / MM)).collect();
-
+    let entries = depth_table(&folder)?;
     let contact = DarkContact::new(&entries, [PIXEL_M; 2])?;
     let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))
         .with_surface(DarkContact::depth_table(&entries)?, SurfaceInput::Signal);
@@ -63,6 +60,25 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let surface = press.surface(0)?;
     let ball = surface.fit_ball(BALL_M).ok_or("no ball fits the surface")?;
 
+    let rings = profile(surface, &ball);
+    print(&reading, &ball, &rings);
+    let page = draw(surface, &ball, &rings, HeatMap::of_frame(frame.view(), [PIXEL_M * MM; 2]));
+    page.save(arguments.out.join("press.svg"))?;
+    eprintln!("plot: {}", arguments.out.join("press.svg").display());
+    Ok(())
+}
+
+/// (darkness in grey levels, depth in metres) of the makers' table.
+fn depth_table(folder: &Path) -> Result<Vec<(f64, f64)>, ReadError> {
+    let path = folder.join("grey_to_depth_mm.csv");
+    let table = read_table(&path)?;
+    let darkness = table.column("darkness_grey_levels", 0, &path)?;
+    let depth_mm = table.column("depth_mm", 1, &path)?;
+    Ok(darkness.into_iter().zip(depth_mm.iter().map(|z| z / MM)).collect())
+}
+
+/// The contact and the ball beside each other, and both depths by distance from the centre.
+fn print(reading: &ContactReading, ball: &BallFit, rings: &[[f64; 3]]) {
     let px = |m: f64| m / PIXEL_M;
     println!(
         "contact    centroid ({:.1}, {:.1}) px",
@@ -86,14 +102,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         ball.pixels
     );
     println!("\n   r (mm)   measured   ball (mm)");
-    let rings = profile(surface, &ball);
-    for [r, measured, expected] in &rings {
+    for [r, measured, expected] in rings {
         println!("  {:7.2} {:10.3} {:10.3}", r * MM, measured * MM, expected * MM);
     }
-    let page = draw(surface, &ball, &rings, HeatMap::of_frame(frame.view(), [PIXEL_M * MM; 2]));
-    page.save(arguments.out.join("press.svg"))?;
-    eprintln!("plot: {}", arguments.out.join("press.svg").display());
-    Ok(())
 }
 
 /// Mean measured depth and the ball's, in rings of 0.2 mm around the centre: radius, measured, ball.

@@ -1,11 +1,27 @@
 //! A real press: the ball of the 9DTact sensor, its contact and its depth against the ball's geometry.
 #![allow(missing_docs, clippy::print_stdout)]
-use std::path::PathBuf;
+use ndarray::Array2;
+use std::path::{Path, PathBuf};
 use tactile_imaging::io::{read_grey_image, read_table};
-use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
+use tactile_imaging::pipeline::{ContactSurface, DarkContact, Object, Pipeline, Press, Stages, SurfaceInput};
 
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
+
+/// The sensor with its makers' table, and its images without and with the ball.
+fn sensor(folder: &Path) -> (impl Stages, [Array2<u8>; 2]) {
+    let [reference, frame] = ["rectify_crop_ref.png", "rectify_crop_sample.png"]
+        .map(|name| read_grey_image(folder.join(name)).unwrap().to_u8());
+    let path = folder.join("grey_to_depth_mm.csv");
+    let table = read_table(&path).unwrap();
+    let darkness = table.column("darkness_grey_levels", 0, &path).unwrap();
+    let depth = table.column("depth_mm", 1, &path).unwrap();
+    let entries: Vec<_> = darkness.into_iter().zip(depth.into_iter().map(|z| z * 1e-3)).collect();
+    let contact = DarkContact::new(&entries, [PIXEL_M; 2]).unwrap();
+    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))
+        .with_surface(DarkContact::depth_table(&entries).unwrap(), SurfaceInput::Signal);
+    (pipeline, [reference, frame])
+}
 
 #[test]
 fn the_ball_is_found_and_its_depth_is_right() {
@@ -16,17 +32,8 @@ fn the_ball_is_found_and_its_depth_is_right() {
         println!("skipped: no folder {} (set TACTILE_DATA)", folder.display());
         return;
     }
-    let reference = read_grey_image(folder.join("rectify_crop_ref.png")).unwrap().to_u8();
-    let frame = read_grey_image(folder.join("rectify_crop_sample.png")).unwrap().to_u8();
-    let path = folder.join("grey_to_depth_mm.csv");
-    let table = read_table(&path).unwrap();
-    let darkness = table.column("darkness_grey_levels", 0, &path).unwrap();
-    let depth = table.column("depth_mm", 1, &path).unwrap();
-    let entries: Vec<_> = darkness.into_iter().zip(depth.into_iter().map(|z| z * 1e-3)).collect();
-    let contact = DarkContact::new(&entries, [PIXEL_M; 2]).unwrap();
-    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))
-        .with_surface(DarkContact::depth_table(&entries).unwrap(), SurfaceInput::Signal);
-    let mut press = pipeline.press(reference.view()).unwrap();
+    let (pipeline, [reference, frame]) = sensor(&folder);
+    let mut press = Press::new(&pipeline, reference.view()).unwrap();
     press.add_frame(frame.view());
     let reading = *press.contact(0).unwrap().expect("a contact");
     let surface = press.surface(0).unwrap();
@@ -45,7 +52,11 @@ fn the_ball_is_found_and_its_depth_is_right() {
     println!("mean absolute depth error {:.4} mm", ball.mean_absolute_error_m * 1e3);
     assert!(ball.mean_absolute_error_m < 0.0462e-3);
 
-    // The cap's profile, ring by ring of 10 px, against the stated geometry: within 0.1 mm of 1.98 mm everywhere.
+    check_profile(surface);
+}
+
+/// The cap's profile, ring by ring of 10 px, against the stated geometry: within 0.1 mm of 1.98 mm everywhere.
+fn check_profile(surface: &ContactSurface) {
     let a = 67.6 * PIXEL_M;
     let cap = |r: f64| (BALL_M * BALL_M - r * r).sqrt() - (BALL_M * BALL_M - a * a).sqrt();
     let origin = surface.origin_m();

@@ -1,0 +1,99 @@
+//! Uniaxial compression: the law of its states, its frames and its limits.
+
+use super::{camera, relative};
+use tactile_imaging::simulate::{Elastic, SimulateError, SurfacePattern, UniaxialOptions, UniaxialScene};
+
+#[test]
+fn uniaxial_states_obey_their_law_and_balance_the_force() {
+    let forces = vec![0.01, 0.3, 0.7, 1.1];
+    let scene = UniaxialScene::new(UniaxialOptions {
+        forces_n: forces.clone(),
+        material: Elastic { youngs_modulus_pa: 62e3, poisson_ratio: 0.45 },
+        face_m: [9e-3, 11e-3],
+        camera: camera(600, 700),
+        ..UniaxialOptions::default()
+    })
+    .unwrap();
+    for (s, force) in scene.states().iter().zip(forces) {
+        assert_eq!(s.force_n, force);
+        let close = |x: f64, y: f64| assert!(relative(x, y) < 1e-12, "{x} {y}");
+        close(-s.cauchy_zz_pa * s.area_m2, force);
+        // Cauchy from second Piola–Kirchhoff: σ = F S Fᵀ / det F.
+        close(s.cauchy_zz_pa, s.second_piola_zz_pa * s.stretch_z / s.stretch_lateral.powi(2));
+        close(s.second_piola_zz_pa, 62e3 * s.strain_zz);
+        close(0.5 * (s.stretch_lateral.powi(2) - 1.0), -0.45 * s.strain_zz);
+        assert!(s.stretch_z < 1.0 && s.stretch_lateral > 1.0);
+    }
+    for (i, j) in [(0, 1), (1, 3), (2, 3)] {
+        let step = scene.increment(i, j);
+        assert!(relative(step.stress_zz_pa / step.strain_zz, 62e3) < 1e-12);
+        let axial = 1.0 + step.displacement_gradient[(2, 2)];
+        assert!(relative(step.strain_zz, 0.5 * (axial * axial - 1.0)) < 1e-12);
+    }
+}
+
+#[test]
+fn uniaxial_frames_carry_the_force_and_the_points_deform_as_the_states_say() {
+    let mut options = UniaxialOptions { camera: camera(261, 348).ideal(), ..UniaxialOptions::default() };
+    options.centre_px = Some([170.2, 133.9]);
+    let background = options.camera.background_grey;
+    let scene = UniaxialScene::new(options).unwrap();
+    let area = scene.options().camera.pixel_area_m2();
+    let points = scene.material_points(15, 15);
+    for (k, force) in [(0, 0.2), (1, 0.7), (2, 1.2)] {
+        let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
+        assert!(relative(light * area / scene.grey_per_pascal(), force) < 1e-12);
+        assert!(relative(scene.pressure_pa(k).sum() * area, force) < 1e-12);
+        // Where the surface is flat over a pixel, the pressure is the height through the stated factor.
+        let heights = scene.height_m(k);
+        let from_light = scene.pressure_pa(k) * scene.height_per_pascal_m(k);
+        let inner = largest_inner_difference(&heights, &from_light);
+        // Bumps of 0.6 mm height and 0.6 mm half width curve by π²h/2w² = 8 per mm: over a pixel of 0.086 mm
+        // the mean and the centre differ by curvature·pixel²/12 = 5 µm. Border pixels are partly covered.
+        assert!(inner < 6e-6, "{inner}");
+        for p in &points {
+            let moved = scene.deform(k, p);
+            assert!((moved.z - scene.states()[k].stretch_z * p.z).abs() < 1e-18);
+        }
+    }
+    // Strain of the moved points is that of the increment: the map between two states is affine about the centre.
+    let (a, b) = (scene.deform(0, &points[3]), scene.deform(1, &points[3]));
+    let (c, d) = (scene.deform(0, &points[200]), scene.deform(1, &points[200]));
+    let gradient = scene.increment(0, 1).displacement_gradient;
+    let (before, after) = (c - a, d - b);
+    assert!((before + gradient * before - after).norm() < 1e-15);
+}
+
+/// Largest difference where the four neighbours lie on the face as well.
+fn largest_inner_difference(a: &ndarray::Array2<f64>, b: &ndarray::Array2<f64>) -> f64 {
+    let (rows, cols) = a.dim();
+    let mut worst = 0.0_f64;
+    for r in 1..rows - 1 {
+        for c in 1..cols - 1 {
+            let near = [a[[r - 1, c]], a[[r + 1, c]], a[[r, c - 1]], a[[r, c + 1]], a[[r, c]]];
+            if near.iter().all(|&h| h > 0.0) {
+                worst = worst.max((a[[r, c]] - b[[r, c]]).abs());
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn a_force_beyond_the_material_law_is_an_error_and_so_are_bad_patterns() {
+    let limit = 103e3 * 144e-6 / 27.0_f64.sqrt();
+    let at = |force: f64| {
+        UniaxialScene::new(UniaxialOptions {
+            forces_n: vec![force],
+            camera: camera(261, 348),
+            ..UniaxialOptions::default()
+        })
+    };
+    assert!(at(0.999 * limit).is_ok());
+    assert!(matches!(at(1.001 * limit), Err(SimulateError::Overload { .. })));
+    assert!(at(f64::NAN).is_err());
+    let pattern = SurfacePattern { bump_share: 0.6, ..SurfacePattern::default() };
+    assert!(UniaxialScene::new(UniaxialOptions { pattern, ..UniaxialOptions::default() }).is_err());
+    let pattern = SurfacePattern { bump_height_m: [2e-3, 1e-3], ..SurfacePattern::default() };
+    assert!(UniaxialScene::new(UniaxialOptions { pattern, ..UniaxialOptions::default() }).is_err());
+}
