@@ -1,0 +1,100 @@
+//! One load, many equal ones, loads in falling order, as many as a session keeps.
+use crate::press::{SI, coarse_camera, pipeline, relative, trial};
+use crate::table::{EXACT, Table};
+use std::sync::Arc;
+use tactile_imaging::Pipeline;
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::elasticity::modulus::ModulusEstimate;
+use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, SESSION_LOADS, Session, Trial};
+
+/// Rising by 40 mN from 0.2 N.
+fn steps(loads: usize) -> Vec<f64> {
+    (0..loads).map(|k| 0.2 + 0.04 * k as f64).collect()
+}
+
+/// Six of its standard errors around the truth; those errors between a thousandth (that of the force scale) and the two hundredths
+/// that the worst load alone has.
+pub(crate) fn many(table: &mut Table) {
+    let falling = steps(8).into_iter().rev().collect();
+    for (what, forces) in [
+        ("one load", vec![0.7]),
+        ("eight equal loads", vec![0.7; 8]),
+        ("eight falling loads", falling),
+        ("a session full of loads", steps(SESSION_LOADS)),
+        ("a session overfull of loads", steps(SESSION_LOADS + 3)),
+    ] {
+        let trial = trial(coarse_camera(), 200.0, &forces);
+        let pipeline = pipeline(&trial, SI);
+        let truth = trial.truth().youngs_modulus_pa;
+        let press = trial.press(&pipeline).unwrap().modulus().unwrap();
+        let session = streamed(&trial, &pipeline);
+        let gap = relative(&[session.youngs_modulus_pa], &[press.youngs_modulus_pa], 1.0);
+        // A session has its loads in rising order; those that it merges are 3 % apart and follow one law, of which they are means.
+        let allowed =
+            if forces.len() > SESSION_LOADS { 0.1 * press.standard_error_pa / truth } else { EXACT };
+        table.enter(&format!("{what}: session against press"), gap, allowed);
+        for (how, modulus) in [("press", press), ("session", session)] {
+            let (error, own) =
+                (relative(&[modulus.youngs_modulus_pa], &[truth], 1.0), modulus.standard_error_pa);
+            table.enter(&format!("{what}, {how}: modulus over its error"), error * truth / own, 6.0);
+            table.enter(&format!("{what}, {how}: that error"), own / truth, 0.02);
+            assert!(own > 1e-3 * truth, "{what}, {how}: {own}");
+        }
+    }
+}
+
+fn streamed(trial: &Trial, pipeline: &Pipeline) -> ModulusEstimate<f64> {
+    let reference = trial.simulation.reference.view();
+    let mut session = Session::new(Arc::new(pipeline.clone()), reference).unwrap();
+    for frame in &trial.simulation.frames {
+        session.push(frame.view()).unwrap();
+    }
+    session.modulus().unwrap()
+}
+
+#[test]
+fn the_order_of_loads_is_no_matter() {
+    let mut trial = trial(coarse_camera(), 200.0, &steps(8));
+    let pipeline = pipeline(&trial, SI);
+    let rising = [trial.press(&pipeline).unwrap().modulus().unwrap(), streamed(&trial, &pipeline)];
+    trial.simulation.frames.reverse();
+    let falling = [trial.press(&pipeline).unwrap().modulus().unwrap(), streamed(&trial, &pipeline)];
+    for (a, b) in rising.iter().zip(&falling) {
+        let gap = relative(
+            &[a.youngs_modulus_pa, a.standard_error_pa],
+            &[b.youngs_modulus_pa, b.standard_error_pa],
+            1.0,
+        );
+        assert!(gap < EXACT, "{gap}");
+    }
+}
+
+/// Estimators that look at strain say that they need two loads or three, or give a number with an error as large as it should be.
+#[test]
+fn loads_without_a_step_say_so() {
+    for (forces, choice, needed) in [
+        (vec![0.7], EstimatorChoice::PaperRatio, 2),
+        (vec![0.7], EstimatorChoice::Regression, 3),
+        (vec![0.7; 8], EstimatorChoice::PaperRatio, 2),
+        (vec![0.7; 8], EstimatorChoice::Regression, 3),
+    ] {
+        let trial = trial(coarse_camera(), 200.0, &forces);
+        let pipeline = pipeline(&trial, SI).with_estimator(choice).with_control_points(60);
+        let found = trial.press(&pipeline).unwrap().modulus();
+        match found {
+            Err(PipelineError::Modulus(ElasticityError::TooFewLoads { expected, .. })) => {
+                assert!(expected == needed && forces.len() < needed, "{choice}: {expected}");
+            }
+            Ok(modulus) => {
+                let (value, error) = (modulus.youngs_modulus_pa, modulus.standard_error_pa);
+                // Noise over noise: not to be told from zero.
+                assert!(
+                    value.is_finite() && error.is_finite() && error > value.abs() / 3.0,
+                    "{choice}: {value} ± {error}"
+                );
+                assert!(!modulus.warnings.is_empty(), "{choice}");
+            }
+            Err(error) => panic!("{choice}: {error}"),
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! A simulated press, its sensor in any unit, and what the pipeline says of it.
+use nalgebra::Matrix3;
+use ndarray::Array2;
+use std::sync::Arc;
+use tactile_imaging::Pipeline;
+use tactile_imaging::elasticity::contact::{Layer, Waveguide};
+use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
+use tactile_imaging::pipeline::{Object, Press, Trial};
+use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
+
+/// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
+pub(crate) fn camera() -> Camera {
+    Camera { shape: [260, 348], pixel_size_m: [43.1e-6; 2], ..Camera::default() }
+}
+
+/// 174 × 130 pixels on 30 mm: enough for force, radius and modulus.
+pub(crate) fn coarse_camera() -> Camera {
+    Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() }
+}
+
+/// A press at these forces seen by a camera, its brightest pixel at this grey above the background.
+pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
+    let loads = forces.iter().map(|&f| Load::normal(f)).collect();
+    let gain = Gain::PeakGrey(peak_grey);
+    let options = PressOptions { camera, loads, gain, seed: 3, ..PressOptions::default() };
+    Trial::new(options, &CalibrationOptions::default()).expect("a scene")
+}
+
+/// Units of length and force in which the sensor is described, and the grey levels of its calibration.
+#[derive(Clone, Copy)]
+pub(crate) struct Units {
+    pub(crate) length: f64,
+    pub(crate) force: f64,
+    pub(crate) grey: f64,
+}
+
+pub(crate) const SI: Units = Units { length: 1.0, force: 1.0, grey: 1.0 };
+
+/// The trial's pipeline with its sensor described in other units: the layers' moduli too, in force over length².
+pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
+    let options = trial.scene.options();
+    let layers = options.waveguide.layers.iter().map(|l| Layer {
+        thickness_m: l.thickness_m * units.length,
+        youngs_modulus_pa: l.material.youngs_modulus_pa * units.force / (units.length * units.length),
+        poisson_ratio: l.material.poisson_ratio,
+    });
+    let scaled = |p: &CalibrationPair<f64>| CalibrationPair {
+        integrated_pixel_value: p.integrated_pixel_value * units.grey,
+        force_n: p.force_n * units.force,
+        ..*p
+    };
+    let pairs: Vec<_> = trial.pairs.iter().map(scaled).collect();
+    let size = trial.simulation.pixel_size_m.map(|s| s * units.length);
+    let ball = options.object;
+    let object =
+        Object::Sphere { radius_m: ball.radius_m * units.length, poisson_ratio: ball.material.poisson_ratio };
+    let waveguide = Waveguide::new(layers.collect()).expect("layers");
+    Pipeline::from_pairs(&pairs, size, object).expect("a calibration").with_waveguide(waveguide)
+}
+
+/// Exposures without contact, from which the noise of all pixels is measured, and the frames of a press.
+#[derive(Clone)]
+pub(crate) struct Images {
+    pub(crate) references: [Array2<u8>; 2],
+    pub(crate) frames: Vec<Array2<u8>>,
+}
+
+impl Images {
+    pub(crate) fn of(trial: &Trial) -> Self {
+        let references = [0, 1].map(|repeat| trial.scene.reference(repeat));
+        Self { references, frames: trial.simulation.frames.clone() }
+    }
+
+    pub(crate) fn map(&self, change: impl Fn(&Array2<u8>) -> Array2<u8>) -> Self {
+        let references = [0, 1].map(|k| change(&self.references[k]));
+        Self { references, frames: self.frames.iter().map(change).collect() }
+    }
+}
+
+/// What the pipeline says of a press.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Answer {
+    /// Of each frame.
+    pub(crate) force_n: Vec<f64>,
+    pub(crate) radius_m: Vec<f64>,
+    pub(crate) centroid_px: Vec<[f64; 2]>,
+    pub(crate) modulus_pa: f64,
+    pub(crate) modulus_error_pa: f64,
+    /// From the first frame to the last, with its standard error.
+    pub(crate) strain: Matrix3<f64>,
+    pub(crate) strain_error: Matrix3<f64>,
+}
+
+pub(crate) fn answer(pipeline: &Pipeline, images: &Images) -> Answer {
+    let references = images.references.each_ref().map(|image| image.view());
+    let reference = ReferenceFrame::from_frames(&references).expect("two exposures");
+    let mut press = Press::with_reference(pipeline, Arc::new(reference));
+    images.frames.iter().for_each(|image| {
+        press.add_frame(image.view());
+    });
+    let (mut force_n, mut radius_m, mut centroid_px) = (Vec::new(), Vec::new(), Vec::new());
+    for frame in 0..press.frames() {
+        let contact = press.contact(frame).expect("sound frames").expect("a contact");
+        force_n.push(contact.force_n.expect("a force").value);
+        radius_m.push(contact.contact_radius_m.value);
+        centroid_px.push(contact.centroid_px.map(|c| c.value));
+    }
+    let modulus = press.modulus().expect("a modulus");
+    let strain = &press.strain(press.frames() - 1).expect("a strain").summary;
+    Answer {
+        force_n,
+        radius_m,
+        centroid_px,
+        modulus_pa: modulus.youngs_modulus_pa,
+        modulus_error_pa: modulus.standard_error_pa,
+        strain: strain.mean,
+        strain_error: strain.standard_error,
+    }
+}
+
+/// The greatest relative difference of numbers that `scale` turns into those expected.
+pub(crate) fn relative(found: &[f64], expected: &[f64], scale: f64) -> f64 {
+    let gap = |(f, e): (&f64, &f64)| (f / scale / e - 1.0).abs();
+    let worst = |worst: f64, gap: f64| if worst >= gap { worst } else { gap };
+    found.iter().zip(expected).map(gap).fold(0.0, worst)
+}

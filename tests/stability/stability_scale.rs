@@ -1,0 +1,108 @@
+//! Units, brightness and position: what the numbers are against the truth, and what must not change them.
+use crate::press::{Answer, Images, SI, Units, answer, camera, coarse_camera, pipeline, relative, trial};
+use crate::table::{EXACT, STRAIN, Table};
+use crate::{loads, steps, symmetry};
+use tactile_imaging::pipeline::Trial;
+
+#[test]
+fn the_pipeline_keeps_its_numbers() {
+    let mut table = Table::default();
+    truth(&mut table);
+    let trial = trial(camera(), 200.0, &[0.7, 1.2]);
+    let expected = answer(&pipeline(&trial, SI), &Images::of(&trial));
+    units(&mut table, &trial, &expected);
+    symmetry::shifts(&mut table, &trial, &expected);
+    symmetry::turns(&mut table, &trial, &expected);
+    pedestal(&mut table, &trial, &expected);
+    light(&mut table);
+    steps::small(&mut table);
+    loads::many(&mut table);
+    table.finish();
+}
+
+/// Frames of a camera without noise, blur and vignetting: what is left is the pixels' size, the rounding to whole grey levels
+/// and the gauge's noise in the calibration (5 mN, of 16 readings: 0.3 % of these forces).
+fn truth(table: &mut Table) {
+    for grey in [60.0, 120.0, 200.0, 235.0] {
+        let (fine, coarse) = (camera().ideal(), coarse_camera().ideal());
+        for (what, camera) in [("fine", fine), ("coarse", coarse)] {
+            let trial = trial(camera, grey, &[0.7, 1.2]);
+            let (found, truth) = (answer(&pipeline(&trial, SI), &Images::of(&trial)), trial.truth());
+            let force: Vec<_> = truth.frames.iter().map(|f| f.force_n).collect();
+            let radius: Vec<_> = truth.frames.iter().map(|f| f.contact_radius_m).collect();
+            let modulus = relative(&[found.modulus_pa], &[truth.youngs_modulus_pa], 1.0);
+            let case = |quantity: &str| format!("truth, {what}: {quantity}");
+            // Three standard errors of the calibration; E goes as F/a³, and the layers' share enlarges its error by 1.7.
+            table.enter(&case("force"), relative(&found.force_n, &force, 1.0), 0.009);
+            table.enter(&case("radius"), relative(&found.radius_m, &radius, 1.0), 1e-3);
+            table.enter(&case("modulus"), modulus, 0.017);
+            let strain = truth.strain.filter(|_| what == "fine");
+            for (k, name) in ["xx", "yy", "zz"].into_iter().enumerate() {
+                let Some(strain) = strain else { continue };
+                let gap = (found.strain[(k, k)] - strain[k][k]).abs();
+                table.enter(&case(&format!("strain e_{name}")), gap, STRAIN[k]);
+            }
+        }
+    }
+}
+
+fn units(table: &mut Table, trial: &Trial, expected: &Answer) {
+    let images = Images::of(trial);
+    for exponent in [-3, -2, -1, 1, 2, 3] {
+        let length = 10f64.powi(exponent);
+        let found = answer(&pipeline(trial, Units { length, ..SI }), &images);
+        scaled(table, "unit of length", &found, expected, [1.0, length]);
+    }
+    for exponent in [-9, -6, -3, 3, 6, 9] {
+        let force = 10f64.powi(exponent);
+        let found = answer(&pipeline(trial, Units { force, ..SI }), &images);
+        scaled(table, "unit of force", &found, expected, [force, 1.0]);
+    }
+}
+
+/// Lengths, forces and moduli follow their units, strains have none.
+fn scaled(table: &mut Table, case: &str, found: &Answer, expected: &Answer, [force, length]: [f64; 2]) {
+    let pressure = force / (length * length);
+    let rows = [
+        ("force", relative(&found.force_n, &expected.force_n, force)),
+        ("radius", relative(&found.radius_m, &expected.radius_m, length)),
+        ("modulus", relative(&[found.modulus_pa], &[expected.modulus_pa], pressure)),
+        ("its error", relative(&[found.modulus_error_pa], &[expected.modulus_error_pa], pressure)),
+        ("strain", (found.strain - expected.strain).amax()),
+        ("its error", (found.strain_error - expected.strain_error).amax()),
+    ];
+    for (k, (what, error)) in rows.into_iter().enumerate() {
+        let of = if k == 5 { "strain's error" } else { what };
+        table.enter(&format!("{case}: {of}"), error, EXACT);
+    }
+}
+
+/// As much grey everywhere, in reference and frames: the differences, and so all bits, stay.
+fn pedestal(table: &mut Table, trial: &Trial, expected: &Answer) {
+    let brightest = trial.simulation.frames.iter().flatten().max().copied().unwrap_or(0);
+    // A grey level of 255 would count as saturated.
+    let room = 254 - brightest;
+    for grey in [1, room / 2, room] {
+        let raised = Images::of(trial).map(|image| image.mapv(|v| v + grey));
+        let found = answer(&pipeline(trial, SI), &raised);
+        let error = if found == *expected { 0.0 } else { f64::INFINITY };
+        table.enter("constant offset of all grey values: any bit", error, 0.0);
+    }
+}
+
+/// Twice the light, twice the calibration's sums. The noise of rounding, 1/12 of a grey level squared, does not double, so that
+/// the profile's fit weighs bright pixels otherwise, by a hundredth: what it finds moves by that share of its own errors,
+/// 10⁻⁴ of the radius and 4 · 10⁻³ of the modulus. The force is a sum and has no weights.
+fn light(table: &mut Table) {
+    let trial = trial(camera(), 100.0, &[0.7, 1.2]);
+    let expected = answer(&pipeline(&trial, SI), &Images::of(&trial));
+    let bright = Images::of(&trial).map(|image| image * 2);
+    let found = answer(&pipeline(&trial, Units { grey: 2.0, ..SI }), &bright);
+    table.enter("twice the light: force", relative(&found.force_n, &expected.force_n, 1.0), EXACT);
+    table.enter("twice the light: radius", relative(&found.radius_m, &expected.radius_m, 1.0), 1e-5);
+    table.enter("twice the light: modulus", relative(&[found.modulus_pa], &[expected.modulus_pa], 1.0), 1e-4);
+    for (k, name) in ["xx", "yy", "zz"].into_iter().enumerate() {
+        let gap = (found.strain - expected.strain)[(k, k)].abs();
+        table.enter(&format!("twice the light: strain e_{name}"), gap, STRAIN[k]);
+    }
+}

@@ -1,0 +1,36 @@
+//! Steps of load that are hardly one: the strain goes with them to zero.
+use crate::press::{Images, SI, answer, camera, pipeline, trial};
+use crate::table::{STRAIN, Table};
+use ndarray::Array2;
+
+/// Without noise a share p of the pixels has another grey value; as many points stand otherwise, and independent errors of a share p
+/// add as √p. Frames without any such pixel are the same frame and have no strain at all, which is what the step left: δ/3.
+pub(crate) fn small(table: &mut Table) {
+    let steps = [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
+    for (what, camera) in [("without noise", camera().ideal()), ("noise", camera())] {
+        let trial = trial(camera, 200.0, &steps.map(|step| 0.7 * (1.0 + step)));
+        let (pipeline, images) = (pipeline(&trial, SI), Images::of(&trial));
+        for (k, step) in steps.into_iter().enumerate().skip(1) {
+            let frames = vec![images.frames[0].clone(), images.frames[k].clone()];
+            let share = changed_share(&frames).sqrt();
+            let found = answer(&pipeline, &Images { frames, ..images.clone() });
+            // A mean strain of the apparent surfaces, which grow as the cube root of the force.
+            let truth = 0.5 * ((2.0 / 3.0) * step.ln_1p()).exp_m1();
+            for (k, name) in ["xx", "yy", "zz"].into_iter().enumerate() {
+                let case = format!("step {step:.0e}, {what}: strain e_{name}");
+                // The same to a rounding of one.
+                let tolerance = STRAIN[k] * share + truth + 4.0 * f64::EPSILON;
+                table.enter(&case, (found.strain[(k, k)] - truth).abs(), tolerance);
+            }
+            let finite = found.strain_error.iter().all(|e| e.is_finite() && *e >= 0.0);
+            assert!(finite, "step {step}, {what}: {}", found.strain_error);
+        }
+    }
+}
+
+/// Of the pixels of the first frame's contact, those that are otherwise in the second.
+fn changed_share(frames: &[Array2<u8>]) -> f64 {
+    let changed = frames[0].iter().zip(&frames[1]).filter(|(a, b)| a != b).count();
+    let contact = frames[0].iter().filter(|v| **v > 20).count();
+    (changed as f64 / contact as f64).min(1.0)
+}

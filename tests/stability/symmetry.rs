@@ -1,0 +1,106 @@
+//! The contact elsewhere in the frame, mirrored and turned.
+use crate::press::{Answer, Images, SI, answer, pipeline, relative};
+use crate::table::{EXACT, STRAIN, Table};
+use nalgebra::Matrix3;
+use ndarray::{Array2, Axis};
+use tactile_imaging::pipeline::Trial;
+
+/// The contact's threshold allows for false alarms among the pixels of the tiles around it, and those are others: a few faint pixels of
+/// the rim come and go, some 10⁻⁶ of the light. In this order for force, radius (of a fit that hardly looks at the rim) and
+/// centroid in pixels (10⁻⁵ of the light, a hundred pixels away at most).
+const RIM: [f64; 3] = [1e-5, 1e-6, 1e-3];
+
+/// The image moved by whole pixels; what leaves on one side comes in on the other, so that the grey values stay the same.
+fn shifted(image: &Array2<u8>, [x, y]: [isize; 2]) -> Array2<u8> {
+    let (rows, columns) = image.dim();
+    let from = |i: usize, by: isize, n: usize| (i as isize - by).rem_euclid(n as isize) as usize;
+    Array2::from_shape_fn((rows, columns), |(r, c)| image[[from(r, y, rows), from(c, x, columns)]])
+}
+
+pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
+    for by in [[1, 0], [0, 1], [-17, 9], [40, -30], [-50, -35]] {
+        let moved = Images::of(trial).map(|image| shifted(image, by));
+        let found = answer(&pipeline(trial, SI), &moved);
+        let there = |c: [f64; 2]| [c[0] + by[0] as f64, c[1] + by[1] as f64];
+        compare(table, "moved by whole pixels", &found, expected, (there, Matrix3::identity()), RIM);
+    }
+}
+
+/// One of the seven ways to mirror and turn a frame: rows for columns first, then columns and rows in reverse.
+#[derive(Clone, Copy)]
+struct Turn {
+    transposed: bool,
+    reversed: [bool; 2],
+}
+
+impl Turn {
+    fn image(self, image: &Array2<u8>) -> Array2<u8> {
+        let mut view = if self.transposed { image.t() } else { image.view() };
+        for (k, axis) in [Axis(1), Axis(0)].into_iter().enumerate() {
+            if self.reversed[k] {
+                view.invert_axis(axis);
+            }
+        }
+        view.as_standard_layout().into_owned()
+    }
+
+    /// Where (x, y) of a frame of this many columns and rows goes.
+    fn point(self, [x, y]: [f64; 2], [columns, rows]: [f64; 2]) -> [f64; 2] {
+        let (p, n) = if self.transposed { ([y, x], [rows, columns]) } else { ([x, y], [columns, rows]) };
+        std::array::from_fn(|k| if self.reversed[k] { n[k] - 1.0 - p[k] } else { p[k] })
+    }
+
+    /// The same for directions.
+    fn rotation(self) -> Matrix3<f64> {
+        let sign = |k: usize| if k < 2 && self.reversed[k] { -1.0 } else { 1.0 };
+        let from = |k: usize| if k < 2 && self.transposed { 1 - k } else { k };
+        Matrix3::from_fn(|i, j| if from(i) == j { sign(i) } else { 0.0 })
+    }
+}
+
+pub(crate) fn turns(table: &mut Table, trial: &Trial, expected: &Answer) {
+    let (rows, columns) = trial.simulation.reference.dim();
+    for k in 1..8 {
+        let turn = Turn { transposed: k & 4 != 0, reversed: [k & 1 != 0, k & 2 != 0] };
+        let turned = Images::of(trial).map(|image| turn.image(image));
+        let found = answer(&pipeline(trial, SI), &turned);
+        let there = |c| turn.point(c, [columns as f64, rows as f64]);
+        let case = if turn.transposed { "turned" } else { "mirrored" };
+        compare(table, case, &found, expected, (there, turn.rotation()), [EXACT, EXACT, 1e-10]);
+    }
+}
+
+/// The strain follows to the matcher's tolerance: points are placed from the first row on, and where the contact lies otherwise in
+/// the frame they are others.
+fn compare(
+    table: &mut Table,
+    case: &str,
+    found: &Answer,
+    expected: &Answer,
+    (there, rotation): (impl Fn([f64; 2]) -> [f64; 2], Matrix3<f64>),
+    [of_force, of_radius, of_pixel]: [f64; 3],
+) {
+    let centroid = found.centroid_px.iter().zip(&expected.centroid_px).map(|(f, e)| {
+        let e = there(*e);
+        (f[0] - e[0]).hypot(f[1] - e[1])
+    });
+    let strain = rotation * expected.strain * rotation.transpose();
+    let gap = (found.strain - strain).abs();
+    let across = gap[(0, 0)].max(gap[(1, 1)]).max(gap[(0, 1)]);
+    let up = gap[(2, 2)].max(gap[(0, 2)]).max(gap[(1, 2)]);
+    let rows = [
+        ("force", relative(&found.force_n, &expected.force_n, 1.0), of_force),
+        ("radius", relative(&found.radius_m, &expected.radius_m, 1.0), of_radius),
+        ("centroid in pixels", centroid.fold(0.0, f64::max), of_pixel),
+        (
+            "modulus",
+            relative(&[found.modulus_pa], &[expected.modulus_pa], 1.0),
+            3.0 * of_force.max(of_radius),
+        ),
+        ("strain e_xx, e_yy, e_xy", across, STRAIN[0]),
+        ("strain e_zz, e_xz, e_yz", up, STRAIN[2]),
+    ];
+    for (what, error, tolerance) in rows {
+        table.enter(&format!("{case}: {what}"), error, tolerance);
+    }
+}
