@@ -83,6 +83,7 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum StopReason {
     /// The warp and the assignment stand still.
     #[default]
@@ -111,6 +112,7 @@ pub enum StopReason {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MatchReport<T> {
     /// Why it stopped.
     pub stop: StopReason,

@@ -14,6 +14,7 @@
 /// assert_eq!(soft.rows(), 0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SoftMatches<T> {
     starts: Vec<usize>,
     columns: Vec<usize>,

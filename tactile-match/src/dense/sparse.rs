@@ -12,7 +12,8 @@ use tactile_tps::Scalar;
 /// Only the `c` pairs of largest first probability of every model point are kept; the others stay nought, which (20) would not change.
 /// What pair `(a, b)` says for pair `(i, j)` in (19) does not depend on M: these links, `I A c²` at most, are computed once an
 /// outer iteration, and a sweep costs one multiplication each instead of `O(I J A B)`. With all candidates
-/// (`candidates ≥ J`) the answer is that of [`DenseRelaxation`] to rounding.
+/// (`candidates ≥ J`) the answer is that of [`DenseRelaxation`] to rounding. The other candidates of a
+/// point whose match is settled (to a hundred roundings) leave the sweeps.
 ///
 /// ```
 /// use nalgebra::Point2;
@@ -83,6 +84,13 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for SparseRelaxation {
     }
 }
 
+/// The target that has all of a row, so that no other can still come up: what they have is below a hundred roundings.
+fn settled_on<T: Scalar>(row: &[T]) -> Option<usize> {
+    let sum = row.iter().fold(T::zero(), |sum, &p| sum + p);
+    let enough = sum * T::narrow(1.0 - 100.0 * T::UNIT_ROUNDOFF);
+    row[..row.len() - 1].iter().position(|&p| p > T::zero() && p >= enough)
+}
+
 /// Sets all but the `count` likeliest partners of every model point to nought; of equal ones the lower rows stay.
 fn keep_likeliest<T: Scalar>(m: &mut MatchMatrix<T>, count: usize) {
     let columns = m.columns();
@@ -141,10 +149,15 @@ impl<T: Scalar> Links<T> {
         links
     }
 
-    /// The support (19) of the candidate pairs; nought for all others.
+    /// The support (19) of the candidate pairs; nought for all others. Of points whose match is settled
+    /// only the pair they settled on is heard.
     fn support(&self, m: &MatchMatrix<T>) -> Vec<T> {
         let mut support = vec![T::zero(); m.rows() * self.columns];
+        let settled: Vec<Option<usize>> = (0..m.rows()).map(|i| settled_on(m.row(i))).collect();
         for (&(i, j), ends) in self.pairs.iter().zip(self.starts.windows(2)) {
+            if settled[i].is_some_and(|on| on != j) {
+                continue;
+            }
             let links = self.from[ends[0]..ends[1]].iter().zip(&self.compatibility[ends[0]..ends[1]]);
             support[i * self.columns + j] =
                 links.fold(T::zero(), |sum, (&(a, b), &r)| sum + m[(a as usize, b as usize)] * r);

@@ -19,6 +19,7 @@ const RARE: f64 = 0.01;
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Rotation {
     /// By up to about half a right angle.
     #[default]
@@ -42,6 +43,7 @@ pub enum Rotation {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Outliers {
     /// Every point may lack its partner.
     #[default]
@@ -69,6 +71,7 @@ pub enum Outliers {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Search {
     /// Until an answer is exact, or every start is tried and the scales of the prior are fitted to the data: any scene.
     #[default]

@@ -11,6 +11,8 @@ mod hostile;
 mod labelling_against_dense;
 mod reference;
 mod relaxation;
+#[cfg(feature = "serde")]
+mod serde;
 mod serialtrack;
 mod series;
 mod sparse_against_dense;
