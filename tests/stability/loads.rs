@@ -7,9 +7,9 @@ use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, SESSION_LOADS, Session, Trial};
 
-/// Rising by 40 mN from 0.2 N.
+/// Rising by 35 mN from 0.2 N: the last within the calibration.
 fn steps(loads: usize) -> Vec<f64> {
-    (0..loads).map(|k| 0.2 + 0.04 * k as f64).collect()
+    (0..loads).map(|k| 0.2 + 0.035 * k as f64).collect()
 }
 
 /// Six of its standard errors around the truth; those errors between a thousandth (that of the force scale) and the two hundredths
