@@ -122,26 +122,7 @@ fn press_stage_by_stage(case: &str, pipeline: &Pipeline, [reference, first, seco
     let Ok(mut press) = Press::new(pipeline, reference.view()) else { return };
     press.add_frame(first.view());
     press.add_frame(second.view());
-    for frame in 0..2 {
-        if let Ok(Some(contact)) = press.contact(frame) {
-            assert!(is_sound(contact), "{case}: {contact:?}");
-        }
-        if let Ok(surface) = press.surface(frame) {
-            let heights = surface.surface.heights.iter().zip(&surface.surface.mask);
-            assert!(heights.into_iter().all(|(h, inside)| !inside || h.is_finite()), "{case}");
-        }
-        if let Ok(points) = press.control_points(frame) {
-            assert!(points.iter().all(|p| all_finite(p.iter())), "{case}");
-        }
-        if let Ok(matching) = press.matching(frame) {
-            assert!(all_finite(&matching.confidence), "{case}");
-            assert!(matching.warped.iter().all(|p| all_finite(p.iter())), "{case}");
-        }
-        if let Ok(strain) = press.strain(frame) {
-            let summary = &strain.summary;
-            assert!(all_finite(summary.mean.iter().chain(&summary.standard_error)), "{case}: {summary:?}");
-        }
-    }
+    (0..2).for_each(|frame| stages_are_sound(case, &mut press, frame));
     for estimate in press.modulus().into_iter().chain(press.estimates().into_iter().flatten()) {
         let finite = all_finite(&[estimate.youngs_modulus_pa, estimate.standard_error_pa]);
         assert!(finite || !estimate.warnings.is_empty(), "{case}: {estimate:?}");
@@ -149,6 +130,27 @@ fn press_stage_by_stage(case: &str, pipeline: &Pipeline, [reference, first, seco
     match press.measure() {
         Ok(measured) => measured_is_sound(case, &measured),
         Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+fn stages_are_sound(case: &str, press: &mut Press<'_>, frame: usize) {
+    if let Ok(Some(contact)) = press.contact(frame) {
+        assert!(is_sound(contact), "{case}: {contact:?}");
+    }
+    if let Ok(surface) = press.surface(frame) {
+        let heights = surface.surface.heights.iter().zip(&surface.surface.mask);
+        assert!(heights.into_iter().all(|(h, inside)| !inside || h.is_finite()), "{case}");
+    }
+    if let Ok(points) = press.control_points(frame) {
+        assert!(points.iter().all(|p| all_finite(p.iter())), "{case}");
+    }
+    if let Ok(matching) = press.matching(frame) {
+        assert!(all_finite(&matching.confidence), "{case}");
+        assert!(matching.warped.iter().all(|p| all_finite(p.iter())), "{case}");
+    }
+    if let Ok(strain) = press.strain(frame) {
+        let summary = &strain.summary;
+        assert!(all_finite(summary.mean.iter().chain(&summary.standard_error)), "{case}: {summary:?}");
     }
 }
 
