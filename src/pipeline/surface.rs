@@ -80,7 +80,6 @@ pub(super) struct SurfaceWorkspace {
     signal: Array2<f64>,
     smoothed: Array2<f64>,
     mask: Array2<bool>,
-    whole_mask: Array2<bool>,
     line: Vec<f64>,
 }
 
@@ -91,7 +90,6 @@ impl Default for SurfaceWorkspace {
             signal: Array2::default((0, 0)),
             smoothed: Array2::default((0, 0)),
             mask: Array2::default((0, 0)),
-            whole_mask: Array2::default((0, 0)),
             line: Vec::new(),
         }
     }
@@ -111,7 +109,7 @@ impl SurfaceWorkspace {
         binning::mean_difference(frame, reference, whole, side, scale, &mut self.signal);
         binning::block_mask(contact.mask.view(), region, whole, side, &mut self.mask);
         if side == 1 && settings.surface_input == SurfaceInput::Shading {
-            binning::erode(&mut self.mask, &mut self.whole_mask);
+            binning::trim_rim(&mut self.mask, &self.signal);
         }
         let ceiling = settings.surface_input.ceiling();
         // The width is that in the frame: a block has smoothed already.
