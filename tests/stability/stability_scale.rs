@@ -48,8 +48,8 @@ fn truth(table: &mut Table) {
     }
 }
 
-/// One ring of pixels at the rim, where a hemisphere is steepest, may be taken or left: with pixels of width h that is √(2h/a) of
-/// its height.
+/// At the rim, where a hemisphere is steepest, a quarter of a pixel may be taken or left: with pixels of width h that is
+/// √(h/2a) of its height.
 fn surface(table: &mut Table, case: &str, trial: &Trial) {
     let pipeline = pipeline(trial, SI);
     let mut press = trial.press(&pipeline).unwrap();
@@ -57,7 +57,7 @@ fn surface(table: &mut Table, case: &str, trial: &Trial) {
         let found = press.surface(k).unwrap();
         let inside = found.surface.heights.iter().zip(&found.surface.mask).filter(|(_, inside)| **inside);
         let top = inside.map(|(height, _)| *height).fold(f64::NAN, f64::max);
-        let ring = (2.0 * found.pixel_size_m[0] / truth.contact_radius_m).sqrt();
+        let ring = (0.5 * found.pixel_size_m[0] / truth.contact_radius_m).sqrt();
         table.enter(case, (top / truth.surface_height_m - 1.0).abs(), ring);
     }
 }
