@@ -17,6 +17,8 @@ const REACH: f64 = 0.25;
 const GATE: f64 = 0.45;
 /// Rounds of looking up the neighbours' targets and fitting the affine correction.
 const ROUNDS: usize = 2;
+/// Misfits above this share of the largest there can be are not worth a correction.
+const HOPELESS: f64 = 0.75;
 /// Weight of no correction at all, in squared spacings.
 const RIDGE: f64 = 0.3;
 /// Misfits are told apart no finer than this, in spacings.
@@ -113,35 +115,43 @@ impl<const D: usize> Constellations<D> {
         best
     }
 
-    /// Sum of squared distances between where the neighbours are expected about target `j` and the targets there.
+    /// Sum of squared distances between where the neighbours are expected about target `j`, a little bent, and the targets there.
     fn misfit(&self, target: &[[f64; D]], j: usize) -> f64 {
-        let gate = GATE * self.spacing;
-        let mut bend = SMatrix::<f64, D, D>::zeros();
-        let mut misfit = f64::INFINITY;
-        for round in 0..=ROUNDS {
-            misfit = 0.0;
-            let mut outer = SMatrix::<f64, D, D>::zeros();
-            let mut gram = SMatrix::<f64, D, D>::identity() * (RIDGE * self.spacing * self.spacing);
-            for offset in &self.offsets {
-                let offset = SVector::from(*offset);
-                let place = SVector::from(target[j]) + offset + bend * offset;
-                let found = self.targets.nearest(&place.into(), gate);
-                if let Some(found) = found {
-                    let rest = SVector::from(target[found]) - place;
-                    misfit += rest.norm_squared();
-                    outer += (rest + bend * offset) * offset.transpose();
-                    gram += offset * offset.transpose();
-                } else {
-                    misfit += gate * gate;
-                }
-            }
-            let hopeless = misfit > 0.75 * gate * gate * self.offsets.len() as f64;
-            if round == ROUNDS || hopeless {
+        let hopeless = HOPELESS * (GATE * self.spacing).powi(2) * self.offsets.len() as f64;
+        let (mut misfit, mut bend) = self.bent(&target[j], target, &SMatrix::zeros());
+        for _ in 0..ROUNDS {
+            if misfit > hopeless {
                 break;
             }
-            bend = outer * gram.try_inverse().unwrap_or_else(SMatrix::zeros);
+            (misfit, bend) = self.bent(&target[j], target, &bend);
         }
         misfit
+    }
+
+    /// The misfit about `centre` when the neighbours' offsets are bent by `bend`, and the bend that the targets found ask for.
+    fn bent(
+        &self,
+        centre: &[f64; D],
+        target: &[[f64; D]],
+        bend: &SMatrix<f64, D, D>,
+    ) -> (f64, SMatrix<f64, D, D>) {
+        let gate = GATE * self.spacing;
+        let mut misfit = 0.0;
+        let mut outer = SMatrix::<f64, D, D>::zeros();
+        let mut gram = SMatrix::<f64, D, D>::identity() * (RIDGE * self.spacing * self.spacing);
+        for offset in &self.offsets {
+            let offset = SVector::from(*offset);
+            let place = SVector::from(*centre) + offset + bend * offset;
+            let Some(found) = self.targets.nearest(&place.into(), gate) else {
+                misfit += gate * gate;
+                continue;
+            };
+            let rest = SVector::from(target[found]) - place;
+            misfit += rest.norm_squared();
+            outer += (rest + bend * offset) * offset.transpose();
+            gram += offset * offset.transpose();
+        }
+        (misfit, outer * gram.try_inverse().unwrap_or_else(SMatrix::zeros))
     }
 
     /// Probabilities from misfits, with the noise at which the typical best candidate fits as it does.
@@ -156,6 +166,7 @@ impl<const D: usize> Constellations<D> {
         let pair = |&(j, best, second): &(usize, f64, f64)| {
             let trust =
                 if best.is_finite() { 1.0 / (1.0 + (-0.5 * (second - best) / variance).exp()) } else { 0.0 };
+            // A misfit three times the typical is no longer one.
             let fits = (-0.5 * best / (9.0 * variance * values)).exp();
             (j, trust * fits)
         };
