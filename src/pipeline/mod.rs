@@ -45,6 +45,7 @@ mod strain_spline;
 mod surface;
 #[cfg(feature = "simulate")]
 mod trial;
+mod typed;
 
 pub use ball::BallFit;
 pub use batch::contacts;
@@ -69,8 +70,9 @@ pub use settings::{DEFAULT_CONTROL_POINTS, Settings, Skips};
 pub use source::FrameSource;
 #[cfg(feature = "scene")]
 pub use source::ImageFolder;
-pub use stages::{BoxedWarp, Pipeline, Stages};
+pub use stages::{BoxedWarp, Stages};
 pub use strain_spline::StrainSpline;
 pub use surface::{ContactSurface, SurfaceInput};
 #[cfg(feature = "simulate")]
 pub use trial::{FrameTruth, Trial, Truth};
+pub use typed::Pipeline;

@@ -2,7 +2,7 @@
 use super::error::PipelineError;
 use super::object::Object;
 use super::press::Press;
-use super::stages::Pipeline;
+use super::typed::Pipeline;
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::force::CalibrationPair;
 use crate::simulate::{

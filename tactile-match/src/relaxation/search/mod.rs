@@ -1,8 +1,10 @@
-//! The search: which starts are tried, in which order, and when it is over.
+//! The search: which starts are tried, and in which order.
 //!
 //! Most scenes are easy and end with the first, fast run. Where the answer is not exact and complete, further starts
 //! follow: from the patterns of a dense set, warmer and slower, from shape contexts and relaxation labelling, from the
 //! moments. The start with the least energy wins; noisy scenes then choose the scales of the prior by their evidence.
+mod mend;
+mod over;
 
 use super::anneal::Schedule;
 use super::prior::PriorScales;
@@ -31,15 +33,6 @@ const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, patience: 12, sweep
 const COOLEST: f64 = 0.03;
 /// Further tries.
 const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, patience: usize::MAX, sweeps: 5 };
-/// So many points that an incomplete exact answer is not worth a second try.
-const MANY: usize = 500;
-/// Most times that the patterns of so many points are looked at, and the temperature that follows, in spacings.
-const PATTERNS: usize = 3;
-const PATTERN_SIGMA: f64 = 0.3;
-/// Residuals of so many points below this many spacings leave no doubt: one point aside, they would be larger.
-const PLAIN: f64 = 0.15;
-/// Share of the smaller set that an exact answer should match.
-const COMPLETE: f64 = 0.98;
 /// Residuals are judged no finer than this.
 const RESOLUTION: f64 = 0.01;
 
@@ -182,77 +175,6 @@ impl RelaxationMatcher {
             sweeps: pace.sweeps,
             slack: self.options.slack(),
         }
-    }
-
-    /// Whether no further start can do better.
-    fn is_done<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
-        self.is_exact(ws) || self.is_plain(ws)
-    }
-
-    /// Whether the residuals of a dense set are so far below its spacing, for nearly all points, that no part can lie aside.
-    fn is_plain<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
-        let points = ws.model.len().min(ws.target.len());
-        points >= MANY
-            && ws.best.sigma <= PLAIN * ws.constellations.spacing
-            && ws.best.matched >= 0.8 * points as f64
-    }
-
-    /// Whether the best run so far explains nearly every point of the smaller set to rounding.
-    fn is_exact<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
-        let points = ws.model.len().min(ws.target.len());
-        let wanted = if ws.starts == 1 || points < MANY { COMPLETE } else { 0.8 };
-        ws.best.sigma <= finish::CLEAN && ws.best.matched >= wanted * points as f64
-    }
-
-    /// Mends parts that went astray: by the patterns of the points in a dense set, by a reheat elsewhere.
-    fn mend<const D: usize>(
-        &self,
-        ws: &mut RelaxationWorkspace<D>,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        if ws.model.len().min(ws.target.len()) >= MANY {
-            self.follow_patterns(ws, observe)?;
-            if self.is_done(ws) {
-                return ControlFlow::Continue(());
-            }
-        }
-        self.reheat(ws, REHEAT.sigma, observe)
-    }
-
-    /// Short runs from where the patterns of a dense set put it, as long as each matches more points.
-    fn follow_patterns<const D: usize>(
-        &self,
-        ws: &mut RelaxationWorkspace<D>,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let points = ws.model.len().min(ws.target.len()) as f64;
-        for _ in 0..PATTERNS {
-            let before = (ws.best.matched, ws.best.sigma);
-            ws.state.copy_from(&ws.best);
-            if !ws.constellations.propose(&ws.state.warped, &ws.target) {
-                break;
-            }
-            let sets = (&*ws.model, &*ws.target);
-            ws.consensus.fit(&mut ws.annealer, SCALES, sets, &ws.constellations.pairs, &mut ws.state);
-            let sigma = PATTERN_SIGMA * ws.constellations.spacing;
-            self.refine(ws, Pace { sigma, ..REHEAT }, observe)?;
-            let (matched, sigma) = (ws.best.matched, ws.best.sigma);
-            if matched >= COMPLETE * points || (matched < 1.01 * before.0 && sigma > 0.99 * before.1) {
-                break;
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// A short run from the best answer so far: warm enough to mend parts that went astray.
-    fn reheat<const D: usize>(
-        &self,
-        ws: &mut RelaxationWorkspace<D>,
-        sigma: f64,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        ws.state.copy_from(&ws.best);
-        self.refine(ws, Pace { sigma, ..REHEAT }, observe)
     }
 
     /// A run from `ws.state.base` itself.

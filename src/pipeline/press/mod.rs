@@ -1,0 +1,215 @@
+//! A press: frames at one or more loads, of which nothing is computed before it is asked for.
+mod measure;
+mod modulus;
+mod results;
+
+use super::contact::FrameContact;
+use super::error::PipelineError;
+use super::pair::PairStrain;
+use super::report::{Report, SkipReason, Stage};
+use super::stages::{Stages, reference_frame};
+use super::surface::{ContactSurface, SurfaceWorkspace};
+use crate::force::{ForceWorkspace, ReferenceFrame};
+use crate::matching::Matching;
+use nalgebra::Point3;
+use ndarray::ArrayView2;
+use std::sync::Arc;
+
+/// A frame and what is known of it so far.
+struct Loaded<'a> {
+    image: ArrayView2<'a, u8>,
+    gauge_n: Option<f64>,
+    contact: Option<FrameContact>,
+    surface: Option<ContactSurface>,
+    points: Option<Vec<Point3<f64>>>,
+    matching: Option<Matching<f64, 3>>,
+    strain: Option<PairStrain>,
+}
+
+/// Frames at one or more loads. Every result is computed when it is first asked for, with what it needs and nothing else,
+/// and kept. Matches, displacements and strains are from the first frame to a later one.
+///
+/// Made by [`Pipeline::press`](super::Pipeline::press).
+///
+/// ```
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// use tactile_imaging::pipeline::Stage;
+/// let pipeline = trial.pipeline()?.with_control_points(60);
+/// let mut press = trial.press(&pipeline)?;
+/// assert_eq!((press.frames(), press.report().work(Stage::Contact).runs), (2, 0), "nothing is asked for yet");
+/// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
+/// assert!((force.value / 0.7 - 1.0).abs() < 0.02);
+/// assert!((press.modulus()?.youngs_modulus_pa / 103e3 - 1.0).abs() < 0.0538, "Hertz, from both contacts");
+/// assert_eq!(press.report().work(Stage::Surface).runs, 0, "no surface so far");
+/// press.strain(1)?;
+/// assert_eq!(press.report().work(Stage::Surface).runs, 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Press<'a> {
+    stages: &'a dyn Stages,
+    reference: Arc<ReferenceFrame>,
+    frames: Vec<Loaded<'a>>,
+    /// The frame whose results a frame shares: itself, or an equal one before it.
+    twins: Vec<usize>,
+    force: ForceWorkspace,
+    surface: SurfaceWorkspace,
+    report: Report,
+}
+
+impl<'a> Press<'a> {
+    /// Starts a press with stages as an object; see [`Pipeline::press`](super::Pipeline::press).
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{BoxedPipeline, LightContact, Object, Press, StagesConfig};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let light = Box::new(LightContact::from_pairs(&pairs, [50e-6; 2])?);
+    /// let stages = BoxedPipeline::from_config(light, Object::sphere(3e-3), &StagesConfig::default())?;
+    /// let (reference, frame) = (hertz(0.0), hertz(120.0));
+    /// let mut press = Press::new(&stages, reference.view())?;
+    /// press.add_frame(frame.view());
+    /// assert_eq!(press.stages().settings().object, Object::sphere(3e-3));
+    /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
+    /// assert!((force.value / 1.005 - 1.0).abs() < 0.01);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
+    pub fn new(stages: &'a dyn Stages, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
+        Ok(Self::with_reference(stages, Arc::new(reference_frame(stages, &[reference])?)))
+    }
+
+    /// Starts a press on a reference made before: its noise is measured once for many presses.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tactile_imaging::force::ReferenceFrame;
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Press};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let (empty, frame) = (hertz(0.0), hertz(120.0));
+    /// // The mean of several exposures has less noise than one.
+    /// let reference = Arc::new(ReferenceFrame::from_frames(&[empty.view(), empty.view(), empty.view()])?);
+    /// let mut press = Press::with_reference(&pipeline, reference);
+    /// press.add_frame(frame.view());
+    /// let radius = press.contact(0)?.expect("a contact").contact_radius_m;
+    /// assert!((radius.value / 1e-3 - 1.0).abs() < 0.01);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn with_reference(stages: &'a dyn Stages, reference: Arc<ReferenceFrame>) -> Self {
+        Self {
+            stages,
+            reference,
+            frames: Vec::new(),
+            twins: Vec::new(),
+            force: ForceWorkspace::default(),
+            surface: SurfaceWorkspace::default(),
+            report: Report::default(),
+        }
+    }
+
+    /// The same frames on the same reference, of which nothing is computed yet: to time it again.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::pipeline::Stage;
+    /// let pipeline = trial.pipeline()?;
+    /// let mut press = trial.press(&pipeline)?;
+    /// let modulus = press.modulus()?;
+    /// let mut again = press.renewed();
+    /// assert_eq!((again.frames(), again.report().work(Stage::Contact).runs), (2, 0));
+    /// assert_eq!(again.modulus()?, modulus);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn renewed(&self) -> Self {
+        let mut press = Self::with_reference(self.stages, Arc::clone(&self.reference));
+        for frame in &self.frames {
+            press.add_gauged_frame(frame.image, frame.gauge_n);
+        }
+        press
+    }
+
+    /// Adds a frame; returns its number.
+    pub fn add_frame(&mut self, image: ArrayView2<'a, u8>) -> usize {
+        self.add_gauged_frame(image, None)
+    }
+
+    /// Adds a frame with a gauge's reading of the force; returns its number.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, PipelineError};
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// // A sensor that darkens knows depth, not force.
+    /// let contact = DarkContact::new(&[(0.0, 0.0), (150.0, 0.5e-3)], [50e-6; 2])?;
+    /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3));
+    /// let (reference, frame) = (hertz(0.0).mapv(|v| 255 - v), hertz(120.0).mapv(|v| 255 - v));
+    /// let mut press = pipeline.press(reference.view())?;
+    /// assert_eq!(press.add_gauged_frame(frame.view(), Some(0.9)), 0);
+    /// assert_eq!((press.gauge_n(0), press.image(0)), (Some(0.9), Some(frame.view())));
+    /// assert!(press.modulus().is_ok());
+    /// press.add_frame(frame.view());
+    /// assert_eq!(press.modulus().unwrap_err(), PipelineError::NoForce { frame: 1 });
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn add_gauged_frame(&mut self, image: ArrayView2<'a, u8>, gauge_n: Option<f64>) -> usize {
+        let index = self.frames.len();
+        let equal = |f: &Loaded<'_>| f.gauge_n == gauge_n && f.image == image;
+        let skip = self.stages.settings().skips.equal_frames;
+        let twin = if skip { self.frames.iter().position(equal) } else { None };
+        if twin.is_some() {
+            self.report.skipped(Stage::Contact, index, SkipReason::EqualFrame, image.len());
+        }
+        self.twins.push(twin.unwrap_or(index));
+        let (contact, surface, points, matching, strain) = (None, None, None, None, None);
+        self.frames.push(Loaded { image, gauge_n, contact, surface, points, matching, strain });
+        index
+    }
+
+    /// The stages.
+    pub fn stages(&self) -> &'a dyn Stages {
+        self.stages
+    }
+
+    /// The image of a frame.
+    pub fn image(&self, frame: usize) -> Option<ArrayView2<'a, u8>> {
+        Some(self.frames.get(frame)?.image)
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// What was computed and skipped so far.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// The gauge's reading of a frame's force, if there was one.
+    pub fn gauge_n(&self, frame: usize) -> Option<f64> {
+        self.frames.get(frame)?.gauge_n
+    }
+
+    fn twin(&self, frame: usize) -> Result<usize, PipelineError> {
+        let frames = self.frames.len();
+        self.twins.get(frame).copied().ok_or(PipelineError::NoSuchFrame { frame, frames })
+    }
+}

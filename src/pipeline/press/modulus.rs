@@ -1,0 +1,109 @@
+//! The modulus of a press, and the loads it is estimated from.
+use super::Press;
+use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::object::{
+    LoadReading, SharedErrors, all_estimates, chosen_estimate, radius_with_floor, split_errors,
+};
+use crate::pipeline::report::Stage;
+use std::time::Instant;
+
+impl Press<'_> {
+    /// Young's modulus by the estimator of the settings: unless another was chosen, the one that fits the object best. For a
+    /// ball that takes the contacts alone: no surface is reconstructed.
+    ///
+    /// # Errors
+    /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
+    pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
+        let with_strain = self.stages.settings().needs_strain();
+        let (loads, shared) = self.loads(with_strain)?;
+        let start = Instant::now();
+        let estimate = chosen_estimate(self.stages.settings(), &loads, shared);
+        self.report.ran(Stage::Modulus, start.elapsed());
+        estimate
+    }
+
+    /// What every frame says of its load, with the strain since the first: what an estimator of your own needs
+    /// ([`ModulusEstimator`](crate::elasticity::modulus::ModulusEstimator)).
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::Trial;
+    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// # let pipeline = trial.pipeline()?;
+    /// let loads = trial.press(&pipeline)?.load_states()?;
+    /// assert!((loads[1].force_n.value - 1.2).abs() < 0.01);
+    /// assert!(loads[0].mean_strain.is_none() && loads[1].mean_strain.is_some());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoForce`], and those of the contacts and of [`strain`](Self::strain).
+    pub fn load_states(&mut self) -> Result<Vec<LoadState<f64>>, PipelineError> {
+        Ok(self.loads(true)?.0)
+    }
+
+    /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::elasticity::modulus::EstimatorKind;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let mut press = trial.press(&pipeline)?;
+    /// let estimates = press.estimates()?;
+    /// assert_eq!(estimates[0].estimator, EstimatorKind::PaperRatio, "stress over strain");
+    /// let best = press.modulus()?;
+    /// assert!(estimates.contains(&best) && best.estimator == EstimatorKind::HertzSphere);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of the contacts; what an estimator cannot do is left out.
+    pub fn estimates(&mut self) -> Result<Vec<ModulusEstimate<f64>>, PipelineError> {
+        let (loads, shared) = match self.loads(true) {
+            Ok(loads) => loads,
+            Err(_) => self.loads(false)?,
+        };
+        let start = Instant::now();
+        let settings = self.stages.settings();
+        let estimates = all_estimates(&settings.object, settings.waveguide.as_ref(), &loads, shared);
+        self.report.ran(Stage::Modulus, start.elapsed());
+        Ok(estimates)
+    }
+
+    /// What every frame says of its load, and the relative errors that all share.
+    fn loads(&mut self, with_strain: bool) -> Result<(Vec<LoadState<f64>>, SharedErrors), PipelineError> {
+        let mut readings = Vec::with_capacity(self.frames.len());
+        let mut depths = Vec::with_capacity(self.frames.len());
+        let size = self.stages.contact().pixel_size_m();
+        for frame in 0..self.frames.len() {
+            let reading = self.reading(frame)?;
+            let force = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
+            let a = reading.contact_radius_m;
+            readings.push(LoadReading {
+                force_n: force.value,
+                noise_n: reading.force_noise_n,
+                calibration_n: reading.force_calibration_n,
+                radius_m: radius_with_floor(a.value, a.standard_error, size),
+            });
+            depths.push(reading.indentation_m);
+        }
+        let (mut loads, shared) = split_errors(readings.iter().copied(), self.stages.settings());
+        for (load, depth) in loads.iter_mut().zip(depths) {
+            load.indentation_m = depth.map(|d| Estimate::new(d.value, d.standard_error));
+        }
+        for frame in 1..if with_strain { loads.len() } else { 0 } {
+            if self.twins[frame] != 0 {
+                let step = readings[frame].force_n - readings[0].force_n;
+                let summary = &self.strain(frame)?.summary;
+                // (31) takes the strain's size; its sign says whether the load rose.
+                let value = summary.mean[(2, 2)].abs().copysign(step);
+                loads[frame].mean_strain = Some(Estimate::new(value, summary.standard_error[(2, 2)]));
+            }
+        }
+        Ok((loads, shared))
+    }
+}

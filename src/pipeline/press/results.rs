@@ -1,0 +1,168 @@
+//! What a press says of its frames, one stage after the other: contact, surface, control points, match, strain.
+use super::Press;
+use crate::matching::Matching;
+use crate::pipeline::contact::{ContactReading, FrameContact};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::pair::{self, PairStrain};
+use crate::pipeline::report::{SkipReason, Stage};
+use crate::pipeline::surface::{self, ContactSurface};
+use nalgebra::Point3;
+use std::time::Instant;
+
+impl Press<'_> {
+    /// The contact of a frame with its force; `None` where nothing touches.
+    ///
+    /// # Errors
+    /// [`PipelineError::Contact`], [`PipelineError::NoSuchFrame`].
+    pub fn contact(&mut self, frame: usize) -> Result<Option<&ContactReading>, PipelineError> {
+        let at = self.twin(frame)?;
+        if self.frames[at].contact.is_none() {
+            let start = Instant::now();
+            let mut contact = FrameContact::default();
+            let loaded = &self.frames[at];
+            self.stages
+                .contact()
+                .measure(&mut self.force, loaded.image, &self.reference, loaded.gauge_n, &mut contact)
+                .map_err(|source| PipelineError::Contact { frame, source })?;
+            let pixels = loaded.image.len();
+            match contact.region {
+                None => self.report.skipped(Stage::Surface, frame, SkipReason::NoContact, pixels),
+                Some(region) if self.stages.settings().skips.outside_contact => {
+                    let saved = pixels - region.rows() * region.columns();
+                    self.report.skipped(Stage::Surface, frame, SkipReason::OutsideContact, saved);
+                }
+                Some(_) => contact = contact.widened(loaded.image.dim()),
+            }
+            self.report.ran(Stage::Contact, start.elapsed());
+            self.frames[at].contact = Some(contact);
+        }
+        Ok(self.frames[at].contact.as_ref().and_then(|c| c.reading.as_ref()))
+    }
+
+    /// The contact of a frame that must have one.
+    pub(super) fn reading(&mut self, frame: usize) -> Result<ContactReading, PipelineError> {
+        self.contact(frame)?.copied().ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// The surface of a frame's contact.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?;
+    /// let mut press = trial.press(&pipeline)?;
+    /// let surface = press.surface(0)?;
+    /// let top = surface.surface.heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
+    /// // Hertz's pressure read as shading is a hemisphere as high as the contact's radius.
+    /// let radius = trial.truth().frames[0].contact_radius_m;
+    /// assert!((top / radius - 1.0).abs() < 0.1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoContact`], [`PipelineError::Surface`], and those of [`contact`](Self::contact).
+    pub fn surface(&mut self, frame: usize) -> Result<&ContactSurface, PipelineError> {
+        self.reading(frame)?;
+        self.contact(0)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].surface.is_none() {
+            let start = Instant::now();
+            let loaded = &self.frames[at];
+            let contact = loaded.contact.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let images = [loaded.image, self.reference.image()];
+            // All surfaces have the first one's grid, so that what the grid does to them leaves no strain.
+            let first = self.frames[0].contact.as_ref().unwrap_or(contact);
+            let pixels = first.mask.iter().filter(|m| **m).count();
+            let surface = surface::reconstruct(self.stages, &mut self.surface, images, contact, pixels)
+                .map_err(|source| PipelineError::Surface { frame, source })?;
+            self.report.ran(Stage::Surface, start.elapsed());
+            self.frames[at].surface = Some(surface);
+        }
+        self.frames[at].surface.as_ref().ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// Control points on a frame's surface, in metres from the frame's first pixel.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let mut press = trial.press(&pipeline)?;
+    /// let points = press.control_points(0)?;
+    /// assert_eq!(points.len(), 60);
+    /// // All within the contact, whose middle is the frame's: (86.5, 64.5) pixels.
+    /// let radius = 1.1 * trial.truth().frames[0].contact_radius_m;
+    /// assert!(points.iter().all(|p| (p.x - 86.5 * 172.4e-6).hypot(p.y - 64.5 * 172.4e-6) < radius));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`surface`](Self::surface).
+    pub fn control_points(&mut self, frame: usize) -> Result<&[Point3<f64>], PipelineError> {
+        self.surface(frame)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].points.is_none() {
+            let start = Instant::now();
+            let surface = self.frames[at].surface.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let points = surface::sample(self.stages, surface)
+                .map_err(|source| PipelineError::Surface { frame, source })?;
+            self.report.ran(Stage::ControlPoints, start.elapsed());
+            self.frames[at].points = Some(points);
+        }
+        Ok(self.frames[at].points.as_deref().unwrap_or_default())
+    }
+
+    /// The matches of the first frame's control points to those of a later frame.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?.with_control_points(60);
+    /// let mut press = trial.press(&pipeline)?;
+    /// let matching = press.matching(1)?;
+    /// let partners: Vec<_> = matching.assignment.iter().flatten().copied().collect();
+    /// assert!(partners.len() > 50);
+    /// assert_eq!(matching.warped.len(), 60, "where the first frame's points have gone");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::Match`] and those of [`control_points`](Self::control_points).
+    pub fn matching(&mut self, frame: usize) -> Result<&Matching<f64, 3>, PipelineError> {
+        self.control_points(0)?;
+        self.control_points(frame)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].matching.is_none() {
+            let start = Instant::now();
+            let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
+            let matching = pair::match_points(self.stages, [0, frame], points(0), points(at))?;
+            self.report.ran(Stage::Match, start.elapsed());
+            self.frames[at].matching = Some(matching);
+        }
+        self.frames[at].matching.as_ref().ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// The strain between the first frame and a later one.
+    ///
+    /// # Errors
+    /// [`PipelineError::TooFewMatches`], [`PipelineError::Warp`], [`PipelineError::Strain`] and those of
+    /// [`matching`](Self::matching).
+    pub fn strain(&mut self, frame: usize) -> Result<&PairStrain, PipelineError> {
+        self.matching(frame)?;
+        let at = self.twin(frame)?;
+        if self.frames[at].strain.is_none() {
+            let start = Instant::now();
+            let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
+            let matching = self.frames[at].matching.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let grid_m =
+                self.frames[at].surface.as_ref().map_or(0.0, |s| s.pixel_size_m[0].max(s.pixel_size_m[1]));
+            let strain = pair::strain(self.stages, [0, frame], points(0), points(at), matching, grid_m)?;
+            self.report.ran(Stage::Strain, start.elapsed());
+            self.frames[at].strain = Some(strain);
+        }
+        self.frames[at].strain.as_ref().ok_or(PipelineError::NoContact { frame })
+    }
+}

@@ -1,0 +1,193 @@
+//! The settings of a pipeline, one by one.
+use super::Pipeline;
+use crate::elasticity::contact::Waveguide;
+use crate::pipeline::binning::Binning;
+use crate::pipeline::choice::EstimatorChoice;
+use crate::pipeline::object::Object;
+use crate::pipeline::settings::Skips;
+
+impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
+    /// Tells of the sensor's layers: both bodies yield.
+    ///
+    /// ```
+    /// use tactile_imaging::elasticity::contact::{Layer, Waveguide};
+    /// use tactile_imaging::pipeline::{Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let gel = Layer { thickness_m: 10e-3, youngs_modulus_pa: 10e6, poisson_ratio: 0.5 };
+    /// let rigid = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let yielding = rigid.clone().with_waveguide(Waveguide::new(vec![gel])?);
+    /// let (reference, frame) = (hertz(0.0), hertz(120.0));
+    /// let mut modulus = Vec::new();
+    /// for pipeline in [&rigid, &yielding] {
+    ///     let mut press = pipeline.press(reference.view())?;
+    ///     press.add_frame(frame.view());
+    ///     modulus.push(press.modulus()?.youngs_modulus_pa);
+    /// }
+    /// // Compliances add, both of Poisson's ratio ½: 1/E is smaller by the gel's 1/(10 MPa).
+    /// assert!((1.0 / modulus[0] - 1.0 / modulus[1] - 1e-7).abs() < 1e-9);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_waveguide(mut self, waveguide: Waveguide<f64>) -> Self {
+        self.settings.waveguide = Some(waveguide);
+        self
+    }
+
+    /// Says what is pressed.
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::{Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// let pairs = [0.0, 1e5, 2e5].map(|value| CalibrationPair::loading(value, 1e-5 * value));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [21.55e-6; 2], Object::sphere(3e-3))?;
+    /// assert!(!pipeline.settings().object.needs_strain());
+    /// let unknown = pipeline.with_object(Object::Unknown { poisson_ratio: 0.5 });
+    /// assert!(unknown.settings().object.needs_strain());
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    #[must_use]
+    pub fn with_object(mut self, object: Object) -> Self {
+        self.settings.object = object;
+        self
+    }
+
+    /// Takes another estimator of the modulus. For one of your own see [`Press::load_states`](crate::pipeline::Press::load_states).
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::{EstimatorChoice, Trial};
+    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let ratio = trial.pipeline()?.with_estimator(EstimatorChoice::PaperRatio);
+    /// let modulus = trial.press(&ratio)?.modulus()?;
+    /// assert_eq!(modulus.estimator.to_string(), "stress over mean strain");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_estimator(mut self, estimator: EstimatorChoice) -> Self {
+        self.settings.estimator = estimator;
+        self
+    }
+
+    /// Sets the number of control points.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// let pipeline = trial.pipeline()?.with_control_points(40);
+    /// assert_eq!(trial.press(&pipeline)?.control_points(0)?.len(), 40);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_control_points(mut self, count: usize) -> Self {
+        self.settings.control_points = count;
+        self
+    }
+
+    /// Sets the width in pixels of the smoothing before the surface stage: odd, 1 for none (even widths count as one more).
+    ///
+    /// ```
+    /// use tactile_imaging::{Object, Pipeline};
+    /// let pipeline = Pipeline::new((), Object::sphere(3e-3));
+    /// assert_eq!(pipeline.settings().smoothing_px, 5);
+    /// assert_eq!(pipeline.with_smoothing(8).settings().smoothing_px, 9);
+    /// ```
+    #[must_use]
+    pub fn with_smoothing(mut self, width_px: usize) -> Self {
+        self.settings.smoothing_px = width_px | 1;
+        self
+    }
+
+    /// Sets the grid of the surface stage (default [`Binning::Auto`] for shading, every pixel for signals).
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::pipeline::Binning;
+    /// let pipeline = trial.pipeline()?.with_binning(Binning::Blocks(2));
+    /// let mut press = trial.press(&pipeline)?;
+    /// // Blocks of 2 × 2 pixels of 172.4 µm.
+    /// assert!((press.surface(0)?.pixel_size_m[0] - 344.8e-6).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_binning(mut self, binning: Binning) -> Self {
+        self.settings.binning = binning;
+        self
+    }
+
+    /// Corrects vignetting by the reference's own brightness or not (default: not); see [`Settings::flat_field`](crate::pipeline::Settings::flat_field).
+    ///
+    /// ```
+    /// use tactile_imaging::{Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// // A lens that darkens stray light and signal alike towards the right: by 11 % at the contact.
+    /// let lens = |c: usize| 1.0 - 0.005 * (c as f64 - 47.5);
+    /// let press = |peak: f64| ndarray::Array2::from_shape_fn((64, 96), |(r, c)| {
+    ///     let d = ((r as f64 - 32.0).hypot(c as f64 - 70.0) / 20.0).min(1.0);
+    ///     (lens(c) * (100.0 + peak * (1.0 - d * d).sqrt())).round() as u8
+    /// });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let (reference, frame) = (press(0.0), press(120.0));
+    /// for (flat_field, newton) in [(false, 0.89 * 1.005), (true, 1.005)] {
+    ///     let pipeline = pipeline.clone().with_flat_field(flat_field);
+    ///     let mut press = pipeline.press(reference.view())?;
+    ///     press.add_frame(frame.view());
+    ///     let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
+    ///     assert!((force.value / newton - 1.0).abs() < 0.01);
+    /// }
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    #[must_use]
+    pub fn with_flat_field(mut self, flat_field: bool) -> Self {
+        self.settings.flat_field = flat_field;
+        self
+    }
+
+    /// Sets the relative errors common to all forces (default 0.1 %) and to all lengths (default none). What is negative or
+    /// not finite counts as zero.
+    ///
+    /// ```
+    /// use tactile_imaging::{Object, Pipeline};
+    /// let pipeline = Pipeline::new((), Object::sphere(3e-3)).with_scale_errors(0.02, 0.005);
+    /// assert_eq!((pipeline.settings().force_scale_error, pipeline.settings().length_scale_error), (0.02, 0.005));
+    /// assert_eq!(pipeline.with_scale_errors(0.02, f64::NAN).settings().length_scale_error, 0.0);
+    /// ```
+    #[must_use]
+    pub fn with_scale_errors(mut self, force: f64, length: f64) -> Self {
+        let valid = |v: f64| if v > 0.0 && v.is_finite() { v } else { 0.0 };
+        self.settings.force_scale_error = valid(force);
+        self.settings.length_scale_error = valid(length);
+        self
+    }
+
+    /// Sets what may be left out.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::pipeline::{Skips, Stage};
+    /// let pipeline = trial.pipeline()?.with_skips(Skips { equal_frames: false, ..Skips::default() });
+    /// let mut press = pipeline.press(trial.simulation.reference.view())?;
+    /// for _ in 0..2 {
+    ///     let frame = press.add_frame(trial.simulation.frames[0].view());
+    ///     press.contact(frame)?;
+    /// }
+    /// assert_eq!(press.report().work(Stage::Contact).runs, 2, "the same image, measured twice");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_skips(mut self, skips: Skips) -> Self {
+        self.settings.skips = skips;
+        self
+    }
+}
