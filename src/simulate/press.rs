@@ -129,7 +129,7 @@ impl PressScene {
         self.options.camera.expose_load(light.view(), self.options.seed, load, repeat)
     }
 
-    /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`] to draw many
+    /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`](super::Camera::expose) to draw many
     /// exposures of the same light.
     ///
     /// ```

@@ -69,7 +69,7 @@ impl Load {
     }
 }
 
-/// Everything that describes a press; [`PressScene::new`] checks it.
+/// Everything that describes a press; [`PressScene::new`](super::PressScene::new) checks it.
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, Elastic, Load, PressOptions, PressScene, Sphere};

@@ -6,7 +6,7 @@ use super::material::Elastic;
 use super::press_options::Gain;
 use super::relief::SurfacePattern;
 
-/// Everything that describes the squeezed block; [`UniaxialScene::new`] checks it.
+/// Everything that describes the squeezed block; [`UniaxialScene::new`](super::UniaxialScene::new) checks it.
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
