@@ -1,6 +1,7 @@
 //! Sets whose displacements are many times their spacing, evenly spread: annealing alone leaves parts one point aside.
 use nalgebra::{Point, Point2, Point3};
-use tactile_match::{PointMatcher, RelaxationMatcher};
+use std::ops::ControlFlow;
+use tactile_match::{PointMatcher, RelaxationMatcher, RelaxationWorkspace};
 
 /// A number of (−1, 1), without pattern and the same on every machine.
 fn scatter(i: usize, k: usize) -> f64 {
@@ -68,4 +69,26 @@ fn a_dense_surface_in_space_is_matched() {
     let model: Vec<_> = sunflower(1000).into_iter().map(|p| lift(p, 0.5)).collect();
     let target: Vec<_> = sunflower(1000).iter().map(|p| lift(warp(p, 0.12), 0.6)).collect();
     assert_eq!(score(&model, &target, 0), (1000, 0));
+}
+
+#[test]
+fn what_a_workspace_did_before_changes_no_answer() {
+    let scene = |n: usize, noise: f64| {
+        let model = sunflower(n);
+        let off = |i: usize| noise * Point2::new(scatter(i + 7, 0), scatter(i + 7, 1)).coords;
+        let target: Vec<_> = model.iter().enumerate().map(|(i, p)| warp(p, 0.0) + off(i)).collect();
+        (model, target)
+    };
+    let matcher = RelaxationMatcher::default();
+    let run = |workspace: &mut RelaxationWorkspace<2>,
+               (model, target): &(Vec<Point2<f64>>, Vec<Point2<f64>>)| {
+        let go = |_, _| ControlFlow::Continue(());
+        let found = matcher.match_points_with(workspace, model, target, go).unwrap();
+        (found.report(), found.assignment().to_vec())
+    };
+    // In the first scene patterns are looked at, with a wider spacing than the second's, whose first run is nearly right.
+    let (coarse, dense) = (scene(500, 0.01), scene(700, 0.006));
+    let mut used = RelaxationWorkspace::new();
+    run(&mut used, &coarse);
+    assert_eq!(run(&mut used, &dense), run(&mut RelaxationWorkspace::new(), &dense));
 }

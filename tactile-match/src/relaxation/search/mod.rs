@@ -219,6 +219,7 @@ fn begin<const D: usize>(ws: &mut RelaxationWorkspace<D>) {
     ws.annealer.volume = bounding_volume(&ws.target);
     ws.annealer.prior.build(&ws.model, SCALES);
     ws.annealer.soft.set_targets(&ws.target);
+    ws.constellations.spacing = 0.0;
     (ws.starts, ws.stopped) = (0, false);
     ws.best.energy = f64::INFINITY;
     starts::centred(&ws.model, &ws.target, &mut ws.state.base);
