@@ -86,14 +86,20 @@ impl<T: Scalar, const D: usize> MatchSeries<T, D> {
     /// # Ok::<(), tactile_match::MatchError>(())
     /// ```
     pub fn remember(&mut self, model: &[Point<T, D>], found: &Matching<T, D>) {
-        if self.model != model {
-            self.model.clear();
-            self.model.extend_from_slice(model);
-            self.interpolation = None;
-        }
+        self.adopt(model);
         self.last.clone_from(&found.warped);
         self.matched = found.assignment.iter().flatten().count();
         self.sigma = found.report.sigma;
+    }
+
+    /// Forgets the past of another model.
+    fn adopt(&mut self, model: &[Point<T, D>]) {
+        if self.model != model {
+            self.model.clear();
+            self.model.extend_from_slice(model);
+            self.last.clear();
+            self.interpolation = None;
+        }
     }
 
     /// The factorised system of the model's interpolating spline, and the workspace.
@@ -101,9 +107,7 @@ impl<T: Scalar, const D: usize> MatchSeries<T, D> {
         &mut self,
         model: &[Point<T, D>],
     ) -> (&Interpolation<T, D>, &mut RelaxationWorkspace<D>) {
-        if self.model != model {
-            self.interpolation = None;
-        }
+        self.adopt(model);
         let Self { interpolation, workspace, .. } = self;
         let interpolation =
             interpolation.get_or_insert_with(|| Interpolation::new(model, None, Smoothing::None));

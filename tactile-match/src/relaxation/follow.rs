@@ -2,7 +2,7 @@
 
 use super::frame::mean;
 use super::{RelaxationMatch, RelaxationMatcher, finish};
-use crate::{MatchError, MatchSeries, Matching};
+use crate::{MatchError, MatchSeries, Matching, validate};
 use nalgebra::Point;
 use std::ops::ControlFlow;
 use tactile_tps::Scalar;
@@ -23,6 +23,8 @@ impl RelaxationMatcher {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
+        // Before the series takes notice of the model.
+        validate::point_sets(model, target)?;
         let go = |_, _| ControlFlow::Continue(());
         let found = match self.go_on(series, model, target)? {
             Some(found) => found,

@@ -87,7 +87,13 @@ fn an_error_leaves_the_series_as_it_was() {
     let before = series.last_for(&model).unwrap().to_vec();
     assert!(near().match_next(&mut series, &model, &[]).is_err());
     assert!(near().match_next(&mut series, &model, &[Point3::new(f64::NAN, 0.0, 0.0)]).is_err());
+    // Nor does another model that cannot be matched leave anything of its own.
+    assert!(near().match_next(&mut series, &dome(70), &[]).is_err());
     assert_eq!(series.last_for(&model), Some(&*before));
+    let target = frame(&model, 1, 0.0);
+    let next = near().match_next(&mut series, &model, &target).unwrap();
+    agree(&next, &near().match_points(&model, &target).unwrap(), 1e-12);
+    assert!((next.warp.apply(&model[5]) - target[5]).norm() < 1e-9, "the spline is that of its own model");
 }
 
 #[test]
