@@ -6,7 +6,9 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::hint::black_box;
 use tactile_imaging::elasticity::contact::{Bond, LayerEquation, LayerKernel};
-use tactile_imaging::elasticity::curve::{CurveOptions, IndentationCurve, Indenter, Model, select_model};
+use tactile_imaging::elasticity::curve::{
+    CurveOptions, IndentationCurve, Indenter, Model, select_model,
+};
 use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, StrainMeasure, green_lagrange_into,
@@ -19,8 +21,9 @@ fn gradients() -> Vec<Matrix3<f64>> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     (0..GRADIENTS)
         .map(|_| {
-            let turn =
-                Rotation3::from_scaled_axis(Vector3::from([(); 3].map(|()| 0.1 * rng.random::<f64>())));
+            let turn = Rotation3::from_scaled_axis(Vector3::from(
+                [(); 3].map(|()| 0.1 * rng.random::<f64>()),
+            ));
             let h = Matrix3::from_fn(|_, _| 0.4 * rng.random::<f64>() - 0.2);
             turn.matrix() * (Matrix3::identity() + h) - Matrix3::identity()
         })
@@ -39,7 +42,9 @@ fn strain(c: &mut Criterion) {
         })
         .fold(0.0, f64::max);
     assert!(error < 1e-15);
-    println!("Green-Lagrange of {GRADIENTS} gradients: largest difference to (F'F - I)/2 {error:.1e}");
+    println!(
+        "Green-Lagrange of {GRADIENTS} gradients: largest difference to (F'F - I)/2 {error:.1e}"
+    );
     let mut group = c.benchmark_group("strain_100000");
     group.throughput(Throughput::Elements(GRADIENTS as u64));
     group.bench_function("green_lagrange_into_f64", |b| {
@@ -52,13 +57,15 @@ fn strain(c: &mut Criterion) {
     });
     let measures: [&dyn StrainMeasure<f64>; 4] = [&GreenLagrange, &EulerAlmansi, &Hencky, &Biot];
     for measure in measures {
-        group.sample_size(10).bench_function(format!("one at a time, {}", measure.name()), |b| {
-            b.iter(|| {
-                for (h, e) in black_box(&gradients).iter().zip(&mut strains) {
-                    *e = measure.strain(h).unwrap();
-                }
+        group
+            .sample_size(10)
+            .bench_function(format!("one at a time, {}", measure.name()), |b| {
+                b.iter(|| {
+                    for (h, e) in black_box(&gradients).iter().zip(&mut strains) {
+                        *e = measure.strain(h).unwrap();
+                    }
+                });
             });
-        });
     }
     group.finish();
 }
@@ -68,7 +75,9 @@ fn layers(c: &mut Criterion) {
     let error = equation.solve(1.0).unwrap().force_ratio - 3.371_098_31;
     assert!(error.abs() < 1e-8);
     println!("sphere on a bonded layer, a/h = 1: force ratio off by {error:.1e}");
-    c.bench_function("layer integral equation, a/h = 1", |b| b.iter(|| equation.solve(black_box(1.0))));
+    c.bench_function("layer integral equation, a/h = 1", |b| {
+        b.iter(|| equation.solve(black_box(1.0)))
+    });
 }
 
 fn moduli(c: &mut Criterion) {
@@ -76,24 +85,38 @@ fn moduli(c: &mut Criterion) {
         .map(|k| {
             let f = 1e-3 * f64::from(k);
             let a = (0.75 * f * 4e-3 / 80e3).cbrt();
-            LoadState::new(Estimate::new(f, 1e-2 * f)).with_contact_radius(Estimate::new(a, 1e-3 * a))
+            LoadState::new(Estimate::new(f, 1e-2 * f))
+                .with_contact_radius(Estimate::new(a, 1e-3 * a))
         })
         .collect();
-    let estimator = HertzSphere::new(4e-3, 0.5).unwrap().with_force_scale_error(0.01).unwrap();
+    let estimator = HertzSphere::new(4e-3, 0.5)
+        .unwrap()
+        .with_force_scale_error(0.01)
+        .unwrap();
     let error = estimator.estimate(&loads).unwrap().youngs_modulus_pa / 60e3 - 1.0;
     assert!(error.abs() < 1e-12);
     println!("modulus from twelve loads: off by {error:.1e}");
-    c.bench_function("Hertz sphere, 12 loads", |b| b.iter(|| estimator.estimate(black_box(&loads))));
+    c.bench_function("Hertz sphere, 12 loads", |b| {
+        b.iter(|| estimator.estimate(black_box(&loads)))
+    });
     let z: Vec<f64> = (0..200).map(|i| f64::from(i) * 2e-6).collect();
-    let f: Vec<f64> =
-        z.iter().map(|z| 4.0 / 3.0 * 80e3 * 4e-3f64.sqrt() * (z - 1e-4).max(0.0).powf(1.5)).collect();
+    let f: Vec<f64> = z
+        .iter()
+        .map(|z| 4.0 / 3.0 * 80e3 * 4e-3f64.sqrt() * (z - 1e-4).max(0.0).powf(1.5))
+        .collect();
     let curve = IndentationCurve::new(&z, &f).unwrap();
-    let sphere = Indenter::Sphere { radius_m: 4e-3, thickness_m: None, bond: Bond::Bonded };
+    let sphere = Indenter::Sphere {
+        radius_m: 4e-3,
+        thickness_m: None,
+        bond: Bond::Bonded,
+    };
     let fit = || select_model(&curve, &sphere, 0.5, Model::Auto, &CurveOptions::default()).unwrap();
     let error = fit().chosen().youngs_modulus_pa / 60e3 - 1.0;
     assert!(error.abs() < 1e-6);
     println!("modulus from a curve of 200 points with contact-point search: off by {error:.1e}");
-    c.benchmark_group("curve").sample_size(10).bench_function("200 points", |b| b.iter(fit));
+    c.benchmark_group("curve")
+        .sample_size(10)
+        .bench_function("200 points", |b| b.iter(fit));
 }
 
 criterion_group!(benches, strain, layers, moduli);

@@ -8,11 +8,13 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use tactile_imaging::force::{
-    CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions, DetectorWorkspace, ForceMeter,
-    ForceOptions, ForceWorkspace, LinearCalibration, MonotoneCalibration, PolynomialCalibration,
-    ReferenceFrame, StressCalibration,
+    CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions, DetectorWorkspace,
+    ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, MonotoneCalibration,
+    PolynomialCalibration, ReferenceFrame, StressCalibration,
 };
-use tactile_imaging::simulate::{CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene};
+use tactile_imaging::simulate::{
+    CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene,
+};
 
 struct Scene {
     scene: PressScene,
@@ -27,12 +29,20 @@ fn scene() -> Scene {
 
 /// A contact so many times as wide as the default ball's: a ∝ R^⅓ under the same force.
 fn scene_of(wider: f64) -> Scene {
-    let mut options = PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() };
+    let mut options = PressOptions {
+        loads: vec![Load::normal(0.7)],
+        ..PressOptions::default()
+    };
     options.object.radius_m *= wider.powi(3);
     let scene = PressScene::new(options).expect("a valid scene");
     let reference = ReferenceFrame::new(scene.reference(0).view()).expect("a valid frame");
     let (quiet, pressed) = (scene.reference(1), scene.frame(0, 0));
-    Scene { scene, reference, quiet, pressed }
+    Scene {
+        scene,
+        reference,
+        quiet,
+        pressed,
+    }
 }
 
 /// The sum as one writes it, and with a 32-bit sum for every 64 KiB, which the compiler turns into wide instructions.
@@ -41,7 +51,10 @@ fn add_up(bytes: &[u8]) -> u64 {
 }
 
 fn add_up_blocks(bytes: &[u8]) -> u64 {
-    bytes.chunks(1 << 16).map(|c| u64::from(c.iter().map(|&b| u32::from(b)).sum::<u32>())).sum()
+    bytes
+        .chunks(1 << 16)
+        .map(|c| u64::from(c.iter().map(|&b| u32::from(b)).sum::<u32>()))
+        .sum()
 }
 
 fn pass(c: &mut Criterion) {
@@ -49,11 +62,19 @@ fn pass(c: &mut Criterion) {
     let bytes = s.quiet.as_slice().expect("contiguous");
     let mut group = c.benchmark_group("force/pass");
     group.bench_function("add up the bytes", |b| b.iter(|| add_up(black_box(bytes))));
-    group.bench_function("add up the bytes, blocked", |b| b.iter(|| add_up_blocks(black_box(bytes))));
+    group.bench_function("add up the bytes, blocked", |b| {
+        b.iter(|| add_up_blocks(black_box(bytes)))
+    });
     let statistics = s.reference.compare(s.quiet.view(), 10).expect("same size");
     let reference: u64 = add_up(s.reference.image().as_slice().expect("contiguous"));
-    assert_eq!(statistics.sum, add_up(bytes) as i64 - reference as i64, "the pass is exact");
-    group.bench_function("the pass alone", |b| b.iter(|| s.reference.compare(black_box(s.quiet.view()), 10)));
+    assert_eq!(
+        statistics.sum,
+        add_up(bytes) as i64 - reference as i64,
+        "the pass is exact"
+    );
+    group.bench_function("the pass alone", |b| {
+        b.iter(|| s.reference.compare(black_box(s.quiet.view()), 10))
+    });
     let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
     let mut workspace = DetectorWorkspace::default();
     let mut detect = |frame: &Array2<u8>| {
@@ -64,7 +85,9 @@ fn pass(c: &mut Criterion) {
             .is_some()
     };
     assert!(!detect(&s.quiet) && detect(&s.pressed));
-    group.bench_function("frame without contact", |b| b.iter(|| detect(black_box(&s.quiet))));
+    group.bench_function("frame without contact", |b| {
+        b.iter(|| detect(black_box(&s.quiet)))
+    });
     group.finish();
 }
 
@@ -73,11 +96,16 @@ fn contact(c: &mut Criterion) {
         let s = scene_of(wider);
         let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
         let mut workspace = DetectorWorkspace::default();
-        let mut detect =
-            || detector.detect_with::<f64>(&mut workspace, black_box(s.pressed.view()), &s.reference);
-        let (contact, truth) = (detect().expect("valid").contact.expect("contact"), s.scene.truth(0));
-        let error =
-            (0..2).map(|k| (contact.centroid_px[k].value - truth.centroid_px[k]).abs()).fold(0.0, f64::max);
+        let mut detect = || {
+            detector.detect_with::<f64>(&mut workspace, black_box(s.pressed.view()), &s.reference)
+        };
+        let (contact, truth) = (
+            detect().expect("valid").contact.expect("contact"),
+            s.scene.truth(0),
+        );
+        let error = (0..2)
+            .map(|k| (contact.centroid_px[k].value - truth.centroid_px[k]).abs())
+            .fold(0.0, f64::max);
         assert!(error < 0.02, "centroid off by {error} px");
         eprintln!(
             "force/contact: radius {:.0} px, {:.1} % of the frame, centroid off by {error:.4} px, stated {:.4} px",
@@ -87,38 +115,70 @@ fn contact(c: &mut Criterion) {
         );
         let meter = ForceMeter::new([1.0, 1.0], &ForceOptions::default()).expect("valid");
         let mut workspace = ForceWorkspace::default();
-        let unit: Vec<_> =
-            (0..5).map(|k| 1e6 * f64::from(k)).map(|v| CalibrationPair::loading(v, v)).collect();
-        let unit = LinearCalibration::fit(&unit, &CalibrationOptions::default()).expect("enough pairs");
-        c.bench_function(&format!("force/contact/detect, {name}"), |b| b.iter(&mut detect));
-        c.bench_function(&format!("force/contact/detect and fit the profile, {name}"), |b| {
-            b.iter(|| meter.measure_with(&mut workspace, black_box(s.pressed.view()), &s.reference, &unit))
+        let unit: Vec<_> = (0..5)
+            .map(|k| 1e6 * f64::from(k))
+            .map(|v| CalibrationPair::loading(v, v))
+            .collect();
+        let unit =
+            LinearCalibration::fit(&unit, &CalibrationOptions::default()).expect("enough pairs");
+        c.bench_function(&format!("force/contact/detect, {name}"), |b| {
+            b.iter(&mut detect)
         });
+        c.bench_function(
+            &format!("force/contact/detect and fit the profile, {name}"),
+            |b| {
+                b.iter(|| {
+                    meter.measure_with(
+                        &mut workspace,
+                        black_box(s.pressed.view()),
+                        &s.reference,
+                        &unit,
+                    )
+                })
+            },
+        );
     }
 }
 
 fn hertz_fit(c: &mut Criterion) {
     let s = scene();
-    let run = SimulatedRun { steps: 5, ..SimulatedRun::default() };
+    let run = SimulatedRun {
+        steps: 5,
+        ..SimulatedRun::default()
+    };
     let series = s.scene.calibrate(&run).expect("valid");
-    let pairs: Vec<_> = series.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
-    let calibration = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");
+    let pairs: Vec<_> = series
+        .pairs()
+        .map(|(v, f)| CalibrationPair::loading(v, f))
+        .collect();
+    let calibration =
+        LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");
     let truth = s.scene.truth(0);
     let mut group = c.benchmark_group("force/hertz_fit");
-    for (name, skip_profile) in
-        [("whole frame without the profile", true), ("whole frame with the profile", false)]
-    {
-        let options = ForceOptions { skip_profile, ..ForceOptions::default() };
+    for (name, skip_profile) in [
+        ("whole frame without the profile", true),
+        ("whole frame with the profile", false),
+    ] {
+        let options = ForceOptions {
+            skip_profile,
+            ..ForceOptions::default()
+        };
         let meter = ForceMeter::new(truth.pixel_size_m, &options).expect("valid");
         let mut workspace = ForceWorkspace::default();
         let mut measure = || {
             meter
-                .measure_with(&mut workspace, black_box(s.pressed.view()), &s.reference, &calibration)
+                .measure_with(
+                    &mut workspace,
+                    black_box(s.pressed.view()),
+                    &s.reference,
+                    &calibration,
+                )
                 .expect("valid")
         };
         let m = measure();
         let force = m.force_n.value / truth.contact.force_n - 1.0;
-        let radius = m.contact_radius_m.expect("contact").value / truth.contact.contact_radius_m - 1.0;
+        let radius =
+            m.contact_radius_m.expect("contact").value / truth.contact.contact_radius_m - 1.0;
         assert!(force.abs() < 5e-3 && radius.abs() < if skip_profile { 0.02 } else { 3e-3 });
         eprintln!(
             "force/hertz_fit/{name}: force off by {:+.3} %, radius by {:+.3} %",
@@ -140,21 +200,31 @@ fn calibration(c: &mut Criterion) {
     let options = CalibrationOptions::default();
     let mut group = c.benchmark_group("force/calibration");
     let error = |c: &dyn StressCalibration<f64>| {
-        (0..40).map(|k| 1e5 * f64::from(k)).map(|v| (c.force_n(v) - curve(v)).abs()).fold(0.0, f64::max)
+        (0..40)
+            .map(|k| 1e5 * f64::from(k))
+            .map(|v| (c.force_n(v) - curve(v)).abs())
+            .fold(0.0, f64::max)
     };
     let cubic = PolynomialCalibration::fit(&pairs, 3, &options).expect("enough pairs");
     let monotone = MonotoneCalibration::fit(&pairs, &options).expect("enough pairs");
     let errors = [error(&cubic), error(&monotone)];
     assert!(errors[0] < 1e-3 && errors[1] < 4e-3, "{errors:?}");
-    eprintln!("force/calibration: cubic off by {:.1e} N, monotone by {:.1e} N of 2 N", errors[0], errors[1]);
+    eprintln!(
+        "force/calibration: cubic off by {:.1e} N, monotone by {:.1e} N of 2 N",
+        errors[0], errors[1]
+    );
     group.bench_function("fit a cubic to 201 pairs", |b| {
         b.iter(|| PolynomialCalibration::fit(black_box(&pairs), 3, &options))
     });
     group.bench_function("fit a monotone curve to 201 pairs", |b| {
         b.iter(|| MonotoneCalibration::fit(black_box(&pairs), &options))
     });
-    group.bench_function("read a cubic", |b| b.iter(|| cubic.force_n(black_box(1.23e6))));
-    group.bench_function("read a monotone curve", |b| b.iter(|| monotone.force_n(black_box(1.23e6))));
+    group.bench_function("read a cubic", |b| {
+        b.iter(|| cubic.force_n(black_box(1.23e6)))
+    });
+    group.bench_function("read a monotone curve", |b| {
+        b.iter(|| monotone.force_n(black_box(1.23e6)))
+    });
     group.finish();
 }
 

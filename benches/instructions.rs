@@ -25,46 +25,63 @@ fn cloud(n: usize) -> (Points, Points) {
     let mut random = SmallRng::seed_from_u64(n as u64);
     let mut uniform = |size: f64| random.random_range(-size..size);
     let bumps: Vec<(Vector3<f64>, Vector3<f64>)> = (0..6)
-        .map(|_| (Vector3::from_fn(|_, _| uniform(1.2)), Vector3::from_fn(|_, _| uniform(0.2))))
+        .map(|_| {
+            (
+                Vector3::from_fn(|_, _| uniform(1.2)),
+                Vector3::from_fn(|_, _| uniform(0.2)),
+            )
+        })
         .collect();
     let model: Points = (0..n)
         .map(|i| {
             let (r, angle) = (((i as f64 + 0.5) / n as f64).sqrt(), 2.399_963 * i as f64);
             let jitter = 0.25 / (n as f64).sqrt();
-            let (x, y) = (r * angle.cos() + uniform(jitter), r * angle.sin() + uniform(jitter));
+            let (x, y) = (
+                r * angle.cos() + uniform(jitter),
+                r * angle.sin() + uniform(jitter),
+            );
             Point3::new(x, y, 0.6 * (-(x * x + y * y) / 0.4).exp())
         })
         .collect();
     let map = |p: &Point3<f64>| {
-        bumps.iter().fold(*p, |q, (c, a)| q + a * (-(p.coords - c).norm_squared() / 1.28).exp())
+        bumps.iter().fold(*p, |q, (c, a)| {
+            q + a * (-(p.coords - c).norm_squared() / 1.28).exp()
+        })
     };
     let moved = model.iter().map(map).collect();
     (model, moved)
 }
 
 fn distance(a: &[Point3<f64>], b: &[Point3<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max)
 }
 
 fn match_105() {
     let (model, moved) = cloud(105);
     let mut target = moved.clone();
     target.reverse();
-    let matching = counted(|| RelaxationMatcher::default().match_points(&model, &target)).expect("a match");
+    let matching =
+        counted(|| RelaxationMatcher::default().match_points(&model, &target)).expect("a match");
     // A clean scene is solved to rounding.
     assert!(distance(&matching.warped, &moved) < 1e-9);
 }
 
 fn spline_fit_200() {
     let (model, moved) = cloud(200);
-    let spline = counted(|| ThinPlateSpline::fit(&model, &moved, &FitOptions::new(NegR))).expect("a spline");
+    let spline =
+        counted(|| ThinPlateSpline::fit(&model, &moved, &FitOptions::new(NegR))).expect("a spline");
     // Interpolation: rounding times the condition number, about 1e3.
     assert!(spline.report().residual.expect("measured") < 1e-11);
 }
 
 fn frame_pass() {
     let image = |step: usize| {
-        ndarray::Array2::from_shape_fn((1042, 1392), |(y, x)| ((y * 7919 + x * 104_729 + step) % 251) as u8)
+        ndarray::Array2::from_shape_fn((1042, 1392), |(y, x)| {
+            ((y * 7919 + x * 104_729 + step) % 251) as u8
+        })
     };
     let (before, after) = (image(0), image(31));
     let reference = ReferenceFrame::new(before.view()).expect("a frame");
@@ -75,12 +92,19 @@ fn frame_pass() {
 
 /// The whole pipeline on frames of 348 × 260 pixels, a quarter of the paper's each way: callgrind slows it fiftyfold.
 fn pipeline() {
-    let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
-    let options = PressOptions { camera, ..PressOptions::default() };
+    let camera = Camera {
+        shape: [260, 348],
+        pixel_size_m: [86.2e-6; 2],
+        ..Camera::default()
+    };
+    let options = PressOptions {
+        camera,
+        ..PressOptions::default()
+    };
     let trial = Trial::new(options, &CalibrationOptions::default()).expect("default options");
     let stages = trial.pipeline().expect("a calibrated sensor");
-    let measured =
-        counted(|| trial.press(&stages).and_then(|mut press| press.measure())).expect("a measurement");
+    let measured = counted(|| trial.press(&stages).and_then(|mut press| press.measure()))
+        .expect("a measurement");
     let error = measured.youngs_modulus_pa.value / trial.truth().youngs_modulus_pa - 1.0;
     // The paper's own error.
     assert!(error.abs() < 0.0538, "{error}");
@@ -94,7 +118,10 @@ const JOBS: [(&str, fn()); 4] = [
 ];
 
 fn main() {
-    let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let wanted: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| !a.starts_with("--"))
+        .collect();
     for (name, job) in JOBS {
         if wanted.is_empty() || wanted.iter().any(|w| w == name) {
             job();

@@ -10,7 +10,9 @@ use std::ops::ControlFlow;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point, SVector};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
-use tactile_imaging::matching::{DenseRelaxation, PointMatcher, RelaxationMatcher, RelaxationWorkspace};
+use tactile_imaging::matching::{
+    DenseRelaxation, PointMatcher, RelaxationMatcher, RelaxationWorkspace,
+};
 
 /// A model, a target, and where each model point truly goes.
 struct Scene<const D: usize> {
@@ -28,41 +30,77 @@ impl<const D: usize> Scene<D> {
             .map(|i| {
                 let (r, angle) = (((i as f64 + 0.5) / n as f64).sqrt(), 2.399_963 * i as f64);
                 let jitter = 0.25 / (n as f64).sqrt();
-                let plane = [r * angle.cos() + uniform(jitter), r * angle.sin() + uniform(jitter)];
+                let plane = [
+                    r * angle.cos() + uniform(jitter),
+                    r * angle.sin() + uniform(jitter),
+                ];
                 let bell = 0.6 * (-(plane[0] * plane[0] + plane[1] * plane[1]) / 0.4).exp();
                 Point::from(std::array::from_fn(|k| if k < 2 { plane[k] } else { bell }))
             })
             .collect();
         let bumps: Vec<(SVector<f64, D>, SVector<f64, D>)> = (0..6)
-            .map(|_| (SVector::from_fn(|_, _| uniform(1.2)), SVector::from_fn(|_, _| uniform(0.2))))
+            .map(|_| {
+                (
+                    SVector::from_fn(|_, _| uniform(1.2)),
+                    SVector::from_fn(|_, _| uniform(0.2)),
+                )
+            })
             .collect();
         let warp = |p: &Point<f64, D>| {
-            bumps.iter().fold(*p, |q, (c, a)| q + a * (-(p.coords - c).norm_squared() / 1.28).exp())
+            bumps.iter().fold(*p, |q, (c, a)| {
+                q + a * (-(p.coords - c).norm_squared() / 1.28).exp()
+            })
         };
         let truth: Vec<_> = model.iter().map(warp).collect();
-        let mut target: Vec<_> =
-            truth.iter().map(|p| p + SVector::from_fn(|_, _| uniform(noise.max(1e-300)))).collect();
+        let mut target: Vec<_> = truth
+            .iter()
+            .map(|p| p + SVector::from_fn(|_, _| uniform(noise.max(1e-300))))
+            .collect();
         target.reverse();
         target.extend((0..strays).map(|_| Point::from(SVector::from_fn(|_, _| uniform(1.3)))));
-        Self { model, target, truth }
+        Self {
+            model,
+            target,
+            truth,
+        }
     }
 
     /// Mean distance of the warped points from the truth.
     fn error(&self, warped: impl Iterator<Item = Point<f64, D>>) -> f64 {
-        warped.zip(&self.truth).map(|(w, t)| (w - t).norm()).sum::<f64>() / self.truth.len() as f64
+        warped
+            .zip(&self.truth)
+            .map(|(w, t)| (w - t).norm())
+            .sum::<f64>()
+            / self.truth.len() as f64
     }
 }
 
 /// Checks and times the fast matcher on one scene; a match through a warm workspace, without the spline of the result.
-fn fast<const D: usize>(criterion: &mut Criterion, group: &str, name: &str, scene: &Scene<D>, bound: f64) {
+fn fast<const D: usize>(
+    criterion: &mut Criterion,
+    group: &str,
+    name: &str,
+    scene: &Scene<D>,
+    bound: f64,
+) {
     let matcher = RelaxationMatcher::default();
-    let error = scene.error(matcher.match_points(&scene.model, &scene.target).unwrap().warped.into_iter());
+    let error = scene.error(
+        matcher
+            .match_points(&scene.model, &scene.target)
+            .unwrap()
+            .warped
+            .into_iter(),
+    );
     assert!(error < bound, "{group}/{name}: error {error}");
     println!("{group}/{name}: mean error {error:.2e}");
     let mut group = criterion.benchmark_group(group);
     group.sample_size(20);
     group.bench_function(BenchmarkId::new("relaxation", name), |b| {
-        b.iter(|| matcher.match_points(black_box(&scene.model), black_box(&scene.target)).unwrap());
+        b.iter(|| {
+            matcher
+                .match_points(black_box(&scene.model), black_box(&scene.target))
+                .unwrap()
+        });
     });
     let mut workspace = RelaxationWorkspace::new();
     group.bench_function(BenchmarkId::new("relaxation_with", name), |b| {
@@ -81,9 +119,27 @@ fn sizes(criterion: &mut Criterion) {
     for n in [105, 200] {
         let group = format!("match/{n}x{n}");
         // Clean scenes are solved to rounding; noise of ±0.05 (sd 0.029 an axis) leaves less than half of it.
-        fast(criterion, &group, "clean", &Scene::<3>::new(n, 0, 0.0), 1e-9);
-        fast(criterion, &group, "strays", &Scene::<3>::new(n, n / 5, 0.0), 1e-9);
-        fast(criterion, &group, "noise", &Scene::<3>::new(n, 0, 0.05), 0.025);
+        fast(
+            criterion,
+            &group,
+            "clean",
+            &Scene::<3>::new(n, 0, 0.0),
+            1e-9,
+        );
+        fast(
+            criterion,
+            &group,
+            "strays",
+            &Scene::<3>::new(n, n / 5, 0.0),
+            1e-9,
+        );
+        fast(
+            criterion,
+            &group,
+            "noise",
+            &Scene::<3>::new(n, 0, 0.05),
+            0.025,
+        );
     }
 }
 
@@ -96,7 +152,13 @@ fn dense(criterion: &mut Criterion) {
     group.bench_function(BenchmarkId::new("dense", "clean"), |b| {
         let mut error = f64::NAN;
         b.iter(|| {
-            error = scene.error(matcher.match_points(&scene.model, &scene.target).unwrap().warped.into_iter())
+            error = scene.error(
+                matcher
+                    .match_points(&scene.model, &scene.target)
+                    .unwrap()
+                    .warped
+                    .into_iter(),
+            )
         });
         println!("match/105x105/dense: mean error {error:.2e}");
         // It measured 1.6e-3 of the disc's radius on this scene; three times that would be another answer.
@@ -108,7 +170,13 @@ fn dense(criterion: &mut Criterion) {
 /// The plane's disc, 105 points to sixteen times as many, all of them matched right.
 fn scaling(criterion: &mut Criterion) {
     for n in [105, 210, 420, 840, 1680] {
-        fast(criterion, "match/scaling", &n.to_string(), &Scene::<2>::new(n, 0, 0.0), 1e-9);
+        fast(
+            criterion,
+            "match/scaling",
+            &n.to_string(),
+            &Scene::<2>::new(n, 0, 0.0),
+            1e-9,
+        );
     }
 }
 

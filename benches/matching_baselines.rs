@@ -26,19 +26,37 @@ fn scene(n: usize, size: f64) -> Scene {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let model: Vec<Point3> = (0..n)
         .map(|k| {
-            let (radius, angle) = (0.5 * ((k as f64 + 0.5) / n as f64).sqrt(), golden * k as f64);
-            Point3::new(radius * angle.cos(), radius * angle.sin(), 0.25 * (-8.0 * radius * radius).exp())
+            let (radius, angle) = (
+                0.5 * ((k as f64 + 0.5) / n as f64).sqrt(),
+                golden * k as f64,
+            );
+            Point3::new(
+                radius * angle.cos(),
+                radius * angle.sin(),
+                0.25 * (-8.0 * radius * radius).exp(),
+            )
         })
         .collect();
     let bend = |p: &Point3| {
         let wave = |x: f64, phase: f64| size * (4.0 * x + phase).sin();
-        Point3::new(p.x + wave(p.y, 0.3), p.y + wave(p.x, 1.1), p.z + 0.5 * wave(p.x + p.y, 2.0))
+        Point3::new(
+            p.x + wave(p.y, 0.3),
+            p.y + wave(p.x, 1.1),
+            p.z + 0.5 * wave(p.x + p.y, 2.0),
+        )
     };
     // A step prime to n visits every row once.
-    let step = (1..).map(|k| 37 + k).find(|&step| gcd(step, n) == 1).unwrap_or(1);
+    let step = (1..)
+        .map(|k| 37 + k)
+        .find(|&step| gcd(step, n) == 1)
+        .unwrap_or(1);
     let order: Vec<usize> = (0..n).map(|k| k * step % n).collect();
     let target = order.iter().map(|&k| bend(&model[k])).collect();
-    Scene { model, target, order }
+    Scene {
+        model,
+        target,
+        order,
+    }
 }
 
 fn gcd(a: usize, b: usize) -> usize {
@@ -47,12 +65,25 @@ fn gcd(a: usize, b: usize) -> usize {
 
 /// Matches once: at least `share` of the pairs must be right, the mean error (percent of the diameter) below `bound`; prints both.
 fn check(name: &str, matcher: &dyn PointMatcher<f64, 3>, scene: &Scene, share: f64, bound: f64) {
-    let matching = matcher.match_points(&scene.model, &scene.target).expect("good points");
+    let matching = matcher
+        .match_points(&scene.model, &scene.target)
+        .expect("good points");
     let n = scene.model.len();
-    let truth = |k: usize| scene.target[scene.order.iter().position(|&i| i == k).expect("a permutation")];
-    let error = 100.0 * (0..n).map(|k| (matching.warped[k] - truth(k)).norm()).sum::<f64>() / n as f64;
-    let right = (0..n).filter(|&k| matching.assignment[k].is_some_and(|j| scene.order[j] == k)).count()
-        as f64
+    let truth = |k: usize| {
+        scene.target[scene
+            .order
+            .iter()
+            .position(|&i| i == k)
+            .expect("a permutation")]
+    };
+    let error = 100.0
+        * (0..n)
+            .map(|k| (matching.warped[k] - truth(k)).norm())
+            .sum::<f64>()
+        / n as f64;
+    let right = (0..n)
+        .filter(|&k| matching.assignment[k].is_some_and(|j| scene.order[j] == k))
+        .count() as f64
         / n as f64;
     println!(
         "{name}: error {error:.4} %, right {:.1} %, {} iterations",
@@ -68,8 +99,16 @@ type Row<'a> = (&'a str, Box<dyn PointMatcher<f64, 3>>, f64, f64);
 fn standard_case(criterion: &mut Criterion) {
     let scene = scene(105, 0.05);
     let drift = |rank| {
-        let motion = Motion::NonRigid { beta: 2.0, lambda: 3.0, rank };
-        CoherentPointDrift::new(DriftOptions { motion, ..Default::default() }).expect("valid options")
+        let motion = Motion::NonRigid {
+            beta: 2.0,
+            lambda: 3.0,
+            rank,
+        };
+        CoherentPointDrift::new(DriftOptions {
+            motion,
+            ..Default::default()
+        })
+        .expect("valid options")
     };
     let mut group = criterion.benchmark_group("match/105x105");
     let quick: [Row<'_>; 4] = [
@@ -85,10 +124,19 @@ fn standard_case(criterion: &mut Criterion) {
         });
     }
     // The paper's method takes seconds: one match a sample, and as few samples as there may be.
-    group.sampling_mode(SamplingMode::Flat).sample_size(10).warm_up_time(Duration::from_millis(1));
+    group
+        .sampling_mode(SamplingMode::Flat)
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(1));
     group.measurement_time(Duration::from_millis(1));
-    let eight = DenseOptions { neighbourhood: Neighbourhood::Nearest(8), ..Default::default() };
-    let dense = [("dense_8_neighbours", eight), ("dense", DenseOptions::default())];
+    let eight = DenseOptions {
+        neighbourhood: Neighbourhood::Nearest(8),
+        ..Default::default()
+    };
+    let dense = [
+        ("dense_8_neighbours", eight),
+        ("dense", DenseOptions::default()),
+    ];
     for (name, options) in dense {
         let matcher = DenseRelaxation::new(options).expect("valid options");
         check(name, &matcher, &scene, 0.99, 0.5);

@@ -7,12 +7,16 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use tactile_imaging::optics::surface::{Dimple, Flat, TopSurface};
 use tactile_imaging::optics::trace::{Slab, SlabLayer, TraceOptions, trace};
-use tactile_imaging::optics::{AcceptanceAngle, Geometry, LayerStack, Led, acceptance_angle, fresnel};
+use tactile_imaging::optics::{
+    AcceptanceAngle, Geometry, LayerStack, Led, acceptance_angle, fresnel,
+};
 use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
 
 fn closed_forms(c: &mut Criterion) {
     let mut group = c.benchmark_group("optics/closed form");
-    let AcceptanceAngle::Below(angle) = acceptance_angle(1.38_f64, 1.0).unwrap() else { panic!() };
+    let AcceptanceAngle::Below(angle) = acceptance_angle(1.38_f64, 1.0).unwrap() else {
+        panic!()
+    };
     assert!((angle.degrees() - 71.989_426_661_361_93).abs() < 1e-12);
     group.bench_function("acceptance angle", |b| {
         b.iter(|| acceptance_angle(black_box(1.38_f64), black_box(1.0)))
@@ -45,7 +49,11 @@ fn rays(c: &mut Criterion) {
     let mut group = c.benchmark_group("optics/rays");
     for geometry in [Geometry::Section, Geometry::Volume] {
         for (name, surface) in surfaces {
-            let options = TraceOptions { geometry, rays: 2048, ..TraceOptions::default() };
+            let options = TraceOptions {
+                geometry,
+                rays: 2048,
+                ..TraceOptions::default()
+            };
             let budget = trace(&slab, &led, surface, &options, &mut []).unwrap();
             assert!((budget.total() - 1.0).abs() < 1e-13);
             group.throughput(Throughput::Elements(u64::from(options.rays)));
@@ -59,20 +67,40 @@ fn rays(c: &mut Criterion) {
 
 /// Guided share of a flat layer against unfolding (every reflection counted in closed form).
 fn convergence(c: &mut Criterion) {
-    let layers = [SlabLayer { index: 1.38_f64, thickness_m: 10e-3 }];
+    let layers = [SlabLayer {
+        index: 1.38_f64,
+        thickness_m: 10e-3,
+    }];
     let slab = Slab::new(&layers, 1.0, 30e-3).unwrap();
     let led = Led::lambertian();
     let expected = unfolded(1.38, 3.0, 8000);
     let mut group = c.benchmark_group("optics/work against error");
     let mut before = f64::INFINITY;
     for rays in [256, 2048, 16384] {
-        let options =
-            |seed| TraceOptions { geometry: Geometry::Section, rays, seed, ..TraceOptions::default() };
-        let guided = |seed| trace(&slab, &led, &Flat, &options(seed), &mut []).unwrap().guided;
-        let rms = ((0..8).map(|s| (guided(s) / expected - 1.0).powi(2)).sum::<f64>() / 8.0).sqrt();
-        assert!(rms < before, "more rays must not be worse: {rms} after {before}");
+        let options = |seed| TraceOptions {
+            geometry: Geometry::Section,
+            rays,
+            seed,
+            ..TraceOptions::default()
+        };
+        let guided = |seed| {
+            trace(&slab, &led, &Flat, &options(seed), &mut [])
+                .unwrap()
+                .guided
+        };
+        let rms = ((0..8)
+            .map(|s| (guided(s) / expected - 1.0).powi(2))
+            .sum::<f64>()
+            / 8.0)
+            .sqrt();
+        assert!(
+            rms < before,
+            "more rays must not be worse: {rms} after {before}"
+        );
         before = rms;
-        group.bench_function(format!("{rays} rays, error {rms:.1e}"), |b| b.iter(|| guided(black_box(1))));
+        group.bench_function(format!("{rays} rays, error {rms:.1e}"), |b| {
+            b.iter(|| guided(black_box(1)))
+        });
     }
     group.finish();
 }
@@ -99,16 +127,29 @@ fn frames(c: &mut Criterion) {
     let light = scene.expected_frame(1);
     let camera = scene.options().camera;
     let quiet = PressScene::new(PressOptions {
-        camera: Camera { vignetting: 0.0, ..camera },
+        camera: Camera {
+            vignetting: 0.0,
+            ..camera
+        },
         ..PressOptions::default()
     })
     .unwrap();
-    let sum: f64 = quiet.expected_frame(1).iter().map(|v| v - camera.background_grey).sum();
+    let sum: f64 = quiet
+        .expected_frame(1)
+        .iter()
+        .map(|v| v - camera.background_grey)
+        .sum();
     assert!((sum * camera.pixel_area_m2() / quiet.grey_per_pascal() / 1.2 - 1.0).abs() < 1e-11);
     let mut group = c.benchmark_group("simulate/1392x1042");
-    group.sample_size(20).throughput(Throughput::Elements(light.len() as u64));
-    group.bench_function("light of a press", |b| b.iter(|| scene.expected_frame(black_box(1))));
-    group.bench_function("exposure with noise", |b| b.iter(|| camera.expose(light.view(), 1, black_box(2))));
+    group
+        .sample_size(20)
+        .throughput(Throughput::Elements(light.len() as u64));
+    group.bench_function("light of a press", |b| {
+        b.iter(|| scene.expected_frame(black_box(1)))
+    });
+    group.bench_function("exposure with noise", |b| {
+        b.iter(|| camera.expose(light.view(), 1, black_box(2)))
+    });
     group.finish();
 }
 

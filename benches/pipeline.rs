@@ -12,14 +12,19 @@ use std::time::Instant;
 use tactile_imaging::force::ReferenceFrame;
 use tactile_imaging::pipeline::{Measurement, Press, Session, Stage, Stages, Trial};
 use tactile_imaging::simulate::{
-    CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, PressSimulation, Sphere,
+    CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, PressSimulation,
+    Sphere,
 };
 
 fn press(c: &mut Criterion) {
-    let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default()).expect("default options");
+    let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default())
+        .expect("default options");
     let pipeline = trial.pipeline().expect("a calibrated sensor");
     let truth = trial.truth().youngs_modulus_pa;
-    let measured = trial.press(&pipeline).and_then(|mut p| p.measure()).expect("a measurement");
+    let measured = trial
+        .press(&pipeline)
+        .and_then(|mut p| p.measure())
+        .expect("a measurement");
     let error = 100.0 * (measured.youngs_modulus_pa.value / truth - 1.0);
     assert!(error.abs() < 1.0, "modulus error {error} %");
     println!("modulus error {error:+.3} %");
@@ -27,10 +32,20 @@ fn press(c: &mut Criterion) {
     let mut group = c.benchmark_group("pipeline");
     group.sample_size(10);
     group.bench_function("modulus_of_two_frames", |b| {
-        b.iter(|| trial.press(&pipeline).and_then(|mut p| p.modulus()).expect("a modulus"));
+        b.iter(|| {
+            trial
+                .press(&pipeline)
+                .and_then(|mut p| p.modulus())
+                .expect("a modulus")
+        });
     });
     group.bench_function("everything_of_two_frames", |b| {
-        b.iter(|| trial.press(&pipeline).and_then(|mut p| p.measure()).expect("a measurement"));
+        b.iter(|| {
+            trial
+                .press(&pipeline)
+                .and_then(|mut p| p.measure())
+                .expect("a measurement")
+        });
     });
     stream(&mut group, &trial);
     group.finish();
@@ -41,13 +56,15 @@ fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {
     let (one, two) = (&trial.simulation.frames[0], &trial.simulation.frames[1]);
     let empty = trial.scene.reference(9);
     let stages = Arc::new(trial.pipeline().expect("a calibrated sensor"));
-    let session = || Session::new(stages.clone(), trial.simulation.reference.view()).expect("a session");
+    let session =
+        || Session::new(stages.clone(), trial.simulation.reference.view()).expect("a session");
     let mut turn = session();
     let mut side = false;
     group.bench_function("force_of_a_frame", |b| {
         b.iter(|| {
             side = !side;
-            turn.push(black_box(if side { one } else { two }).view()).expect("a contact")
+            turn.push(black_box(if side { one } else { two }).view())
+                .expect("a contact")
         });
     });
     let mut same = session();
@@ -56,21 +73,31 @@ fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {
     });
     let mut strained = session();
     for frame in [one, two] {
-        strained.push(frame.view()).and_then(|_| strained.strain().map(drop)).expect("a strain");
+        strained
+            .push(frame.view())
+            .and_then(|_| strained.strain().map(drop))
+            .expect("a strain");
     }
     let third = trial.scene.frame(1, 11);
     group.bench_function("strain_of_a_frame", |b| {
         b.iter(|| {
             side = !side;
-            strained.push(black_box(if side { &third } else { two }).view()).expect("a contact");
-            strained.strain().expect("a strain").map(|found| found.strain.summary.mean)
+            strained
+                .push(black_box(if side { &third } else { two }).view())
+                .expect("a contact");
+            strained
+                .strain()
+                .expect("a strain")
+                .map(|found| found.strain.summary.mean)
         });
     });
     let (mut quiet, other) = (session(), trial.scene.reference(10));
     group.bench_function("frame_without_contact", |b| {
         b.iter(|| {
             side = !side;
-            quiet.push(black_box(if side { &empty } else { &other }).view()).expect("no contact")
+            quiet
+                .push(black_box(if side { &empty } else { &other }).view())
+                .expect("no contact")
         });
     });
 }
@@ -84,12 +111,32 @@ fn coverage(k: usize) -> f64 {
 /// A calibrated sensor and a ball whose larger load covers that share of the frame.
 fn sensor(k: usize) -> Trial {
     let camera = Camera::default();
-    let material = if k.is_multiple_of(2) { Elastic::CL2000X } else { Elastic::CL2003X };
-    let object = Sphere { radius_m: 3e-3, material };
-    let base = PressOptions { object, gain: Gain::PeakGrey(180.0), seed: k as u64 + 1, ..Default::default() };
-    let area_m2: f64 = camera.pixel_size_m.iter().zip([1392.0, 1042.0]).map(|(size, n)| size * n).product();
+    let material = if k.is_multiple_of(2) {
+        Elastic::CL2000X
+    } else {
+        Elastic::CL2003X
+    };
+    let object = Sphere {
+        radius_m: 3e-3,
+        material,
+    };
+    let base = PressOptions {
+        object,
+        gain: Gain::PeakGrey(180.0),
+        seed: k as u64 + 1,
+        ..Default::default()
+    };
+    let area_m2: f64 = camera
+        .pixel_size_m
+        .iter()
+        .zip([1392.0, 1042.0])
+        .map(|(size, n)| size * n)
+        .product();
     let wanted_m = (coverage(k) * area_m2 / std::f64::consts::PI).sqrt();
-    let unit = PressScene::new(PressOptions { loads: vec![Load::normal(1.0)], ..base.clone() });
+    let unit = PressScene::new(PressOptions {
+        loads: vec![Load::normal(1.0)],
+        ..base.clone()
+    });
     let radius_m = unit.expect("a unit load").truth(0).contact.contact_radius_m;
     let force_n = (wanted_m / radius_m).powi(3);
     let loads = vec![Load::normal(force_n / 1.2 * 0.7), Load::normal(force_n)];
@@ -105,7 +152,9 @@ fn sensor(k: usize) -> Trial {
 fn scene(trial: &Trial, number: u64) -> PressScene {
     let mut state = number.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1_u64 << 53) as f64
     };
     let mut options = trial.scene.options().clone();
@@ -114,7 +163,10 @@ fn scene(trial: &Trial, number: u64) -> PressScene {
     let mut place = |n: usize| reach + uniform() * (n as f64 - 2.0 * reach).max(0.0);
     options.centre_px = Some([place(camera.shape[1]), place(camera.shape[0])]);
     let strength = 0.8 + 0.4 * uniform();
-    options.loads.iter_mut().for_each(|load| load.force_n *= strength);
+    options
+        .loads
+        .iter_mut()
+        .for_each(|load| load.force_n *= strength);
     options.gain = Gain::GreyPerPascal(trial.scene.grey_per_pascal());
     options.seed = 1000 + number;
     PressScene::new(options).expect("a scene")
@@ -157,7 +209,13 @@ impl Table {
         let all = press().measure().expect("a measurement");
         let everything = start.elapsed().as_secs_f64();
         self.everything_ms.push(everything * 1e3);
-        self.add_skipped(press(), reference, stages, [&made.frames[1], empty], everything);
+        self.add_skipped(
+            press(),
+            reference,
+            stages,
+            [&made.frames[1], empty],
+            everything,
+        );
         for (list, stage) in self.stages_ms.iter_mut().zip(Stage::ALL) {
             list.push(all.report.work(stage).time.as_secs_f64() * 1e3);
         }
@@ -177,30 +235,44 @@ impl Table {
         let start = Instant::now();
         let frame = twins.add_frame(equal.view());
         assert!(twins.strain(frame).is_ok());
-        self.equal_share.push(100.0 * start.elapsed().as_secs_f64() / (0.5 * everything));
-        assert_eq!(twins.report().work(Stage::Surface).runs, 2, "an equal frame takes no surface");
+        self.equal_share
+            .push(100.0 * start.elapsed().as_secs_f64() / (0.5 * everything));
+        assert_eq!(
+            twins.report().work(Stage::Surface).runs,
+            2,
+            "an equal frame takes no surface"
+        );
         let mut quiet = Press::with_reference(stages, reference.clone());
         let start = Instant::now();
         quiet.add_frame(empty.view());
         assert!(quiet.contact(0).expect("a frame").is_none());
-        self.empty_share.push(100.0 * start.elapsed().as_secs_f64() / (0.5 * everything));
+        self.empty_share
+            .push(100.0 * start.elapsed().as_secs_f64() / (0.5 * everything));
     }
 
     fn add_errors(&mut self, modulus: f64, all: &Measurement, made: &PressSimulation) {
-        self.modulus_error.push(100.0 * (modulus / made.youngs_modulus_pa - 1.0).abs());
+        self.modulus_error
+            .push(100.0 * (modulus / made.youngs_modulus_pa - 1.0).abs());
         for (frame, truth) in all.frames.iter().zip(&made.truth) {
-            self.force_error.push(100.0 * (frame.force_n.value / truth.contact.force_n - 1.0).abs());
+            self.force_error
+                .push(100.0 * (frame.force_n.value / truth.contact.force_n - 1.0).abs());
             let height = frame.surface_height_m.expect("a surface");
-            self.height_error.push(100.0 * (height / truth.contact.apparent_height_m(0.0) - 1.0).abs());
+            self.height_error
+                .push(100.0 * (height / truth.contact.apparent_height_m(0.0) - 1.0).abs());
         }
-        let truth = made.truth[0].scaling_to(&made.truth[1]).green_lagrange_strain();
+        let truth = made.truth[0]
+            .scaling_to(&made.truth[1])
+            .green_lagrange_strain();
         let mean = all.strain.as_ref().expect("a strain").mean;
         let errors = (0..3).map(|k| 100.0 * (mean[k][k] / truth[(k, k)] - 1.0).abs());
         self.strain_error.push(errors.fold(0.0, f64::max));
     }
 
     fn print(&mut self) {
-        println!("{:<24} {:>10} {:>14} {:>10}", "", "median", "99th centile", "worst");
+        println!(
+            "{:<24} {:>10} {:>14} {:>10}",
+            "", "median", "99th centile", "worst"
+        );
         row("modulus of a pair", "ms", &mut self.modulus_ms);
         row("everything of a pair", "ms", &mut self.everything_ms);
         for (stage, list) in Stage::ALL.iter().zip(&mut self.stages_ms) {
@@ -218,22 +290,39 @@ impl Table {
 fn row(name: &str, unit: &str, values: &mut [f64]) {
     values.sort_unstable_by(f64::total_cmp);
     let at = |share: f64| values[((values.len() - 1) as f64 * share).ceil() as usize];
-    println!("{name:<24} {:>7.3} {unit:<2} {:>11.3} {unit:<2} {:>7.3} {unit}", at(0.5), at(0.99), at(1.0));
+    println!(
+        "{name:<24} {:>7.3} {unit:<2} {:>11.3} {unit:<2} {:>7.3} {unit}",
+        at(0.5),
+        at(0.99),
+        at(1.0)
+    );
 }
 
 fn scenes(_: &mut Criterion) {
     let quick = std::env::args().any(|a| a == "--test" || a == "--quick");
-    let (sensors, presses) =
-        if quick { ([4, 9].as_slice(), 1) } else { ([0, 1, 2, 3, 4, 5, 6, 7, 8, 9].as_slice(), 50) };
+    let (sensors, presses) = if quick {
+        ([4, 9].as_slice(), 1)
+    } else {
+        ([0, 1, 2, 3, 4, 5, 6, 7, 8, 9].as_slice(), 50)
+    };
     let mut table = Table::default();
     for &k in sensors {
         let trial = sensor(k);
-        let pipeline = trial.pipeline().expect("a calibrated sensor").with_flat_field(true);
-        let reference = ReferenceFrame::new(trial.simulation.reference.view()).expect("a reference");
+        let pipeline = trial
+            .pipeline()
+            .expect("a calibrated sensor")
+            .with_flat_field(true);
+        let reference =
+            ReferenceFrame::new(trial.simulation.reference.view()).expect("a reference");
         let reference = Arc::new(reference.with_flat_field().expect("stray light"));
         for press in 0..presses {
             let scene = scene(&trial, 100 * k as u64 + press);
-            table.add(&pipeline, &scene.simulate(), &reference, &scene.reference(9));
+            table.add(
+                &pipeline,
+                &scene.simulate(),
+                &reference,
+                &scene.reference(9),
+            );
         }
     }
     println!("{} presses", table.modulus_ms.len());
@@ -242,31 +331,60 @@ fn scenes(_: &mut Criterion) {
     assert!(worst < 3.0, "modulus error {worst} %");
     if !quick {
         let shares = [&table.empty_share, &table.equal_share].map(|list| list[list.len() / 2]);
-        assert!(shares[0] < 5.0 && shares[1] < 10.0, "skipped frames take {shares:?} % of a frame");
+        assert!(
+            shares[0] < 5.0 && shares[1] < 10.0,
+            "skipped frames take {shares:?} % of a frame"
+        );
     }
 }
 
 /// Balls of 62 and 103 kPa at 0.7 and 1.2 N: the modulus of thirty presses each.
 fn papers_presses(_: &mut Criterion) {
-    let presses = if std::env::args().any(|a| a == "--test" || a == "--quick") { 2 } else { 30 };
+    let presses = if std::env::args().any(|a| a == "--test" || a == "--quick") {
+        2
+    } else {
+        30
+    };
     for material in [Elastic::CL2000X, Elastic::CL2003X] {
-        let object = Sphere { radius_m: PressOptions::default().object.radius_m, material };
+        let object = Sphere {
+            radius_m: PressOptions::default().object.radius_m,
+            material,
+        };
         let loads = vec![Load::normal(0.7), Load::normal(1.2)];
-        let options = PressOptions { object, loads, ..PressOptions::default() };
+        let options = PressOptions {
+            object,
+            loads,
+            ..PressOptions::default()
+        };
         let trial = Trial::new(options, &CalibrationOptions::default()).expect("a sensor");
-        let pipeline = trial.pipeline().expect("a calibrated sensor").with_flat_field(true);
+        let pipeline = trial
+            .pipeline()
+            .expect("a calibrated sensor")
+            .with_flat_field(true);
         let error = |number: u64| {
-            let options = PressOptions { seed: 5000 + number, ..trial.scene.options().clone() };
+            let options = PressOptions {
+                seed: 5000 + number,
+                ..trial.scene.options().clone()
+            };
             let made = PressScene::new(options).expect("a scene").simulate();
             let mut press = pipeline.press(made.reference.view()).expect("a reference");
-            made.frames.iter().for_each(|frame| _ = press.add_frame(frame.view()));
+            made.frames
+                .iter()
+                .for_each(|frame| _ = press.add_frame(frame.view()));
             let found = press.modulus().expect("a modulus").youngs_modulus_pa;
             100.0 * (found / material.youngs_modulus_pa - 1.0).abs()
         };
         let mut errors: Vec<f64> = (0..presses).map(error).collect();
-        row(&format!("{:.0} kPa, 0.7 and 1.2 N", material.youngs_modulus_pa / 1e3), "%", &mut errors);
+        row(
+            &format!("{:.0} kPa, 0.7 and 1.2 N", material.youngs_modulus_pa / 1e3),
+            "%",
+            &mut errors,
+        );
         let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
-        assert!(median < 1.0 && worst < 3.0, "modulus error: median {median} %, worst {worst} %");
+        assert!(
+            median < 1.0 && worst < 3.0,
+            "modulus error: median {median} %, worst {worst} %"
+        );
     }
 }
 

@@ -4,12 +4,15 @@
 use std::{hint::black_box, path::PathBuf};
 
 use criterion::measurement::WallTime;
-use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{
+    BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main,
+};
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    Alignment, Branch, BrooksHorn, ControlPointSampler, CosinePoisson, CurvatureAdaptive, DepthTable, Domain,
-    Eikonal, EquallySpaced, Frame, FrankotChellappa, Lighting, MaskedLeastSquares, Pentland, Random, Rim,
-    Scalar, SlopeIntegrator, Surface, SurfaceReconstruction, TsaiShah, Workspace, height_error, slopes,
+    Alignment, Branch, BrooksHorn, ControlPointSampler, CosinePoisson, CurvatureAdaptive,
+    DepthTable, Domain, Eikonal, EquallySpaced, Frame, FrankotChellappa, Lighting,
+    MaskedLeastSquares, Pentland, Random, Rim, Scalar, SlopeIntegrator, Surface,
+    SurfaceReconstruction, TsaiShah, Workspace, height_error, slopes,
 };
 
 type Method = Box<dyn SurfaceReconstruction<f64>>;
@@ -29,19 +32,29 @@ fn vase(n: usize) -> Case {
     let slope = |y: f64| (f(y + 1e-6) - f(y - 1e-6)) / 2e-6;
     let at = |r: usize, c: usize| (c as f64 / n as f64 - 0.5075, r as f64 / n as f64);
     let square = |r: usize, c: usize| f(at(r, c).1).powi(2) - at(r, c).0.powi(2);
-    let over = |r, c, value: f64| if square(r, c) > 0.0 { value / square(r, c).sqrt() } else { 0.0 };
+    let over = |r, c, value: f64| {
+        if square(r, c) > 0.0 {
+            value / square(r, c).sqrt()
+        } else {
+            0.0
+        }
+    };
     Case {
         name: "vase",
         z: Array2::from_shape_fn((n, n), |(r, c)| square(r, c).max(0.0).sqrt() * n as f64),
         mask: Array2::from_shape_fn((n, n), |(r, c)| square(r, c) > 0.0),
         p: Array2::from_shape_fn((n, n), |(r, c)| over(r, c, -at(r, c).0)),
-        q: Array2::from_shape_fn((n, n), |(r, c)| over(r, c, f(at(r, c).1) * slope(at(r, c).1))),
+        q: Array2::from_shape_fn((n, n), |(r, c)| {
+            over(r, c, f(at(r, c).1) * slope(at(r, c).1))
+        }),
     }
 }
 
 fn data() -> PathBuf {
-    std::env::var_os("TACTILE_DATA")
-        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")), PathBuf::from)
+    std::env::var_os("TACTILE_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")),
+        PathBuf::from,
+    )
 }
 
 /// Mozart's bust at half size (means of 2×2), if the data are there.
@@ -52,30 +65,56 @@ fn mozart() -> Option<Case> {
         return None;
     };
     let z = Array2::from_shape_fn((128, 128), |(r, c)| {
-        (0..4).map(|k| full[[2 * r + k / 2, 2 * c + k % 2]]).sum::<f64>() / 8.0
+        (0..4)
+            .map(|k| full[[2 * r + k / 2, 2 * c + k % 2]])
+            .sum::<f64>()
+            / 8.0
     });
     let (p, q) = slopes(z.view(), [1.0, 1.0]);
-    Some(Case { name: "mozart", mask: z.mapv(|z| z > 0.0), z, p, q })
+    Some(Case {
+        name: "mozart",
+        mask: z.mapv(|z| z > 0.0),
+        z,
+        p,
+        q,
+    })
 }
 
 /// Height 0 outside the object, and the height where the surface faces the light: where z + (s_x x + s_y y)/s_z has a
 /// maximum, a minimum or a saddle.
 fn knowledge(case: &Case, [x, y, z]: [f64; 3]) -> Array2<f64> {
     let (rows, columns) = case.z.dim();
-    let tilted =
-        Array2::from_shape_fn((rows, columns), |(r, c)| case.z[[r, c]] + (x * c as f64 + y * r as f64) / z);
-    const RING: [(usize, usize); 8] = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0)];
+    let tilted = Array2::from_shape_fn((rows, columns), |(r, c)| {
+        case.z[[r, c]] + (x * c as f64 + y * r as f64) / z
+    });
+    const RING: [(usize, usize); 8] = [
+        (0, 0),
+        (0, 1),
+        (0, 2),
+        (1, 2),
+        (2, 2),
+        (2, 1),
+        (2, 0),
+        (1, 0),
+    ];
     Array2::from_shape_fn((rows, columns), |(r, c)| {
         if !case.mask[[r, c]] {
             return 0.0;
         }
         let ring = RING.map(|(dr, dc)| ((r + dr).wrapping_sub(1), (c + dc).wrapping_sub(1)));
-        if !ring.iter().all(|&at| case.mask.get(at).copied().unwrap_or(false)) {
+        if !ring
+            .iter()
+            .all(|&at| case.mask.get(at).copied().unwrap_or(false))
+        {
             return f64::NAN;
         }
         let above = ring.map(|at| tilted[at] > tilted[[r, c]]);
         let changes = (0..8).filter(|&i| above[i] != above[(i + 1) % 8]).count();
-        if changes == 0 || changes >= 4 { case.z[[r, c]] } else { f64::NAN }
+        if changes == 0 || changes >= 4 {
+            case.z[[r, c]]
+        } else {
+            f64::NAN
+        }
     })
 }
 
@@ -97,27 +136,54 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
     let masked = Domain::pixels().with_mask(case.mask.view());
     let informed = masked.with_known_heights(known.view());
     let eikonal = Eikonal::new(lighting);
-    let rim = eikonal.with_rim(Rim::Height(0.0)).unwrap().with_branch(Branch::Rising);
+    let rim = eikonal
+        .with_rim(Rim::Height(0.0))
+        .unwrap()
+        .with_branch(Branch::Rising);
     let mut methods: Vec<(&str, Method, &Domain<'_, f64>, Alignment)> = vec![
-        ("eikonal-known", Box::new(eikonal), &informed, Alignment::None),
-        ("tsai-shah", Box::new(TsaiShah::new(lighting)), &masked, Alignment::Offset),
-        ("brooks-horn", Box::new(BrooksHorn::new(lighting)), &masked, Alignment::Offset),
+        (
+            "eikonal-known",
+            Box::new(eikonal),
+            &informed,
+            Alignment::None,
+        ),
+        (
+            "tsai-shah",
+            Box::new(TsaiShah::new(lighting)),
+            &masked,
+            Alignment::Offset,
+        ),
+        (
+            "brooks-horn",
+            Box::new(BrooksHorn::new(lighting)),
+            &masked,
+            Alignment::Offset,
+        ),
     ];
     if lighting.is_frontal() {
         methods.push(("eikonal-rim", Box::new(rim), &masked, Alignment::None));
     } else {
-        methods.push(("pentland", Box::new(Pentland::new(lighting)), &masked, Alignment::Offset));
+        methods.push((
+            "pentland",
+            Box::new(Pentland::new(lighting)),
+            &masked,
+            Alignment::Offset,
+        ));
     }
     for (name, method, domain, alignment) in methods {
         let id = format!("{name}/{}/{:?}", case.name, light.map(|v| v as i32)).replace(' ', "");
         let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
         let frame = Frame::Real(image.view());
-        method.reconstruct_with(&mut workspace, frame, domain, &mut surface).unwrap();
+        method
+            .reconstruct_with(&mut workspace, frame, domain, &mut surface)
+            .unwrap();
         let error = survey_error(case, &id, &surface, alignment);
         check_survey(case, name, &lighting, error);
         group.bench_function(BenchmarkId::new(id, 128), |bencher| {
             bencher.iter(|| {
-                method.reconstruct_with(&mut workspace, black_box(frame), domain, &mut surface).unwrap();
+                method
+                    .reconstruct_with(&mut workspace, black_box(frame), domain, &mut surface)
+                    .unwrap();
             });
         });
     }
@@ -125,8 +191,13 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
 
 /// Prints the errors of a surface; returns the mean absolute one, in pixels.
 fn survey_error(case: &Case, id: &str, surface: &Surface<f64>, alignment: Alignment) -> f64 {
-    let error =
-        height_error(surface.heights.view(), case.z.view(), Some(case.mask.view()), alignment).unwrap();
+    let error = height_error(
+        surface.heights.view(),
+        case.z.view(),
+        Some(case.mask.view()),
+        alignment,
+    )
+    .unwrap();
     eprintln!(
         "{id}: mean |error| {:.3} px ({alignment:?}), constant guess {:.2} px, range {:.1} px",
         error.error.mean_absolute, error.constant_guess, error.range
@@ -166,7 +237,9 @@ fn contact_share(criterion: &mut Criterion) {
         // The peak is known, for where the frame is full no rim is in sight.
         let mut known = Array2::from_elem((rows, columns), f64::NAN);
         known[[520, 695]] = height;
-        let domain = Domain::pixels().with_mask(mask.view()).with_known_heights(known.view());
+        let domain = Domain::pixels()
+            .with_mask(mask.view())
+            .with_known_heights(known.view());
         let method = Eikonal::new(lighting).with_branch(Branch::Falling);
         let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
         group.bench_function(
@@ -174,7 +247,9 @@ fn contact_share(criterion: &mut Criterion) {
             |bencher| {
                 bencher.iter(|| {
                     let frame = Frame::Bytes(black_box(image.view()));
-                    method.reconstruct_with(&mut workspace, frame, &domain, &mut surface).unwrap();
+                    method
+                        .reconstruct_with(&mut workspace, frame, &domain, &mut surface)
+                        .unwrap();
                 });
             },
         );
@@ -193,9 +268,19 @@ fn points(criterion: &mut Criterion) {
         ("adaptive", Box::new(CurvatureAdaptive::new(2.0).unwrap())),
     ];
     for (name, sampler) in samplers {
-        assert_eq!(sampler.sample(z.view(), None, [1.0, 1.0], 200).unwrap().len(), 200);
+        assert_eq!(
+            sampler
+                .sample(z.view(), None, [1.0, 1.0], 200)
+                .unwrap()
+                .len(),
+            200
+        );
         group.bench_function(BenchmarkId::new(name, "200/300x300"), |bencher| {
-            bencher.iter(|| sampler.sample(black_box(z.view()), None, [1.0, 1.0], 200).unwrap());
+            bencher.iter(|| {
+                sampler
+                    .sample(black_box(z.view()), None, [1.0, 1.0], 200)
+                    .unwrap()
+            });
         });
     }
     group.finish();
@@ -212,7 +297,9 @@ fn depth_table(criterion: &mut Criterion) {
     group.bench_function(BenchmarkId::new("depth-table", "1392x1042"), |bencher| {
         bencher.iter(|| {
             let frame = Frame::Bytes(black_box(image.view()));
-            table.reconstruct_with(&mut workspace, frame, &domain, &mut surface).unwrap();
+            table
+                .reconstruct_with(&mut workspace, frame, &domain, &mut surface)
+                .unwrap();
         });
     });
     group.finish();
@@ -222,14 +309,22 @@ fn depth_table(criterion: &mut Criterion) {
 fn bumps(rows: usize, columns: usize) -> [Array2<f64>; 3] {
     let mut state = 20u64;
     let mut uniform = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let least = rows.min(columns) as f64;
     let [mut z, mut p, mut q] = [0, 1, 2].map(|_| Array2::zeros((rows, columns)));
     for _ in 0..8 {
-        let (cx, cy) = (columns as f64 * (0.25 + 0.5 * uniform()), rows as f64 * (0.25 + 0.5 * uniform()));
-        let (sigma, height) = (least * (0.04 + 0.08 * uniform()), least * 0.04 * (uniform() - 0.5));
+        let (cx, cy) = (
+            columns as f64 * (0.25 + 0.5 * uniform()),
+            rows as f64 * (0.25 + 0.5 * uniform()),
+        );
+        let (sigma, height) = (
+            least * (0.04 + 0.08 * uniform()),
+            least * 0.04 * (uniform() - 0.5),
+        );
         for ((r, c), z) in z.indexed_iter_mut() {
             let (x, y) = (c as f64 - cx, r as f64 - cy);
             let bump = height * (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
@@ -247,7 +342,9 @@ fn integrate_as<T: Scalar>(criterion: &mut Criterion, scalar: &str, rows: usize,
     let [z, p, q] = bumps(rows, columns);
     let (p, q) = (p.mapv(T::of), q.mapv(T::of));
     let mut group = criterion.benchmark_group("integrate");
-    group.throughput(Throughput::Elements((rows * columns) as u64)).sample_size(10);
+    group
+        .throughput(Throughput::Elements((rows * columns) as u64))
+        .sample_size(10);
     let methods: [(&str, Box<dyn SlopeIntegrator<T>>, f64); 3] = [
         ("cosine-poisson", Box::new(CosinePoisson::new()), 1e-3),
         ("frankot-chellappa", Box::new(FrankotChellappa::new()), 0.2),
@@ -256,18 +353,26 @@ fn integrate_as<T: Scalar>(criterion: &mut Criterion, scalar: &str, rows: usize,
     for (name, method, bound) in methods {
         let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
         let domain = Domain::pixels();
-        method.integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface).unwrap();
-        let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
+        method
+            .integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)
+            .unwrap();
+        let norm =
+            |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
         let difference = norm(&mut surface.heights.iter().zip(&z).map(|(a, b)| a.as_f64() - b));
         let relative = difference / norm(&mut z.iter().copied());
         eprintln!("integrate/{name}/{columns}x{rows}/{scalar}: relative error {relative:.3e}");
         assert!(relative < bound);
-        group.bench_function(BenchmarkId::new(name, format!("{columns}x{rows}/{scalar}")), |bencher| {
-            bencher.iter(|| {
-                let (p, q) = (black_box(p.view()), q.view());
-                method.integrate_with(&mut workspace, p, q, &domain, &mut surface).unwrap();
-            });
-        });
+        group.bench_function(
+            BenchmarkId::new(name, format!("{columns}x{rows}/{scalar}")),
+            |bencher| {
+                bencher.iter(|| {
+                    let (p, q) = (black_box(p.view()), q.view());
+                    method
+                        .integrate_with(&mut workspace, p, q, &domain, &mut surface)
+                        .unwrap();
+                });
+            },
+        );
     }
     group.finish();
 }
@@ -279,5 +384,12 @@ fn integrate(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, survey, contact_share, points, depth_table, integrate);
+criterion_group!(
+    benches,
+    survey,
+    contact_share,
+    points,
+    depth_table,
+    integrate
+);
 criterion_main!(benches);

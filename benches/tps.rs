@@ -10,7 +10,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::tps::{
-    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline, Workspace,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline,
+    Workspace,
 };
 
 const SIZES: [usize; 3] = [105, 200, 1000];
@@ -27,24 +28,38 @@ struct Problem {
 impl Problem {
     fn new(n: usize) -> Self {
         let mut random = SmallRng::seed_from_u64(n as u64);
-        let mut point = |size: f64| Point3::from(Vector3::from_fn(|_, _| random.random_range(-size..size)));
+        let mut point =
+            |size: f64| Point3::from(Vector3::from_fn(|_, _| random.random_range(-size..size)));
         let bumps: Vec<_> = (0..5).map(|_| (point(1.0), point(0.17).coords)).collect();
         let sources: Vec<_> = (0..n).map(|_| point(1.0)).collect();
         let queries = (0..QUERIES).map(|_| point(0.95)).collect();
-        let mut problem = Self { bumps, sources, targets: Vec::new(), queries };
+        let mut problem = Self {
+            bumps,
+            sources,
+            targets: Vec::new(),
+            queries,
+        };
         problem.targets = problem.sources.iter().map(|p| problem.map(p)).collect();
         problem
     }
 
     fn map(&self, p: &Point3<f64>) -> Point3<f64> {
-        self.bumps.iter().fold(*p, |q, (c, a)| q + a * (-(p - c).norm_squared() / 0.72).exp())
+        self.bumps.iter().fold(*p, |q, (c, a)| {
+            q + a * (-(p - c).norm_squared() / 0.72).exp()
+        })
     }
 
     /// Root mean square error at the queries.
     fn error<K: Kernel>(&self, spline: &ThinPlateSpline<f64, 3, K>) -> f64 {
         let mut values = vec![Point3::origin(); QUERIES];
-        spline.apply_into(&self.queries, &mut values).expect("equal lengths");
-        let squares = self.queries.iter().zip(&values).map(|(q, v)| (self.map(q) - v).norm_squared());
+        spline
+            .apply_into(&self.queries, &mut values)
+            .expect("equal lengths");
+        let squares = self
+            .queries
+            .iter()
+            .zip(&values)
+            .map(|(q, v)| (self.map(q) - v).norm_squared());
         (squares.sum::<f64>() / QUERIES as f64).sqrt()
     }
 }
@@ -63,12 +78,18 @@ fn kernels(c: &mut Criterion, name: &str, bench: impl Bench) {
 type Group<'a> = criterion::BenchmarkGroup<'a, criterion::measurement::WallTime>;
 
 trait Bench {
-    fn run<K: Kernel>(&self, group: &mut Group<'_>, problem: &Problem, kernel_name: &str, kernel: K);
+    fn run<K: Kernel>(
+        &self,
+        group: &mut Group<'_>,
+        problem: &Problem,
+        kernel_name: &str,
+        kernel: K,
+    );
 }
 
 fn solved<K: Kernel>(problem: &Problem, kernel: K, label: &str) -> ThinPlateSpline<f64, 3, K> {
-    let spline =
-        ThinPlateSpline::fit(&problem.sources, &problem.targets, &FitOptions::new(kernel)).expect("a spline");
+    let spline = ThinPlateSpline::fit(&problem.sources, &problem.targets, &FitOptions::new(kernel))
+        .expect("a spline");
     let error = problem.error(&spline);
     let report = spline.report();
     println!(
@@ -90,7 +111,9 @@ impl Bench for Fit {
         solved(problem, kernel.clone(), name);
         let options = FitOptions::new(kernel);
         group.bench_function(BenchmarkId::new(name, problem.sources.len()), |b| {
-            b.iter(|| ThinPlateSpline::fit(black_box(&problem.sources), &problem.targets, &options));
+            b.iter(|| {
+                ThinPlateSpline::fit(black_box(&problem.sources), &problem.targets, &options)
+            });
         });
     }
 }
@@ -101,13 +124,17 @@ impl Bench for Refit {
     fn run<K: Kernel>(&self, group: &mut Group<'_>, problem: &Problem, name: &str, kernel: K) {
         let n = problem.sources.len();
         let expected = solved(problem, kernel.clone(), name);
-        let factorization =
-            Factorization::new(&problem.sources, &FitOptions::new(kernel.clone())).expect("a factor");
+        let factorization = Factorization::new(&problem.sources, &FitOptions::new(kernel.clone()))
+            .expect("a factor");
         let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(kernel));
-        factorization.fit_with(&mut workspace, &problem.targets, &mut spline).expect("a fit");
+        factorization
+            .fit_with(&mut workspace, &problem.targets, &mut spline)
+            .expect("a fit");
         assert!((problem.error(&spline) / problem.error(&expected) - 1.0).abs() < 1e-3);
         group.bench_function(BenchmarkId::new(format!("{name}/targets"), n), |b| {
-            b.iter(|| factorization.fit_with(&mut workspace, black_box(&problem.targets), &mut spline));
+            b.iter(|| {
+                factorization.fit_with(&mut workspace, black_box(&problem.targets), &mut spline)
+            });
         });
         if n > 256 {
             return;
@@ -148,11 +175,18 @@ struct Jacobian;
 impl Bench for Jacobian {
     fn run<K: Kernel>(&self, group: &mut Group<'_>, problem: &Problem, name: &str, kernel: K) {
         let spline = solved(problem, kernel, name);
-        let (mut values, mut jacobians) = (vec![Point3::origin(); QUERIES], vec![Matrix3::zeros(); QUERIES]);
+        let (mut values, mut jacobians) = (
+            vec![Point3::origin(); QUERIES],
+            vec![Matrix3::zeros(); QUERIES],
+        );
         group.throughput(Throughput::Elements(QUERIES as u64));
         group.bench_function(BenchmarkId::new(name, problem.sources.len()), |b| {
             b.iter(|| {
-                spline.apply_and_jacobian_into(black_box(&problem.queries), &mut values, &mut jacobians)
+                spline.apply_and_jacobian_into(
+                    black_box(&problem.queries),
+                    &mut values,
+                    &mut jacobians,
+                )
             });
         });
     }

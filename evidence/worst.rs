@@ -8,7 +8,10 @@ pub(crate) struct Worst {
 
 impl Worst {
     pub(crate) fn new(heading: &'static str) -> Self {
-        Self { heading, rows: Vec::new() }
+        Self {
+            heading,
+            rows: Vec::new(),
+        }
     }
 
     /// Enters an error in units of ε·cond; `bound` is what the check allows.
@@ -46,10 +49,20 @@ pub(crate) fn cases(text: &str) -> Vec<serde_json::Value> {
 
 #[allow(dead_code)]
 pub(crate) fn numbers(value: &serde_json::Value) -> Vec<f64> {
-    value.as_array().expect("an array").iter().map(|v| v.as_f64().expect("a number")).collect()
+    value
+        .as_array()
+        .expect("an array")
+        .iter()
+        .map(|v| v.as_f64().expect("a number"))
+        .collect()
 }
 
 #[allow(dead_code)]
 pub(crate) fn rows(value: &serde_json::Value) -> Vec<Vec<f64>> {
-    value.as_array().expect("rows").iter().map(numbers).collect()
+    value
+        .as_array()
+        .expect("rows")
+        .iter()
+        .map(numbers)
+        .collect()
 }

@@ -10,8 +10,8 @@ use std::error::Error;
 use std::path::PathBuf;
 use tactile_imaging::elasticity::contact::{Bond, relative_radius_m, tangent_of_degrees};
 use tactile_imaging::elasticity::curve::{
-    Baseline, ContactPoint, CurveFit, CurveOptions, CurveSelection, IndentationCurve, Indenter, Model,
-    SelectionReason, select_model,
+    Baseline, ContactPoint, CurveFit, CurveOptions, CurveSelection, IndentationCurve, Indenter,
+    Model, SelectionReason, select_model,
 };
 use tactile_imaging::elasticity::modulus::EstimatorKind;
 use tactile_imaging::io::read_table;
@@ -109,11 +109,22 @@ fn main() -> std::process::ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let curve = read_curve(arguments)?;
     let options = CurveOptions {
-        baseline: if arguments.tared { Baseline::Zero } else { Baseline::Auto },
-        contact_point: arguments.contact.map_or(ContactPoint::Search, ContactPoint::At),
+        baseline: if arguments.tared {
+            Baseline::Zero
+        } else {
+            Baseline::Auto
+        },
+        contact_point: arguments
+            .contact
+            .map_or(ContactPoint::Search, ContactPoint::At),
     };
-    let found =
-        select_model(&curve, &indenter(arguments)?, arguments.poisson, model(arguments.model), &options)?;
+    let found = select_model(
+        &curve,
+        &indenter(arguments)?,
+        arguments.poisson,
+        model(arguments.model),
+        &options,
+    )?;
     if arguments.json {
         println!("{:#}", json(&found));
     } else {
@@ -127,33 +138,60 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 fn read_curve(arguments: &Arguments) -> Result<IndentationCurve, Box<dyn Error>> {
     let table = read_table(&arguments.curve)?;
     if table.values.ncols() < 2 {
-        return Err(
-            format!("{}: two columns are needed, indentation and force", arguments.curve.display()).into()
-        );
+        return Err(format!(
+            "{}: two columns are needed, indentation and force",
+            arguments.curve.display()
+        )
+        .into());
     }
-    let named = table.header.iter().position(|h| h.to_lowercase().contains("force"));
+    let named = table
+        .header
+        .iter()
+        .position(|h| h.to_lowercase().contains("force"));
     let force = named.unwrap_or(if arguments.force_first { 0 } else { 1 });
     let depth = if force == 0 { 1 } else { 0 };
     let share = if arguments.plates { 0.5 } else { 1.0 };
-    let z: Vec<f64> = table.values.column(depth).iter().map(|z| z * share).collect();
-    Ok(IndentationCurve::new(&z, &table.values.column(force).to_vec())?)
+    let z: Vec<f64> = table
+        .values
+        .column(depth)
+        .iter()
+        .map(|z| z * share)
+        .collect();
+    Ok(IndentationCurve::new(
+        &z,
+        &table.values.column(force).to_vec(),
+    )?)
 }
 
 fn indenter(arguments: &Arguments) -> Result<Indenter, Box<dyn Error>> {
-    let bond = if arguments.sliding { Bond::Free } else { Bond::Bonded };
+    let bond = if arguments.sliding {
+        Bond::Free
+    } else {
+        Bond::Bonded
+    };
     let thickness_m = arguments.thickness;
-    Ok(match (arguments.shape, arguments.radius, arguments.ball_radius) {
-        (Shape::Cone, ..) => Indenter::Cone { half_angle_tangent: tangent_of_degrees(arguments.half_angle)? },
-        (Shape::Punch, Some(radius_m), _) => Indenter::Punch { radius_m },
-        (Shape::Sphere, Some(radius_m), None) => Indenter::Sphere { radius_m, thickness_m, bond },
-        (Shape::Sphere, None, Some(radius_m)) => Indenter::Ball { radius_m },
-        (Shape::Sphere, Some(radius), Some(ball)) => Indenter::Sphere {
-            radius_m: relative_radius_m(Some(radius), Some(ball))?,
-            thickness_m: None,
-            bond,
+    Ok(
+        match (arguments.shape, arguments.radius, arguments.ball_radius) {
+            (Shape::Cone, ..) => Indenter::Cone {
+                half_angle_tangent: tangent_of_degrees(arguments.half_angle)?,
+            },
+            (Shape::Punch, Some(radius_m), _) => Indenter::Punch { radius_m },
+            (Shape::Sphere, Some(radius_m), None) => Indenter::Sphere {
+                radius_m,
+                thickness_m,
+                bond,
+            },
+            (Shape::Sphere, None, Some(radius_m)) => Indenter::Ball { radius_m },
+            (Shape::Sphere, Some(radius), Some(ball)) => Indenter::Sphere {
+                radius_m: relative_radius_m(Some(radius), Some(ball))?,
+                thickness_m: None,
+                bond,
+            },
+            (Shape::Sphere | Shape::Punch, None, _) => {
+                return Err("--radius (m) is needed for this shape".into());
+            }
         },
-        (Shape::Sphere | Shape::Punch, None, _) => return Err("--radius (m) is needed for this shape".into()),
-    })
+    )
 }
 
 fn model(law: Law) -> Model {
@@ -190,7 +228,9 @@ fn reason(found: &CurveSelection) -> String {
     match found.reason {
         SelectionReason::Asked => "asked for".into(),
         SelectionReason::OnlyCandidate => "the only law for this indenter".into(),
-        SelectionReason::BetterFit { margin } => format!("its AICc is {margin:.1} below the next law's"),
+        SelectionReason::BetterFit { margin } => {
+            format!("its AICc is {margin:.1} below the next law's")
+        }
         SelectionReason::MostGeneral { behind } => {
             format!(
                 "fits as well as any (AICc {behind:.1} above the lowest) and holds wherever the others do"
@@ -202,7 +242,11 @@ fn reason(found: &CurveSelection) -> String {
 
 fn print(found: &CurveSelection, points: usize) {
     let fit = found.chosen();
-    println!("Young's modulus   {}   (95 %: {})", pascals(fit.youngs_modulus_pa), interval(fit));
+    println!(
+        "Young's modulus   {}   (95 %: {})",
+        pascals(fit.youngs_modulus_pa),
+        interval(fit)
+    );
     println!("law               {}: {}", fit.model, reason(found));
     println!("contact point     {:.4e} m", fit.contact_point_m);
     println!("force offset      {:.3e} N", fit.offset_n);
@@ -217,7 +261,10 @@ fn print(found: &CurveSelection, points: usize) {
         println!("warning           {warning}");
     }
     if found.fits.len() > 1 {
-        println!("\n{:<40} {:>14} {:>10} {:>8}", "law", "modulus", "AICc", "weight");
+        println!(
+            "\n{:<40} {:>14} {:>10} {:>8}",
+            "law", "modulus", "AICc", "weight"
+        );
         for (fit, weight) in found.fits.iter().zip(&found.weights) {
             let modulus = pascals(fit.youngs_modulus_pa);
             println!(
@@ -257,18 +304,30 @@ fn page(curve: &IndentationCurve, found: &CurveSelection) -> Result<Page, Box<dy
     let at = |i: usize, force: f64| [mm(curve.position_m()[i]), force * 1e3];
     let measured = curve.force_n().iter().enumerate().map(|(i, &f)| at(i, f));
     let fitted = fit.fitted_n.iter().enumerate().map(|(i, &f)| at(i, f));
-    let title = format!("{}: {} ({})", fit.model, pascals(fit.youngs_modulus_pa), interval(fit));
+    let title = format!(
+        "{}: {} ({})",
+        fit.model,
+        pascals(fit.youngs_modulus_pa),
+        interval(fit)
+    );
     let upper = Panel::new(title)
         .x_label("indentation from the contact point (mm)")
         .y_label("force (mN)")
         .points(measured, Colour::BLUE, "measured")
         .line(fitted, Colour::ORANGE, "fit");
-    let zero = [mm(curve.position_m()[0]), mm(curve.position_m()[curve.position_m().len() - 1])];
-    let residuals = (curve.force_n().iter().zip(&fit.fitted_n).enumerate()).map(|(i, (f, g))| at(i, f - g));
+    let zero = [
+        mm(curve.position_m()[0]),
+        mm(curve.position_m()[curve.position_m().len() - 1]),
+    ];
+    let residuals =
+        (curve.force_n().iter().zip(&fit.fitted_n).enumerate()).map(|(i, (f, g))| at(i, f - g));
     let lower = Panel::new("Residuals")
         .x_label("indentation from the contact point (mm)")
         .y_label("measured − fit (mN)")
         .points(residuals, Colour::BLUE, "")
         .dashed(zero.map(|x| [x, 0.0]), Colour::ORANGE, "");
-    Ok(Page::new("Indentation").columns(1).panel(upper).panel(lower))
+    Ok(Page::new("Indentation")
+        .columns(1)
+        .panel(upper)
+        .panel(lower))
 }

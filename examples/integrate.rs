@@ -13,8 +13,8 @@ use tactile_imaging::{
     io::{read_grey_image, read_grid, write_grid},
     plot::{HeatMap, Layer, Page, Panel},
     sfs::{
-        CosinePoisson, Domain, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator, Surface, Workspace,
-        slopes,
+        CosinePoisson, Domain, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator, Surface,
+        Workspace, slopes,
     },
 };
 
@@ -44,7 +44,13 @@ struct Arguments {
     #[arg(long, value_name = "KNOWN.csv")]
     heights: Option<PathBuf>,
     /// Width and height of a pixel; heights have their unit.
-    #[arg(long, value_name = "X,Y", default_value = "1,1", value_delimiter = ',', num_args = 1)]
+    #[arg(
+        long,
+        value_name = "X,Y",
+        default_value = "1,1",
+        value_delimiter = ',',
+        num_args = 1
+    )]
     pixel_size: Vec<f64>,
     /// CSV file for the heights.
     #[arg(long, value_name = "Z.csv")]
@@ -88,13 +94,19 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if let Some(known) = &known {
         domain = domain.with_known_heights(known.view());
     }
-    let plain = mask.is_none() && known.is_none() && p.iter().chain(&q).all(|slope| slope.is_finite());
-    let automatic = if plain { Method::Poisson } else { Method::LeastSquares };
-    let (name, method): (_, Box<dyn SlopeIntegrator<f64>>) = match arguments.method.unwrap_or(automatic) {
-        Method::Poisson => ("poisson", Box::new(CosinePoisson::new())),
-        Method::FrankotChellappa => ("frankot-chellappa", Box::new(FrankotChellappa::new())),
-        Method::LeastSquares => ("least-squares", Box::new(MaskedLeastSquares::new())),
+    let plain =
+        mask.is_none() && known.is_none() && p.iter().chain(&q).all(|slope| slope.is_finite());
+    let automatic = if plain {
+        Method::Poisson
+    } else {
+        Method::LeastSquares
     };
+    let (name, method): (_, Box<dyn SlopeIntegrator<f64>>) =
+        match arguments.method.unwrap_or(automatic) {
+            Method::Poisson => ("poisson", Box::new(CosinePoisson::new())),
+            Method::FrankotChellappa => ("frankot-chellappa", Box::new(FrankotChellappa::new())),
+            Method::LeastSquares => ("least-squares", Box::new(MaskedLeastSquares::new())),
+        };
     let (ms, surface) = solve(method.as_ref(), &p, &q, &domain)?;
     let report = &surface.report;
     let line = serde_json::json!({
@@ -108,8 +120,15 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     if let Some(path) = &arguments.plot {
         let heights = HeatMap::of_pixels(surface.heights.view(), [width, height], "height");
-        let panel = Panel::new("Heights").x_label("x").y_label("y").equal_aspect().image_axes();
-        Page::new("Integrated slopes").columns(1).panel(panel.layer(Layer::Heat(heights))).save(path)?;
+        let panel = Panel::new("Heights")
+            .x_label("x")
+            .y_label("y")
+            .equal_aspect()
+            .image_axes();
+        Page::new("Integrated slopes")
+            .columns(1)
+            .panel(panel.layer(Layer::Heat(heights)))
+            .save(path)?;
     }
     Ok(())
 }
@@ -133,10 +152,19 @@ fn solve(
 }
 
 /// Root mean square of the difference between the slopes of the heights and the given ones.
-fn slope_rms(surface: &Surface<f64>, p: &Array2<f64>, q: &Array2<f64>, pixel_size: [f64; 2]) -> f64 {
+fn slope_rms(
+    surface: &Surface<f64>,
+    p: &Array2<f64>,
+    q: &Array2<f64>,
+    pixel_size: [f64; 2],
+) -> f64 {
     let (px, qy) = slopes(surface.heights.view(), pixel_size);
     let squares = |a: &Array2<f64>, b: &Array2<f64>| -> (f64, usize) {
-        let differences = a.iter().zip(b).map(|(a, b)| a - b).filter(|d| d.is_finite());
+        let differences = a
+            .iter()
+            .zip(b)
+            .map(|(a, b)| a - b)
+            .filter(|d| d.is_finite());
         differences.fold((0.0, 0), |(sum, count), d| (sum + d * d, count + 1))
     };
     let ((a, m), (b, n)) = (squares(&px, p), squares(&qy, q));

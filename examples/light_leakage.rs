@@ -14,7 +14,9 @@ use std::path::PathBuf;
 use clap::Parser;
 use tactile_imaging::optics::surface::{Dimple, Flat, TopSurface, Touched, TouchingObject};
 use tactile_imaging::optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, path, trace};
-use tactile_imaging::optics::{AcceptanceAngle, Dispersion, Geometry, LayerStack, Led, OpticsError};
+use tactile_imaging::optics::{
+    AcceptanceAngle, Dispersion, Geometry, LayerStack, Led, OpticsError,
+};
 use tactile_imaging::plot::{Colour, Page, Panel, Scale};
 
 /// Where the light of an LED goes in the layered waveguide, at rest and under a press.
@@ -39,11 +41,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments = Arguments::parse();
     let glass = Dispersion::BOROFLOAT_33.index(530e-9)?;
     let layer = |index, thickness_m| SlabLayer { index, thickness_m };
-    let layers = [layer(1.41, 2e-3), layer(1.40, 3e-3), layer(1.39, 5e-3), layer(glass, 2e-3)];
+    let layers = [
+        layer(1.41, 2e-3),
+        layer(1.40, 3e-3),
+        layer(1.39, 5e-3),
+        layer(glass, 2e-3),
+    ];
     let slab = Slab::new(&layers, 1.0, LENGTH_M)?;
     let led = Led::new(1.0, 70_f64.to_radians())?;
     print_angles()?;
-    let scenes = Scenes { slab, led, rays: arguments.rays };
+    let scenes = Scenes {
+        slab,
+        led,
+        rays: arguments.rays,
+    };
     scenes.print_budgets()?;
     let page = Page::new("Why the sensor sees a press")
         .columns(2)
@@ -87,7 +98,12 @@ fn dimple(depth_m: f64) -> Result<Dimple<f64>, OpticsError> {
 
 /// A dimple touched by a white object over its inner 3 mm.
 fn pressed(depth_m: f64, index: f64) -> Result<Touched<Dimple<f64>, f64>, OpticsError> {
-    Touched::new(dimple(depth_m)?, TouchingObject { index, albedo: 0.8 }, CENTRE_M, 3e-3)
+    Touched::new(
+        dimple(depth_m)?,
+        TouchingObject { index, albedo: 0.8 },
+        CENTRE_M,
+        3e-3,
+    )
 }
 
 struct Scenes<'a> {
@@ -107,16 +123,31 @@ impl Scenes<'_> {
     }
 
     fn options(&self, geometry: Geometry, rays: u32, seed: u64) -> TraceOptions<f64> {
-        TraceOptions { geometry, rays, seed, emitter_half_width_m: 5e-3, ..TraceOptions::default() }
+        TraceOptions {
+            geometry,
+            rays,
+            seed,
+            emitter_half_width_m: 5e-3,
+            ..TraceOptions::default()
+        }
     }
 
     fn print_budgets(&self) -> Result<(), OpticsError> {
-        println!("\nwhere the light of a 140° LED goes (% of its light, {} rays in space)", self.rays);
-        println!("{:34} {:>8} {:>8} {:>8} {:>8} {:>8}", "", "guided", "top", "bottom", "camera", "object");
+        println!(
+            "\nwhere the light of a 140° LED goes (% of its light, {} rays in space)",
+            self.rays
+        );
+        println!(
+            "{:34} {:>8} {:>8} {:>8} {:>8} {:>8}",
+            "", "guided", "top", "bottom", "camera", "object"
+        );
         let row = |name: &str, surface: &dyn TopSurface<f64>| -> Result<(), OpticsError> {
             let b = self.budget(surface, Geometry::Volume)?;
             let shares = [b.guided, b.above, b.below, b.camera, b.absorbed];
-            let cells: Vec<String> = shares.iter().map(|s| format!("{:8.3}", 100.0 * s)).collect();
+            let cells: Vec<String> = shares
+                .iter()
+                .map(|s| format!("{:8.3}", 100.0 * s))
+                .collect();
             println!("{name:34} {}", cells.join(" "));
             Ok(())
         };
@@ -129,9 +160,17 @@ impl Scenes<'_> {
 
     fn paths(&self, title: &str, surface: &dyn TopSurface<f64>) -> Result<Panel, OpticsError> {
         let mm = |v: f64| 1e3 * v;
-        let mut panel = Panel::new(title).x_label("along the slab (mm)").y_label("height (mm)");
+        let mut panel = Panel::new(title)
+            .x_label("along the slab (mm)")
+            .y_label("height (mm)");
         let mut vertices = [[0.0; 3]; 200];
-        let colours = [Colour::BLUE, Colour::ORANGE, Colour::GREEN, Colour::PURPLE, Colour::SKY];
+        let colours = [
+            Colour::BLUE,
+            Colour::ORANGE,
+            Colour::GREEN,
+            Colour::PURPLE,
+            Colour::SKY,
+        ];
         let (mut stays, mut leaves) = (Vec::new(), Vec::new());
         for (k, colour) in colours.into_iter().enumerate() {
             // Aimed at the flank that faces the LED, from five angles within its cone.
@@ -139,7 +178,10 @@ impl Scenes<'_> {
             let inside = (angle.sin() / 1.40).asin();
             let depth_share = (12.5e-3 * inside.tan() / self.slab.thickness_m()).min(1.0);
             let written = path(&self.slab, surface, depth_share, angle, &mut vertices)?;
-            let line: Vec<[f64; 2]> = vertices[..written].iter().map(|v| [mm(v[0]), mm(v[2])]).collect();
+            let line: Vec<[f64; 2]> = vertices[..written]
+                .iter()
+                .map(|v| [mm(v[0]), mm(v[2])])
+                .collect();
             let end = line[written - 1];
             if end[0] < mm(LENGTH_M) - 1e-6 {
                 leaves.push(end)
@@ -148,9 +190,14 @@ impl Scenes<'_> {
             }
             panel = panel.line(line, colour, "");
         }
-        panel =
-            panel.points(stays, Colour::BLACK, "still trapped").points(leaves, Colour::RED, "leaves here");
-        let top = (0..=300).map(|i| 1e-4 * f64::from(i)).map(|x| [mm(x), mm(surface.height(x, 0.0))]);
+        panel = panel.points(stays, Colour::BLACK, "still trapped").points(
+            leaves,
+            Colour::RED,
+            "leaves here",
+        );
+        let top = (0..=300)
+            .map(|i| 1e-4 * f64::from(i))
+            .map(|x| [mm(x), mm(surface.height(x, 0.0))]);
         panel = panel.line(top, Colour::BLACK, "");
         for z in [-2.0, -5.0, -10.0, -12.0] {
             panel = panel.dashed([[0.0, z], [mm(LENGTH_M), z]], Colour::GREY, "");
@@ -163,9 +210,10 @@ impl Scenes<'_> {
         let mut panel = Panel::new("Light to the camera against the dimple's steepest slope")
             .x_label("steepest slope")
             .y_label("light to the camera (%)");
-        for (geometry, name, colour) in
-            [(Geometry::Section, "section", Colour::BLUE), (Geometry::Volume, "space", Colour::ORANGE)]
-        {
+        for (geometry, name, colour) in [
+            (Geometry::Section, "section", Colour::BLUE),
+            (Geometry::Volume, "space", Colour::ORANGE),
+        ] {
             let mut curve = Vec::new();
             for step in 0..=24 {
                 let slope = 0.025 * f64::from(step);
@@ -179,15 +227,19 @@ impl Scenes<'_> {
 
     fn against_index(&self) -> Result<Panel, OpticsError> {
         eprintln!("tracing against the object's index …");
-        let mut panel = Panel::new("Light to the camera against the object's index (flat contact, 3 mm)")
-            .x_label("refractive index of the touching object")
-            .y_label("light to the camera (%)");
+        let mut panel =
+            Panel::new("Light to the camera against the object's index (flat contact, 3 mm)")
+                .x_label("refractive index of the touching object")
+                .y_label("light to the camera (%)");
         for (albedo, colour) in [(0.8, Colour::ORANGE), (0.4, Colour::BLUE)] {
             let mut curve = Vec::new();
             for step in 0..=24 {
                 let index = 1.0 + 0.025 * f64::from(step);
                 let touched = Touched::new(Flat, TouchingObject { index, albedo }, CENTRE_M, 3e-3)?;
-                curve.push([index, 100.0 * self.budget(&touched, Geometry::Volume)?.camera]);
+                curve.push([
+                    index,
+                    100.0 * self.budget(&touched, Geometry::Volume)?.camera,
+                ]);
             }
             panel = panel.line(curve, colour, &format!("albedo {albedo}"));
         }
@@ -211,7 +263,10 @@ impl Scenes<'_> {
             let options = self.options(Geometry::Volume, 4 * self.rays, 1);
             trace(&self.slab, &self.led, surface, &options, &mut profile)?;
             panel = panel.line(
-                profile.iter().enumerate().map(|(k, v)| [k as f64 + 0.5, 100.0 * v]),
+                profile
+                    .iter()
+                    .enumerate()
+                    .map(|(k, v)| [k as f64 + 0.5, 100.0 * v]),
                 colour,
                 name,
             );
@@ -241,7 +296,10 @@ impl Scenes<'_> {
             println!("  {rays:7.0} rays  {error:8.4} %");
         }
         let first = curve[0];
-        let random = curve.iter().map(|p| [p[0], first[1] * (first[0] / p[0]).sqrt()]).collect::<Vec<_>>();
+        let random = curve
+            .iter()
+            .map(|p| [p[0], first[1] * (first[0] / p[0]).sqrt()])
+            .collect::<Vec<_>>();
         Ok(Panel::new("Convergence with the number of rays")
             .x_label("rays")
             .y_label("rms error (%)")

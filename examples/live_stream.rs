@@ -60,10 +60,18 @@ fn main() -> Result<ExitCode, Failure> {
     let truth = trial.truth().youngs_modulus_pa;
     let late = play(&mut session, &frames, &arguments, truth)?;
     let share = 100.0 * late as f64 / frames.len() as f64;
-    println!("{} frames at {} Hz, {late} late ({share:.1} %)", frames.len(), arguments.rate);
+    println!(
+        "{} frames at {} Hz, {late} late ({share:.1} %)",
+        frames.len(),
+        arguments.rate
+    );
     let modulus = session.modulus()?;
     let error = 100.0 * (modulus.youngs_modulus_pa / truth - 1.0);
-    println!("modulus {}, true {:.2} kPa ({error:+.2} %)", in_kpa(&modulus), truth * 1e-3);
+    println!(
+        "modulus {}, true {:.2} kPa ({error:+.2} %)",
+        in_kpa(&modulus),
+        truth * 1e-3
+    );
     print!("{}", session.report());
     if let Some(caution) = session.drift_flag() {
         println!("caution: {caution}");
@@ -73,23 +81,46 @@ fn main() -> Result<ExitCode, Failure> {
 
 /// Success if few enough frames came late and the modulus is right; says on stderr what is not.
 fn verdict(late_percent: f64, error_percent: f64, arguments: &Arguments) -> ExitCode {
-    let Arguments { tolerance, allowed_late, .. } = arguments;
+    let Arguments {
+        tolerance,
+        allowed_late,
+        ..
+    } = arguments;
     let wrong = error_percent.is_nan() || error_percent.abs() > *tolerance;
     let late = late_percent > *allowed_late;
     if late {
-        eprintln!("failed: {late_percent:.1} % of the frames came late, more than {allowed_late} %");
+        eprintln!(
+            "failed: {late_percent:.1} % of the frames came late, more than {allowed_late} %"
+        );
     }
     if wrong {
         eprintln!("failed: the modulus is off by {error_percent:+.2} %, more than {tolerance} %");
     }
-    if late || wrong { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+    if late || wrong {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    }
 }
 
 fn press_options(arguments: &Arguments) -> PressOptions {
-    let small = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
-    let camera = if arguments.full_size { Camera::default() } else { small };
+    let small = Camera {
+        shape: [260, 348],
+        pixel_size_m: [86.2e-6; 2],
+        ..Camera::default()
+    };
+    let camera = if arguments.full_size {
+        Camera::default()
+    } else {
+        small
+    };
     let loads = vec![Load::normal(arguments.force)];
-    PressOptions { camera, loads, gain: Gain::PeakGrey(200.0), ..PressOptions::default() }
+    PressOptions {
+        camera,
+        loads,
+        gain: Gain::PeakGrey(200.0),
+        ..PressOptions::default()
+    }
 }
 
 /// Makes all frames of the loading and unloading.
@@ -117,26 +148,38 @@ fn play(
     arguments: &Arguments,
     truth_pa: f64,
 ) -> Result<usize, Failure> {
-    let Some((_, first)) = frames.first() else { return Ok(0) };
+    let Some((_, first)) = frames.first() else {
+        return Ok(0);
+    };
     let period = Duration::from_secs_f64(1.0 / arguments.rate);
     session.push(first.view())?; // buffers get their size before the clock starts
     let start = Instant::now();
     let mut late = 0;
-    let heading = if arguments.strain { "   strain xx, zz" } else { "" };
+    let heading = if arguments.strain {
+        "   strain xx, zz"
+    } else {
+        ""
+    };
     println!("time (s)   force (N)   radius (mm)   late (%)   modulus (kPa){heading}");
     for (i, (time_s, frame)) in frames.iter().enumerate() {
         let due = Duration::from_secs_f64(*time_s);
         std::thread::sleep(due.saturating_sub(start.elapsed()));
         let update = session.push(frame.view())?;
         let modulus = session.modulus().ok();
-        let force = update.contact.and_then(|c| c.force_n).map_or(0.0, |f| f.value);
+        let force = update
+            .contact
+            .and_then(|c| c.force_n)
+            .map_or(0.0, |f| f.value);
         let strained = arguments.strain && force > arguments.force / 3.0;
         let strain = if strained { strain_of(session)? } else { None };
         late += usize::from(start.elapsed() > due + period);
         if i % 16 == 0 {
             let share = 100.0 * late as f64 / (i + 1) as f64;
             print_line(*time_s, &update, share, modulus.as_ref(), truth_pa);
-            println!("{}", strain.map_or(String::new(), |[x, z]| format!("   {x:+.3}, {z:+.3}")));
+            println!(
+                "{}",
+                strain.map_or(String::new(), |[x, z]| format!("   {x:+.3}, {z:+.3}"))
+            );
         }
     }
     Ok(late)
@@ -162,11 +205,18 @@ fn print_line(
     let force = contact.and_then(|c| c.force_n).map_or(0.0, |f| f.value);
     let radius_mm = contact.map_or(0.0, |c| c.contact_radius_m.value * 1e3);
     let text = modulus.map_or("-".into(), |m| {
-        format!("{} ({:+.2} %)", in_kpa(m), 100.0 * (m.youngs_modulus_pa / truth_pa - 1.0))
+        format!(
+            "{} ({:+.2} %)",
+            in_kpa(m),
+            100.0 * (m.youngs_modulus_pa / truth_pa - 1.0)
+        )
     });
     print!("{time_s:8.3} {force:11.4} {radius_mm:13.4} {late_percent:10.1}   {text:<27}");
 }
 
 fn in_kpa(modulus: &ModulusEstimate<f64>) -> String {
-    format!("{} kPa", with_error(modulus.youngs_modulus_pa, modulus.standard_error_pa, 1e-3))
+    format!(
+        "{} kPa",
+        with_error(modulus.youngs_modulus_pa, modulus.standard_error_pa, 1e-3)
+    )
 }

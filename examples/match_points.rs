@@ -15,8 +15,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
-    CoherentPointDrift, DenseRelaxation, LinearAssignment, MatchError, Matching, NearestNeighbour, Outliers,
-    PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation, SparseRelaxation,
+    CoherentPointDrift, DenseRelaxation, LinearAssignment, MatchError, Matching, NearestNeighbour,
+    Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation, SparseRelaxation,
 };
 
 /// Matches the point sets of case files and writes result files.
@@ -87,11 +87,17 @@ impl Arguments {
             Stray::Target => Outliers::Target,
             Stray::None => Outliers::None,
         };
-        RelaxationOptions::default().rotation(rotation).outliers(outliers)
+        RelaxationOptions::default()
+            .rotation(rotation)
+            .outliers(outliers)
     }
 
     fn matcher<const D: usize>(&self) -> Box<dyn PointMatcher<f64, D>> {
-        match if self.dense { Method::Dense } else { self.method } {
+        match if self.dense {
+            Method::Dense
+        } else {
+            self.method
+        } {
             Method::Relaxation => Box::new(RelaxationMatcher::new(self.options())),
             Method::Dense => Box::new(DenseRelaxation::default()),
             Method::Sparse => Box::new(SparseRelaxation::default()),
@@ -147,7 +153,13 @@ fn solve<const D: usize>(
         "# {name}: {:?} after {} iterations, {} starts, residual {:.3e}",
         report.stop, report.iterations, report.starts, report.residual
     )?;
-    write_case_result(out, name, times[times.len() / 2], &matching.warped, &matching.assignment)?;
+    write_case_result(
+        out,
+        name,
+        times[times.len() / 2],
+        &matching.warped,
+        &matching.assignment,
+    )?;
     Ok(())
 }
 

@@ -65,7 +65,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut workspace = ForceWorkspace::default();
     for (name, frame) in &input.frames {
         let m = meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
-        if arguments.json { println!("{}", json(name, &m)) } else { describe(name, &m) }
+        if arguments.json {
+            println!("{}", json(name, &m))
+        } else {
+            describe(name, &m)
+        }
     }
     plot(&input.pairs, &calibration)?.save(&arguments.plot)?;
     eprintln!("calibration plot: {}", arguments.plot.display());
@@ -74,13 +78,24 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn from_files(arguments: &Arguments, reference: &PathBuf) -> Result<Input, Box<dyn Error>> {
     let load = |path: &PathBuf| tactile_imaging::io::read_grey_image(path);
-    let named = |path: &PathBuf| Ok::<_, Box<dyn Error>>((path.display().to_string(), load(path)?.to_u8()));
-    let path = arguments.pairs.as_ref().ok_or("calibration pairs are needed")?;
+    let named =
+        |path: &PathBuf| Ok::<_, Box<dyn Error>>((path.display().to_string(), load(path)?.to_u8()));
+    let path = arguments
+        .pairs
+        .as_ref()
+        .ok_or("calibration pairs are needed")?;
     let points = tactile_imaging::io::read_points::<2>(path)?;
-    let pairs = points.iter().map(|p| CalibrationPair::loading(p[0], p[1])).collect();
+    let pairs = points
+        .iter()
+        .map(|p| CalibrationPair::loading(p[0], p[1]))
+        .collect();
     Ok(Input {
         reference: load(reference)?.to_u8(),
-        frames: arguments.frame.iter().map(named).collect::<Result<_, _>>()?,
+        frames: arguments
+            .frame
+            .iter()
+            .map(named)
+            .collect::<Result<_, _>>()?,
         pairs,
         pixel_m: 1e-6 * arguments.pixel_um,
     })
@@ -93,14 +108,24 @@ fn simulated() -> Result<Input, Box<dyn Error>> {
         loads: vec![Load::normal(0.7), Load::normal(1.2)],
         ..Default::default()
     })?;
-    let series = scene.calibrate(&simulate::CalibrationOptions { steps: 10, ..Default::default() })?;
+    let series = scene.calibrate(&simulate::CalibrationOptions {
+        steps: 10,
+        ..Default::default()
+    })?;
     let pair = |p: &simulate::CalibrationPoint| CalibrationPair {
         integrated_pixel_value: p.integrated_pixel_value,
         force_n: p.force_n,
-        branch: if p.branch == simulate::Branch::Loading { Branch::Loading } else { Branch::Unloading },
+        branch: if p.branch == simulate::Branch::Loading {
+            Branch::Loading
+        } else {
+            Branch::Unloading
+        },
     };
     let made = scene.simulate();
-    let names = made.truth.iter().map(|t| format!("simulated press of {} N", t.contact.force_n));
+    let names = made
+        .truth
+        .iter()
+        .map(|t| format!("simulated press of {} N", t.contact.force_n));
     Ok(Input {
         frames: names.zip(made.frames).collect(),
         reference: made.reference,
@@ -138,9 +163,16 @@ fn describe(name: &str, m: &ForceMeasurement<f64>) {
         println!("  no contact");
         return;
     };
-    println!("  force        {:.4} ± {:.4} N", m.force_n.value, m.force_n.standard_error);
+    println!(
+        "  force        {:.4} ± {:.4} N",
+        m.force_n.value, m.force_n.standard_error
+    );
     if let Some(r) = m.contact_radius_m {
-        println!("  radius       {:.4} mm (± {:.2} um)", 1e3 * r.value, 1e6 * r.standard_error);
+        println!(
+            "  radius       {:.4} mm (± {:.2} um)",
+            1e3 * r.value,
+            1e6 * r.standard_error
+        );
     }
     println!(
         "  centroid     {:.4} mm, {:.4} mm (± {:.2} um)",
@@ -149,7 +181,11 @@ fn describe(name: &str, m: &ForceMeasurement<f64>) {
         1e6 * centroid[0].standard_error
     );
     if let (Some(mean), Some(peak)) = (m.mean_stress_pa, m.peak_stress_pa) {
-        println!("  stress       {:.2} kPa mean, {:.2} kPa peak", 1e-3 * mean.value, 1e-3 * peak.value);
+        println!(
+            "  stress       {:.2} kPa mean, {:.2} kPa peak",
+            1e-3 * mean.value,
+            1e-3 * peak.value
+        );
     }
     if contact.touches_edge {
         println!("  warning: the contact reaches the edge of the frame");
@@ -160,7 +196,8 @@ fn describe(name: &str, m: &ForceMeasurement<f64>) {
 }
 
 fn json(name: &str, m: &ForceMeasurement<f64>) -> serde_json::Value {
-    let estimate = |e: tactile_imaging::force::Estimate<f64>| serde_json::json!([e.value, e.standard_error]);
+    let estimate =
+        |e: tactile_imaging::force::Estimate<f64>| serde_json::json!([e.value, e.standard_error]);
     serde_json::json!({
         "frame": name,
         "contact": m.contact.is_some(),
@@ -174,9 +211,15 @@ fn json(name: &str, m: &ForceMeasurement<f64>) -> serde_json::Value {
 }
 
 /// Pairs and line above, residuals below.
-fn plot(pairs: &[CalibrationPair<f64>], line: &LinearCalibration<f64>) -> Result<Page, Box<dyn Error>> {
-    let of =
-        |branch: Branch| -> Vec<usize> { (0..pairs.len()).filter(|k| pairs[*k].branch == branch).collect() };
+fn plot(
+    pairs: &[CalibrationPair<f64>],
+    line: &LinearCalibration<f64>,
+) -> Result<Page, Box<dyn Error>> {
+    let of = |branch: Branch| -> Vec<usize> {
+        (0..pairs.len())
+            .filter(|k| pairs[*k].branch == branch)
+            .collect()
+    };
     let residuals = &line.report().residuals_n;
     let [low, high] = line.range();
     let mut top = Panel::new("Calibration")
@@ -184,7 +227,10 @@ fn plot(pairs: &[CalibrationPair<f64>], line: &LinearCalibration<f64>) -> Result
         .x_label("integrated pixel value (million grey levels)")
         .y_label("force (N)");
     top = top.line(
-        [[1e-6 * low, line.force_n(low)], [1e-6 * high, line.force_n(high)]],
+        [
+            [1e-6 * low, line.force_n(low)],
+            [1e-6 * high, line.force_n(high)],
+        ],
         Colour::BLACK,
         "fitted line",
     );
@@ -192,15 +238,27 @@ fn plot(pairs: &[CalibrationPair<f64>], line: &LinearCalibration<f64>) -> Result
         .x_label("integrated pixel value (million grey levels)")
         .y_label("measured − fitted (mN)");
     bottom = bottom.line([[1e-6 * low, 0.0], [1e-6 * high, 0.0]], Colour::BLACK, "");
-    for (branch, colour, name) in
-        [(Branch::Loading, Colour::BLUE, "loading"), (Branch::Unloading, Colour::ORANGE, "unloading")]
-    {
+    for (branch, colour, name) in [
+        (Branch::Loading, Colour::BLUE, "loading"),
+        (Branch::Unloading, Colour::ORANGE, "unloading"),
+    ] {
         let x = |k: usize| 1e-6 * pairs[k].integrated_pixel_value;
         let found = of(branch);
         if !found.is_empty() {
-            top = top.points(found.iter().map(|k| [x(*k), pairs[*k].force_n]), colour, name);
-            bottom = bottom.points(found.iter().map(|k| [x(*k), 1e3 * residuals[*k]]), colour, "");
+            top = top.points(
+                found.iter().map(|k| [x(*k), pairs[*k].force_n]),
+                colour,
+                name,
+            );
+            bottom = bottom.points(
+                found.iter().map(|k| [x(*k), 1e3 * residuals[*k]]),
+                colour,
+                "",
+            );
         }
     }
-    Ok(Page::new("Force calibration").columns(1).panel(top).panel(bottom))
+    Ok(Page::new("Force calibration")
+        .columns(1)
+        .panel(top)
+        .panel(bottom))
 }

@@ -43,9 +43,15 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let root = std::env::var_os("TACTILE_DATA").map_or("../shared/data".into(), PathBuf::from);
-    let folder = arguments.data.clone().unwrap_or_else(|| root.join("9dtact"));
+    let folder = arguments
+        .data
+        .clone()
+        .unwrap_or_else(|| root.join("9dtact"));
     if arguments.data.is_none() && !folder.is_dir() {
-        println!("skipped: no folder {} (set TACTILE_DATA or --data)", folder.display());
+        println!(
+            "skipped: no folder {} (set TACTILE_DATA or --data)",
+            folder.display()
+        );
         return Ok(());
     }
     let reference = read_grey_image(folder.join("rectify_crop_ref.png"))?.to_u8();
@@ -62,7 +68,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 
     let rings = profile(surface, &ball);
     print(&reading, &ball, &rings);
-    let page = draw(surface, &ball, &rings, HeatMap::of_frame(frame.view(), [PIXEL_M * MM; 2]));
+    let page = draw(
+        surface,
+        &ball,
+        &rings,
+        HeatMap::of_frame(frame.view(), [PIXEL_M * MM; 2]),
+    );
     page.save(arguments.out.join("press.svg"))?;
     eprintln!("plot: {}", arguments.out.join("press.svg").display());
     Ok(())
@@ -74,7 +85,10 @@ fn depth_table(folder: &Path) -> Result<Vec<(f64, f64)>, ReadError> {
     let table = read_table(&path)?;
     let darkness = table.column("darkness_grey_levels", 0, &path)?;
     let depth_mm = table.column("depth_mm", 1, &path)?;
-    Ok(darkness.into_iter().zip(depth_mm.iter().map(|z| z / MM)).collect())
+    Ok(darkness
+        .into_iter()
+        .zip(depth_mm.iter().map(|z| z / MM))
+        .collect())
 }
 
 /// The contact and the ball beside each other, and both depths by distance from the centre.
@@ -89,13 +103,20 @@ fn print(reading: &ContactReading, ball: &BallFit, rings: &[[f64; 3]]) {
         px(reading.contact_radius_m.value),
         reading.contact_radius_m.value * MM
     );
-    println!("ball       centre ({:.1}, {:.1}) px", px(ball.centre_m[0]), px(ball.centre_m[1]));
+    println!(
+        "ball       centre ({:.1}, {:.1}) px",
+        px(ball.centre_m[0]),
+        px(ball.centre_m[1])
+    );
     println!(
         "           contact radius {:.1} px = {:.3} mm",
         px(ball.contact_radius_m),
         ball.contact_radius_m * MM
     );
-    println!("           cap {:.3} mm deep", ball.depth_m(ball.centre_m) * MM);
+    println!(
+        "           cap {:.3} mm deep",
+        ball.depth_m(ball.centre_m) * MM
+    );
     println!(
         "depth      mean absolute error {:.4} mm over {} pixels (the makers state 0.0462 mm)",
         ball.mean_absolute_error_m * MM,
@@ -103,7 +124,12 @@ fn print(reading: &ContactReading, ball: &BallFit, rings: &[[f64; 3]]) {
     );
     println!("\n   r (mm)   measured   ball (mm)");
     for [r, measured, expected] in rings {
-        println!("  {:7.2} {:10.3} {:10.3}", r * MM, measured * MM, expected * MM);
+        println!(
+            "  {:7.2} {:10.3} {:10.3}",
+            r * MM,
+            measured * MM,
+            expected * MM
+        );
     }
 }
 
@@ -112,7 +138,10 @@ fn profile(surface: &ContactSurface, ball: &BallFit) -> Vec<[f64; 3]> {
     let mut rings = vec![[0.0; 4]; 20];
     let origin = surface.origin_m();
     for ((row, column), h) in surface.surface.heights.indexed_iter() {
-        let at = [origin[0] + column as f64 * PIXEL_M, origin[1] + row as f64 * PIXEL_M];
+        let at = [
+            origin[0] + column as f64 * PIXEL_M,
+            origin[1] + row as f64 * PIXEL_M,
+        ];
         let r = (at[0] - ball.centre_m[0]).hypot(at[1] - ball.centre_m[1]);
         if let Some(ring) = rings.get_mut((r / 0.2e-3) as usize) {
             let depth = if h.is_finite() { *h } else { 0.0 };
@@ -121,7 +150,11 @@ fn profile(surface: &ContactSurface, ball: &BallFit) -> Vec<[f64; 3]> {
             }
         }
     }
-    rings.iter().filter(|ring| ring[0] > 0.0).map(|[n, r, z, b]| [r / n, z / n, b / n]).collect()
+    rings
+        .iter()
+        .filter(|ring| ring[0] > 0.0)
+        .map(|[n, r, z, b]| [r / n, z / n, b / n])
+        .collect()
 }
 
 fn draw(surface: &ContactSurface, ball: &BallFit, rings: &[[f64; 3]], frame: HeatMap) -> Page {
@@ -145,7 +178,11 @@ fn draw(surface: &ContactSurface, ball: &BallFit, rings: &[[f64; 3]], frame: Hea
         .marked(column(1), Marker::Ring, Colour::RED, "measured");
     Page::new("9DTact: a ball of 4 mm radius")
         .columns(3)
-        .panel(axes("Frame").heat_map(frame).line(circle.clone(), Colour::ORANGE, "ball's contact"))
+        .panel(
+            axes("Frame")
+                .heat_map(frame)
+                .line(circle.clone(), Colour::ORANGE, "ball's contact"),
+        )
         .panel(axes("Depth").heat_map(map).line(circle, Colour::ORANGE, ""))
         .panel(cut)
 }

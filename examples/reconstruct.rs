@@ -83,7 +83,10 @@ enum BranchName {
 }
 
 fn direction(text: &str) -> Result<[f64; 3], String> {
-    let parts: Vec<f64> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
+    let parts: Vec<f64> = text
+        .split(',')
+        .map_while(|part| part.trim().parse().ok())
+        .collect();
     let count = text.split(',').count();
     match parts[..] {
         [x, y, z] if count == 3 => Ok([x, y, z]),
@@ -121,7 +124,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     let (name, method) = choose(arguments, lighting, mask.is_some(), known.is_some())?;
     let (ms, surface) = solve(method.as_ref(), &image, &domain)?;
-    let fit = reprojection(surface.heights.view(), Frame::Real(image.view()), [1.0, 1.0], &lighting)?;
+    let fit = reprojection(
+        surface.heights.view(),
+        Frame::Real(image.view()),
+        [1.0, 1.0],
+        &lighting,
+    )?;
     let report = &surface.report;
     let line = serde_json::json!({
         "ms": ms, "iterations": report.iterations, "reprojection_rms": fit.error.rms, "method": name,
@@ -130,7 +138,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     });
     println!("{line}");
     if report.stop == StopReason::IterationLimit && matches!(name, "eikonal") {
-        eprintln!("the sweeps did not settle; the last change was {:.2e} px", report.residual);
+        eprintln!(
+            "the sweeps did not settle; the last change was {:.2e} px",
+            report.residual
+        );
     }
     if let Some(path) = &arguments.out {
         write_grid(path, surface.heights.view())?;
@@ -146,12 +157,21 @@ fn not_outside(known: &Array2<f64>) -> Array2<bool> {
     let (rows, columns) = known.dim();
     let mut mask = Array2::from_elem((rows, columns), true);
     let border = |&(r, c): &(usize, usize)| r == 0 || c == 0 || r + 1 == rows || c + 1 == columns;
-    let mut open: Vec<(usize, usize)> = known.indexed_iter().map(|(at, _)| at).filter(border).collect();
+    let mut open: Vec<(usize, usize)> = known
+        .indexed_iter()
+        .map(|(at, _)| at)
+        .filter(border)
+        .collect();
     while let Some(at) = open.pop() {
         if mask[at] && known[at].is_finite() {
             mask[at] = false;
             let (r, c) = at;
-            let near = [(r.wrapping_sub(1), c), (r + 1, c), (r, c.wrapping_sub(1)), (r, c + 1)];
+            let near = [
+                (r.wrapping_sub(1), c),
+                (r + 1, c),
+                (r, c.wrapping_sub(1)),
+                (r, c + 1),
+            ];
             open.extend(near.into_iter().filter(|&(r, c)| r < rows && c < columns));
         }
     }
@@ -167,23 +187,35 @@ fn choose(
     known: bool,
 ) -> Result<(&'static str, Boxed), Box<dyn Error>> {
     let from_rim = masked && lighting.is_frontal();
-    let automatic =
-        if known || from_rim || arguments.rim.is_some() { Method::Eikonal } else { Method::BrooksHorn };
+    let automatic = if known || from_rim || arguments.rim.is_some() {
+        Method::Eikonal
+    } else {
+        Method::BrooksHorn
+    };
     Ok(match arguments.method.unwrap_or(automatic) {
         Method::Eikonal => {
-            let rim = arguments.rim.or((!known && masked).then_some(0.0)).map_or(Rim::Free, Rim::Height);
+            let rim = arguments
+                .rim
+                .or((!known && masked).then_some(0.0))
+                .map_or(Rim::Free, Rim::Height);
             let branch = match arguments.branch {
                 BranchName::Auto => Branch::Auto,
                 BranchName::Rising => Branch::Rising,
                 BranchName::Falling => Branch::Falling,
             };
-            ("eikonal", Box::new(Eikonal::new(lighting).with_rim(rim)?.with_branch(branch)))
+            (
+                "eikonal",
+                Box::new(Eikonal::new(lighting).with_rim(rim)?.with_branch(branch)),
+            )
         }
         Method::TsaiShah => ("tsai-shah", Box::new(TsaiShah::new(lighting))),
         Method::Pentland => ("pentland", Box::new(Pentland::new(lighting))),
         Method::BrooksHorn => {
             let occluding = masked && lighting.is_frontal();
-            ("brooks-horn", Box::new(BrooksHorn::new(lighting).with_occluding_rim(occluding)))
+            (
+                "brooks-horn",
+                Box::new(BrooksHorn::new(lighting).with_occluding_rim(occluding)),
+            )
         }
     })
 }
@@ -212,7 +244,12 @@ fn solve(
     let mut times = Vec::new();
     while times.len() < 5 && times.iter().sum::<f64>() < 500.0 {
         let start = Instant::now();
-        method.reconstruct_with(&mut workspace, Frame::Real(image.view()), domain, &mut surface)?;
+        method.reconstruct_with(
+            &mut workspace,
+            Frame::Real(image.view()),
+            domain,
+            &mut surface,
+        )?;
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     times.sort_by(f64::total_cmp);
@@ -220,14 +257,27 @@ fn solve(
 }
 
 fn extreme(heights: &Array2<f64>, pick: fn(f64, f64) -> f64) -> f64 {
-    heights.iter().copied().filter(|z| z.is_finite()).fold(f64::NAN, pick)
+    heights
+        .iter()
+        .copied()
+        .filter(|z| z.is_finite())
+        .fold(f64::NAN, pick)
 }
 
 fn plot(image: &Array2<f64>, surface: &Surface<f64>, lighting: &Lighting<f64>) -> Page {
-    let grey =
-        |values: &Array2<f64>| Layer::Heat(HeatMap::of_frame(values.mapv(|v| v as u8).view(), [1.0, 1.0]));
+    let grey = |values: &Array2<f64>| {
+        Layer::Heat(HeatMap::of_frame(
+            values.mapv(|v| v as u8).view(),
+            [1.0, 1.0],
+        ))
+    };
     let panel = |title: &str, layer: Layer| {
-        Panel::new(title).x_label("x / px").y_label("y / px").equal_aspect().image_axes().layer(layer)
+        Panel::new(title)
+            .x_label("x / px")
+            .y_label("y / px")
+            .equal_aspect()
+            .image_axes()
+            .layer(layer)
     };
     let heights = HeatMap::of_pixels(surface.heights.view(), [1.0, 1.0], "height / px");
     let shaded = render(surface.heights.view(), [1.0, 1.0], lighting);

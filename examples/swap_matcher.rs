@@ -17,31 +17,45 @@ impl PointMatcher<f64, 3> for ScaledNeighbours {
         model: &[Point3<f64>],
         target: &[Point3<f64>],
     ) -> Result<Matching<f64, 3>, MatchError> {
-        let (from, to) = (Cloud::of(model, PointSet::Model)?, Cloud::of(target, PointSet::Target)?);
+        let (from, to) = (
+            Cloud::of(model, PointSet::Model)?,
+            Cloud::of(target, PointSet::Target)?,
+        );
         let scale = to.size / from.size;
         let warp = Affine::new(Matrix3::identity() * scale, to.middle - from.middle * scale);
-        let warped: Vec<_> = model.iter().map(|p| Point3::from(p.coords * scale + warp.offset)).collect();
+        let warped: Vec<_> = model
+            .iter()
+            .map(|p| Point3::from(p.coords * scale + warp.offset))
+            .collect();
         let partner = |i: usize| {
             let j = nearest(&warped[i], target);
             (nearest(&target[j], &warped) == i).then_some(j)
         };
         let assignment: Vec<_> = (0..model.len()).map(partner).collect();
-        let squares =
-            assignment.iter().zip(&warped).filter_map(|(a, p)| a.map(|j| (target[j] - p).norm_squared()));
+        let squares = assignment
+            .iter()
+            .zip(&warped)
+            .filter_map(|(a, p)| a.map(|j| (target[j] - p).norm_squared()));
         let matched = assignment.iter().flatten().count().max(1) as f64;
         let residual = (squares.sum::<f64>() / matched).sqrt();
         let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
         Ok(Matching {
             warp: Box::new(warp),
             warped,
-            confidence: assignment.iter().map(|a| if a.is_some() { 1.0 } else { 0.0 }).collect(),
+            confidence: assignment
+                .iter()
+                .map(|a| if a.is_some() { 1.0 } else { 0.0 })
+                .collect(),
             assignment,
             soft: SoftMatches::new(),
             unmatched_model,
             unmatched_target,
             displacement_covariance: vec![Matrix3::identity() * residual * residual; model.len()],
             energy: Vec::new(),
-            report: MatchReport { residual, ..MatchReport::default() },
+            report: MatchReport {
+                residual,
+                ..MatchReport::default()
+            },
         })
     }
 }
@@ -58,14 +72,21 @@ impl Cloud {
         }
         let n = points.len() as f64;
         let middle = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
-        let size = (points.iter().map(|p| (p.coords - middle).norm_squared()).sum::<f64>() / n).sqrt();
+        let size = (points
+            .iter()
+            .map(|p| (p.coords - middle).norm_squared())
+            .sum::<f64>()
+            / n)
+            .sqrt();
         Ok(Self { middle, size })
     }
 }
 
 fn nearest(point: &Point3<f64>, set: &[Point3<f64>]) -> usize {
     let distance = |i: &usize| (set[*i] - point).norm_squared();
-    (0..set.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    (0..set.len())
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(0)
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -76,7 +97,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     report("ScaledNeighbours", &trial, &swapped)
 }
 
-fn report(name: &str, trial: &Trial, stages: &dyn Stages) -> Result<(), Box<dyn std::error::Error>> {
+fn report(
+    name: &str,
+    trial: &Trial,
+    stages: &dyn Stages,
+) -> Result<(), Box<dyn std::error::Error>> {
     let measurement = trial.press(stages)?.measure()?;
     println!("{name}");
     if let Some(matching) = &measurement.matching {

@@ -117,7 +117,8 @@ fn warp<const D: usize, K: Kernel>(
     let spline = spline.map_err(name)?;
     let factorization = Factorization::new(sources, &options).map_err(name)?;
     let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel));
-    let (refit_ms, refit) = median_ms(|| factorization.fit_with(&mut workspace, &targets, &mut refitted));
+    let (refit_ms, refit) =
+        median_ms(|| factorization.fit_with(&mut workspace, &targets, &mut refitted));
     refit.map_err(name)?;
     let mut values = vec![Point::origin(); queries.len()];
     let mut jacobians = vec![SMatrix::zeros(); queries.len()];
@@ -155,8 +156,14 @@ fn fit<const D: usize, K: Kernel>(
 ) -> Result<ThinPlateSpline<f64, D, K>, TpsError> {
     let tell = |progress: &Progress| {
         match progress.residual {
-            Some(residual) => eprint!("\rstep {}: largest residual {residual:.1e}   ", progress.done),
-            None => eprint!("\rprepared {} of {} points   ", progress.done, progress.total),
+            Some(residual) => eprint!(
+                "\rstep {}: largest residual {residual:.1e}   ",
+                progress.done
+            ),
+            None => eprint!(
+                "\rprepared {} of {} points   ",
+                progress.done, progress.total
+            ),
         }
         ControlFlow::Continue(())
     };
@@ -170,12 +177,20 @@ fn fit<const D: usize, K: Kernel>(
 /// The error with the file it is about.
 fn in_files(arguments: &Arguments, error: TpsError) -> String {
     let path = match error {
-        TpsError::Length { input: Input::Targets, .. }
-        | TpsError::NotFinite { input: Input::Targets, .. } => &arguments.targets,
+        TpsError::Length {
+            input: Input::Targets,
+            ..
+        }
+        | TpsError::NotFinite {
+            input: Input::Targets,
+            ..
+        } => &arguments.targets,
         _ => &arguments.sources,
     };
     match error {
-        TpsError::Length { expected, found, .. } => format!(
+        TpsError::Length {
+            expected, found, ..
+        } => format!(
             "{}: expected {expected} rows, as many as {} has, found {found}",
             path.display(),
             arguments.sources.display()
@@ -213,7 +228,11 @@ fn write<const D: usize>(
 ) -> Result<(), Box<dyn Error>> {
     const AXES: [&str; 3] = ["x", "y", "z"];
     let mut header: Vec<String> = AXES[..D].iter().map(|i| format!("f{i}")).collect();
-    header.extend(AXES[..D].iter().flat_map(|i| AXES[..D].iter().map(move |j| format!("df{i}_d{j}"))));
+    header.extend(
+        AXES[..D]
+            .iter()
+            .flat_map(|i| AXES[..D].iter().map(move |j| format!("df{i}_d{j}"))),
+    );
     let mut text = header.join(",") + "\n";
     for (value, jacobian) in values.iter().zip(jacobians) {
         let transposed = jacobian.transpose();

@@ -9,9 +9,9 @@ mod study;
 use ndarray::{Array2, ArrayView2};
 use study::{study, study_with};
 use tactile_imaging::force::{
-    CalibrationPair, ContactOptions, DriftCorrection, ForceError, ForceMeasurement, ForceMeter, ForceOptions,
-    ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair, ShearTracker,
-    StressCalibration, measure_force,
+    CalibrationPair, ContactOptions, DriftCorrection, ForceError, ForceMeasurement, ForceMeter,
+    ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair,
+    ShearTracker, StressCalibration, measure_force,
 };
 use tactile_imaging::simulate::{
     Camera, Gain, Hostile, Illumination, Load, PressOptions, PressScene, PressTruth,
@@ -19,7 +19,12 @@ use tactile_imaging::simulate::{
 
 /// A quarter of the default resolution, so that a thousand frames take seconds.
 fn camera() -> Camera {
-    Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], vignetting: 0.0, ..Camera::default() }
+    Camera {
+        shape: [260, 348],
+        pixel_size_m: [86.2e-6; 2],
+        vignetting: 0.0,
+        ..Camera::default()
+    }
 }
 
 fn press(camera: Camera) -> PressOptions {
@@ -44,7 +49,12 @@ fn calibration(scene: &PressScene) -> LinearCalibration<f64> {
 
 /// A reference with noise of its own for every seed.
 fn dark(scene: &PressScene, seed: u64) -> Array2<u8> {
-    PressScene::new(PressOptions { seed, ..scene.options().clone() }).unwrap().reference(0)
+    PressScene::new(PressOptions {
+        seed,
+        ..scene.options().clone()
+    })
+    .unwrap()
+    .reference(0)
 }
 
 #[test]
@@ -53,7 +63,13 @@ fn a_thousand_seeds() {
     let s = study(&scene, 1000, &ForceOptions::default());
     assert!(s.force.worst() < 2e-3 && s.radius.worst() < 3e-3);
     assert!(s.centroid.iter().all(|c| c.rms() < 0.01) && s.centre.rms() < 0.01);
-    for errors in [&s.force, &s.centroid[0], &s.centroid[1], &s.centre, &s.radius] {
+    for errors in [
+        &s.force,
+        &s.centroid[0],
+        &s.centroid[1],
+        &s.centre,
+        &s.radius,
+    ] {
         // 68.3 % is the normal law's; the binomial spread of a thousand seeds is 1.5 %.
         assert!(
             (0.66..=0.71).contains(&errors.inside_one_sigma()),
@@ -66,8 +82,11 @@ fn a_thousand_seeds() {
 
 #[test]
 fn the_full_frame_with_its_vignetting() {
-    let scene =
-        PressScene::new(PressOptions { loads: vec![Load::normal(0.7)], ..PressOptions::default() }).unwrap();
+    let scene = PressScene::new(PressOptions {
+        loads: vec![Load::normal(0.7)],
+        ..PressOptions::default()
+    })
+    .unwrap();
     let s = study(&scene, 4, &ForceOptions::default());
     // Vignetting takes up to 0.1 % of the light at the rim of this contact and is not corrected.
     assert!(s.force.worst() < 2e-3 && s.radius.worst() < 3e-3 && s.centroid[0].worst() < 0.02);
@@ -76,31 +95,73 @@ fn the_full_frame_with_its_vignetting() {
 #[test]
 fn vignetting_is_corrected_on_request() {
     // In a corner, where the lens takes 2 % of the light; the scene's calibration belongs to the middle.
-    let vignetted = Camera { vignetting: 0.03, ..camera() };
-    let scene = PressScene::new(PressOptions { centre_px: Some([60.3, 51.8]), ..press(vignetted) }).unwrap();
+    let vignetted = Camera {
+        vignetting: 0.03,
+        ..camera()
+    };
+    let scene = PressScene::new(PressOptions {
+        centre_px: Some([60.3, 51.8]),
+        ..press(vignetted)
+    })
+    .unwrap();
     let plain = study(&scene, 20, &ForceOptions::default());
     assert!(plain.force.rms() > 0.01);
-    let flat = study_with(&scene, 200, &ForceOptions::default(), |r| r.with_flat_field().unwrap());
+    let flat = study_with(&scene, 200, &ForceOptions::default(), |r| {
+        r.with_flat_field().unwrap()
+    });
     assert!(flat.force.worst() < 2e-3 && flat.radius.worst() < 3e-3);
     // 200 seeds: 68.3 ± 3.3 %.
-    assert!((0.58..=0.78).contains(&flat.force.inside_one_sigma()), "{}", flat.force.inside_one_sigma());
+    assert!(
+        (0.58..=0.78).contains(&flat.force.inside_one_sigma()),
+        "{}",
+        flat.force.inside_one_sigma()
+    );
 }
 
 #[test]
 fn blur_oblong_pixels_and_small_contacts() {
-    let oblong = Camera { pixel_size_m: [86.2e-6, 120e-6], ..camera() };
+    let oblong = Camera {
+        pixel_size_m: [86.2e-6, 120e-6],
+        ..camera()
+    };
     for (name, options) in [
-        ("no blur", press(Camera { blur_sigma_px: 0.0, ..camera() })),
-        ("blur of 2 px", press(Camera { blur_sigma_px: 2.0, ..camera() })),
+        (
+            "no blur",
+            press(Camera {
+                blur_sigma_px: 0.0,
+                ..camera()
+            }),
+        ),
+        (
+            "blur of 2 px",
+            press(Camera {
+                blur_sigma_px: 2.0,
+                ..camera()
+            }),
+        ),
         ("oblong pixels", press(oblong)),
-        ("radius of 9 px", PressOptions { loads: vec![Load::normal(0.01)], ..press(camera()) }),
+        (
+            "radius of 9 px",
+            PressOptions {
+                loads: vec![Load::normal(0.01)],
+                ..press(camera())
+            },
+        ),
     ] {
         println!("{name}");
-        let s = study(&PressScene::new(options).unwrap(), 200, &ForceOptions::default());
+        let s = study(
+            &PressScene::new(options).unwrap(),
+            200,
+            &ForceOptions::default(),
+        );
         // Three standard deviations of what the noise allows; 200 seeds: 68.3 ± 3.3 %.
         assert!(s.force.worst() < 5e-3 && s.radius.rms() < 1e-3 && s.centroid[0].rms() < 0.01);
         for errors in [&s.force, &s.centre, &s.radius] {
-            assert!((0.58..=0.78).contains(&errors.inside_one_sigma()), "{name} {}", errors.name);
+            assert!(
+                (0.58..=0.78).contains(&errors.inside_one_sigma()),
+                "{name} {}",
+                errors.name
+            );
         }
     }
 }
@@ -108,10 +169,16 @@ fn blur_oblong_pixels_and_small_contacts() {
 #[test]
 fn lamps_that_drift_are_corrected_on_request() {
     let mut options = press(camera());
-    options.loads[0].illumination = Illumination { level: 1.05, tilt: [0.1, -0.06] };
+    options.loads[0].illumination = Illumination {
+        level: 1.05,
+        tilt: [0.1, -0.06],
+    };
     let scene = PressScene::new(options).unwrap();
     let with = |drift| ForceOptions {
-        contact: ContactOptions { drift, ..Default::default() },
+        contact: ContactOptions {
+            drift,
+            ..Default::default()
+        },
         ..Default::default()
     };
     let uncorrected = study(&scene, 20, &with(DriftCorrection::None));
@@ -124,7 +191,10 @@ fn lamps_that_drift_are_corrected_on_request() {
 
 #[test]
 fn false_alarms_are_as_rare_as_stated() {
-    let camera = Camera { shape: [130, 174], ..camera() };
+    let camera = Camera {
+        shape: [130, 174],
+        ..camera()
+    };
     let scene = PressScene::new(press(camera)).unwrap();
     let meter = ForceMeter::new([1e-5; 2], &ForceOptions::default()).unwrap();
     let (calibration, mut workspace) = (calibration(&scene), ForceWorkspace::default());
@@ -146,7 +216,11 @@ fn false_alarms_are_as_rare_as_stated() {
 #[test]
 fn faint_contacts_are_found() {
     // A peak of three grey levels, under three standard deviations of a difference.
-    let scene = PressScene::new(PressOptions { gain: Gain::PeakGrey(3.0), ..press(camera()) }).unwrap();
+    let scene = PressScene::new(PressOptions {
+        gain: Gain::PeakGrey(3.0),
+        ..press(camera())
+    })
+    .unwrap();
     let s = study(&scene, 50, &ForceOptions::default());
     assert!(s.force.rms() < 0.03, "{}", s.force.rms());
 }
@@ -155,18 +229,30 @@ fn faint_contacts_are_found() {
 fn shear_follows_the_centroid() {
     let mut options = press(camera());
     options.loads = (0..4)
-        .map(|k| Load { shear_n: [0.02 * f64::from(k), -0.03 * f64::from(k)], ..Load::normal(0.7) })
+        .map(|k| Load {
+            shear_n: [0.02 * f64::from(k), -0.03 * f64::from(k)],
+            ..Load::normal(0.7)
+        })
         .collect();
     let scene = PressScene::new(options).unwrap();
     let calibration = calibration(&scene);
     let made = scene.simulate();
     let pairs: Vec<ShearPair<f64>> = (1..6)
         .map(|k| f64::from(k) * 1e-5)
-        .map(|u| ShearPair { centroid_step_m: [u, 2.0 * u], force_n: [400.0 * u, 800.0 * u] })
+        .map(|u| ShearPair {
+            centroid_step_m: [u, 2.0 * u],
+            force_n: [400.0 * u, 800.0 * u],
+        })
         .collect();
     let mut tracker = ShearTracker::new(ShearCalibration::fit(&pairs).unwrap());
     for (k, frame) in made.frames.iter().enumerate() {
-        let m = measure(frame.view(), made.reference.view(), made.pixel_size_m, &calibration).unwrap();
+        let m = measure(
+            frame.view(),
+            made.reference.view(),
+            made.pixel_size_m,
+            &calibration,
+        )
+        .unwrap();
         let shear = tracker.update(&m).expect("contact");
         for axis in 0..2 {
             let truth = made.truth[k].load.shear_n[axis];
@@ -178,8 +264,13 @@ fn shear_follows_the_centroid() {
             );
         }
     }
-    let none =
-        measure(made.reference.view(), made.reference.view(), made.pixel_size_m, &calibration).unwrap();
+    let none = measure(
+        made.reference.view(),
+        made.reference.view(),
+        made.pixel_size_m,
+        &calibration,
+    )
+    .unwrap();
     assert!(tracker.update(&none).is_none());
 }
 
@@ -189,7 +280,13 @@ fn measure(
     pixel_size_m: [f64; 2],
     calibration: &dyn StressCalibration<f64>,
 ) -> Result<ForceMeasurement<f64>, ForceError> {
-    measure_force(frame, reference, pixel_size_m, calibration, &ForceOptions::default())
+    measure_force(
+        frame,
+        reference,
+        pixel_size_m,
+        calibration,
+        &ForceOptions::default(),
+    )
 }
 
 /// Nothing here may panic, and what is wrong must show.
@@ -199,8 +296,12 @@ fn hostile_scenes_end_civilly() {
     for kind in Hostile::ALL {
         let made = kind.simulate(&base).unwrap();
         let scene = PressScene::new(base.clone()).unwrap();
-        let result =
-            measure(made.frames[0].view(), made.reference.view(), made.pixel_size_m, &calibration(&scene));
+        let result = measure(
+            made.frames[0].view(),
+            made.reference.view(),
+            made.pixel_size_m,
+            &calibration(&scene),
+        );
         println!("{kind:?}: {}", describe(&result));
         check(kind, &result, &made.truth);
     }
@@ -225,11 +326,17 @@ fn describe(result: &Result<ForceMeasurement<f64>, ForceError>) -> String {
 fn check(kind: Hostile, result: &Result<ForceMeasurement<f64>, ForceError>, truth: &[PressTruth]) {
     let contact = result.as_ref().ok().and_then(|m| m.contact);
     match kind {
-        Hostile::NoiseOnly | Hostile::AllSaturated | Hostile::AllBlack | Hostile::PressedReference => {
+        Hostile::NoiseOnly
+        | Hostile::AllSaturated
+        | Hostile::AllBlack
+        | Hostile::PressedReference => {
             assert!(result.is_ok() && contact.is_none(), "{kind:?}");
         }
         Hostile::SaturatedContact => {
-            assert!(matches!(result, Err(ForceError::SaturatedContact { .. })), "{kind:?}");
+            assert!(
+                matches!(result, Err(ForceError::SaturatedContact { .. })),
+                "{kind:?}"
+            );
         }
         Hostile::SeveralContacts => assert_eq!(contact.unwrap().other_contacts, truth.len() - 1),
         Hostile::CutByEdge | Hostile::InCorner | Hostile::FillsFrame => {

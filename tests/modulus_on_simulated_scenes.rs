@@ -26,8 +26,8 @@ use rand::{RngExt, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_imaging::elasticity::modulus::{Estimate, ModulusEstimate};
 use tactile_imaging::force::{
-    CalibrationOptions, CalibrationPair, ForceMeasurement, ForceMeter, ForceWorkspace, LinearCalibration,
-    ReferenceFrame, StressCalibration,
+    CalibrationOptions, CalibrationPair, ForceMeasurement, ForceMeter, ForceWorkspace,
+    LinearCalibration, ReferenceFrame, StressCalibration,
 };
 
 const NU: f64 = 0.5;
@@ -36,7 +36,10 @@ const GAUGE: f64 = 1e-3;
 
 /// Scenes per study; coverage needs more than the thirty of the error bars. `SCENES` overrides.
 fn scenes(default: u64) -> u64 {
-    std::env::var("SCENES").ok().and_then(|s| s.parse().ok()).unwrap_or(default)
+    std::env::var("SCENES")
+        .ok()
+        .and_then(|s| s.parse().ok())
+        .unwrap_or(default)
 }
 
 struct Study {
@@ -46,10 +49,15 @@ struct Study {
 
 impl Study {
     fn run(count: u64, name: &str, trial: impl Fn(u64) -> (f64, ModulusEstimate<f64>)) -> Self {
-        let mut study = Self { errors: Vec::new(), covered: 0 };
+        let mut study = Self {
+            errors: Vec::new(),
+            covered: 0,
+        };
         for seed in 0..count {
             let (truth, found) = trial(seed);
-            study.errors.push((found.youngs_modulus_pa / truth - 1.0).abs());
+            study
+                .errors
+                .push((found.youngs_modulus_pa / truth - 1.0).abs());
             study.covered += usize::from(found.interval_95.contains(truth));
         }
         let first: Vec<f64> = study.errors.iter().take(30).copied().collect();
@@ -65,7 +73,12 @@ impl Study {
 
     fn check(&self) {
         let first = &self.errors[..self.errors.len().min(30)];
-        assert!(median(first) < 0.01 && worst(first) < 0.03, "{} {}", median(first), worst(first));
+        assert!(
+            median(first) < 0.01 && worst(first) < 0.03,
+            "{} {}",
+            median(first),
+            worst(first)
+        );
         // 92 to 98 %, widened by two binomial standard deviations of so many scenes.
         let n = self.errors.len() as f64;
         let (share, slack) = (self.covered as f64 / n, 2.0 * (0.05 * 0.95 / n).sqrt());
@@ -98,7 +111,10 @@ fn verbose() -> bool {
 
 /// Integrated pixel value as if it were newtons: a calibration of slope one.
 fn unit_calibration() -> LinearCalibration<f64> {
-    let pairs: Vec<_> = (0..5).map(|k| f64::from(k) * 1e6).map(|v| CalibrationPair::loading(v, v)).collect();
+    let pairs: Vec<_> = (0..5)
+        .map(|k| f64::from(k) * 1e6)
+        .map(|v| CalibrationPair::loading(v, v))
+        .collect();
     LinearCalibration::fit(&pairs, &Default::default()).unwrap()
 }
 
@@ -112,15 +128,23 @@ fn calibrate(
     let (unit, mut workspace) = (unit_calibration(), ForceWorkspace::default());
     let measured: Vec<(f64, f64)> = frames
         .map(|(force, frame)| {
-            let m = meter.measure_with(&mut workspace, frame.view(), reference, &unit).unwrap();
+            let m = meter
+                .measure_with(&mut workspace, frame.view(), reference, &unit)
+                .unwrap();
             (force, m.force_n.value)
         })
         .collect();
     let range = measured.iter().map(|m| m.0).fold(0.0, f64::max);
     let mut gauge = |force: f64| force + GAUGE * range * rng.sample::<f64, _>(StandardNormal);
-    let pairs: Vec<_> = measured.iter().map(|&(f, v)| CalibrationPair::loading(v, gauge(f))).collect();
+    let pairs: Vec<_> = measured
+        .iter()
+        .map(|&(f, v)| CalibrationPair::loading(v, gauge(f)))
+        .collect();
     // No light, no force: the error of the slope is then all that the forces share.
-    let options = CalibrationOptions { through_origin: true, ..CalibrationOptions::default() };
+    let options = CalibrationOptions {
+        through_origin: true,
+        ..CalibrationOptions::default()
+    };
     LinearCalibration::fit(&pairs, &options).unwrap()
 }
 
@@ -131,7 +155,10 @@ fn estimate(e: tactile_imaging::force::Estimate<f64>) -> Estimate<f64> {
 /// The force with the calibration's degrees of freedom.
 fn force(measured: &ForceMeasurement<f64>) -> Estimate<f64> {
     let degrees_of_freedom = measured.reading.and_then(|r| r.degrees_of_freedom);
-    Estimate { degrees_of_freedom, ..estimate(measured.force_n) }
+    Estimate {
+        degrees_of_freedom,
+        ..estimate(measured.force_n)
+    }
 }
 
 /// Covariance of forces that share one calibration.
@@ -139,7 +166,10 @@ fn force_covariance(
     calibration: &LinearCalibration<f64>,
     measured: &[ForceMeasurement<f64>],
 ) -> DMatrix<f64> {
-    let values: Vec<_> = measured.iter().map(|m| m.contact.unwrap().integrated_pixel_value).collect();
+    let values: Vec<_> = measured
+        .iter()
+        .map(|m| m.contact.unwrap().integrated_pixel_value)
+        .collect();
     let covariance = calibration.force_covariance_n2(&values);
     DMatrix::from_fn(values.len(), values.len(), |i, j| covariance[[i, j]])
 }

@@ -3,7 +3,9 @@
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{read_grey_image, read_table};
-use tactile_imaging::pipeline::{ContactSurface, DarkContact, Object, Pipeline, Press, Stages, SurfaceInput};
+use tactile_imaging::pipeline::{
+    ContactSurface, DarkContact, Object, Pipeline, Press, Stages, SurfaceInput,
+};
 
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
@@ -16,10 +18,15 @@ fn sensor(folder: &Path) -> (impl Stages, [Array2<u8>; 2]) {
     let table = read_table(&path).unwrap();
     let darkness = table.column("darkness_grey_levels", 0, &path).unwrap();
     let depth = table.column("depth_mm", 1, &path).unwrap();
-    let entries: Vec<_> = darkness.into_iter().zip(depth.into_iter().map(|z| z * 1e-3)).collect();
+    let entries: Vec<_> = darkness
+        .into_iter()
+        .zip(depth.into_iter().map(|z| z * 1e-3))
+        .collect();
     let contact = DarkContact::new(&entries, [PIXEL_M; 2]).unwrap();
-    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))
-        .with_surface(DarkContact::depth_table(&entries).unwrap(), SurfaceInput::Signal);
+    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M)).with_surface(
+        DarkContact::depth_table(&entries).unwrap(),
+        SurfaceInput::Signal,
+    );
     (pipeline, [reference, frame])
 }
 
@@ -46,10 +53,16 @@ fn the_ball_is_found_and_its_depth_is_right() {
     let [x, y] = ball.centre_m.map(|m| m / PIXEL_M);
     assert!((x - 243.9).hypot(y - 188.5) < 1.0, "centre {x}, {y}");
     let radius = ball.contact_radius_m / PIXEL_M;
-    assert!((radius / 67.6 - 1.0).abs() < 0.025, "contact radius {radius} px");
+    assert!(
+        (radius / 67.6 - 1.0).abs() < 0.025,
+        "contact radius {radius} px"
+    );
 
     // The makers state a mean absolute depth error of 0.0462 mm; against the ball, over its whole contact.
-    println!("mean absolute depth error {:.4} mm", ball.mean_absolute_error_m * 1e3);
+    println!(
+        "mean absolute depth error {:.4} mm",
+        ball.mean_absolute_error_m * 1e3
+    );
     assert!(ball.mean_absolute_error_m < 0.0462e-3);
 
     check_profile(surface);
@@ -72,6 +85,11 @@ fn check_profile(surface: &ContactSurface) {
         }
     }
     for [n, measured, expected] in rings {
-        assert!((measured / n - expected / n).abs() < 0.1e-3, "{} against {}", measured / n, expected / n);
+        assert!(
+            (measured / n - expected / n).abs() < 0.1e-3,
+            "{} against {}",
+            measured / n,
+            expected / n
+        );
     }
 }

@@ -23,25 +23,42 @@ use tactile_imaging::tps::AffineModel;
 const PAPER_ERROR: f64 = 0.0538;
 
 fn scene_of(material: Elastic, seed: u64) -> PressScene {
-    let object = Sphere { radius_m: 3e-3, material };
-    PressScene::new(PressOptions { object, seed, ..PressOptions::default() }).unwrap()
+    let object = Sphere {
+        radius_m: 3e-3,
+        material,
+    };
+    PressScene::new(PressOptions {
+        object,
+        seed,
+        ..PressOptions::default()
+    })
+    .unwrap()
 }
 
 #[test]
 fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
     for (material, seed) in [(Elastic::CL2000X, 3), (Elastic::CL2003X, 4)] {
         let folder = tempfile::tempdir().unwrap();
-        let path =
-            write_folder(&scene_of(material, seed), &CalibrationOptions::default(), folder.path()).unwrap();
+        let path = write_folder(
+            &scene_of(material, seed),
+            &CalibrationOptions::default(),
+            folder.path(),
+        )
+        .unwrap();
         let measured = Scene::measure_file(path).unwrap();
         let error = measured.youngs_modulus_pa.value / material.youngs_modulus_pa - 1.0;
         assert!(error.abs() < PAPER_ERROR, "error {error}");
         assert_eq!(measured.youngs_modulus_pa.estimator, "Hertz sphere");
         assert!(
-            measured.estimators[0].estimator.contains("stress over mean strain"),
+            measured.estimators[0]
+                .estimator
+                .contains("stress over mean strain"),
             "the paper's ratio is first"
         );
-        assert!(measured.flags.iter().any(|f| f.to_string().contains("a/R")), "a/R beyond 0.3 is flagged");
+        assert!(
+            measured.flags.iter().any(|f| f.to_string().contains("a/R")),
+            "a/R beyond 0.3 is flagged"
+        );
     }
 }
 
@@ -53,7 +70,11 @@ fn small_scene(folder: &Path) {
             10 + (peak * (1.0 - square / 400.0).max(0.0).sqrt()).round() as u8
         })
     };
-    write_grey_image(folder.join("reference.png"), Array2::from_elem((60, 80), 10).view()).unwrap();
+    write_grey_image(
+        folder.join("reference.png"),
+        Array2::from_elem((60, 80), 10).view(),
+    )
+    .unwrap();
     write_grey_image(folder.join("one.png"), blob(100.0).view()).unwrap();
     write_grey_image(folder.join("two.pgm"), blob(130.0).view()).unwrap();
     fs::write(
@@ -61,7 +82,11 @@ fn small_scene(folder: &Path) {
         "integrated_pixel_value,force_N\n0,0\n50000,0.5\n100000,1.0\n150000,1.5\n",
     )
     .unwrap();
-    fs::write(folder.join("depth.csv"), "darkness_grey_levels,depth_mm\n1,0.02\n60,1.9\n").unwrap();
+    fs::write(
+        folder.join("depth.csv"),
+        "darkness_grey_levels,depth_mm\n1,0.02\n60,1.9\n",
+    )
+    .unwrap();
 }
 
 const VALID: &str = r#"
@@ -105,15 +130,29 @@ fn every_mistake_gets_one_sentence_with_file_and_field() {
     let at = folder.path();
     small_scene(at);
     write_grey_image(at.join("small.png"), Array2::from_elem((5, 7), 10).view()).unwrap();
-    write_grey_image(at.join("white.png"), Array2::from_elem((60, 80), 255).view()).unwrap();
+    write_grey_image(
+        at.join("white.png"),
+        Array2::from_elem((60, 80), 255).view(),
+    )
+    .unwrap();
     fs::write(at.join("short.csv"), "1,2\n").unwrap();
-    fs::write(at.join("bad.csv"), "integrated_pixel_value,force_N\n1,2\n3,x\n").unwrap();
+    fs::write(
+        at.join("bad.csv"),
+        "integrated_pixel_value,force_N\n1,2\n3,x\n",
+    )
+    .unwrap();
     for (from, to, wanted) in MISTAKES {
         assert!(VALID.contains(from), "{from} is in the valid file");
         let answer = sentence(at, &VALID.replacen(from, to, 1));
-        assert!(answer.contains("scene.toml"), "{from} -> {to}: the file is named: {answer}");
+        assert!(
+            answer.contains("scene.toml"),
+            "{from} -> {to}: the file is named: {answer}"
+        );
         for part in *wanted {
-            assert!(answer.contains(part), "{from} -> {to}: `{part}` in: {answer}");
+            assert!(
+                answer.contains(part),
+                "{from} -> {to}: `{part}` in: {answer}"
+            );
         }
         assert!(!answer.contains('\n'), "one sentence: {answer}");
     }
@@ -127,16 +166,27 @@ fn a_depth_table_needs_gauge_readings() {
         let square = (c as f64 - 40.2).powi(2) + (r as f64 - 30.4).powi(2);
         200 - (50.0 * (1.0 - square / 400.0).max(0.0).sqrt()).round() as u8
     });
-    write_grey_image(folder.path().join("bright.png"), Array2::from_elem((60, 80), 200).view()).unwrap();
+    write_grey_image(
+        folder.path().join("bright.png"),
+        Array2::from_elem((60, 80), 200).view(),
+    )
+    .unwrap();
     write_grey_image(folder.path().join("dark.png"), dark.view()).unwrap();
     let text = VALID
         .replace("pairs = \"pairs.csv\"", "depth_table = \"depth.csv\"")
         .replace("reference.png", "bright.png")
         .replace("one.png", "dark.png")
         .replace("[[frames]]\nimage = \"two.pgm\"\n", "");
-    assert!(sentence(folder.path(), &text).starts_with("measured "), "{}", sentence(folder.path(), &text));
+    assert!(
+        sentence(folder.path(), &text).starts_with("measured "),
+        "{}",
+        sentence(folder.path(), &text)
+    );
     let answer = sentence(folder.path(), &text.replace("force_N = 0.8\n", ""));
-    assert!(answer.contains("frames[1].force_N") && answer.contains("gauge"), "{answer}");
+    assert!(
+        answer.contains("frames[1].force_N") && answer.contains("gauge"),
+        "{answer}"
+    );
 }
 
 #[test]
@@ -157,16 +207,29 @@ fn measured(scene: &Scene, stages: &dyn Stages) -> String {
 #[test]
 fn stages_by_name_are_those_of_the_typed_pipeline() {
     let folder = tempfile::tempdir().unwrap();
-    let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
-    let made = PressScene::new(PressOptions { camera, ..PressOptions::default() }).unwrap();
+    let camera = Camera {
+        shape: [130, 174],
+        pixel_size_m: [172.4e-6; 2],
+        ..Camera::default()
+    };
+    let made = PressScene::new(PressOptions {
+        camera,
+        ..PressOptions::default()
+    })
+    .unwrap();
     let path = write_folder(&made, &CalibrationOptions::default(), folder.path()).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     let by_name = |table: &str| {
         let scene = Scene::parse(&format!("{text}\n[stages]\n{table}"), &path).unwrap();
-        measured(&scene, scene.stages(&scene.load().unwrap()).unwrap().as_ref())
+        measured(
+            &scene,
+            scene.stages(&scene.load().unwrap()).unwrap().as_ref(),
+        )
     };
     let scene = Scene::read(&path).unwrap();
-    let LoadedCalibration::Pairs(pairs) = scene.load().unwrap().calibration else { panic!("pairs") };
+    let LoadedCalibration::Pairs(pairs) = scene.load().unwrap().calibration else {
+        panic!("pairs")
+    };
     let boxed = scene.stages(&scene.load().unwrap()).unwrap();
     let typed = Pipeline::from_pairs(&pairs, scene.pixel_size_m, scene.object).unwrap();
     let typed = typed.with_waveguide(boxed.settings().waveguide.clone().unwrap());
@@ -174,29 +237,56 @@ fn stages_by_name_are_those_of_the_typed_pipeline() {
     assert_eq!(by_name(""), measured(&scene, &typed));
     let named = by_name("sampler = \"curvature\"\nwarp = \"affine\"\nstrain = \"hencky\"");
     let swapped = typed.with_sampler(CurvatureAdaptive::new(4.0).unwrap());
-    assert_eq!(named, measured(&scene, &swapped.with_warp(AffineModel).with_strain(Hencky)));
-    let ratio = Scene::parse(&format!("{text}\n[stages]\nestimator = \"paper-ratio\""), &path).unwrap();
     assert_eq!(
-        ratio.stages(&ratio.load().unwrap()).unwrap().settings().estimator,
+        named,
+        measured(&scene, &swapped.with_warp(AffineModel).with_strain(Hencky))
+    );
+    let ratio = Scene::parse(
+        &format!("{text}\n[stages]\nestimator = \"paper-ratio\""),
+        &path,
+    )
+    .unwrap();
+    assert_eq!(
+        ratio
+            .stages(&ratio.load().unwrap())
+            .unwrap()
+            .settings()
+            .estimator,
         EstimatorChoice::PaperRatio
     );
     let data = scene.load().unwrap();
     let heights = |name: &str| {
-        let scene = Scene::parse(&format!("{text}\n[stages]\nreconstruction = \"{name}\""), &path).unwrap();
+        let scene = Scene::parse(
+            &format!("{text}\n[stages]\nreconstruction = \"{name}\""),
+            &path,
+        )
+        .unwrap();
         let stages = scene.stages(&data).unwrap();
         let mut press = scene.press(stages.as_ref(), &data).unwrap();
         press.surface(1).unwrap().surface.heights.clone()
     };
-    assert!(heights("tsai-shah") != heights("eikonal") && heights("brooks-horn") != heights("eikonal"));
+    assert!(
+        heights("tsai-shah") != heights("eikonal") && heights("brooks-horn") != heights("eikonal")
+    );
 }
 
 #[test]
 fn a_flat_field_is_asked_for_by_its_key() {
     let folder = tempfile::tempdir().unwrap();
     small_scene(folder.path());
-    for (text, wanted) in [(VALID.to_string(), false), (format!("flat_field = \"reference\"{VALID}"), true)] {
+    for (text, wanted) in [
+        (VALID.to_string(), false),
+        (format!("flat_field = \"reference\"{VALID}"), true),
+    ] {
         let scene = Scene::parse(&text, folder.path().join("scene.toml")).unwrap();
         assert_eq!(scene.flat_field, wanted);
-        assert_eq!(scene.stages(&scene.load().unwrap()).unwrap().settings().flat_field, wanted);
+        assert_eq!(
+            scene
+                .stages(&scene.load().unwrap())
+                .unwrap()
+                .settings()
+                .flat_field,
+            wanted
+        );
     }
 }

@@ -16,8 +16,10 @@ use tactile_imaging::io::read_points;
 use tactile_imaging::matching::RelaxationMatcher;
 
 fn frame(k: usize) -> Option<Vec<Point3<f64>>> {
-    let folder = std::env::var_os("TACTILE_DATA")
-        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")), PathBuf::from);
+    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")),
+        PathBuf::from,
+    );
     let path = folder.join(format!("serialtrack/stretch3d_frame{k:02}.csv"));
     if !path.exists() {
         println!("skipped: no {} (set TACTILE_DATA)", path.display());
@@ -27,13 +29,24 @@ fn frame(k: usize) -> Option<Vec<Point3<f64>>> {
 }
 
 fn stretch(k: usize) {
-    let (Some(before), Some(after)) = (frame(0), frame(k)) else { return };
-    let found =
-        measure::strain_between(&before, &after, &RelaxationMatcher::default(), &GreenLagrange).unwrap();
+    let (Some(before), Some(after)) = (frame(0), frame(k)) else {
+        return;
+    };
+    let found = measure::strain_between(
+        &before,
+        &after,
+        &RelaxationMatcher::default(),
+        &GreenLagrange,
+    )
+    .unwrap();
     let mut exact = Matrix3::zeros();
     exact[(0, 0)] = 0.5 * ((1.0 + 0.05 * k as f64).powi(2) - 1.0);
     let gap = found.summary.mean - exact;
-    let squares: f64 = found.strains.iter().map(|e| (e - exact).norm_squared()).sum();
+    let squares: f64 = found
+        .strains
+        .iter()
+        .map(|e| (e - exact).norm_squared())
+        .sum();
     let local = (squares / found.strains.len() as f64).sqrt();
     println!(
         "0 -> {k}: {} pairs, mean off by xx {:+.1e}, others {:.1e}, standard errors {:.1e}, local rms {local:.1e}",

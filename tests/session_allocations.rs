@@ -6,9 +6,17 @@ use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
 #[test]
 fn pushing_frames_allocates_nothing_after_warm_up() {
-    let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+    let camera = Camera {
+        shape: [260, 348],
+        pixel_size_m: [86.2e-6; 2],
+        ..Camera::default()
+    };
     let loads = vec![Load::normal(0.3), Load::normal(0.7), Load::normal(1.2)];
-    let options = PressOptions { camera, loads, ..PressOptions::default() };
+    let options = PressOptions {
+        camera,
+        loads,
+        ..PressOptions::default()
+    };
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let empty = trial.scene.reference(5);
     let stages = Arc::new(trial.pipeline().unwrap());

@@ -1,13 +1,21 @@
 //! The scene simulator against itself: its truth is consistent and its noise has the moments it states.
 use ndarray::Array2;
 use tactile_imaging::simulate::{
-    Camera, Elastic, Gain, Illumination, Load, PressOptions, PressScene, Response, SimulateError, Sphere,
+    Camera, Elastic, Gain, Illumination, Load, PressOptions, PressScene, Response, SimulateError,
+    Sphere,
 };
 
 /// The default scene on a quarter of the pixels a side.
 fn small() -> PressOptions {
-    let camera = Camera { shape: [260, 348], pixel_size_m: [30e-3 / 348.0; 2], ..Camera::default() };
-    PressOptions { camera, ..PressOptions::default() }
+    let camera = Camera {
+        shape: [260, 348],
+        pixel_size_m: [30e-3 / 348.0; 2],
+        ..Camera::default()
+    };
+    PressOptions {
+        camera,
+        ..PressOptions::default()
+    }
 }
 
 fn relative(found: f64, expected: f64) -> f64 {
@@ -17,7 +25,10 @@ fn relative(found: f64, expected: f64) -> f64 {
 #[test]
 fn the_light_of_an_ideal_frame_sums_to_the_force() {
     let mut options = small();
-    options.camera = Camera { pixel_size_m: [90e-6, 75e-6], ..options.camera.ideal() };
+    options.camera = Camera {
+        pixel_size_m: [90e-6, 75e-6],
+        ..options.camera.ideal()
+    };
     options.centre_px = Some([170.37, 131.8]);
     let background = options.camera.background_grey;
     let scene = PressScene::new(options).unwrap();
@@ -43,7 +54,10 @@ fn the_bent_response_integrates_exactly() {
     let mut options = small();
     options.camera = options.camera.ideal();
     options.response = Response::Quadratic { droop: 0.2 };
-    let (area, background) = (options.camera.pixel_area_m2(), options.camera.background_grey);
+    let (area, background) = (
+        options.camera.pixel_area_m2(),
+        options.camera.background_grey,
+    );
     let scene = PressScene::new(options).unwrap();
     for k in 0..2 {
         let contact = scene.truth(k).contact;
@@ -64,7 +78,10 @@ fn the_bent_response_integrates_exactly() {
 #[test]
 fn blur_keeps_force_and_centroid_and_reaches_in_from_beyond_the_edge() {
     let mut options = small();
-    options.camera = Camera { blur_sigma_px: 3.0, ..options.camera.ideal() };
+    options.camera = Camera {
+        blur_sigma_px: 3.0,
+        ..options.camera.ideal()
+    };
     options.centre_px = Some([171.3, 120.4]);
     let background = options.camera.background_grey;
     let blurred = PressScene::new(options.clone()).unwrap();
@@ -78,7 +95,10 @@ fn blur_keeps_force_and_centroid_and_reaches_in_from_beyond_the_edge() {
     };
     let (sum, x) = moments(&blurred.expected_frame(0));
     assert!(relative(sum, blurred.truth(0).integrated_pixel_value) < 1e-12);
-    assert!((x - 171.3).abs() < 1e-4, "rim pixels shift the centroid of pixel averages by some 1e-5 px");
+    assert!(
+        (x - 171.3).abs() < 1e-4,
+        "rim pixels shift the centroid of pixel averages by some 1e-5 px"
+    );
     // A contact whose rim lies just left of the frame still lightens the first column.
     let radius_px = blurred.truth(0).contact.contact_radius_m / options.camera.pixel_size_m[0];
     options.centre_px = Some([-radius_px - 1.5, 120.4]);
@@ -89,13 +109,20 @@ fn blur_keeps_force_and_centroid_and_reaches_in_from_beyond_the_edge() {
 
 #[test]
 fn noise_has_the_stated_mean_and_variance() {
-    let camera = Camera { shape: [400, 500], ..Camera::default() };
+    let camera = Camera {
+        shape: [400, 500],
+        ..Camera::default()
+    };
     for grey in [0.3, 4.0, 15.0, 120.0, 200.0] {
         let light = Array2::from_elem((400, 500), grey);
         let image = camera.expose(light.view(), 7, 3);
         let n = image.len() as f64;
         let mean = image.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
-        let variance = image.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let variance = image
+            .iter()
+            .map(|&v| (f64::from(v) - mean).powi(2))
+            .sum::<f64>()
+            / (n - 1.0);
         // Rounding adds 1/12 where the noise spans a level or more; below that, and where noise is clipped at black,
         // the moments are those of the rounded law, so only the brighter fields are checked.
         if grey < 4.0 {
@@ -103,7 +130,10 @@ fn noise_has_the_stated_mean_and_variance() {
         }
         let expected = camera.noise_sd_grey(grey).powi(2) + 1.0 / 12.0;
         // Five standard errors: a false alarm in 10⁶.
-        assert!((mean - grey).abs() < 5.0 * (expected / n).sqrt() + 0.02, "mean {mean} of {grey}");
+        assert!(
+            (mean - grey).abs() < 5.0 * (expected / n).sqrt() + 0.02,
+            "mean {mean} of {grey}"
+        );
         assert!(
             relative(variance, expected) < 5.0 * (2.0 / n).sqrt() + 0.02,
             "variance {variance} {expected}"
@@ -114,8 +144,12 @@ fn noise_has_the_stated_mean_and_variance() {
 #[test]
 fn faint_light_is_poisson() {
     // 20 electrons a grey level and no read noise: at 2 grey levels the count is Poisson of mean 40.
-    let camera =
-        Camera { shape: [400, 500], full_well_electrons: 5100.0, read_noise_grey: 0.0, ..Camera::default() };
+    let camera = Camera {
+        shape: [400, 500],
+        full_well_electrons: 5100.0,
+        read_noise_grey: 0.0,
+        ..Camera::default()
+    };
     let image = camera.expose(Array2::from_elem((400, 500), 2.0).view(), 1, 1);
     let zero = image.iter().filter(|&&v| v == 0).count() as f64 / image.len() as f64;
     // Grey 0 is fewer than 10 electrons: P(X ≤ 9 | 40) = 9.2e-9; grey ≤ 1 is fewer than 30: 0.0374… by summation.
@@ -159,7 +193,13 @@ const NOISE_OF_SEED_42: &[u8] = &[100, 102, 101, 102, 96, 101, 102, 101, 100, 10
 #[test]
 fn shear_moves_the_contact_by_force_over_stiffness() {
     let mut options = small();
-    options.loads = vec![Load::normal(0.7), Load { shear_n: [0.2, -0.1], ..Load::normal(0.7) }];
+    options.loads = vec![
+        Load::normal(0.7),
+        Load {
+            shear_n: [0.2, -0.1],
+            ..Load::normal(0.7)
+        },
+    ];
     options.shear_stiffness_n_per_m = [400.0, 500.0];
     let scene = PressScene::new(options).unwrap();
     let (before, after) = (scene.truth(0).centre_m(), scene.truth(1).centre_m());
@@ -208,20 +248,68 @@ fn no_force_is_no_light() {
 fn every_meaningless_value_is_named() {
     type Spoil = fn(&mut PressOptions, f64);
     let cases: [(&str, Spoil, &[f64]); 14] = [
-        ("radius_m", |o, v| o.object.radius_m = v, &[0.0, -1.0, f64::INFINITY]),
-        ("youngs_modulus_pa", |o, v| o.object.material.youngs_modulus_pa = v, &[0.0, -1.0]),
-        ("poisson_ratio", |o, v| o.object.material.poisson_ratio = v, &[-1.0, 0.6]),
-        ("thickness_m", |o, v| o.waveguide.layers[1].thickness_m = v, &[0.0, f64::INFINITY]),
-        ("refractive_index", |o, v| o.waveguide.layers[1].refractive_index = v, &[0.9]),
-        ("force_n", |o, v| o.loads[1].force_n = v, &[-0.1, f64::INFINITY]),
-        ("shear_n", |o, v| o.loads[0].shear_n[1] = v, &[f64::INFINITY]),
-        ("shear_stiffness_n_per_m", |o, v| o.shear_stiffness_n_per_m[0] = v, &[0.0]),
+        (
+            "radius_m",
+            |o, v| o.object.radius_m = v,
+            &[0.0, -1.0, f64::INFINITY],
+        ),
+        (
+            "youngs_modulus_pa",
+            |o, v| o.object.material.youngs_modulus_pa = v,
+            &[0.0, -1.0],
+        ),
+        (
+            "poisson_ratio",
+            |o, v| o.object.material.poisson_ratio = v,
+            &[-1.0, 0.6],
+        ),
+        (
+            "thickness_m",
+            |o, v| o.waveguide.layers[1].thickness_m = v,
+            &[0.0, f64::INFINITY],
+        ),
+        (
+            "refractive_index",
+            |o, v| o.waveguide.layers[1].refractive_index = v,
+            &[0.9],
+        ),
+        (
+            "force_n",
+            |o, v| o.loads[1].force_n = v,
+            &[-0.1, f64::INFINITY],
+        ),
+        (
+            "shear_n",
+            |o, v| o.loads[0].shear_n[1] = v,
+            &[f64::INFINITY],
+        ),
+        (
+            "shear_stiffness_n_per_m",
+            |o, v| o.shear_stiffness_n_per_m[0] = v,
+            &[0.0],
+        ),
         ("pixel_size_m", |o, v| o.camera.pixel_size_m[1] = v, &[0.0]),
-        ("background_grey", |o, v| o.camera.background_grey = v, &[-1.0]),
+        (
+            "background_grey",
+            |o, v| o.camera.background_grey = v,
+            &[-1.0],
+        ),
         ("vignetting", |o, v| o.camera.vignetting = v, &[-0.1, 1.1]),
-        ("blur_sigma_px", |o, v| o.camera.blur_sigma_px = v, &[-0.1, 1e6]),
-        ("full_well_electrons", |o, v| o.camera.full_well_electrons = v, &[0.0]),
-        ("read_noise_grey", |o, v| o.camera.read_noise_grey = v, &[-1.0, f64::INFINITY]),
+        (
+            "blur_sigma_px",
+            |o, v| o.camera.blur_sigma_px = v,
+            &[-0.1, 1e6],
+        ),
+        (
+            "full_well_electrons",
+            |o, v| o.camera.full_well_electrons = v,
+            &[0.0],
+        ),
+        (
+            "read_noise_grey",
+            |o, v| o.camera.read_noise_grey = v,
+            &[-1.0, f64::INFINITY],
+        ),
     ];
     for (name, spoil, values) in cases {
         for &value in values.iter().chain(&[f64::NAN]) {
@@ -238,16 +326,37 @@ fn every_meaningless_value_is_named() {
         spoil(&mut options);
         PressScene::new(options).err()
     };
-    assert!(matches!(spoiled(|o| o.loads.clear()), Some(SimulateError::TooFew { field: "loads", .. })));
-    assert!(matches!(spoiled(|o| o.waveguide.layers.clear()), Some(SimulateError::TooFew { .. })));
-    assert!(matches!(spoiled(|o| o.camera.shape = [0, 3]), Some(SimulateError::TooFew { .. })));
+    assert!(matches!(
+        spoiled(|o| o.loads.clear()),
+        Some(SimulateError::TooFew { field: "loads", .. })
+    ));
+    assert!(matches!(
+        spoiled(|o| o.waveguide.layers.clear()),
+        Some(SimulateError::TooFew { .. })
+    ));
+    assert!(matches!(
+        spoiled(|o| o.camera.shape = [0, 3]),
+        Some(SimulateError::TooFew { .. })
+    ));
     assert!(spoiled(|o| o.gain = Gain::PeakGrey(f64::NAN)).is_some());
     assert!(spoiled(|o| o.response = Response::Quadratic { droop: 0.51 }).is_some());
     assert!(spoiled(|o| o.centre_px = Some([f64::NAN, 0.0])).is_some());
-    let bad = Illumination { level: -1.0, ..Illumination::default() };
+    let bad = Illumination {
+        level: -1.0,
+        ..Illumination::default()
+    };
     let mut options = small();
     options.loads[0].illumination = bad;
     assert!(PressScene::new(options).is_err());
-    let rigid = Sphere { radius_m: 1e-3, material: Elastic::RIGID };
-    assert!(PressScene::new(PressOptions { object: rigid, ..small() }).is_ok());
+    let rigid = Sphere {
+        radius_m: 1e-3,
+        material: Elastic::RIGID,
+    };
+    assert!(
+        PressScene::new(PressOptions {
+            object: rigid,
+            ..small()
+        })
+        .is_ok()
+    );
 }

@@ -5,16 +5,23 @@ mod uniaxial;
 
 use proptest::prelude::*;
 use tactile_imaging::simulate::{
-    Branch, CalibrationOptions, Camera, Elastic, Gain, Hostile, LoadCycle, PressOptions, PressScene,
-    Response, SimulateError, Sphere, write_folder,
+    Branch, CalibrationOptions, Camera, Elastic, Gain, Hostile, LoadCycle, PressOptions,
+    PressScene, Response, SimulateError, Sphere, write_folder,
 };
 
 fn camera(rows: usize, cols: usize) -> Camera {
-    Camera { shape: [rows, cols], pixel_size_m: [30e-3 / cols as f64; 2], ..Camera::default() }
+    Camera {
+        shape: [rows, cols],
+        pixel_size_m: [30e-3 / cols as f64; 2],
+        ..Camera::default()
+    }
 }
 
 fn press(rows: usize, cols: usize) -> PressOptions {
-    PressOptions { camera: camera(rows, cols), ..PressOptions::default() }
+    PressOptions {
+        camera: camera(rows, cols),
+        ..PressOptions::default()
+    }
 }
 
 fn relative(found: f64, expected: f64) -> f64 {
@@ -26,7 +33,10 @@ fn the_calibration_is_linear_and_holds_for_the_object_as_well() {
     let mut options = press(261, 348);
     options.camera.vignetting = 0.0;
     let scene = PressScene::new(options).unwrap();
-    let quiet = CalibrationOptions { gauge_noise_n: 0.0, ..CalibrationOptions::default() };
+    let quiet = CalibrationOptions {
+        gauge_noise_n: 0.0,
+        ..CalibrationOptions::default()
+    };
     let series = scene.calibrate(&quiet).unwrap();
     assert_eq!(series.points.len(), 41);
     assert_eq!(series.points[20].true_force_n, 2.0);
@@ -35,12 +45,20 @@ fn the_calibration_is_linear_and_holds_for_the_object_as_well() {
     let noise = 5.0 * (2.0 * 90828.0_f64).sqrt() * 1.2 * series.newton_per_grey;
     for point in &series.points {
         let found = point.integrated_pixel_value * series.newton_per_grey;
-        assert!((found - point.true_force_n).abs() < noise, "{found} N of {}", point.true_force_n);
+        assert!(
+            (found - point.true_force_n).abs() < noise,
+            "{found} N of {}",
+            point.true_force_n
+        );
     }
     let made = scene.simulate();
     let sum = |k: usize| {
         let difference = |(a, b): (&u8, &u8)| f64::from(*a) - f64::from(*b);
-        made.frames[k].iter().zip(&made.reference).map(difference).sum::<f64>()
+        made.frames[k]
+            .iter()
+            .zip(&made.reference)
+            .map(difference)
+            .sum::<f64>()
     };
     assert!((sum(0) * series.newton_per_grey - 0.7).abs() < noise);
     assert!((sum(1) * series.newton_per_grey - 1.2).abs() < noise);
@@ -56,7 +74,11 @@ fn gauge_noise_and_hysteresis_are_as_asked() {
         ..CalibrationOptions::default()
     };
     let series = scene.calibrate(&options).unwrap();
-    let errors: Vec<f64> = series.points.iter().map(|p| p.force_n - p.true_force_n).collect();
+    let errors: Vec<f64> = series
+        .points
+        .iter()
+        .map(|p| p.force_n - p.true_force_n)
+        .collect();
     let n = errors.len() as f64;
     let sd = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
     // Five standard errors of a standard deviation from 201 readings.
@@ -70,22 +92,34 @@ fn gauge_noise_and_hysteresis_are_as_asked() {
 
 #[test]
 fn a_bent_response_bends_the_calibration_below_the_line() {
-    let options = PressOptions { response: Response::Quadratic { droop: 0.3 }, ..press(130, 174) };
+    let options = PressOptions {
+        response: Response::Quadratic { droop: 0.3 },
+        ..press(130, 174)
+    };
     let scene = PressScene::new(options).unwrap();
-    let quiet = CalibrationOptions { gauge_noise_n: 0.0, ..CalibrationOptions::default() };
+    let quiet = CalibrationOptions {
+        gauge_noise_n: 0.0,
+        ..CalibrationOptions::default()
+    };
     let series = scene.calibrate(&quiet).unwrap();
     let value = |k: usize| series.points[k].integrated_pixel_value;
     assert!(value(20) < 2.0 * value(10) * 0.99);
     assert!(
-        series.points[..21].windows(2).all(|w| w[1].integrated_pixel_value > w[0].integrated_pixel_value)
+        series.points[..21]
+            .windows(2)
+            .all(|w| w[1].integrated_pixel_value > w[0].integrated_pixel_value)
     );
 }
 
 #[test]
 fn a_stream_rests_rises_and_falls_at_the_frame_rate() {
     let scene = PressScene::new(press(66, 87)).unwrap();
-    let cycle =
-        LoadCycle { light_drift_per_s: 0.5, largest_shear_n: [0.1, 0.0], cycles: 2, ..LoadCycle::default() };
+    let cycle = LoadCycle {
+        light_drift_per_s: 0.5,
+        largest_shear_n: [0.1, 0.0],
+        cycles: 2,
+        ..LoadCycle::default()
+    };
     let stream = scene.stream(cycle).unwrap();
     assert_eq!(stream.len(), 168);
     let frames: Vec<_> = stream.collect();
@@ -102,25 +136,46 @@ fn a_stream_rests_rises_and_falls_at_the_frame_rate() {
     let again: Vec<_> = scene.stream(cycle).unwrap().map(|f| f.frame).collect();
     assert!(frames.iter().zip(&again).all(|(a, b)| a.frame == *b));
     assert_ne!(frames[0].frame, frames[1].frame);
-    let bad = LoadCycle { frame_rate_hz: f64::NAN, ..cycle };
-    assert!(matches!(scene.stream(bad), Err(SimulateError::OutOfRange { field: "frame_rate_hz", .. })));
+    let bad = LoadCycle {
+        frame_rate_hz: f64::NAN,
+        ..cycle
+    };
+    assert!(matches!(
+        scene.stream(bad),
+        Err(SimulateError::OutOfRange {
+            field: "frame_rate_hz",
+            ..
+        })
+    ));
 }
 
 #[test]
 fn a_scene_on_disk_has_the_files_its_description_names() {
     let folder = tempfile::tempdir().unwrap();
     let scene = PressScene::new(press(66, 87)).unwrap();
-    let path = write_folder(&scene, &CalibrationOptions::default(), &folder.path().join("scene")).unwrap();
+    let path = write_folder(
+        &scene,
+        &CalibrationOptions::default(),
+        &folder.path().join("scene"),
+    )
+    .unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let table: toml::Table = text.parse().unwrap();
     let home = path.parent().unwrap();
     let made = scene.simulate();
     let image = |name: &str| image::open(home.join(name)).unwrap().to_luma8().into_raw();
-    assert_eq!(image(table["reference"].as_str().unwrap()), made.reference.as_slice().unwrap());
+    assert_eq!(
+        image(table["reference"].as_str().unwrap()),
+        made.reference.as_slice().unwrap()
+    );
     for (entry, frame) in table["frames"].as_array().unwrap().iter().zip(&made.frames) {
-        assert_eq!(image(entry["image"].as_str().unwrap()), frame.as_slice().unwrap());
+        assert_eq!(
+            image(entry["image"].as_str().unwrap()),
+            frame.as_slice().unwrap()
+        );
     }
-    let pairs = std::fs::read_to_string(home.join(table["calibration"]["pairs"].as_str().unwrap())).unwrap();
+    let pairs = std::fs::read_to_string(home.join(table["calibration"]["pairs"].as_str().unwrap()))
+        .unwrap();
     assert!(pairs.starts_with("integrated_pixel_value,force_N\n"));
     assert_eq!(pairs.lines().count(), 42);
     assert_eq!(table["waveguide"]["layers"].as_array().unwrap().len(), 3);
@@ -133,19 +188,23 @@ fn a_scene_on_disk_has_the_files_its_description_names() {
 fn hostile_scenes_are_what_they_say() {
     let base = press(66, 87);
     let made = |kind: Hostile| kind.simulate(&base).unwrap();
-    let count = |frame: &ndarray::Array2<u8>, value: u8| frame.iter().filter(|&&v| v == value).count();
+    let count =
+        |frame: &ndarray::Array2<u8>, value: u8| frame.iter().filter(|&&v| v == value).count();
     let (saturated, black) = (made(Hostile::AllSaturated), made(Hostile::AllBlack));
     assert_eq!(count(&saturated.frames[0], 255), 66 * 87);
     assert_eq!(count(&saturated.reference, 255), 66 * 87);
-    assert_eq!(count(&black.frames[0], 0) + count(&black.reference, 0), 2 * 66 * 87);
+    assert_eq!(
+        count(&black.frames[0], 0) + count(&black.reference, 0),
+        2 * 66 * 87
+    );
     assert_eq!(made(Hostile::NoiseOnly).truth[0].visible_force_n, 0.0);
     assert!(count(&made(Hostile::SaturatedContact).frames[0], 255) > 100);
     let several = made(Hostile::SeveralContacts);
     assert_eq!(several.truth.len(), 3);
     for pair in several.truth.windows(2) {
         assert!(pair[0].contact.force_n > pair[1].contact.force_n);
-        let apart =
-            (pair[0].centre_px[0] - pair[1].centre_px[0]).hypot(pair[0].centre_px[1] - pair[1].centre_px[1]);
+        let apart = (pair[0].centre_px[0] - pair[1].centre_px[0])
+            .hypot(pair[0].centre_px[1] - pair[1].centre_px[1]);
         let radii = (pair[0].contact.contact_radius_m + pair[1].contact.contact_radius_m)
             / base.camera.pixel_size_m[0];
         assert!(apart > radii, "contacts must not touch");

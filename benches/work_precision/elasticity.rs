@@ -23,12 +23,22 @@ pub(crate) fn bootstrap(study: &mut Study) {
     let expected = spread();
     for replicates in [30, 100, 300, 1000, 3000, 10_000] {
         let job = || {
-            let run = |seed| Bootstrap { replicates, seed }.run(cube).expect("an answer").standard_error;
+            let run = |seed| {
+                Bootstrap { replicates, seed }
+                    .run(cube)
+                    .expect("an answer")
+                    .standard_error
+            };
             (0..RUNS).map(run).collect::<Vec<f64>>()
         };
         let is_default = replicates == Bootstrap::default().replicates;
         study.run("replicates", replicates, is_default, job, |found| {
-            (found.iter().map(|s| (s / expected - 1.0).powi(2)).sum::<f64>() / RUNS as f64).sqrt()
+            (found
+                .iter()
+                .map(|s| (s / expected - 1.0).powi(2))
+                .sum::<f64>()
+                / RUNS as f64)
+                .sqrt()
         });
         study.entries.last_mut().expect("an entry").seconds /= RUNS as f64;
     }

@@ -5,41 +5,120 @@ use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ForceMeter, ForceOptions, ForceWorkspace, HertzFitOptions,
     LinearCalibration, ReferenceFrame,
 };
-use tactile_imaging::simulate::{CalibrationOptions as SimulatedRun, Camera, Load, PressOptions, PressScene};
+use tactile_imaging::simulate::{
+    CalibrationOptions as SimulatedRun, Camera, Load, PressOptions, PressScene,
+};
 
 const SEEDS: u32 = 4;
 
 pub(crate) fn frame(study: &mut Study) {
     study.error_label = "rms error of the contact radius, relative";
     let camera = study.choose(
-        Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() },
+        Camera {
+            shape: [260, 348],
+            pixel_size_m: [86.2e-6; 2],
+            ..Camera::default()
+        },
         Camera::default(),
     );
-    let options = PressOptions { loads: vec![Load::normal(0.7)], camera, ..PressOptions::default() };
+    let options = PressOptions {
+        loads: vec![Load::normal(0.7)],
+        camera,
+        ..PressOptions::default()
+    };
     let scene = PressScene::new(options).expect("a valid scene");
-    let series = scene.calibrate(&SimulatedRun { steps: 5, ..SimulatedRun::default() }).expect("valid");
-    let pairs: Vec<_> = series.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
-    let calibration = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");
+    let series = scene
+        .calibrate(&SimulatedRun {
+            steps: 5,
+            ..SimulatedRun::default()
+        })
+        .expect("valid");
+    let pairs: Vec<_> = series
+        .pairs()
+        .map(|(v, f)| CalibrationPair::loading(v, f))
+        .collect();
+    let calibration =
+        LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");
     let reference = ReferenceFrame::new(scene.reference(0).view()).expect("a frame");
     let frames: Vec<_> = (0..SEEDS).map(|seed| scene.frame(0, seed)).collect();
     let truth = scene.truth(0);
     let fit = HertzFitOptions::default();
-    let with = |hertz| ForceOptions { hertz, ..ForceOptions::default() };
+    let with = |hertz| ForceOptions {
+        hertz,
+        ..ForceOptions::default()
+    };
     for (knob, setting, is_default, options) in [
         ("profile", "default", true, ForceOptions::default()),
-        ("profile", "skipped", false, ForceOptions { skip_profile: true, ..ForceOptions::default() }),
-        ("iterations", "1", false, with(HertzFitOptions { max_iterations: 1, ..fit })),
-        ("iterations", "2", false, with(HertzFitOptions { max_iterations: 2, ..fit })),
-        ("iterations", "5", false, with(HertzFitOptions { max_iterations: 5, ..fit })),
-        ("background", "fitted", false, with(HertzFitOptions { fit_background: true, ..fit })),
-        ("blur", "none", false, with(HertzFitOptions { blur_px: Some(0.0), ..fit })),
-        ("blur", "1 px", false, with(HertzFitOptions { blur_px: Some(1.0), ..fit })),
+        (
+            "profile",
+            "skipped",
+            false,
+            ForceOptions {
+                skip_profile: true,
+                ..ForceOptions::default()
+            },
+        ),
+        (
+            "iterations",
+            "1",
+            false,
+            with(HertzFitOptions {
+                max_iterations: 1,
+                ..fit
+            }),
+        ),
+        (
+            "iterations",
+            "2",
+            false,
+            with(HertzFitOptions {
+                max_iterations: 2,
+                ..fit
+            }),
+        ),
+        (
+            "iterations",
+            "5",
+            false,
+            with(HertzFitOptions {
+                max_iterations: 5,
+                ..fit
+            }),
+        ),
+        (
+            "background",
+            "fitted",
+            false,
+            with(HertzFitOptions {
+                fit_background: true,
+                ..fit
+            }),
+        ),
+        (
+            "blur",
+            "none",
+            false,
+            with(HertzFitOptions {
+                blur_px: Some(0.0),
+                ..fit
+            }),
+        ),
+        (
+            "blur",
+            "1 px",
+            false,
+            with(HertzFitOptions {
+                blur_px: Some(1.0),
+                ..fit
+            }),
+        ),
     ] {
         let meter = ForceMeter::new(truth.pixel_size_m, &options).expect("valid");
         let mut workspace = ForceWorkspace::default();
         let mut radius = |frame: &ndarray::Array2<u8>| {
-            let measured =
-                meter.measure_with(&mut workspace, frame.view(), &reference, &calibration).expect("valid");
+            let measured = meter
+                .measure_with(&mut workspace, frame.view(), &reference, &calibration)
+                .expect("valid");
             measured.contact_radius_m.expect("a contact").value
         };
         let job = || frames.iter().map(&mut radius).collect::<Vec<f64>>();

@@ -58,18 +58,31 @@ fn main() -> ExitCode {
     };
     let named: Vec<&String> = arguments.iter().filter(|a| !a.starts_with("--")).collect();
     let within = arguments.iter().find_map(|a| a.strip_prefix("--within="));
-    let within = within.map_or(WITHIN, |text| text.parse().expect("--within= a factor such as 1.5"));
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/target/work_precision"));
+    let within = within.map_or(WITHIN, |text| {
+        text.parse().expect("--within= a factor such as 1.5")
+    });
+    let folder = Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/target/work_precision"
+    ));
     std::fs::create_dir_all(folder).expect("a folder for the results");
     let mut behind = 0;
-    for (name, fill) in STUDIES.iter().filter(|(name, _)| named.is_empty() || named.iter().any(|n| n == name))
+    for (name, fill) in STUDIES
+        .iter()
+        .filter(|(name, _)| named.is_empty() || named.iter().any(|n| n == name))
     {
         let mut study = Study::new(name, effort);
         fill(&mut study);
-        study.write_csv(&folder.join(format!("{name}.csv"))).expect("a written table");
+        study
+            .write_csv(&folder.join(format!("{name}.csv")))
+            .expect("a written table");
         picture::save(&study, &folder.join(format!("{name}.svg"))).expect("a written picture");
         behind += study.judge(within);
     }
     println!("results in {}", folder.display());
-    if behind == 0 || effort == Effort::Once { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if behind == 0 || effort == Effort::Once {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
 }

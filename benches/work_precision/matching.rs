@@ -5,8 +5,8 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::matching::dense::Neighbourhood;
 use tactile_imaging::matching::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, NearestNeighbour,
-    Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation,
+    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment,
+    NearestNeighbour, Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation,
 };
 
 struct Scene {
@@ -24,21 +24,38 @@ impl Scene {
         let model: Vec<Point3<f64>> = (0..N)
             .map(|i| {
                 let (r, angle) = (((i as f64 + 0.5) / N as f64).sqrt(), 2.399_963 * i as f64);
-                let (x, y) = (r * angle.cos() + uniform(0.025), r * angle.sin() + uniform(0.025));
+                let (x, y) = (
+                    r * angle.cos() + uniform(0.025),
+                    r * angle.sin() + uniform(0.025),
+                );
                 Point3::new(x, y, 0.6 * (-(x * x + y * y) / 0.4).exp())
             })
             .collect();
         let bumps: Vec<(Vector3<f64>, Vector3<f64>)> = (0..6)
-            .map(|_| (Vector3::from_fn(|_, _| uniform(1.2)), Vector3::from_fn(|_, _| uniform(0.2))))
+            .map(|_| {
+                (
+                    Vector3::from_fn(|_, _| uniform(1.2)),
+                    Vector3::from_fn(|_, _| uniform(0.2)),
+                )
+            })
             .collect();
         let warp = |p: &Point3<f64>| {
-            bumps.iter().fold(*p, |q, (c, a)| q + a * (-(p.coords - c).norm_squared() / 1.28).exp())
+            bumps.iter().fold(*p, |q, (c, a)| {
+                q + a * (-(p.coords - c).norm_squared() / 1.28).exp()
+            })
         };
         let truth: Vec<_> = model.iter().map(warp).collect();
-        let mut target: Vec<_> = truth.iter().map(|p| p + Vector3::from_fn(|_, _| uniform(noise))).collect();
+        let mut target: Vec<_> = truth
+            .iter()
+            .map(|p| p + Vector3::from_fn(|_, _| uniform(noise)))
+            .collect();
         target.reverse();
         target.extend((0..strays).map(|_| Point3::from(Vector3::from_fn(|_, _| uniform(1.3)))));
-        Self { model, target, truth }
+        Self {
+            model,
+            target,
+            truth,
+        }
     }
 }
 
@@ -52,12 +69,21 @@ fn run(
     matcher: &dyn PointMatcher<f64, 3>,
 ) {
     let job = || {
-        let warped = |s: &Scene| matcher.match_points(&s.model, &s.target).expect("a match").warped;
+        let warped = |s: &Scene| {
+            matcher
+                .match_points(&s.model, &s.target)
+                .expect("a match")
+                .warped
+        };
         scenes.iter().map(warped).collect::<Vec<_>>()
     };
     study.run(knob, setting, is_default, job, |all| {
         let of = |(warped, scene): (&Vec<Point3<f64>>, &Scene)| {
-            warped.iter().zip(&scene.truth).map(|(w, t)| (w - t).norm()).sum::<f64>()
+            warped
+                .iter()
+                .zip(&scene.truth)
+                .map(|(w, t)| (w - t).norm())
+                .sum::<f64>()
                 / scene.truth.len() as f64
         };
         all.iter().zip(scenes).map(of).sum::<f64>() / scenes.len() as f64
@@ -68,19 +94,30 @@ fn run(
 
 pub(crate) fn noisy(study: &mut Study) {
     study.error_label = "mean error, radius 1, noise ±0.03";
-    let scenes: Vec<_> = (0..study.choose(4, 16)).map(|seed| Scene::new(seed, 0, 0.03)).collect();
+    let scenes: Vec<_> = (0..study.choose(4, 16))
+        .map(|seed| Scene::new(seed, 0, 0.03))
+        .collect();
     every(study, &scenes);
 }
 
 pub(crate) fn strays(study: &mut Study) {
     study.error_label = "mean error, radius 1, 21 strays";
-    let scenes: Vec<_> = (0..study.choose(4, 16)).map(|seed| Scene::new(seed, 21, 0.01)).collect();
+    let scenes: Vec<_> = (0..study.choose(4, 16))
+        .map(|seed| Scene::new(seed, 21, 0.01))
+        .collect();
     every(study, &scenes);
 }
 
 fn every(study: &mut Study, scenes: &[Scene]) {
     let options = RelaxationOptions::default();
-    run(study, scenes, "relaxation", "default", true, &RelaxationMatcher::new(options));
+    run(
+        study,
+        scenes,
+        "relaxation",
+        "default",
+        true,
+        &RelaxationMatcher::new(options),
+    );
     for limit in [1, 3, 10, 30] {
         let options = options.max_iterations(limit).expect("valid");
         run(
@@ -94,26 +131,82 @@ fn every(study: &mut Study, scenes: &[Scene]) {
     }
     for share in [0.01, 0.3] {
         let options = options.stray_share(share).expect("valid");
-        run(study, scenes, "stray share", &format!("{share}"), false, &RelaxationMatcher::new(options));
+        run(
+            study,
+            scenes,
+            "stray share",
+            &format!("{share}"),
+            false,
+            &RelaxationMatcher::new(options),
+        );
     }
     for side in [Outliers::None, Outliers::Target] {
         let matcher = RelaxationMatcher::new(options.outliers(side));
-        run(study, scenes, "outliers", &format!("{side:?}"), false, &matcher);
+        run(
+            study,
+            scenes,
+            "outliers",
+            &format!("{side:?}"),
+            false,
+            &matcher,
+        );
     }
-    run(study, scenes, "rotation", "any", false, &RelaxationMatcher::new(options.rotation(Rotation::Any)));
+    run(
+        study,
+        scenes,
+        "rotation",
+        "any",
+        false,
+        &RelaxationMatcher::new(options.rotation(Rotation::Any)),
+    );
     others(study, scenes);
 }
 
 fn others(study: &mut Study, scenes: &[Scene]) {
-    run(study, scenes, "baselines", "nearest neighbour", false, &NearestNeighbour::new());
-    run(study, scenes, "baselines", "linear assignment", false, &LinearAssignment::new());
+    run(
+        study,
+        scenes,
+        "baselines",
+        "nearest neighbour",
+        false,
+        &NearestNeighbour::new(),
+    );
+    run(
+        study,
+        scenes,
+        "baselines",
+        "linear assignment",
+        false,
+        &LinearAssignment::new(),
+    );
     for tolerance in [1e-2, 1e-5, 1e-8] {
-        let drift = CoherentPointDrift::new(DriftOptions { tolerance, ..Default::default() }).expect("valid");
-        run(study, scenes, "point drift", &format!("tolerance {tolerance}"), false, &drift);
+        let drift = CoherentPointDrift::new(DriftOptions {
+            tolerance,
+            ..Default::default()
+        })
+        .expect("valid");
+        run(
+            study,
+            scenes,
+            "point drift",
+            &format!("tolerance {tolerance}"),
+            false,
+            &drift,
+        );
     }
     for k in study.choose(vec![5], vec![5, 8, 12, 20]) {
-        let options = DenseOptions { neighbourhood: Neighbourhood::Nearest(k), ..Default::default() };
+        let options = DenseOptions {
+            neighbourhood: Neighbourhood::Nearest(k),
+            ..Default::default()
+        };
         let dense = DenseRelaxation::new(options).expect("valid");
-        run(study, scenes, "dense relaxation", &format!("{k} neighbours"), false, &dense);
+        run(
+            study,
+            scenes,
+            "dense relaxation",
+            &format!("{k} neighbours"),
+            false,
+            &dense,
+        );
     }
 }

@@ -8,22 +8,42 @@ use tactile_imaging::optics::{Geometry, Led};
 pub(crate) fn rays(study: &mut Study) {
     study.error_label = "rms error of the guided share, relative";
     const SEEDS: u64 = 4;
-    let layers = [SlabLayer { index: 1.38_f64, thickness_m: 10e-3 }];
+    let layers = [SlabLayer {
+        index: 1.38_f64,
+        thickness_m: 10e-3,
+    }];
     let slab = Slab::new(&layers, 1.0, 30e-3).expect("valid");
     let guided = |options: &TraceOptions<f64>| {
-        trace(&slab, &Led::lambertian(), &Flat, options, &mut []).expect("valid").guided
+        trace(&slab, &Led::lambertian(), &Flat, options, &mut [])
+            .expect("valid")
+            .guided
     };
     for geometry in [Geometry::Section, Geometry::Volume] {
-        let default = TraceOptions { geometry, ..TraceOptions::default() };
-        let finest =
-            TraceOptions { rays: study.choose(1 << 18, 1 << 21), cutoff: 1e-12, seed: 99, ..default };
+        let default = TraceOptions {
+            geometry,
+            ..TraceOptions::default()
+        };
+        let finest = TraceOptions {
+            rays: study.choose(1 << 18, 1 << 21),
+            cutoff: 1e-12,
+            seed: 99,
+            ..default
+        };
         let expected = guided(&finest);
         let mut run = |knob, options: TraceOptions<f64>, is_default| {
-            let job =
-                || (0..SEEDS).map(|seed| guided(&TraceOptions { seed, ..options })).collect::<Vec<f64>>();
+            let job = || {
+                (0..SEEDS)
+                    .map(|seed| guided(&TraceOptions { seed, ..options }))
+                    .collect::<Vec<f64>>()
+            };
             let setting = format!("{} rays, cutoff {:e}", options.rays, options.cutoff);
             study.run(knob, setting, is_default, job, |found| {
-                (found.iter().map(|g| (g / expected - 1.0).powi(2)).sum::<f64>() / SEEDS as f64).sqrt()
+                (found
+                    .iter()
+                    .map(|g| (g / expected - 1.0).powi(2))
+                    .sum::<f64>()
+                    / SEEDS as f64)
+                    .sqrt()
             });
             study.entries.last_mut().expect("an entry").seconds /= SEEDS as f64;
         };
@@ -33,7 +53,11 @@ pub(crate) fn rays(study: &mut Study) {
         };
         for rays in [64, 256, 1024, 4096, 16_384] {
             // Sections and volumes are different problems; the default is a volume.
-            run(name, TraceOptions { rays, ..default }, rays == default.rays && name == "volume");
+            run(
+                name,
+                TraceOptions { rays, ..default },
+                rays == default.rays && name == "volume",
+            );
         }
         for cutoff in [1e-2, 1e-4] {
             run(cutoffs, TraceOptions { cutoff, ..default }, false);

@@ -8,11 +8,20 @@ use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
 /// Presses on one sensor that differ in force and noise: one alone would say what its noise happened to do.
 fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {
-    let camera = Camera { shape, pixel_size_m: [30e-3 / shape[1] as f64; 2], ..Camera::default() };
+    let camera = Camera {
+        shape,
+        pixel_size_m: [30e-3 / shape[1] as f64; 2],
+        ..Camera::default()
+    };
     let trial = |seed: u64| {
         let low = 0.6 + 0.2 * seed as f64 / count as f64;
         let loads = [low, low / 0.7 * 1.2].map(Load::normal).to_vec();
-        let options = PressOptions { camera, loads, seed, ..PressOptions::default() };
+        let options = PressOptions {
+            camera,
+            loads,
+            seed,
+            ..PressOptions::default()
+        };
         Trial::new(options, &CalibrationOptions::default()).expect("valid options")
     };
     (0..count).map(trial).collect()
@@ -30,13 +39,25 @@ fn run(
     let stages: Vec<_> = trials.iter().map(stages).collect();
     let strain = |(trial, stages): (&Trial, &dyn Stages)| {
         let measured = trial.press(stages).and_then(|mut press| press.measure());
-        measured.expect("a measurement").strain.expect("a strain").mean
+        measured
+            .expect("a measurement")
+            .strain
+            .expect("a strain")
+            .mean
     };
-    let job = || trials.iter().zip(stages.iter().map(AsRef::as_ref)).map(strain).collect::<Vec<_>>();
+    let job = || {
+        trials
+            .iter()
+            .zip(stages.iter().map(AsRef::as_ref))
+            .map(strain)
+            .collect::<Vec<_>>()
+    };
     study.run(knob, setting, is_default, job, |found| {
         let worst = |(mean, trial): (&[[f64; 3]; 3], &Trial)| {
             let truth = trial.truth().strain.expect("two loads");
-            (0..3).map(|k| (mean[k][k] / truth[k][k] - 1.0).abs()).fold(0.0, f64::max)
+            (0..3)
+                .map(|k| (mean[k][k] / truth[k][k] - 1.0).abs())
+                .fold(0.0, f64::max)
         };
         let squares: f64 = found.iter().zip(trials).map(worst).map(|e| e * e).sum();
         (squares / trials.len() as f64).sqrt()
@@ -49,21 +70,58 @@ pub(crate) fn strain(study: &mut Study) {
     let usual = trials(Camera::default().shape, count);
     let with = |change: fn(Pipeline, usize) -> Pipeline, value: usize| {
         move |trial: &Trial| -> Box<dyn Stages> {
-            Box::new(change(trial.pipeline().expect("a calibrated sensor"), value))
+            Box::new(change(
+                trial.pipeline().expect("a calibrated sensor"),
+                value,
+            ))
         }
     };
-    run(study, &usual, "pipeline", "default", true, with(|pipeline, _| pipeline, 0));
+    run(
+        study,
+        &usual,
+        "pipeline",
+        "default",
+        true,
+        with(|pipeline, _| pipeline, 0),
+    );
     for points in [50, 100, 400] {
-        let stages = with(|pipeline, points| pipeline.with_control_points(points), points);
-        run(study, &usual, "control points", &points.to_string(), false, stages);
+        let stages = with(
+            |pipeline, points| pipeline.with_control_points(points),
+            points,
+        );
+        run(
+            study,
+            &usual,
+            "control points",
+            &points.to_string(),
+            false,
+            stages,
+        );
     }
     for width in [1, 3, 11] {
         let stages = with(|pipeline, width| pipeline.with_smoothing(width), width);
-        run(study, &usual, "smoothing", &format!("{width} px"), false, stages);
+        run(
+            study,
+            &usual,
+            "smoothing",
+            &format!("{width} px"),
+            false,
+            stages,
+        );
     }
     for side in study.choose(vec![3, 6], vec![2, 3, 5, 6, 8]) {
-        let stages = with(|pipeline, side| pipeline.with_binning(Binning::Blocks(side)), side);
-        run(study, &usual, "binning", &format!("{side} px"), false, stages);
+        let stages = with(
+            |pipeline, side| pipeline.with_binning(Binning::Blocks(side)),
+            side,
+        );
+        run(
+            study,
+            &usual,
+            "binning",
+            &format!("{side} px"),
+            false,
+            stages,
+        );
     }
     let drift = |trial: &Trial| -> Box<dyn Stages> {
         let pipeline = trial.pipeline().expect("a calibrated sensor");
@@ -72,6 +130,13 @@ pub(crate) fn strain(study: &mut Study) {
     run(study, &usual, "matcher", "point drift", false, drift);
     for shape in study.choose(vec![[260, 348]], vec![[130, 174], [260, 348], [521, 696]]) {
         let name = format!("{} × {}", shape[1], shape[0]);
-        run(study, &trials(shape, count), "camera", &name, false, with(|pipeline, _| pipeline, 0));
+        run(
+            study,
+            &trials(shape, count),
+            "camera",
+            &name,
+            false,
+            with(|pipeline, _| pipeline, 0),
+        );
     }
 }

@@ -3,8 +3,9 @@
 use crate::study::Study;
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    Alignment, BrooksHorn, CosinePoisson, Domain, Eikonal, FrankotChellappa, Lighting, MaskedLeastSquares,
-    Rim, Scalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah, height_error,
+    Alignment, BrooksHorn, CosinePoisson, Domain, Eikonal, FrankotChellappa, Lighting,
+    MaskedLeastSquares, Rim, Scalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
+    height_error,
 };
 
 /// A field over n × n pixels of the square [−1, 1]².
@@ -14,9 +15,17 @@ fn field<T>(n: usize, at: impl Fn(f64, f64) -> T) -> Array2<T> {
 }
 
 /// Mean absolute error over the height of the surface, a constant being free.
-fn mean_error(found: &Array2<f64>, truth: &Array2<f64>, mask: Option<&Array2<bool>>, range: f64) -> f64 {
+fn mean_error(
+    found: &Array2<f64>,
+    truth: &Array2<f64>,
+    mask: Option<&Array2<bool>>,
+    range: f64,
+) -> f64 {
     let mask = mask.map(|m| m.view());
-    height_error(found.view(), truth.view(), mask, Alignment::Offset).expect("same size").error.mean_absolute
+    height_error(found.view(), truth.view(), mask, Alignment::Offset)
+        .expect("same size")
+        .error
+        .mean_absolute
         / range
 }
 
@@ -24,7 +33,9 @@ fn mean_error(found: &Array2<f64>, truth: &Array2<f64>, mask: Option<&Array2<boo
 pub(crate) fn surfaces(study: &mut Study) {
     study.error_label = "mean error over the height";
     let light = Lighting::frontal();
-    let eikonal = Eikonal::new(light).with_rim(Rim::Height(0.0)).expect("valid");
+    let eikonal = Eikonal::new(light)
+        .with_rim(Rim::Height(0.0))
+        .expect("valid");
     let n = 96;
     surface(study, "eikonal", "default", true, n, &eikonal);
     for tolerance in [1e-1, 1e-2, 1e-3, 1e-8] {
@@ -51,12 +62,30 @@ pub(crate) fn surfaces(study: &mut Study) {
         surface(study, "grid", &format!("{n} × {n}"), false, n, &eikonal);
     }
     for iterations in [1, 3, 12, 48] {
-        let method = TsaiShah::new(light).with_iterations(iterations).expect("valid");
-        surface(study, "Tsai–Shah", &format!("{iterations} iterations"), false, n, &method);
+        let method = TsaiShah::new(light)
+            .with_iterations(iterations)
+            .expect("valid");
+        surface(
+            study,
+            "Tsai–Shah",
+            &format!("{iterations} iterations"),
+            false,
+            n,
+            &method,
+        );
     }
     for iterations in study.choose(vec![100], vec![30, 100, 300, 1000]) {
-        let method = BrooksHorn::new(light).with_iterations(iterations, 20).expect("valid");
-        surface(study, "Brooks–Horn", &format!("{iterations} iterations"), false, n, &method);
+        let method = BrooksHorn::new(light)
+            .with_iterations(iterations, 20)
+            .expect("valid");
+        surface(
+            study,
+            "Brooks–Horn",
+            &format!("{iterations} iterations"),
+            false,
+            n,
+            &method,
+        );
     }
 }
 
@@ -70,12 +99,26 @@ fn surface(
 ) {
     let height = |x: f64, y: f64| 0.4 - 0.625 * (x * x + y * y);
     let mask = field(n, |x, y| height(x, y) > 0.0);
-    let image =
-        field(n, |x, y| if height(x, y) > 0.0 { 1.0 / (1.0 + 1.5625 * (x * x + y * y)).sqrt() } else { 0.0 });
+    let image = field(n, |x, y| {
+        if height(x, y) > 0.0 {
+            1.0 / (1.0 + 1.5625 * (x * x + y * y)).sqrt()
+        } else {
+            0.0
+        }
+    });
     let truth = field(n, |x, y| height(x, y).max(0.0));
-    let domain = Domain::new([2.0 / n as f64; 2]).expect("valid").with_mask(mask.view());
-    let job = || method.reconstruct(image.view(), &domain).expect("a surface").heights;
-    study.run(knob, setting, is_default, job, |z| mean_error(z, &truth, Some(&mask), 0.4));
+    let domain = Domain::new([2.0 / n as f64; 2])
+        .expect("valid")
+        .with_mask(mask.view());
+    let job = || {
+        method
+            .reconstruct(image.view(), &domain)
+            .expect("a surface")
+            .heights
+    };
+    study.run(knob, setting, is_default, job, |z| {
+        mean_error(z, &truth, Some(&mask), 0.4)
+    });
 }
 
 /// A Gaussian bump from its slopes, over a square that it does not fill.
@@ -83,12 +126,35 @@ pub(crate) fn slopes(study: &mut Study) {
     study.error_label = "mean error over the height";
     for n in study.choose(vec![64, 128], vec![64, 128, 256, 512]) {
         let size = format!("{n} × {n}");
-        integral::<f64>(study, "cosine Poisson", &size, true, n, &CosinePoisson::new());
+        integral::<f64>(
+            study,
+            "cosine Poisson",
+            &size,
+            true,
+            n,
+            &CosinePoisson::new(),
+        );
         integral::<f32>(study, "cosine, f32", &size, false, n, &CosinePoisson::new());
-        integral::<f64>(study, "Frankot–Chellappa", &size, false, n, &FrankotChellappa::new());
+        integral::<f64>(
+            study,
+            "Frankot–Chellappa",
+            &size,
+            false,
+            n,
+            &FrankotChellappa::new(),
+        );
         for tolerance in [1e-2, 1e-4, 1e-8] {
-            let method = MaskedLeastSquares::new().with_tolerance(tolerance).expect("valid");
-            integral::<f64>(study, "least squares", &format!("{size}, {tolerance}"), false, n, &method);
+            let method = MaskedLeastSquares::new()
+                .with_tolerance(tolerance)
+                .expect("valid");
+            integral::<f64>(
+                study,
+                "least squares",
+                &format!("{size}, {tolerance}"),
+                false,
+                n,
+                &method,
+            );
         }
     }
 }
@@ -106,7 +172,12 @@ fn integral<T: Scalar>(
     let q = field(n, |x, y| T::of(-(y + 0.05) / 0.09 * height(x, y)));
     let truth = field(n, height);
     let domain = Domain::new([T::of(2.0 / n as f64); 2]).expect("valid");
-    let job = || method.integrate(p.view(), q.view(), &domain).expect("a surface").heights;
+    let job = || {
+        method
+            .integrate(p.view(), q.view(), &domain)
+            .expect("a surface")
+            .heights
+    };
     study.run(knob, setting, is_default, job, |z| {
         let wide = z.mapv(|v| num_traits::ToPrimitive::to_f64(&v).expect("a number"));
         mean_error(&wide, &truth, None, 0.3)

@@ -34,12 +34,22 @@ pub(crate) struct Study {
 
 impl Study {
     pub(crate) fn new(name: &'static str, effort: Effort) -> Self {
-        Self { name, error_label: "error", entries: Vec::new(), peers: Vec::new(), effort }
+        Self {
+            name,
+            error_label: "error",
+            entries: Vec::new(),
+            peers: Vec::new(),
+            effort,
+        }
     }
 
     /// `quick` or `full`, whichever is asked for.
     pub(crate) fn choose<T>(&self, quick: T, full: T) -> T {
-        if self.effort == Effort::Full { full } else { quick }
+        if self.effort == Effort::Full {
+            full
+        } else {
+            quick
+        }
     }
 
     /// Times a job (least of many runs) and takes the error of its answer. A knob's default must be said to be one.
@@ -66,14 +76,29 @@ impl Study {
             }
         };
         let error = error(&answer).max(ROUNDING);
-        assert!(error.is_finite(), "{}: {knob} {} has no error", self.name, setting.to_string());
-        self.entries.push(Entry { knob, setting: setting.to_string(), is_default, seconds, error });
+        assert!(
+            error.is_finite(),
+            "{}: {knob} {} has no error",
+            self.name,
+            setting.to_string()
+        );
+        self.entries.push(Entry {
+            knob,
+            setting: setting.to_string(),
+            is_default,
+            seconds,
+            error,
+        });
     }
 
     /// Settings that no other beats in both, by time.
     pub(crate) fn front(&self) -> Vec<&Entry> {
         let mut order: Vec<&Entry> = self.entries.iter().collect();
-        order.sort_by(|a, b| (a.seconds, a.error).partial_cmp(&(b.seconds, b.error)).expect("finite"));
+        order.sort_by(|a, b| {
+            (a.seconds, a.error)
+                .partial_cmp(&(b.seconds, b.error))
+                .expect("finite")
+        });
         let mut least = f64::INFINITY;
         order.retain(|e| {
             e.error < least && {
@@ -113,7 +138,10 @@ impl Study {
 
     pub(crate) fn write_csv(&self, path: &Path) -> std::io::Result<()> {
         let mut file = std::fs::File::create(path)?;
-        writeln!(file, "study,knob,setting,default,seconds,error,behind_front")?;
+        writeln!(
+            file,
+            "study,knob,setting,default,seconds,error,behind_front"
+        )?;
         for e in &self.entries {
             let behind = self.behind(e);
             writeln!(
@@ -123,7 +151,11 @@ impl Study {
             )?;
         }
         for (label, seconds, error) in &self.peers {
-            writeln!(file, "{},peer,\"{label}\",false,{seconds:e},{error:e},", self.name)?;
+            writeln!(
+                file,
+                "{},peer,\"{label}\",false,{seconds:e},{error:e},",
+                self.name
+            )?;
         }
         Ok(())
     }

@@ -59,7 +59,10 @@ pub(crate) struct Arguments {
 
 /// A positive, finite number.
 fn positive(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite());
+    let value = text
+        .parse()
+        .ok()
+        .filter(|v: &f64| *v > 0.0 && v.is_finite());
     value.ok_or_else(|| "expected a positive number".into())
 }
 

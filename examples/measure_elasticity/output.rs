@@ -37,7 +37,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let measurement = press.measure().map_err(|e| source.explain(e))?;
     let truth = source.truth();
     if arguments.json {
-        let json = Json { measurement: &measurement, truth: truth.as_ref(), timing };
+        let json = Json {
+            measurement: &measurement,
+            truth: truth.as_ref(),
+            timing,
+        };
         println!("{}", serde_json::to_string_pretty(&json)?);
     } else {
         println!("{measurement}");
@@ -57,7 +61,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             ));
         }
         let paths = save_press_pages(&mut press, lines, &arguments.out)?;
-        eprintln!("plots: {}", paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "));
+        eprintln!(
+            "plots: {}",
+            paths
+                .iter()
+                .map(|p| p.display().to_string())
+                .collect::<Vec<_>>()
+                .join(", ")
+        );
     }
     Ok(())
 }
@@ -80,11 +91,20 @@ fn repeat(
         }
         times[Stage::ALL.len()].push(whole);
     }
-    let names = Stage::ALL.map(|s| s.to_string()).into_iter().chain(["whole".to_owned()]);
+    let names = Stage::ALL
+        .map(|s| s.to_string())
+        .into_iter()
+        .chain(["whole".to_owned()]);
     let row = |(stage, mut list): (String, Vec<std::time::Duration>)| {
         list.sort_unstable();
-        let at = |share: f64| list[((list.len() - 1) as f64 * share).ceil() as usize].as_secs_f64() * 1e3;
-        Timing { stage, median_ms: at(0.5), centile_99_ms: at(0.99) }
+        let at = |share: f64| {
+            list[((list.len() - 1) as f64 * share).ceil() as usize].as_secs_f64() * 1e3
+        };
+        Timing {
+            stage,
+            median_ms: at(0.5),
+            centile_99_ms: at(0.99),
+        }
     };
     Ok(names.zip(times).map(row).collect())
 }
@@ -101,9 +121,15 @@ fn percent(found: f64, truth: f64) -> f64 {
 }
 
 fn print_comparison(measurement: &Measurement, truth: &Truth) {
-    println!("beside the truth        {:>12} {:>12} {:>10}", "measured", "true", "error");
+    println!(
+        "beside the truth        {:>12} {:>12} {:>10}",
+        "measured", "true", "error"
+    );
     let line = |name: String, unit: &str, found: f64, truth: f64| {
-        println!("  {name:<16} {unit:<4} {found:>12.4} {truth:>12.4} {:>+8.2} %", percent(found, truth));
+        println!(
+            "  {name:<16} {unit:<4} {found:>12.4} {truth:>12.4} {:>+8.2} %",
+            percent(found, truth)
+        );
     };
     for (i, (m, t)) in measurement.frames.iter().zip(&truth.frames).enumerate() {
         line(format!("force {}", i + 1), "N", m.force_n.value, t.force_n);
@@ -114,15 +140,31 @@ fn print_comparison(measurement: &Measurement, truth: &Truth) {
             t.contact_radius_m * 1e3,
         );
         if let Some(height) = m.surface_height_m {
-            line(format!("surface height {}", i + 1), "mm", height * 1e3, t.surface_height_m * 1e3);
+            line(
+                format!("surface height {}", i + 1),
+                "mm",
+                height * 1e3,
+                t.surface_height_m * 1e3,
+            );
         }
         let step = (m.centroid_px[0] - t.centroid_px[0]).hypot(m.centroid_px[1] - t.centroid_px[1]);
-        println!("  {:<16} px   {step:>12.4} away from the truth", format!("centroid {}", i + 1));
+        println!(
+            "  {:<16} px   {step:>12.4} away from the truth",
+            format!("centroid {}", i + 1)
+        );
     }
     if let (Some(m), Some(t)) = (&measurement.strain, &truth.strain) {
-        for (k, name) in ["strain e_xx", "strain e_yy", "strain e_zz"].into_iter().enumerate() {
+        for (k, name) in ["strain e_xx", "strain e_yy", "strain e_zz"]
+            .into_iter()
+            .enumerate()
+        {
             line(name.into(), "", m.mean[k][k], t[k][k]);
         }
     }
-    line("modulus".into(), "kPa", measurement.youngs_modulus_pa.value * 1e-3, truth.youngs_modulus_pa * 1e-3);
+    line(
+        "modulus".into(),
+        "kPa",
+        measurement.youngs_modulus_pa.value * 1e-3,
+        truth.youngs_modulus_pa * 1e-3,
+    );
 }

@@ -22,15 +22,23 @@ impl Source {
             let data = scene.load()?;
             return Ok(Self::Scene(Box::new((scene, data))));
         }
-        eprintln!("simulating a calibration series and {} frames", arguments.forces.len());
-        Ok(Self::Simulated(Box::new(Trial::new(options(arguments), &CalibrationOptions::default())?)))
+        eprintln!(
+            "simulating a calibration series and {} frames",
+            arguments.forces.len()
+        );
+        Ok(Self::Simulated(Box::new(Trial::new(
+            options(arguments),
+            &CalibrationOptions::default(),
+        )?)))
     }
 
     pub(crate) fn stages(&self, arguments: &Arguments) -> Result<Box<dyn Stages>, Failure> {
         Ok(match self {
-            Self::Simulated(trial) => {
-                Box::new(trial.pipeline()?.with_control_points(arguments.points as usize))
-            }
+            Self::Simulated(trial) => Box::new(
+                trial
+                    .pipeline()?
+                    .with_control_points(arguments.points as usize),
+            ),
             Self::Scene(own) => own.0.stages_with(&own.1, arguments.points as usize)?,
         })
     }
@@ -51,7 +59,11 @@ impl Source {
     }
 
     pub(crate) fn truth(&self) -> Option<Truth> {
-        if let Self::Simulated(trial) = self { Some(trial.truth()) } else { None }
+        if let Self::Simulated(trial) = self {
+            Some(trial.truth())
+        } else {
+            None
+        }
     }
 }
 
@@ -61,12 +73,22 @@ fn options(arguments: &Arguments) -> PressOptions {
         Polymer::Cl2003x => Elastic::CL2003X,
     };
     let material = match arguments.modulus_kpa {
-        Some(kpa) => Elastic { youngs_modulus_pa: kpa * 1e3, ..polymer },
+        Some(kpa) => Elastic {
+            youngs_modulus_pa: kpa * 1e3,
+            ..polymer
+        },
         None => polymer,
     };
-    let camera = if arguments.ideal_camera { Camera::default().ideal() } else { Camera::default() };
+    let camera = if arguments.ideal_camera {
+        Camera::default().ideal()
+    } else {
+        Camera::default()
+    };
     PressOptions {
-        object: Sphere { radius_m: arguments.radius_mm * 1e-3, material },
+        object: Sphere {
+            radius_m: arguments.radius_mm * 1e-3,
+            material,
+        },
         loads: arguments.forces.iter().map(|&f| Load::normal(f)).collect(),
         camera,
         seed: arguments.seed,

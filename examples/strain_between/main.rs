@@ -3,7 +3,12 @@
 //! ```text
 //! cargo run --release --example strain_between -- before.csv after.csv --measure hencky
 //! ```
-#![allow(clippy::print_stdout, clippy::print_stderr, unreachable_pub, missing_docs)]
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    unreachable_pub,
+    missing_docs
+)]
 
 mod measure;
 mod robust_spline;
@@ -73,7 +78,10 @@ fn main() -> std::process::ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    match (read_point_table(&arguments.a)?, read_point_table(&arguments.b)?) {
+    match (
+        read_point_table(&arguments.a)?,
+        read_point_table(&arguments.b)?,
+    ) {
         (PointTable::Plane(a), PointTable::Plane(b)) => report(&a, &b, arguments),
         (PointTable::Space(a), PointTable::Space(b)) => report(&a, &b, arguments),
         _ => Err("one file has two columns and the other three".into()),
@@ -86,7 +94,12 @@ fn report<const D: usize>(
     arguments: &Arguments,
 ) -> Result<(), Box<dyn Error>> {
     eprintln!("matching {} to {} points", a.len(), b.len());
-    let found = strain_between(a, b, &RelaxationMatcher::default(), arguments.measure.strain())?;
+    let found = strain_between(
+        a,
+        b,
+        &RelaxationMatcher::default(),
+        arguments.measure.strain(),
+    )?;
     if arguments.json {
         println!("{:#}", json(&found, a.len(), b.len(), arguments));
     } else {
@@ -99,8 +112,14 @@ fn report<const D: usize>(
 
 /// Names and indices of the components in `D` dimensions.
 fn components(dimensions: usize) -> Vec<(&'static str, usize, usize)> {
-    let all =
-        [("e_xx", 0, 0), ("e_yy", 1, 1), ("e_xy", 0, 1), ("e_zz", 2, 2), ("e_xz", 0, 2), ("e_yz", 1, 2)];
+    let all = [
+        ("e_xx", 0, 0),
+        ("e_yy", 1, 1),
+        ("e_xy", 0, 1),
+        ("e_zz", 2, 2),
+        ("e_xz", 0, 2),
+        ("e_yz", 1, 2),
+    ];
     all[..if dimensions == 2 { 3 } else { 6 }].to_vec()
 }
 
@@ -125,10 +144,16 @@ fn print<const D: usize>(found: &Strain<D>, before: usize, after: usize, argumen
         share(after)
     );
     println!("left out    {} as misplaced", left_out(found));
-    println!("noise       {:.3} per coordinate (in the points' unit)", found.sigma);
+    println!(
+        "noise       {:.3} per coordinate (in the points' unit)",
+        found.sigma
+    );
     println!("smoothing   {}", smoothing(found));
     if !found.summary.folded.is_empty() {
-        println!("FOLDED      at {} points (det F ≤ 0), left out of the mean", found.summary.folded.len());
+        println!(
+            "FOLDED      at {} points (det F ≤ 0), left out of the mean",
+            found.summary.folded.len()
+        );
     }
     println!(
         "\n{:<8} {:>12} {:>12} {:>12}   ({})",
@@ -141,9 +166,15 @@ fn print<const D: usize>(found: &Strain<D>, before: usize, after: usize, argumen
     for (name, i, j) in components(D) {
         let at = |m: &Matrix3<f64>| m[(i, j)];
         let (mean, spread) = (at(&found.summary.mean), at(&found.summary.spread));
-        println!("{name:<8} {mean:>12.6} {spread:>12.6} {:>12.6}", at(&found.standard_error));
+        println!(
+            "{name:<8} {mean:>12.6} {spread:>12.6} {:>12.6}",
+            at(&found.standard_error)
+        );
     }
-    println!("(standard errors with {} degrees of freedom)", found.degrees_of_freedom);
+    println!(
+        "(standard errors with {} degrees of freedom)",
+        found.degrees_of_freedom
+    );
 }
 
 fn json<const D: usize>(
@@ -182,8 +213,13 @@ fn page<const D: usize>(found: &Strain<D>) -> Page {
     let flat = |p: &Point<f64, D>| [p[0], p[1]];
     let good = |i: &usize| found.weights[*i] >= 1e-3;
     let pairs = |keep: bool| {
-        let chosen = (0..found.pairs.len()).filter(|i| good(i) == keep).collect::<Vec<_>>();
-        chosen.into_iter().map(|i| [flat(&found.pairs[i][0]), flat(&found.pairs[i][1])]).collect::<Vec<_>>()
+        let chosen = (0..found.pairs.len())
+            .filter(|i| good(i) == keep)
+            .collect::<Vec<_>>();
+        chosen
+            .into_iter()
+            .map(|i| [flat(&found.pairs[i][0]), flat(&found.pairs[i][1])])
+            .collect::<Vec<_>>()
     };
     let matches = Panel::new("Matches")
         .x_label("x (unit of the points)")
@@ -200,10 +236,16 @@ fn page<const D: usize>(found: &Strain<D>) -> Page {
         ))
         .x_label("x (unit of the points)")
         .y_label("y (unit of the points)")
-        .coloured_points(positions.clone(), found.strains.iter().map(|e| e[(i, j)]), name)
+        .coloured_points(
+            positions.clone(),
+            found.strains.iter().map(|e| e[(i, j)]),
+            name,
+        )
         .equal_aspect()
     };
-    let page = Page::new("Strain between two point sets").columns(2).panel(matches);
+    let page = Page::new("Strain between two point sets")
+        .columns(2)
+        .panel(matches);
     components(D)
         .into_iter()
         .filter(|c| c.1 == c.2 || D == 2)

@@ -35,8 +35,12 @@ pub fn strain_between<const D: usize>(
     measure: &dyn StrainMeasure<f64>,
 ) -> Result<Strain<D>, Box<dyn Error>> {
     let matching = matcher.match_points(before, after)?;
-    let first: Vec<_> =
-        matching.assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect();
+    let first: Vec<_> = matching
+        .assignment
+        .iter()
+        .enumerate()
+        .filter_map(|(i, j)| j.map(|j| (i, j)))
+        .collect();
     if first.len() < FEWEST_PAIRS {
         return Err(format!("only {} points matched, too few for a spline", first.len()).into());
     }
@@ -45,8 +49,11 @@ pub fn strain_between<const D: usize>(
     let pairs = partners(before, after, &rough);
     let robust = fit(before, after, &pairs)?;
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| before[i]).collect();
-    let field =
-        StrainField::from_gradients(&RobustSpline::gradients(&robust.spline, &sources), None, measure)?;
+    let field = StrainField::from_gradients(
+        &RobustSpline::gradients(&robust.spline, &sources),
+        None,
+        measure,
+    )?;
     let mut means = Vec::new();
     for fold in &robust.folds {
         means.push(
@@ -86,7 +93,9 @@ fn partners<const D: usize>(
     let predicted: Vec<_> = before.iter().map(|p| rough.spline.apply(p)).collect();
     let nearest = |p: &Point<f64, D>, set: &[Point<f64, D>], not: usize| {
         let distance = |k: usize| (set[k] - p).norm_squared();
-        (0..set.len()).filter(|&k| k != not).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+        (0..set.len())
+            .filter(|&k| k != not)
+            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
     };
     let mut spacing: Vec<f64> = (0..after.len())
         .filter_map(|j| nearest(&after[j], after, j).map(|k| (after[k] - after[j]).norm()))
@@ -104,6 +113,9 @@ fn partners<const D: usize>(
 fn jackknife(means: &[Matrix3<f64>]) -> Matrix3<f64> {
     let k = means.len() as f64;
     let centre: Matrix3<f64> = means.iter().sum::<Matrix3<f64>>() / k;
-    let squares = means.iter().map(|m| (m - centre).component_mul(&(m - centre))).sum::<Matrix3<f64>>();
+    let squares = means
+        .iter()
+        .map(|m| (m - centre).component_mul(&(m - centre)))
+        .sum::<Matrix3<f64>>();
     squares.map(|s| (s * (k - 1.0) / k).sqrt())
 }

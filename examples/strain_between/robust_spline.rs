@@ -52,9 +52,14 @@ pub fn fit<const D: usize>(
     for _ in 0..3 {
         let held_out = hold_out(sources, targets, &weights, lambda)?;
         sigma = noise::<D>(&held_out.distances);
-        let scaled: Vec<f64> = held_out.distances.iter().map(|d| d / (sigma * CUTOFF[D])).collect();
+        let scaled: Vec<f64> = held_out
+            .distances
+            .iter()
+            .map(|d| d / (sigma * CUTOFF[D]))
+            .collect();
         weights = scaled.iter().map(|&u| biweight(u)).collect();
-        response = weights.iter().sum::<f64>() / scaled.iter().map(|&u| biweight_slope::<D>(u)).sum::<f64>();
+        response = weights.iter().sum::<f64>()
+            / scaled.iter().map(|&u| biweight_slope::<D>(u)).sum::<f64>();
         folds = held_out.splines;
     }
     Ok(RobustSpline {
@@ -93,22 +98,49 @@ fn choose<const D: usize>(
     square: f64,
 ) -> Result<f64, TpsError> {
     let step = sources.len().div_ceil(CHOICE_PAIRS);
-    let pick = |p: Points<'_, D>| p.iter().skip(step / 2).step_by(step).copied().collect::<Vec<_>>();
+    let pick = |p: Points<'_, D>| {
+        p.iter()
+            .skip(step / 2)
+            .step_by(step)
+            .copied()
+            .collect::<Vec<_>>()
+    };
     let (sources, targets) = (pick(sources), pick(targets));
     let ones = vec![1.0; sources.len()];
     let mut distances = Vec::new();
     for lambda in LAMBDAS {
         distances.push(hold_out(&sources, &targets, &ones, lambda * square)?.distances);
     }
-    let sigma = distances.iter().map(|d| noise::<D>(d)).fold(f64::INFINITY, f64::min);
-    let losses: Vec<Vec<f64>> =
-        distances.iter().map(|d| d.iter().map(|d| tukey_loss(d / (sigma * CUTOFF[D]))).collect()).collect();
+    let sigma = distances
+        .iter()
+        .map(|d| noise::<D>(d))
+        .fold(f64::INFINITY, f64::min);
+    let losses: Vec<Vec<f64>> = distances
+        .iter()
+        .map(|d| {
+            d.iter()
+                .map(|d| tukey_loss(d / (sigma * CUTOFF[D])))
+                .collect()
+        })
+        .collect();
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    let best = (0..LAMBDAS.len()).min_by(|&i, &j| mean(&losses[i]).total_cmp(&mean(&losses[j]))).unwrap_or(0);
+    let best = (0..LAMBDAS.len())
+        .min_by(|&i, &j| mean(&losses[i]).total_cmp(&mean(&losses[j])))
+        .unwrap_or(0);
     let as_good = |&k: &usize| {
-        let gaps: Vec<f64> = losses[k].iter().zip(&losses[best]).map(|(a, b)| a - b).collect();
+        let gaps: Vec<f64> = losses[k]
+            .iter()
+            .zip(&losses[best])
+            .map(|(a, b)| a - b)
+            .collect();
         let centre = mean(&gaps);
-        let spread = mean(&gaps.iter().map(|g| (g - centre).powi(2)).collect::<Vec<_>>()).sqrt();
+        let spread = mean(
+            &gaps
+                .iter()
+                .map(|g| (g - centre).powi(2))
+                .collect::<Vec<_>>(),
+        )
+        .sqrt();
         centre <= spread / (gaps.len() as f64).sqrt()
     };
     Ok(LAMBDAS[(best..LAMBDAS.len()).rev().find(as_good).unwrap_or(best)])
@@ -125,8 +157,11 @@ fn hold_out<const D: usize>(
     let mut splines = Vec::new();
     let parts = parts(sources.len());
     for part in 0..parts {
-        let without: Vec<f64> =
-            weights.iter().enumerate().map(|(i, &w)| if fold(i, parts) == part { 0.0 } else { w }).collect();
+        let without: Vec<f64> = weights
+            .iter()
+            .enumerate()
+            .map(|(i, &w)| if fold(i, parts) == part { 0.0 } else { w })
+            .collect();
         let spline = weighted(sources, targets, &without, lambda)?;
         for i in (0..sources.len()).filter(|&i| fold(i, parts) == part) {
             distances[i] = (spline.apply(&sources[i]) - targets[i]).norm();
@@ -157,8 +192,16 @@ fn weighted<const D: usize>(
 
 fn squared_radius<const D: usize>(points: Points<'_, D>) -> f64 {
     let n = points.len() as f64;
-    let centre = points.iter().fold(nalgebra::SVector::<f64, D>::zeros(), |c, p| c + p.coords / n);
-    points.iter().map(|p| (p.coords - centre).norm_squared()).sum::<f64>() / n
+    let centre = points
+        .iter()
+        .fold(nalgebra::SVector::<f64, D>::zeros(), |c, p| {
+            c + p.coords / n
+        });
+    points
+        .iter()
+        .map(|p| (p.coords - centre).norm_squared())
+        .sum::<f64>()
+        / n
 }
 
 /// Standard deviation of one coordinate from the median distance: the medians of χ with 1, 2, 3 degrees.
@@ -178,7 +221,11 @@ fn biweight(u: f64) -> f64 {
 /// An M-estimator's error is that of its pulls over the mean of this, not over the mean weight (Huber 1981, 7.6): on clean data
 /// in the plane the ratio of the two is 1.26.
 fn biweight_slope<const D: usize>(u: f64) -> f64 {
-    if u < 1.0 { (1.0 - u * u).powi(2) - 4.0 / D as f64 * u * u * (1.0 - u * u) } else { 0.0 }
+    if u < 1.0 {
+        (1.0 - u * u).powi(2) - 4.0 / D as f64 * u * u * (1.0 - u * u)
+    } else {
+        0.0
+    }
 }
 
 fn tukey_loss(u: f64) -> f64 {

@@ -95,7 +95,10 @@ pub fn parse_cases(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<MatchCase
     let mut cases = Vec::new();
     let mut open: Option<OpenCase<'_>> = None;
     for (i, line) in text.lines().enumerate() {
-        let at = At { path, line: i as u64 + 1 };
+        let at = At {
+            path,
+            line: i as u64 + 1,
+        };
         let mut words = line.split_ascii_whitespace();
         match (words.next(), &mut open) {
             (None, _) => {}
@@ -113,7 +116,10 @@ pub fn parse_cases(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<MatchCase
     }
     cases.extend(open.map(OpenCase::close).transpose()?);
     if cases.is_empty() {
-        return Err(ReadError::Empty { path: path.into(), expected: Expected::CaseHeader });
+        return Err(ReadError::Empty {
+            path: path.into(),
+            expected: Expected::CaseHeader,
+        });
     }
     Ok(cases)
 }
@@ -142,7 +148,11 @@ pub fn write_case_result<const D: usize>(
     warped: &[Point<f64, D>],
     assignment: &[Option<usize>],
 ) -> std::io::Result<()> {
-    assert_eq!(warped.len(), assignment.len(), "one assignment for every warped point");
+    assert_eq!(
+        warped.len(),
+        assignment.len(),
+        "one assignment for every warped point"
+    );
     writeln!(out, "case {name} {time_ms:?}")?;
     for p in warped {
         write!(out, "w")?;
@@ -164,11 +174,22 @@ struct At<'a> {
 
 impl At<'_> {
     fn field(self, column: usize, expected: Expected, found: &str) -> ReadError {
-        ReadError::Field { path: self.path.into(), line: self.line, column, expected, found: shorten(found) }
+        ReadError::Field {
+            path: self.path.into(),
+            line: self.line,
+            column,
+            expected,
+            found: shorten(found),
+        }
     }
 
     fn line(self, expected: Expected, found: usize) -> ReadError {
-        ReadError::Line { path: self.path.into(), line: self.line, expected, found }
+        ReadError::Line {
+            path: self.path.into(),
+            line: self.line,
+            expected,
+            found,
+        }
     }
 }
 
@@ -189,7 +210,8 @@ impl<'a> OpenCase<'a> {
             return Err(at.line(Expected::CaseHeader, words.len() + 1));
         };
         let count = |column: usize, word: &str| {
-            word.parse::<usize>().map_err(|_| at.field(column, Expected::WholeNumber, word))
+            word.parse::<usize>()
+                .map_err(|_| at.field(column, Expected::WholeNumber, word))
         };
         if dimension != "2" && dimension != "3" {
             return Err(at.field(3, Expected::Dimension, dimension));
@@ -205,9 +227,10 @@ impl<'a> OpenCase<'a> {
     }
 
     fn close(self) -> Result<MatchCase, ReadError> {
-        for (tag, wanted, found) in
-            [('m', self.counts[0], self.model.len()), ('t', self.counts[1], self.target.len())]
-        {
+        for (tag, wanted, found) in [
+            ('m', self.counts[0], self.model.len()),
+            ('t', self.counts[1], self.target.len()),
+        ] {
             if wanted != found {
                 return Err(self.at.line(Expected::TaggedRows(tag, wanted), found));
             }
@@ -215,11 +238,20 @@ impl<'a> OpenCase<'a> {
         let plane = |rows: &[[f64; 3]]| rows.iter().map(|r| Point2::new(r[0], r[1])).collect();
         let space = |rows: &[[f64; 3]]| rows.iter().map(|&r| Point3::from(r)).collect();
         let points = if self.dimension == 2 {
-            CasePoints::Plane { model: plane(&self.model), target: plane(&self.target) }
+            CasePoints::Plane {
+                model: plane(&self.model),
+                target: plane(&self.target),
+            }
         } else {
-            CasePoints::Space { model: space(&self.model), target: space(&self.target) }
+            CasePoints::Space {
+                model: space(&self.model),
+                target: space(&self.target),
+            }
         };
-        Ok(MatchCase { name: self.name, points })
+        Ok(MatchCase {
+            name: self.name,
+            points,
+        })
     }
 }
 
@@ -238,7 +270,11 @@ fn coordinates<'w>(
         }
         found += 1;
     }
-    if found == dimension { Ok(point) } else { Err(at.line(Expected::Columns(dimension + 1), found + 1)) }
+    if found == dimension {
+        Ok(point)
+    } else {
+        Err(at.line(Expected::Columns(dimension + 1), found + 1))
+    }
 }
 
 #[cfg(test)]
@@ -247,12 +283,16 @@ mod tests {
 
     #[test]
     fn reads_model_and_target_and_not_the_truth() {
-        let text =
-            "case a_1 2 1 2\nm 1 2\nt 3 4\nt 5 6\ng not read\np x\n# note\ncase b 3 1 1\nm 1 2 3\nt 4 5 6\n";
+        let text = "case a_1 2 1 2\nm 1 2\nt 3 4\nt 5 6\ng not read\np x\n# note\ncase b 3 1 1\nm 1 2 3\nt 4 5 6\n";
         let cases = parse_cases(text.as_bytes(), "c.txt").unwrap();
         assert_eq!(cases[0].name, "a_1");
-        let CasePoints::Plane { model, target } = &cases[0].points else { panic!("two coordinates") };
-        assert_eq!((model[0], target[1]), ([1.0, 2.0].into(), [5.0, 6.0].into()));
+        let CasePoints::Plane { model, target } = &cases[0].points else {
+            panic!("two coordinates")
+        };
+        assert_eq!(
+            (model[0], target[1]),
+            ([1.0, 2.0].into(), [5.0, 6.0].into())
+        );
         assert!(
             matches!(&cases[1].points, CasePoints::Space { model, .. } if model[0] == [1.0, 2.0, 3.0].into())
         );
@@ -260,12 +300,19 @@ mod tests {
 
     #[test]
     fn errors_name_the_line() {
-        let message = |text: &str| parse_cases(text.as_bytes(), "c.txt").unwrap_err().to_string();
+        let message = |text: &str| {
+            parse_cases(text.as_bytes(), "c.txt")
+                .unwrap_err()
+                .to_string()
+        };
         assert_eq!(
             message("case a 2 1 1\nm 1 x\n"),
             "c.txt, line 2, column 3: expected a finite number, found `x`"
         );
-        assert_eq!(message("case a 2 2 0\nm 1 2\n"), "c.txt, line 1: expected 2 rows tagged m, found 1");
+        assert_eq!(
+            message("case a 2 2 0\nm 1 2\n"),
+            "c.txt, line 1: expected 2 rows tagged m, found 1"
+        );
         assert_eq!(
             message("case a 4 0 0\n"),
             "c.txt, line 1, column 3: expected dimension 2 or 3, found `4`"
@@ -279,6 +326,9 @@ mod tests {
         let mut out = Vec::new();
         let warped = [Point2::new(0.1, 2.0), Point2::new(-1.0, 1e-20)];
         write_case_result(&mut out, "a", 1.5, &warped, &[Some(3), None]).unwrap();
-        assert_eq!(String::from_utf8(out).unwrap(), "case a 1.5\nw 0.1 2.0\nw -1.0 1e-20\na 3\na -1\n");
+        assert_eq!(
+            String::from_utf8(out).unwrap(),
+            "case a 1.5\nw 0.1 2.0\nw -1.0 1e-20\na 3\na -1\n"
+        );
     }
 }

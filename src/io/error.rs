@@ -138,12 +138,19 @@ pub enum ReadError {
 }
 
 fn list(names: &[String]) -> String {
-    if names.is_empty() { "no header line".into() } else { format!("`{}`", names.join("`, `")) }
+    if names.is_empty() {
+        "no header line".into()
+    } else {
+        format!("`{}`", names.join("`, `"))
+    }
 }
 
 /// Reads a whole file; the error names it.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
-    std::fs::read(path).map_err(|source| ReadError::Open { path: path.into(), source })
+    std::fs::read(path).map_err(|source| ReadError::Open {
+        path: path.into(),
+        source,
+    })
 }
 
 /// Writes a whole file, creating its folder where needed.
@@ -154,7 +161,10 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
         }
         std::fs::write(path, bytes)
     };
-    write().map_err(|source| ReadError::Write { path: path.into(), source })
+    write().map_err(|source| ReadError::Write {
+        path: path.into(),
+        source,
+    })
 }
 
 /// The field as it can stand in a message: at most 40 characters, no control characters.

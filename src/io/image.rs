@@ -55,7 +55,8 @@ pub struct GreyImage {
 impl GreyImage {
     /// The levels rounded to 8 bits (half up).
     pub fn to_u8(&self) -> Array2<u8> {
-        self.levels.mapv(|v| (v + 0.5).floor().clamp(0.0, 255.0) as u8)
+        self.levels
+            .mapv(|v| (v + 0.5).floor().clamp(0.0, 255.0) as u8)
     }
 }
 
@@ -101,7 +102,10 @@ pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImag
         reader.limits(limits);
         reader.decode()
     };
-    let decoded = decode().map_err(|source| ReadError::Image { path: name.as_ref().into(), source })?;
+    let decoded = decode().map_err(|source| ReadError::Image {
+        path: name.as_ref().into(),
+        source,
+    })?;
     Ok(to_grey(decoded))
 }
 
@@ -119,11 +123,16 @@ pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImag
 ///
 /// # Errors
 /// [`ReadError::Write`] and [`ReadError::Image`].
-pub fn write_grey_image(path: impl AsRef<Path>, pixels: ArrayView2<'_, u8>) -> Result<(), ReadError> {
+pub fn write_grey_image(
+    path: impl AsRef<Path>,
+    pixels: ArrayView2<'_, u8>,
+) -> Result<(), ReadError> {
     let path = path.as_ref();
     let (rows, columns) = pixels.dim();
     let samples: Vec<u8> = pixels.iter().copied().collect();
-    let is_pgm = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
+    let is_pgm = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("pgm"));
     let mut bytes = Vec::new();
     if is_pgm {
         bytes = format!("P5\n{columns} {rows}\n255\n").into_bytes();
@@ -132,8 +141,18 @@ pub fn write_grey_image(path: impl AsRef<Path>, pixels: ArrayView2<'_, u8>) -> R
         let cursor = &mut Cursor::new(&mut bytes);
         let (width, height) = (columns as u32, rows as u32);
         let colour = ::image::ExtendedColorType::L8;
-        ::image::write_buffer_with_format(cursor, &samples, width, height, colour, ImageFormat::Png)
-            .map_err(|source| ReadError::Image { path: path.into(), source })?;
+        ::image::write_buffer_with_format(
+            cursor,
+            &samples,
+            width,
+            height,
+            colour,
+            ImageFormat::Png,
+        )
+        .map_err(|source| ReadError::Image {
+            path: path.into(),
+            source,
+        })?;
     }
     write_bytes(path, &bytes)
 }
@@ -144,15 +163,33 @@ fn to_grey(image: DynamicImage) -> GreyImage {
     let luma = |rgb: [f64; 3]| (0..3).map(|i| REC_601[i] * rgb[i]).sum::<f64>();
     let wide = image.color().bytes_per_pixel() / image.color().channel_count() > 1;
     let levels: Vec<f64> = match (wide, colour) {
-        (false, false) => image.into_luma_alpha8().pixels().map(|p| f64::from(p.0[0])).collect(),
-        (false, true) => image.into_rgb8().pixels().map(|p| luma(p.0.map(f64::from))).collect(),
-        (true, false) => image.into_luma_alpha16().pixels().map(|p| f64::from(p.0[0]) / 257.0).collect(),
-        (true, true) => {
-            image.into_rgb16().pixels().map(|p| luma(p.0.map(|v| f64::from(v) / 257.0))).collect()
-        }
+        (false, false) => image
+            .into_luma_alpha8()
+            .pixels()
+            .map(|p| f64::from(p.0[0]))
+            .collect(),
+        (false, true) => image
+            .into_rgb8()
+            .pixels()
+            .map(|p| luma(p.0.map(f64::from)))
+            .collect(),
+        (true, false) => image
+            .into_luma_alpha16()
+            .pixels()
+            .map(|p| f64::from(p.0[0]) / 257.0)
+            .collect(),
+        (true, true) => image
+            .into_rgb16()
+            .pixels()
+            .map(|p| luma(p.0.map(|v| f64::from(v) / 257.0)))
+            .collect(),
     };
     let levels = Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape));
-    GreyImage { levels, bits: if wide { 16 } else { 8 }, colour }
+    GreyImage {
+        levels,
+        bits: if wide { 16 } else { 8 },
+        colour,
+    }
 }
 
 #[cfg(test)]
@@ -183,7 +220,12 @@ mod tests {
 
     #[test]
     fn a_text_file_is_an_error_that_names_it() {
-        let error = parse_grey_image(b"hello", "frame.png").unwrap_err().to_string();
-        assert!(error.starts_with("cannot decode the image frame.png: "), "{error}");
+        let error = parse_grey_image(b"hello", "frame.png")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.starts_with("cannot decode the image frame.png: "),
+            "{error}"
+        );
     }
 }

@@ -53,9 +53,12 @@ pub fn read_point_table(path: impl AsRef<Path>) -> Result<PointTable, ReadError>
     match values.ncols() {
         2 => Ok(PointTable::Plane(to_points(&values))),
         3 => Ok(PointTable::Space(to_points(&values))),
-        found => {
-            Err(ReadError::Line { path: path.into(), line: 1, expected: Expected::TwoOrThreeColumns, found })
-        }
+        found => Err(ReadError::Line {
+            path: path.into(),
+            line: 1,
+            expected: Expected::TwoOrThreeColumns,
+            found,
+        }),
     }
 }
 
@@ -76,7 +79,9 @@ pub fn read_point_table(path: impl AsRef<Path>) -> Result<PointTable, ReadError>
 ///
 /// # Errors
 /// [`ReadError`], among others where the file has not `D` columns.
-pub fn read_points<const D: usize>(path: impl AsRef<Path>) -> Result<Vec<Point<f64, D>>, ReadError> {
+pub fn read_points<const D: usize>(
+    path: impl AsRef<Path>,
+) -> Result<Vec<Point<f64, D>>, ReadError> {
     let path = path.as_ref();
     parse_points(&read_bytes(path)?, path)
 }
@@ -103,7 +108,12 @@ pub fn parse_points<const D: usize>(
     if values.ncols() == D {
         return Ok(to_points(&values));
     }
-    Err(ReadError::Line { path: path.into(), line: 1, expected: Expected::Columns(D), found: values.ncols() })
+    Err(ReadError::Line {
+        path: path.into(),
+        line: 1,
+        expected: Expected::Columns(D),
+        found: values.ncols(),
+    })
 }
 
 /// Writes points with a header; reading them again gives the same bits.
@@ -137,5 +147,9 @@ pub fn write_points<const D: usize>(
 }
 
 fn to_points<const D: usize>(values: &Array2<f64>) -> Vec<Point<f64, D>> {
-    values.rows().into_iter().map(|row| Point::from(std::array::from_fn(|i| row[i]))).collect()
+    values
+        .rows()
+        .into_iter()
+        .map(|row| Point::from(std::array::from_fn(|i| row[i])))
+        .collect()
 }

@@ -37,14 +37,18 @@ impl Table {
         let found = if self.header.is_empty() {
             Some(position).filter(|&i| i < self.values.ncols())
         } else {
-            self.header.iter().position(|h| h.eq_ignore_ascii_case(name))
+            self.header
+                .iter()
+                .position(|h| h.eq_ignore_ascii_case(name))
         };
         let missing = || ReadError::MissingColumn {
             path: path.into(),
             column: name.into(),
             found: self.header.clone(),
         };
-        found.map(|i| self.values.column(i).to_vec()).ok_or_else(missing)
+        found
+            .map(|i| self.values.column(i).to_vec())
+            .ok_or_else(missing)
     }
 }
 
@@ -74,13 +78,21 @@ pub(crate) fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<T
     let mut reader = reader(bytes);
     let (mut header, mut values, mut columns) = (Vec::new(), Vec::new(), None);
     for record in reader.byte_records() {
-        let record = record.map_err(|e| ReadError::Open { path: path.into(), source: e.into() })?;
+        let record = record.map_err(|e| ReadError::Open {
+            path: path.into(),
+            source: e.into(),
+        })?;
         let line = record.position().map_or(0, csv::Position::line);
         let fields: Vec<_> = record.iter().map(String::from_utf8_lossy).collect();
         let first = columns.is_none();
         if *columns.get_or_insert(fields.len()) != fields.len() {
             let expected = Expected::Columns(columns.unwrap_or(0));
-            return Err(ReadError::Line { path: path.into(), line, expected, found: fields.len() });
+            return Err(ReadError::Line {
+                path: path.into(),
+                line,
+                expected,
+                found: fields.len(),
+            });
         }
         if first && is_header(&fields) {
             header = fields.iter().map(|f| shorten(f)).collect();
@@ -89,9 +101,13 @@ pub(crate) fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<T
         push_numbers(&fields, &cell, path, line, &mut values)?;
     }
     let columns = columns.filter(|_| !values.is_empty());
-    let empty = || ReadError::Empty { path: path.into(), expected: Expected::Rows };
+    let empty = || ReadError::Empty {
+        path: path.into(),
+        expected: Expected::Rows,
+    };
     let columns = columns.ok_or_else(empty)?;
-    let values = Array2::from_shape_vec((values.len() / columns, columns), values).map_err(|_| empty())?;
+    let values =
+        Array2::from_shape_vec((values.len() / columns, columns), values).map_err(|_| empty())?;
     Ok(Table { header, values })
 }
 
@@ -141,9 +157,17 @@ fn number(field: &str, cell: &Expected) -> Option<f64> {
 
 /// The separator of the first line that has one.
 fn delimiter(bytes: &[u8]) -> u8 {
-    let lines = bytes.split(|&b| b == b'\n').filter(|l| !l.starts_with(b"#"));
-    let first = lines.into_iter().find(|l| !l.trim_ascii().is_empty()).unwrap_or_default();
-    [b',', b';', b'\t'].into_iter().find(|d| first.contains(d)).unwrap_or(b',')
+    let lines = bytes
+        .split(|&b| b == b'\n')
+        .filter(|l| !l.starts_with(b"#"));
+    let first = lines
+        .into_iter()
+        .find(|l| !l.trim_ascii().is_empty())
+        .unwrap_or_default();
+    [b',', b';', b'\t']
+        .into_iter()
+        .find(|d| first.contains(d))
+        .unwrap_or(b',')
 }
 
 #[cfg(test)]
@@ -157,12 +181,24 @@ mod tests {
     #[test]
     fn a_header_is_recognised_and_columns_found_by_name() {
         let table = parse("# note\nforce_N, pixel\n1, 2\n\n3,4\n").unwrap();
-        assert_eq!(table.column("FORCE_n", 1, Path::new("")).unwrap(), [1.0, 3.0]);
+        assert_eq!(
+            table.column("FORCE_n", 1, Path::new("")).unwrap(),
+            [1.0, 3.0]
+        );
         assert!(
-            matches!(table.column("x", 0, Path::new("")), Err(ReadError::MissingColumn { .. })),
+            matches!(
+                table.column("x", 0, Path::new("")),
+                Err(ReadError::MissingColumn { .. })
+            ),
             "a header decides, not the position"
         );
-        assert_eq!(parse("1;2\n3;4").unwrap().column("any", 1, Path::new("")).unwrap(), [2.0, 4.0]);
+        assert_eq!(
+            parse("1;2\n3;4")
+                .unwrap()
+                .column("any", 1, Path::new(""))
+                .unwrap(),
+            [2.0, 4.0]
+        );
     }
 
     #[test]
@@ -172,8 +208,17 @@ mod tests {
             message("x,y\n1,2\n1,two\n"),
             "t.csv, line 3, column 2: expected a finite number, found `two`"
         );
-        assert_eq!(message("1,2\n3\n"), "t.csv, line 2: expected 2 columns, found 1");
-        assert_eq!(message("1,inf\n"), "t.csv, line 1, column 2: expected a finite number, found `inf`");
-        assert_eq!(message("x,y\n"), "t.csv: expected at least one row of numbers, found none");
+        assert_eq!(
+            message("1,2\n3\n"),
+            "t.csv, line 2: expected 2 columns, found 1"
+        );
+        assert_eq!(
+            message("1,inf\n"),
+            "t.csv, line 1, column 2: expected a finite number, found `inf`"
+        );
+        assert_eq!(
+            message("x,y\n"),
+            "t.csv: expected at least one row of numbers, found none"
+        );
     }
 }

@@ -82,8 +82,14 @@ impl ContactSurface {
         }
         let contact_radius_m = (radius_m * radius_m - at.z * at.z).sqrt();
         let (centre_m, mean_absolute_error_m) = ([at.x, at.y], 0.0);
-        let mut fit =
-            BallFit { radius_m, centre_m, contact_radius_m, mean_absolute_error_m, pixels: 0, iterations };
+        let mut fit = BallFit {
+            radius_m,
+            centre_m,
+            contact_radius_m,
+            mean_absolute_error_m,
+            pixels: 0,
+            iterations,
+        };
         if !(at.z < 0.0 && contact_radius_m > 0.0) {
             return None;
         }
@@ -95,7 +101,10 @@ impl ContactSurface {
 }
 
 fn fit_error(fit: &BallFit, pixels: &[[f64; 3]]) -> (f64, usize) {
-    let depth = pixels.iter().map(|[x, y, z]| (fit.depth_m([*x, *y]), z)).filter(|(d, _)| *d > 0.0);
+    let depth = pixels
+        .iter()
+        .map(|[x, y, z]| (fit.depth_m([*x, *y]), z))
+        .filter(|(d, _)| *d > 0.0);
     let (sum, n) = depth.fold((0.0, 0), |(s, n), (d, z)| (s + (z - d).abs(), n + 1));
     (sum / n.max(1) as f64, n)
 }
@@ -118,15 +127,28 @@ mod tests {
             iterations: 0,
         };
         let size = [50e-6, 40e-6];
-        let depth =
-            |(r, c): (usize, usize)| truth.depth_m([(c + 10) as f64 * size[0], (r + 4) as f64 * size[1]]);
+        let depth = |(r, c): (usize, usize)| {
+            truth.depth_m([(c + 10) as f64 * size[0], (r + 4) as f64 * size[1]])
+        };
         let heights = Array2::from_shape_fn((130, 110), depth);
         let mask = heights.mapv(|h| h > 0.0);
         let table = DepthTable::new(&[(0.0, 0.0), (1.0, 1.0)]).unwrap();
         let domain = Domain::new(size).unwrap().with_mask(mask.view());
         let surface = table.reconstruct(heights.view(), &domain).unwrap();
-        let region = BoundingBox { row_start: 4, row_end: 134, column_start: 10, column_end: 120 };
-        let fit = ContactSurface { surface, region, binning: 1, pixel_size_m: size }.fit_ball(4e-3).unwrap();
+        let region = BoundingBox {
+            row_start: 4,
+            row_end: 134,
+            column_start: 10,
+            column_end: 120,
+        };
+        let fit = ContactSurface {
+            surface,
+            region,
+            binning: 1,
+            pixel_size_m: size,
+        }
+        .fit_ball(4e-3)
+        .unwrap();
         // Gauss–Newton stops at 10⁻⁹ of the radius.
         for k in 0..2 {
             assert!((fit.centre_m[k] - truth.centre_m[k]).abs() < 1e-10);

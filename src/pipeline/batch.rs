@@ -55,6 +55,10 @@ pub fn contacts(
     #[cfg(not(feature = "rayon"))]
     {
         let mut state = (ForceWorkspace::default(), FrameContact::default());
-        Ok(frames.iter().enumerate().map(|item| one(&mut state, item)).collect())
+        Ok(frames
+            .iter()
+            .enumerate()
+            .map(|item| one(&mut state, item))
+            .collect())
     }
 }

@@ -52,7 +52,11 @@ impl Binning {
 }
 
 /// The box that whole blocks make of a contact's box: grown to the right and downwards, cut at the frame's end.
-pub(super) fn whole_blocks(region: BoundingBox, side: usize, (rows, columns): (usize, usize)) -> BoundingBox {
+pub(super) fn whole_blocks(
+    region: BoundingBox,
+    side: usize,
+    (rows, columns): (usize, usize),
+) -> BoundingBox {
     let end = |start: usize, end: usize, limit: usize| {
         let blocks = (end - start).div_ceil(side).min((limit - start) / side);
         start + blocks * side
@@ -80,7 +84,12 @@ pub(super) fn mean_difference(
         let mut out = means.row_mut(row / side);
         let blocks = f.exact_chunks(side).into_iter().zip(r.exact_chunks(side));
         for (sum, (f, r)) in out.iter_mut().zip(blocks) {
-            *sum += f64::from(f.iter().zip(r).map(|(&f, &r)| i32::from(f) - i32::from(r)).sum::<i32>());
+            *sum += f64::from(
+                f.iter()
+                    .zip(r)
+                    .map(|(&f, &r)| i32::from(f) - i32::from(r))
+                    .sum::<i32>(),
+            );
         }
     }
     let scale = scale / (side * side) as f64;
@@ -102,7 +111,13 @@ pub(super) fn block_mask(
         let span = |start: usize, end: usize| [start.min(end), (start + side).min(end)];
         let ([row_start, row_end], [column_start, column_end]) =
             (span(row * side, rows), span(column * side, columns));
-        let pixels = BoundingBox { row_start, row_end, column_start, column_end }.of(mask);
+        let pixels = BoundingBox {
+            row_start,
+            row_end,
+            column_start,
+            column_end,
+        }
+        .of(mask);
         *inside = 4 * pixels.iter().filter(|m| **m).count() >= 3 * side * side;
     }
 }
@@ -136,7 +151,12 @@ mod tests {
     fn means_of_blocks_are_those_of_their_pixels() {
         let frame = Array2::from_shape_fn((9, 11), |(r, c)| (7 * r + 3 * c) as u8);
         let reference = Array2::from_elem((9, 11), 5_u8);
-        let contact = BoundingBox { row_start: 1, row_end: 8, column_start: 2, column_end: 9 };
+        let contact = BoundingBox {
+            row_start: 1,
+            row_end: 8,
+            column_start: 2,
+            column_end: 9,
+        };
         let region = whole_blocks(contact, 3, frame.dim());
         assert_eq!(
             (region.row_end, region.column_end),
@@ -146,8 +166,9 @@ mod tests {
         let mut means = Array2::zeros((0, 0));
         mean_difference(frame.view(), reference.view(), region, 3, 2.0, &mut means);
         // The mean of a linear function is its value in the block's middle; all sums are exact in f64.
-        let middle =
-            |(r, c): (usize, usize)| 2.0 * (7.0 * (3 * r + 2) as f64 + 3.0 * (3 * c + 3) as f64 - 5.0);
+        let middle = |(r, c): (usize, usize)| {
+            2.0 * (7.0 * (3 * r + 2) as f64 + 3.0 * (3 * c + 3) as f64 - 5.0)
+        };
         for (at, mean) in means.indexed_iter() {
             assert!((mean - middle(at)).abs() < 1e-12, "{at:?}: {mean}");
         }
@@ -155,7 +176,12 @@ mod tests {
 
     #[test]
     fn a_block_is_inside_if_three_quarters_of_it_are() {
-        let contact = BoundingBox { row_start: 0, row_end: 2, column_start: 0, column_end: 6 };
+        let contact = BoundingBox {
+            row_start: 0,
+            row_end: 2,
+            column_start: 0,
+            column_end: 6,
+        };
         let mask = Array2::from_shape_fn((2, 6), |(r, c)| c <= 2 || c == 4 || (c == 5 && r == 0));
         let mut blocks = Array2::default((0, 0));
         block_mask(mask.view(), contact, contact, 2, &mut blocks);
@@ -165,18 +191,29 @@ mod tests {
     #[test]
     fn pixels_too_near_the_rim_of_a_hemisphere_are_trimmed() {
         let distance = |(r, c): (usize, usize)| (r as f64 - 25.3).hypot(c as f64 - 24.8);
-        let shading =
-            Array2::from_shape_fn((50, 50), |at| (1.0 - (distance(at) / 20.0).powi(2)).max(0.0).sqrt());
+        let shading = Array2::from_shape_fn((50, 50), |at| {
+            (1.0 - (distance(at) / 20.0).powi(2)).max(0.0).sqrt()
+        });
         // A blur's light reaches half a pixel beyond the rim.
         let mut mask = Array2::from_shape_fn((50, 50), |at| distance(at) < 20.5);
         trim_rim(&mut mask, &shading);
         for (at, inside) in mask.indexed_iter() {
             // The radius from the pixels is half a pixel too large at most: a fortieth of the quarter pixel.
             let inner = 20.0 - distance(at);
-            assert!(if inner > 0.26 { *inside } else { !*inside || inner > 0.23 }, "{at:?}: {inner}");
+            assert!(
+                if inner > 0.26 {
+                    *inside
+                } else {
+                    !*inside || inner > 0.23
+                },
+                "{at:?}: {inner}"
+            );
         }
         let mut flat = Array2::from_elem((6, 6), true);
         trim_rim(&mut flat, &Array2::from_elem((6, 6), 1.0));
-        assert!(flat.iter().all(|inside| *inside), "a flat contact has no dark rim");
+        assert!(
+            flat.iter().all(|inside| *inside),
+            "a flat contact has no dark rim"
+        );
     }
 }

@@ -92,7 +92,10 @@ impl BoxedPipeline {
             matcher: config.matcher.boxed(),
             warp: config.warp.boxed(),
             strain: config.strain.boxed(),
-            settings: Settings { estimator: config.estimator, ..Settings::new(object) },
+            settings: Settings {
+                estimator: config.estimator,
+                ..Settings::new(object)
+            },
         })
     }
 

@@ -1,8 +1,9 @@
 //! The first stage: one frame to contact, force, centroid and radius.
 use super::error::PipelineError;
 use crate::force::{
-    BoundingBox, CalibrationOptions, CalibrationPair, Estimate, ForceError, ForceMeasurement, ForceMeter,
-    ForceOptions, ForceWorkspace, LinearCalibration, Polarity, ReferenceFrame, StopReason, StressCalibration,
+    BoundingBox, CalibrationOptions, CalibrationPair, Estimate, ForceError, ForceMeasurement,
+    ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, Polarity, ReferenceFrame,
+    StopReason, StressCalibration,
 };
 use ndarray::{Array2, ArrayView2};
 
@@ -64,8 +65,12 @@ impl ContactReading {
     pub fn mean_stress_pa(&self) -> Option<Estimate<f64>> {
         let (force, radius) = (self.force_n?, self.contact_radius_m);
         let value = force.value / (std::f64::consts::PI * radius.value * radius.value);
-        let relative = (force.standard_error / force.value).hypot(2.0 * radius.standard_error / radius.value);
-        Some(Estimate { value, standard_error: value.abs() * relative })
+        let relative =
+            (force.standard_error / force.value).hypot(2.0 * radius.standard_error / radius.value);
+        Some(Estimate {
+            value,
+            standard_error: value.abs() * relative,
+        })
     }
 
     fn of_light(force: &ForceMeasurement<f64>) -> Option<Self> {
@@ -83,7 +88,9 @@ impl ContactReading {
             out_of_calibration: reading.out_of_range,
             touches_edge: contact.touches_edge,
             other_contacts: contact.other_contacts,
-            converged: force.profile.is_none_or(|p| p.stop == StopReason::Converged),
+            converged: force
+                .profile
+                .is_none_or(|p| p.stop == StopReason::Converged),
         })
     }
 }
@@ -126,13 +133,25 @@ pub struct FrameContact {
 impl FrameContact {
     /// Gives up the saving of the contact's box: the mask is laid out over the whole frame.
     pub(super) fn widened(&self, (rows, columns): (usize, usize)) -> Self {
-        let Some(region) = self.region else { return self.clone() };
+        let Some(region) = self.region else {
+            return self.clone();
+        };
         let mut mask = Array2::from_elem((rows, columns), false);
         for ((row, column), inside) in self.mask.indexed_iter() {
             mask[[region.row_start + row, region.column_start + column]] = *inside;
         }
-        let region = Some(BoundingBox { row_start: 0, row_end: rows, column_start: 0, column_end: columns });
-        Self { reading: self.reading, region, mask, background_step_grey: self.background_step_grey }
+        let region = Some(BoundingBox {
+            row_start: 0,
+            row_end: rows,
+            column_start: 0,
+            column_end: columns,
+        });
+        Self {
+            reading: self.reading,
+            region,
+            mask,
+            background_step_grey: self.background_step_grey,
+        }
     }
 }
 
@@ -220,7 +239,10 @@ impl LightContact {
     ///
     /// # Errors
     /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`].
-    pub fn from_pairs(pairs: &[CalibrationPair<f64>], pixel_size_m: [f64; 2]) -> Result<Self, PipelineError> {
+    pub fn from_pairs(
+        pairs: &[CalibrationPair<f64>],
+        pixel_size_m: [f64; 2],
+    ) -> Result<Self, PipelineError> {
         let calibration = LinearCalibration::fit(pairs, &CalibrationOptions::default())
             .map_err(PipelineError::Calibration)?;
         Self::new(calibration, pixel_size_m, &ForceOptions::default())
@@ -238,7 +260,12 @@ impl<C: StressCalibration<f64>> LightContact<C> {
         options: &ForceOptions,
     ) -> Result<Self, PipelineError> {
         let meter = ForceMeter::new(pixel_size_m, options).map_err(PipelineError::Sensor)?;
-        Ok(Self { meter, calibration, pixel_size_m, polarity: options.contact.polarity })
+        Ok(Self {
+            meter,
+            calibration,
+            pixel_size_m,
+            polarity: options.contact.polarity,
+        })
     }
 
     /// The calibration.
@@ -256,18 +283,24 @@ impl<C: StressCalibration<f64>> ContactStage for LightContact<C> {
         _gauge_n: Option<f64>,
         contact: &mut FrameContact,
     ) -> Result<(), ForceError> {
-        let force = self.meter.measure_with(workspace, frame, reference, &self.calibration)?;
+        let force = self
+            .meter
+            .measure_with(workspace, frame, reference, &self.calibration)?;
         contact.reading = ContactReading::of_light(&force);
         contact.region = None;
         let pixels = frame.len().max(1) as f64;
-        contact.background_step_grey =
-            force.contact.is_none().then_some(force.statistics.sum as f64 / pixels);
+        contact.background_step_grey = force
+            .contact
+            .is_none()
+            .then_some(force.statistics.sum as f64 / pixels);
         if contact.reading.is_some()
             && let Some((region, mask)) = workspace.mask()
         {
             contact.region = Some(region);
             resize(&mut contact.mask, mask.dim());
-            contact.mask.zip_mut_with(&mask, |to, from| *to = *from == 1);
+            contact
+                .mask
+                .zip_mut_with(&mask, |to, from| *to = *from == 1);
         }
         Ok(())
     }

@@ -47,7 +47,11 @@ impl DarkContact {
     /// [`PipelineError::DepthTable`].
     pub fn new(table: &[(f64, f64)], pixel_size_m: [f64; 2]) -> Result<Self, PipelineError> {
         let depth_table = Self::depth_table(table)?;
-        Ok(Self { pixel_size_m, threshold_grey: Self::DEFAULT_THRESHOLD_GREY, table: depth_table })
+        Ok(Self {
+            pixel_size_m,
+            threshold_grey: Self::DEFAULT_THRESHOLD_GREY,
+            table: depth_table,
+        })
     }
 
     /// The table as a reconstruction, zero where there is no contact.
@@ -55,7 +59,11 @@ impl DarkContact {
     /// # Errors
     /// [`PipelineError::DepthTable`].
     pub fn depth_table(table: &[(f64, f64)]) -> Result<DepthTable<f64>, PipelineError> {
-        let kept: Vec<_> = table.iter().copied().filter(|(d, z)| *d >= 0.0 && *z >= 0.0).collect();
+        let kept: Vec<_> = table
+            .iter()
+            .copied()
+            .filter(|(d, z)| *d >= 0.0 && *z >= 0.0)
+            .collect();
         DepthTable::new(&kept)
             .and_then(|t| t.with_contact_threshold(Self::DEFAULT_THRESHOLD_GREY))
             .map_err(PipelineError::DepthTable)
@@ -73,7 +81,10 @@ impl ContactStage for DarkContact {
     ) -> Result<(), ForceError> {
         let image = reference.image();
         if frame.dim() != image.dim() {
-            return Err(ForceError::SizeMismatch { expected: image.dim(), found: frame.dim() });
+            return Err(ForceError::SizeMismatch {
+                expected: image.dim(),
+                found: frame.dim(),
+            });
         }
         let darkness = |at: [usize; 2]| f64::from(image[at]) - f64::from(frame[at]);
         let patch = largest_patch(frame.dim(), |at| darkness(at) > self.threshold_grey);
@@ -88,7 +99,11 @@ impl ContactStage for DarkContact {
             contact.mask[[row - region.row_start, column - region.column_start]] = true;
         }
         contact.region = Some(region);
-        let peak = patch.pixels.iter().map(|&at| darkness(at)).fold(0.0, f64::max);
+        let peak = patch
+            .pixels
+            .iter()
+            .map(|&at| darkness(at))
+            .fold(0.0, f64::max);
         let saturated = patch.pixels.iter().filter(|&&at| frame[at] == 0).count();
         contact.reading = Some(self.reading(&patch, frame.dim(), gauge_n, peak, saturated));
         Ok(())
@@ -123,12 +138,24 @@ impl DarkContact {
         let (step, _) = self.table.depth(peak - 1.0);
         let b = patch.region;
         ContactReading {
-            force_n: gauge_n.map(|value| Estimate { value, standard_error: 0.0 }),
+            force_n: gauge_n.map(|value| Estimate {
+                value,
+                standard_error: 0.0,
+            }),
             force_noise_n: 0.0,
             force_calibration_n: 0.0,
-            contact_radius_m: Estimate { value: radius_px * pixel, standard_error: 0.5 * pixel },
-            indentation_m: Some(Estimate { value: depth, standard_error: (depth - step).abs() }),
-            centroid_px: [mean(1), mean(0)].map(|value| Estimate { value, standard_error: centroid_error }),
+            contact_radius_m: Estimate {
+                value: radius_px * pixel,
+                standard_error: 0.5 * pixel,
+            },
+            indentation_m: Some(Estimate {
+                value: depth,
+                standard_error: (depth - step).abs(),
+            }),
+            centroid_px: [mean(1), mean(0)].map(|value| Estimate {
+                value,
+                standard_error: centroid_error,
+            }),
             area_m2: n * hx * hy,
             peak_grey: peak,
             saturated_share: saturated as f64 / n,
@@ -151,7 +178,10 @@ struct Patch {
 }
 
 /// The largest set of pixels inside, connected by their sides; `None` where no pixel is inside. O(pixels).
-fn largest_patch((rows, columns): (usize, usize), inside: impl Fn([usize; 2]) -> bool) -> Option<Patch> {
+fn largest_patch(
+    (rows, columns): (usize, usize),
+    inside: impl Fn([usize; 2]) -> bool,
+) -> Option<Patch> {
     let mut open = Array2::from_shape_fn((rows, columns), |(r, c)| inside([r, c]));
     let mut largest: Vec<[usize; 2]> = Vec::new();
     for start in 0..rows * columns {
@@ -163,7 +193,12 @@ fn largest_patch((rows, columns): (usize, usize), inside: impl Fn([usize; 2]) ->
         let mut next = 0;
         while let Some(&[r, c]) = patch.get(next) {
             next += 1;
-            let beside = [[r.wrapping_sub(1), c], [r + 1, c], [r, c.wrapping_sub(1)], [r, c + 1]];
+            let beside = [
+                [r.wrapping_sub(1), c],
+                [r + 1, c],
+                [r, c.wrapping_sub(1)],
+                [r, c + 1],
+            ];
             for at in beside {
                 if open.get(at).copied().unwrap_or(false) {
                     open[at] = false;
@@ -181,8 +216,16 @@ fn largest_patch((rows, columns): (usize, usize), inside: impl Fn([usize; 2]) ->
     };
     let (row_start, row_last) = range(0)?;
     let (column_start, column_last) = range(1)?;
-    let region = BoundingBox { row_start, row_end: row_last + 1, column_start, column_end: column_last + 1 };
-    Some(Patch { pixels: largest, region })
+    let region = BoundingBox {
+        row_start,
+        row_end: row_last + 1,
+        column_start,
+        column_end: column_last + 1,
+    };
+    Some(Patch {
+        pixels: largest,
+        region,
+    })
 }
 
 #[cfg(test)]

@@ -28,7 +28,11 @@ pub(super) fn estimate(e: Estimate<f64>, scale: f64) -> String {
 impl Display for ModulusResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let k = |v: f64| v * 1e-3;
-        write!(f, "{} kPa", with_error(self.value, self.standard_error, 1e-3))?;
+        write!(
+            f,
+            "{} kPa",
+            with_error(self.value, self.standard_error, 1e-3)
+        )?;
         match self.interval_95 {
             (low, Some(high)) => write!(f, "   95 %: {:.2} to {:.2} kPa", k(low), k(high))?,
             (low, None) => write!(f, "   95 %: above {:.2} kPa", k(low))?,
@@ -75,7 +79,14 @@ impl Display for MatchResult {
 impl Display for StrainResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let e = |i: usize, j: usize| with_error(self.mean[i][j], self.standard_error[i][j], 1.0);
-        write!(f, "{}: e_xx {}  e_yy {}  e_zz {}", self.measure, e(0, 0), e(1, 1), e(2, 2))
+        write!(
+            f,
+            "{}: e_xx {}  e_yy {}  e_zz {}",
+            self.measure,
+            e(0, 0),
+            e(1, 1),
+            e(2, 2)
+        )
     }
 }
 

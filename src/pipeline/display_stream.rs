@@ -16,16 +16,21 @@ impl Display for ContactReading {
             Some(force) => write!(f, "force {} N", estimate(force, 1.0))?,
             None => f.write_str("force unknown")?,
         }
-        write!(f, "   contact radius {} mm", estimate(self.contact_radius_m, 1e3))?;
+        write!(
+            f,
+            "   contact radius {} mm",
+            estimate(self.contact_radius_m, 1e3)
+        )?;
         if let Some(depth) = self.indentation_m {
             write!(f, "   indentation {} mm", estimate(depth, 1e3))?;
         }
         let [x, y] = self.centroid_px.map(|c| estimate(c, 1.0));
         write!(f, "   centroid ({x}, {y}) px")?;
-        self.flags(0).try_for_each(|flag| match flag.to_string().strip_prefix("frame 1: ") {
-            Some(caution) => write!(f, "   [{caution}]"),
-            None => write!(f, "   [{flag}]"),
-        })
+        self.flags(0)
+            .try_for_each(|flag| match flag.to_string().strip_prefix("frame 1: ") {
+                Some(caution) => write!(f, "   [{caution}]"),
+                None => write!(f, "   [{flag}]"),
+            })
     }
 }
 
@@ -40,15 +45,26 @@ impl Display for Update {
             let [x, y] = shear.force_n.map(|e| estimate(e, 1.0));
             write!(f, "   shear ({x}, {y}) N")?;
         }
-        if self.repeated { f.write_str("   (equals the frame before)") } else { Ok(()) }
+        if self.repeated {
+            f.write_str("   (equals the frame before)")
+        } else {
+            Ok(())
+        }
     }
 }
 
 impl Display for DriftWatch {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { frames, last_grey, greatest_grey } = self;
+        let Self {
+            frames,
+            last_grey,
+            greatest_grey,
+        } = self;
         let s = if *frames == 1 { "" } else { "s" };
-        write!(f, "light {last_grey:+.2} grey levels from the reference, {greatest_grey:+.2} at most, in ")?;
+        write!(
+            f,
+            "light {last_grey:+.2} grey levels from the reference, {greatest_grey:+.2} at most, in "
+        )?;
         write!(f, "{frames} frame{s} without contact")
     }
 }
@@ -56,8 +72,15 @@ impl Display for DriftWatch {
 impl Display for BallFit {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let [x, y] = self.centre_m.map(|v| v * 1e3);
-        write!(f, "ball of radius {:.3} mm at ({x:.3}, {y:.3}) mm", self.radius_m * 1e3)?;
-        let (a, error) = (self.contact_radius_m * 1e3, self.mean_absolute_error_m * 1e6);
+        write!(
+            f,
+            "ball of radius {:.3} mm at ({x:.3}, {y:.3}) mm",
+            self.radius_m * 1e3
+        )?;
+        let (a, error) = (
+            self.contact_radius_m * 1e3,
+            self.mean_absolute_error_m * 1e6,
+        );
         write!(
             f,
             "   contact radius {a:.3} mm   mean absolute error {error:.1} µm over {} pixels",
@@ -72,7 +95,11 @@ impl Display for Skip {
         if let Some(frame) = self.frame {
             write!(f, " of frame {}", frame + 1)?;
         }
-        let what = if self.stage == Stage::Match { "iterations" } else { "pixels" };
+        let what = if self.stage == Stage::Match {
+            "iterations"
+        } else {
+            "pixels"
+        };
         write!(f, ": {} ({} {what} saved)", self.reason, self.saved)
     }
 }
@@ -80,7 +107,12 @@ impl Display for Skip {
 impl Display for Work {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let s = if self.runs == 1 { "" } else { "s" };
-        write!(f, "{:.3} ms in {} run{s}", self.time.as_secs_f64() * 1e3, self.runs)
+        write!(
+            f,
+            "{:.3} ms in {} run{s}",
+            self.time.as_secs_f64() * 1e3,
+            self.runs
+        )
     }
 }
 
@@ -89,21 +121,36 @@ impl Display for FrameTruth {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let [x, y] = self.centroid_px;
         let (a, depth) = (self.contact_radius_m * 1e3, self.indentation_m * 1e3);
-        write!(f, "force {:.4} N   contact radius {a:.4} mm   a/R {:.3}", self.force_n, self.contact_ratio)?;
-        write!(f, "   indentation {depth:.4} mm   centroid ({x:.2}, {y:.2}) px")
+        write!(
+            f,
+            "force {:.4} N   contact radius {a:.4} mm   a/R {:.3}",
+            self.force_n, self.contact_ratio
+        )?;
+        write!(
+            f,
+            "   indentation {depth:.4} mm   centroid ({x:.2}, {y:.2}) px"
+        )
     }
 }
 
 #[cfg(feature = "simulate")]
 impl Display for Truth {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "Young's modulus  {} kPa", with_error(self.youngs_modulus_pa, 0.0, 1e-3))?;
+        write!(
+            f,
+            "Young's modulus  {} kPa",
+            with_error(self.youngs_modulus_pa, 0.0, 1e-3)
+        )?;
         for (i, frame) in self.frames.iter().enumerate() {
             write!(f, "\nframe {:<10} {frame}", i + 1)?;
         }
         match self.strain {
             Some(e) => {
-                write!(f, "\nstrain           e_xx {:.4}  e_yy {:.4}  e_zz {:.4}", e[0][0], e[1][1], e[2][2])
+                write!(
+                    f,
+                    "\nstrain           e_xx {:.4}  e_yy {:.4}  e_zz {:.4}",
+                    e[0][0], e[1][1], e[2][2]
+                )
             }
             None => Ok(()),
         }

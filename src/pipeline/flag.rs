@@ -25,7 +25,11 @@ use std::fmt;
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "kind", rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "kind", rename_all = "snake_case")
+)]
 #[non_exhaustive]
 pub enum Flag {
     /// Some of the contact's pixels are saturated: force and radius are low.
@@ -100,12 +104,16 @@ impl ContactReading {
     pub fn flags(&self, frame: usize) -> impl Iterator<Item = Flag> {
         let share = self.saturated_share;
         let saturated = (share > 0.0).then_some(Flag::Saturated { frame, share });
-        let outside = self.out_of_calibration.then_some(Flag::OutOfCalibration { frame });
+        let outside = self
+            .out_of_calibration
+            .then_some(Flag::OutOfCalibration { frame });
         let edge = self.touches_edge.then_some(Flag::TouchesEdge { frame });
         let others = self.other_contacts;
         let several = (others > 0).then_some(Flag::SeveralContacts { frame, others });
         let fit = (!self.converged).then_some(Flag::ProfileNotConverged { frame });
-        [saturated, outside, edge, several, fit].into_iter().flatten()
+        [saturated, outside, edge, several, fit]
+            .into_iter()
+            .flatten()
     }
 }
 
@@ -113,27 +121,55 @@ impl fmt::Display for Flag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Saturated { frame, share } => {
-                write!(f, "frame {}: {:.2} % of the contact is saturated", frame + 1, 100.0 * share)
+                write!(
+                    f,
+                    "frame {}: {:.2} % of the contact is saturated",
+                    frame + 1,
+                    100.0 * share
+                )
             }
             Self::OutOfCalibration { frame } => {
-                write!(f, "frame {}: outside the range of the calibration", frame + 1)
+                write!(
+                    f,
+                    "frame {}: outside the range of the calibration",
+                    frame + 1
+                )
             }
             Self::TouchesEdge { frame } => {
-                write!(f, "frame {}: the contact reaches the frame's edge", frame + 1)
+                write!(
+                    f,
+                    "frame {}: the contact reaches the frame's edge",
+                    frame + 1
+                )
             }
             Self::SeveralContacts { frame, others: 1 } => {
-                write!(f, "frame {}: another contact beside the one measured", frame + 1)
+                write!(
+                    f,
+                    "frame {}: another contact beside the one measured",
+                    frame + 1
+                )
             }
             Self::SeveralContacts { frame, others } => {
-                write!(f, "frame {}: {others} other contacts beside the one measured", frame + 1)
+                write!(
+                    f,
+                    "frame {}: {others} other contacts beside the one measured",
+                    frame + 1
+                )
             }
             Self::LightDrifted { grey } => {
-                write!(f, "the light has drifted by {grey:+.2} grey levels since the reference was taken")
+                write!(
+                    f,
+                    "the light has drifted by {grey:+.2} grey levels since the reference was taken"
+                )
             }
             Self::ProfileNotConverged { frame } => {
                 write!(f, "frame {}: the profile's fit did not converge", frame + 1)
             }
-            Self::GaugeDisagrees { frame, measured_n, gauge_n } => {
+            Self::GaugeDisagrees {
+                frame,
+                measured_n,
+                gauge_n,
+            } => {
                 write!(
                     f,
                     "frame {}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N",

@@ -52,8 +52,9 @@ pub use batch::contacts;
 pub use binning::Binning;
 pub use boxed::{BoxedPipeline, StagesConfig};
 pub use choice::{
-    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, EstimatorChoice, FitWarp,
-    MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, UnknownStage, WarpChoice,
+    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, EstimatorChoice,
+    FitWarp, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, UnknownStage,
+    WarpChoice,
 };
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;

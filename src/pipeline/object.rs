@@ -5,8 +5,8 @@ use super::settings::Settings;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::Waveguide;
 use crate::elasticity::modulus::{
-    Estimate, Evidence, FlatPunch, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio,
-    StrainReference, StressStrainRegression,
+    Estimate, Evidence, FlatPunch, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator,
+    PaperRatio, StrainReference, StressStrainRegression,
 };
 
 /// The pressed object, as far as it is known.
@@ -21,7 +21,11 @@ use crate::elasticity::modulus::{
 /// assert_eq!(ball, Object::Sphere { radius_m: 3e-3, poisson_ratio: Object::DEFAULT_POISSON_RATIO });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(tag = "shape", rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "shape", rename_all = "snake_case")
+)]
 #[non_exhaustive]
 pub enum Object {
     /// A ball.
@@ -51,12 +55,19 @@ impl Object {
 
     /// A rubber ball of this radius in metres.
     pub fn sphere(radius_m: f64) -> Self {
-        Self::Sphere { radius_m, poisson_ratio: Self::DEFAULT_POISSON_RATIO }
+        Self::Sphere {
+            radius_m,
+            poisson_ratio: Self::DEFAULT_POISSON_RATIO,
+        }
     }
 
     /// The radius of a ball.
     pub fn sphere_radius_m(&self) -> Option<f64> {
-        if let Self::Sphere { radius_m, .. } = self { Some(*radius_m) } else { None }
+        if let Self::Sphere { radius_m, .. } = self {
+            Some(*radius_m)
+        } else {
+            None
+        }
     }
 
     /// Whether the estimator that fits this object best looks at strain; a ball's looks at the contact alone.
@@ -92,20 +103,32 @@ pub(crate) fn split_errors(
     settings: &Settings,
 ) -> (Vec<LoadState<f64>>, SharedErrors) {
     let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
-    let common = readings.clone().map(|r| relative(&r)).fold(f64::INFINITY, f64::min);
+    let common = readings
+        .clone()
+        .map(|r| relative(&r))
+        .fold(f64::INFINITY, f64::min);
     let common = if common.is_finite() { common } else { 0.0 };
     let load = |r: LoadReading| {
-        let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2)).max(0.0).sqrt();
-        LoadState::new(Estimate::new(r.force_n, r.noise_n.hypot(rest))).with_contact_radius(r.radius_m)
+        let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2))
+            .max(0.0)
+            .sqrt();
+        LoadState::new(Estimate::new(r.force_n, r.noise_n.hypot(rest)))
+            .with_contact_radius(r.radius_m)
     };
-    let shared =
-        SharedErrors { force: common.hypot(settings.force_scale_error), length: settings.length_scale_error };
+    let shared = SharedErrors {
+        force: common.hypot(settings.force_scale_error),
+        length: settings.length_scale_error,
+    };
     (readings.map(load).collect(), shared)
 }
 
 /// The contact radius with what no profile can know better: a hundredth of a pixel, by which a rim of pixels, blur and the
 /// contact's true shape differ from the fitted profile.
-pub(crate) fn radius_with_floor(value: f64, standard_error: f64, pixel_size_m: [f64; 2]) -> Estimate<f64> {
+pub(crate) fn radius_with_floor(
+    value: f64,
+    standard_error: f64,
+    pixel_size_m: [f64; 2],
+) -> Estimate<f64> {
     let floor = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
     Estimate::new(value, standard_error.hypot(floor))
 }
@@ -118,23 +141,42 @@ pub(crate) fn chosen_estimate(
     loads: &[LoadState<f64>],
     shared: SharedErrors,
 ) -> Result<ModulusEstimate<f64>, PipelineError> {
-    let (object, waveguide, choice) = (settings.object, settings.waveguide.as_ref(), settings.estimator);
+    let (object, waveguide, choice) = (
+        settings.object,
+        settings.waveguide.as_ref(),
+        settings.estimator,
+    );
     let attempt = match (choice, object) {
-        (EstimatorChoice::Best | EstimatorChoice::Sphere, Object::Sphere { radius_m, poisson_ratio }) => {
-            hertz(radius_m, poisson_ratio, waveguide, shared, Evidence::All).and_then(|e| e.estimate(loads))
-        }
-        (EstimatorChoice::FlatPunch, Object::FlatPunch { radius_m, poisson_ratio }) => {
-            flat_punch(radius_m, poisson_ratio, waveguide, shared).and_then(|e| e.estimate(loads))
-        }
+        (
+            EstimatorChoice::Best | EstimatorChoice::Sphere,
+            Object::Sphere {
+                radius_m,
+                poisson_ratio,
+            },
+        ) => hertz(radius_m, poisson_ratio, waveguide, shared, Evidence::All)
+            .and_then(|e| e.estimate(loads)),
+        (
+            EstimatorChoice::FlatPunch,
+            Object::FlatPunch {
+                radius_m,
+                poisson_ratio,
+            },
+        ) => flat_punch(radius_m, poisson_ratio, waveguide, shared).and_then(|e| e.estimate(loads)),
         (EstimatorChoice::Best | EstimatorChoice::PaperRatio, _) => {
             paper_ratio(&object, shared).and_then(|e| e.estimate(loads))
         }
         (EstimatorChoice::Regression, _) => regression(shared).and_then(|e| e.estimate(loads)),
         (EstimatorChoice::Sphere, _) => {
-            return Err(PipelineError::WrongEstimator { estimator: choice, needs: "a ball" });
+            return Err(PipelineError::WrongEstimator {
+                estimator: choice,
+                needs: "a ball",
+            });
         }
         (EstimatorChoice::FlatPunch, _) => {
-            return Err(PipelineError::WrongEstimator { estimator: choice, needs: "a flat punch" });
+            return Err(PipelineError::WrongEstimator {
+                estimator: choice,
+                needs: "a flat punch",
+            });
         }
     };
     attempt.map_err(PipelineError::Modulus)
@@ -148,13 +190,20 @@ pub(crate) fn all_estimates(
     loads: &[LoadState<f64>],
     shared: SharedErrors,
 ) -> Vec<ModulusEstimate<f64>> {
-    let mut attempts: Vec<Attempt> = vec![paper_ratio(object, shared).and_then(|e| e.estimate(loads))];
+    let mut attempts: Vec<Attempt> =
+        vec![paper_ratio(object, shared).and_then(|e| e.estimate(loads))];
     match *object {
-        Object::Sphere { radius_m, poisson_ratio } => {
+        Object::Sphere {
+            radius_m,
+            poisson_ratio,
+        } => {
             let both = hertz(radius_m, poisson_ratio, waveguide, shared, Evidence::All);
             attempts.push(both.and_then(|e| e.estimate(loads)));
         }
-        Object::FlatPunch { radius_m, poisson_ratio } => {
+        Object::FlatPunch {
+            radius_m,
+            poisson_ratio,
+        } => {
             let punch = flat_punch(radius_m, poisson_ratio, waveguide, shared);
             attempts.push(punch.and_then(|e| e.estimate(loads)));
         }

@@ -54,7 +54,10 @@ pub(super) fn match_points(
     target: &[Point3<f64>],
 ) -> Result<Matching<f64, 3>, PipelineError> {
     let [from, to] = frames;
-    stages.matcher().match_points(model, target).map_err(|source| PipelineError::Match { from, to, source })
+    stages
+        .matcher()
+        .match_points(model, target)
+        .map_err(|source| PipelineError::Match { from, to, source })
 }
 
 /// As [`match_points`], from where the last match of a series ended.
@@ -83,27 +86,43 @@ pub(super) fn strain(
     grid_m: f64,
 ) -> Result<PairStrain, PipelineError> {
     let [from, to] = frames;
-    let pairs = matching.assignment.iter().enumerate().filter_map(|(i, a)| a.map(|j| (i, j)));
-    let pairs: Vec<_> = pairs.filter(|&(i, _)| matching.confidence[i] > 0.0).collect();
+    let pairs = matching
+        .assignment
+        .iter()
+        .enumerate()
+        .filter_map(|(i, a)| a.map(|j| (i, j)));
+    let pairs: Vec<_> = pairs
+        .filter(|&(i, _)| matching.confidence[i] > 0.0)
+        .collect();
     if pairs.len() < LEAST_MATCHES {
-        return Err(PipelineError::TooFewMatches { from, to, expected: LEAST_MATCHES, found: pairs.len() });
+        return Err(PipelineError::TooFewMatches {
+            from,
+            to,
+            expected: LEAST_MATCHES,
+            found: pairs.len(),
+        });
     }
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let targets: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
     let weights: Vec<_> = pairs.iter().map(|&(i, _)| matching.confidence[i]).collect();
-    let warp = stages.fit_warp(&sources, &targets, &weights).map_err(|source| PipelineError::Warp {
-        from,
-        to,
-        source,
-    })?;
+    let warp = stages
+        .fit_warp(&sources, &targets, &weights)
+        .map_err(|source| PipelineError::Warp { from, to, source })?;
     let mut gradients = vec![Matrix3::zeros(); model.len()];
-    warp.jacobian_into(model, &mut gradients).map_err(|source| PipelineError::Warp { from, to, source })?;
+    warp.jacobian_into(model, &mut gradients)
+        .map_err(|source| PipelineError::Warp { from, to, source })?;
     gradients.iter_mut().for_each(|g| *g -= Matrix3::identity());
     let measure = stages.strain();
     let field = StrainField::from_gradients(&gradients, None, measure)
         .map_err(|source| PipelineError::Strain { from, to, source })?;
     let mut summary = field.summary();
     let noise = mean_strain_error(&sources, &targets, grid_m);
-    summary.standard_error.zip_apply(&noise, |error, noise| *error = error.hypot(noise));
-    Ok(PairStrain { measure: measure.name(), summary, field })
+    summary
+        .standard_error
+        .zip_apply(&noise, |error, noise| *error = error.hypot(noise));
+    Ok(PairStrain {
+        measure: measure.name(),
+        summary,
+        field,
+    })
 }

@@ -19,7 +19,11 @@ use std::time::Duration;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(rename_all = "snake_case")
+)]
 #[non_exhaustive]
 pub enum Stage {
     /// Contact, force, centroid and radius.
@@ -38,8 +42,14 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in order.
-    pub const ALL: [Self; 6] =
-        [Self::Contact, Self::Surface, Self::ControlPoints, Self::Match, Self::Strain, Self::Modulus];
+    pub const ALL: [Self; 6] = [
+        Self::Contact,
+        Self::Surface,
+        Self::ControlPoints,
+        Self::Match,
+        Self::Strain,
+        Self::Modulus,
+    ];
 }
 
 impl fmt::Display for Stage {
@@ -79,7 +89,11 @@ impl fmt::Display for Stage {
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(rename_all = "snake_case")
+)]
 #[non_exhaustive]
 pub enum SkipReason {
     /// Nobody asked for it.
@@ -197,14 +211,28 @@ impl Report {
 
     /// Counts a skip of a stream: those of one kind are one entry, of no frame, with the sum of what was saved.
     pub(crate) fn count_skip(&mut self, stage: Stage, reason: SkipReason, saved: usize) {
-        match self.skips.iter_mut().find(|s| s.stage == stage && s.reason == reason) {
+        match self
+            .skips
+            .iter_mut()
+            .find(|s| s.stage == stage && s.reason == reason)
+        {
             Some(skip) => skip.saved += saved,
-            None => self.skips.push(Skip { stage, frame: None, reason, saved }),
+            None => self.skips.push(Skip {
+                stage,
+                frame: None,
+                reason,
+                saved,
+            }),
         }
     }
 
     pub(crate) fn skipped(&mut self, stage: Stage, frame: usize, reason: SkipReason, saved: usize) {
-        self.skips.push(Skip { stage, frame: Some(frame), reason, saved });
+        self.skips.push(Skip {
+            stage,
+            frame: Some(frame),
+            reason,
+            saved,
+        });
     }
 }
 
@@ -221,7 +249,9 @@ impl fmt::Display for Report {
                 )?;
             }
         }
-        self.skips.iter().try_for_each(|skip| writeln!(f, "  skipped: {skip}"))
+        self.skips
+            .iter()
+            .try_for_each(|skip| writeln!(f, "  skipped: {skip}"))
     }
 }
 
@@ -237,7 +267,11 @@ impl serde::Serialize for Report {
         }
         let line = |stage: Stage| {
             let work = self.work(stage);
-            Line { stage, runs: work.runs, milliseconds: work.time.as_secs_f64() * 1e3 }
+            Line {
+                stage,
+                runs: work.runs,
+                milliseconds: work.time.as_secs_f64() * 1e3,
+            }
         };
         let mut out = serializer.serialize_struct("Report", 2)?;
         out.serialize_field("stages", &Stage::ALL.map(line))?;

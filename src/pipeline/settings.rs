@@ -42,7 +42,11 @@ pub struct Skips {
 
 impl Default for Skips {
     fn default() -> Self {
-        Self { equal_frames: true, outside_contact: true, last_answer: true }
+        Self {
+            equal_frames: true,
+            outside_contact: true,
+            last_answer: true,
+        }
     }
 }
 

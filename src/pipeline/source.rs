@@ -80,17 +80,28 @@ impl ImageFolder {
     ) -> Result<Self, crate::io::ReadError> {
         let folder = folder.as_ref();
         let list = || -> std::io::Result<Vec<_>> {
-            std::fs::read_dir(folder)?.map(|entry| entry.map(|e| e.path())).collect()
+            std::fs::read_dir(folder)?
+                .map(|entry| entry.map(|e| e.path()))
+                .collect()
         };
-        let mut files =
-            list().map_err(|source| crate::io::ReadError::Open { path: folder.into(), source })?;
+        let mut files = list().map_err(|source| crate::io::ReadError::Open {
+            path: folder.into(),
+            source,
+        })?;
         let is_image = |path: &std::path::PathBuf| {
-            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+            let extension = path
+                .extension()
+                .and_then(|e| e.to_str())
+                .unwrap_or_default();
             ["png", "pgm", "jpg", "jpeg"].contains(&extension.to_ascii_lowercase().as_str())
         };
         files.retain(is_image);
         files.sort();
-        Ok(Self { files: files.into_iter(), period_s: 1.0 / frame_rate_hz, next_s: 0.0 })
+        Ok(Self {
+            files: files.into_iter(),
+            period_s: 1.0 / frame_rate_hz,
+            next_s: 0.0,
+        })
     }
 }
 
@@ -99,7 +110,9 @@ impl FrameSource for ImageFolder {
     type Error = crate::io::ReadError;
 
     fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error> {
-        let Some(path) = self.files.next() else { return Ok(None) };
+        let Some(path) = self.files.next() else {
+            return Ok(None);
+        };
         *frame = crate::io::read_grey_image(path)?.to_u8();
         let time_s = self.next_s;
         self.next_s += self.period_s;

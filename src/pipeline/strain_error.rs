@@ -21,19 +21,32 @@ pub(super) fn mean_strain_error(
     let spread: Matrix3<f64> = s.iter().map(|d| d * d.transpose()).sum();
     // What the points do not span they know nothing of: a little of their size keeps the inverse finite.
     let inverse = (spread + Matrix3::identity() * (1e-12 * spread.trace())).try_inverse();
-    let Some(inverse) = inverse else { return Matrix3::zeros() };
-    let slope = t.iter().zip(&s).map(|(t, d)| t * d.transpose()).sum::<Matrix3<f64>>() * inverse;
+    let Some(inverse) = inverse else {
+        return Matrix3::zeros();
+    };
+    let slope = t
+        .iter()
+        .zip(&s)
+        .map(|(t, d)| t * d.transpose())
+        .sum::<Matrix3<f64>>()
+        * inverse;
     let gradient = clustered(&s, &t, &slope, &inverse);
     let along = |k: usize| slope.column(k).norm();
     let edge = EDGE_PX * grid_m * (from.recip() - to.recip()).abs();
-    let residual: Vector3<f64> =
-        s.iter().zip(&t).map(|(d, t)| t - slope * d).map(|r| r.component_mul(&r)).sum();
+    let residual: Vector3<f64> = s
+        .iter()
+        .zip(&t)
+        .map(|(d, t)| t - slope * d)
+        .map(|r| r.component_mul(&r))
+        .sum();
     // Both surfaces have the same errors, in the units of the first.
     let dilution = |k: usize| residual[k] * inverse[(k, k)] / (1.0 + along(k).powi(2));
     Matrix3::from_fn(|j, k| {
         if j == k {
             let square = along(j).powi(2);
-            (along(j) * gradient[(j, j)]).hypot(square * edge).hypot(square * dilution(j))
+            (along(j) * gradient[(j, j)])
+                .hypot(square * edge)
+                .hypot(square * dilution(j))
         } else {
             0.5 * (along(j) * gradient[(j, k)]).hypot(along(k) * gradient[(k, j)])
         }
@@ -58,7 +71,11 @@ fn clustered(
 ) -> Matrix3<f64> {
     let mut variance = Matrix3::zeros();
     for (s, t) in s.chunks(RUN).zip(t.chunks(RUN)) {
-        let sum: Matrix3<f64> = s.iter().zip(t).map(|(d, t)| (t - slope * d) * d.transpose()).sum();
+        let sum: Matrix3<f64> = s
+            .iter()
+            .zip(t)
+            .map(|(d, t)| (t - slope * d) * d.transpose())
+            .sum();
         let share = sum * inverse;
         variance += share.component_mul(&share);
     }
@@ -91,7 +108,8 @@ mod tests {
         // What is added to keep the inverse finite, 1e-12 of the trace, and rounding.
         assert!(mean_strain_error(&sources, &targets, 0.0).amax() < 1e-10);
         let edge = mean_strain_error(&sources, &targets, 0.1);
-        let disc = (2.0 * sources.iter().map(|p| p.x * p.x + p.y * p.y).sum::<f64>() / 200.0).sqrt();
+        let disc =
+            (2.0 * sources.iter().map(|p| p.x * p.x + p.y * p.y).sum::<f64>() / 200.0).sqrt();
         let expected = 1.44 * EDGE_PX * 0.1 * (1.0 - 1.0 / 1.2) / disc;
         // The disc's centroid is not quite the origin.
         assert!((edge[(2, 2)] / expected - 1.0).abs() < 1e-3, "{edge}");
@@ -104,8 +122,11 @@ mod tests {
         let (mut told, mut true_square, trials) = (0.0, 0.0, 200);
         for trial in 0..trials {
             let off = |i: usize| 0.02 * wave(i / RUN + 1000 * trial);
-            let targets: Vec<_> =
-                sources.iter().enumerate().map(|(i, p)| Point3::new(p.x, p.y, 1.2 * p.z + off(i))).collect();
+            let targets: Vec<_> = sources
+                .iter()
+                .enumerate()
+                .map(|(i, p)| Point3::new(p.x, p.y, 1.2 * p.z + off(i)))
+                .collect();
             let [(_, s), (_, t)] = [&sources, &targets].map(|points| centred(points));
             let spread: Matrix3<f64> = s.iter().map(|d| d * d.transpose()).sum();
             let outer: Matrix3<f64> = t.iter().zip(&s).map(|(t, d)| t * d.transpose()).sum();
@@ -121,8 +142,16 @@ mod tests {
     #[test]
     fn points_that_span_no_volume_leave_a_finite_error() {
         let flat: Vec<_> = dome().iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
-        assert!(mean_strain_error(&flat, &flat, 1e-3).iter().all(|v| v.is_finite()));
+        assert!(
+            mean_strain_error(&flat, &flat, 1e-3)
+                .iter()
+                .all(|v| v.is_finite())
+        );
         let one = vec![Point3::origin(); 20];
-        assert!(mean_strain_error(&one, &one, 1e-3).iter().all(|v| v.is_finite()));
+        assert!(
+            mean_strain_error(&one, &one, 1e-3)
+                .iter()
+                .all(|v| v.is_finite())
+        );
     }
 }

@@ -61,7 +61,9 @@ impl WarpModel<f64, 3> for StrainSpline {
             Some(lambda) => Smoothing::Lambda(lambda),
             None => Smoothing::Gcv,
         };
-        FitOptions::new(NegR).smoothing(smoothing).fit(sources, targets, weights)
+        FitOptions::new(NegR)
+            .smoothing(smoothing)
+            .fit(sources, targets, weights)
     }
 }
 
@@ -76,7 +78,9 @@ struct Pairs {
 impl Pairs {
     fn fit(&self, lambda: f64) -> Option<Spline> {
         let model = FitOptions::new(NegR).smoothing(Smoothing::Lambda(lambda));
-        model.fit(&self.sources, &self.targets, Some(&self.weights)).ok()
+        model
+            .fit(&self.sources, &self.targets, Some(&self.weights))
+            .ok()
     }
 
     /// Squared distances from where `spline` puts the sources to the targets, times the weights.
@@ -113,7 +117,11 @@ fn stiffest_as_good(
         scores.push((lambda, mean_with_error(&errors)));
     }
     let &(_, (least, error)) = scores.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    scores.iter().rev().find(|(_, (mean, _))| *mean <= least + error).map(|&(lambda, _)| lambda)
+    scores
+        .iter()
+        .rev()
+        .find(|(_, (mean, _))| *mean <= least + error)
+        .map(|&(lambda, _)| lambda)
 }
 
 /// The pairs, runs of neighbours dealt in turn to two halves.
@@ -132,14 +140,27 @@ fn halves(sources: &[Point3<f64>], targets: &[Point3<f64>], weights: Option<&[f6
 fn mean_radius(points: &[Point3<f64>]) -> f64 {
     let n = points.len() as f64;
     let centroid = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
-    (points.iter().map(|p| (p.coords - centroid).norm_squared()).sum::<f64>() / n).sqrt()
+    (points
+        .iter()
+        .map(|p| (p.coords - centroid).norm_squared())
+        .sum::<f64>()
+        / n)
+        .sqrt()
 }
 
 /// Mean and its standard error.
 fn mean_with_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
-    (mean, values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>().sqrt() / n)
+    (
+        mean,
+        values
+            .iter()
+            .map(|v| (v - mean) * (v - mean))
+            .sum::<f64>()
+            .sqrt()
+            / n,
+    )
 }
 
 #[cfg(test)]
@@ -155,22 +176,37 @@ mod tests {
         };
         let mut sources: Vec<_> = (0..200).map(point).collect();
         let strip = |p: &Point3<f64>| (10.0 * p.y).floor();
-        sources.sort_by(|a, b| (strip(a), a.x).partial_cmp(&(strip(b), b.x)).expect("finite"));
+        sources.sort_by(|a, b| {
+            (strip(a), a.x)
+                .partial_cmp(&(strip(b), b.x))
+                .expect("finite")
+        });
         // Four neighbours have the same error.
-        let wave = |i: usize| 2.0 * (((i / 4) as f64 * 12.9898).sin() * 43_758.545_3).rem_euclid(1.0) - 1.0;
+        let wave = |i: usize| {
+            2.0 * (((i / 4) as f64 * 12.9898).sin() * 43_758.545_3).rem_euclid(1.0) - 1.0
+        };
         let targets = sources.iter().enumerate();
-        let targets = targets.map(|(i, p)| Point3::from(1.2 * p.coords * (1.0 + error * wave(i)))).collect();
+        let targets = targets
+            .map(|(i, p)| Point3::from(1.2 * p.coords * (1.0 + error * wave(i))))
+            .collect();
         (sources, targets)
     }
 
     fn mean_across(warp: &Spline, points: &[Point3<f64>]) -> f64 {
-        points.iter().map(|p| Warp::jacobian(warp, p)[(2, 2)]).sum::<f64>() / points.len() as f64 - 1.0
+        points
+            .iter()
+            .map(|p| Warp::jacobian(warp, p)[(2, 2)])
+            .sum::<f64>()
+            / points.len() as f64
+            - 1.0
     }
 
     #[test]
     fn errors_that_neighbours_share_do_not_spoil_the_strain_across_the_surface() {
         let (sources, targets) = dome(0.03);
-        let stiff = StrainSpline.fit(&sources, &targets, None).expect("a spline");
+        let stiff = StrainSpline
+            .fit(&sources, &targets, None)
+            .expect("a spline");
         let loose = FitOptions::new(NegR).fit(&sources, &targets, None);
         let error = |warp: &Spline| {
             let square = |p| (Warp::jacobian(warp, p)[(2, 2)] - 1.2).powi(2);
@@ -190,23 +226,43 @@ mod tests {
         let targets: Vec<_> = sources.iter().map(bend).collect();
         let error = |warp: &Spline| {
             let inner = sources.iter().filter(|p| p.z > 0.5);
-            inner.map(|p| (Warp::jacobian(warp, p)[(0, 0)] - 1.0 - 0.6 * p.x).abs()).sum::<f64>()
+            inner
+                .map(|p| (Warp::jacobian(warp, p)[(0, 0)] - 1.0 - 0.6 * p.x).abs())
+                .sum::<f64>()
         };
-        let chosen = error(&StrainSpline.fit(&sources, &targets, None).expect("a spline"));
-        let fit = |smoothing| FitOptions::new(NegR).smoothing(smoothing).fit(&sources, &targets, None);
+        let chosen = error(
+            &StrainSpline
+                .fit(&sources, &targets, None)
+                .expect("a spline"),
+        );
+        let fit = |smoothing| {
+            FitOptions::new(NegR)
+                .smoothing(smoothing)
+                .fit(&sources, &targets, None)
+        };
         let [affine, interpolated] = [Smoothing::Lambda(1e9), Smoothing::None]
             .map(|smoothing| error(&fit(smoothing).expect("a spline")));
         // What the gradient of a spline through points of a surface can tell of the bending is told, to a third of the whole.
-        assert!(chosen < interpolated + affine / 3.0, "{chosen}: {interpolated} to {affine}");
+        assert!(
+            chosen < interpolated + affine / 3.0,
+            "{chosen}: {interpolated} to {affine}"
+        );
     }
 
     #[test]
     fn a_scale_of_the_points_changes_no_strain() {
         let (sources, targets) = dome(0.02);
         let millimetres = |v: &[Point3<f64>]| v.iter().map(|p| p * 1e-3).collect::<Vec<_>>();
-        let one = StrainSpline.fit(&sources, &targets, None).expect("a spline");
-        let other = StrainSpline.fit(&millimetres(&sources), &millimetres(&targets), None).expect("a spline");
-        let (a, b) = (mean_across(&one, &sources), mean_across(&other, &millimetres(&sources)));
+        let one = StrainSpline
+            .fit(&sources, &targets, None)
+            .expect("a spline");
+        let other = StrainSpline
+            .fit(&millimetres(&sources), &millimetres(&targets), None)
+            .expect("a spline");
+        let (a, b) = (
+            mean_across(&one, &sources),
+            mean_across(&other, &millimetres(&sources)),
+        );
         // λ scales as the kernel: the same equations, to the rounding of a system of 200.
         assert!((a - b).abs() < 1e-8, "{a} {b}");
     }
@@ -214,10 +270,16 @@ mod tests {
     #[test]
     fn few_or_unusable_pairs_leave_the_choice_to_the_spline() {
         let (sources, targets) = dome(0.01);
-        assert!(StrainSpline.fit(&sources[..20], &targets[..20], None).is_ok());
+        assert!(
+            StrainSpline
+                .fit(&sources[..20], &targets[..20], None)
+                .is_ok()
+        );
         assert!(StrainSpline.fit(&sources, &targets[1..], None).is_err());
         let flat: Vec<_> = sources.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
-        let own = FitOptions::new(NegR).smoothing(Smoothing::Gcv).fit(&flat, &flat, None);
+        let own = FitOptions::new(NegR)
+            .smoothing(Smoothing::Gcv)
+            .fit(&flat, &flat, None);
         assert_eq!(StrainSpline.fit(&flat, &flat, None).is_ok(), own.is_ok());
     }
 }

@@ -67,8 +67,14 @@ impl ContactSurface {
     pub fn origin_m(&self) -> [f64; 2] {
         let side = self.binning as f64;
         let middle = 0.5 * (side - 1.0);
-        let first = [self.region.column_start as f64 + middle, self.region.row_start as f64 + middle];
-        [first[0] * self.pixel_size_m[0] / side, first[1] * self.pixel_size_m[1] / side]
+        let first = [
+            self.region.column_start as f64 + middle,
+            self.region.row_start as f64 + middle,
+        ];
+        [
+            first[0] * self.pixel_size_m[0] / side,
+            first[1] * self.pixel_size_m[1] / side,
+        ]
     }
 }
 
@@ -149,25 +155,47 @@ pub(super) fn reconstruct(
         SurfaceInput::Shading => 1.0 / reading.peak_grey,
         SurfaceInput::Signal => 1.0,
     };
-    let scale = if stages.contact().polarity() == Polarity::Darker { -scale } else { scale };
+    let scale = if stages.contact().polarity() == Polarity::Darker {
+        -scale
+    } else {
+        scale
+    };
     let side = settings.binning.side(pixels, settings.control_points);
     let region = workspace.load(settings, images, contact, (region, scale, side));
-    let pixel_size_m = stages.contact().pixel_size_m().map(|size| size * side as f64);
+    let pixel_size_m = stages
+        .contact()
+        .pixel_size_m()
+        .map(|size| size * side as f64);
     let domain = Domain::new(pixel_size_m)?.with_mask(workspace.mask.view());
     let mut surface = Surface::new();
     let frame = Frame::Real(workspace.signal.view());
-    let sfs = workspace.sfs.get_mut().unwrap_or_else(PoisonError::into_inner);
-    stages.surface().reconstruct_with(sfs, frame, &domain, &mut surface)?;
-    Ok(ContactSurface { surface, region, binning: side, pixel_size_m })
+    let sfs = workspace
+        .sfs
+        .get_mut()
+        .unwrap_or_else(PoisonError::into_inner);
+    stages
+        .surface()
+        .reconstruct_with(sfs, frame, &domain, &mut surface)?;
+    Ok(ContactSurface {
+        surface,
+        region,
+        binning: side,
+        pixel_size_m,
+    })
 }
 
 /// Control points on a surface, in metres from the frame's first pixel.
-pub(super) fn sample(stages: &dyn Stages, surface: &ContactSurface) -> Result<Vec<Point3<f64>>, SfsError> {
+pub(super) fn sample(
+    stages: &dyn Stages,
+    surface: &ContactSurface,
+) -> Result<Vec<Point3<f64>>, SfsError> {
     let (heights, mask) = (&surface.surface.heights, &surface.surface.mask);
     let usable = mask.iter().filter(|m| **m).count();
     let count = stages.settings().control_points.min(usable);
     let size = surface.pixel_size_m;
-    let mut points = stages.sampler().sample(heights.view(), Some(mask.view()), size, count)?;
+    let mut points = stages
+        .sampler()
+        .sample(heights.view(), Some(mask.view()), size, count)?;
     let [x, y] = surface.origin_m();
     for p in &mut points {
         p.x += x;
@@ -201,7 +229,9 @@ fn smooth(image: &mut Array2<f64>, line: &mut Vec<f64>, width: usize) {
 
 /// Means over 2 × half + 1 neighbours.
 fn box_mean(line: &[f64], half: usize, mut set: impl FnMut(usize, f64)) {
-    let Some(last) = line.len().checked_sub(1) else { return };
+    let Some(last) = line.len().checked_sub(1) else {
+        return;
+    };
     let at = |i: isize| line[i.clamp(0, last as isize) as usize];
     let half = half as isize;
     let mut sum: f64 = (-half..=half).map(at).sum();
@@ -227,6 +257,9 @@ mod tests {
         impulse[[10, 10]] = 1.0;
         smooth(&mut impulse, &mut Vec::new(), 5);
         assert!((impulse.sum() - 1.0).abs() < 1e-12);
-        assert!((impulse[[10, 10]] - 0.04).abs() < 1e-12, "(1/5)² in the middle of two passes");
+        assert!(
+            (impulse[[10, 10]] - 0.04).abs() < 1e-12,
+            "(1/5)² in the middle of two passes"
+        );
     }
 }

@@ -6,7 +6,8 @@ use super::typed::Pipeline;
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::force::CalibrationPair;
 use crate::simulate::{
-    Branch, CalibrationOptions, PressOptions, PressScene, PressSimulation, SimulateError, WaveguideLayer,
+    Branch, CalibrationOptions, PressOptions, PressScene, PressSimulation, SimulateError,
+    WaveguideLayer,
 };
 
 /// The truth of one simulated frame.
@@ -94,7 +95,10 @@ impl Trial {
     ///
     /// # Errors
     /// [`SimulateError`] for options that have no meaning.
-    pub fn new(options: PressOptions, calibration: &CalibrationOptions) -> Result<Self, SimulateError> {
+    pub fn new(
+        options: PressOptions,
+        calibration: &CalibrationOptions,
+    ) -> Result<Self, SimulateError> {
         let scene = PressScene::new(options)?;
         let series = scene.calibrate(calibration)?;
         let pair = |p: &crate::simulate::CalibrationPoint| match p.branch {
@@ -103,7 +107,11 @@ impl Trial {
         };
         let pairs = series.points.iter().map(pair).collect();
         let simulation = scene.simulate();
-        Ok(Self { scene, simulation, pairs })
+        Ok(Self {
+            scene,
+            simulation,
+            pairs,
+        })
     }
 
     /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the ball's radius and the
@@ -121,7 +129,10 @@ impl Trial {
         let layers = options.waveguide.layers.iter().map(layer).collect();
         let waveguide = Waveguide::new(layers).map_err(PipelineError::Material)?;
         let ball = options.object;
-        let object = Object::Sphere { radius_m: ball.radius_m, poisson_ratio: ball.material.poisson_ratio };
+        let object = Object::Sphere {
+            radius_m: ball.radius_m,
+            poisson_ratio: ball.material.poisson_ratio,
+        };
         let pipeline = Pipeline::from_pairs(&self.pairs, self.simulation.pixel_size_m, object)?;
         Ok(pipeline.with_waveguide(waveguide))
     }
@@ -150,7 +161,9 @@ impl Trial {
             surface_height_m: t.contact.apparent_height_m(0.0),
         };
         let strain = (truth.len() > 1).then(|| {
-            let e = truth[0].scaling_to(&truth[truth.len() - 1]).green_lagrange_strain();
+            let e = truth[0]
+                .scaling_to(&truth[truth.len() - 1])
+                .green_lagrange_strain();
             std::array::from_fn(|r| std::array::from_fn(|c| e[(r, c)]))
         });
         Truth {

@@ -34,8 +34,14 @@ impl Colour {
     pub const WHITE: Self = Self(255, 255, 255);
 
     /// Colours told apart by people with any colour vision (Okabe & Ito 2008), in the order to take them.
-    pub const CATEGORIES: [Self; 6] =
-        [Self::BLUE, Self::ORANGE, Self::GREEN, Self::RED, Self::PURPLE, Self::SKY];
+    pub const CATEGORIES: [Self; 6] = [
+        Self::BLUE,
+        Self::ORANGE,
+        Self::GREEN,
+        Self::RED,
+        Self::PURPLE,
+        Self::SKY,
+    ];
 }
 
 /// A map from the unit interval to colours.
@@ -81,8 +87,13 @@ const VIRIDIS: [[f64; 3]; 17] = [
     [253., 231., 37.],
 ];
 
-const DIVERGING: [[f64; 3]; 5] =
-    [[33., 102., 172.], [146., 197., 222.], [247., 247., 247.], [244., 165., 130.], [178., 24., 43.]];
+const DIVERGING: [[f64; 3]; 5] = [
+    [33., 102., 172.],
+    [146., 197., 222.],
+    [247., 247., 247.],
+    [244., 165., 130.],
+    [178., 24., 43.],
+];
 
 impl ColorMap {
     /// The colour at `t`, held to [0, 1]; light grey where `t` is NaN.

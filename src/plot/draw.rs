@@ -35,7 +35,11 @@ pub(super) fn rgb(c: Colour) -> RGBColor {
 pub(super) fn draw_panel<'a>(area: &Area<'a>, panel: &Panel) -> Result<(), Fail<'a>> {
     let (width, _) = area.dim_in_pixel();
     let middle = Pos::new(HPos::Center, VPos::Center);
-    area.draw_text(&panel.title, &style(16, BLACK).pos(middle), (width as i32 / 2, 17))?;
+    area.draw_text(
+        &panel.title,
+        &style(16, BLACK).pos(middle),
+        (width as i32 / 2, 17),
+    )?;
     if !panel.text.is_empty() {
         return draw_lines(area, &panel.text);
     }
@@ -47,7 +51,13 @@ pub(super) fn draw_panel<'a>(area: &Area<'a>, panel: &Panel) -> Result<(), Fail<
     }
     if let Some((map, range, text)) = bar {
         let corner = [frame.corner[0] + frame.size[0] + 12, frame.corner[1]];
-        draw_bar(area, &HeatMap::of_bar(map, text), range, corner, frame.size[1])?;
+        draw_bar(
+            area,
+            &HeatMap::of_bar(map, text),
+            range,
+            corner,
+            frame.size[1],
+        )?;
     }
     draw_legend(&mut chart, panel)
 }
@@ -65,11 +75,30 @@ impl Frame {
     fn new(area: &Area<'_>, panel: &Panel, right: i32) -> Self {
         let (width, height) = area.dim_in_pixel();
         let ranges @ [x, y] = panel.ranges();
-        let room = [width as i32 - EDGE - LEFT - right, height as i32 - TOP - BOTTOM].map(|v| v.max(20));
-        let size = if panel.equal_aspect { fit(room, [x[1] - x[0], y[1] - y[0]]) } else { room };
-        let corner = [EDGE + LEFT + (room[0] - size[0]) / 2, TOP + (room[1] - size[1]) / 2];
-        let rest = [width as i32 - corner[0] - size[0], height as i32 - corner[1] - size[1]];
-        Self { corner, size, rest, ranges }
+        let room = [
+            width as i32 - EDGE - LEFT - right,
+            height as i32 - TOP - BOTTOM,
+        ]
+        .map(|v| v.max(20));
+        let size = if panel.equal_aspect {
+            fit(room, [x[1] - x[0], y[1] - y[0]])
+        } else {
+            room
+        };
+        let corner = [
+            EDGE + LEFT + (room[0] - size[0]) / 2,
+            TOP + (room[1] - size[1]) / 2,
+        ];
+        let rest = [
+            width as i32 - corner[0] - size[0],
+            height as i32 - corner[1] - size[1],
+        ];
+        Self {
+            corner,
+            size,
+            rest,
+            ranges,
+        }
     }
 }
 
@@ -94,7 +123,12 @@ fn draw_lines<'a>(area: &Area<'a>, lines: &[String]) -> Result<(), Fail<'a>> {
 fn draw_axes<'c, 'a>(
     area: &'c Area<'a>,
     panel: &Panel,
-    Frame { corner, size, rest, ranges: [x, y] }: &Frame,
+    Frame {
+        corner,
+        size,
+        rest,
+        ranges: [x, y],
+    }: &Frame,
     map: bool,
 ) -> Result<Chart<'c, 'a>, Fail<'a>> {
     let up = if panel.y_down { [y[1], y[0]] } else { *y };

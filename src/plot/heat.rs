@@ -52,13 +52,22 @@ impl HeatMap {
     /// An 8-bit frame in grey, black to white over the whole scale.
     pub fn of_frame(frame: ArrayView2<'_, u8>, pixel_size: [f64; 2]) -> Self {
         let values = frame.mapv(f64::from);
-        Self::of_pixels(values.view(), pixel_size, "grey level").colours(ColorMap::Grey).range([0.0, 255.0])
+        Self::of_pixels(values.view(), pixel_size, "grey level")
+            .colours(ColorMap::Grey)
+            .range([0.0, 255.0])
     }
 
     /// The colours of a bar, from one end to the other.
     pub(super) fn of_bar(map: ColorMap, label: &str) -> Self {
         let values = Array2::from_shape_fn((64, 1), |(i, _)| i as f64 / 63.0);
-        Self { values, x: [0.0; 2], y: [0.0; 2], map, range: [0.0, 1.0], label: label.into() }
+        Self {
+            values,
+            x: [0.0; 2],
+            y: [0.0; 2],
+            map,
+            range: [0.0, 1.0],
+            label: label.into(),
+        }
     }
 
     /// Puts the grid's first pixel centre at `origin` instead of (0, 0).
@@ -102,13 +111,19 @@ impl HeatMap {
 
     fn mean(&self, rows: Range<usize>, columns: Range<usize>) -> f64 {
         let cells = rows.flat_map(|r| columns.clone().map(move |c| self.values[[r, c]]));
-        let (sum, n) = cells.filter(|v| v.is_finite()).fold((0.0, 0), |(s, n), v| (s + v, n + 1));
+        let (sum, n) = cells
+            .filter(|v| v.is_finite())
+            .fold((0.0, 0), |(s, n), v| (s + v, n + 1));
         if n == 0 { f64::NAN } else { sum / f64::from(n) }
     }
 
     fn unit(&self, value: f64) -> f64 {
         let [lo, hi] = self.range;
-        if hi > lo || value.is_nan() { (value - lo) / (hi - lo) } else { 0.5 }
+        if hi > lo || value.is_nan() {
+            (value - lo) / (hi - lo)
+        } else {
+            0.5
+        }
     }
 }
 

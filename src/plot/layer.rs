@@ -113,13 +113,17 @@ impl Layer {
     /// Calls `f` with every position that must be inside the axes.
     pub(super) fn visit(&self, mut f: impl FnMut([f64; 2])) {
         match self {
-            Self::Points { points, .. } | Self::ColouredPoints { points, .. } | Self::Line { points, .. } => {
+            Self::Points { points, .. }
+            | Self::ColouredPoints { points, .. }
+            | Self::Line { points, .. } => {
                 points.iter().for_each(|&p| f(p));
             }
-            Self::ErrorBars { points, errors, .. } => points.iter().zip(errors).for_each(|(p, e)| {
-                f([p[0], p[1] - e]);
-                f([p[0], p[1] + e]);
-            }),
+            Self::ErrorBars { points, errors, .. } => {
+                points.iter().zip(errors).for_each(|(p, e)| {
+                    f([p[0], p[1] - e]);
+                    f([p[0], p[1] + e]);
+                })
+            }
             Self::Segments { pairs, .. } => pairs.iter().flatten().for_each(|&p| f(p)),
             Self::Heat(map) => {
                 f([map.x[0], map.y[0]]);
@@ -132,7 +136,9 @@ impl Layer {
     pub(super) fn bar(&self) -> Option<(ColorMap, [f64; 2], &str)> {
         match self {
             Self::Heat(map) => Some((map.map, map.range, &map.label)),
-            Self::ColouredPoints { values, map, label, .. } => Some((*map, range_of(values.iter()), label)),
+            Self::ColouredPoints {
+                values, map, label, ..
+            } => Some((*map, range_of(values.iter()), label)),
             _ => None,
         }
     }
@@ -141,6 +147,8 @@ impl Layer {
 /// Smallest and largest finite value; (0, 1) where there is none.
 pub(super) fn range_of<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
     let start = [f64::INFINITY, f64::NEG_INFINITY];
-    let [lo, hi] = values.filter(|v| v.is_finite()).fold(start, |[lo, hi], &v| [lo.min(v), hi.max(v)]);
+    let [lo, hi] = values
+        .filter(|v| v.is_finite())
+        .fold(start, |[lo, hi], &v| [lo.min(v), hi.max(v)]);
     if lo > hi { [0.0, 1.0] } else { [lo, hi] }
 }

@@ -37,16 +37,26 @@ const SAMPLE: i32 = 22;
 const LETTER: i32 = 8;
 const LINE: i32 = 18;
 
-pub(super) fn draw_legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, panel: &Panel) -> Result<(), Fail<'a>> {
+pub(super) fn draw_legend<'c, 'a: 'c>(
+    chart: &mut Chart<'c, 'a>,
+    panel: &Panel,
+) -> Result<(), Fail<'a>> {
     let labels: Vec<_> = panel.layers.iter().filter_map(label_of).collect();
     if labels.is_empty() {
         return Ok(());
     }
-    for layer in panel.layers.iter().filter(|layer| label_of(layer).is_some()) {
+    for layer in panel
+        .layers
+        .iter()
+        .filter(|layer| label_of(layer).is_some())
+    {
         draw_entry(chart, layer)?;
     }
     let longest = labels.iter().map(|l| l.chars().count()).max().unwrap_or(0) as i32;
-    let size = [2 * MARGIN + SAMPLE + LETTER * longest, MARGIN + LINE * labels.len() as i32];
+    let size = [
+        2 * MARGIN + SAMPLE + LETTER * longest,
+        MARGIN + LINE * labels.len() as i32,
+    ];
     let position = match panel.legend {
         Legend::Emptiest => emptiest(chart, panel, size),
         Legend::UpperRight => SeriesLabelPosition::UpperRight,
@@ -83,12 +93,19 @@ fn draw_entry<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, layer: &Layer) -> Result<()
         return Ok(());
     };
     let colour = rgb(*colour);
-    let gap = if matches!(layer, Layer::Line { dashed: true, .. }) { 4 } else { 0 };
-    let entry = chart.draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?.label(label.as_str());
+    let gap = if matches!(layer, Layer::Line { dashed: true, .. }) {
+        4
+    } else {
+        0
+    };
+    let entry = chart
+        .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?
+        .label(label.as_str());
     if matches!(layer, Layer::Points { .. }) {
         entry.legend(move |(x, y)| Circle::new((x + 9, y), 4, colour.filled()));
     } else {
-        let piece = move |x0: i32, x1: i32| PathElement::new([(x0, 0), (x1, 0)], colour.stroke_width(2));
+        let piece =
+            move |x0: i32, x1: i32| PathElement::new([(x0, 0), (x1, 0)], colour.stroke_width(2));
         entry.legend(move |at| EmptyElement::at(at) + piece(0, 9 - gap) + piece(9 + gap, 18));
     }
     Ok(())
@@ -100,9 +117,14 @@ fn emptiest(chart: &Chart<'_, '_>, panel: &Panel, size: [i32; 2]) -> SeriesLabel
     let marks = marks(chart, panel);
     let near = |value: i32, edge: i32, room: i32| (value - edge).abs() <= room + 2 * MARGIN;
     let hidden = |right: bool, lower: bool| {
-        let corner =
-            (if right { across.end } else { across.start }, if lower { down.end } else { down.start });
-        marks.iter().filter(|m| near(m.0, corner.0, size[0]) && near(m.1, corner.1, size[1])).count()
+        let corner = (
+            if right { across.end } else { across.start },
+            if lower { down.end } else { down.start },
+        );
+        marks
+            .iter()
+            .filter(|m| near(m.0, corner.0, size[0]) && near(m.1, corner.1, size[1]))
+            .count()
     };
     let corners = [
         (SeriesLabelPosition::UpperRight, hidden(true, false)),

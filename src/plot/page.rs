@@ -63,7 +63,12 @@ pub struct Page {
 impl Page {
     /// An empty page, one column, panels of 560 × 420 pixels.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), panels: Vec::new(), columns: 1, panel_size: (560, 420) }
+        Self {
+            title: title.into(),
+            panels: Vec::new(),
+            columns: 1,
+            panel_size: (560, 420),
+        }
     }
 
     /// Sets the number of columns (at least one).
@@ -93,8 +98,10 @@ impl Page {
     /// [`PlotError::Draw`].
     pub fn to_svg(&self) -> Result<String, PlotError> {
         let mut svg = String::new();
-        self.draw(&mut svg)
-            .map_err(|e| PlotError::Draw { title: self.title.clone(), message: e.to_string() })?;
+        self.draw(&mut svg).map_err(|e| PlotError::Draw {
+            title: self.title.clone(),
+            message: e.to_string(),
+        })?;
         // The back end leaves out the type's first half, which strict readers want.
         Ok(svg.replace("\"data:png;base64,", "\"data:image/png;base64,"))
     }
@@ -111,7 +118,10 @@ impl Page {
             }
             std::fs::write(path, svg)
         };
-        write().map_err(|source| PlotError::Write { path: path.into(), source })
+        write().map_err(|source| PlotError::Write {
+            path: path.into(),
+            source,
+        })
     }
 
     fn draw(&self, svg: &mut String) -> Result<(), Box<dyn std::error::Error + '_>> {
@@ -125,9 +135,17 @@ impl Page {
         let (title, body) = root.split_vertically(head);
         let anchor = Pos::new(HPos::Center, VPos::Center);
         title
-            .draw_text(&self.title, &style(20, BLACK).pos(anchor), (size.0 as i32 / 2, 24))
+            .draw_text(
+                &self.title,
+                &style(20, BLACK).pos(anchor),
+                (size.0 as i32 / 2, 24),
+            )
             .map_err(|e| fail(&e))?;
-        for (area, panel) in body.split_evenly((rows, self.columns)).iter().zip(&self.panels) {
+        for (area, panel) in body
+            .split_evenly((rows, self.columns))
+            .iter()
+            .zip(&self.panels)
+        {
             draw_panel(area, panel).map_err(|e| fail(&e))?;
         }
         root.present().map_err(|e| fail(&e))?;

@@ -41,7 +41,10 @@ pub struct Panel {
 impl Panel {
     /// An empty panel.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), ..Self::default() }
+        Self {
+            title: title.into(),
+            ..Self::default()
+        }
     }
 
     /// Names the x axis; write the unit into it.
@@ -162,7 +165,12 @@ impl Panel {
 
     /// Adds discs.
     #[must_use]
-    pub fn points(self, points: impl IntoIterator<Item = [f64; 2]>, colour: Colour, label: &str) -> Self {
+    pub fn points(
+        self,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        colour: Colour,
+        label: &str,
+    ) -> Self {
         self.marked(points, Marker::Disc, colour, label)
     }
 
@@ -176,7 +184,13 @@ impl Panel {
         label: &str,
     ) -> Self {
         let points = points.into_iter().collect();
-        self.layer(Layer::Points { points, colour, marker, radius: 3.0, label: label.into() })
+        self.layer(Layer::Points {
+            points,
+            colour,
+            marker,
+            radius: 3.0,
+            label: label.into(),
+        })
     }
 
     /// Adds points coloured by a value, with a colour bar.
@@ -199,21 +213,47 @@ impl Panel {
     ) -> Self {
         let (points, values) = (points.into_iter().collect(), values.into_iter().collect());
         let map = ColorMap::Viridis;
-        self.layer(Layer::ColouredPoints { points, values, map, radius: 3.5, label: label.into() })
+        self.layer(Layer::ColouredPoints {
+            points,
+            values,
+            map,
+            radius: 3.5,
+            label: label.into(),
+        })
     }
 
     /// Adds a line.
     #[must_use]
-    pub fn line(self, points: impl IntoIterator<Item = [f64; 2]>, colour: Colour, label: &str) -> Self {
+    pub fn line(
+        self,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        colour: Colour,
+        label: &str,
+    ) -> Self {
         let points = points.into_iter().collect();
-        self.layer(Layer::Line { points, colour, dashed: false, label: label.into() })
+        self.layer(Layer::Line {
+            points,
+            colour,
+            dashed: false,
+            label: label.into(),
+        })
     }
 
     /// Adds a dashed line.
     #[must_use]
-    pub fn dashed(self, points: impl IntoIterator<Item = [f64; 2]>, colour: Colour, label: &str) -> Self {
+    pub fn dashed(
+        self,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        colour: Colour,
+        label: &str,
+    ) -> Self {
         let points = points.into_iter().collect();
-        self.layer(Layer::Line { points, colour, dashed: true, label: label.into() })
+        self.layer(Layer::Line {
+            points,
+            colour,
+            dashed: true,
+            label: label.into(),
+        })
     }
 
     /// Adds vertical error bars of plus and minus `errors`.
@@ -225,14 +265,28 @@ impl Panel {
         colour: Colour,
     ) -> Self {
         let (points, errors) = (points.into_iter().collect(), errors.into_iter().collect());
-        self.layer(Layer::ErrorBars { points, errors, colour })
+        self.layer(Layer::ErrorBars {
+            points,
+            errors,
+            colour,
+        })
     }
 
     /// Adds arrows from the first to the second position of every pair.
     #[must_use]
-    pub fn arrows(self, pairs: impl IntoIterator<Item = [[f64; 2]; 2]>, colour: Colour, label: &str) -> Self {
+    pub fn arrows(
+        self,
+        pairs: impl IntoIterator<Item = [[f64; 2]; 2]>,
+        colour: Colour,
+        label: &str,
+    ) -> Self {
         let pairs = pairs.into_iter().collect();
-        self.layer(Layer::Segments { pairs, colour, arrows: true, label: label.into() })
+        self.layer(Layer::Segments {
+            pairs,
+            colour,
+            arrows: true,
+            label: label.into(),
+        })
     }
 
     /// Adds plain segments, such as the matches between two point sets.
@@ -255,7 +309,12 @@ impl Panel {
         label: &str,
     ) -> Self {
         let pairs = pairs.into_iter().collect();
-        self.layer(Layer::Segments { pairs, colour, arrows: false, label: label.into() })
+        self.layer(Layer::Segments {
+            pairs,
+            colour,
+            arrows: false,
+            label: label.into(),
+        })
     }
 
     /// Adds a heat map and draws the panel like an image.

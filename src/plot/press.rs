@@ -69,7 +69,10 @@ pub fn save_press_pages(
     summary: Vec<String>,
     folder: impl AsRef<Path>,
 ) -> Result<Vec<PathBuf>, PressPlotError> {
-    let mut pages = vec![("frames", frames_page(press)?), ("surfaces", surfaces_page(press)?)];
+    let mut pages = vec![
+        ("frames", frames_page(press)?),
+        ("surfaces", surfaces_page(press)?),
+    ];
     let last = press.frames().saturating_sub(1);
     if last > 0 && press.strain(last).is_ok() {
         pages.push(("matches", matches_page(press, last)?));
@@ -115,17 +118,31 @@ pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
     lines.push(format!("estimator\t{}", modulus.estimator));
     for (i, frame) in measurement.frames.iter().enumerate() {
         let (f, a) = (frame.force_n, frame.contact_radius_m);
-        lines.push(format!("force {}\t{} N", i + 1, with_error(f.value, f.standard_error, 1.0)));
-        lines.push(format!("contact radius {}\t{} mm", i + 1, with_error(a.value, a.standard_error, MM)));
+        lines.push(format!(
+            "force {}\t{} N",
+            i + 1,
+            with_error(f.value, f.standard_error, 1.0)
+        ));
+        lines.push(format!(
+            "contact radius {}\t{} mm",
+            i + 1,
+            with_error(a.value, a.standard_error, MM)
+        ));
         if let Some(ratio) = frame.contact_ratio {
             lines.push(format!("a/R {}\t{ratio:.3}", i + 1));
         }
     }
     if let Some(m) = &measurement.matching {
-        lines.push(format!("matches\t{} of {} control points", m.matched, m.points));
+        lines.push(format!(
+            "matches\t{} of {} control points",
+            m.matched, m.points
+        ));
     }
     if let Some(s) = &measurement.strain {
-        lines.push(format!("mean strain e_zz\t{}", with_error(s.mean[2][2], s.standard_error[2][2], 1.0)));
+        lines.push(format!(
+            "mean strain e_zz\t{}",
+            with_error(s.mean[2][2], s.standard_error[2][2], 1.0)
+        ));
     }
     lines
 }
@@ -149,10 +166,15 @@ fn frames_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
     for frame in 0..press.frames() {
         let title = force_title(press, frame)?;
         let circle = press.contact(frame)?.map(|c| {
-            let [x, y] = [c.centroid_px[0].value * size[0], c.centroid_px[1].value * size[1]];
+            let [x, y] = [
+                c.centroid_px[0].value * size[0],
+                c.centroid_px[1].value * size[1],
+            ];
             circle([x, y], c.contact_radius_m.value * MM)
         });
-        let Some(image) = press.image(frame) else { continue };
+        let Some(image) = press.image(frame) else {
+            continue;
+        };
         let panel = axes(title).heat_map(HeatMap::of_frame(image, size));
         page = page.panel(panel.line(circle.unwrap_or_default(), Colour::ORANGE, "contact radius"));
     }
@@ -161,7 +183,9 @@ fn frames_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
 
 fn circle([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
     let at = |i: u32| f64::from(i) * std::f64::consts::TAU / 120.0;
-    (0..=120).map(|i| [x + radius * at(i).cos(), y + radius * at(i).sin()]).collect()
+    (0..=120)
+        .map(|i| [x + radius * at(i).cos(), y + radius * at(i).sin()])
+        .collect()
 }
 
 /// Heights as maps, and a cut through the middle of each.
@@ -173,18 +197,40 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
         let points = press.control_points(frame)?.to_vec();
         let surface = press.surface(frame)?;
         let (origin, size) = (surface.origin_m(), surface.pixel_size_m.map(|s| s * MM));
-        let masked =
-            |(at, h): ((usize, usize), &f64)| if surface.surface.mask[at] { *h * MM } else { f64::NAN };
+        let masked = |(at, h): ((usize, usize), &f64)| {
+            if surface.surface.mask[at] {
+                *h * MM
+            } else {
+                f64::NAN
+            }
+        };
         let cells: Vec<f64> = surface.surface.heights.indexed_iter().map(masked).collect();
-        let heights = Array2::from_shape_vec(surface.surface.heights.dim(), cells).unwrap_or_default();
-        let map = HeatMap::of_pixels(heights.view(), size, "height (mm)").origin(origin.map(|o| o * MM));
+        let heights =
+            Array2::from_shape_vec(surface.surface.heights.dim(), cells).unwrap_or_default();
+        let map =
+            HeatMap::of_pixels(heights.view(), size, "height (mm)").origin(origin.map(|o| o * MM));
         let dots = points.iter().map(|p| [p.x * MM, p.y * MM]);
-        page = page.panel(axes(title.clone()).heat_map(map).marked(dots, Marker::Ring, Colour::RED, ""));
-        let top = heights.indexed_iter().filter(|(_, h)| h.is_finite()).max_by(|a, b| a.1.total_cmp(b.1));
+        page = page.panel(axes(title.clone()).heat_map(map).marked(
+            dots,
+            Marker::Ring,
+            Colour::RED,
+            "",
+        ));
+        let top = heights
+            .indexed_iter()
+            .filter(|(_, h)| h.is_finite())
+            .max_by(|a, b| a.1.total_cmp(b.1));
         if let Some(((row, _), _)) = top {
             let cut = heights.row(row);
-            let line = cut.iter().enumerate().map(|(c, h)| [origin[0] * MM + c as f64 * size[0], *h]);
-            cuts = cuts.line(line, Colour::CATEGORIES[frame % Colour::CATEGORIES.len()], &title);
+            let line = cut
+                .iter()
+                .enumerate()
+                .map(|(c, h)| [origin[0] * MM + c as f64 * size[0], *h]);
+            cuts = cuts.line(
+                line,
+                Colour::CATEGORIES[frame % Colour::CATEGORIES.len()],
+                &title,
+            );
         }
     }
     Ok(page.panel(cuts))
@@ -192,9 +238,18 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
 
 /// Control points of both frames and their matches, from above and from the side.
 fn matches_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotError> {
-    let (model, target) = (press.control_points(0)?.to_vec(), press.control_points(last)?.to_vec());
+    let (model, target) = (
+        press.control_points(0)?.to_vec(),
+        press.control_points(last)?.to_vec(),
+    );
     let matching = press.matching(last)?;
-    let pairs = || matching.assignment.iter().enumerate().filter_map(|(i, a)| a.map(|j| (i, j)));
+    let pairs = || {
+        matching
+            .assignment
+            .iter()
+            .enumerate()
+            .filter_map(|(i, a)| a.map(|j| (i, j)))
+    };
     let view = |title: &str, axis: [usize; 2]| {
         let at = |p: &nalgebra::Point3<f64>| axis.map(|k| p[k] * MM);
         let segments = pairs().map(|(i, j)| [at(&model[i]), at(&target[j])]);
@@ -203,7 +258,12 @@ fn matches_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotErr
             .equal_aspect()
             .segments(segments, Colour::GREY, "match")
             .points(model.iter().map(at), Colour::BLUE, "first frame")
-            .marked(target.iter().map(at), Marker::Ring, Colour::RED, "last frame")
+            .marked(
+                target.iter().map(at),
+                Marker::Ring,
+                Colour::RED,
+                "last frame",
+            )
     };
     Ok(Page::new("Control points and matches")
         .columns(2)
@@ -221,11 +281,25 @@ fn displacement_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPl
     let lengths = model.iter().zip(warped).map(|(a, b)| (b - a).norm() * UM);
     let rise = model.iter().zip(warped).map(|(a, b)| (b.z - a.z) * UM);
     let points = || model.iter().map(at);
-    Ok(Page::new("Displacement between the first and the last frame")
-        .columns(3)
-        .panel(axes("Direction").equal_aspect().arrows(arrows, Colour::BLUE, "displacement"))
-        .panel(axes("Length").equal_aspect().coloured_points(points(), lengths, "displacement (µm)"))
-        .panel(axes("Along z").equal_aspect().coloured_points(points(), rise, "displacement (µm)")))
+    Ok(
+        Page::new("Displacement between the first and the last frame")
+            .columns(3)
+            .panel(
+                axes("Direction")
+                    .equal_aspect()
+                    .arrows(arrows, Colour::BLUE, "displacement"),
+            )
+            .panel(axes("Length").equal_aspect().coloured_points(
+                points(),
+                lengths,
+                "displacement (µm)",
+            ))
+            .panel(axes("Along z").equal_aspect().coloured_points(
+                points(),
+                rise,
+                "displacement (µm)",
+            )),
+    )
 }
 
 /// The diagonal of the strain over the control points.
@@ -237,7 +311,11 @@ fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotErro
         let values = strain.field.strains().iter().map(|e| e[(k, k)]);
         let title = format!("{name}: mean {:+.4}", strain.summary.mean[(k, k)]);
         let points = model.iter().map(|p| [p.x * MM, p.y * MM]);
-        page = page.panel(axes(title).equal_aspect().coloured_points(points, values, name));
+        page = page.panel(
+            axes(title)
+                .equal_aspect()
+                .coloured_points(points, values, name),
+        );
     }
     Ok(page)
 }
@@ -256,12 +334,17 @@ fn summary_page(press: &mut Press<'_>, lines: Vec<String>) -> Result<Page, Press
     let largest = points.iter().map(|(f, _)| f.value).fold(0.0, f64::max);
     let cubes = points.iter().map(|(f, a)| a.value / f.value.cbrt());
     let scale = cubes.sum::<f64>() / points.len().max(1) as f64 * MM;
-    let law = (0..=100).map(|i| 1.05 * largest * f64::from(i) / 100.0).map(|f| [f, scale * f.cbrt()]);
+    let law = (0..=100)
+        .map(|i| 1.05 * largest * f64::from(i) / 100.0)
+        .map(|f| [f, scale * f.cbrt()]);
     let growth = Panel::new("Contact radius against force")
         .x_label("force (N)")
         .y_label("contact radius (mm)")
         .dashed(law, Colour::GREY, "a ∝ F^(1/3)")
         .error_bars(at.clone(), errors, Colour::BLUE)
         .points(at, Colour::BLUE, "measured");
-    Ok(Page::new("Summary").columns(2).panel(Panel::new("Results").text(lines)).panel(growth))
+    Ok(Page::new("Summary")
+        .columns(2)
+        .panel(Panel::new("Results").text(lines))
+        .panel(growth))
 }

@@ -49,7 +49,10 @@ impl Panel {
         let tight = self.layers.iter().any(|l| matches!(l, Layer::Heat(_)));
         let [x, y] = bounds.map(|b| widen(b, if tight { 0.0 } else { 0.04 }));
         let fixed = |r: Option<[f64; 2]>, s: Scale| r.map(|r| widen(r.map(|v| s.forward(v)), 0.0));
-        [fixed(self.x_range, self.scales[0]).unwrap_or(x), fixed(self.y_range, self.scales[1]).unwrap_or(y)]
+        [
+            fixed(self.x_range, self.scales[0]).unwrap_or(x),
+            fixed(self.y_range, self.scales[1]).unwrap_or(y),
+        ]
     }
 }
 

@@ -22,7 +22,12 @@ impl Axis {
             Scale::Log10 => decades(lo, hi, wanted),
         };
         let largest = ticks.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        Self { inner: (from..to).into(), ticks, scale, power: common_power(largest) }
+        Self {
+            inner: (from..to).into(),
+            ticks,
+            scale,
+            power: common_power(largest),
+        }
     }
 }
 
@@ -35,7 +40,11 @@ impl Ranged for Axis {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
+        if hint.weight().allow_light_points() {
+            Vec::new()
+        } else {
+            self.ticks.clone()
+        }
     }
 
     fn range(&self) -> Range<f64> {
@@ -51,7 +60,11 @@ impl ValueFormatter<f64> for Axis {
             Scale::Linear => {
                 let mantissa = clean(v / 10f64.powi(self.power));
                 let power = superscript(self.power);
-                if mantissa == 0.0 { "0".into() } else { format!("{}×10{power}", label(mantissa)) }
+                if mantissa == 0.0 {
+                    "0".into()
+                } else {
+                    format!("{}×10{power}", label(mantissa))
+                }
             }
         }
     }
@@ -59,7 +72,11 @@ impl ValueFormatter<f64> for Axis {
 
 /// The power of ten that all labels of an axis share; 0 where plain numbers are short.
 fn common_power(largest: f64) -> i32 {
-    if largest == 0.0 || (0.01..1e5).contains(&largest) { 0 } else { largest.log10().floor() as i32 }
+    if largest == 0.0 || (0.01..1e5).contains(&largest) {
+        0
+    } else {
+        largest.log10().floor() as i32
+    }
 }
 
 /// Rounded to 1e-9, and never a negative zero.
@@ -73,11 +90,16 @@ fn decades(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
         let powers = (lo.floor() as i64)..=(hi.ceil() as i64).min(lo.floor() as i64 + 700);
         let round = powers.filter(|p| p.rem_euclid(step) == 0);
         let all = round.flat_map(|p| factors.iter().map(move |f| p as f64 + f.log10()));
-        all.filter(|v| (lo - 1e-9..=hi + 1e-9).contains(v)).collect()
+        all.filter(|v| (lo - 1e-9..=hi + 1e-9).contains(v))
+            .collect()
     };
     let step = ((hi - lo) / wanted.max(1) as f64).ceil().max(1.0) as i64;
     let plain = between(step, &[1.0]);
-    if plain.len() > 2 { plain } else { between(1, &[1.0, 2.0, 5.0]) }
+    if plain.len() > 2 {
+        plain
+    } else {
+        between(1, &[1.0, 2.0, 5.0])
+    }
 }
 
 /// Round values from `lo` to `hi`, about `wanted` of them: steps of 1, 2 or 5 times a power of ten.
@@ -87,11 +109,16 @@ pub(super) fn nice_ticks(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
         return vec![lo];
     }
     let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough * 0.999);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|s| *s >= rough * 0.999);
     let step = step.unwrap_or(10.0 * power);
     let first = (lo / step - 1e-9).ceil() as i64;
     let last = (hi / step + 1e-9).floor() as i64;
-    (first..=last.min(first.saturating_add(100))).map(|i| i as f64 * step).collect()
+    (first..=last.min(first.saturating_add(100)))
+        .map(|i| i as f64 * step)
+        .collect()
 }
 
 /// A number as short as it can be read: 0.25, 1200, 3×10⁶.
@@ -102,7 +129,11 @@ pub(super) fn label(v: f64) -> String {
     } else if (1e-3..1e5).contains(&size) {
         let digits = (3 - size.log10().floor() as i32).max(0) as usize;
         let text = format!("{v:.digits$}");
-        if text.contains('.') { trim(&text).into() } else { text }
+        if text.contains('.') {
+            trim(&text).into()
+        } else {
+            text
+        }
     } else {
         let mut power = size.log10().floor() as i32;
         let mut mantissa = trim(&format!("{:.4}", v / 10f64.powi(power))).to_owned();
@@ -135,7 +166,11 @@ mod tests {
     #[test]
     fn ticks_are_round_and_inside() {
         assert_eq!(nice_ticks(0.0, 1.0, 5).len(), 6);
-        assert!(nice_ticks(-3.0, 97.0, 5).iter().all(|t| t.rem_euclid(20.0) == 0.0));
+        assert!(
+            nice_ticks(-3.0, 97.0, 5)
+                .iter()
+                .all(|t| t.rem_euclid(20.0) == 0.0)
+        );
         assert_eq!(nice_ticks(1.0, 1.0, 5), [1.0]);
     }
 
@@ -147,13 +182,22 @@ mod tests {
 
     #[test]
     fn an_axis_keeps_one_power_of_ten() {
-        assert_eq!(labels(Scale::Linear, [-6e-4, 1.1e-3], 4), ["-0.5×10⁻³", "0", "0.5×10⁻³", "1×10⁻³"]);
-        assert_eq!(labels(Scale::Linear, [0.0, 0.2], 4), ["0", "0.05", "0.1", "0.15", "0.2"]);
+        assert_eq!(
+            labels(Scale::Linear, [-6e-4, 1.1e-3], 4),
+            ["-0.5×10⁻³", "0", "0.5×10⁻³", "1×10⁻³"]
+        );
+        assert_eq!(
+            labels(Scale::Linear, [0.0, 0.2], 4),
+            ["0", "0.05", "0.1", "0.15", "0.2"]
+        );
     }
 
     #[test]
     fn logarithmic_ticks_are_powers_of_ten_or_2_and_5_times_them() {
-        assert_eq!(labels(Scale::Log10, [0.3, 4.2], 5), ["10", "100", "1000", "10000"]);
+        assert_eq!(
+            labels(Scale::Log10, [0.3, 4.2], 5),
+            ["10", "100", "1000", "10000"]
+        );
         assert_eq!(labels(Scale::Log10, [-0.1, 1.1], 5), ["1", "2", "5", "10"]);
         assert_eq!(labels(Scale::Log10, [-12.0, 0.0], 4).len(), 5);
     }

@@ -12,12 +12,20 @@ pub(super) struct Fields<'a> {
 
 impl<'a> Fields<'a> {
     pub(super) fn new(file: &'a Path, table: &'a Table) -> Self {
-        Self { file, prefix: String::new(), table }
+        Self {
+            file,
+            prefix: String::new(),
+            table,
+        }
     }
 
     /// The field's name with its path: `waveguide.layers[2].thickness_m`.
     pub(super) fn path(&self, name: &str) -> String {
-        if self.prefix.is_empty() { name.into() } else { format!("{}.{name}", self.prefix) }
+        if self.prefix.is_empty() {
+            name.into()
+        } else {
+            format!("{}.{name}", self.prefix)
+        }
     }
 
     /// Refuses fields that are not in `known`.
@@ -37,26 +45,42 @@ impl<'a> Fields<'a> {
     }
 
     pub(super) fn missing(&self, name: &str, expected: &'static str) -> SceneError {
-        SceneError::Missing { file: self.file.into(), field: self.path(name), expected }
+        SceneError::Missing {
+            file: self.file.into(),
+            field: self.path(name),
+            expected,
+        }
     }
 
     pub(super) fn wrong(&self, name: &str, expected: &'static str, found: &Value) -> SceneError {
         let found = match found {
-            Value::String(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => found.to_string(),
+            Value::String(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => {
+                found.to_string()
+            }
             Value::Array(values) => format!("an array of {}", values.len()),
             Value::Table(_) => "a table".into(),
             Value::Datetime(_) => "a date".into(),
         };
-        SceneError::Wrong { file: self.file.into(), field: self.path(name), expected, found }
+        SceneError::Wrong {
+            file: self.file.into(),
+            field: self.path(name),
+            expected,
+            found,
+        }
     }
 
     fn value(&self, name: &str, expected: &'static str) -> Result<&'a Value, SceneError> {
-        self.table.get(name).ok_or_else(|| self.missing(name, expected))
+        self.table
+            .get(name)
+            .ok_or_else(|| self.missing(name, expected))
     }
 
     pub(super) fn string(&self, name: &str, expected: &'static str) -> Result<&'a str, SceneError> {
         let value = self.value(name, expected)?;
-        value.as_str().filter(|s| !s.is_empty()).ok_or_else(|| self.wrong(name, expected, value))
+        value
+            .as_str()
+            .filter(|s| !s.is_empty())
+            .ok_or_else(|| self.wrong(name, expected, value))
     }
 
     /// A number for which `accept` holds.
@@ -67,7 +91,9 @@ impl<'a> Fields<'a> {
         accept: impl Fn(f64) -> bool,
     ) -> Result<f64, SceneError> {
         let value = self.value(name, expected)?;
-        as_number(value).filter(|&v| accept(v)).ok_or_else(|| self.wrong(name, expected, value))
+        as_number(value)
+            .filter(|&v| accept(v))
+            .ok_or_else(|| self.wrong(name, expected, value))
     }
 
     pub(super) fn optional_number(
@@ -76,13 +102,23 @@ impl<'a> Fields<'a> {
         expected: &'static str,
         accept: impl Fn(f64) -> bool,
     ) -> Result<Option<f64>, SceneError> {
-        if self.has(name) { self.number(name, expected, accept).map(Some) } else { Ok(None) }
+        if self.has(name) {
+            self.number(name, expected, accept).map(Some)
+        } else {
+            Ok(None)
+        }
     }
 
     /// Two positive numbers.
-    pub(super) fn positive_pair(&self, name: &str, expected: &'static str) -> Result<[f64; 2], SceneError> {
+    pub(super) fn positive_pair(
+        &self,
+        name: &str,
+        expected: &'static str,
+    ) -> Result<[f64; 2], SceneError> {
         let value = self.value(name, expected)?;
-        let numbers = value.as_array().map(|a| a.iter().map(as_number).collect::<Vec<_>>());
+        let numbers = value
+            .as_array()
+            .map(|a| a.iter().map(as_number).collect::<Vec<_>>());
         match numbers.as_deref() {
             Some(&[Some(x), Some(y)]) if positive(x) && positive(y) => Ok([x, y]),
             _ => Err(self.wrong(name, expected, value)),
@@ -91,18 +127,37 @@ impl<'a> Fields<'a> {
 
     pub(super) fn table(&self, name: &str, expected: &'static str) -> Result<Self, SceneError> {
         let value = self.value(name, expected)?;
-        let table = value.as_table().ok_or_else(|| self.wrong(name, expected, value))?;
-        Ok(Self { file: self.file, prefix: self.path(name), table })
+        let table = value
+            .as_table()
+            .ok_or_else(|| self.wrong(name, expected, value))?;
+        Ok(Self {
+            file: self.file,
+            prefix: self.path(name),
+            table,
+        })
     }
 
     /// At least one table in an array.
-    pub(super) fn tables(&self, name: &str, expected: &'static str) -> Result<Vec<Self>, SceneError> {
+    pub(super) fn tables(
+        &self,
+        name: &str,
+        expected: &'static str,
+    ) -> Result<Vec<Self>, SceneError> {
         let value = self.value(name, expected)?;
         let wrong = || self.wrong(name, expected, value);
-        let values = value.as_array().filter(|a| !a.is_empty()).ok_or_else(wrong)?;
+        let values = value
+            .as_array()
+            .filter(|a| !a.is_empty())
+            .ok_or_else(wrong)?;
         let table = |(i, v): (usize, &'a Value)| {
             let prefix = format!("{}[{}]", self.path(name), i + 1);
-            v.as_table().map(|table| Self { file: self.file, prefix, table }).ok_or_else(wrong)
+            v.as_table()
+                .map(|table| Self {
+                    file: self.file,
+                    prefix,
+                    table,
+                })
+                .ok_or_else(wrong)
         };
         values.iter().enumerate().map(table).collect()
     }
@@ -119,5 +174,7 @@ pub(super) fn poisson(v: f64) -> bool {
 }
 
 fn as_number(value: &Value) -> Option<f64> {
-    value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
+    value
+        .as_float()
+        .or_else(|| value.as_integer().map(|i| i as f64))
 }

@@ -76,11 +76,17 @@ impl Scene {
             }
             frames.push(image);
         }
-        Ok(SceneData { reference, frames, calibration: self.load_calibration()? })
+        Ok(SceneData {
+            reference,
+            frames,
+            calibration: self.load_calibration()?,
+        })
     }
 
     fn image(&self, field: &str, path: &Path) -> Result<Array2<u8>, SceneError> {
-        read_grey_image(path).map(|i| i.to_u8()).map_err(|source| self.file_error(field, source))
+        read_grey_image(path)
+            .map(|i| i.to_u8())
+            .map_err(|source| self.file_error(field, source))
     }
 
     fn load_calibration(&self) -> Result<LoadedCalibration, SceneError> {
@@ -94,18 +100,34 @@ impl Scene {
         };
         match &self.calibration {
             CalibrationSource::Pairs(path) => {
-                let pairs = columns("calibration.pairs", path, ["integrated_pixel_value", "force_N"])?;
-                Ok(LoadedCalibration::Pairs(pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect()))
+                let pairs = columns(
+                    "calibration.pairs",
+                    path,
+                    ["integrated_pixel_value", "force_N"],
+                )?;
+                Ok(LoadedCalibration::Pairs(
+                    pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect(),
+                ))
             }
             CalibrationSource::DepthTable(path) => {
-                let rows = columns("calibration.depth_table", path, ["darkness_grey_levels", "depth_mm"])?;
-                Ok(LoadedCalibration::DepthTable(rows.map(|(d, z)| (d, z * 1e-3)).collect()))
+                let rows = columns(
+                    "calibration.depth_table",
+                    path,
+                    ["darkness_grey_levels", "depth_mm"],
+                )?;
+                Ok(LoadedCalibration::DepthTable(
+                    rows.map(|(d, z)| (d, z * 1e-3)).collect(),
+                ))
             }
         }
     }
 
     fn file_error(&self, field: &str, source: ReadError) -> SceneError {
-        SceneError::File { file: self.file.clone(), field: field.into(), source: Box::new(source) }
+        SceneError::File {
+            file: self.file.clone(),
+            field: field.into(),
+            source: Box::new(source),
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 use super::{LoadedCalibration, Scene, SceneData, SceneError};
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::pipeline::{
-    BoxedPipeline, ContactStage, DEFAULT_CONTROL_POINTS, DarkContact, LightContact, Measurement, Pipeline,
-    PipelineError, Press, Stages, SurfaceInput,
+    BoxedPipeline, ContactStage, DEFAULT_CONTROL_POINTS, DarkContact, LightContact, Measurement,
+    Pipeline, PipelineError, Press, Stages, SurfaceInput,
 };
 
 impl Scene {
@@ -76,22 +76,32 @@ impl Scene {
         data: &SceneData,
         control_points: usize,
     ) -> Result<Box<dyn Stages>, SceneError> {
-        self.build_stages(data, control_points).map_err(|e| self.measure_error(e))
+        self.build_stages(data, control_points)
+            .map_err(|e| self.measure_error(e))
     }
 
     /// The scene's frames on a pipeline, ready to be asked.
     ///
     /// # Errors
     /// [`SceneError::Measure`].
-    pub fn press<'a>(&self, stages: &'a dyn Stages, data: &'a SceneData) -> Result<Press<'a>, SceneError> {
-        let mut press = Press::new(stages, data.reference.view()).map_err(|e| self.measure_error(e))?;
+    pub fn press<'a>(
+        &self,
+        stages: &'a dyn Stages,
+        data: &'a SceneData,
+    ) -> Result<Press<'a>, SceneError> {
+        let mut press =
+            Press::new(stages, data.reference.view()).map_err(|e| self.measure_error(e))?;
         for (image, frame) in data.frames.iter().zip(&self.frames) {
             press.add_gauged_frame(image.view(), frame.force_n);
         }
         Ok(press)
     }
 
-    fn build_stages(&self, data: &SceneData, points: usize) -> Result<Box<dyn Stages>, PipelineError> {
+    fn build_stages(
+        &self,
+        data: &SceneData,
+        points: usize,
+    ) -> Result<Box<dyn Stages>, PipelineError> {
         let layer = |l: &super::SceneLayer| Layer {
             thickness_m: l.thickness_m,
             youngs_modulus_pa: l.youngs_modulus_pa,
@@ -105,7 +115,8 @@ impl Scene {
             .with_flat_field(self.flat_field)
             .with_estimator(self.stages.estimator);
         let boxed = |contact: Box<dyn ContactStage>| {
-            BoxedPipeline::from_config(contact, self.object, &self.stages).map_err(PipelineError::DepthTable)
+            BoxedPipeline::from_config(contact, self.object, &self.stages)
+                .map_err(PipelineError::DepthTable)
         };
         Ok(match &data.calibration {
             LoadedCalibration::Pairs(pairs) => {
@@ -136,6 +147,10 @@ impl Scene {
             (PipelineError::Sensor(_), _) => "reference".into(),
             _ => "frames".into(),
         };
-        SceneError::Measure { file: self.file.clone(), field, source: Box::new(error) }
+        SceneError::Measure {
+            file: self.file.clone(),
+            field,
+            source: Box::new(error),
+        }
     }
 }

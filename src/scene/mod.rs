@@ -198,8 +198,12 @@ impl Scene {
     /// [`SceneError`]: one sentence that names the file and the field.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path)
-            .map_err(|source| SceneError::Open(Box::new(ReadError::Open { path: path.into(), source })))?;
+        let bytes = std::fs::read(path).map_err(|source| {
+            SceneError::Open(Box::new(ReadError::Open {
+                path: path.into(),
+                source,
+            }))
+        })?;
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
@@ -226,19 +230,26 @@ impl Scene {
     /// As [`read`](Self::read).
     pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
         let file = file.as_ref();
-        let table: toml::Table = text.parse().map_err(|e: toml::de::Error| SceneError::Syntax {
-            file: file.into(),
-            line: e.span().map_or(1, |s| 1 + text[..s.start.min(text.len())].matches('\n').count()),
-            message: e.message().lines().next().unwrap_or("not TOML").into(),
-        })?;
+        let table: toml::Table = text
+            .parse()
+            .map_err(|e: toml::de::Error| SceneError::Syntax {
+                file: file.into(),
+                line: e.span().map_or(1, |s| {
+                    1 + text[..s.start.min(text.len())].matches('\n').count()
+                }),
+                message: e.message().lines().next().unwrap_or("not TOML").into(),
+            })?;
         let fields = Fields::new(file, &table);
         fields.only(&tables::FIELDS)?;
         let folder = file.parent().unwrap_or(Path::new(""));
         Ok(Self {
             file: file.into(),
-            reference: folder.join(fields.string("reference", "the path of the image without contact")?),
-            pixel_size_m: fields
-                .positive_pair("pixel_size_m", "two positive numbers [x, y] (metres per pixel)")?,
+            reference: folder
+                .join(fields.string("reference", "the path of the image without contact")?),
+            pixel_size_m: fields.positive_pair(
+                "pixel_size_m",
+                "two positive numbers [x, y] (metres per pixel)",
+            )?,
             flat_field: tables::flat_field(&fields)?,
             calibration: tables::calibration(&fields, folder)?,
             frames: tables::frames(&fields, folder)?,

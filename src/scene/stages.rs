@@ -2,8 +2,8 @@
 use super::SceneError;
 use super::fields::Fields;
 use crate::pipeline::{
-    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig, StrainChoice,
-    UnknownStage, WarpChoice,
+    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig,
+    StrainChoice, UnknownStage, WarpChoice,
 };
 use std::str::FromStr;
 
@@ -12,11 +12,25 @@ pub(super) fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
         return Ok(StagesConfig::default());
     }
     let fields = scene.table("stages", "a table of stages by name")?;
-    fields.only(&["reconstruction", "sampler", "matcher", "warp", "strain", "estimator"])?;
+    fields.only(&[
+        "reconstruction",
+        "sampler",
+        "matcher",
+        "warp",
+        "strain",
+        "estimator",
+    ])?;
     if fields.has("reconstruction") && scene.table("calibration", "a table")?.has("depth_table") {
-        let given =
-            toml::Value::String(fields.string("reconstruction", ReconstructionChoice::EXPECTED)?.into());
-        return Err(fields.wrong("reconstruction", "absent: the depth table makes the surface", &given));
+        let given = toml::Value::String(
+            fields
+                .string("reconstruction", ReconstructionChoice::EXPECTED)?
+                .into(),
+        );
+        return Err(fields.wrong(
+            "reconstruction",
+            "absent: the depth table makes the surface",
+            &given,
+        ));
     }
     Ok(StagesConfig {
         reconstruction: choice(&fields, "reconstruction", ReconstructionChoice::EXPECTED)?,
@@ -37,5 +51,6 @@ fn choice<C: FromStr<Err = UnknownStage> + Default>(
         return Ok(C::default());
     }
     let text = fields.string(name, expected)?;
-    text.parse().map_err(|_: UnknownStage| fields.wrong(name, expected, &toml::Value::String(text.into())))
+    text.parse()
+        .map_err(|_: UnknownStage| fields.wrong(name, expected, &toml::Value::String(text.into())))
 }

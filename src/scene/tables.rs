@@ -5,8 +5,16 @@ use crate::pipeline::Object;
 use std::path::Path;
 
 /// What may stand at the top of a scene file.
-pub(super) const FIELDS: [&str; 8] =
-    ["reference", "pixel_size_m", "flat_field", "calibration", "frames", "object", "waveguide", "stages"];
+pub(super) const FIELDS: [&str; 8] = [
+    "reference",
+    "pixel_size_m",
+    "flat_field",
+    "calibration",
+    "frames",
+    "object",
+    "waveguide",
+    "stages",
+];
 
 pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
     const EXPECTED: &str = "\"reference\", or absent for no correction";
@@ -19,21 +27,31 @@ pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
     }
 }
 
-pub(super) fn calibration(fields: &Fields<'_>, folder: &Path) -> Result<CalibrationSource, SceneError> {
+pub(super) fn calibration(
+    fields: &Fields<'_>,
+    folder: &Path,
+) -> Result<CalibrationSource, SceneError> {
     const EXPECTED: &str = "a table with `pairs` or `depth_table`";
     let fields = fields.table("calibration", EXPECTED)?;
     fields.only(&["pairs", "depth_table"])?;
     match (fields.has("pairs"), fields.has("depth_table")) {
         (true, false) => {
-            let path = fields.string("pairs", "the path of a CSV file (integrated_pixel_value,force_N)")?;
+            let path = fields.string(
+                "pairs",
+                "the path of a CSV file (integrated_pixel_value,force_N)",
+            )?;
             Ok(CalibrationSource::Pairs(folder.join(path)))
         }
         (false, true) => {
-            let path =
-                fields.string("depth_table", "the path of a CSV file (darkness_grey_levels,depth_mm)")?;
+            let path = fields.string(
+                "depth_table",
+                "the path of a CSV file (darkness_grey_levels,depth_mm)",
+            )?;
             Ok(CalibrationSource::DepthTable(folder.join(path)))
         }
-        (false, false) => Err(fields.missing("pairs", "`pairs` or `depth_table`, the path of a CSV file")),
+        (false, false) => {
+            Err(fields.missing("pairs", "`pairs` or `depth_table`, the path of a CSV file"))
+        }
         (true, true) => {
             let both = toml::Value::String("both".into());
             Err(fields.wrong("pairs", "alone: give `pairs` or `depth_table`", &both))
@@ -62,8 +80,14 @@ pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
         .unwrap_or(Object::DEFAULT_POISSON_RATIO);
     let radius = || fields.number("radius_m", "a positive number (metres)", positive);
     match shape {
-        "sphere" => Ok(Object::Sphere { radius_m: radius()?, poisson_ratio }),
-        "flat_punch" => Ok(Object::FlatPunch { radius_m: radius()?, poisson_ratio }),
+        "sphere" => Ok(Object::Sphere {
+            radius_m: radius()?,
+            poisson_ratio,
+        }),
+        "flat_punch" => Ok(Object::FlatPunch {
+            radius_m: radius()?,
+            poisson_ratio,
+        }),
         "unknown" => {
             let _ = fields.optional_number("radius_m", "a positive number (metres)", positive)?;
             Ok(Object::Unknown { poisson_ratio })
@@ -78,15 +102,27 @@ pub(super) fn layers(fields: &Fields<'_>) -> Result<Vec<SceneLayer>, SceneError>
     }
     let fields = fields.table("waveguide", "a table with `layers`")?;
     fields.only(&["layers"])?;
-    let tables =
-        fields.tables("layers", "an array of one or more tables, from the object's side to the glass")?;
+    let tables = fields.tables(
+        "layers",
+        "an array of one or more tables, from the object's side to the glass",
+    )?;
     let layer = |f: &Fields<'_>| {
-        f.only(&["refractive_index", "thickness_m", "youngs_modulus_pa", "poisson_ratio"])?;
+        f.only(&[
+            "refractive_index",
+            "thickness_m",
+            "youngs_modulus_pa",
+            "poisson_ratio",
+        ])?;
         Ok(SceneLayer {
-            refractive_index: f
-                .number("refractive_index", "a number of at least 1", |v| v >= 1.0 && v.is_finite())?,
+            refractive_index: f.number("refractive_index", "a number of at least 1", |v| {
+                v >= 1.0 && v.is_finite()
+            })?,
             thickness_m: f.number("thickness_m", "a positive number (metres)", positive)?,
-            youngs_modulus_pa: f.number("youngs_modulus_pa", "a positive number (pascals)", positive)?,
+            youngs_modulus_pa: f.number(
+                "youngs_modulus_pa",
+                "a positive number (pascals)",
+                positive,
+            )?,
             poisson_ratio: f
                 .optional_number("poisson_ratio", "a number above -1, at most 0.5", poisson)?
                 .unwrap_or(0.5),

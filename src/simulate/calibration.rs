@@ -39,8 +39,17 @@ pub struct CalibrationOptions {
 impl Default for CalibrationOptions {
     /// A rigid sphere of 10 mm radius, 0 to 2 N in 20 steps and back, 2 mN of gauge noise, no hysteresis.
     fn default() -> Self {
-        let indenter = Sphere { radius_m: 10e-3, material: Elastic::RIGID };
-        Self { indenter, largest_force_n: 2.0, steps: 20, gauge_noise_n: 2e-3, hysteresis: 0.0 }
+        let indenter = Sphere {
+            radius_m: 10e-3,
+            material: Elastic::RIGID,
+        };
+        Self {
+            indenter,
+            largest_force_n: 2.0,
+            steps: 20,
+            gauge_noise_n: 2e-3,
+            hysteresis: 0.0,
+        }
     }
 }
 
@@ -117,7 +126,9 @@ pub struct CalibrationSeries {
 impl CalibrationSeries {
     /// (integrated pixel value, gauge force) of every reading.
     pub fn pairs(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        self.points.iter().map(|p| (p.integrated_pixel_value, p.force_n))
+        self.points
+            .iter()
+            .map(|p| (p.integrated_pixel_value, p.force_n))
     }
 }
 
@@ -146,7 +157,10 @@ impl PressScene {
     ///
     /// # Errors
     /// [`SimulateError::OutOfRange`] for an option without meaning.
-    pub fn calibrate(&self, options: &CalibrationOptions) -> Result<CalibrationSeries, SimulateError> {
+    pub fn calibrate(
+        &self,
+        options: &CalibrationOptions,
+    ) -> Result<CalibrationSeries, SimulateError> {
         options.validate()?;
         let (camera, seed) = (self.options().camera, self.options().seed);
         let dark = camera.compose(&[], &Illumination::default());
@@ -170,7 +184,10 @@ impl PressScene {
                 true_force_n,
             });
         }
-        Ok(CalibrationSeries { points, newton_per_grey: camera.pixel_area_m2() / self.grey_per_pascal() })
+        Ok(CalibrationSeries {
+            points,
+            newton_per_grey: camera.pixel_area_m2() / self.grey_per_pascal(),
+        })
     }
 }
 
@@ -188,7 +205,9 @@ impl CalibrationOptions {
         let x = force_n / self.largest_force_n;
         match branch {
             Branch::Loading => force_n,
-            Branch::Unloading => force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x),
+            Branch::Unloading => {
+                force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x)
+            }
         }
     }
 

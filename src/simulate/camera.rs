@@ -95,7 +95,10 @@ impl Camera {
 
     /// The coordinates (x, y) of the frame's middle in pixels.
     pub fn middle_px(&self) -> [f64; 2] {
-        [(self.shape[1] as f64 - 1.0) / 2.0, (self.shape[0] as f64 - 1.0) / 2.0]
+        [
+            (self.shape[1] as f64 - 1.0) / 2.0,
+            (self.shape[0] as f64 - 1.0) / 2.0,
+        ]
     }
 
     /// Turns expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255. Each (`seed`, `frame`)
@@ -114,7 +117,12 @@ impl Camera {
     ) -> Array2<u8> {
         let mut image = Array2::zeros(expected_grey.dim());
         let law = self.noise_law();
-        for (row, (mut out, light)) in image.rows_mut().into_iter().zip(expected_grey.rows()).enumerate() {
+        for (row, (mut out, light)) in image
+            .rows_mut()
+            .into_iter()
+            .zip(expected_grey.rows())
+            .enumerate()
+        {
             let mut rng = row_stream(seed, purpose, frame, row);
             for (pixel, &grey) in out.iter_mut().zip(light) {
                 // `as` cuts towards zero and saturates at 0 and 255.
@@ -166,11 +174,22 @@ impl Camera {
             let source = patch.values.clone();
             patch.values.map_inplace(|v| *v *= kernel[0]);
             let length = source.len_of(axis);
-            for (k, &w) in kernel.iter().enumerate().skip(1).filter(|(k, _)| *k < length) {
+            for (k, &w) in kernel
+                .iter()
+                .enumerate()
+                .skip(1)
+                .filter(|(k, _)| *k < length)
+            {
                 let head = ndarray::Slice::from(..length - k);
                 let tail = ndarray::Slice::from(k..);
-                patch.values.slice_axis_mut(axis, tail).scaled_add(w, &source.slice_axis(axis, head));
-                patch.values.slice_axis_mut(axis, head).scaled_add(w, &source.slice_axis(axis, tail));
+                patch
+                    .values
+                    .slice_axis_mut(axis, tail)
+                    .scaled_add(w, &source.slice_axis(axis, head));
+                patch
+                    .values
+                    .slice_axis_mut(axis, head)
+                    .scaled_add(w, &source.slice_axis(axis, tail));
             }
         }
     }
@@ -184,7 +203,10 @@ impl Camera {
         }
         let [cx, cy] = self.middle_px();
         let fall = self.vignetting / (cx * cx + cy * cy).max(f64::MIN_POSITIVE);
-        let tilt = [lamps.tilt[0] / (2.0 * cx).max(1.0), lamps.tilt[1] / (2.0 * cy).max(1.0)];
+        let tilt = [
+            lamps.tilt[0] / (2.0 * cx).max(1.0),
+            lamps.tilt[1] / (2.0 * cy).max(1.0),
+        ];
         for (r, mut line) in frame.rows_mut().into_iter().enumerate() {
             let dy = r as f64 - cy;
             for (c, value) in line.iter_mut().enumerate() {
@@ -215,13 +237,23 @@ impl Camera {
 
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
         at_least("shape", self.shape[0].min(self.shape[1]), 1)?;
-        within("shape", self.shape[0].max(self.shape[1]) as f64, 1.0, 65535.0)?;
+        within(
+            "shape",
+            self.shape[0].max(self.shape[1]) as f64,
+            1.0,
+            65535.0,
+        )?;
         positive("pixel_size_m", self.pixel_size_m[0])?;
         positive("pixel_size_m", self.pixel_size_m[1])?;
         not_negative("background_grey", self.background_grey)?;
         within("vignetting", self.vignetting, 0.0, 1.0)?;
         within("blur_sigma_px", self.blur_sigma_px, 0.0, 1000.0)?;
-        within("full_well_electrons", self.full_well_electrons, 1.0, f64::INFINITY)?;
+        within(
+            "full_well_electrons",
+            self.full_well_electrons,
+            1.0,
+            f64::INFINITY,
+        )?;
         not_negative("read_noise_grey", self.read_noise_grey)
     }
 }

@@ -75,13 +75,25 @@ pub struct Contact {
 
 impl Contact {
     /// The contact of `sphere` on `waveguide` at `force_n` ≥ 0.
-    pub(super) fn new(sphere: &Sphere, waveguide: &Waveguide, law: ContactLaw, force_n: f64) -> Self {
+    pub(super) fn new(
+        sphere: &Sphere,
+        waveguide: &Waveguide,
+        law: ContactLaw,
+        force_n: f64,
+    ) -> Self {
         let body = waveguide.series();
-        let (c1, c2) = (sphere.material.plane_strain_compliance(), body.plane_strain_compliance());
+        let (c1, c2) = (
+            sphere.material.plane_strain_compliance(),
+            body.plane_strain_compliance(),
+        );
         let effective_modulus_pa = 1.0 / (c1 + c2);
         let radius = sphere.radius_m;
         let a = (0.75 * force_n * radius / effective_modulus_pa).cbrt();
-        let peak_pressure_pa = if a > 0.0 { 1.5 * force_n / (PI * a * a) } else { 0.0 };
+        let peak_pressure_pa = if a > 0.0 {
+            1.5 * force_n / (PI * a * a)
+        } else {
+            0.0
+        };
         let nu = body.poisson_ratio;
         Self {
             force_n,
@@ -118,7 +130,11 @@ impl Contact {
     /// exactly a hemisphere of radius a, z = √(a² − r²), whatever the sphere's radius and modulus. Zero outside.
     pub fn apparent_height_m(&self, r_m: f64) -> f64 {
         let a = self.contact_radius_m;
-        if r_m >= a { 0.0 } else { ((a - r_m) * (a + r_m)).sqrt() }
+        if r_m >= a {
+            0.0
+        } else {
+            ((a - r_m) * (a + r_m)).sqrt()
+        }
     }
 
     /// Displacement (x, y, z) of the waveguide's material point that lay at (`x_m`, `y_m`) from the contact's
@@ -147,7 +163,11 @@ impl Contact {
 
     /// Sum of both surfaces' normal displacements at distance r (Johnson, eqs. 3.41a and 3.42a).
     fn joint_displacement_m(&self, r: f64) -> f64 {
-        let (a, p0, e) = (self.contact_radius_m, self.peak_pressure_pa, self.effective_modulus_pa);
+        let (a, p0, e) = (
+            self.contact_radius_m,
+            self.peak_pressure_pa,
+            self.effective_modulus_pa,
+        );
         if r <= a {
             return PI * p0 * (2.0 * a * a - r * r) / (4.0 * a * e);
         }
@@ -177,7 +197,10 @@ mod tests {
     use super::*;
 
     fn contact(law: ContactLaw, force_n: f64) -> Contact {
-        let sphere = Sphere { radius_m: 3e-3, material: Elastic::CL2000X };
+        let sphere = Sphere {
+            radius_m: 3e-3,
+            material: Elastic::CL2000X,
+        };
         Contact::new(&sphere, &Waveguide::default(), law, force_n)
     }
 
@@ -186,19 +209,31 @@ mod tests {
         let c = contact(ContactLaw::Hertz, 0.7);
         let close = |x: f64, y: f64| assert!((x / y - 1.0).abs() < 1e-14, "{x} {y}");
         let (a, e) = (c.contact_radius_m, c.effective_modulus_pa);
-        close(1.0 / e, 0.75 / 103e3 + 0.75 * (2e-3 / 1.36e5 + 3e-3 / 8e4 + 5e-3 / 3.4e4) / 10e-3);
+        close(
+            1.0 / e,
+            0.75 / 103e3 + 0.75 * (2e-3 / 1.36e5 + 3e-3 / 8e4 + 5e-3 / 3.4e4) / 10e-3,
+        );
         close(a.powi(3), 0.75 * 0.7 * 3e-3 / e);
         close(c.indentation_m, a * a / 3e-3);
-        close(c.force_n, 4.0 / 3.0 * e * 3e-3_f64.sqrt() * c.indentation_m.powf(1.5));
+        close(
+            c.force_n,
+            4.0 / 3.0 * e * 3e-3_f64.sqrt() * c.indentation_m.powf(1.5),
+        );
         close(c.peak_pressure_pa, 2.0 * a * e / (PI * 3e-3));
         // Both surfaces' displacement at the centre is the approach.
-        close(-c.waveguide_displacement_m(0.0, 0.0)[2], c.waveguide_share * c.indentation_m);
+        close(
+            -c.waveguide_displacement_m(0.0, 0.0)[2],
+            c.waveguide_share * c.indentation_m,
+        );
     }
 
     #[test]
     fn displacement_is_continuous_at_the_rim_and_where_the_series_takes_over() {
         let c = contact(ContactLaw::Hertz, 0.7);
-        for (r, step) in [(c.contact_radius_m, 1e-9), (50.0 * c.contact_radius_m, 1e-9)] {
+        for (r, step) in [
+            (c.contact_radius_m, 1e-9),
+            (50.0 * c.contact_radius_m, 1e-9),
+        ] {
             let at = |q: f64| c.waveguide_displacement_m(q, 0.0)[2];
             // One-sided values differ by slope × step plus the closed form's cancellation, (r/a)³ ulps.
             assert!((at(r * (1.0 - step)) / at(r * (1.0 + step)) - 1.0).abs() < 1e-8);
@@ -211,12 +246,17 @@ mod tests {
 
     #[test]
     fn tatara_keeps_the_radius_and_lessens_the_approach() {
-        let (h, t) = (contact(ContactLaw::Hertz, 0.7), contact(ContactLaw::Tatara, 0.7));
+        let (h, t) = (
+            contact(ContactLaw::Hertz, 0.7),
+            contact(ContactLaw::Tatara, 0.7),
+        );
         assert_eq!(h.contact_radius_m, t.contact_radius_m);
         assert!(t.indentation_m < h.indentation_m && t.indentation_m > 0.0);
         // At small load the correction vanishes relative to Hertz's approach, as F against F^(2/3).
-        let ratio =
-            |f| contact(ContactLaw::Tatara, f).indentation_m / contact(ContactLaw::Hertz, f).indentation_m;
+        let ratio = |f| {
+            contact(ContactLaw::Tatara, f).indentation_m
+                / contact(ContactLaw::Hertz, f).indentation_m
+        };
         let fall = (1.0 - ratio(1e-6)) / (1.0 - ratio(1e-9));
         assert!((fall - 10.0).abs() < 0.01, "{fall}");
     }

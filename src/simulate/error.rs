@@ -58,7 +58,12 @@ pub(super) fn within(
     if found >= minimum && found <= maximum {
         Ok(())
     } else {
-        Err(SimulateError::OutOfRange { field, minimum, maximum, found })
+        Err(SimulateError::OutOfRange {
+            field,
+            minimum,
+            maximum,
+            found,
+        })
     }
 }
 
@@ -78,6 +83,18 @@ pub(super) fn finite(field: &'static str, found: f64) -> Result<(), SimulateErro
 }
 
 /// At least `expected` entries.
-pub(super) fn at_least(field: &'static str, found: usize, expected: usize) -> Result<(), SimulateError> {
-    if found >= expected { Ok(()) } else { Err(SimulateError::TooFew { field, expected, found }) }
+pub(super) fn at_least(
+    field: &'static str,
+    found: usize,
+    expected: usize,
+) -> Result<(), SimulateError> {
+    if found >= expected {
+        Ok(())
+    } else {
+        Err(SimulateError::TooFew {
+            field,
+            expected,
+            found,
+        })
+    }
 }

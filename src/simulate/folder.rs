@@ -74,7 +74,10 @@ pub fn write_folder(
     folder: &Path,
 ) -> Result<PathBuf, FolderError> {
     let series = scene.calibrate(calibration)?;
-    std::fs::create_dir_all(folder).map_err(|source| FolderError::Write { path: folder.into(), source })?;
+    std::fs::create_dir_all(folder).map_err(|source| FolderError::Write {
+        path: folder.into(),
+        source,
+    })?;
     let made = scene.simulate();
     write_image(&folder.join("reference.png"), made.reference.view())?;
     for (k, frame) in made.frames.iter().enumerate() {
@@ -91,14 +94,21 @@ pub fn write_folder(
 }
 
 fn write_text(path: &Path, text: &str) -> Result<(), FolderError> {
-    std::fs::write(path, text).map_err(|source| FolderError::Write { path: path.into(), source })
+    std::fs::write(path, text).map_err(|source| FolderError::Write {
+        path: path.into(),
+        source,
+    })
 }
 
 fn write_image(path: &Path, frame: ArrayView2<'_, u8>) -> Result<(), FolderError> {
     let (rows, cols) = frame.dim();
-    let image =
-        ImageBuffer::from_fn(cols as u32, rows as u32, |x, y| Luma([frame[[y as usize, x as usize]]]));
-    image.save(path).map_err(|source| FolderError::Image { path: path.into(), source })
+    let image = ImageBuffer::from_fn(cols as u32, rows as u32, |x, y| {
+        Luma([frame[[y as usize, x as usize]]])
+    });
+    image.save(path).map_err(|source| FolderError::Image {
+        path: path.into(),
+        source,
+    })
 }
 
 /// The scene's description as the command line reads it.
@@ -107,26 +117,44 @@ fn description(scene: &PressScene) -> Table {
     let size = Value::Array(options.camera.pixel_size_m.map(Value::Float).to_vec());
     let frame = |(k, load): (usize, &super::Load)| {
         let image = Value::String(format!("frame_{}.png", k + 1));
-        Value::Table(table([("image", image), ("force_N", Value::Float(load.force_n))]))
+        Value::Table(table([
+            ("image", image),
+            ("force_N", Value::Float(load.force_n)),
+        ]))
     };
     let object = table([
         ("shape", Value::String("sphere".to_owned())),
         ("radius_m", Value::Float(options.object.radius_m)),
-        ("poisson_ratio", Value::Float(options.object.material.poisson_ratio)),
+        (
+            "poisson_ratio",
+            Value::Float(options.object.material.poisson_ratio),
+        ),
     ]);
     let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
     table([
         ("reference", Value::String("reference.png".to_owned())),
         ("pixel_size_m", size),
-        ("calibration", Value::Table(table([("pairs", Value::String("calibration.csv".to_owned()))]))),
-        ("frames", Value::Array(options.loads.iter().enumerate().map(frame).collect())),
+        (
+            "calibration",
+            Value::Table(table([(
+                "pairs",
+                Value::String("calibration.csv".to_owned()),
+            )])),
+        ),
+        (
+            "frames",
+            Value::Array(options.loads.iter().enumerate().map(frame).collect()),
+        ),
         ("object", Value::Table(object)),
         ("waveguide", Value::Table(table([("layers", layers)]))),
     ])
 }
 
 fn table<const N: usize>(entries: [(&str, Value); N]) -> Table {
-    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    entries
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
 }
 
 /// A layer of the waveguide.
@@ -134,7 +162,10 @@ fn layer(l: &super::material::WaveguideLayer) -> Value {
     Value::Table(table([
         ("refractive_index", Value::Float(l.refractive_index)),
         ("thickness_m", Value::Float(l.thickness_m)),
-        ("youngs_modulus_pa", Value::Float(l.material.youngs_modulus_pa)),
+        (
+            "youngs_modulus_pa",
+            Value::Float(l.material.youngs_modulus_pa),
+        ),
         ("poisson_ratio", Value::Float(l.material.poisson_ratio)),
     ]))
 }

@@ -97,7 +97,10 @@ impl Hostile {
         let middle = camera.middle_px();
         let side = (camera.shape[0] as f64 * camera.pixel_size_m[1])
             .min(camera.shape[1] as f64 * camera.pixel_size_m[0]);
-        let unit = PressScene::new(PressOptions { loads: vec![Load::normal(1.0)], ..base.clone() })?;
+        let unit = PressScene::new(PressOptions {
+            loads: vec![Load::normal(1.0)],
+            ..base.clone()
+        })?;
         let unit_radius = unit.contact(0).contact_radius_m;
         // F = 4E*a³/(3R).
         let force = |radius_m: f64| (radius_m / unit_radius).powi(3);
@@ -114,7 +117,9 @@ impl Hostile {
             Self::SaturatedContact => options.gain = Gain::PeakGrey(2000.0),
             Self::CutByEdge => options.centre_px = Some([-0.5, middle[1]]),
             Self::InCorner => options.centre_px = Some([-0.5, -0.5]),
-            Self::SubPixelContact => options.loads[0] = Load::normal(force(0.3 * camera.pixel_size_m[0])),
+            Self::SubPixelContact => {
+                options.loads[0] = Load::normal(force(0.3 * camera.pixel_size_m[0]))
+            }
             Self::FillsFrame => options.loads[0] = Load::normal(force(3.0 * side)),
             Self::BrighterLamps => options.loads[0].illumination.level = 1.05,
             Self::MovedLamps => options.loads[0].illumination.tilt = [0.2, 0.0],
@@ -129,7 +134,11 @@ fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, super::
     let [rows, cols] = base.camera.shape.map(|n| n as f64);
     let mut scenes = Vec::new();
     let first = PressScene::new(base.clone())?;
-    for (share, at) in [(0.3, [0.25, 0.3]), (0.15, [0.7, 0.35]), (0.05, [0.45, 0.75])] {
+    for (share, at) in [
+        (0.3, [0.25, 0.3]),
+        (0.15, [0.7, 0.35]),
+        (0.05, [0.45, 0.75]),
+    ] {
         let options = PressOptions {
             loads: vec![Load::normal(share * force_n)],
             centre_px: Some([at[0] * cols, at[1] * rows]),

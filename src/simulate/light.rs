@@ -71,7 +71,10 @@ pub struct Illumination {
 
 impl Default for Illumination {
     fn default() -> Self {
-        Self { level: 1.0, tilt: [0.0; 2] }
+        Self {
+            level: 1.0,
+            tilt: [0.0; 2],
+        }
     }
 }
 

@@ -25,11 +25,20 @@ pub struct Elastic {
 
 impl Elastic {
     /// Versaflex CL2000X: 103 kPa, incompressible (the paper, §5).
-    pub const CL2000X: Self = Self { youngs_modulus_pa: 103e3, poisson_ratio: 0.5 };
+    pub const CL2000X: Self = Self {
+        youngs_modulus_pa: 103e3,
+        poisson_ratio: 0.5,
+    };
     /// Versaflex CL2003X: 62 kPa, incompressible (the paper, §5).
-    pub const CL2003X: Self = Self { youngs_modulus_pa: 62e3, poisson_ratio: 0.5 };
+    pub const CL2003X: Self = Self {
+        youngs_modulus_pa: 62e3,
+        poisson_ratio: 0.5,
+    };
     /// A body that does not deform.
-    pub const RIGID: Self = Self { youngs_modulus_pa: f64::INFINITY, poisson_ratio: 0.3 };
+    pub const RIGID: Self = Self {
+        youngs_modulus_pa: f64::INFINITY,
+        poisson_ratio: 0.3,
+    };
 
     /// (1 − ν²)/E in 1/Pa: what the body adds to 1/E*. Zero for a rigid body.
     pub fn plane_strain_compliance(&self) -> f64 {
@@ -37,8 +46,18 @@ impl Elastic {
     }
 
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
-        within("youngs_modulus_pa", self.youngs_modulus_pa, f64::MIN_POSITIVE, f64::INFINITY)?;
-        within("poisson_ratio", self.poisson_ratio, -1.0 + f64::EPSILON, 0.5)
+        within(
+            "youngs_modulus_pa",
+            self.youngs_modulus_pa,
+            f64::MIN_POSITIVE,
+            f64::INFINITY,
+        )?;
+        within(
+            "poisson_ratio",
+            self.poisson_ratio,
+            -1.0 + f64::EPSILON,
+            0.5,
+        )
     }
 }
 
@@ -109,9 +128,18 @@ impl Default for Waveguide {
         let layer = |refractive_index, thickness_m, youngs_modulus_pa| WaveguideLayer {
             refractive_index,
             thickness_m,
-            material: Elastic { youngs_modulus_pa, poisson_ratio: 0.5 },
+            material: Elastic {
+                youngs_modulus_pa,
+                poisson_ratio: 0.5,
+            },
         };
-        Self { layers: vec![layer(1.41, 2e-3, 1.36e5), layer(1.40, 3e-3, 8.0e4), layer(1.39, 5e-3, 3.4e4)] }
+        Self {
+            layers: vec![
+                layer(1.41, 2e-3, 1.36e5),
+                layer(1.40, 3e-3, 8.0e4),
+                layer(1.39, 5e-3, 3.4e4),
+            ],
+        }
     }
 }
 
@@ -125,9 +153,20 @@ impl Waveguide {
     /// ```
     pub fn series(&self) -> Elastic {
         let height = self.thickness_m();
-        let compliance: f64 = self.layers.iter().map(|l| l.thickness_m / l.material.youngs_modulus_pa).sum();
-        let weighted: f64 = self.layers.iter().map(|l| l.thickness_m * l.material.poisson_ratio).sum();
-        Elastic { youngs_modulus_pa: height / compliance, poisson_ratio: (weighted / height).min(0.5) }
+        let compliance: f64 = self
+            .layers
+            .iter()
+            .map(|l| l.thickness_m / l.material.youngs_modulus_pa)
+            .sum();
+        let weighted: f64 = self
+            .layers
+            .iter()
+            .map(|l| l.thickness_m * l.material.poisson_ratio)
+            .sum();
+        Elastic {
+            youngs_modulus_pa: height / compliance,
+            poisson_ratio: (weighted / height).min(0.5),
+        }
     }
 
     /// Thickness of the whole stack in metres.

@@ -32,8 +32,11 @@ impl Patch {
             if row < 0 || row >= frame.nrows() as isize {
                 continue;
             }
-            for (value, &light) in
-                frame.row_mut(row as usize).iter_mut().skip(first).zip(line.iter().skip(skip))
+            for (value, &light) in frame
+                .row_mut(row as usize)
+                .iter_mut()
+                .skip(first)
+                .zip(line.iter().skip(skip))
             {
                 *value += light;
             }
@@ -64,7 +67,10 @@ impl Disc {
     pub(super) fn window(&self, shape: [usize; 2], margin: usize) -> [[isize; 2]; 2] {
         let m = margin as isize;
         let span = |axis: usize, length: usize| {
-            let (c, r) = (self.centre_px[axis], self.radius_m / self.pixel_size_m[axis]);
+            let (c, r) = (
+                self.centre_px[axis],
+                self.radius_m / self.pixel_size_m[axis],
+            );
             let (limit, lowest) = (length as isize + m, -m);
             let first = ((c - r + 0.5).floor() as isize - m).clamp(lowest, limit);
             let last = ((c + r + 0.5).ceil() as isize + m).clamp(first, limit);
@@ -81,7 +87,9 @@ impl Disc {
         // In units of the radius: pixel sizes, and the pixels' first edges.
         let size: [f64; 2] = std::array::from_fn(|k| self.pixel_size_m[k] / self.radius_m);
         let edge = |axis: usize, k: isize| (k as f64 - 0.5 - self.centre_px[axis]) * size[axis];
-        let columns: Vec<Span> = (col0..col1).map(|k| Span::new(edge(0, k), size[0])).collect();
+        let columns: Vec<Span> = (col0..col1)
+            .map(|k| Span::new(edge(0, k), size[0]))
+            .collect();
         let xs: Vec<f64> = (col0..=col1).map(|k| edge(0, k)).collect();
         let mut corners = Corners::new(profile, &xs);
         for (r, mut line) in values.rows_mut().into_iter().enumerate() {
@@ -99,7 +107,10 @@ impl Disc {
                 };
             }
         }
-        Patch { origin: [row0, col0], values }
+        Patch {
+            origin: [row0, col0],
+            values,
+        }
     }
 }
 
@@ -174,7 +185,13 @@ struct Corners<'a> {
 impl<'a> Corners<'a> {
     fn new(profile: Profile, xs: &'a [f64]) -> Self {
         let unknown = vec![f64::NAN; xs.len()];
-        Self { profile, xs, ys: [0.0; 2], above: unknown.clone(), below: unknown }
+        Self {
+            profile,
+            xs,
+            ys: [0.0; 2],
+            above: unknown.clone(),
+            below: unknown,
+        }
     }
 
     /// Moves on to the row between `above` and `below`; the corners between it and the last row are kept.

@@ -62,15 +62,24 @@ impl PressScene {
     /// [`SimulateError::OutOfRange`] or [`SimulateError::TooFew`] naming the first field that has no meaning.
     pub fn new(options: PressOptions) -> Result<Self, SimulateError> {
         options.validate()?;
-        let contact = |l: &Load| Contact::new(&options.object, &options.waveguide, options.law, l.force_n);
+        let contact =
+            |l: &Load| Contact::new(&options.object, &options.waveguide, options.law, l.force_n);
         let contacts: Vec<Contact> = options.loads.iter().map(contact).collect();
-        let peak_pressure_pa = contacts.iter().map(|c| c.peak_pressure_pa).fold(0.0, f64::max);
+        let peak_pressure_pa = contacts
+            .iter()
+            .map(|c| c.peak_pressure_pa)
+            .fold(0.0, f64::max);
         let grey_per_pascal = match options.gain {
             Gain::GreyPerPascal(gain) => gain,
             Gain::PeakGrey(_) if peak_pressure_pa == 0.0 => 0.0,
             Gain::PeakGrey(grey) => grey / (peak_pressure_pa * (1.0 - options.response.droop())),
         };
-        Ok(Self { options, contacts, grey_per_pascal, peak_pressure_pa })
+        Ok(Self {
+            options,
+            contacts,
+            grey_per_pascal,
+            peak_pressure_pa,
+        })
     }
 
     /// What the scene was made from.
@@ -100,7 +109,11 @@ impl PressScene {
     /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
     /// ```
     pub fn droop_per_pascal(&self) -> f64 {
-        if self.peak_pressure_pa == 0.0 { 0.0 } else { self.options.response.droop() / self.peak_pressure_pa }
+        if self.peak_pressure_pa == 0.0 {
+            0.0
+        } else {
+            self.options.response.droop() / self.peak_pressure_pa
+        }
     }
 
     /// The frame without contact, and the frames and truth of every load.
@@ -117,7 +130,9 @@ impl PressScene {
 
     /// An exposure without contact; each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
-        self.options.camera.expose_reference(self.options.seed, repeat)
+        self.options
+            .camera
+            .expose_reference(self.options.seed, repeat)
     }
 
     /// An exposure of load `load`; each `repeat` has its own noise.
@@ -126,7 +141,9 @@ impl PressScene {
     /// If there is no such load.
     pub fn frame(&self, load: usize, repeat: u32) -> Array2<u8> {
         let light = self.expected_frame(load);
-        self.options.camera.expose_load(light.view(), self.options.seed, load, repeat)
+        self.options
+            .camera
+            .expose_load(light.view(), self.options.seed, load, repeat)
     }
 
     /// Expected grey levels of load `load`, before noise and rounding. Pass it to [`Camera::expose`](super::Camera::expose) to draw many
@@ -150,7 +167,9 @@ impl PressScene {
     /// If there is no such load.
     pub fn expected_frame(&self, load: usize) -> Array2<f64> {
         let leaked = self.leaked_light(load);
-        self.options.camera.compose(leaked.as_slice(), &self.options.loads[load].illumination)
+        self.options
+            .camera
+            .compose(leaked.as_slice(), &self.options.loads[load].illumination)
     }
 
     /// The truth of load `load`.
@@ -162,9 +181,21 @@ impl PressScene {
     }
 
     /// The same waveguide, camera, light and centre with another object and other loads.
-    pub(super) fn with_object(&self, object: Sphere, loads: Vec<Load>) -> Result<Self, SimulateError> {
-        let changed = Self::new(PressOptions { object, loads, ..self.options.clone() })?;
-        Ok(Self { grey_per_pascal: self.grey_per_pascal, peak_pressure_pa: self.peak_pressure_pa, ..changed })
+    pub(super) fn with_object(
+        &self,
+        object: Sphere,
+        loads: Vec<Load>,
+    ) -> Result<Self, SimulateError> {
+        let changed = Self::new(PressOptions {
+            object,
+            loads,
+            ..self.options.clone()
+        })?;
+        Ok(Self {
+            grey_per_pascal: self.grey_per_pascal,
+            peak_pressure_pa: self.peak_pressure_pa,
+            ..changed
+        })
     }
 
     /// Contact of load `load`.
@@ -175,13 +206,19 @@ impl PressScene {
     /// The contact's disc on the image plane.
     pub(super) fn disc(&self, load: usize) -> Disc {
         let options = &self.options;
-        let middle = options.centre_px.unwrap_or_else(|| options.camera.middle_px());
+        let middle = options
+            .centre_px
+            .unwrap_or_else(|| options.camera.middle_px());
         let pixel_size_m = options.camera.pixel_size_m;
         let shear = options.loads[load].shear_n;
         let centre_px = std::array::from_fn(|k| {
             middle[k] + shear[k] / options.shear_stiffness_n_per_m[k] / pixel_size_m[k]
         });
-        Disc { centre_px, radius_m: self.contacts[load].contact_radius_m, pixel_size_m }
+        Disc {
+            centre_px,
+            radius_m: self.contacts[load].contact_radius_m,
+            pixel_size_m,
+        }
     }
 
     /// Blurred light of the contact in grey levels above the background; none without force.
@@ -193,11 +230,15 @@ impl PressScene {
         let window = disc.window(camera.shape, camera.blur_reach());
         let mut patch = disc.average(Profile::Hemisphere, window);
         let peak = self.contacts[load].peak_pressure_pa;
-        patch.values.map_inplace(|v| *v *= self.grey_per_pascal * peak);
+        patch
+            .values
+            .map_inplace(|v| *v *= self.grey_per_pascal * peak);
         let droop = self.droop_per_pascal();
         if droop > 0.0 {
             let square = disc.average(Profile::Paraboloid, window);
-            patch.values.scaled_add(-self.grey_per_pascal * droop * peak * peak, &square.values);
+            patch
+                .values
+                .scaled_add(-self.grey_per_pascal * droop * peak * peak, &square.values);
         }
         camera.blur(&mut patch);
         Some(patch)

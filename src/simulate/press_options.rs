@@ -65,7 +65,11 @@ pub struct Load {
 impl Load {
     /// A normal force without shear, lamps unchanged.
     pub fn normal(force_n: f64) -> Self {
-        Self { force_n, shear_n: [0.0; 2], illumination: Illumination::default() }
+        Self {
+            force_n,
+            shear_n: [0.0; 2],
+            illumination: Illumination::default(),
+        }
     }
 }
 
@@ -118,7 +122,10 @@ impl Default for PressOptions {
     /// larger sphere or smaller loads.
     fn default() -> Self {
         Self {
-            object: Sphere { radius_m: 3e-3, material: Elastic::CL2000X },
+            object: Sphere {
+                radius_m: 3e-3,
+                material: Elastic::CL2000X,
+            },
             waveguide: Waveguide::default(),
             law: ContactLaw::Hertz,
             loads: vec![Load::normal(0.7), Load::normal(1.2)],

@@ -39,7 +39,12 @@ pub struct SurfacePattern {
 impl Default for SurfacePattern {
     /// A 0.5 mm base with 8×8 bumps of 0.3 to 0.6 mm.
     fn default() -> Self {
-        Self { base_height_m: 0.5e-3, bump_height_m: [0.3e-3, 0.6e-3], bumps: [8, 8], bump_share: 0.4 }
+        Self {
+            base_height_m: 0.5e-3,
+            bump_height_m: [0.3e-3, 0.6e-3],
+            bumps: [8, 8],
+            bump_share: 0.4,
+        }
     }
 }
 
@@ -47,9 +52,19 @@ impl SurfacePattern {
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
         positive("base_height_m", self.base_height_m)?;
         not_negative("bump_height_m", self.bump_height_m[0])?;
-        super::error::within("bump_height_m", self.bump_height_m[1], self.bump_height_m[0], f64::MAX)?;
+        super::error::within(
+            "bump_height_m",
+            self.bump_height_m[1],
+            self.bump_height_m[0],
+            f64::MAX,
+        )?;
         at_least("bumps", self.bumps[0].min(self.bumps[1]), 1)?;
-        super::error::within("bumps", self.bumps[0].max(self.bumps[1]) as f64, 1.0, 1000.0)?;
+        super::error::within(
+            "bumps",
+            self.bumps[0].max(self.bumps[1]) as f64,
+            1.0,
+            1000.0,
+        )?;
         super::error::within("bump_share", self.bump_share, 1e-6, 0.5)
     }
 
@@ -70,11 +85,18 @@ impl SurfacePattern {
                     let low = -0.5 * size_m[k] + at[k] as f64 * cell[k] + half_width_m;
                     uniform(low, low + cell[k] - 2.0 * half_width_m)
                 });
-                bumps
-                    .push(Bump { centre_m, height_m: uniform(self.bump_height_m[0], self.bump_height_m[1]) });
+                bumps.push(Bump {
+                    centre_m,
+                    height_m: uniform(self.bump_height_m[0], self.bump_height_m[1]),
+                });
             }
         }
-        Relief { size_m, base_height_m: self.base_height_m, half_width_m, bumps }
+        Relief {
+            size_m,
+            base_height_m: self.base_height_m,
+            half_width_m,
+            bumps,
+        }
     }
 }
 
@@ -102,15 +124,25 @@ impl Relief {
         }
         let factor = |b: &Bump, k: usize| {
             let t = (at[k] - b.centre_m[k]) / self.half_width_m;
-            if t.abs() < 1.0 { (FRAC_PI_2 * t).cos().powi(2) } else { 0.0 }
+            if t.abs() < 1.0 {
+                (FRAC_PI_2 * t).cos().powi(2)
+            } else {
+                0.0
+            }
         };
-        self.base_height_m + self.bumps.iter().map(|b| b.height_m * factor(b, 0) * factor(b, 1)).sum::<f64>()
+        self.base_height_m
+            + self
+                .bumps
+                .iter()
+                .map(|b| b.height_m * factor(b, 0) * factor(b, 1))
+                .sum::<f64>()
     }
 
     /// Volume between the face's plane and its heights, in cubic metres.
     pub(super) fn volume_m3(&self) -> f64 {
         let bumps: f64 = self.bumps.iter().map(|b| b.height_m).sum();
-        self.base_height_m * self.size_m[0] * self.size_m[1] + bumps * self.half_width_m * self.half_width_m
+        self.base_height_m * self.size_m[0] * self.size_m[1]
+            + bumps * self.half_width_m * self.half_width_m
     }
 
     /// ∫ of the plain face's indicator from −∞ to `x` along axis `k`, in metres.

@@ -132,7 +132,12 @@ impl PressScene {
         }
         let frames = (cycle.rest_s + cycle.period_s * cycle.cycles as f64) * cycle.frame_rate_hz;
         within("frames", frames, 0.0, 1e9)?;
-        Ok(FrameStream { scene: self.clone(), cycle, next: 0, count: frames.ceil() as usize })
+        Ok(FrameStream {
+            scene: self.clone(),
+            cycle,
+            next: 0,
+            count: frames.ceil() as usize,
+        })
     }
 }
 
@@ -169,7 +174,11 @@ impl Iterator for FrameStream {
         let camera = scene.options().camera;
         // Above the frames a scene makes itself, whose numbers stay below 2⁴⁷.
         let frame = camera.expose(light.view(), scene.options().seed, 1 << 47 | k as u64);
-        Some(StreamedFrame { time_s, frame, truth: scene.truth(0) })
+        Some(StreamedFrame {
+            time_s,
+            frame,
+            truth: scene.truth(0),
+        })
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {

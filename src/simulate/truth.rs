@@ -125,14 +125,19 @@ impl PressTruth {
 
     fn disc(&self) -> Disc {
         let radius_m = self.contact.contact_radius_m;
-        Disc { centre_px: self.centre_px, radius_m, pixel_size_m: self.pixel_size_m }
+        Disc {
+            centre_px: self.centre_px,
+            radius_m,
+            pixel_size_m: self.pixel_size_m,
+        }
     }
 
     fn averaged(&self, profile: Profile) -> Array2<f64> {
         let mut field = Array2::zeros(self.shape);
         if self.contact.contact_radius_m > 0.0 {
             let disc = self.disc();
-            disc.average(profile, disc.window(self.shape, 0)).add_to(&mut field);
+            disc.average(profile, disc.window(self.shape, 0))
+                .add_to(&mut field);
         }
         field
     }
@@ -156,23 +161,31 @@ impl PressTruth {
             let [row0, col0] = pressure.origin;
             self.centroid_px = [sum_x / sum + col0 as f64, sum_y / sum + row0 as f64];
         }
-        let squared =
-            if droop_per_pascal > 0.0 { disc.average(Profile::Paraboloid, window).values.sum() } else { 0.0 };
+        let squared = if droop_per_pascal > 0.0 {
+            disc.average(Profile::Paraboloid, window).values.sum()
+        } else {
+            0.0
+        };
         self.visible_force_n = peak * sum * self.pixel_size_m[0] * self.pixel_size_m[1];
-        self.integrated_pixel_value = self.grey_per_pascal * peak * (sum - droop_per_pascal * peak * squared);
+        self.integrated_pixel_value =
+            self.grey_per_pascal * peak * (sum - droop_per_pascal * peak * squared);
     }
 }
 
 /// Pixels whose expected grey level exceeds 255; the frame is made only where one can.
 fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
     let (options, lamps) = (scene.options(), scene.options().loads[load].illumination);
-    let brightest =
-        options.camera.background_grey + scene.grey_per_pascal() * scene.contact(load).peak_pressure_pa;
+    let brightest = options.camera.background_grey
+        + scene.grey_per_pascal() * scene.contact(load).peak_pressure_pa;
     let lit = lamps.level + 0.5 * (lamps.tilt[0].abs() + lamps.tilt[1].abs());
     if brightest * lit <= 255.0 {
         return 0;
     }
-    scene.expected_frame(load).iter().filter(|&&v| v > 255.0).count()
+    scene
+        .expected_frame(load)
+        .iter()
+        .filter(|&&v| v > 255.0)
+        .count()
 }
 
 /// The map that takes the apparent surface of one load to that of another: it scales about the contact's centre.
@@ -203,8 +216,9 @@ pub struct SurfaceScaling {
 impl SurfaceScaling {
     /// Where a point of the first surface lies on the second.
     pub fn apply(&self, point: &Point3<f64>) -> Point3<f64> {
-        let [x, y] =
-            std::array::from_fn(|k| self.to_centre_m[k] + self.scale * (point[k] - self.from_centre_m[k]));
+        let [x, y] = std::array::from_fn(|k| {
+            self.to_centre_m[k] + self.scale * (point[k] - self.from_centre_m[k])
+        });
         Point3::new(x, y, self.scale * point.z)
     }
 

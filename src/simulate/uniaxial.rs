@@ -56,14 +56,25 @@ impl UniaxialScene {
         options.validate()?;
         let area0 = options.face_m[0] * options.face_m[1];
         let solve = |&f: &f64| UniaxialState::new(&options.material, area0, f);
-        let states = options.forces_n.iter().map(solve).collect::<Result<Vec<_>, _>>()?;
+        let states = options
+            .forces_n
+            .iter()
+            .map(solve)
+            .collect::<Result<Vec<_>, _>>()?;
         let relief = options.pattern.place(options.face_m, options.seed);
-        let mut scene = Self { options, states, relief, grey_per_pascal: 1.0 };
+        let mut scene = Self {
+            options,
+            states,
+            relief,
+            grey_per_pascal: 1.0,
+        };
         scene.grey_per_pascal = match scene.options.gain {
             Gain::GreyPerPascal(gain) => gain,
             Gain::PeakGrey(grey) => {
                 let loads = 0..scene.states.len();
-                let peak = loads.flat_map(|k| scene.pressure(k).values).fold(0.0, f64::max);
+                let peak = loads
+                    .flat_map(|k| scene.pressure(k).values)
+                    .fold(0.0, f64::max);
                 if peak > 0.0 { grey / peak } else { 0.0 }
             }
         };
@@ -95,7 +106,9 @@ impl UniaxialScene {
 
     /// An exposure without contact; each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
-        self.options.camera.expose_reference(self.options.seed, repeat)
+        self.options
+            .camera
+            .expose_reference(self.options.seed, repeat)
     }
 
     /// An exposure of state `load`; each `repeat` has its own noise.
@@ -104,7 +117,9 @@ impl UniaxialScene {
     /// If there is no such state.
     pub fn frame(&self, load: usize, repeat: u32) -> Array2<u8> {
         let light = self.expected_frame(load);
-        self.options.camera.expose_load(light.view(), self.options.seed, load, repeat)
+        self.options
+            .camera
+            .expose_load(light.view(), self.options.seed, load, repeat)
     }
 
     /// Expected grey levels of state `load`, before noise and rounding.
@@ -126,7 +141,9 @@ impl UniaxialScene {
         let mut patch = self.pressure(load);
         patch.values.map_inplace(|v| *v *= self.grey_per_pascal);
         self.options.camera.blur(&mut patch);
-        self.options.camera.compose(&[patch], &Illumination::default())
+        self.options
+            .camera
+            .compose(&[patch], &Illumination::default())
     }
 
     /// Pressure in pascal averaged over each pixel; the sum times the pixel's area is the force.
@@ -163,7 +180,11 @@ impl UniaxialScene {
     /// # Panics
     /// If there is no such state.
     pub fn height_m(&self, load: usize) -> Array2<f64> {
-        let (s, centre, size) = (&self.states[load], self.centre_px(), self.options.camera.pixel_size_m);
+        let (s, centre, size) = (
+            &self.states[load],
+            self.centre_px(),
+            self.options.camera.pixel_size_m,
+        );
         Array2::from_shape_fn(self.options.camera.shape, |(row, col)| {
             let x = (col as f64 - centre[0]) * size[0] / s.stretch_lateral;
             let y = (row as f64 - centre[1]) * size[1] / s.stretch_lateral;
@@ -180,7 +201,11 @@ impl UniaxialScene {
         for row in 0..rows {
             for col in 0..columns {
                 let p = [at(col, columns, size[0]), at(row, rows, size[1])];
-                points.push(Point3::new(p[0] + centre[0], p[1] + centre[1], self.relief.height_m(p)));
+                points.push(Point3::new(
+                    p[0] + centre[0],
+                    p[1] + centre[1],
+                    self.relief.height_m(p),
+                ));
             }
         }
         points
@@ -209,7 +234,9 @@ impl UniaxialScene {
     }
 
     fn centre_px(&self) -> [f64; 2] {
-        self.options.centre_px.unwrap_or_else(|| self.options.camera.middle_px())
+        self.options
+            .centre_px
+            .unwrap_or_else(|| self.options.camera.middle_px())
     }
 
     fn centre_m(&self) -> [f64; 2] {
@@ -228,12 +255,18 @@ impl UniaxialScene {
             let limit = length as isize + reach;
             let first = ((centre[k] - half + 0.5).floor() as isize - reach).clamp(-reach, limit);
             let last = ((centre[k] + half + 0.5).ceil() as isize + reach).clamp(first, limit);
-            let edges = (first..=last).map(|i| (i as f64 - 0.5 - centre[k]) * pixel[k]).collect::<Vec<_>>();
+            let edges = (first..=last)
+                .map(|i| (i as f64 - 0.5 - centre[k]) * pixel[k])
+                .collect::<Vec<_>>();
             (first, edges)
         };
         let spans = [span(0, camera.shape[1]), span(1, camera.shape[0])];
         let means = |k: usize, integral: &dyn Fn(f64) -> f64| -> Vec<f64> {
-            spans[k].1.windows(2).map(|e| (integral(e[1]) - integral(e[0])) / pixel[k]).collect()
+            spans[k]
+                .1
+                .windows(2)
+                .map(|e| (integral(e[1]) - integral(e[0])) / pixel[k])
+                .collect()
         };
         let mut values = Array2::zeros((spans[1].1.len() - 1, spans[0].1.len() - 1));
         let face = |k: usize| means(k, &|x| relief.face_integral(k, x));
@@ -244,17 +277,27 @@ impl UniaxialScene {
         }
         let scale = s.force_n / (relief.volume_m3() * s.stretch_lateral * s.stretch_lateral);
         values.map_inplace(|v| *v *= scale);
-        Patch { origin: [spans[1].0, spans[0].0], values }
+        Patch {
+            origin: [spans[1].0, spans[0].0],
+            values,
+        }
     }
 }
 
 /// values += height · column ⊗ line, where both differ from zero.
 fn add_product(values: &mut Array2<f64>, height: f64, column: &[f64], line: &[f64]) {
     let first = line.iter().position(|&v| v != 0.0).unwrap_or(line.len());
-    let last = line.iter().rposition(|&v| v != 0.0).map_or(first, |k| k + 1);
+    let last = line
+        .iter()
+        .rposition(|&v| v != 0.0)
+        .map_or(first, |k| k + 1);
     for (mut row, &c) in values.rows_mut().into_iter().zip(column) {
         if c != 0.0 {
-            row.iter_mut().zip(line).take(last).skip(first).for_each(|(v, &l)| *v += height * c * l);
+            row.iter_mut()
+                .zip(line)
+                .take(last)
+                .skip(first)
+                .for_each(|(v, &l)| *v += height * c * l);
         }
     }
 }

@@ -58,13 +58,20 @@ pub struct UniaxialIncrement {
 }
 
 impl UniaxialState {
-    pub(super) fn new(material: &Elastic, area0_m2: f64, force_n: f64) -> Result<Self, SimulateError> {
+    pub(super) fn new(
+        material: &Elastic,
+        area0_m2: f64,
+        force_n: f64,
+    ) -> Result<Self, SimulateError> {
         let e = material.youngs_modulus_pa;
         // Nominal stress over modulus: λ(1 − λ²)/2, greatest at 1/√3.
         let load = force_n / (e * area0_m2);
         let limit = 1.0 / 27.0_f64.sqrt();
         if load >= limit {
-            return Err(SimulateError::Overload { force_n, limit_n: limit * e * area0_m2 });
+            return Err(SimulateError::Overload {
+                force_n,
+                limit_n: limit * e * area0_m2,
+            });
         }
         // λ³ − λ + 2·load = 0: the largest of three real roots by the cosine formula.
         let stretch = 2.0 / 3.0_f64.sqrt() * ((-load / limit).acos() / 3.0).cos();

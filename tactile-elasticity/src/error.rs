@@ -193,7 +193,10 @@ pub(crate) fn positive(value: f64, quantity: Quantity) -> Result<f64, Elasticity
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err(ElasticityError::NotPositive { quantity, found: value })
+        Err(ElasticityError::NotPositive {
+            quantity,
+            found: value,
+        })
     }
 }
 
@@ -202,16 +205,27 @@ pub(crate) fn not_negative(value: f64, quantity: Quantity) -> Result<f64, Elasti
     if value >= 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err(ElasticityError::Negative { quantity, found: value })
+        Err(ElasticityError::Negative {
+            quantity,
+            found: value,
+        })
     }
 }
 
 /// `value` if it is finite.
 pub(crate) fn finite(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
-    if value.is_finite() { Ok(value) } else { Err(ElasticityError::NotFinite { quantity }) }
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(ElasticityError::NotFinite { quantity })
+    }
 }
 
 /// `value` if it is a Poisson ratio in (−1, ½].
 pub(crate) fn poisson(value: f64) -> Result<f64, ElasticityError> {
-    if value > -1.0 && value <= 0.5 { Ok(value) } else { Err(ElasticityError::PoissonRatio { found: value }) }
+    if value > -1.0 && value <= 0.5 {
+        Ok(value)
+    } else {
+        Err(ElasticityError::PoissonRatio { found: value })
+    }
 }

@@ -40,13 +40,18 @@ const NO_EVIDENCE: f64 = 2.0;
 /// others, ascending. The list must not be empty.
 pub(crate) fn rank(criteria: &[f64]) -> (Vec<usize>, SelectionReason) {
     let lowest = criteria.iter().copied().fold(f64::INFINITY, f64::min);
-    let chosen = criteria.iter().position(|c| *c <= lowest + NO_EVIDENCE).unwrap_or(0);
+    let chosen = criteria
+        .iter()
+        .position(|c| *c <= lowest + NO_EVIDENCE)
+        .unwrap_or(0);
     let mut others: Vec<usize> = (0..criteria.len()).filter(|&k| k != chosen).collect();
     others.sort_by(|&i, &j| criteria[i].total_cmp(&criteria[j]));
     let reason = match others.first().map(|&k| criteria[k] - criteria[chosen]) {
         None => SelectionReason::OnlyCandidate,
         Some(margin) if margin > NO_EVIDENCE => SelectionReason::BetterFit { margin },
-        Some(_) => SelectionReason::MostGeneral { behind: criteria[chosen] - lowest },
+        Some(_) => SelectionReason::MostGeneral {
+            behind: criteria[chosen] - lowest,
+        },
     };
     others.insert(0, chosen);
     (others, reason)

@@ -3,7 +3,8 @@
 use ndarray::ArrayView2;
 
 use crate::{
-    ForceError, ForceMeasurement, ForceMeter, ForceWorkspace, Real, ReferenceFrame, StressCalibration,
+    ForceError, ForceMeasurement, ForceMeter, ForceWorkspace, Real, ReferenceFrame,
+    StressCalibration,
 };
 
 impl<T: Real> ForceMeter<T> {
@@ -35,7 +36,10 @@ impl<T: Real> ForceMeter<T> {
         calibration: &(impl StressCalibration<T> + ?Sized),
     ) -> Vec<Result<ForceMeasurement<T>, ForceError>> {
         let mut workspace = ForceWorkspace::default();
-        frames.iter().map(|f| self.measure_with(&mut workspace, f.view(), reference, calibration)).collect()
+        frames
+            .iter()
+            .map(|f| self.measure_with(&mut workspace, f.view(), reference, calibration))
+            .collect()
     }
 
     /// Measures frames on all threads of the current pool; the results are those of [`ForceMeter::measure_all`], bit for bit.

@@ -83,7 +83,11 @@ impl DriftLine {
     /// Corrected difference of the pixel `x` columns from the line's start.
     pub(crate) fn difference(&self, x: usize, frame: f32, reference: f32) -> f32 {
         let level = self.start + self.step * x as f32;
-        if self.lamp { frame / level - reference } else { frame - reference - level }
+        if self.lamp {
+            frame / level - reference
+        } else {
+            frame - reference - level
+        }
     }
 }
 
@@ -116,7 +120,11 @@ impl Drift {
         let y = row as f64 - self.middle[1];
         let x = first_column as f64 - self.middle[0];
         let start = value + per_column * x + per_row * y;
-        DriftLine { lamp: self.correction.is_lamp(), start: start as f32, step: per_column as f32 }
+        DriftLine {
+            lamp: self.correction.is_lamp(),
+            start: start as f32,
+            step: per_column as f32,
+        }
     }
 
     /// Variances that the correction leaves at a place: of the background in squared grey levels, and of the signal's scale.
@@ -139,19 +147,33 @@ impl Drift {
     fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
         let [value, per_column, per_row] = self.coefficients;
         let at = value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1]);
-        if self.correction.is_lamp() { reference * (at - 1.0) } else { at }
+        if self.correction.is_lamp() {
+            reference * (at - 1.0)
+        } else {
+            at
+        }
     }
 
     /// The greatest background it takes anywhere in the frame, in grey levels, for a reference of even brightness.
-    pub(crate) fn greatest_grey(&self, statistics: &FrameStatistics, reference: &ReferenceFrame) -> f64 {
+    pub(crate) fn greatest_grey(
+        &self,
+        statistics: &FrameStatistics,
+        reference: &ReferenceFrame,
+    ) -> f64 {
         if self.is_zero() {
             return 0.0;
         }
         let image = reference.image();
         let mean = image.iter().map(|p| f64::from(*p)).sum::<f64>() / image.len() as f64;
-        let (right, bottom) = (statistics.columns as f64 - 1.0, statistics.rows as f64 - 1.0);
+        let (right, bottom) = (
+            statistics.columns as f64 - 1.0,
+            statistics.rows as f64 - 1.0,
+        );
         let corners = [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]];
-        corners.iter().map(|[x, y]| self.level(*x, *y, mean).abs()).fold(0.0, f64::max)
+        corners
+            .iter()
+            .map(|[x, y]| self.level(*x, *y, mean).abs())
+            .fold(0.0, f64::max)
     }
 
     /// What is left of a tile's summed difference.
@@ -180,19 +202,34 @@ pub(crate) fn fit(
     scratch: &mut Vec<f64>,
 ) -> Drift {
     let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
-    let mut drift = Drift { correction, middle, ..Drift::none() };
+    let mut drift = Drift {
+        correction,
+        middle,
+        ..Drift::none()
+    };
     if correction.is_lamp() {
         drift.coefficients[0] = 1.0;
     }
     let terms = correction.terms();
-    drift.coefficients[0] += median(scratch, tiles.clone().map(|t| drift.residual(&t) / weight(&drift, &t)));
+    drift.coefficients[0] += median(
+        scratch,
+        tiles
+            .clone()
+            .map(|t| drift.residual(&t) / weight(&drift, &t)),
+    );
     let mut kept = 0;
     for _ in 0..20 {
-        let spread = 1.4826 * median(scratch, tiles.clone().map(|t| (drift.residual(&t) / t.pixels).abs()));
+        let spread = 1.4826
+            * median(
+                scratch,
+                tiles.clone().map(|t| (drift.residual(&t) / t.pixels).abs()),
+            );
         let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
         let limit = 3.0 * spread.max(noise);
         let before = drift;
-        let near = tiles.clone().filter(|t| (before.residual(t) / t.pixels).abs() <= limit);
+        let near = tiles
+            .clone()
+            .filter(|t| (before.residual(t) / t.pixels).abs() <= limit);
         let count = drift.step(near, terms, sd);
         drift.tiles = count;
         if count == kept {
@@ -205,7 +242,11 @@ pub(crate) fn fit(
 
 /// What one unit of the first coefficient does to a tile's sum.
 fn weight(drift: &Drift, tile: &TileSum) -> f64 {
-    if drift.correction.is_lamp() { tile.reference.max(1.0) } else { tile.pixels }
+    if drift.correction.is_lamp() {
+        tile.reference.max(1.0)
+    } else {
+        tile.pixels
+    }
 }
 
 impl Drift {
@@ -213,7 +254,9 @@ impl Drift {
     fn step(&mut self, tiles: impl Iterator<Item = TileSum>, terms: usize, sd: f64) -> usize {
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
         let sums = Normal::of(self, tiles, terms, scale);
-        let Some(inverse) = sums.matrix.try_inverse() else { return sums.count };
+        let Some(inverse) = sums.matrix.try_inverse() else {
+            return sums.count;
+        };
         let step = inverse * sums.right;
         for i in 0..terms {
             self.coefficients[i] += step[i] / scale[i];
@@ -238,13 +281,28 @@ struct Normal {
 
 impl Normal {
     /// Places count from the frame's middle, in units of `scale`.
-    fn of(drift: &Drift, tiles: impl Iterator<Item = TileSum>, terms: usize, scale: [f64; 3]) -> Self {
+    fn of(
+        drift: &Drift,
+        tiles: impl Iterator<Item = TileSum>,
+        terms: usize,
+        scale: [f64; 3],
+    ) -> Self {
         let (mut matrix, right) = (nalgebra::Matrix3::identity(), nalgebra::Vector3::zeros());
         matrix.view_mut((0, 0), (terms, terms)).fill(0.0);
-        let mut sums = Self { matrix, right, count: 0, reference: 0.0, pixels: 0.0 };
+        let mut sums = Self {
+            matrix,
+            right,
+            count: 0,
+            reference: 0.0,
+            pixels: 0.0,
+        };
         for tile in tiles {
             let w = weight(drift, &tile);
-            let at = [1.0, (tile.x - drift.middle[0]) / scale[1], (tile.y - drift.middle[1]) / scale[2]];
+            let at = [
+                1.0,
+                (tile.x - drift.middle[0]) / scale[1],
+                (tile.y - drift.middle[1]) / scale[2],
+            ];
             let residual = drift.residual(&tile);
             for i in 0..terms {
                 sums.right[i] += w * at[i] * residual / tile.pixels;

@@ -148,6 +148,14 @@ impl Requirement {
             Self::Odd => value >= 1.0 && value % 2.0 == 1.0,
             Self::AtLeastOne => value >= 1.0 && value.is_finite(),
         };
-        if holds { Ok(()) } else { Err(ForceError::InvalidOption { name, value, requirement: self }) }
+        if holds {
+            Ok(())
+        } else {
+            Err(ForceError::InvalidOption {
+                name,
+                value,
+                requirement: self,
+            })
+        }
     }
 }

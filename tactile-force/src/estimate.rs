@@ -26,7 +26,8 @@ pub trait Real: Float + FromPrimitive + Debug + Display + Default + Send + Sync 
     }
 }
 
-impl<T> Real for T where T: Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static {}
+impl<T> Real for T where T: Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static
+{}
 
 /// A value and its standard error (one standard deviation), both in the unit the field's name states.
 ///
@@ -46,7 +47,10 @@ pub struct Estimate<T> {
 
 impl<T: Real> Estimate<T> {
     pub(crate) fn nearest(value: f64, variance: f64) -> Self {
-        Self { value: T::nearest(value), standard_error: T::nearest(variance.max(0.0).sqrt()) }
+        Self {
+            value: T::nearest(value),
+            standard_error: T::nearest(variance.max(0.0).sqrt()),
+        }
     }
 
     /// The value and its error in another unit.
@@ -58,7 +62,10 @@ impl<T: Real> Estimate<T> {
     /// assert_eq!(metres, Estimate { value: 100.0, standard_error: 2.0 });
     /// ```
     pub fn scaled(self, factor: T) -> Self {
-        Self { value: self.value * factor, standard_error: self.standard_error * factor.abs() }
+        Self {
+            value: self.value * factor,
+            standard_error: self.standard_error * factor.abs(),
+        }
     }
 }
 

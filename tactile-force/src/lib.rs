@@ -41,13 +41,18 @@ mod shear;
 
 pub use calibration::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, Hysteresis,
-    LinearCalibration, MonotoneCalibration, PolynomialCalibration, Robustness, StopReason, StressCalibration,
+    LinearCalibration, MonotoneCalibration, PolynomialCalibration, Robustness, StopReason,
+    StressCalibration,
 };
-pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity};
+pub use contact::{
+    Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
+};
 pub use drift::{Drift, DriftCorrection};
 pub use error::{ForceError, Requirement};
 pub use estimate::{Estimate, Real};
-pub use frame::{BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame};
+pub use frame::{
+    BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame,
+};
 pub use hertz::{HertzFit, HertzFitOptions, HertzFitter};
 pub use image::{
     GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,

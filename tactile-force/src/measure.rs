@@ -160,11 +160,17 @@ impl<T: Real> ForceMeter<T> {
         reference: &ReferenceFrame,
         calibration: &(impl StressCalibration<T> + ?Sized),
     ) -> Result<ForceMeasurement<T>, ForceError> {
-        let found = self.detector.detect_with(&mut workspace.detector, frame, reference)?;
+        let found = self
+            .detector
+            .detect_with(&mut workspace.detector, frame, reference)?;
         let (Some(contact), Some(noise)) = (found.contact, found.noise) else {
             return Ok(ForceMeasurement::without_contact(found));
         };
-        let profile = if self.skip_profile { None } else { self.profile(workspace, &contact, noise) };
+        let profile = if self.skip_profile {
+            None
+        } else {
+            self.profile(workspace, &contact, noise)
+        };
         Ok(self.combine(found, contact, profile, calibration))
     }
 
@@ -182,7 +188,13 @@ impl<T: Real> ForceMeter<T> {
             radius: contact.equivalent_radius_px.as_f64() * (hy / hx).sqrt(),
             integral: contact.integrated_pixel_value.value.as_f64(),
         };
-        self.fitter.fit_with(&mut workspace.rings, &workspace.detector.region, start, noise, [hx, hy])
+        self.fitter.fit_with(
+            &mut workspace.rings,
+            &workspace.detector.region,
+            start,
+            noise,
+            [hx, hy],
+        )
     }
 
     fn combine(
@@ -196,12 +208,22 @@ impl<T: Real> ForceMeter<T> {
         let pixel_area = hx * hy;
         let reading = calibration.read(contact.integrated_pixel_value);
         let radius = contact_radius(&contact, profile, pixel_area.sqrt());
-        let step = calibration.stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel_area);
-        let peak = profile.map_or(Estimate { value: contact.peak, standard_error: T::one() }, |p| p.peak);
+        let step =
+            calibration.stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel_area);
+        let peak = profile.map_or(
+            Estimate {
+                value: contact.peak,
+                standard_error: T::one(),
+            },
+            |p| p.peak,
+        );
         ForceMeasurement {
             force_n: reading.force_n,
             reading: Some(reading),
-            centroid_m: Some([contact.centroid_px[0].scaled(hx), contact.centroid_px[1].scaled(hy)]),
+            centroid_m: Some([
+                contact.centroid_px[0].scaled(hx),
+                contact.centroid_px[1].scaled(hy),
+            ]),
             contact_area_m2: Some(T::nearest(contact.area_px as f64) * pixel_area),
             contact_radius_m: Some(radius),
             mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
@@ -216,9 +238,16 @@ impl<T: Real> ForceMeter<T> {
 }
 
 /// The profile's radius, else the mask's with half a pixel as its error; `side` is that of a square pixel of equal area.
-fn contact_radius<T: Real>(contact: &Contact<T>, profile: Option<HertzFit<T>>, side: T) -> Estimate<T> {
+fn contact_radius<T: Real>(
+    contact: &Contact<T>,
+    profile: Option<HertzFit<T>>,
+    side: T,
+) -> Estimate<T> {
     let half = T::nearest(0.5) * side;
-    let of_mask = Estimate { value: contact.equivalent_radius_px * side, standard_error: half };
+    let of_mask = Estimate {
+        value: contact.equivalent_radius_px * side,
+        standard_error: half,
+    };
     profile.map_or(of_mask, |p| p.radius_m)
 }
 
@@ -228,7 +257,10 @@ fn mean_stress<T: Real>(force: Estimate<T>, radius: Estimate<T>) -> Estimate<T> 
     let two = T::one() + T::one();
     let value = force.value / (pi * radius.value * radius.value);
     let relative = |e: Estimate<T>| e.standard_error / e.value;
-    Estimate { value, standard_error: value * relative(force).hypot(two * relative(radius)) }
+    Estimate {
+        value,
+        standard_error: value * relative(force).hypot(two * relative(radius)),
+    }
 }
 
 impl<T: Real> ForceMeasurement<T> {
@@ -282,5 +314,10 @@ pub fn measure_force<T: Real>(
 ) -> Result<ForceMeasurement<T>, ForceError> {
     let meter = ForceMeter::new(pixel_size_m, options)?;
     let reference = ReferenceFrame::new(reference)?;
-    meter.measure_with(&mut ForceWorkspace::default(), frame, &reference, calibration)
+    meter.measure_with(
+        &mut ForceWorkspace::default(),
+        frame,
+        &reference,
+        calibration,
+    )
 }

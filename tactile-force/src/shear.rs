@@ -51,9 +51,17 @@ impl<T: Real> ShearCalibration<T> {
     /// Fewer than two pairs, a pair that is not finite, or an axis along which nothing moved.
     pub fn fit(pairs: &[ShearPair<T>]) -> Result<Self, ForceError> {
         if pairs.len() < 2 {
-            return Err(ForceError::TooFewPairs { required: 2, found: pairs.len() });
+            return Err(ForceError::TooFewPairs {
+                required: 2,
+                found: pairs.len(),
+            });
         }
-        let finite = |p: &ShearPair<T>| p.centroid_step_m.iter().chain(&p.force_n).all(|v| v.is_finite());
+        let finite = |p: &ShearPair<T>| {
+            p.centroid_step_m
+                .iter()
+                .chain(&p.force_n)
+                .all(|v| v.is_finite())
+        };
         if let Some(index) = pairs.iter().position(|p| !finite(p)) {
             return Err(ForceError::NonFinitePair { index });
         }
@@ -90,8 +98,10 @@ fn axis<T: Real>(pairs: &[ShearPair<T>], k: usize) -> Result<(f64, f64, f64), Fo
         return Err(ForceError::DegeneratePairs { span: 0.0 });
     }
     let stiffness = uf / uu;
-    let residual = |p: &ShearPair<T>| p.force_n[k].as_f64() - stiffness * p.centroid_step_m[k].as_f64();
-    let variance = pairs.iter().map(|p| residual(p).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
+    let residual =
+        |p: &ShearPair<T>| p.force_n[k].as_f64() - stiffness * p.centroid_step_m[k].as_f64();
+    let variance =
+        pairs.iter().map(|p| residual(p).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
     Ok((stiffness, variance / uu, variance.sqrt()))
 }
 
@@ -155,7 +165,11 @@ pub struct ShearTracker<T> {
 impl<T: Real> ShearTracker<T> {
     /// A tracker that waits for contact.
     pub fn new(calibration: ShearCalibration<T>) -> Self {
-        Self { calibration, first: None, last: None }
+        Self {
+            calibration,
+            first: None,
+            last: None,
+        }
     }
 
     /// Takes the next frame. The first frame of a contact has zero shear by definition; without contact there is none, and
@@ -177,7 +191,10 @@ impl<T: Real> ShearTracker<T> {
     /// assert!(tracker.update_centroid(None).is_none());
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
-    pub fn update_centroid(&mut self, centroid_m: Option<[Estimate<T>; 2]>) -> Option<ShearMeasurement<T>> {
+    pub fn update_centroid(
+        &mut self,
+        centroid_m: Option<[Estimate<T>; 2]>,
+    ) -> Option<ShearMeasurement<T>> {
         let Some(now) = centroid_m else {
             (self.first, self.last) = (None, None);
             return None;
@@ -187,7 +204,11 @@ impl<T: Real> ShearTracker<T> {
         let step_m = self.last.map_or(zero, |from| difference(now, from));
         self.first.get_or_insert(now);
         self.last = Some(now);
-        Some(ShearMeasurement { displacement_m, step_m, force_n: self.calibration.force_n(displacement_m) })
+        Some(ShearMeasurement {
+            displacement_m,
+            step_m,
+            force_n: self.calibration.force_n(displacement_m),
+        })
     }
 }
 

@@ -48,8 +48,16 @@ impl LinearAssignment {
     /// # Errors
     /// [`MatchError::InvalidOption`] unless the distance is positive and finite.
     pub fn within(max_distance: f64) -> Result<Self, MatchError> {
-        option_within("max_distance", max_distance, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
-        Ok(Self { max_distance: Some(max_distance) })
+        option_within(
+            "max_distance",
+            max_distance,
+            f64::MIN_POSITIVE,
+            f64::MAX,
+            "(0, ∞)",
+        )?;
+        Ok(Self {
+            max_distance: Some(max_distance),
+        })
     }
 }
 
@@ -63,7 +71,12 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for LinearAssignment {
         let distances = Distances::new(model, target);
         let limit = distances.limit(self.max_distance);
         // nalgebra is column-major: the transpose in memory is row-major.
-        let costs: Vec<f64> = distances.squared.transpose().iter().map(|s| s.min(limit)).collect();
+        let costs: Vec<f64> = distances
+            .squared
+            .transpose()
+            .iter()
+            .map(|s| s.min(limit))
+            .collect();
         let mut assignment = linear_assignment(&costs, model.len(), target.len())?;
         for (i, partner) in assignment.iter_mut().enumerate() {
             *partner = partner.filter(|&j| distances.squared[(i, j)] <= limit);

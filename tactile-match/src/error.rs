@@ -52,7 +52,9 @@ pub enum MatchError {
         set: PointSet,
     },
     /// A coordinate is NaN, infinite or so large that its square is (beyond 10¹⁵³ in double, 10¹⁸ in single precision).
-    #[error("point {row} of the {set} has a coordinate that is not finite or too large to be squared")]
+    #[error(
+        "point {row} of the {set} has a coordinate that is not finite or too large to be squared"
+    )]
     NotFinite {
         /// The set the point belongs to.
         set: PointSet,

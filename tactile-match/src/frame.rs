@@ -12,7 +12,10 @@ pub(crate) struct Frame<const D: usize> {
 
 impl<const D: usize> Default for Frame<D> {
     fn default() -> Self {
-        Self { centre: SVector::zeros(), scale: 1.0 }
+        Self {
+            centre: SVector::zeros(),
+            scale: 1.0,
+        }
     }
 }
 
@@ -25,14 +28,27 @@ impl<const D: usize> Frame<D> {
     /// Centre and root mean square radius of a set; scale one where all points coincide.
     pub(crate) fn of<T: RealField + Copy>(points: &[Point<T, D>]) -> Self {
         let (centre, radius) = centre_and_radius(points);
-        Self { centre, scale: if radius > 0.0 { radius } else { 1.0 } }
+        Self {
+            centre,
+            scale: if radius > 0.0 { radius } else { 1.0 },
+        }
     }
 
     /// The model's centre and the largest distance from it along an axis in either set: for sets compared as they lie.
-    pub(crate) fn of_both<T: RealField + Copy>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
+    pub(crate) fn of_both<T: RealField + Copy>(
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Self {
         let centre = Self::of(model).centre;
-        let largest = model.iter().chain(target).map(|p| (widened(p) - centre).amax()).fold(0.0, f64::max);
-        Self { centre, scale: if largest > 0.0 { largest } else { 1.0 } }
+        let largest = model
+            .iter()
+            .chain(target)
+            .map(|p| (widened(p) - centre).amax())
+            .fold(0.0, f64::max);
+        Self {
+            centre,
+            scale: if largest > 0.0 { largest } else { 1.0 },
+        }
     }
 
     /// A point in this frame.
@@ -41,10 +57,17 @@ impl<const D: usize> Frame<D> {
     }
 
     /// All points in this frame.
-    pub(crate) fn enter<T: RealField + Copy>(&self, points: &[Point<T, D>], columns: &mut [Vec<f64>; D]) {
+    pub(crate) fn enter<T: RealField + Copy>(
+        &self,
+        points: &[Point<T, D>],
+        columns: &mut [Vec<f64>; D],
+    ) {
         columns.iter_mut().for_each(Vec::clear);
         for point in points {
-            columns.iter_mut().zip(self.inside(point).iter()).for_each(|(column, &c)| column.push(c));
+            columns
+                .iter_mut()
+                .zip(self.inside(point).iter())
+                .for_each(|(column, &c)| column.push(c));
         }
     }
 
@@ -60,12 +83,23 @@ pub(crate) fn centre_and_radius<T: RealField + Copy, const D: usize>(
 ) -> (SVector<f64, D>, f64) {
     let n = points.len() as f64;
     let origin = widened(&points[0]); // sums of differences keep the digits of sets far from the origin
-    let centre = origin + points.iter().map(|p| widened(p) - origin).sum::<SVector<f64, D>>() / n;
+    let centre = origin
+        + points
+            .iter()
+            .map(|p| widened(p) - origin)
+            .sum::<SVector<f64, D>>()
+            / n;
     // The largest radius taken out first: no square under- or overflows.
-    let largest = points.iter().map(|p| (widened(p) - centre).amax()).fold(0.0, f64::max);
+    let largest = points
+        .iter()
+        .map(|p| (widened(p) - centre).amax())
+        .fold(0.0, f64::max);
     if !(largest > 0.0 && largest.is_finite()) {
         return (centre, 0.0);
     }
-    let squares: f64 = points.iter().map(|p| ((widened(p) - centre) / largest).norm_squared()).sum();
+    let squares: f64 = points
+        .iter()
+        .map(|p| ((widened(p) - centre) / largest).norm_squared())
+        .sum();
     (centre, largest * (squares / n).sqrt())
 }

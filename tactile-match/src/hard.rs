@@ -4,7 +4,8 @@ use crate::frame::Frame;
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
 use tactile_tps::{
-    Affine, AffineModel, Factorization, FitOptions, NegR, R2LogR, Scalar, Smoothing, Warp, WarpModel,
+    Affine, AffineModel, Factorization, FitOptions, NegR, R2LogR, Scalar, Smoothing, Warp,
+    WarpModel,
 };
 
 /// Soft matches below this weight are left out.
@@ -22,11 +23,17 @@ pub(crate) struct Distances<const D: usize> {
 impl<const D: usize> Distances<D> {
     pub(crate) fn new<T: Scalar>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
         let frame = Frame::of_both(model, target);
-        let inside = |points: &[Point<T, D>]| points.iter().map(|p| frame.inside(p)).collect::<Vec<_>>();
+        let inside =
+            |points: &[Point<T, D>]| points.iter().map(|p| frame.inside(p)).collect::<Vec<_>>();
         let (model, target) = (inside(model), inside(target));
-        let squared =
-            DMatrix::from_fn(model.len(), target.len(), |i, j| (model[i] - target[j]).norm_squared());
-        Self { frame, target, squared }
+        let squared = DMatrix::from_fn(model.len(), target.len(), |i, j| {
+            (model[i] - target[j]).norm_squared()
+        });
+        Self {
+            frame,
+            target,
+            squared,
+        }
     }
 
     /// The square of a length of the caller, in the units of the frame; infinite for none.
@@ -39,12 +46,16 @@ impl<const D: usize> Distances<D> {
     fn posterior(&self, i: usize, variance: f64) -> Vec<f64> {
         let row = self.squared.row(i);
         let least = row.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut p: Vec<f64> =
-            row.iter()
-                .map(|&s| {
-                    if s > least { (-0.5 * (s - least) / variance.max(f64::MIN_POSITIVE)).exp() } else { 1.0 }
-                })
-                .collect();
+        let mut p: Vec<f64> = row
+            .iter()
+            .map(|&s| {
+                if s > least {
+                    (-0.5 * (s - least) / variance.max(f64::MIN_POSITIVE)).exp()
+                } else {
+                    1.0
+                }
+            })
+            .collect();
         let sum: f64 = p.iter().sum();
         p.iter_mut().for_each(|p| *p /= sum);
         p
@@ -56,7 +67,9 @@ impl<const D: usize> Distances<D> {
             .target
             .iter()
             .zip(p)
-            .fold(SMatrix::zeros(), |sum, (y, &p)| sum + (y - mean) * (y - mean).transpose() * p);
+            .fold(SMatrix::zeros(), |sum, (y, &p)| {
+                sum + (y - mean) * (y - mean).transpose() * p
+            });
         sum * (self.frame.scale * self.frame.scale)
     }
 }
@@ -69,8 +82,11 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
     distances: &Distances<D>,
     assignment: Vec<Option<usize>>,
 ) -> Matching<T, D> {
-    let pairs: Vec<(usize, usize)> =
-        assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect();
+    let pairs: Vec<(usize, usize)> = assignment
+        .iter()
+        .enumerate()
+        .filter_map(|(i, j)| j.map(|j| (i, j)))
+        .collect();
     let total: f64 = pairs.iter().map(|&(i, j)| distances.squared[(i, j)]).sum();
     let variance = total / (pairs.len().max(1) * D) as f64;
     let (mut soft, mut confidence, mut covariance) = (SoftMatches::new(), Vec::new(), Vec::new());
@@ -78,14 +94,19 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
         let p = distances.posterior(i, variance);
         confidence.push(partner.map_or_else(T::zero, |j| nalgebra::convert(p[j])));
         covariance.push(distances.spread(&p).map(nalgebra::convert));
-        let kept = p.iter().enumerate().filter(|(_, p)| partner.is_some() && **p > NEGLIGIBLE);
+        let kept = p
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| partner.is_some() && **p > NEGLIGIBLE);
         soft.push_row(kept.map(|(j, &p)| (j, nalgebra::convert::<f64, T>(p))));
     }
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
     let (warp, warped) = through(model, &sources, &images);
-    let residual =
-        pairs.iter().map(|&(i, j)| (warped[i] - target[j]).norm_squared()).fold(T::zero(), |s, r| s + r);
+    let residual = pairs
+        .iter()
+        .map(|&(i, j)| (warped[i] - target[j]).norm_squared())
+        .fold(T::zero(), |s, r| s + r);
     let count: T = nalgebra::convert(pairs.len().max(1) as f64);
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
     let scale = distances.frame.scale;
@@ -117,13 +138,18 @@ fn through<T: Scalar, const D: usize>(
 ) -> (Box<dyn Warp<T, D> + Send + Sync>, Vec<Point<T, D>>) {
     let finite = |warp: &dyn Warp<T, D>| {
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        warped.iter().all(|p| p.iter().all(|c| c.is_finite())).then_some(warped)
+        warped
+            .iter()
+            .all(|p| p.iter().all(|c| c.is_finite()))
+            .then_some(warped)
     };
     let spline = spline(sources, images, None, Smoothing::None);
     if let Some(warped) = finite(&spline) {
         return (spline, warped);
     }
-    let affine = AffineModel.fit(sources, images, None).unwrap_or_else(|_| Affine::identity());
+    let affine = AffineModel
+        .fit(sources, images, None)
+        .unwrap_or_else(|_| Affine::identity());
     if let Some(warped) = finite(&affine) {
         return (Box::new(affine), warped);
     }
@@ -147,14 +173,20 @@ pub(crate) struct Interpolation<T: Scalar, const D: usize> {
 }
 
 impl<T: Scalar, const D: usize> Interpolation<T, D> {
-    pub(crate) fn new(sources: &[Point<T, D>], weights: Option<Vec<T>>, smoothing: Smoothing<T>) -> Self {
+    pub(crate) fn new(
+        sources: &[Point<T, D>],
+        weights: Option<Vec<T>>,
+        smoothing: Smoothing<T>,
+    ) -> Self {
         fn options<T: Scalar, K>(
             kernel: K,
             smoothing: Smoothing<T>,
             weights: &Option<Vec<T>>,
         ) -> FitOptions<T, K> {
             let options = FitOptions::new(kernel).smoothing(smoothing);
-            weights.iter().fold(options, |options, weights| options.weights(weights.clone()))
+            weights
+                .iter()
+                .fold(options, |options, weights| options.weights(weights.clone()))
         }
         let system = if D == 2 {
             let plane = Factorization::new(sources, &options(R2LogR, smoothing, &weights));
@@ -163,7 +195,11 @@ impl<T: Scalar, const D: usize> Interpolation<T, D> {
             let space = Factorization::new(sources, &options(NegR, smoothing, &weights));
             space.ok().map(|space| System::Space(Box::new(space)))
         };
-        Self { system, weights, smoothing }
+        Self {
+            system,
+            weights,
+            smoothing,
+        }
     }
 
     /// The spline through these pairs; an affine map where they determine none, the identity where there are none.
@@ -173,15 +209,21 @@ impl<T: Scalar, const D: usize> Interpolation<T, D> {
         images: &[Point<T, D>],
     ) -> Box<dyn Warp<T, D> + Send + Sync> {
         let spline: Option<Box<dyn Warp<T, D> + Send + Sync>> = match &self.system {
-            Some(System::Plane(plane)) => plane.fit(images).ok().map(|spline| Box::new(spline) as _),
-            Some(System::Space(space)) => space.fit(images).ok().map(|spline| Box::new(spline) as _),
+            Some(System::Plane(plane)) => {
+                plane.fit(images).ok().map(|spline| Box::new(spline) as _)
+            }
+            Some(System::Space(space)) => {
+                space.fit(images).ok().map(|spline| Box::new(spline) as _)
+            }
             None => None,
         };
         let exact = self.smoothing == Smoothing::None;
-        spline.filter(|spline| follows(&**spline, sources, images, exact)).unwrap_or_else(|| {
-            let affine = AffineModel.fit(sources, images, self.weights.as_deref());
-            Box::new(affine.unwrap_or_else(|_| Affine::identity()))
-        })
+        spline
+            .filter(|spline| follows(&**spline, sources, images, exact))
+            .unwrap_or_else(|| {
+                let affine = AffineModel.fit(sources, images, self.weights.as_deref());
+                Box::new(affine.unwrap_or_else(|_| Affine::identity()))
+            })
     }
 }
 

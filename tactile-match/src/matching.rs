@@ -83,7 +83,11 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum StopReason {
     /// The warp and the assignment stand still.
     #[default]
@@ -176,7 +180,9 @@ pub fn unmatched_rows(assignment: &[Option<usize>], target_len: usize) -> (Vec<u
     for &row in assignment.iter().flatten() {
         taken[row] = true;
     }
-    let model = (0..assignment.len()).filter(|&i| assignment[i].is_none()).collect();
+    let model = (0..assignment.len())
+        .filter(|&i| assignment[i].is_none())
+        .collect();
     (model, (0..target_len).filter(|&j| !taken[j]).collect())
 }
 
@@ -186,7 +192,10 @@ mod tests {
 
     #[test]
     fn unmatched_rows_are_the_complement_of_the_assignment() {
-        assert_eq!(unmatched_rows(&[Some(2), None, Some(0)], 4), (vec![1], vec![1, 3]));
+        assert_eq!(
+            unmatched_rows(&[Some(2), None, Some(0)], 4),
+            (vec![1], vec![1, 3])
+        );
         assert_eq!(unmatched_rows(&[], 1), (vec![], vec![0]));
     }
 

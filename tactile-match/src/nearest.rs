@@ -46,8 +46,16 @@ impl NearestNeighbour {
     /// # Errors
     /// [`MatchError::InvalidOption`] unless the distance is positive and finite.
     pub fn within(max_distance: f64) -> Result<Self, MatchError> {
-        option_within("max_distance", max_distance, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
-        Ok(Self { max_distance: Some(max_distance) })
+        option_within(
+            "max_distance",
+            max_distance,
+            f64::MIN_POSITIVE,
+            f64::MAX,
+            "(0, ∞)",
+        )?;
+        Ok(Self {
+            max_distance: Some(max_distance),
+        })
     }
 }
 
@@ -79,5 +87,8 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for NearestNeighbour {
 
 /// The least of some distances, the first of equals.
 fn nearest(distances: impl Iterator<Item = f64>) -> (usize, f64) {
-    distances.enumerate().fold((0, f64::INFINITY), |best, d| if d.1 < best.1 { d } else { best })
+    distances.enumerate().fold(
+        (0, f64::INFINITY),
+        |best, d| if d.1 < best.1 { d } else { best },
+    )
 }

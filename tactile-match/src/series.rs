@@ -108,7 +108,11 @@ impl<T: Scalar, const D: usize> MatchSeries<T, D> {
         model: &[Point<T, D>],
     ) -> (&Interpolation<T, D>, &mut RelaxationWorkspace<D>) {
         self.adopt(model);
-        let Self { interpolation, workspace, .. } = self;
+        let Self {
+            interpolation,
+            workspace,
+            ..
+        } = self;
         let interpolation =
             interpolation.get_or_insert_with(|| Interpolation::new(model, None, Smoothing::None));
         (interpolation, workspace)

@@ -23,7 +23,11 @@ pub struct SoftMatches<T> {
 
 impl<T> Default for SoftMatches<T> {
     fn default() -> Self {
-        Self { starts: vec![0], columns: Vec::new(), weights: Vec::new() }
+        Self {
+            starts: vec![0],
+            columns: Vec::new(),
+            weights: Vec::new(),
+        }
     }
 }
 
@@ -68,7 +72,10 @@ impl<T: Copy> SoftMatches<T> {
             (Some(&start), Some(&end)) => start..end,
             _ => 0..0,
         };
-        self.columns[range.clone()].iter().copied().zip(self.weights[range].iter().copied())
+        self.columns[range.clone()]
+            .iter()
+            .copied()
+            .zip(self.weights[range].iter().copied())
     }
 }
 

@@ -43,7 +43,11 @@ pub(crate) fn option_within(
     if value.is_finite() && (low..=high).contains(&value) {
         Ok(())
     } else {
-        Err(MatchError::InvalidOption { option, value, expected })
+        Err(MatchError::InvalidOption {
+            option,
+            value,
+            expected,
+        })
     }
 }
 
@@ -55,8 +59,18 @@ mod tests {
     #[test]
     fn empty_and_not_finite_sets_are_typed_errors() {
         let good = [Point2::new(0.0, 1.0)];
-        assert_eq!(point_sets(&[], &good), Err(MatchError::Empty { set: PointSet::Model }));
-        assert_eq!(point_sets(&good, &[]), Err(MatchError::Empty { set: PointSet::Target }));
+        assert_eq!(
+            point_sets(&[], &good),
+            Err(MatchError::Empty {
+                set: PointSet::Model
+            })
+        );
+        assert_eq!(
+            point_sets(&good, &[]),
+            Err(MatchError::Empty {
+                set: PointSet::Target
+            })
+        );
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let set = [Point2::new(0.0, 1.0), Point2::new(bad, 0.0)];
             let expected = |set| Err(MatchError::NotFinite { set, row: 1 });

@@ -35,12 +35,18 @@ pub struct Angle<T> {
 impl<T: Real> Angle<T> {
     /// The angle of the right-angled triangle with these two legs.
     pub(crate) fn from_legs(opposite: T, adjacent: T) -> Self {
-        Self { radians: opposite.atan2(adjacent), complement: adjacent.atan2(opposite) }
+        Self {
+            radians: opposite.atan2(adjacent),
+            complement: adjacent.atan2(opposite),
+        }
     }
 
     /// π/2.
     pub fn right() -> Self {
-        Self { radians: T::FRAC_PI_2(), complement: T::zero() }
+        Self {
+            radians: T::FRAC_PI_2(),
+            complement: T::zero(),
+        }
     }
 
     /// In radians.
@@ -130,7 +136,10 @@ pub fn critical_angle<T: Real>(n: T, ambient: T) -> Result<CriticalAngle<T>, Opt
         return Ok(CriticalAngle::Never);
     }
     // The root of each factor: the product of two huge indices would overflow.
-    Ok(CriticalAngle::Beyond(Angle::from_legs(n0, (n - n0).sqrt() * (n + n0).sqrt())))
+    Ok(CriticalAngle::Beyond(Angle::from_legs(
+        n0,
+        (n - n0).sqrt() * (n + n0).sqrt(),
+    )))
 }
 
 /// The acceptance angle of a layer of index `n` in an ambient of index `ambient`, (1)–(4).

@@ -30,16 +30,22 @@ impl Dispersion {
     ///
     /// Least-squares Cauchy fit by us of 36 tabulated values, 0.40–0.75 µm, residual sd 1.8×10⁻⁴, largest 5.5×10⁻⁴
     /// (X. Zhang et al., Appl. Opt. 59 (2020) 2337–2344, as tabulated by refractiveindex.info).
-    pub const PDMS_5_1: Self =
-        Self::Cauchy { coefficients: [1.391435, 3.8065e-3, 0.0], range_m: [0.40e-6, 0.75e-6] };
+    pub const PDMS_5_1: Self = Self::Cauchy {
+        coefficients: [1.391435, 3.8065e-3, 0.0],
+        range_m: [0.40e-6, 0.75e-6],
+    };
     /// PDMS (Dow Corning), 10:1: 1.3950 at 589 nm; residual sd 2.4×10⁻⁴, largest 4.6×10⁻⁴. Source as for
     /// [`PDMS_5_1`](Self::PDMS_5_1).
-    pub const PDMS_10_1: Self =
-        Self::Cauchy { coefficients: [1.384091, 3.7890e-3, 0.0], range_m: [0.40e-6, 0.75e-6] };
+    pub const PDMS_10_1: Self = Self::Cauchy {
+        coefficients: [1.384091, 3.7890e-3, 0.0],
+        range_m: [0.40e-6, 0.75e-6],
+    };
     /// PDMS (Dow Corning), 20:1: 1.4073 at 589 nm; residual sd 1.6×10⁻⁴, largest 3.8×10⁻⁴. Source as for
     /// [`PDMS_5_1`](Self::PDMS_5_1).
-    pub const PDMS_20_1: Self =
-        Self::Cauchy { coefficients: [1.395397, 4.1179e-3, 0.0], range_m: [0.40e-6, 0.75e-6] };
+    pub const PDMS_20_1: Self = Self::Cauchy {
+        coefficients: [1.395397, 4.1179e-3, 0.0],
+        range_m: [0.40e-6, 0.75e-6],
+    };
     /// PDMS RTV 615: 1.4303 at 588 nm, 0.35–0.70 µm (F. Schneider et al., Sens. Actuators A 151 (2009) 95–99).
     pub const PDMS_RTV615: Self = Self::Sellmeier {
         constant: 0.0,
@@ -50,13 +56,21 @@ impl Dispersion {
     /// refractiveindex.info).
     pub const BOROFLOAT_33: Self = Self::Sellmeier {
         constant: 0.3542,
-        terms: [[0.78657, 0.10856 * 0.10856], [0.18285, 4.427 * 4.427], [0.0, 0.0]],
+        terms: [
+            [0.78657, 0.10856 * 0.10856],
+            [0.18285, 4.427 * 4.427],
+            [0.0, 0.0],
+        ],
         range_m: [0.24e-6, 1.55e-6],
     };
     /// Borosilicate crown glass N-BK7: 1.5168 at 588 nm, 0.3–2.5 µm (Schott's catalogue, 2017).
     pub const N_BK7: Self = Self::Sellmeier {
         constant: 0.0,
-        terms: [[1.03961212, 0.00600069867], [0.231792344, 0.0200179144], [1.01046945, 103.560653]],
+        terms: [
+            [1.03961212, 0.00600069867],
+            [0.231792344, 0.0200179144],
+            [1.01046945, 103.560653],
+        ],
         range_m: [0.3e-6, 2.5e-6],
     };
 
@@ -73,14 +87,23 @@ impl Dispersion {
     pub fn index<T: Real>(&self, wavelength_m: T) -> Result<T, OpticsError> {
         let [shortest, longest] = self.range_m();
         // The ends themselves may be rounded in a short scalar.
-        within("wavelength in metres", wavelength_m, shortest * (1.0 - 1e-7), longest * (1.0 + 1e-7))?;
+        within(
+            "wavelength in metres",
+            wavelength_m,
+            shortest * (1.0 - 1e-7),
+            longest * (1.0 + 1e-7),
+        )?;
         let square = (wavelength_m * real(1e6)).powi(2);
         Ok(match self {
-            Self::Cauchy { coefficients: [a, b, c], .. } => {
-                real::<T>(*a) + (real::<T>(*b) + real::<T>(*c) / square) / square
-            }
-            Self::Sellmeier { constant, terms, .. } => {
-                let term = |sum: T, [b, c]: &[f64; 2]| sum + real::<T>(*b) * square / (square - real(*c));
+            Self::Cauchy {
+                coefficients: [a, b, c],
+                ..
+            } => real::<T>(*a) + (real::<T>(*b) + real::<T>(*c) / square) / square,
+            Self::Sellmeier {
+                constant, terms, ..
+            } => {
+                let term =
+                    |sum: T, [b, c]: &[f64; 2]| sum + real::<T>(*b) * square / (square - real(*c));
                 terms.iter().fold(T::one() + real(*constant), term).sqrt()
             }
         })

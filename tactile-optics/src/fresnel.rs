@@ -81,14 +81,26 @@ impl<T: Real> Fresnel<T> {
 /// ```
 pub fn fresnel<T: Real>(n1: T, n2: T, incidence: T) -> Result<Fresnel<T>, OpticsError> {
     // A scalar's π/2 may lie above the true one by rounding.
-    within("angle of incidence", incidence, 0.0, core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7))?;
+    within(
+        "angle of incidence",
+        incidence,
+        0.0,
+        core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7),
+    )?;
     let (sine, cosine) = incidence.sin_cos();
-    Ok(from_sine_and_cosine(index(n1)?, index(n2)?, sine, cosine.max(T::zero())))
+    Ok(from_sine_and_cosine(
+        index(n1)?,
+        index(n2)?,
+        sine,
+        cosine.max(T::zero()),
+    ))
 }
 
 /// [`fresnel`] for an incidence given by sine and cosine, as a ray tracer has it.
 pub(crate) fn from_sine_and_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Fresnel<T> {
-    let Some(b) = refracted_normal(n1, n2, sine, cosine) else { return Fresnel::total() };
+    let Some(b) = refracted_normal(n1, n2, sine, cosine) else {
+        return Fresnel::total();
+    };
     let a = n1 * cosine;
     let across = n1 * sine;
     // Amplitudes over the common factor: s uses n₁c₁ and n₂c₂, p uses n₂c₁ and n₁c₂ = n₁(n₂c₂)/n₂.

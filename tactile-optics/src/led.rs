@@ -48,13 +48,24 @@ impl<T: Real> Led<T> {
     /// [`OpticsError::OutOfRange`] for an exponent outside 0 to 1000 or a half angle outside (0, π/2].
     pub fn new(exponent: T, half_angle: T) -> Result<Self, OpticsError> {
         within("exponent of the radiation pattern", exponent, 0.0, 1000.0)?;
-        within("half angle of the LED", half_angle, 1e-6, core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7))?;
-        Ok(Self { exponent, half_angle: half_angle.min(T::FRAC_PI_2()) })
+        within(
+            "half angle of the LED",
+            half_angle,
+            1e-6,
+            core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7),
+        )?;
+        Ok(Self {
+            exponent,
+            half_angle: half_angle.min(T::FRAC_PI_2()),
+        })
     }
 
     /// A Lambertian LED: m = 1 up to a right angle.
     pub fn lambertian() -> Self {
-        Self { exponent: T::one(), half_angle: T::FRAC_PI_2() }
+        Self {
+            exponent: T::one(),
+            half_angle: T::FRAC_PI_2(),
+        }
     }
 
     /// The pattern whose intensity has halved at `angle`, as data sheets state it: m = ln ½ / ln cos(angle).
@@ -92,7 +103,8 @@ impl<T: Real> Led<T> {
         let limit = acceptance.radians().min(self.half_angle);
         if geometry == Geometry::Section {
             let intensity = |t: T| t.cos().max(T::zero()).powf(self.exponent);
-            return integral(T::zero(), limit, intensity) / integral(T::zero(), self.half_angle, intensity);
+            return integral(T::zero(), limit, intensity)
+                / integral(T::zero(), self.half_angle, intensity);
         }
         let flux = |t: T| t.cos().max(T::zero()).powf(self.exponent) * t.sin();
         let slope = acceptance.radians().sin();
@@ -103,7 +115,11 @@ impl<T: Real> Led<T> {
             flux(theta) * part * (t + t)
         };
         let trapped = integral(T::zero(), limit, flux)
-            + integral(T::zero(), (self.half_angle - limit).max(T::zero()).sqrt(), outer);
+            + integral(
+                T::zero(),
+                (self.half_angle - limit).max(T::zero()).sqrt(),
+                outer,
+            );
         trapped / integral(T::zero(), self.half_angle, flux)
     }
 
@@ -113,7 +129,10 @@ impl<T: Real> Led<T> {
         let one = T::one();
         if geometry == Geometry::Section {
             let theta = (u + u - one) * self.half_angle;
-            return ([theta.cos(), T::zero(), theta.sin()], theta.cos().max(T::zero()).powf(self.exponent));
+            return (
+                [theta.cos(), T::zero(), theta.sin()],
+                theta.cos().max(T::zero()).powf(self.exponent),
+            );
         }
         let power = self.exponent + one;
         let rim = self.half_angle.cos().max(T::zero()).powf(power);

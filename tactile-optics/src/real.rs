@@ -42,7 +42,12 @@ pub(crate) fn within<T: Real>(
     if value >= minimum && value <= maximum {
         Ok(found)
     } else {
-        Err(OpticsError::OutOfRange { quantity, minimum, maximum, found: value })
+        Err(OpticsError::OutOfRange {
+            quantity,
+            minimum,
+            maximum,
+            found: value,
+        })
     }
 }
 

@@ -49,5 +49,8 @@ pub fn propagation<T: Real>(n: T, invariant: T) -> Result<Propagation<T>, Optics
         return Ok(Propagation::Evanescent);
     }
     let normal = (n - s).sqrt() * (n + s).sqrt();
-    Ok(Propagation::At { angle: Angle::from_legs(s, normal), cosine: normal / n })
+    Ok(Propagation::At {
+        angle: Angle::from_legs(s, normal),
+        cosine: normal / n,
+    })
 }

@@ -84,12 +84,17 @@ impl<'a, T: Real> LayerStack<'a, T> {
     /// [`OpticsError::Empty`] without layers, [`OpticsError::OutOfRange`] for an index that is not positive and finite.
     pub fn new(indices: &'a [T], ambient: T) -> Result<Self, OpticsError> {
         if indices.is_empty() {
-            return Err(OpticsError::Empty { quantity: "stack of layers" });
+            return Err(OpticsError::Empty {
+                quantity: "stack of layers",
+            });
         }
         for &n in indices {
             index(n)?;
         }
-        Ok(Self { indices, ambient: index(ambient)? })
+        Ok(Self {
+            indices,
+            ambient: index(ambient)?,
+        })
     }
 
     /// The layers' indices.
@@ -123,7 +128,9 @@ impl<'a, T: Real> LayerStack<'a, T> {
     /// ```
     pub fn critical_angles(&self) -> impl Iterator<Item = CriticalAngle<T>> + 'a {
         let ambient = self.ambient;
-        self.indices.iter().map(move |&n| critical_angle(n, ambient).unwrap_or(CriticalAngle::Never))
+        self.indices
+            .iter()
+            .map(move |&n| critical_angle(n, ambient).unwrap_or(CriticalAngle::Never))
     }
 
     /// The acceptance angle of each layer in the ambient, (1)–(4).
@@ -188,14 +195,23 @@ impl<'a, T: Real> LayerStack<'a, T> {
         let four = real::<T>(4.0);
         let (mut single_pass, mut reflected) = (T::one(), T::zero());
         let mut before = self.ambient;
-        for after in self.indices.iter().copied().chain(core::iter::once(self.ambient)) {
+        for after in self
+            .indices
+            .iter()
+            .copied()
+            .chain(core::iter::once(self.ambient))
+        {
             let (sum, step) = (before + after, before - after);
             single_pass = single_pass * (four * (before / sum) * (after / sum));
             reflected = reflected + step / before * (step / after) / four;
             before = after;
         }
         let transmittance = (T::one() + reflected).recip();
-        NormalIncidence { single_pass, transmittance, reflectance: reflected / (T::one() + reflected) }
+        NormalIncidence {
+            single_pass,
+            transmittance,
+            reflectance: reflected / (T::one() + reflected),
+        }
     }
 
     /// Whether the cone of an LED at the stack's edge is trapped by every layer: it must stay under 2·min θᵢ.
@@ -203,11 +219,27 @@ impl<'a, T: Real> LayerStack<'a, T> {
     /// # Errors
     /// [`OpticsError::OutOfRange`] for a full angle outside 0 to π.
     pub fn led_cone(&self, full_angle: T) -> Result<LedCone<T>, OpticsError> {
-        within("full angle of the cone", full_angle, 0.0, core::f64::consts::PI * (1.0 + 1e-7))?;
-        let weaker =
-            |a: AcceptanceAngle<T>, b| if a.radians() <= AcceptanceAngle::radians(&b) { a } else { b };
-        let weakest = self.acceptance_angles().fold(AcceptanceAngle::AllTrapped, weaker);
+        within(
+            "full angle of the cone",
+            full_angle,
+            0.0,
+            core::f64::consts::PI * (1.0 + 1e-7),
+        )?;
+        let weaker = |a: AcceptanceAngle<T>, b| {
+            if a.radians() <= AcceptanceAngle::radians(&b) {
+                a
+            } else {
+                b
+            }
+        };
+        let weakest = self
+            .acceptance_angles()
+            .fold(AcceptanceAngle::AllTrapped, weaker);
         let limit = weakest.radians() + weakest.radians();
-        Ok(LedCone { full_angle, weakest, margin: limit - full_angle })
+        Ok(LedCone {
+            full_angle,
+            weakest,
+            margin: limit - full_angle,
+        })
     }
 }

@@ -36,19 +36,30 @@ impl<'a, T: Scalar> Domain<'a, T> {
     /// # Errors
     /// [`SfsError::InvalidOption`] unless both sizes are positive and finite.
     pub fn new(pixel_size_m: [T; 2]) -> Result<Self, SfsError> {
-        let domain = Self { mask: None, pixel_size_m, known_heights: None };
+        let domain = Self {
+            mask: None,
+            pixel_size_m,
+            known_heights: None,
+        };
         domain.check_pixel_size()?;
         Ok(domain)
     }
 
     /// The whole image with heights in pixels.
     pub fn pixels() -> Self {
-        Self { mask: None, pixel_size_m: [T::one(); 2], known_heights: None }
+        Self {
+            mask: None,
+            pixel_size_m: [T::one(); 2],
+            known_heights: None,
+        }
     }
 
     /// Restricts the solution to the pixels where `mask` is true.
     pub fn with_mask(self, mask: ArrayView2<'a, bool>) -> Self {
-        Self { mask: Some(mask), ..self }
+        Self {
+            mask: Some(mask),
+            ..self
+        }
     }
 
     /// Fixes the heights that are not NaN.
@@ -65,7 +76,10 @@ impl<'a, T: Scalar> Domain<'a, T> {
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     pub fn with_known_heights(self, known: ArrayView2<'a, T>) -> Self {
-        Self { known_heights: Some(known), ..self }
+        Self {
+            known_heights: Some(known),
+            ..self
+        }
     }
 
     fn check_pixel_size(&self) -> Result<(), SfsError> {
@@ -83,7 +97,12 @@ impl<'a, T: Scalar> Domain<'a, T> {
             same_shape(Input::KnownHeights, [rows, columns], known.dim())?;
         }
         let Some(mask) = self.mask else {
-            return Ok(BoundingBox { top: 0, left: 0, rows, columns });
+            return Ok(BoundingBox {
+                top: 0,
+                left: 0,
+                rows,
+                columns,
+            });
         };
         same_shape(Input::Mask, [rows, columns], mask.dim())?;
         BoundingBox::of(mask).ok_or(SfsError::EmptyMask)
@@ -98,7 +117,9 @@ impl<'a, T: Scalar> Domain<'a, T> {
     /// The known height of a pixel, if there is one.
     #[inline]
     pub(crate) fn known(&self, row: usize, column: usize) -> Option<T> {
-        self.known_heights.map(|known| known[[row, column]]).filter(|height| height.is_finite())
+        self.known_heights
+            .map(|known| known[[row, column]])
+            .filter(|height| height.is_finite())
     }
 }
 
@@ -109,7 +130,15 @@ pub(crate) fn same_shape(
     (rows, columns): (usize, usize),
 ) -> Result<(), SfsError> {
     let found = [rows, columns];
-    if found == expected { Ok(()) } else { Err(SfsError::ShapeMismatch { input, expected, found }) }
+    if found == expected {
+        Ok(())
+    } else {
+        Err(SfsError::ShapeMismatch {
+            input,
+            expected,
+            found,
+        })
+    }
 }
 
 /// The smallest rectangle that holds a mask.
@@ -141,13 +170,20 @@ impl BoundingBox {
     pub fn of(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let (mut top, mut bottom, mut left, mut right) = (usize::MAX, 0, usize::MAX, 0);
         for (row, line) in mask.outer_iter().enumerate() {
-            let Some((first, last)) = ends(line) else { continue };
+            let Some((first, last)) = ends(line) else {
+                continue;
+            };
             top = top.min(row);
             bottom = row;
             left = left.min(first);
             right = right.max(last);
         }
-        (top != usize::MAX).then(|| Self { top, left, rows: bottom - top + 1, columns: right - left + 1 })
+        (top != usize::MAX).then(|| Self {
+            top,
+            left,
+            rows: bottom - top + 1,
+            columns: right - left + 1,
+        })
     }
 
     /// Number of pixels.
@@ -158,7 +194,8 @@ impl BoundingBox {
     /// Row and column of its pixels, in reading order.
     pub(crate) fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
         let columns = self.left..self.left + self.columns;
-        (self.top..self.top + self.rows).flat_map(move |row| columns.clone().map(move |column| (row, column)))
+        (self.top..self.top + self.rows)
+            .flat_map(move |row| columns.clone().map(move |column| (row, column)))
     }
 
     /// Whether every pixel of `other` lies in this box.

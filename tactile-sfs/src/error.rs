@@ -93,7 +93,9 @@ pub enum SfsError {
         found: f64,
     },
     /// The light comes from behind the surface or grazes it (z ≤ 0): no shading carries shape then.
-    #[error("the light direction ({x}, {y}, {z}) does not come from the viewer's side (z must be positive)")]
+    #[error(
+        "the light direction ({x}, {y}, {z}) does not come from the viewer's side (z must be positive)"
+    )]
     LightFromBelow {
         /// x of the direction found.
         x: f64,
@@ -103,7 +105,9 @@ pub enum SfsError {
         z: f64,
     },
     /// The method is defined for frontal or for oblique light alone.
-    #[error("{method} needs an oblique light (x or y not zero): under frontal light it is undefined")]
+    #[error(
+        "{method} needs an oblique light (x or y not zero): under frontal light it is undefined"
+    )]
     FrontalLight {
         /// Name of the method.
         method: &'static str,
@@ -112,7 +116,9 @@ pub enum SfsError {
     #[error("no height is known: give known heights or a rim height")]
     NoKnownHeight,
     /// A slope is NaN or infinite where the integrator cannot skip it.
-    #[error("the slope at row {row}, column {column} is not finite; a masked integrator can leave it out")]
+    #[error(
+        "the slope at row {row}, column {column} is not finite; a masked integrator can leave it out"
+    )]
     NonFiniteSlope {
         /// Row of the slope.
         row: usize,
@@ -132,7 +138,9 @@ pub enum SfsError {
         index: usize,
     },
     /// More control points were asked for than the surface has pixels.
-    #[error("{requested} control points asked for, but the surface has only {available} usable pixels")]
+    #[error(
+        "{requested} control points asked for, but the surface has only {available} usable pixels"
+    )]
     TooManyPoints {
         /// Points asked for.
         requested: usize,
@@ -156,7 +164,12 @@ pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), SfsError>
 
 /// `Ok` if `value` is finite and not negative.
 pub(crate) fn non_negative(option: &'static str, value: f64) -> Result<(), SfsError> {
-    in_range(option, "a finite number of at least zero", value, value >= 0.0)
+    in_range(
+        option,
+        "a finite number of at least zero",
+        value,
+        value >= 0.0,
+    )
 }
 
 /// `Ok` if `value` is finite and `inside` holds.
@@ -169,6 +182,10 @@ pub(crate) fn in_range(
     if inside && value.is_finite() {
         Ok(())
     } else {
-        Err(SfsError::InvalidOption { option, expected, found: value })
+        Err(SfsError::InvalidOption {
+            option,
+            expected,
+            found: value,
+        })
     }
 }

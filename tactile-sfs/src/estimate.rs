@@ -38,15 +38,34 @@ pub fn estimate_lighting<T: Scalar>(
     frame: Frame<'_, T>,
     domain: &Domain<'_, T>,
 ) -> Result<Lighting<T>, SfsError> {
-    let Statistics { mean, square, gradient, .. } = Statistics::of(&frame, domain)?;
-    let gamma = (6.0 * core::f64::consts::PI.powi(2) * square - 48.0 * mean * mean).max(0.0).sqrt();
-    let slant = if gamma > 0.0 { (4.0 * mean / gamma).clamp(0.0, 1.0).acos() } else { 0.0 };
+    let Statistics {
+        mean,
+        square,
+        gradient,
+        ..
+    } = Statistics::of(&frame, domain)?;
+    let gamma = (6.0 * core::f64::consts::PI.powi(2) * square - 48.0 * mean * mean)
+        .max(0.0)
+        .sqrt();
+    let slant = if gamma > 0.0 {
+        (4.0 * mean / gamma).clamp(0.0, 1.0).acos()
+    } else {
+        0.0
+    };
     let slant = slant.min(80.0_f64.to_radians());
     let azimuth = gradient[1].atan2(gradient[0]);
-    let direction = [slant.sin() * azimuth.cos(), slant.sin() * azimuth.sin(), slant.cos()];
+    let direction = [
+        slant.sin() * azimuth.cos(),
+        slant.sin() * azimuth.sin(),
+        slant.cos(),
+    ];
     let light = Lighting::new(direction.map(T::of))?;
     let albedo = gamma / core::f64::consts::PI;
-    if albedo > 0.0 { light.with_albedo(T::of(albedo)) } else { Ok(light) }
+    if albedo > 0.0 {
+        light.with_albedo(T::of(albedo))
+    } else {
+        Ok(light)
+    }
 }
 
 /// What the image says about the light.
@@ -65,12 +84,21 @@ impl Statistics {
         let area = domain.validate(rows, columns)?;
         let value = |row: usize, column: usize| -> Option<f64> {
             let inside = row < rows && column < columns && domain.contains(row, column);
-            inside.then(|| frame.at(row, column).as_f64()).filter(|value| value.is_finite())
+            inside
+                .then(|| frame.at(row, column).as_f64())
+                .filter(|value| value.is_finite())
         };
         let [hx, hy] = domain.pixel_size_m.map(Scalar::as_f64);
-        let mut sums = Self { count: 0, mean: 0.0, square: 0.0, gradient: [0.0; 2] };
+        let mut sums = Self {
+            count: 0,
+            mean: 0.0,
+            square: 0.0,
+            gradient: [0.0; 2],
+        };
         for (row, column) in area.pixels() {
-            let Some(here) = value(row, column) else { continue };
+            let Some(here) = value(row, column) else {
+                continue;
+            };
             sums.count += 1;
             sums.mean += here;
             sums.square += here * here;
@@ -80,7 +108,11 @@ impl Statistics {
         }
         enough(sums.count)?;
         let n = sums.count as f64;
-        Ok(Self { mean: sums.mean / n, square: sums.square / n, ..sums })
+        Ok(Self {
+            mean: sums.mean / n,
+            square: sums.square / n,
+            ..sums
+        })
     }
 
     /// Adds the direction of one gradient.
@@ -94,7 +126,14 @@ impl Statistics {
 }
 
 fn enough(available: usize) -> Result<(), SfsError> {
-    if available < FEWEST { Err(SfsError::TooFewPixels { needed: FEWEST, available }) } else { Ok(()) }
+    if available < FEWEST {
+        Err(SfsError::TooFewPixels {
+            needed: FEWEST,
+            available,
+        })
+    } else {
+        Ok(())
+    }
 }
 
 /// Estimates the intensity at normal incidence: the given quantile of the intensities above the ambient, which is
@@ -120,13 +159,25 @@ pub fn estimate_normal_intensity<T: Scalar>(
     ambient: T,
     quantile: f64,
 ) -> Result<T, SfsError> {
-    crate::error::in_range("quantile", "in (0, 1]", quantile, quantile > 0.0 && quantile <= 1.0)?;
+    crate::error::in_range(
+        "quantile",
+        "in (0, 1]",
+        quantile,
+        quantile > 0.0 && quantile <= 1.0,
+    )?;
     let (rows, columns) = frame.dim();
     let area = domain.validate(rows, columns)?;
     let value = |(row, column)| (frame.at(row, column) - ambient).as_f64();
-    let inside = area.pixels().filter(|&(row, column)| domain.contains(row, column));
-    let mut values: Vec<f64> = inside.map(value).filter(|value| value.is_finite()).collect();
+    let inside = area
+        .pixels()
+        .filter(|&(row, column)| domain.contains(row, column));
+    let mut values: Vec<f64> = inside
+        .map(value)
+        .filter(|value| value.is_finite())
+        .collect();
     enough(values.len())?;
     let index = ((values.len() - 1) as f64 * quantile).round() as usize;
-    Ok(T::of(*values.select_nth_unstable_by(index, f64::total_cmp).1))
+    Ok(T::of(
+        *values.select_nth_unstable_by(index, f64::total_cmp).1,
+    ))
 }

@@ -42,12 +42,12 @@ pub use frame::Frame;
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
 pub use quality::{
-    Alignment, ErrorSummary, HeightError, Reprojection, SlopeError, height_error, render, reprojection,
-    slope_error, slopes,
+    Alignment, ErrorSummary, HeightError, Reprojection, SlopeError, height_error, render,
+    reprojection, slope_error, slopes,
 };
 pub use reconstruct::{
-    BallCalibration, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Rim, Signal, SurfaceReconstruction,
-    TsaiShah,
+    BallCalibration, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Rim, Signal,
+    SurfaceReconstruction, TsaiShah,
 };
 pub use sample::{ControlPointSampler, CurvatureAdaptive, EquallySpaced, Random};
 pub use scalar::Scalar;

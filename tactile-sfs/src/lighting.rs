@@ -41,13 +41,21 @@ impl<T: Scalar> Lighting<T> {
             return Err(SfsError::LightFromBelow { x, y, z });
         }
         let unit = |v: f64| T::of(v / length);
-        Ok(Self { direction: [unit(x), unit(y), unit(z)], ..Self::frontal() })
+        Ok(Self {
+            direction: [unit(x), unit(y), unit(z)],
+            ..Self::frontal()
+        })
     }
 
     /// Light from the viewer, albedo 1, ambient 0 and intensity 1 at normal incidence.
     pub fn frontal() -> Self {
         let (zero, one) = (T::zero(), T::one());
-        Self { direction: [zero, zero, one], albedo: one, ambient: zero, normal_intensity: one }
+        Self {
+            direction: [zero, zero, one],
+            albedo: one,
+            ambient: zero,
+            normal_intensity: one,
+        }
     }
 
     /// The share of light the surface reflects, in the unit the caller likes: only albedo · I₀ matters.
@@ -74,7 +82,10 @@ impl<T: Scalar> Lighting<T> {
     /// [`SfsError::InvalidOption`] unless positive and finite.
     pub fn with_normal_intensity(self, normal_intensity: T) -> Result<Self, SfsError> {
         positive("intensity at normal incidence", normal_intensity.as_f64())?;
-        Ok(Self { normal_intensity, ..self })
+        Ok(Self {
+            normal_intensity,
+            ..self
+        })
     }
 
     /// Unit vector from the surface to the light.

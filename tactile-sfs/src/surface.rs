@@ -194,7 +194,8 @@ impl<T: Scalar> Surface<T> {
 
     /// Heights with `value` where there is none.
     pub fn filled(&self, value: T) -> Array2<T> {
-        self.heights.mapv(|height| if height.is_nan() { value } else { height })
+        self.heights
+            .mapv(|height| if height.is_nan() { value } else { height })
     }
 
     /// Where every reconstruction enters: checks the domain against an image of this size, empties the surface for it and
@@ -232,7 +233,12 @@ impl<T: Scalar> Surface<T> {
     }
 
     /// The same for callers that write every pixel of the box themselves: what it holds need not be cleared.
-    pub(crate) fn prepare_to_overwrite(&mut self, rows: usize, columns: usize, bounding_box: BoundingBox) {
+    pub(crate) fn prepare_to_overwrite(
+        &mut self,
+        rows: usize,
+        columns: usize,
+        bounding_box: BoundingBox,
+    ) {
         if self.heights.dim() != (rows, columns) {
             self.heights = Array2::from_elem((rows, columns), T::nan());
             self.mask = Array2::from_elem((rows, columns), false);
@@ -242,8 +248,10 @@ impl<T: Scalar> Surface<T> {
         }
         self.bounding_box = bounding_box;
         self.report.components.clear();
-        self.report =
-            Report { components: core::mem::take(&mut self.report.components), ..Report::default() };
+        self.report = Report {
+            components: core::mem::take(&mut self.report.components),
+            ..Report::default()
+        };
     }
 
     fn clear(&mut self, area: BoundingBox) {

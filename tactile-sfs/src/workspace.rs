@@ -74,7 +74,10 @@ impl<T: Scalar> Workspace<T> {
 
     /// Calls `callback` from time to time during iterative solves; `Break` ends the solve with
     /// [`StopReason::Cancelled`] and the best answer so far.
-    pub fn on_progress(&mut self, callback: impl FnMut(Progress) -> ControlFlow<()> + Send + 'static) {
+    pub fn on_progress(
+        &mut self,
+        callback: impl FnMut(Progress) -> ControlFlow<()> + Send + 'static,
+    ) {
         self.callback = Some(Box::new(callback));
     }
 
@@ -100,9 +103,20 @@ impl<T: Scalar> Workspace<T> {
     }
 
     /// Tells the callback; `Some(Cancelled)` if it wants to stop.
-    pub(crate) fn report(&mut self, iterations: usize, limit: usize, residual: T) -> Option<StopReason> {
+    pub(crate) fn report(
+        &mut self,
+        iterations: usize,
+        limit: usize,
+        residual: T,
+    ) -> Option<StopReason> {
         let callback = self.callback.as_mut()?;
-        let progress = Progress { iterations, limit, residual: residual.as_f64() };
-        callback(progress).is_break().then_some(StopReason::Cancelled)
+        let progress = Progress {
+            iterations,
+            limit,
+            residual: residual.as_f64(),
+        };
+        callback(progress)
+            .is_break()
+            .then_some(StopReason::Cancelled)
     }
 }

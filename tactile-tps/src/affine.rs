@@ -2,7 +2,9 @@
 
 use nalgebra::{Point, SMatrix, SVector};
 
-use crate::{Scalar, TpsError, Warp, WarpModel, error::Input, options::validate_weights, sites::finite};
+use crate::{
+    Scalar, TpsError, Warp, WarpModel, error::Input, options::validate_weights, sites::finite,
+};
 
 /// The affine map f(x) = A x + b.
 ///
@@ -15,7 +17,10 @@ use crate::{Scalar, TpsError, Warp, WarpModel, error::Input, options::validate_w
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned"))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned")
+)]
 pub struct Affine<T: Scalar, const D: usize> {
     /// The Jacobian A.
     pub linear: SMatrix<T, D, D>,
@@ -69,7 +74,10 @@ impl<T: Scalar, const D: usize> Warp<T, D> for Affine<T, D> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned"))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned")
+)]
 pub struct Rigid<T: Scalar, const D: usize> {
     /// The rotation R.
     pub rotation: SMatrix<T, D, D>,
@@ -87,7 +95,10 @@ impl<T: Scalar, const D: usize> Rigid<T, D> {
     /// assert_eq!(Rigid::identity().apply(&point), point);
     /// ```
     pub fn identity() -> Self {
-        Self { rotation: SMatrix::identity(), translation: SVector::zeros() }
+        Self {
+            rotation: SMatrix::identity(),
+            translation: SVector::zeros(),
+        }
     }
 }
 
@@ -156,7 +167,8 @@ impl<const D: usize> Moments<D> {
         let total: f64 = (0..sources.len()).map(weight).sum();
         let mean = |points: &[Point<T, D>]| {
             let origin = vector(&points[0]);
-            let sum = |sum: SVector<f64, D>, (i, p)| sum + (vector(p) - origin) * (weight(i) / total);
+            let sum =
+                |sum: SVector<f64, D>, (i, p)| sum + (vector(p) - origin) * (weight(i) / total);
             origin + points.iter().enumerate().fold(SVector::zeros(), sum)
         };
         let (source_mean, target_mean) = (mean(sources), mean(targets));
@@ -166,7 +178,12 @@ impl<const D: usize> Moments<D> {
             cross += y * x.transpose() * (weight(i) / total);
             scatter += x * x.transpose() * (weight(i) / total);
         }
-        Ok(Self { source_mean, target_mean, cross, scatter })
+        Ok(Self {
+            source_mean,
+            target_mean,
+            cross,
+            scatter,
+        })
     }
 
     fn offset<T: Scalar>(&self, linear: &SMatrix<f64, D, D>) -> SVector<T, D> {
@@ -195,10 +212,15 @@ fn validate<T: Scalar, const D: usize>(
 }
 
 /// Eigenvalues and vectors of a symmetric `D` × `D` matrix.
-fn symmetric_eigen<const D: usize>(matrix: &SMatrix<f64, D, D>) -> (Vec<f64>, nalgebra::DMatrix<f64>) {
+fn symmetric_eigen<const D: usize>(
+    matrix: &SMatrix<f64, D, D>,
+) -> (Vec<f64>, nalgebra::DMatrix<f64>) {
     let dynamic = nalgebra::DMatrix::from_fn(D, D, |i, j| matrix[(i, j)]);
     let eigen = dynamic.symmetric_eigen();
-    (eigen.eigenvalues.iter().copied().collect(), eigen.eigenvectors)
+    (
+        eigen.eigenvalues.iter().copied().collect(),
+        eigen.eigenvectors,
+    )
 }
 
 impl<T: Scalar, const D: usize> WarpModel<T, D> for AffineModel {
@@ -235,7 +257,10 @@ impl<T: Scalar, const D: usize> WarpModel<T, D> for RigidModel {
     ) -> Result<Rigid<T, D>, TpsError> {
         let moments = Moments::new(sources, targets, weights)?;
         let rotation = nearest_rotation(&moments.cross);
-        Ok(Rigid { rotation: rotation.map(T::narrow), translation: moments.offset(&rotation) })
+        Ok(Rigid {
+            rotation: rotation.map(T::narrow),
+            translation: moments.offset(&rotation),
+        })
     }
 }
 

@@ -22,7 +22,11 @@ pub(crate) const HEAD: usize = 8;
 /// Not a multiple of 512 bytes: columns that far apart would crowd into the same few sets of the cache.
 pub(crate) fn layout(n: usize, q: usize) -> usize {
     let stride = HEAD + (n - q).div_ceil(PANEL) * PANEL;
-    if stride.is_multiple_of(64) { stride + PANEL } else { stride }
+    if stride.is_multiple_of(64) {
+        stride + PANEL
+    } else {
+        stride
+    }
 }
 
 /// The factor L of A = L Lᵀ, column by column, behind `HEAD` rows and columns.
@@ -61,7 +65,12 @@ impl Cholesky {
     pub(crate) fn factor(&mut self) -> Result<(), usize> {
         let stride = self.stride;
         let l = &mut self.l[HEAD * stride + HEAD..];
-        Arch::new().dispatch(Factor { l, stride, order: stride - HEAD, reciprocal: &mut self.reciprocal })
+        Arch::new().dispatch(Factor {
+            l,
+            stride,
+            order: stride - HEAD,
+            reciprocal: &mut self.reciprocal,
+        })
     }
 
     /// b ← A⁻¹b for `R` columns of `stride` places each, of which those from `HEAD` on count.
@@ -108,17 +117,36 @@ impl WithSimd for Factor<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { l, stride, order, reciprocal } = self;
+        let Self {
+            l,
+            stride,
+            order,
+            reciprocal,
+        } = self;
         let mut packed = Strips::new();
         for block in (0..order).step_by(BLOCK) {
             let end = order.min(block + BLOCK);
             for depth in (0..block).step_by(DEPTH) {
-                packed.update(simd, l, stride, order, depth..block.min(depth + DEPTH), block..end);
+                packed.update(
+                    simd,
+                    l,
+                    stride,
+                    order,
+                    depth..block.min(depth + DEPTH),
+                    block..end,
+                );
             }
             for column in (block..end).step_by(PANEL) {
                 update(simd, l, stride, order, block..column, column);
-                diagonal(&mut l[column * stride..], stride, column, reciprocal).map_err(|k| column + k)?;
-                panel(simd, &mut l[column * stride..], stride, column..order, reciprocal);
+                diagonal(&mut l[column * stride..], stride, column, reciprocal)
+                    .map_err(|k| column + k)?;
+                panel(
+                    simd,
+                    &mut l[column * stride..],
+                    stride,
+                    column..order,
+                    reciprocal,
+                );
             }
         }
         Ok(())
@@ -166,7 +194,8 @@ fn strip<S: Simd, const V: usize>(
     let height = V * S::F64_LANES;
     let steps = |offset: usize, width: usize| {
         let at = column + offset;
-        left.chunks_exact(stride).map(move |l| (&l[row..row + height], &l[at..at + width]))
+        left.chunks_exact(stride)
+            .map(move |l| (&l[row..row + height], &l[at..at + width]))
     };
     if S::F64_LANES >= 8 {
         tile::<S, V, 8>(simd, steps(0, 8), panel, stride, row);
@@ -178,7 +207,12 @@ fn strip<S: Simd, const V: usize>(
 
 /// Factors the 8 × 8 block on the diagonal, fails with the place of a bad pivot.
 #[inline(always)]
-fn diagonal(columns: &mut [f64], stride: usize, start: usize, reciprocal: &mut [f64]) -> Result<(), usize> {
+fn diagonal(
+    columns: &mut [f64],
+    stride: usize,
+    start: usize,
+    reciprocal: &mut [f64],
+) -> Result<(), usize> {
     let mut a: [[f64; PANEL]; PANEL] =
         core::array::from_fn(|j| core::array::from_fn(|i| columns[j * stride + start + i]));
     for k in 0..PANEL {
@@ -228,7 +262,8 @@ fn panel<S: Simd>(
                 sum = simd.mul_add_e_f64s(simd.splat_f64s(-factor[d][c]), x[d], sum);
             }
             x[c] = simd.mul_f64s(sum, simd.splat_f64s(factor[c][c]));
-            S::as_mut_simd_f64s(&mut columns[c * stride + row..c * stride + row + S::F64_LANES]).0[0] = x[c];
+            S::as_mut_simd_f64s(&mut columns[c * stride + row..c * stride + row + S::F64_LANES])
+                .0[0] = x[c];
         }
     }
 }

@@ -106,7 +106,9 @@ pub enum TpsError {
     #[error("the iterative solver keeps no factor: ask for the direct one")]
     NoFactor,
     /// Two source points coincide, their targets differ, and no smoothing was asked for.
-    #[error("source points {first} and {second} coincide but their targets differ: smooth, or drop one")]
+    #[error(
+        "source points {first} and {second} coincide but their targets differ: smooth, or drop one"
+    )]
     Conflict {
         /// The earlier of the two.
         first: usize,

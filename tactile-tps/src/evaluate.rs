@@ -34,7 +34,11 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
     #[inline(always)]
     pub(crate) fn new() -> Self {
         let zero = [T::zero(); W];
-        Self { value: [zero; M], gradient: [[zero; D]; M], hessian: [[[zero; D]; D]; M] }
+        Self {
+            value: [zero; M],
+            gradient: [[zero; D]; M],
+            hessian: [[[zero; D]; D]; M],
+        }
     }
 
     #[inline(always)]
@@ -67,7 +71,14 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
     }
 
     #[inline(always)]
-    fn add_hessian<L: Lane<T>>(&mut self, l: usize, weight: &[L; M], d: &[L; D], slope: L, bend: L) {
+    fn add_hessian<L: Lane<T>>(
+        &mut self,
+        l: usize,
+        weight: &[L; M],
+        d: &[L; D],
+        slope: L,
+        bend: L,
+    ) {
         for k in 0..D {
             for i in 0..=k {
                 let own = if i == k { slope } else { L::zero() };

@@ -139,7 +139,13 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             this.decompose();
         } else if options.iterates(this.sites.len()) {
             let mut iterative = Iterative::default();
-            let built = iterative.build(&this.setting(), &this.site_weights, lambda, &mut system, &mut watch);
+            let built = iterative.build(
+                &this.setting(),
+                &this.site_weights,
+                lambda,
+                &mut system,
+                &mut watch,
+            );
             if built.is_break() {
                 return Err(TpsError::Stopped);
             }
@@ -223,7 +229,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     pub(crate) fn setting(&self) -> Setting<'_, K, D> {
-        Setting { kernel: &self.kernel, sites: &self.sites, rank_tolerance: self.rank_tolerance }
+        Setting {
+            kernel: &self.kernel,
+            sites: &self.sites,
+            rank_tolerance: self.rank_tolerance,
+        }
     }
 
     /// λ in the frame's units: the kernel scales as length to its degree.
@@ -236,6 +246,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
 
     /// How much larger the kernel is outside than in the frame.
     pub(crate) fn unit(&self) -> f64 {
-        self.sites.frame.scale.powi(self.kernel.degree().unwrap_or(0))
+        self.sites
+            .frame
+            .scale
+            .powi(self.kernel.degree().unwrap_or(0))
     }
 }

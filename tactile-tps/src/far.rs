@@ -28,14 +28,28 @@ pub(crate) struct Terms {
 }
 
 impl Terms {
-    pub(crate) const NONE: Self = Self { weight: 0.0, level: 0.0, reach: f64::INFINITY };
+    pub(crate) const NONE: Self = Self {
+        weight: 0.0,
+        level: 0.0,
+        reach: f64::INFINITY,
+    };
 
     pub(crate) fn new<T: Scalar, K: Kernel>(kernel: &K, weight: f64, level: f64) -> Self {
-        let terms = Self { weight, level, reach: 0.0 };
+        let terms = Self {
+            weight,
+            level,
+            reach: 0.0,
+        };
         let bad = |s: f64| terms.rounding::<T, K>(kernel, s) > tolerance::<T>() * level;
         // Doubling from the points' own size to beyond any query that has digits itself.
-        let reach = (0..200).map(|k| 2f64.powi(k)).find(|&s| bad(s)).unwrap_or(f64::INFINITY);
-        Self { reach: if reach > 1.0 { reach / 2.0 } else { 0.0 }, ..terms }
+        let reach = (0..200)
+            .map(|k| 2f64.powi(k))
+            .find(|&s| bad(s))
+            .unwrap_or(f64::INFINITY);
+        Self {
+            reach: if reach > 1.0 { reach / 2.0 } else { 0.0 },
+            ..terms
+        }
     }
 
     /// Rounding error to expect of a plain sum at squared distance `s` from the frame's centre.
@@ -75,7 +89,11 @@ struct Jets<R, const D: usize> {
 
 impl<R: Real, const D: usize> Jets<R, D> {
     fn zero() -> Self {
-        Self { value: R::zero(), gradient: [R::zero(); D], hessian: [[R::zero(); D]; D] }
+        Self {
+            value: R::zero(),
+            gradient: [R::zero(); D],
+            hessian: [[R::zero(); D]; D],
+        }
     }
 
     fn add(&mut self, factor: R, term: &Self) {
@@ -139,7 +157,10 @@ impl<const D: usize, const M: usize> Sums<D, M> {
         for (jets, moments) in self.jets.iter_mut().zip(&self.moments) {
             let correction = solve_gram(self.gram, moments.map(|x| x.high), D + 1);
             for c in 0..=D {
-                jets.add(Twofold::from_f64(-correction[c]), &self.shadows[c].map(Twofold::from_f64));
+                jets.add(
+                    Twofold::from_f64(-correction[c]),
+                    &self.shadows[c].map(Twofold::from_f64),
+                );
             }
         }
         self.jets
@@ -153,7 +174,10 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M>
     pub(crate) fn sample(&self, point: &Point<T, D>) -> Sample<T, D, M> {
         let x: [Twofold; D] = core::array::from_fn(|k| {
             let shifted = two_sum(point[k].widen(), -self.frame.centre[k]);
-            Twofold { high: shifted.high / self.frame.scale, low: shifted.low / self.frame.scale }
+            Twofold {
+                high: shifted.high / self.frame.scale,
+                low: shifted.low / self.frame.scale,
+            }
         });
         let mut sums = Sums::<D, M>::zero();
         for j in 0..self.centres[0].len() {
@@ -169,12 +193,17 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M>
         let d: [Twofold; D] = core::array::from_fn(|k| x[k] - Twofold::from_f64(centre[k]));
         let s = d.iter().fold(Twofold::ZERO, |s, &d| s + d * d);
         let jet = self.kernel.jet(s);
-        let (slope, bend) = (jet.first * Twofold::from_f64(2.0), jet.second * Twofold::from_f64(4.0));
+        let (slope, bend) = (
+            jet.first * Twofold::from_f64(2.0),
+            jet.second * Twofold::from_f64(4.0),
+        );
         Jets {
             value: jet.value,
             gradient: d.map(|d| slope * d),
             hessian: core::array::from_fn(|k| {
-                core::array::from_fn(|i| bend * d[k] * d[i] + if i == k { slope } else { Twofold::ZERO })
+                core::array::from_fn(|i| {
+                    bend * d[k] * d[i] + if i == k { slope } else { Twofold::ZERO }
+                })
             }),
         }
     }
@@ -184,7 +213,9 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M>
         let scale = self.frame.scale;
         let value = core::array::from_fn(|m| {
             let constant = wide(self.affine.constant[m]) + sums[m].value;
-            let sum = (0..D).fold(constant, |sum, k| sum + wide(self.affine.gradient[m][k]) * x[k]);
+            let sum = (0..D).fold(constant, |sum, k| {
+                sum + wide(self.affine.gradient[m][k]) * x[k]
+            });
             T::narrow(sum.high)
         });
         let gradient = core::array::from_fn(|m| {
@@ -193,9 +224,15 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M>
             })
         });
         let hessian = core::array::from_fn(|m| {
-            sums[m].hessian.map(|row| row.map(|h| T::narrow(h.high / scale / scale)))
+            sums[m]
+                .hessian
+                .map(|row| row.map(|h| T::narrow(h.high / scale / scale)))
         });
-        Sample { value, gradient, hessian }
+        Sample {
+            value,
+            gradient,
+            hessian,
+        }
     }
 }
 

@@ -5,7 +5,8 @@ use core::ops::ControlFlow;
 use nalgebra::Point;
 
 use crate::{
-    Factorization, Kernel, Progress, Scalar, Spline, TpsError, Workspace, refine::Buffers, task::Task,
+    Factorization, Kernel, Progress, Scalar, Spline, TpsError, Workspace, refine::Buffers,
+    task::Task,
 };
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
@@ -30,7 +31,10 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ///
     /// # Errors
     /// [`TpsError`] for bad targets.
-    pub fn fit<const M: usize>(&self, targets: &[Point<T, M>]) -> Result<Spline<T, D, M, K>, TpsError> {
+    pub fn fit<const M: usize>(
+        &self,
+        targets: &[Point<T, M>],
+    ) -> Result<Spline<T, D, M, K>, TpsError> {
         self.fit_watched(targets, |_| ControlFlow::Continue(()))
     }
 
@@ -63,8 +67,17 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Spline<T, D, M, K>, TpsError> {
         let mut spline = Spline::empty(self.kernel.clone());
-        let task = Task { careful: true, ..self.task() };
-        self.watched(&task, &mut Buffers::default(), targets, &mut spline, &mut watch)?;
+        let task = Task {
+            careful: true,
+            ..self.task()
+        };
+        self.watched(
+            &task,
+            &mut Buffers::default(),
+            targets,
+            &mut spline,
+            &mut watch,
+        )?;
         Ok(spline)
     }
 
@@ -93,6 +106,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
     ) -> Result<(), TpsError> {
-        self.finish(&self.task(), &mut workspace.buffers, targets, spline).map(drop)
+        self.finish(&self.task(), &mut workspace.buffers, targets, spline)
+            .map(drop)
     }
 }

@@ -42,7 +42,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// close to degenerate that plain arithmetic has no factor.
     pub fn influence(&self, point: &Point<T, D>) -> Result<Vec<T>, TpsError> {
         let mut influence = vec![T::zero(); self.len()];
-        self.influence_into(&mut Workspace::new(), core::slice::from_ref(point), &mut influence)?;
+        self.influence_into(
+            &mut Workspace::new(),
+            core::slice::from_ref(point),
+            &mut influence,
+        )?;
         Ok(influence)
     }
 
@@ -69,7 +73,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// As [`influence`](Self::influence).
     pub fn jacobian_influence(&self, point: &Point<T, D>) -> Result<Vec<SVector<T, D>>, TpsError> {
         let mut influence = vec![SVector::zeros(); self.len()];
-        self.jacobian_influence_into(&mut Workspace::new(), core::slice::from_ref(point), &mut influence)?;
+        self.jacobian_influence_into(
+            &mut Workspace::new(),
+            core::slice::from_ref(point),
+            &mut influence,
+        )?;
         Ok(influence)
     }
 
@@ -102,12 +110,24 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.linear(points.len(), influence.len())?;
         let whole = points.len() / GROUP * GROUP;
         let (grouped, single) = influence.split_at_mut(whole * self.len());
-        for (points, rows) in points.chunks_exact(GROUP).zip(grouped.chunks_exact_mut(GROUP * self.len())) {
+        for (points, rows) in points
+            .chunks_exact(GROUP)
+            .zip(grouped.chunks_exact_mut(GROUP * self.len()))
+        {
             let columns = core::array::from_fn(|r| Column::value(self, &points[r]));
-            self.follow::<GROUP>(&columns, &mut workspace.buffers, |r, i, a| rows[r * self.len() + i] = a);
+            self.follow::<GROUP>(&columns, &mut workspace.buffers, |r, i, a| {
+                rows[r * self.len() + i] = a
+            });
         }
-        for (point, row) in points[whole..].iter().zip(single.chunks_exact_mut(self.len())) {
-            self.follow(&[Column::value(self, point)], &mut workspace.buffers, |_, i, a| row[i] = a);
+        for (point, row) in points[whole..]
+            .iter()
+            .zip(single.chunks_exact_mut(self.len()))
+        {
+            self.follow(
+                &[Column::value(self, point)],
+                &mut workspace.buffers,
+                |_, i, a| row[i] = a,
+            );
         }
         Ok(())
     }
@@ -151,7 +171,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         match self.smoothing {
             Smoothing::Gcv => Err(TpsError::DependsOnTargets),
             _ if self.iterative.is_some() => Err(TpsError::NoFactor),
-            _ if self.system.indefinite => Err(TpsError::NotDefinite { column: self.system.null.q }),
+            _ if self.system.indefinite => Err(TpsError::NotDefinite {
+                column: self.system.null.q,
+            }),
             _ => Ok(()),
         }
     }
@@ -169,12 +191,22 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         targets.resize(R * n, 0.0);
         for (column, terms) in columns.iter().zip(targets.chunks_exact_mut(n)) {
             let axes = core::array::from_fn(|k| &self.sites.axes[k][..]);
-            dispatch(Fill { kernel: &self.kernel, axes, column, terms });
+            dispatch(Fill {
+                kernel: &self.kernel,
+                axes,
+                column,
+                terms,
+            });
         }
-        self.system.solve_adjoint(targets, n, columns.each_ref().map(|c| &c.affine), work);
+        self.system
+            .solve_adjoint(targets, n, columns.each_ref().map(|c| &c.affine), work);
         for (r, found) in targets.chunks_exact(n).enumerate() {
             for i in 0..self.len() {
-                sink(r, i, T::narrow(found[self.sites.site(i)] * self.share(i) / columns[r].unit));
+                sink(
+                    r,
+                    i,
+                    T::narrow(found[self.sites.site(i)] * self.share(i) / columns[r].unit),
+                );
             }
         }
     }
@@ -201,15 +233,44 @@ struct Column<const D: usize> {
 
 impl<const D: usize> Column<D> {
     fn value<T: Scalar, K>(factorization: &Factorization<T, D, K>, point: &Point<T, D>) -> Self {
-        let (span, point) = (&factorization.system.span, factorization.sites.frame.inside(point));
-        let affine = core::array::from_fn(|c| if c <= span.directions { span.value(c, &point) } else { 0.0 });
-        Self { point, axis: None, affine, unit: 1.0 }
+        let (span, point) = (
+            &factorization.system.span,
+            factorization.sites.frame.inside(point),
+        );
+        let affine = core::array::from_fn(|c| {
+            if c <= span.directions {
+                span.value(c, &point)
+            } else {
+                0.0
+            }
+        });
+        Self {
+            point,
+            axis: None,
+            affine,
+            unit: 1.0,
+        }
     }
 
-    fn slope<T: Scalar, K>(factorization: &Factorization<T, D, K>, point: &Point<T, D>, axis: usize) -> Self {
+    fn slope<T: Scalar, K>(
+        factorization: &Factorization<T, D, K>,
+        point: &Point<T, D>,
+        axis: usize,
+    ) -> Self {
         let (span, frame) = (&factorization.system.span, &factorization.sites.frame);
-        let affine = core::array::from_fn(|c| if c <= span.directions { span.slope(c, axis) } else { 0.0 });
-        Self { point: frame.inside(point), axis: Some(axis), affine, unit: frame.scale }
+        let affine = core::array::from_fn(|c| {
+            if c <= span.directions {
+                span.slope(c, axis)
+            } else {
+                0.0
+            }
+        });
+        Self {
+            point: frame.inside(point),
+            axis: Some(axis),
+            affine,
+            unit: frame.scale,
+        }
     }
 }
 

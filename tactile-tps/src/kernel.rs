@@ -115,7 +115,11 @@ impl Kernel for R2LogR {
         let half = R::from_f64(0.5);
         let log = off_centre(s, s.ln());
         let half_log = half * log;
-        Jet { value: s * half_log, first: off_centre(s, half_log + half), second: off_centre(s, half / s) }
+        Jet {
+            value: s * half_log,
+            first: off_centre(s, half_log + half),
+            second: off_centre(s, half / s),
+        }
     }
     fn degree(&self) -> Option<i32> {
         Some(2)
@@ -127,7 +131,11 @@ impl Kernel for NegR {
     fn jet<R: Real>(&self, s: R) -> Jet<R> {
         let r = s.sqrt();
         let first = off_centre(s, R::from_f64(-0.5) / r);
-        Jet { value: -r, first, second: off_centre(s, R::from_f64(-0.5) * first / s) }
+        Jet {
+            value: -r,
+            first,
+            second: off_centre(s, R::from_f64(-0.5) * first / s),
+        }
     }
     fn degree(&self) -> Option<i32> {
         Some(1)
@@ -138,7 +146,11 @@ impl Kernel for R3 {
     #[inline(always)]
     fn jet<R: Real>(&self, s: R) -> Jet<R> {
         let r = s.sqrt();
-        Jet { value: s * r, first: R::from_f64(1.5) * r, second: off_centre(s, R::from_f64(0.75) / r) }
+        Jet {
+            value: s * r,
+            first: R::from_f64(1.5) * r,
+            second: off_centre(s, R::from_f64(0.75) / r),
+        }
     }
     fn degree(&self) -> Option<i32> {
         Some(3)

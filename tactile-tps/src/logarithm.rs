@@ -18,10 +18,17 @@ pub(crate) fn ln_f64(x: f64, fma: impl Fn(f64, f64, f64) -> f64) -> f64 {
     let t = f / (2.0 + f);
     let z = t * t;
     let w = z * z;
-    let even =
-        fma(w, fma(w, 0.153_138_376_992_093_73, 0.222_221_984_321_497_84), 0.399_999_999_994_094_2) * w;
+    let even = fma(
+        w,
+        fma(w, 0.153_138_376_992_093_73, 0.222_221_984_321_497_84),
+        0.399_999_999_994_094_2,
+    ) * w;
     let odd = fma(w, 0.147_981_986_051_165_86, 0.181_835_721_616_180_5);
-    let odd = fma(w, fma(w, odd, 0.285_714_287_436_623_9), 0.666_666_666_666_673_5) * z;
+    let odd = fma(
+        w,
+        fma(w, odd, 0.285_714_287_436_623_9),
+        0.666_666_666_666_673_5,
+    ) * z;
     let half_square = 0.5 * f * f;
     let tail = fma(t, half_square + (odd + even), k * LN2_LOW);
     fma(k, LN2_HIGH, f - (half_square - tail))
@@ -71,22 +78,41 @@ mod tests {
     #[test]
     fn agrees_with_the_library_to_an_ulp() {
         for x in arguments().filter(|&x| x != 1.0) {
-            assert!(ulps(ln_f64(x, f64::mul_add), x.ln(), f64::EPSILON) <= 1.5, "{x:e}");
-            assert!(ulps(ln_f64(x, |a, b, c| a * b + c), x.ln(), f64::EPSILON) <= 1.5, "{x:e}");
+            assert!(
+                ulps(ln_f64(x, f64::mul_add), x.ln(), f64::EPSILON) <= 1.5,
+                "{x:e}"
+            );
+            assert!(
+                ulps(ln_f64(x, |a, b, c| a * b + c), x.ln(), f64::EPSILON) <= 1.5,
+                "{x:e}"
+            );
         }
-        for x in arguments().map(|x| x as f32).filter(|x| x.is_normal() && *x != 1.0) {
+        for x in arguments()
+            .map(|x| x as f32)
+            .filter(|x| x.is_normal() && *x != 1.0)
+        {
             let expected = f64::from(x).ln();
             assert!(
-                ulps(f64::from(ln_f32(x, f32::mul_add)), expected, f64::from(f32::EPSILON)) <= 1.5,
+                ulps(
+                    f64::from(ln_f32(x, f32::mul_add)),
+                    expected,
+                    f64::from(f32::EPSILON)
+                ) <= 1.5,
                 "{x:e}"
             );
             let plain = f64::from(ln_f32(x, |a, b, c| a * b + c));
-            assert!(ulps(plain, expected, f64::from(f32::EPSILON)) <= 1.5, "{x:e}");
+            assert!(
+                ulps(plain, expected, f64::from(f32::EPSILON)) <= 1.5,
+                "{x:e}"
+            );
         }
     }
 
     #[test]
     fn is_exact_at_one() {
-        assert_eq!((ln_f64(1.0, f64::mul_add), ln_f32(1.0, f32::mul_add)), (0.0, 0.0));
+        assert_eq!(
+            (ln_f64(1.0, f64::mul_add), ln_f32(1.0, f32::mul_add)),
+            (0.0, 0.0)
+        );
     }
 }

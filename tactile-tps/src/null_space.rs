@@ -36,7 +36,13 @@ pub(crate) struct NullSpace {
 
 impl NullSpace {
     /// Factors the q columns of length n, n ≥ q, that `fill` writes one by one.
-    pub(crate) fn factor(&mut self, n: usize, q: usize, stride: usize, fill: impl Fn(usize, &mut [f64])) {
+    pub(crate) fn factor(
+        &mut self,
+        n: usize,
+        q: usize,
+        stride: usize,
+        fill: impl Fn(usize, &mut [f64]),
+    ) {
         (self.n, self.q, self.stride) = (n, q, stride);
         self.v.clear();
         self.v.resize(stride * MAX, 0.0);
@@ -61,12 +67,17 @@ impl NullSpace {
     /// Entry of the triangle R Πᵀ, columns in their original order.
     pub(crate) fn triangle(&self, row: usize, column: usize) -> f64 {
         let place = self.order[..self.q].iter().position(|&c| c == column);
-        place.filter(|&place| place >= row).map_or(0.0, |place| self.r[row][place])
+        place
+            .filter(|&place| place >= row)
+            .map_or(0.0, |place| self.r[row][place])
     }
 
     /// The reflectors, padded to `MAX` columns.
     pub(crate) fn reflectors(&self) -> Columns<'_, MAX> {
-        Columns { data: &self.v, stride: self.stride }
+        Columns {
+            data: &self.v,
+            stride: self.stride,
+        }
     }
 
     fn column(&self, k: usize) -> &[f64] {
@@ -77,8 +88,11 @@ impl NullSpace {
     fn pivot(&mut self, k: usize) {
         let head = self.rows().start + k;
         let norm = |j: usize| dot(&self.column(j)[head..], &self.column(j)[head..]);
-        let best =
-            (k..self.q).fold((k, -1.0), |best, j| if norm(j) > best.1 { (j, norm(j)) } else { best }).0;
+        let best = (k..self.q)
+            .fold((k, -1.0), |best, j| {
+                if norm(j) > best.1 { (j, norm(j)) } else { best }
+            })
+            .0;
         if best != k {
             let (left, right) = self.v.split_at_mut(best * self.stride);
             left[k * self.stride..(k + 1) * self.stride].swap_with_slice(&mut right[..self.stride]);
@@ -108,7 +122,10 @@ impl NullSpace {
         let tau = (beta - top) / beta;
         for (j, other) in right.chunks_exact_mut(stride).take(later).enumerate() {
             let dot = tau * dot(&column[head..], &other[head..]);
-            other[head..].iter_mut().zip(&column[head..]).for_each(|(o, v)| *o -= dot * v);
+            other[head..]
+                .iter_mut()
+                .zip(&column[head..])
+                .for_each(|(o, v)| *o -= dot * v);
             self.r[k][k + 1 + j] = other[head];
         }
         tau
@@ -140,9 +157,20 @@ impl NullSpace {
     }
 
     fn apply_compact(&self, b: &mut [f64], transpose: bool) {
-        let t = |i: usize, j: usize| if transpose { self.t[j][i] } else { self.t[i][j] };
+        let t = |i: usize, j: usize| {
+            if transpose {
+                self.t[j][i]
+            } else {
+                self.t[i][j]
+            }
+        };
         let t = core::array::from_fn(|i| core::array::from_fn(|j| t(i, j)));
-        Reflect { v: self.reflectors(), t, b }.apply();
+        Reflect {
+            v: self.reflectors(),
+            t,
+            b,
+        }
+        .apply();
     }
 
     /// Turns the lower triangle of K into that of QᵀKQ, given Y = K V for the reflectors V in `x`; returns the
@@ -161,13 +189,21 @@ impl NullSpace {
         }
         for (c, y) in x.chunks_exact_mut(stride).enumerate() {
             for i in 0..q {
-                y.iter_mut().zip(self.column(i)).for_each(|(y, v)| *y -= s[i][c] * v);
+                y.iter_mut()
+                    .zip(self.column(i))
+                    .for_each(|(y, v)| *y -= s[i][c] * v);
             }
         }
         let mut squares = 0.0;
         for j in self.rows() {
             let column = &mut k[j * stride..(j + 1) * stride];
-            let below = Update { column, j, v: self.reflectors(), x: Columns { data: x, stride } }.subtract();
+            let below = Update {
+                column,
+                j,
+                v: self.reflectors(),
+                x: Columns { data: x, stride },
+            }
+            .subtract();
             if j >= HEAD {
                 squares += 2.0 * below + k[j * stride + j].powi(2);
             }
@@ -218,7 +254,12 @@ pub(crate) fn ratio(a: f64, b: f64) -> f64 {
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (lanes, others) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = lanes.remainder().iter().zip(others.remainder()).map(|(a, b)| a * b).sum();
+    let tail: f64 = lanes
+        .remainder()
+        .iter()
+        .zip(others.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
     for (a, b) in lanes.zip(others) {
         for l in 0..8 {
             sums[l] += a[l] * b[l];

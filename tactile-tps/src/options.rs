@@ -237,14 +237,18 @@ impl<T: Scalar, K> FitOptions<T, K> {
             return Err(TpsError::Tolerance { value: tolerance });
         }
         validate_smoothing(&self.smoothing)?;
-        self.weights.as_deref().map_or(Ok(()), |weights| validate_weights(weights, points))
+        self.weights
+            .as_deref()
+            .map_or(Ok(()), |weights| validate_weights(weights, points))
     }
 }
 
 pub(crate) fn validate_smoothing<T: Scalar>(smoothing: &Smoothing<T>) -> Result<(), TpsError> {
     match smoothing {
         Smoothing::Lambda(lambda) if !(lambda.widen() >= 0.0 && lambda.widen().is_finite()) => {
-            Err(TpsError::Lambda { value: lambda.widen() })
+            Err(TpsError::Lambda {
+                value: lambda.widen(),
+            })
         }
         _ => Ok(()),
     }
@@ -252,11 +256,20 @@ pub(crate) fn validate_smoothing<T: Scalar>(smoothing: &Smoothing<T>) -> Result<
 
 pub(crate) fn validate_weights<T: Scalar>(weights: &[T], points: usize) -> Result<(), TpsError> {
     if weights.len() != points {
-        return Err(TpsError::Length { input: Input::Weights, expected: points, found: weights.len() });
+        return Err(TpsError::Length {
+            input: Input::Weights,
+            expected: points,
+            found: weights.len(),
+        });
     }
-    let bad = weights.iter().position(|w| !(w.widen() >= 0.0 && w.widen().is_finite()));
+    let bad = weights
+        .iter()
+        .position(|w| !(w.widen() >= 0.0 && w.widen().is_finite()));
     match bad {
-        Some(index) => Err(TpsError::Weight { index, value: weights[index].widen() }),
+        Some(index) => Err(TpsError::Weight {
+            index,
+            value: weights[index].widen(),
+        }),
         None if weights.iter().all(|w| w.widen() == 0.0) => Err(TpsError::Empty(Input::Weights)),
         None => Ok(()),
     }

@@ -24,7 +24,11 @@ impl Packed {
                 data.extend((start..start + STRIP).map(value));
             }
         }
-        Self { rows, columns, data }
+        Self {
+            rows,
+            columns,
+            data,
+        }
     }
 
     /// Σᵢ factors[i] rowᵢ for each of `M` columns of factors, into `out` from `offset` on, columns `stride` apart.
@@ -36,7 +40,13 @@ impl Packed {
         offset: usize,
     ) {
         let factors = factors.map(|column| &column[..self.rows]);
-        Arch::new().dispatch(Combine { matrix: self, factors, out, stride, offset });
+        Arch::new().dispatch(Combine {
+            matrix: self,
+            factors,
+            out,
+            stride,
+            offset,
+        });
     }
 }
 
@@ -53,7 +63,13 @@ impl<const M: usize> WithSimd for Combine<'_, M> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { matrix, factors, out, stride, offset } = self;
+        let Self {
+            matrix,
+            factors,
+            out,
+            stride,
+            offset,
+        } = self;
         let strips = matrix.data.chunks_exact((matrix.rows * STRIP).max(1));
         for (strip, start) in strips.zip((0..matrix.columns).step_by(STRIP)) {
             let used = STRIP.min(matrix.columns - start);
@@ -94,6 +110,8 @@ fn sum<S: Simd, const M: usize>(
         }
     }
     for m in 0..M {
-        S::as_mut_simd_f64s(&mut sums[m][part..part + width]).0.copy_from_slice(&total[m]);
+        S::as_mut_simd_f64s(&mut sums[m][part..part + width])
+            .0
+            .copy_from_slice(&total[m]);
     }
 }

@@ -28,7 +28,11 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
-    pub fn par_apply_into(&self, points: &[Point<T, D>], values: &mut [Point<T, M>]) -> Result<(), TpsError> {
+    pub fn par_apply_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+    ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         let chunks = points.par_chunks(CHUNK).zip(values.par_chunks_mut(CHUNK));
         chunks.try_for_each(|(points, values)| self.apply_into(points, values))
@@ -62,9 +66,14 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         same_length(points.len(), jacobians.len())?;
-        let outputs = values.par_chunks_mut(CHUNK).zip(jacobians.par_chunks_mut(CHUNK));
-        points.par_chunks(CHUNK).zip(outputs).try_for_each(|(points, (values, jacobians))| {
-            self.apply_and_jacobian_into(points, values, jacobians)
-        })
+        let outputs = values
+            .par_chunks_mut(CHUNK)
+            .zip(jacobians.par_chunks_mut(CHUNK));
+        points
+            .par_chunks(CHUNK)
+            .zip(outputs)
+            .try_for_each(|(points, (values, jacobians))| {
+                self.apply_and_jacobian_into(points, values, jacobians)
+            })
     }
 }

@@ -81,9 +81,17 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         let square = kernel(scale * scale) / self.unit() - kernel(1.0);
         let n = self.count();
         let offset = SVector::from_fn(|i, _| {
-            let norm = |j: usize| (0..D).map(|k| self.centres[k * n + j].widen().powi(2)).sum::<f64>();
-            let second: f64 = (0..n).map(|j| self.weights[i * n + j].widen() * norm(j)).sum();
-            let shift: f64 = (0..D).map(|k| self.affine.gradient[i][k].widen() * (centre[k] / scale)).sum();
+            let norm = |j: usize| {
+                (0..D)
+                    .map(|k| self.centres[k * n + j].widen().powi(2))
+                    .sum::<f64>()
+            };
+            let second: f64 = (0..n)
+                .map(|j| self.weights[i * n + j].widen() * norm(j))
+                .sum();
+            let shift: f64 = (0..D)
+                .map(|k| self.affine.gradient[i][k].widen() * (centre[k] / scale))
+                .sum();
             self.affine.constant[i].widen() - shift - square * second
         });
         (linear, offset)
@@ -105,6 +113,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     pub(crate) fn parts(&self) -> Parts<'_, T, K, D, M> {
         let (centres, weights) = self.columns();
-        Parts { kernel: &self.kernel, frame: self.frame, centres, weights, affine: &self.affine }
+        Parts {
+            kernel: &self.kernel,
+            frame: self.frame,
+            centres,
+            weights,
+            affine: &self.affine,
+        }
     }
 }

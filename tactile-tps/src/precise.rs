@@ -38,17 +38,28 @@ impl Reflector {
         x[head + 1..].fill(Twofold::ZERO);
         x[head] = beta;
         if norm.high == 0.0 {
-            return Self { head, tau: Twofold::ZERO, v };
+            return Self {
+                head,
+                tau: Twofold::ZERO,
+                v,
+            };
         }
         let scale = top - beta;
         v[head] = Twofold::from_f64(1.0);
         v[head + 1..].iter_mut().for_each(|x| *x = *x / scale);
-        Self { head, tau: (beta - top) / beta, v }
+        Self {
+            head,
+            tau: (beta - top) / beta,
+            v,
+        }
     }
 
     fn apply(&self, x: &mut [Twofold]) {
         let product = dot(&self.v[self.head..], &x[self.head..]) * self.tau;
-        x[self.head..].iter_mut().zip(&self.v[self.head..]).for_each(|(x, v)| *x = *x - product * *v);
+        x[self.head..]
+            .iter_mut()
+            .zip(&self.v[self.head..])
+            .for_each(|(x, v)| *x = *x - product * *v);
     }
 
     /// K ← H K H for a symmetric matrix kept in full.
@@ -56,14 +67,17 @@ impl Reflector {
         let n = k.rows;
         (0..n).for_each(|j| self.apply(k.column(j)));
         for i in 0..n {
-            let row = (self.head..n).fold(Twofold::ZERO, |sum, j| sum + k.at(i, j) * self.v[j]) * self.tau;
+            let row = (self.head..n).fold(Twofold::ZERO, |sum, j| sum + k.at(i, j) * self.v[j])
+                * self.tau;
             (self.head..n).for_each(|j| k.data[j * n + i] = k.data[j * n + i] - row * self.v[j]);
         }
     }
 }
 
 fn dot(a: &[Twofold], b: &[Twofold]) -> Twofold {
-    a.iter().zip(b).fold(Twofold::ZERO, |sum, (a, b)| sum + *a * *b)
+    a.iter()
+        .zip(b)
+        .fold(Twofold::ZERO, |sum, (a, b)| sum + *a * *b)
 }
 
 /// Solves as [`System::solve`]; `None` if the matrix is not definite even now.
@@ -82,7 +96,9 @@ pub(crate) fn solve<const D: usize, const M: usize, K: Kernel>(
     let mut affine = [[0.0; MAX]; M];
     for m in 0..M {
         let values = &mut y[m * count..(m + 1) * count];
-        let mut b: Vec<_> = (0..n).map(|i| Twofold::from_f64(values[system.active[i]]) * scale(i)).collect();
+        let mut b: Vec<_> = (0..n)
+            .map(|i| Twofold::from_f64(values[system.active[i]]) * scale(i))
+            .collect();
         affine[m] = projected.solve(&mut b);
         values.fill(0.0);
         (0..n).for_each(|i| values[system.active[i]] = (b[i] * scale(i)).high);
@@ -109,9 +125,13 @@ impl Projected {
         let (n, q) = (system.active.len(), system.null.q);
         let point = |i: usize| sites.precise(system.active[i]);
         let mut k = kernel_matrix(kernel, n, point, &scale, lambda);
-        let mut p = Matrix { rows: n, data: Vec::with_capacity(n * q) };
+        let mut p = Matrix {
+            rows: n,
+            data: Vec::with_capacity(n * q),
+        };
         for c in 0..q {
-            p.data.extend((0..n).map(|i| system.span.precise(c, &point(i)) * scale(i)));
+            p.data
+                .extend((0..n).map(|i| system.span.precise(c, &point(i)) * scale(i)));
         }
         let mut reflectors = Vec::with_capacity(q);
         for c in 0..q {
@@ -130,8 +150,9 @@ impl Projected {
         let (n, q) = (b.len(), reflectors.len());
         reflectors.iter().for_each(|r| r.apply(b));
         substitute(k, q, b);
-        let mut head: Vec<_> =
-            (0..q).map(|i| b[i] - (q..n).fold(Twofold::ZERO, |s, j| s + k.at(i, j) * b[j])).collect();
+        let mut head: Vec<_> = (0..q)
+            .map(|i| b[i] - (q..n).fold(Twofold::ZERO, |s, j| s + k.at(i, j) * b[j]))
+            .collect();
         let mut affine = [0.0; MAX];
         for i in (0..q).rev() {
             let rest = (i + 1..q).fold(head[i], |rest, j| rest - p.at(i, j) * head[j]);
@@ -151,7 +172,10 @@ fn kernel_matrix<K: Kernel, const D: usize>(
     scale: impl Fn(usize) -> Twofold,
     lambda: f64,
 ) -> Matrix {
-    let mut k = Matrix { rows: n, data: vec![Twofold::ZERO; n * n] };
+    let mut k = Matrix {
+        rows: n,
+        data: vec![Twofold::ZERO; n * n],
+    };
     for j in 0..n {
         for i in j..n {
             let (a, b) = (point(i), point(j));
@@ -179,7 +203,10 @@ fn cholesky(k: &mut Matrix, q: usize) -> Option<()> {
         column[c..].iter_mut().for_each(|x| *x = *x / root);
         for (j, other) in (c + 1..n).zip(right.chunks_exact_mut(n)) {
             let factor = column[j];
-            other[j..].iter_mut().zip(&column[j..]).for_each(|(x, l)| *x = *x - factor * *l);
+            other[j..]
+                .iter_mut()
+                .zip(&column[j..])
+                .for_each(|(x, l)| *x = *x - factor * *l);
         }
     }
     Some(())

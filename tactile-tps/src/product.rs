@@ -14,9 +14,22 @@ pub(crate) fn energy<K: Kernel, const D: usize, const M: usize>(
     weights: [&[f64]; M],
 ) -> f64 {
     let mut residuals = vec![0.0; M * centres[0].len()];
-    let sum = Sum { kernel, centres, weights };
-    dispatch(Subtract { sum, places: centres, residuals: &mut residuals });
-    let products = weights.iter().copied().flatten().zip(&residuals).map(|(w, r)| -w * r);
+    let sum = Sum {
+        kernel,
+        centres,
+        weights,
+    };
+    dispatch(Subtract {
+        sum,
+        places: centres,
+        residuals: &mut residuals,
+    });
+    let products = weights
+        .iter()
+        .copied()
+        .flatten()
+        .zip(&residuals)
+        .map(|(w, r)| -w * r);
     f64::max(products.sum(), 0.0)
 }
 
@@ -55,7 +68,10 @@ impl<K: Kernel, const D: usize, const M: usize> Subtract<'_, K, D, M> {
         self.sum.block::<L, W, 0>(&x, &mut sums);
         for m in 0..M {
             let residuals = &mut self.residuals[m * n + start..m * n + start + used];
-            residuals.iter_mut().zip(&sums.value[m]).for_each(|(r, sum)| *r -= sum);
+            residuals
+                .iter_mut()
+                .zip(&sums.value[m])
+                .for_each(|(r, sum)| *r -= sum);
         }
     }
 }

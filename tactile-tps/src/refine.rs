@@ -82,7 +82,11 @@ impl<const M: usize> Solution<M> {
 
 impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     /// Solves for the targets in `buffers`, `None` if the kernel is not definite on the sites; `careful` measures the residual and refines from a lower condition number on.
-    pub(crate) fn solve<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Option<Solution<M>> {
+    pub(crate) fn solve<const M: usize>(
+        &self,
+        buffers: &mut Buffers,
+        careful: bool,
+    ) -> Option<Solution<M>> {
         let (n, system) = (self.sites.len(), self.system);
         if let Some(solution) = self.solve_precisely(buffers, careful) {
             return Some(solution);
@@ -91,8 +95,13 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             return None;
         }
         buffers.weights.clone_from(&buffers.targets);
-        let affine =
-            system.solve(&mut buffers.weights, n, self.lambda, &mut buffers.work, &mut buffers.spare);
+        let affine = system.solve(
+            &mut buffers.weights,
+            n,
+            self.lambda,
+            &mut buffers.work,
+            &mut buffers.spare,
+        );
         let mut solution = Solution::new(affine, system.condition(self.lambda));
         let threshold = match careful {
             true if n <= SMALL_POINTS => 10.0 * n as f64,
@@ -109,15 +118,29 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     }
 
     /// In twice the working precision, where that is needed and can be had.
-    fn solve_precisely<const M: usize>(&self, buffers: &mut Buffers, careful: bool) -> Option<Solution<M>> {
+    fn solve_precisely<const M: usize>(
+        &self,
+        buffers: &mut Buffers,
+        careful: bool,
+    ) -> Option<Solution<M>> {
         if !(self.system.indefinite || self.needs_precision(careful)) {
             return None;
         }
         buffers.weights.clone_from(&buffers.targets);
-        let affine = precise::solve(self.kernel, self.sites, self.system, self.lambda, &mut buffers.weights)?;
+        let affine = precise::solve(
+            self.kernel,
+            self.sites,
+            self.system,
+            self.lambda,
+            &mut buffers.weights,
+        )?;
         let residual = careful.then(|| self.sampled(&affine, buffers));
         let solution = Solution::new(affine, self.system.condition(self.lambda));
-        Some(Solution { residual, precise: true, ..solution })
+        Some(Solution {
+            residual,
+            precise: true,
+            ..solution
+        })
     }
 
     /// Solves with other weights by the spectrum of the system; `None` if that takes too many steps.
@@ -126,11 +149,22 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         buffers: &mut Buffers,
         reweighting: &Reweighting<'_>,
     ) -> Option<Solution<M>> {
-        let Buffers { targets, weights, residuals, excess, work, spare, .. } = buffers;
+        let Buffers {
+            targets,
+            weights,
+            residuals,
+            excess,
+            work,
+            spare,
+            ..
+        } = buffers;
         weights.clone_from(targets);
         let memory = [residuals, work, spare];
         let (affine, iterations) = self.system.resolve(weights, reweighting, excess, memory)?;
-        Some(Solution { iterations, ..Solution::new(affine, reweighting.condition) })
+        Some(Solution {
+            iterations,
+            ..Solution::new(affine, reweighting.condition)
+        })
     }
 
     /// Whether plain arithmetic would leave too few digits, and the points are few enough to do something about it.
@@ -139,7 +173,11 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     fn needs_precision(&self, careful: bool) -> bool {
         let (n, condition) = (self.sites.len(), self.system.condition(self.lambda));
         let span = &self.system.span;
-        let stretch = 1.0 / span.extents[..span.directions].last().copied().unwrap_or(1.0);
+        let stretch = 1.0
+            / span.extents[..span.directions]
+                .last()
+                .copied()
+                .unwrap_or(1.0);
         (n <= PRECISE_POINTS && condition > PRECISE_CONDITION)
             || (careful && n <= FEW_POINTS && condition * stretch > FEW_CONDITION)
     }
@@ -149,16 +187,31 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         for _ in 0..STEPS {
             let residual = self.residual(&solution.affine, buffers);
             solution.residual = Some(residual);
-            let Buffers { weights, residuals, work, spare, .. } = buffers;
+            let Buffers {
+                weights,
+                residuals,
+                work,
+                spare,
+                ..
+            } = buffers;
             let affine: [[f64; MAX]; M] =
-                self.system.solve(residuals, self.sites.len(), self.lambda, work, spare);
+                self.system
+                    .solve(residuals, self.sites.len(), self.lambda, work, spare);
             let step = largest(residuals) / largest(weights).max(f64::MIN_POSITIVE);
             // A step that is no shorter than half the last is rounding.
             if step.is_nan() || step > 0.5 * last {
                 return;
             }
-            weights.iter_mut().zip(residuals.iter()).for_each(|(w, r)| *w += r);
-            solution.affine.iter_mut().flatten().zip(affine.iter().flatten()).for_each(|(a, d)| *a += d);
+            weights
+                .iter_mut()
+                .zip(residuals.iter())
+                .for_each(|(w, r)| *w += r);
+            solution
+                .affine
+                .iter_mut()
+                .flatten()
+                .zip(affine.iter().flatten())
+                .for_each(|(a, d)| *a += d);
             solution.refinements += 1;
             if step < 1e-8 {
                 return;
@@ -170,10 +223,19 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
     /// y − K w − λ W⁻¹ w − P a at the sites, and its largest entry relative to the largest target.
     fn residual<const M: usize>(&self, affine: &[[f64; MAX]; M], buffers: &mut Buffers) -> f64 {
         let n = self.sites.len();
-        let Buffers { targets, weights, residuals, .. } = buffers;
+        let Buffers {
+            targets,
+            weights,
+            residuals,
+            ..
+        } = buffers;
         residuals.clone_from(targets);
         let sum = self.sum::<M>(weights);
-        dispatch(Subtract { places: sum.centres, sum, residuals });
+        dispatch(Subtract {
+            places: sum.centres,
+            sum,
+            residuals,
+        });
         let mut size = 0.0;
         for (i, &site) in self.system.active.iter().enumerate() {
             for m in 0..M {
@@ -190,7 +252,12 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         let (n, active) = (self.sites.len(), &self.system.active);
         let count = active.len().min(BLOCK);
         let pick = |i: usize| i * active.len() / count;
-        let Buffers { targets, weights, residuals, .. } = buffers;
+        let Buffers {
+            targets,
+            weights,
+            residuals,
+            ..
+        } = buffers;
         residuals.clear();
         residuals.resize(M * count, 0.0);
         let mut places = [[0.0; BLOCK]; D];
@@ -198,12 +265,16 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
             (0..count).for_each(|i| axis[i] = self.sites.axes[k][active[pick(i)]]);
         }
         let sum = self.sum::<M>(weights);
-        dispatch(Subtract { sum, places: places.each_ref().map(|axis| &axis[..count]), residuals });
+        dispatch(Subtract {
+            sum,
+            places: places.each_ref().map(|axis| &axis[..count]),
+            residuals,
+        });
         let mut size = 0.0;
         for i in 0..count {
             for m in 0..M {
-                let known =
-                    targets[m * n + active[pick(i)]] - self.rest(&affine[m], &weights[m * n..], pick(i));
+                let known = targets[m * n + active[pick(i)]]
+                    - self.rest(&affine[m], &weights[m * n..], pick(i));
                 size = f64::max(size, (known + residuals[m * count + i]).abs());
             }
         }
@@ -212,9 +283,16 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
 
     /// λ W⁻¹ w + P a at an active site.
     fn rest(&self, affine: &[f64; MAX], weights: &[f64], i: usize) -> f64 {
-        let (site, scale) = (self.system.active[i], self.system.scales.get(i).copied().unwrap_or(1.0));
+        let (site, scale) = (
+            self.system.active[i],
+            self.system.scales.get(i).copied().unwrap_or(1.0),
+        );
         let smooth = self.lambda * (weights[site] / scale / scale);
-        smooth + self.system.span.polynomial(affine, |k| self.sites.axes[k][site])
+        smooth
+            + self
+                .system
+                .span
+                .polynomial(affine, |k| self.sites.axes[k][site])
     }
 
     fn sum<'b, const M: usize>(&'b self, weights: &'b [f64]) -> Sum<'b, f64, K, D, M> {

@@ -61,7 +61,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             return self.fit_with(workspace, targets, spline);
         }
         if let Some(weights) = weights {
-            let Workspace { buffers, site_weights, .. } = workspace;
+            let Workspace {
+                buffers,
+                site_weights,
+                ..
+            } = workspace;
             self.sites.weigh(Some(weights), site_weights);
             if let Some(task) = self.cheap(weights, site_weights, smoothing, &mut buffers.excess)
                 && self.finish(&task, buffers, targets, spline)?
@@ -89,7 +93,12 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         } else {
             self.build(workspace, weights, smoothing)?;
         }
-        let Workspace { buffers, system, iterative, .. } = workspace;
+        let Workspace {
+            buffers,
+            system,
+            iterative,
+            ..
+        } = workspace;
         let iterates = !spectral && !gcv && self.iterative.is_some();
         let task = Task {
             weights,
@@ -107,7 +116,12 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         weights: Option<&[T]>,
         smoothing: Smoothing<T>,
     ) -> Result<(), TpsError> {
-        let Workspace { system, iterative, site_weights, .. } = workspace;
+        let Workspace {
+            system,
+            iterative,
+            site_weights,
+            ..
+        } = workspace;
         self.sites.weigh(weights, site_weights);
         let (setting, lambda) = (self.setting(), self.inner_lambda(smoothing));
         if smoothing == Smoothing::Gcv {
@@ -116,8 +130,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             system.factor(&setting, site_weights, lambda)?;
         } else {
             // Nobody watches, so nobody breaks off.
-            let _ =
-                iterative.build(&setting, site_weights, lambda, system, &mut |_| ControlFlow::Continue(()));
+            let _ = iterative.build(&setting, site_weights, lambda, system, &mut |_| {
+                ControlFlow::Continue(())
+            });
         }
         Ok(())
     }
@@ -136,12 +151,20 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             return None;
         }
         let task = |system, reweighting| {
-            Some(Task { weights: Some(weights), smoothing, reweighting, ..Task::new(system) })
+            Some(Task {
+                weights: Some(weights),
+                smoothing,
+                reweighting,
+                ..Task::new(system)
+            })
         };
         if self.inner_lambda(smoothing) == 0.0 {
             let same = self.system.lambda == 0.0 && self.system.active.len() == self.sites.len();
             let task = task(&self.system, None).filter(|_| same);
-            return task.map(|task| Task { iterative: self.iterative.as_ref(), ..task });
+            return task.map(|task| Task {
+                iterative: self.iterative.as_ref(),
+                ..task
+            });
         }
         if !self.decomposes(smoothing) {
             return None;
@@ -155,6 +178,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// Whether a refit with this smoothing and the factorisation's own weights is to go by the spectrum.
     fn decomposes(&self, smoothing: Smoothing<T>) -> bool {
         let few = self.spectral.get().is_some() || self.sites.len() <= DECOMPOSE_POINTS;
-        few && self.iterative.is_none() && self.site_weights.is_empty() && self.inner_lambda(smoothing) > 0.0
+        few && self.iterative.is_none()
+            && self.site_weights.is_empty()
+            && self.inner_lambda(smoothing) > 0.0
     }
 }

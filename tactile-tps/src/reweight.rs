@@ -57,7 +57,11 @@ impl<'a> Reweighting<'a> {
         let condition = (most + high) / (least + low);
         let spread = (least.max(0.0) + high) / (least.max(0.0) + low);
         let rate = (spread.sqrt() - 1.0) / (spread.sqrt() + 1.0);
-        let bound = if rate > 0.0 { (0.5 * TOLERANCE).ln() / rate.ln() } else { 0.0 };
+        let bound = if rate > 0.0 {
+            (0.5 * TOLERANCE).ln() / rate.ln()
+        } else {
+            0.0
+        };
         let level = median(excess);
         let apart = excess.iter().filter(|&&d| d != level).count();
         let steps = null.n / POINTS_PER_STEP;
@@ -67,7 +71,14 @@ impl<'a> Reweighting<'a> {
         }
         excess.clear();
         excess.extend(weights.iter().map(|w| lambda / w - level));
-        Some(Self { spectrum, null, level, condition, steps, apart })
+        Some(Self {
+            spectrum,
+            null,
+            level,
+            condition,
+            steps,
+            apart,
+        })
     }
 
     /// By the equations of the few weights that differ (Woodbury 1950).
@@ -145,7 +156,8 @@ impl<'a> Reweighting<'a> {
                 self.null.apply_transpose(column);
             }
             units.resize((start + GROUP) * stride, 0.0);
-            self.spectrum.coefficients::<GROUP>(group, &mut units[start * stride..]);
+            self.spectrum
+                .coefficients::<GROUP>(group, &mut units[start * stride..]);
         }
         units.truncate(self.apart * stride);
     }
@@ -187,7 +199,10 @@ impl<'a> Reweighting<'a> {
             self.turn::<M>(&beta, b, s);
             size = new;
             self.diagonal(excess, p, product);
-            product.iter_mut().zip(&*s).for_each(|(product, s)| *product += s);
+            product
+                .iter_mut()
+                .zip(&*s)
+                .for_each(|(product, s)| *product += s);
             let curvature = self.inner::<M>(p, product);
             let alpha: [f64; M] = core::array::from_fn(|m| ratio(size[m], curvature[m]));
             self.advance::<M>(&alpha, p, x);

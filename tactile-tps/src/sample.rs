@@ -33,7 +33,9 @@ impl<T: Scalar, const D: usize, const M: usize> Sample<T, D, M> {
 
     /// Largest value.
     pub(crate) fn size(&self) -> f64 {
-        self.value.iter().fold(0.0, |size, x| f64::max(size, x.widen().abs()))
+        self.value
+            .iter()
+            .fold(0.0, |size, x| f64::max(size, x.widen().abs()))
     }
 
     #[inline(always)]
@@ -43,7 +45,8 @@ impl<T: Scalar, const D: usize, const M: usize> Sample<T, D, M> {
 
     #[inline(always)]
     pub(crate) fn hessian(&self) -> [SMatrix<T, D, D>; M] {
-        self.hessian.map(|h| SMatrix::from_fn(|i, j| if i >= j { h[i][j] } else { h[j][i] }))
+        self.hessian
+            .map(|h| SMatrix::from_fn(|i, j| if i >= j { h[i][j] } else { h[j][i] }))
     }
 }
 
@@ -56,7 +59,8 @@ pub(crate) struct Each<'a, T: Scalar, K, F, const D: usize, const M: usize, cons
     pub(crate) sink: F,
 }
 
-impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Job<T> for Each<'_, T, K, F, D, M, ORDER>
+impl<T, K, F, const D: usize, const M: usize, const ORDER: usize> Job<T>
+    for Each<'_, T, K, F, D, M, ORDER>
 where
     T: Scalar,
     K: Kernel,

@@ -27,8 +27,13 @@ impl<const D: usize> Frame<D> {
             }
         }
         let centre = core::array::from_fn(|k| 0.5 * low[k] + 0.5 * high[k]);
-        let half = (0..D).map(|k| 0.5 * high[k] - 0.5 * low[k]).fold(0.0, f64::max);
-        Self { centre, scale: if rescale { power_of_two(half) } else { 1.0 } }
+        let half = (0..D)
+            .map(|k| 0.5 * high[k] - 0.5 * low[k])
+            .fold(0.0, f64::max);
+        Self {
+            centre,
+            scale: if rescale { power_of_two(half) } else { 1.0 },
+        }
     }
 
     #[inline(always)]
@@ -41,7 +46,11 @@ impl<const D: usize> Frame<D> {
 fn power_of_two(x: f64) -> f64 {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
     let power = f64::from_bits(x.to_bits() & EXPONENT);
-    if power > 0.0 && power.is_finite() { power } else { 1.0 }
+    if power > 0.0 && power.is_finite() {
+        power
+    } else {
+        1.0
+    }
 }
 
 /// Distinct points in their frame, and which input point went where.
@@ -70,9 +79,22 @@ impl<const D: usize> Sites<D> {
         let frame = Frame::around(points, rescale);
         let (first, site_of) = merge(points);
         let exact = |i: usize, k: usize| two_sum(points[i][k].widen(), -frame.centre[k]);
-        let axes = core::array::from_fn(|k| first.iter().map(|&i| exact(i, k).high / frame.scale).collect());
-        let low = core::array::from_fn(|k| first.iter().map(|&i| exact(i, k).low / frame.scale).collect());
-        let largest = points.iter().flat_map(|p| p.iter()).fold(0.0, |m, x| f64::max(m, x.widen().abs()));
+        let axes = core::array::from_fn(|k| {
+            first
+                .iter()
+                .map(|&i| exact(i, k).high / frame.scale)
+                .collect()
+        });
+        let low = core::array::from_fn(|k| {
+            first
+                .iter()
+                .map(|&i| exact(i, k).low / frame.scale)
+                .collect()
+        });
+        let largest = points
+            .iter()
+            .flat_map(|p| p.iter())
+            .fold(0.0, |m, x| f64::max(m, x.widen().abs()));
         Ok(Self {
             frame,
             axes,
@@ -103,7 +125,10 @@ impl<const D: usize> Sites<D> {
 
     /// A site's coordinates without rounding.
     pub(crate) fn precise(&self, site: usize) -> [Twofold; D] {
-        core::array::from_fn(|k| Twofold { high: self.axes[k][site], low: self.low[k][site] })
+        core::array::from_fn(|k| Twofold {
+            high: self.axes[k][site],
+            low: self.low[k][site],
+        })
     }
 
     /// Number of points given.
@@ -114,7 +139,11 @@ impl<const D: usize> Sites<D> {
     /// Site of input point `i`.
     #[inline(always)]
     pub(crate) fn site(&self, i: usize) -> usize {
-        if self.site_of.is_empty() { i } else { self.site_of[i] }
+        if self.site_of.is_empty() {
+            i
+        } else {
+            self.site_of[i]
+        }
     }
 }
 
@@ -123,7 +152,10 @@ pub(crate) fn finite<T: Scalar, const D: usize>(
     points: &[Point<T, D>],
     input: Input,
 ) -> Result<(), TpsError> {
-    match points.iter().position(|p| p.iter().any(|x| !x.widen().is_finite())) {
+    match points
+        .iter()
+        .position(|p| p.iter().any(|x| !x.widen().is_finite()))
+    {
         Some(index) => Err(TpsError::NotFinite { input, index }),
         None => Ok(()),
     }

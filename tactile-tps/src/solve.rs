@@ -20,10 +20,15 @@ impl<const D: usize> System<D> {
         work.clear();
         work.resize(M * stride, 0.0);
         for (m, column) in work.chunks_exact_mut(stride).enumerate() {
-            self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
+            self.scaled(
+                &y[m * sites..(m + 1) * sites],
+                &mut column[self.null.rows()],
+            );
             self.null.apply_transpose(column);
         }
-        self.spectrum.as_ref().map(|spectrum| spectrum.cross_validate::<M>(work, n, spare))
+        self.spectrum
+            .as_ref()
+            .map(|spectrum| spectrum.cross_validate::<M>(work, n, spare))
     }
 
     /// Solves for `M` outputs: `y` holds the values at all sites and receives the weights w; returns the affine parts.
@@ -68,20 +73,30 @@ impl<const D: usize> System<D> {
         let mut heads = self.rotate::<M>(y, sites, columns);
         let steps = reweighting.solve::<M>(columns, excess, work, spare)?;
         for (head, column) in heads.iter_mut().zip(work.chunks_exact(stride)) {
-            head.iter_mut().zip(&column[HEAD - q..HEAD]).for_each(|(h, e)| *h -= e);
+            head.iter_mut()
+                .zip(&column[HEAD - q..HEAD])
+                .for_each(|(h, e)| *h -= e);
         }
         self.lift(y, sites, &mut work[..M * stride], &mut heads);
         Some((heads, steps))
     }
 
     /// Qᵀ W^½ y in `work`; returns its first q places, output by output.
-    fn rotate<const M: usize>(&self, y: &[f64], sites: usize, work: &mut Vec<f64>) -> [[f64; MAX]; M] {
+    fn rotate<const M: usize>(
+        &self,
+        y: &[f64],
+        sites: usize,
+        work: &mut Vec<f64>,
+    ) -> [[f64; MAX]; M] {
         let (q, stride) = (self.null.q, self.null.stride);
         work.clear();
         work.resize(M * stride, 0.0);
         let mut heads = [[0.0; MAX]; M];
         for (m, column) in work.chunks_exact_mut(stride).enumerate() {
-            self.scaled(&y[m * sites..(m + 1) * sites], &mut column[self.null.rows()]);
+            self.scaled(
+                &y[m * sites..(m + 1) * sites],
+                &mut column[self.null.rows()],
+            );
             self.null.apply_transpose(column);
             heads[m][..q].copy_from_slice(&column[HEAD - q..HEAD]);
         }
@@ -104,7 +119,10 @@ impl<const D: usize> System<D> {
                 *head -= dot(self.coupling(k), &column[HEAD..HEAD + n - q]);
             }
             self.null.apply(column);
-            self.scatter(&column[self.null.rows()], &mut y[m * sites..(m + 1) * sites]);
+            self.scatter(
+                &column[self.null.rows()],
+                &mut y[m * sites..(m + 1) * sites],
+            );
             heads[m] = self.null.solve_upper(&heads[m][..q]);
         }
     }
@@ -125,7 +143,8 @@ impl<const D: usize> System<D> {
         for (column, head) in work.chunks_exact_mut(stride).zip(&heads) {
             for (k, head) in head.iter().enumerate().take(q) {
                 let tail = column[HEAD..HEAD + n - q].iter_mut();
-                tail.zip(self.coupling(k)).for_each(|(b, coupling)| *b -= head * coupling);
+                tail.zip(self.coupling(k))
+                    .for_each(|(b, coupling)| *b -= head * coupling);
             }
         }
         self.cholesky.solve::<R>(work);
@@ -134,7 +153,10 @@ impl<const D: usize> System<D> {
             column[..HEAD].fill(0.0);
             column[HEAD - q..HEAD].copy_from_slice(&heads[r][..q]);
             self.null.apply(column);
-            self.scatter(&column[self.null.rows()], &mut y[r * sites..(r + 1) * sites]);
+            self.scatter(
+                &column[self.null.rows()],
+                &mut y[r * sites..(r + 1) * sites],
+            );
         }
     }
 
@@ -146,13 +168,28 @@ impl<const D: usize> System<D> {
 
     /// Spreads the rows, each times its scale, over the sites.
     fn scatter(&self, rows: &[f64], y: &mut [f64]) {
-        let scale = |i: usize| if self.scales.is_empty() { 1.0 } else { self.scales[i] };
-        self.active.iter().enumerate().for_each(|(i, &site)| y[site] = rows[i] * scale(i));
+        let scale = |i: usize| {
+            if self.scales.is_empty() {
+                1.0
+            } else {
+                self.scales[i]
+            }
+        };
+        self.active
+            .iter()
+            .enumerate()
+            .for_each(|(i, &site)| y[site] = rows[i] * scale(i));
     }
 
     /// The values at the active sites, each times its scale.
     fn scaled(&self, y: &[f64], column: &mut [f64]) {
-        self.active.iter().zip(column.iter_mut()).for_each(|(&site, value)| *value = y[site]);
-        column.iter_mut().zip(&self.scales).for_each(|(value, scale)| *value *= scale);
+        self.active
+            .iter()
+            .zip(column.iter_mut())
+            .for_each(|(&site, value)| *value = y[site]);
+        column
+            .iter_mut()
+            .zip(&self.scales)
+            .for_each(|(value, scale)| *value *= scale);
     }
 }

@@ -21,21 +21,33 @@ pub(crate) struct Span<const D: usize> {
 
 impl<const D: usize> Default for Span<D> {
     fn default() -> Self {
-        Self { directions: 0, basis: None, extents: [0.0; D] }
+        Self {
+            directions: 0,
+            basis: None,
+            extents: [0.0; D],
+        }
     }
 }
 
 impl<const D: usize> Span<D> {
     /// The span of the `active` sites. `tolerance` is the share of the largest extent below which a direction counts
     /// as not spanned; `scratch` is overwritten.
-    pub(crate) fn new(sites: &Sites<D>, active: &[usize], tolerance: f64, scratch: &mut NullSpace) -> Self {
+    pub(crate) fn new(
+        sites: &Sites<D>,
+        active: &[usize],
+        tolerance: f64,
+        scratch: &mut NullSpace,
+    ) -> Self {
         let n = active.len();
         let mean = |k: usize| active.iter().map(|&i| sites.axes[k][i]).sum::<f64>() / n as f64;
         let means: [f64; D] = core::array::from_fn(mean);
         let mut rows = [[0.0; D]; D];
         if n >= D {
             scratch.factor(n, D, layout(n, D), |k, column| {
-                column.iter_mut().zip(active).for_each(|(v, &i)| *v = sites.axes[k][i] - means[k]);
+                column
+                    .iter_mut()
+                    .zip(active)
+                    .for_each(|(v, &i)| *v = sites.axes[k][i] - means[k]);
             });
             rows = core::array::from_fn(|j| core::array::from_fn(|i| scratch.triangle(i, j)));
         } else {
@@ -48,10 +60,17 @@ impl<const D: usize> Span<D> {
 
     fn of_columns(columns: [[f64; D]; D], n: usize, grain: f64, tolerance: f64) -> Self {
         let (sizes, vectors) = singular(columns);
-        let noise = f64::max(8.0 * (grain + f64::EPSILON) * (n as f64).sqrt(), tolerance * sizes[0]);
+        let noise = f64::max(
+            8.0 * (grain + f64::EPSILON) * (n as f64).sqrt(),
+            tolerance * sizes[0],
+        );
         let directions = sizes.iter().filter(|size| **size > noise).count();
         let extents = sizes.map(|size| if sizes[0] > 0.0 { size / sizes[0] } else { 0.0 });
-        Self { directions, basis: (directions < D).then_some(vectors), extents }
+        Self {
+            directions,
+            basis: (directions < D).then_some(vectors),
+            extents,
+        }
     }
 
     /// Writes affine function `c` of [1, x·b₁, …] at the sites `active`, each value times its `scale`.
@@ -70,7 +89,10 @@ impl<const D: usize> Span<D> {
                 (c, Some(basis)) => (0..D).map(|k| basis[c - 1][k] * sites.axes[k][site]).sum(),
             };
         }
-        column.iter_mut().zip(scales).for_each(|(value, scale)| *value *= scale);
+        column
+            .iter_mut()
+            .zip(scales)
+            .for_each(|(value, scale)| *value *= scale);
     }
 
     /// Σ aₖ pₖ(x) for the coordinates `x`.
@@ -79,7 +101,9 @@ impl<const D: usize> Span<D> {
             None => x(c),
             Some(basis) => (0..D).map(|k| basis[c][k] * x(k)).sum(),
         };
-        a[0] + (0..self.directions).map(|c| a[c + 1] * along(c)).sum::<f64>()
+        a[0] + (0..self.directions)
+            .map(|c| a[c + 1] * along(c))
+            .sum::<f64>()
     }
 
     /// Affine function `c` at a point.
@@ -105,9 +129,9 @@ impl<const D: usize> Span<D> {
         match (c, &self.basis) {
             (0, _) => Twofold::from_f64(1.0),
             (c, None) => point[c - 1],
-            (c, Some(basis)) => {
-                (0..D).fold(Twofold::ZERO, |sum, k| sum + point[k] * Twofold::from_f64(basis[c - 1][k]))
-            }
+            (c, Some(basis)) => (0..D).fold(Twofold::ZERO, |sum, k| {
+                sum + point[k] * Twofold::from_f64(basis[c - 1][k])
+            }),
         }
     }
 
@@ -125,7 +149,8 @@ impl<const D: usize> Span<D> {
 /// Singular values, falling, and right singular vectors by one-sided rotations (Hestenes 1958), which keep small
 /// singular values to their own relative precision.
 fn singular<const D: usize>(mut columns: [[f64; D]; D]) -> ([f64; D], [[f64; D]; D]) {
-    let mut vectors = core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));
+    let mut vectors =
+        core::array::from_fn(|j| core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 }));
     // Three columns need a handful of sweeps; convergence is quadratic.
     for _ in 0..20 {
         let mut turned = false;
@@ -181,8 +206,11 @@ mod tests {
     #[test]
     fn singular_values_come_to_their_own_precision() {
         let (c, s) = (0.8, 0.6);
-        let (sizes, vectors) =
-            singular([[3.0 * c, -2e-9 * s, 0.0], [3.0 * s, 2e-9 * c, 0.0], [0.0, 0.0, 1.0]]);
+        let (sizes, vectors) = singular([
+            [3.0 * c, -2e-9 * s, 0.0],
+            [3.0 * s, 2e-9 * c, 0.0],
+            [0.0, 0.0, 1.0],
+        ]);
         for (found, expected) in sizes.iter().zip([3.0, 1.0, 2e-9]) {
             assert!((found / expected - 1.0f64).abs() < 1e-15 * 100.0, "{found}");
         }

@@ -21,7 +21,10 @@ impl Spectrum {
     /// Of the matrix of order `m` whose lower triangle stands in `matrix` behind `HEAD` rows and columns.
     pub(crate) fn new(matrix: &[f64], m: usize, stride: usize) -> Self {
         if m == 0 {
-            return Self { stride, ..Self::default() };
+            return Self {
+                stride,
+                ..Self::default()
+            };
         }
         let entry = |i: usize, j: usize| matrix[(HEAD + i.min(j)) * stride + HEAD + i.max(j)];
         let eigen = DMatrix::from_fn(m, m, entry).symmetric_eigen();
@@ -29,8 +32,18 @@ impl Spectrum {
         let by_place = Packed::new(m, m, |i, k| vectors[(i, k)]);
         let by_vector = Packed::new(m, m, |k, i| vectors[(i, k)]);
         let values = eigen.eigenvalues.as_slice().to_vec();
-        let (least, most) = (eigen.eigenvalues.min(), f64::max(eigen.eigenvalues.max(), 0.0));
-        Self { values, least, most, by_place, by_vector, stride }
+        let (least, most) = (
+            eigen.eigenvalues.min(),
+            f64::max(eigen.eigenvalues.max(), 0.0),
+        );
+        Self {
+            values,
+            least,
+            most,
+            by_place,
+            by_vector,
+            stride,
+        }
     }
 
     /// b ← (A + λI)⁻¹ b for `M` columns of b, behind `HEAD` places each.
@@ -45,7 +58,10 @@ impl Spectrum {
     /// c ← (diag(μ) + λI)⁻¹ c, column by column.
     pub(crate) fn divide(&self, coefficients: &mut [f64], lambda: f64) {
         for column in coefficients.chunks_exact_mut(self.stride) {
-            column.iter_mut().zip(&self.values).for_each(|(c, mu)| *c /= mu + lambda);
+            column
+                .iter_mut()
+                .zip(&self.values)
+                .for_each(|(c, mu)| *c /= mu + lambda);
         }
     }
 
@@ -80,7 +96,12 @@ impl Spectrum {
     ///
     /// V(λ) = (1/n) |W^½(y − f)|² / ((1/n) tr(I − H))², both sums over the eigenvalues: |W^½(y − f)|² =
     /// Σ (λ/(μ + λ))² (vᵀb)² and tr(I − H) = Σ λ/(μ + λ).
-    pub(crate) fn cross_validate<const M: usize>(&self, b: &[f64], n: usize, energies: &mut Vec<f64>) -> f64 {
+    pub(crate) fn cross_validate<const M: usize>(
+        &self,
+        b: &[f64],
+        n: usize,
+        energies: &mut Vec<f64>,
+    ) -> f64 {
         energies.clear();
         energies.resize(M * self.stride, 0.0);
         self.coefficients::<M>(b, energies);
@@ -90,8 +111,12 @@ impl Spectrum {
         let most = f64::max(self.most, f64::MIN_POSITIVE);
         let score = |log: f64| {
             let filter = |mu: f64| 1.0 / (1.0 + mu.max(0.0) / log.exp2());
-            let rss: f64 =
-                self.values.iter().zip(energies.iter()).map(|(&mu, e)| filter(mu).powi(2) * e).sum();
+            let rss: f64 = self
+                .values
+                .iter()
+                .zip(energies.iter())
+                .map(|(&mu, e)| filter(mu).powi(2) * e)
+                .sum();
             let trace: f64 = self.values.iter().map(|&mu| filter(mu)).sum();
             n as f64 * rss / (trace * trace)
         };
@@ -106,7 +131,12 @@ fn minimise(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     const STEPS: usize = 148;
     let at = |i: usize| low + (high - low) * i as f64 / STEPS as f64;
     let scores = (0..=STEPS).map(|i| (f(at(i)), i));
-    let best = scores.fold((f64::INFINITY, 0), |best, new| if new.0 <= best.0 { new } else { best }).1;
+    let best = scores
+        .fold(
+            (f64::INFINITY, 0),
+            |best, new| if new.0 <= best.0 { new } else { best },
+        )
+        .1;
     let (mut a, mut b) = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     for _ in 0..40 {

@@ -99,10 +99,16 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     pub fn empty(kernel: K) -> Self {
         Self {
             kernel,
-            frame: Frame { centre: [0.0; D], scale: 1.0 },
+            frame: Frame {
+                centre: [0.0; D],
+                scale: 1.0,
+            },
             centres: Vec::new(),
             weights: Vec::new(),
-            affine: Linear { constant: [T::zero(); M], gradient: [[T::zero(); D]; M] },
+            affine: Linear {
+                constant: [T::zero(); M],
+                gradient: [[T::zero(); D]; M],
+            },
             terms: Terms::NONE,
             report: FitReport {
                 points: 0,
@@ -124,17 +130,31 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// Takes over a solution, in memory that is already there where it suffices.
     pub(crate) fn assign(&mut self, fitted: &Fitted<'_, D, M>, buffers: &Buffers) {
-        let Fitted { sites, system, solution, origin, level, .. } = fitted;
+        let Fitted {
+            sites,
+            system,
+            solution,
+            origin,
+            level,
+            ..
+        } = fitted;
         self.frame = sites.frame;
         self.centres.clear();
-        sites.axes.iter().for_each(|axis| self.centres.extend(axis.iter().map(|&x| T::narrow(x))));
+        sites
+            .axes
+            .iter()
+            .for_each(|axis| self.centres.extend(axis.iter().map(|&x| T::narrow(x))));
         self.weights.clear();
-        self.weights.extend(buffers.weights.iter().map(|&w| T::narrow(w)));
+        self.weights
+            .extend(buffers.weights.iter().map(|&w| T::narrow(w)));
         for k in 0..M {
             self.affine.constant[k] = T::narrow(origin[k] + solution.affine[k][0]);
             self.affine.gradient[k] = system.span.gradient(&solution.affine[k]).map(T::narrow);
         }
-        let weight = self.columns().1.map(|w| w.iter().map(|x| x.widen().abs()).sum::<f64>());
+        let weight = self
+            .columns()
+            .1
+            .map(|w| w.iter().map(|x| x.widen().abs()).sum::<f64>());
         let weight = weight.iter().fold(0.0, |m: f64, &x| m.max(x));
         self.terms = Terms::new::<T, K>(&self.kernel, weight, *level);
         self.record(fitted);
@@ -142,7 +162,15 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
 
     /// Takes a solution down in the report.
     fn record(&mut self, fitted: &Fitted<'_, D, M>) {
-        let Fitted { sites, system, lambda, unit, solution, level, .. } = fitted;
+        let Fitted {
+            sites,
+            system,
+            lambda,
+            unit,
+            solution,
+            level,
+            ..
+        } = fitted;
         let rounding = self.terms.rounding::<T, K>(&self.kernel, 0.0);
         let report = &mut self.report;
         report.digits = digits::<T>(if *level > 0.0 { rounding / level } else { 0.0 });
@@ -205,8 +233,12 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     pub fn digits(&self, point: &Point<T, D>) -> f64 {
         let mut size = 0.0;
-        self.each::<0>(core::slice::from_ref(point), |_, sample| size = sample.size());
-        let rounding = self.terms.rounding::<T, K>(&self.kernel, self.distance_squared(point));
+        self.each::<0>(core::slice::from_ref(point), |_, sample| {
+            size = sample.size()
+        });
+        let rounding = self
+            .terms
+            .rounding::<T, K>(&self.kernel, self.distance_squared(point));
         digits::<T>(rounding / f64::max(size, self.terms.level))
     }
 
@@ -228,8 +260,18 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     pub fn bending_energy(&self) -> f64 {
         let n = self.count();
-        let axis = |k: usize| self.centres[k * n..(k + 1) * n].iter().map(|x| x.widen()).collect();
-        let output = |m: usize| self.weights[m * n..(m + 1) * n].iter().map(|x| x.widen()).collect();
+        let axis = |k: usize| {
+            self.centres[k * n..(k + 1) * n]
+                .iter()
+                .map(|x| x.widen())
+                .collect()
+        };
+        let output = |m: usize| {
+            self.weights[m * n..(m + 1) * n]
+                .iter()
+                .map(|x| x.widen())
+                .collect()
+        };
         let centres: [Vec<f64>; D] = core::array::from_fn(axis);
         let weights: [Vec<f64>; M] = core::array::from_fn(output);
         let energy = energy::<K, D, M>(

@@ -60,7 +60,11 @@ impl<const C: usize> WithSimd for Product<'_, C> {
         }
         for c in 0..C {
             let y = &mut y[c * stride..(c + 1) * stride];
-            for (y, k) in S::as_mut_simd_f64s(&mut y[start..]).0.iter_mut().zip(vectors) {
+            for (y, k) in S::as_mut_simd_f64s(&mut y[start..])
+                .0
+                .iter_mut()
+                .zip(vectors)
+            {
                 *y = simd.mul_add_e_f64s(*k, splat[c], *y);
             }
             y[j] += simd.reduce_sum_f64s(sums[c]) - column[j] * own[c];
@@ -143,8 +147,9 @@ impl<const C: usize> WithSimd for Reflect<'_, C> {
             }
         }
         let sums = sums.map(|sum| simd.reduce_sum_f64s(sum));
-        let factors: [S::f64s; C] =
-            core::array::from_fn(|i| simd.splat_f64s(-(0..C).map(|j| t[i][j] * sums[j]).sum::<f64>()));
+        let factors: [S::f64s; C] = core::array::from_fn(|i| {
+            simd.splat_f64s(-(0..C).map(|j| t[i][j] * sums[j]).sum::<f64>())
+        });
         for i in 0..count {
             for c in 0..C {
                 b[i] = simd.mul_add_e_f64s(v[c][i], factors[c], b[i]);

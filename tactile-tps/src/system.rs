@@ -57,15 +57,25 @@ impl<const D: usize> System<D> {
         self.spectrum = None;
         let size = self.assemble(setting, weights, lambda > 0.0);
         let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
-        let Self { cholesky, scratch, .. } = self;
+        let Self {
+            cholesky, scratch, ..
+        } = self;
         (HEAD..HEAD + n - q).for_each(|j| cholesky.l[j * stride + j] += lambda);
         let factored = cholesky.factor();
         self.indefinite = factored.is_err();
         if let Err(column) = factored {
             self.condition = f64::INFINITY;
-            return if n <= PRECISE_POINTS { Ok(()) } else { Err(TpsError::NotDefinite { column }) };
+            return if n <= PRECISE_POINTS {
+                Ok(())
+            } else {
+                Err(TpsError::NotDefinite { column })
+            };
         }
-        let inverse = if n > q { cholesky.inverse_norm(scratch) } else { 0.0 };
+        let inverse = if n > q {
+            cholesky.inverse_norm(scratch)
+        } else {
+            0.0
+        };
         self.condition = f64::max(1.0, (size + lambda) * inverse);
         Ok(())
     }
@@ -81,22 +91,42 @@ impl<const D: usize> System<D> {
 
     /// Condition number of QᵀSQ with `lambda` added to a spectral system.
     pub(crate) fn condition(&self, lambda: f64) -> f64 {
-        self.spectrum.as_ref().map_or(self.condition, |spectrum| spectrum.condition(lambda))
+        self.spectrum
+            .as_ref()
+            .map_or(self.condition, |spectrum| spectrum.condition(lambda))
     }
 
     /// Writes the lower triangle of QᵀSQ without λ; returns its Frobenius norm.
-    fn assemble<K: Kernel>(&mut self, setting: &Setting<'_, K, D>, weights: &[f64], scaled: bool) -> f64 {
+    fn assemble<K: Kernel>(
+        &mut self,
+        setting: &Setting<'_, K, D>,
+        weights: &[f64],
+        scaled: bool,
+    ) -> f64 {
         let sites = setting.sites;
         self.choose(sites.len(), weights, scaled);
         self.outline(setting);
         let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
-        let Self { active, scales, null, cholesky, scratch, .. } = self;
+        let Self {
+            active,
+            scales,
+            null,
+            cholesky,
+            scratch,
+            ..
+        } = self;
         cholesky.prepare(n - q, stride);
         scratch.clear();
         scratch.resize((MAX + D + 1) * stride, 0.0);
         let (product, places) = scratch.split_at_mut(MAX * stride);
         gather(sites, active, scales, null.rows(), places);
-        dispatch(Assemble::<_, D> { kernel: setting.kernel, places, null, matrix: &mut cholesky.l, product });
+        dispatch(Assemble::<_, D> {
+            kernel: setting.kernel,
+            places,
+            null,
+            matrix: &mut cholesky.l,
+            product,
+        });
         null.project(&mut cholesky.l, product)
     }
 
@@ -106,8 +136,16 @@ impl<const D: usize> System<D> {
         self.span = Span::new(sites, &self.active, setting.rank_tolerance, &mut self.spare);
         let n = self.active.len();
         let q = n.min(1 + self.span.directions);
-        let Self { active, scales, span, null, .. } = self;
-        null.factor(n, q, layout(n, q), |c, column| span.fill(sites, active, scales, c, column));
+        let Self {
+            active,
+            scales,
+            span,
+            null,
+            ..
+        } = self;
+        null.factor(n, q, layout(n, q), |c, column| {
+            span.fill(sites, active, scales, c, column)
+        });
     }
 
     /// Sites of positive weight, heaviest first so that the reflectors keep light rows apart.
@@ -120,8 +158,10 @@ impl<const D: usize> System<D> {
         }
         self.active.extend((0..n).filter(|&i| weights[i] > 0.0));
         if scaled {
-            self.active.sort_unstable_by(|&i, &j| weights[j].total_cmp(&weights[i]).then(i.cmp(&j)));
-            self.scales.extend(self.active.iter().map(|&i| weights[i].sqrt()));
+            self.active
+                .sort_unstable_by(|&i, &j| weights[j].total_cmp(&weights[i]).then(i.cmp(&j)));
+            self.scales
+                .extend(self.active.iter().map(|&i| weights[i].sqrt()));
         }
     }
 }
@@ -138,7 +178,10 @@ fn gather<const D: usize>(
     for (k, column) in places.chunks_exact_mut(stride).enumerate() {
         let column = &mut column[rows.clone()];
         if k < D {
-            column.iter_mut().zip(active).for_each(|(x, &site)| *x = sites.axes[k][site]);
+            column
+                .iter_mut()
+                .zip(active)
+                .for_each(|(x, &site)| *x = sites.axes[k][site]);
         } else if scales.is_empty() {
             column.fill(1.0);
         } else {
@@ -178,7 +221,13 @@ impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
                 }
                 *value = (self.kernel.value(s) * (L::new(scales[i]) * own_scale)).get();
             }
-            Product { column, j, x: self.null.reflectors(), y: self.product }.add();
+            Product {
+                column,
+                j,
+                x: self.null.reflectors(),
+                y: self.product,
+            }
+            .add();
         }
     }
 }

@@ -36,7 +36,10 @@ impl<const D: usize> Sites<D> {
         buffers.targets.resize(n * M, 0.0);
         for (k, column) in buffers.targets.chunks_exact_mut(n).enumerate() {
             if self.site_of.is_empty() {
-                column.iter_mut().zip(targets).for_each(|(v, t)| *v = t[k].widen() - origin[k]);
+                column
+                    .iter_mut()
+                    .zip(targets)
+                    .for_each(|(v, t)| *v = t[k].widen() - origin[k]);
                 continue;
             }
             let totals = &mut buffers.work;
@@ -46,7 +49,8 @@ impl<const D: usize> Sites<D> {
                 let weight = weights.map_or(1.0, |w| w[i].widen());
                 totals[site] += weight;
                 if weight > 0.0 {
-                    column[site] += (target[k].widen() - origin[k] - column[site]) * (weight / totals[site]);
+                    column[site] +=
+                        (target[k].widen() - origin[k] - column[site]) * (weight / totals[site]);
                 }
             }
         }

@@ -33,7 +33,14 @@ impl<'a, T: Scalar, const D: usize> Task<'a, T, D> {
     /// A quick interpolation without weights.
     pub(crate) fn new(system: &'a System<D>) -> Self {
         let (weights, smoothing) = (None, Smoothing::None);
-        Self { system, weights, smoothing, careful: false, reweighting: None, iterative: None }
+        Self {
+            system,
+            weights,
+            smoothing,
+            careful: false,
+            reweighting: None,
+            iterative: None,
+        }
     }
 }
 
@@ -58,7 +65,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         targets: &[Point<T, M>],
         spline: &mut Spline<T, D, M, K>,
     ) -> Result<bool, TpsError> {
-        self.watched(task, buffers, targets, spline, &mut |_| ControlFlow::Continue(()))
+        self.watched(task, buffers, targets, spline, &mut |_| {
+            ControlFlow::Continue(())
+        })
     }
 
     /// As [`finish`](Self::finish), telling `watch` how an iteration gets on.
@@ -75,13 +84,31 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.check(targets, task.weights, lambda == 0.0 && !gcv)?;
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
         self.sites.gather(targets, task.weights, &origin, buffers);
-        let lambda = if gcv { self.validated::<M>(system, buffers)? } else { lambda };
+        let lambda = if gcv {
+            self.validated::<M>(system, buffers)?
+        } else {
+            lambda
+        };
         let Some(solution) = self.solution::<M>(task, lambda, buffers, watch)? else {
             return Ok(false);
         };
-        let level = targets.iter().flat_map(|t| t.iter()).fold(0.0, |m, x| f64::max(m, x.widen().abs()));
+        let level = targets
+            .iter()
+            .flat_map(|t| t.iter())
+            .fold(0.0, |m, x| f64::max(m, x.widen().abs()));
         let (sites, unit) = (&self.sites, self.unit());
-        spline.assign(&Fitted { sites, system, lambda, unit, solution, origin, level }, buffers);
+        spline.assign(
+            &Fitted {
+                sites,
+                system,
+                lambda,
+                unit,
+                solution,
+                origin,
+                level,
+            },
+            buffers,
+        );
         Ok(true)
     }
 
@@ -94,10 +121,18 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ) -> Result<(), TpsError> {
         if targets.len() != self.len() {
             let (expected, found) = (self.len(), targets.len());
-            return Err(TpsError::Length { input: Input::Targets, expected, found });
+            return Err(TpsError::Length {
+                input: Input::Targets,
+                expected,
+                found,
+            });
         }
         finite(targets, Input::Targets)?;
-        if through { self.sites.agree(targets, weights) } else { Ok(()) }
+        if through {
+            self.sites.agree(targets, weights)
+        } else {
+            Ok(())
+        }
     }
 
     /// Solves for the targets in `buffers` by what the task has.
@@ -110,26 +145,47 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ) -> Result<Option<Solution<M>>, TpsError> {
         let (system, tolerance) = (task.system, self.tolerance);
         if let Some(iterative) = task.iterative {
-            let run = Run { kernel: &self.kernel, system, iterative, tolerance };
+            let run = Run {
+                kernel: &self.kernel,
+                system,
+                iterative,
+                tolerance,
+            };
             return Ok(Some(run.solve(buffers, watch)));
         }
-        let equations = Equations { kernel: &self.kernel, sites: &self.sites, system, lambda };
+        let equations = Equations {
+            kernel: &self.kernel,
+            sites: &self.sites,
+            system,
+            lambda,
+        };
         match &task.reweighting {
             Some(reweighting) => Ok(equations.resolve(buffers, reweighting)),
             None => match equations.solve(buffers, task.careful) {
-                None => Err(TpsError::NotDefinite { column: system.null.q }),
+                None => Err(TpsError::NotDefinite {
+                    column: system.null.q,
+                }),
                 solution => Ok(solution),
             },
         }
     }
 
     /// The λ of least generalised cross-validation.
-    fn validated<const M: usize>(&self, system: &System<D>, buffers: &mut Buffers) -> Result<f64, TpsError> {
+    fn validated<const M: usize>(
+        &self,
+        system: &System<D>,
+        buffers: &mut Buffers,
+    ) -> Result<f64, TpsError> {
         let (needed, found) = (system.null.q, system.active.len());
         if found <= needed {
             return Err(TpsError::TooFewForValidation { needed, found });
         }
-        let Buffers { targets, work, spare, .. } = buffers;
+        let Buffers {
+            targets,
+            work,
+            spare,
+            ..
+        } = buffers;
         let lambda = system.cross_validate::<M>(targets, self.sites.len(), work, spare);
         Ok(lambda.unwrap_or(0.0))
     }

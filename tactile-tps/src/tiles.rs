@@ -20,7 +20,10 @@ pub(crate) struct Strips {
 impl Strips {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { strip: [0.0; TALL * DEPTH], block: [0.0; BLOCK * DEPTH] }
+        Self {
+            strip: [0.0; TALL * DEPTH],
+            block: [0.0; BLOCK * DEPTH],
+        }
     }
 
     /// Subtracts what the columns `earlier` contribute to the `columns`, strip of rows by strip of rows.
@@ -37,13 +40,21 @@ impl Strips {
         let depth = earlier.len();
         let (left, right) = l.split_at_mut(columns.start * stride);
         let left = &left[earlier.start * stride..earlier.end * stride];
-        for (panel, block) in columns.clone().step_by(PANEL).zip(self.block.chunks_exact_mut(PANEL * DEPTH)) {
+        for (panel, block) in columns
+            .clone()
+            .step_by(PANEL)
+            .zip(self.block.chunks_exact_mut(PANEL * DEPTH))
+        {
             pack(block, PANEL, left, stride, panel);
         }
         let tall = 3 * S::F64_LANES;
         let mut row = columns.start;
         while row < order {
-            let height = if row + tall <= order { tall } else { S::F64_LANES };
+            let height = if row + tall <= order {
+                tall
+            } else {
+                S::F64_LANES
+            };
             pack(&mut self.strip[..depth * height], height, left, stride, row);
             self.subtract(simd, right, stride, columns.clone(), row, [depth, height]);
             row += height;
@@ -64,9 +75,15 @@ impl Strips {
         let strip = &self.strip[..depth * height];
         let whole = height > S::F64_LANES;
         // Panels that begin below the strip's last row lie above the diagonal.
-        let panels = columns.clone().step_by(PANEL).take_while(|&column| column < row + height);
+        let panels = columns
+            .clone()
+            .step_by(PANEL)
+            .take_while(|&column| column < row + height);
         for (column, block) in panels.zip(self.block.chunks_exact(PANEL * DEPTH)) {
-            let (block, panel) = (&block[..depth * PANEL], &mut right[(column - columns.start) * stride..]);
+            let (block, panel) = (
+                &block[..depth * PANEL],
+                &mut right[(column - columns.start) * stride..],
+            );
             if whole {
                 wide::<S, 3>(simd, strip, block, panel, stride, row);
             } else {
@@ -79,7 +96,10 @@ impl Strips {
 /// Copies `height` rows from `row` on of each column next to each other.
 #[inline(always)]
 fn pack(to: &mut [f64], height: usize, columns: &[f64], stride: usize, row: usize) {
-    for (to, from) in to.chunks_exact_mut(height).zip(columns.chunks_exact(stride)) {
+    for (to, from) in to
+        .chunks_exact_mut(height)
+        .zip(columns.chunks_exact(stride))
+    {
         to.copy_from_slice(&from[row..row + height]);
     }
 }
@@ -99,7 +119,13 @@ fn wide<S: Simd, const V: usize>(
         tile::<S, V, 8>(simd, steps(), panel, stride, row);
     } else {
         tile::<S, V, 4>(simd, steps().map(|(a, b)| (a, &b[..4])), panel, stride, row);
-        tile::<S, V, 4>(simd, steps().map(|(a, b)| (a, &b[4..])), &mut panel[4 * stride..], stride, row);
+        tile::<S, V, 4>(
+            simd,
+            steps().map(|(a, b)| (a, &b[4..])),
+            &mut panel[4 * stride..],
+            stride,
+            row,
+        );
     }
 }
 

@@ -31,21 +31,29 @@ impl<const R: usize> Solve<'_, R> {
     /// Solves one panel of L z = b and subtracts it from the rows below.
     #[inline(always)]
     fn forward<S: Simd>(&mut self, simd: S, start: usize) {
-        let Self { l, stride, order, reciprocal, .. } = *self;
+        let Self {
+            l,
+            stride,
+            order,
+            reciprocal,
+            ..
+        } = *self;
         let columns = &l[start * stride..];
         let mut x = [[0.0; PANEL]; R];
         for r in 0..R {
             let b = &mut self.b[r * stride..];
             for c in 0..PANEL {
-                let done: f64 =
-                    (0..c).fold(b[start + c], |sum, d| sum - columns[d * stride + start + c] * x[r][d]);
+                let done: f64 = (0..c).fold(b[start + c], |sum, d| {
+                    sum - columns[d * stride + start + c] * x[r][d]
+                });
                 x[r][c] = done * reciprocal[start + c];
             }
             b[start..start + PANEL].copy_from_slice(&x[r]);
         }
         let x: [[S::f64s; PANEL]; R] = x.map(|x| x.map(|x| simd.splat_f64s(-x)));
         for row in (start + PANEL..order).step_by(S::F64_LANES) {
-            let l: [S::f64s; PANEL] = core::array::from_fn(|c| load::<S, 1>(&columns[c * stride..], row)[0]);
+            let l: [S::f64s; PANEL] =
+                core::array::from_fn(|c| load::<S, 1>(&columns[c * stride..], row)[0]);
             for r in 0..R {
                 let at = r * stride + row;
                 let b = &mut S::as_mut_simd_f64s(&mut self.b[at..at + S::F64_LANES]).0[0];
@@ -59,7 +67,12 @@ impl<const R: usize> Solve<'_, R> {
     /// Solves one panel of Lᵀx = z from the rows below.
     #[inline(always)]
     fn backward<S: Simd>(&mut self, simd: S, start: usize) {
-        let Self { l, stride, reciprocal, .. } = *self;
+        let Self {
+            l,
+            stride,
+            reciprocal,
+            ..
+        } = *self;
         let columns = &l[start * stride..];
         let mut known = [[0.0; PANEL]; R];
         for half in [0, PANEL / 2] {
@@ -69,8 +82,9 @@ impl<const R: usize> Solve<'_, R> {
             let b = &mut self.b[r * stride..];
             for c in (0..PANEL).rev() {
                 let own = &columns[c * stride + start..c * stride + start + PANEL];
-                let rest =
-                    (c + 1..PANEL).fold(b[start + c] - known[r][c], |sum, d| sum - own[d] * b[start + d]);
+                let rest = (c + 1..PANEL).fold(b[start + c] - known[r][c], |sum, d| {
+                    sum - own[d] * b[start + d]
+                });
                 b[start + c] = rest * reciprocal[start + c];
             }
         }

@@ -19,29 +19,44 @@ pub(crate) struct Twofold {
 pub(crate) fn two_sum(a: f64, b: f64) -> Twofold {
     let high = a + b;
     let part = high - a;
-    Twofold { high, low: (a - (high - part)) + (b - part) }
+    Twofold {
+        high,
+        low: (a - (high - part)) + (b - part),
+    }
 }
 
 /// The same for |a| ≥ |b|.
 #[inline(always)]
 fn quick_two_sum(a: f64, b: f64) -> Twofold {
     let high = a + b;
-    Twofold { high, low: b - (high - a) }
+    Twofold {
+        high,
+        low: b - (high - a),
+    }
 }
 
 #[inline(always)]
 fn two_product(a: f64, b: f64) -> Twofold {
     let high = a * b;
-    Twofold { high, low: a.mul_add(b, -high) }
+    Twofold {
+        high,
+        low: a.mul_add(b, -high),
+    }
 }
 
 impl Twofold {
-    pub(crate) const ZERO: Self = Self { high: 0.0, low: 0.0 };
+    pub(crate) const ZERO: Self = Self {
+        high: 0.0,
+        low: 0.0,
+    };
 
     /// 2ᵏ x.
     fn scale(self, k: i32) -> Self {
         let factor = 2f64.powi(k);
-        Self { high: self.high * factor, low: self.low * factor }
+        Self {
+            high: self.high * factor,
+            low: self.low * factor,
+        }
     }
 }
 
@@ -59,7 +74,10 @@ impl Neg for Twofold {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { high: -self.high, low: -self.low }
+        Self {
+            high: -self.high,
+            low: -self.low,
+        }
     }
 }
 
@@ -158,7 +176,10 @@ impl Real for Twofold {
 }
 
 /// ln 2 to twice the working precision.
-const LN_2: Twofold = Twofold { high: core::f64::consts::LN_2, low: 2.319_046_813_846_299_6e-17 };
+const LN_2: Twofold = Twofold {
+    high: core::f64::consts::LN_2,
+    low: 2.319_046_813_846_299_6e-17,
+};
 
 #[cfg(test)]
 mod tests {
@@ -188,7 +209,10 @@ mod tests {
     fn logarithms_of_powers_and_products_agree() {
         let ten = Twofold::from_f64(10.0).ln();
         // ln 10 = 2.302585092994045684017991454684364207601101488628772976033…
-        let expected = Twofold { high: core::f64::consts::LN_10, low: -2.170_756_223_382_249_4e-16 };
+        let expected = Twofold {
+            high: core::f64::consts::LN_10,
+            low: -2.170_756_223_382_249_4e-16,
+        };
         assert!(off(ten, expected) < CLOSE);
         let hundred = Twofold::from_f64(100.0).ln();
         assert!(off(hundred, ten + ten) < CLOSE);

@@ -26,7 +26,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     pub fn apply(&self, point: &Point<T, D>) -> Point<T, M> {
         let mut value = [Point::origin()];
-        self.each::<0>(core::slice::from_ref(point), |_, sample| value[0] = sample.point());
+        self.each::<0>(core::slice::from_ref(point), |_, sample| {
+            value[0] = sample.point()
+        });
         value[0]
     }
 
@@ -47,7 +49,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     pub fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, M, D> {
         let mut jacobian = SMatrix::zeros();
-        self.each::<1>(core::slice::from_ref(point), |_, sample| jacobian = sample.jacobian());
+        self.each::<1>(core::slice::from_ref(point), |_, sample| {
+            jacobian = sample.jacobian()
+        });
         jacobian
     }
 
@@ -69,7 +73,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     pub fn hessian(&self, point: &Point<T, D>) -> [SMatrix<T, D, D>; M] {
         let mut hessian = [SMatrix::zeros(); M];
-        self.each::<2>(core::slice::from_ref(point), |_, sample| hessian = sample.hessian());
+        self.each::<2>(core::slice::from_ref(point), |_, sample| {
+            hessian = sample.hessian()
+        });
         hessian
     }
 
@@ -92,7 +98,11 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
-    pub fn apply_into(&self, points: &[Point<T, D>], values: &mut [Point<T, M>]) -> Result<(), TpsError> {
+    pub fn apply_into(
+        &self,
+        points: &[Point<T, D>],
+        values: &mut [Point<T, M>],
+    ) -> Result<(), TpsError> {
         same_length(points.len(), values.len())?;
         self.each::<0>(points, |i, sample| values[i] = sample.point());
         Ok(())
@@ -200,7 +210,11 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         mut sink: impl FnMut(usize, Sample<T, D, M>),
     ) {
         let (centres, weights) = self.columns();
-        let sum = Sum { kernel: &self.kernel, centres, weights };
+        let sum = Sum {
+            kernel: &self.kernel,
+            centres,
+            weights,
+        };
         let checked = |i: usize, sample: Sample<T, D, M>| {
             let s = self.distance_squared(&points[i]);
             if s > self.terms.reach && self.terms.lost::<T, K>(&self.kernel, s, sample.size()) {

@@ -23,9 +23,16 @@ pub trait Warp<T: Scalar, const D: usize> {
     ///
     /// # Errors
     /// [`TpsError::Length`] if the slices differ in length.
-    fn apply_into(&self, points: &[Point<T, D>], images: &mut [Point<T, D>]) -> Result<(), TpsError> {
+    fn apply_into(
+        &self,
+        points: &[Point<T, D>],
+        images: &mut [Point<T, D>],
+    ) -> Result<(), TpsError> {
         same_length(points.len(), images.len())?;
-        points.iter().zip(images).for_each(|(point, image)| *image = self.apply(point));
+        points
+            .iter()
+            .zip(images)
+            .for_each(|(point, image)| *image = self.apply(point));
         Ok(())
     }
 
@@ -53,7 +60,10 @@ pub trait Warp<T: Scalar, const D: usize> {
         jacobians: &mut [SMatrix<T, D, D>],
     ) -> Result<(), TpsError> {
         same_length(points.len(), jacobians.len())?;
-        points.iter().zip(jacobians).for_each(|(point, jacobian)| *jacobian = self.jacobian(point));
+        points
+            .iter()
+            .zip(jacobians)
+            .for_each(|(point, jacobian)| *jacobian = self.jacobian(point));
         Ok(())
     }
 }
@@ -65,7 +75,11 @@ impl<T: Scalar, const D: usize, W: Warp<T, D> + ?Sized> Warp<T, D> for Box<W> {
     fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
         (**self).jacobian(point)
     }
-    fn apply_into(&self, points: &[Point<T, D>], images: &mut [Point<T, D>]) -> Result<(), TpsError> {
+    fn apply_into(
+        &self,
+        points: &[Point<T, D>],
+        images: &mut [Point<T, D>],
+    ) -> Result<(), TpsError> {
         (**self).apply_into(points, images)
     }
     fn jacobian_into(
@@ -119,7 +133,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
     fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
         Spline::jacobian(self, point)
     }
-    fn apply_into(&self, points: &[Point<T, D>], images: &mut [Point<T, D>]) -> Result<(), TpsError> {
+    fn apply_into(
+        &self,
+        points: &[Point<T, D>],
+        images: &mut [Point<T, D>],
+    ) -> Result<(), TpsError> {
         Spline::apply_into(self, points, images)
     }
     fn jacobian_into(
@@ -150,5 +168,13 @@ impl<T: Scalar, const D: usize, K: Kernel> WarpModel<T, D> for FitOptions<T, K> 
 
 /// The output must be as long as the input.
 pub(crate) fn same_length(expected: usize, found: usize) -> Result<(), TpsError> {
-    if expected == found { Ok(()) } else { Err(TpsError::Length { input: Input::Output, expected, found }) }
+    if expected == found {
+        Ok(())
+    } else {
+        Err(TpsError::Length {
+            input: Input::Output,
+            expected,
+            found,
+        })
+    }
 }

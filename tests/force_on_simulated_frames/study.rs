@@ -13,7 +13,11 @@ pub(super) struct Errors {
 
 impl Errors {
     fn new(name: &'static str) -> Self {
-        Self { name, errors: Vec::new(), stated: Vec::new() }
+        Self {
+            name,
+            errors: Vec::new(),
+            stated: Vec::new(),
+        }
     }
 
     fn add(&mut self, found: Estimate<f64>, truth: f64, unit: f64) {
@@ -30,7 +34,12 @@ impl Errors {
     }
 
     pub(super) fn inside_one_sigma(&self) -> f64 {
-        let inside = self.errors.iter().zip(&self.stated).filter(|(e, s)| e.abs() < **s).count();
+        let inside = self
+            .errors
+            .iter()
+            .zip(&self.stated)
+            .filter(|(e, s)| e.abs() < **s)
+            .count();
         inside as f64 / self.errors.len() as f64
     }
 
@@ -73,18 +82,34 @@ pub(super) fn study_with(
         radius: Errors::new("radius / true radius"),
     };
     for seed in 0..seeds {
-        let frame = scene.options().camera.expose(light.view(), 1_000_000 + seed, 1);
+        let frame = scene
+            .options()
+            .camera
+            .expose(light.view(), 1_000_000 + seed, 1);
         let reference = prepare(ReferenceFrame::new(dark(scene, 2_000_000 + seed).view()).unwrap());
-        let m = meter.measure_with(&mut workspace, frame.view(), &reference, &calibration).unwrap();
+        let m = meter
+            .measure_with(&mut workspace, frame.view(), &reference, &calibration)
+            .unwrap();
         let (contact, fit) = (m.contact.expect("contact"), m.profile.expect("profile"));
-        s.force.add(m.force_n, truth.contact.force_n, truth.contact.force_n);
+        s.force
+            .add(m.force_n, truth.contact.force_n, truth.contact.force_n);
         for k in 0..2 {
             s.centroid[k].add(contact.centroid_px[k], truth.centroid_px[k], 1.0);
         }
         s.centre.add(fit.centre_px[0], truth.centre_px[0], 1.0);
-        s.radius.add(fit.radius_m, truth.contact.contact_radius_m, truth.contact.contact_radius_m);
+        s.radius.add(
+            fit.radius_m,
+            truth.contact.contact_radius_m,
+            truth.contact.contact_radius_m,
+        );
     }
-    for errors in [&s.force, &s.centroid[0], &s.centroid[1], &s.centre, &s.radius] {
+    for errors in [
+        &s.force,
+        &s.centroid[0],
+        &s.centroid[1],
+        &s.centre,
+        &s.radius,
+    ] {
         errors.show();
     }
     s

@@ -5,14 +5,16 @@
 
 use nalgebra::Point;
 use proptest::prelude::*;
-use tactile_imaging::elasticity::curve::{CurveOptions, IndentationCurve, Indenter, Model, select_model};
+use tactile_imaging::elasticity::curve::{
+    CurveOptions, IndentationCurve, Indenter, Model, select_model,
+};
 use tactile_imaging::force::{
-    CalibrationOptions, CalibrationPair, LinearCalibration, MonotoneCalibration, PolynomialCalibration,
-    StressCalibration,
+    CalibrationOptions, CalibrationPair, LinearCalibration, MonotoneCalibration,
+    PolynomialCalibration, StressCalibration,
 };
 use tactile_imaging::io::{
-    cases::parse_cases, grid::parse_grid, image::parse_grey_image, points::parse_points, read_table,
-    write_grey_image,
+    cases::parse_cases, grid::parse_grid, image::parse_grey_image, points::parse_points,
+    read_table, write_grey_image,
 };
 use tactile_imaging::scene::Scene;
 use tactile_imaging::tps::ThinPlateSpline;
@@ -26,8 +28,20 @@ fn edits() -> impl Strategy<Value = Vec<Edit>> {
 }
 
 /// Values and words that a field of a table or scene may wrongly hold.
-const FIELDS: [&str; 12] =
-    ["", "0", "-1", "nan", "inf", "1e308", "-1e-320", "1e999", "99999999999999999999", "x", "\"", "[[1]]"];
+const FIELDS: [&str; 12] = [
+    "",
+    "0",
+    "-1",
+    "nan",
+    "inf",
+    "1e308",
+    "-1e-320",
+    "1e999",
+    "99999999999999999999",
+    "x",
+    "\"",
+    "[[1]]",
+];
 
 fn mutated(valid: &[u8], edits: &[Edit]) -> Vec<u8> {
     let mut bytes = valid.to_vec();
@@ -59,12 +73,18 @@ fn mutated(valid: &[u8], edits: &[Edit]) -> Vec<u8> {
 fn piece(bytes: &[u8], at: usize, separators: &[u8]) -> std::ops::Range<usize> {
     let ends = |byte: &u8| separators.contains(byte);
     let start = bytes[..at].iter().rposition(ends).map_or(0, |k| k + 1);
-    start..bytes[at..].iter().position(ends).map_or(bytes.len(), |k| at + k)
+    start
+        ..bytes[at..]
+            .iter()
+            .position(ends)
+            .map_or(bytes.len(), |k| at + k)
 }
 
 /// The answer, if there is one; an error must name the file.
 fn answer<T, E: std::fmt::Display>(result: Result<T, E>, file: &str) -> Option<T> {
-    result.map_err(|error| assert!(error.to_string().contains(file), "{error}")).ok()
+    result
+        .map_err(|error| assert!(error.to_string().contains(file), "{error}"))
+        .ok()
 }
 
 const SCENE: &[u8] = br#"
@@ -197,5 +217,8 @@ fn the_unchanged_files_are_read() {
     let [depths, forces] = columns(CURVE, ["indentation_m", "force_N"]).unwrap();
     assert!(IndentationCurve::new(&depths, &forces).is_ok());
     assert!(parse_grey_image(&image("a.png"), "a").is_ok());
-    assert_eq!(columns(TABLE, ["integrated_pixel_value", "force_N"]).unwrap()[0][3], 150_000.0);
+    assert_eq!(
+        columns(TABLE, ["integrated_pixel_value", "force_N"]).unwrap()[0][3],
+        150_000.0
+    );
 }

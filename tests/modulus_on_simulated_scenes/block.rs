@@ -22,13 +22,21 @@ const STATES: [usize; 2] = [1, 7];
 /// A block of that modulus, squeezed by 1 % to 8 %.
 fn squeezed(modulus: f64, seed: u64) -> UniaxialScene {
     // F = E A₀ λ(1 − λ²)/2.
-    let force_at =
-        |squeeze: f64| modulus * FACE_M * FACE_M * 0.5 * (1.0 - squeeze) * (1.0 - (1.0 - squeeze).powi(2));
+    let force_at = |squeeze: f64| {
+        modulus * FACE_M * FACE_M * 0.5 * (1.0 - squeeze) * (1.0 - (1.0 - squeeze).powi(2))
+    };
     UniaxialScene::new(UniaxialOptions {
-        material: Elastic { youngs_modulus_pa: modulus, poisson_ratio: NU },
+        material: Elastic {
+            youngs_modulus_pa: modulus,
+            poisson_ratio: NU,
+        },
         face_m: [FACE_M; 2],
         forces_n: (1..=8).map(|k| force_at(0.01 * f64::from(k))).collect(),
-        camera: Camera { shape: [400, 400], pixel_size_m: [14e-3 / 400.0; 2], ..Camera::default() },
+        camera: Camera {
+            shape: [400, 400],
+            pixel_size_m: [14e-3 / 400.0; 2],
+            ..Camera::default()
+        },
         seed,
         ..UniaxialOptions::default()
     })
@@ -42,25 +50,36 @@ fn forces(
     pressed: &[Vec<Array2<u8>>; 2],
     rng: &mut ChaCha8Rng,
 ) -> ([Estimate<f64>; 2], DMatrix<f64>) {
-    let options = ForceOptions { skip_profile: true, ..ForceOptions::default() };
+    let options = ForceOptions {
+        skip_profile: true,
+        ..ForceOptions::default()
+    };
     let meter = ForceMeter::new(scene.options().camera.pixel_size_m, &options).unwrap();
     let reference = reference(dark);
-    let frames =
-        (0..8).flat_map(|k| [1, 2].map(|repeat| (scene.options().forces_n[k], scene.frame(k, repeat))));
+    let frames = (0..8)
+        .flat_map(|k| [1, 2].map(|repeat| (scene.options().forces_n[k], scene.frame(k, repeat))));
     let calibration = calibrate(&meter, &reference, frames, rng);
     let mut workspace = ForceWorkspace::default();
     let measured = pressed.each_ref().map(|frames| {
-        meter.measure_with(&mut workspace, frames[0].view(), &reference, &calibration).unwrap()
+        meter
+            .measure_with(&mut workspace, frames[0].view(), &reference, &calibration)
+            .unwrap()
     });
-    (measured.each_ref().map(force), force_covariance(&calibration, &measured))
+    (
+        measured.each_ref().map(force),
+        force_covariance(&calibration, &measured),
+    )
 }
 
 /// e_xx = e_yy = −ν e_zz, each counted from the first load and hence over its λ_t² = 1 − 2ν e_zz. Two errors of much the same size
 /// have twice the degrees of freedom of one.
 fn lateral(found: &Strain<2>) -> Estimate<f64> {
     let (mean, error) = (found.summary.mean, found.standard_error);
-    Estimate::new(0.5 * (mean[(0, 0)] + mean[(1, 1)]), 0.5 * error[(0, 0)].hypot(error[(1, 1)]))
-        .with_degrees_of_freedom(2.0 * found.degrees_of_freedom as f64)
+    Estimate::new(
+        0.5 * (mean[(0, 0)] + mean[(1, 1)]),
+        0.5 * error[(0, 0)].hypot(error[(1, 1)]),
+    )
+    .with_degrees_of_freedom(2.0 * found.degrees_of_freedom as f64)
 }
 
 /// The two loads, the first squeezed by `first`.
@@ -73,7 +92,11 @@ fn loads(first: f64, forces: &[Estimate<f64>; 2], lateral: Estimate<f64>) -> [Lo
         LoadState::new(forces[i]).with_contact_area(Estimate::exact(area))
     };
     let (value, standard_error) = (squeeze(lateral.value), squeeze(lateral.standard_error));
-    let strain = Estimate { value, standard_error, ..lateral };
+    let strain = Estimate {
+        value,
+        standard_error,
+        ..lateral
+    };
     [load(0), load(1).with_mean_strain(strain)]
 }
 
@@ -126,13 +149,24 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
     let modulus = log_uniform(&mut rng, 10e3, 500e3);
     let scene = squeezed(modulus, seed);
     let dark: Vec<_> = (0..8).map(|k| scene.reference(k)).collect();
-    let pressed = STATES.map(|k| (3..7).map(|repeat| scene.frame(k, repeat)).collect::<Vec<_>>());
+    let pressed = STATES.map(|k| {
+        (3..7)
+            .map(|repeat| scene.frame(k, repeat))
+            .collect::<Vec<_>>()
+    });
     let (forces, covariance) = forces(&scene, &dark, &pressed, &mut rng);
     let unlit = mean_frame(&dark);
     let pixel_m = scene.options().camera.pixel_size_m[0];
-    let [before, after] = pressed.each_ref().map(|frames| bumps(&(mean_frame(frames) - &unlit), pixel_m));
-    let found = measure::strain_between(&before, &after, &RelaxationMatcher::default(), &GreenLagrange)
-        .expect("strain");
+    let [before, after] = pressed
+        .each_ref()
+        .map(|frames| bumps(&(mean_frame(frames) - &unlit), pixel_m));
+    let found = measure::strain_between(
+        &before,
+        &after,
+        &RelaxationMatcher::default(),
+        &GreenLagrange,
+    )
+    .expect("strain");
     let answer = ratio(&forces, &covariance, lateral(&found));
     if verbose() {
         report(&scene, before.len(), &found, forces[1], &answer);

@@ -19,7 +19,11 @@ fn waveguide() -> Waveguide<f64> {
         youngs_modulus_pa: l.material.youngs_modulus_pa,
         poisson_ratio: l.material.poisson_ratio,
     };
-    let layers = tactile_imaging::simulate::Waveguide::default().layers.iter().map(layer).collect();
+    let layers = tactile_imaging::simulate::Waveguide::default()
+        .layers
+        .iter()
+        .map(layer)
+        .collect();
     Waveguide::new(layers).unwrap()
 }
 
@@ -35,32 +39,60 @@ impl Presses {
     fn draw(seed: u64, rng: &mut ChaCha8Rng) -> Self {
         let modulus = log_uniform(rng, 10e3, 500e3);
         let radius = log_uniform(rng, 1e-3, 10e-3);
-        let soft = Elastic { youngs_modulus_pa: modulus, poisson_ratio: NU };
+        let soft = Elastic {
+            youngs_modulus_pa: modulus,
+            poisson_ratio: NU,
+        };
         let compliance = waveguide().compliance_per_pa();
         let reduced = 1.0 / (compliance + soft.plane_strain_compliance());
         let force_at = |ratio: f64| 4.0 / 3.0 * reduced * radius * radius * ratio.powi(3);
         let ratio = |k: u32| 0.1 + 0.2 * f64::from(k) / 11.0;
         let pixel_size_m = [0.3 * radius / 96.0; 2];
         let options = PressOptions {
-            object: Sphere { radius_m: radius, material: soft },
-            loads: (0..LOADS).map(|k| Load::normal(force_at(ratio(k)))).collect(),
-            camera: Camera { shape: [384, 384], pixel_size_m, vignetting: 0.0, ..Camera::default() },
+            object: Sphere {
+                radius_m: radius,
+                material: soft,
+            },
+            loads: (0..LOADS)
+                .map(|k| Load::normal(force_at(ratio(k))))
+                .collect(),
+            camera: Camera {
+                shape: [384, 384],
+                pixel_size_m,
+                vignetting: 0.0,
+                ..Camera::default()
+            },
             seed,
             ..PressOptions::default()
         };
         let sphere = PressScene::new(options.clone()).unwrap();
-        let rigid = Sphere { radius_m: radius / (reduced * compliance), material: Elastic::RIGID };
+        let rigid = Sphere {
+            radius_m: radius / (reduced * compliance),
+            material: Elastic::RIGID,
+        };
         let ball = PressScene::new(PressOptions {
             object: rigid,
-            loads: (1..=GAUGE_LOADS).map(|k| Load::normal(force_at(0.3) * f64::from(k) / 20.0)).collect(),
+            loads: (1..=GAUGE_LOADS)
+                .map(|k| Load::normal(force_at(0.3) * f64::from(k) / 20.0))
+                .collect(),
             gain: Gain::GreyPerPascal(sphere.grey_per_pascal()),
             seed: seed + 1_000_000,
             ..options
         });
-        Self { modulus, radius, sphere, ball: ball.unwrap() }
+        Self {
+            modulus,
+            radius,
+            sphere,
+            ball: ball.unwrap(),
+        }
     }
 
-    fn report(&self, measured: &ForceMeasurement<f64>, load: &LoadState<f64>, found: &ModulusEstimate<f64>) {
+    fn report(
+        &self,
+        measured: &ForceMeasurement<f64>,
+        load: &LoadState<f64>,
+        found: &ModulusEstimate<f64>,
+    ) {
         let (modulus, truth) = (self.modulus, self.sphere.truth(LOADS as usize - 1).contact);
         let radius = load.contact_radius_m.unwrap();
         println!(
@@ -82,19 +114,32 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let presses = Presses::draw(seed, &mut rng);
     let (sphere, ball) = (&presses.sphere, &presses.ball);
-    let meter = ForceMeter::new(sphere.options().camera.pixel_size_m, &ForceOptions::default()).unwrap();
+    let meter = ForceMeter::new(
+        sphere.options().camera.pixel_size_m,
+        &ForceOptions::default(),
+    )
+    .unwrap();
     let reference = reference(&(0..8).map(|k| sphere.reference(k)).collect::<Vec<_>>());
-    let frames = ball.options().loads.iter().enumerate().map(|(k, load)| (load.force_n, ball.frame(k, 0)));
+    let frames = ball
+        .options()
+        .loads
+        .iter()
+        .enumerate()
+        .map(|(k, load)| (load.force_n, ball.frame(k, 0)));
     let calibration = calibrate(&meter, &reference, frames, &mut rng);
     let mut workspace = ForceWorkspace::default();
     let measured: Vec<_> = (0..LOADS as usize)
         .map(|k| {
             let frame = sphere.frame(k, 1);
-            meter.measure_with(&mut workspace, frame.view(), &reference, &calibration).unwrap()
+            meter
+                .measure_with(&mut workspace, frame.view(), &reference, &calibration)
+                .unwrap()
         })
         .collect();
     let loads: Vec<_> = (measured.iter())
-        .map(|m| LoadState::new(force(m)).with_contact_radius(estimate(m.contact_radius_m.unwrap())))
+        .map(|m| {
+            LoadState::new(force(m)).with_contact_radius(estimate(m.contact_radius_m.unwrap()))
+        })
         .collect();
     let estimator = HertzSphere::new(presses.radius, NU)
         .unwrap()
@@ -104,7 +149,11 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
         .unwrap();
     let found = estimator.estimate(&loads).unwrap();
     if verbose() {
-        presses.report(&measured[measured.len() - 1], &loads[loads.len() - 1], &found);
+        presses.report(
+            &measured[measured.len() - 1],
+            &loads[loads.len() - 1],
+            &found,
+        );
     }
     (presses.modulus, found)
 }

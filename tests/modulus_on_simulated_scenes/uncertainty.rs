@@ -6,8 +6,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::field::{StrainField, mean_strain_covariance};
 use tactile_imaging::elasticity::modulus::{
-    Bootstrap, BootstrapSummary, Estimate, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio,
-    StrainReference,
+    Bootstrap, BootstrapSummary, Estimate, LoadState, ModulusEstimate, ModulusEstimator,
+    PaperRatio, StrainReference,
 };
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{self, CalibrationPair, LinearCalibration, StressCalibration};
@@ -34,7 +34,8 @@ struct Experiment {
 impl Experiment {
     fn new() -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(21);
-        let mut point = |size: f64| Point3::from([(); 3].map(|()| size * (rng.random::<f64>() - 0.5)));
+        let mut point =
+            |size: f64| Point3::from([(); 3].map(|()| size * (rng.random::<f64>() - 0.5)));
         let before: Vec<_> = (0..70).map(|_| point(4e-3)).collect();
         let samples = (0..25).map(|_| point(3e-3)).collect();
         let spread = (0..70)
@@ -43,25 +44,44 @@ impl Experiment {
         // A squeeze that bends: the gradient differs from place to place.
         let after = before
             .iter()
-            .map(|p| p + Vector3::new(0.02 * p.x, 0.02 * p.y + 4.0 * p.x * p.z, p.z * (-0.04 + 5.0 * p.x)))
+            .map(|p| {
+                p + Vector3::new(
+                    0.02 * p.x,
+                    0.02 * p.y + 4.0 * p.x * p.z,
+                    p.z * (-0.04 + 5.0 * p.x),
+                )
+            })
             .collect();
         let gauge = [1.2, -0.7, 0.4, -1.5, 0.9, 1.1, -0.8, -0.6, 0.3];
-        let pairs = (0..9)
-            .zip(gauge)
-            .map(|(k, e)| CalibrationPair::loading(1e5 * f64::from(k), 0.05 * f64::from(k) + 2e-3 * e));
+        let pairs = (0..9).zip(gauge).map(|(k, e)| {
+            CalibrationPair::loading(1e5 * f64::from(k), 0.05 * f64::from(k) + 2e-3 * e)
+        });
         // λ is held: the spline is then linear in its targets.
         let options = FitOptions::default().smoothing(Smoothing::Lambda(1e-4));
         let spline = Factorization::new(&before, &options).unwrap();
-        Self { pairs: pairs.collect(), before, after, spread, spline, samples }
+        Self {
+            pairs: pairs.collect(),
+            before,
+            after,
+            spread,
+            spline,
+            samples,
+        }
     }
 
     fn gradients(&self, after: &[Point3<f64>]) -> Vec<Matrix3<f64>> {
         let spline = self.spline.fit(after).unwrap();
-        self.samples.iter().map(|p| spline.jacobian(p) - Matrix3::identity()).collect()
+        self.samples
+            .iter()
+            .map(|p| spline.jacobian(p) - Matrix3::identity())
+            .collect()
     }
 
     fn squeeze(gradients: &[Matrix3<f64>]) -> f64 {
-        -StrainField::from_gradients(gradients, None, &GreenLagrange).unwrap().summary().mean[(2, 2)]
+        -StrainField::from_gradients(gradients, None, &GreenLagrange)
+            .unwrap()
+            .summary()
+            .mean[(2, 2)]
     }
 
     fn calibrate(&self, pairs: &[CalibrationPair<f64>]) -> LinearCalibration<f64> {
@@ -71,28 +91,52 @@ impl Experiment {
     /// Everything by propagation.
     fn propagate(&self, share: Shares) -> Result<ModulusEstimate<f64>, ElasticityError> {
         let calibration = self.calibrate(&self.pairs);
-        let light = LIGHT.map(|(value, noise)| force::Estimate { value, standard_error: noise * share[1] });
+        let light = LIGHT.map(|(value, noise)| force::Estimate {
+            value,
+            standard_error: noise * share[1],
+        });
         let all = calibration.force_covariance_n2(&light);
-        let quiet = calibration
-            .force_covariance_n2(&LIGHT.map(|(value, _)| force::Estimate { value, standard_error: 0.0 }));
-        let covariance =
-            DMatrix::from_fn(2, 2, |i, j| share[0].powi(2) * quiet[[i, j]] + all[[i, j]] - quiet[[i, j]]);
+        let quiet = calibration.force_covariance_n2(&LIGHT.map(|(value, _)| force::Estimate {
+            value,
+            standard_error: 0.0,
+        }));
+        let covariance = DMatrix::from_fn(2, 2, |i, j| {
+            share[0].powi(2) * quiet[[i, j]] + all[[i, j]] - quiet[[i, j]]
+        });
         let gradients = self.gradients(&self.after);
-        let influence: Vec<_> =
-            self.samples.iter().map(|p| self.spline.jacobian_influence(p).unwrap()).collect();
-        let displacement: Vec<_> = self.spread.iter().map(|l| l * l.transpose() * share[2].powi(2)).collect();
+        let influence: Vec<_> = self
+            .samples
+            .iter()
+            .map(|p| self.spline.jacobian_influence(p).unwrap())
+            .collect();
+        let displacement: Vec<_> = self
+            .spread
+            .iter()
+            .map(|l| l * l.transpose() * share[2].powi(2))
+            .collect();
         let weights = vec![1.0; self.samples.len()];
-        let strain = mean_strain_covariance(&gradients, &weights, |i, j| influence[i][j], &displacement)?;
+        let strain =
+            mean_strain_covariance(&gradients, &weights, |i, j| influence[i][j], &displacement)?;
         let squeeze = Estimate::new(Self::squeeze(&gradients), strain[(2, 2)].sqrt());
         let forces = LIGHT.map(|(v, _)| calibration.force_n(v));
-        ratio().with_force_covariance(&covariance)?.estimate(&loads(forces, squeeze))
+        ratio()
+            .with_force_covariance(&covariance)?
+            .estimate(&loads(forces, squeeze))
     }
 
     /// Everything drawn anew: pairs and their fit, light, displacements and their spline.
-    fn redraw(&self, share: Shares, replicates: usize) -> Result<BootstrapSummary, ElasticityError> {
+    fn redraw(
+        &self,
+        share: Shares,
+        replicates: usize,
+    ) -> Result<BootstrapSummary, ElasticityError> {
         let centre = self.calibrate(&self.pairs);
         let gauge = centre.report().residual_sd_n * share[0];
-        Bootstrap { replicates, seed: 4 }.run(|normal| {
+        Bootstrap {
+            replicates,
+            seed: 4,
+        }
+        .run(|normal| {
             let pairs: Vec<_> = (self.pairs.iter())
                 .map(|p| CalibrationPair {
                     force_n: centre.force_n(p.integrated_pixel_value) + gauge * normal(),
@@ -100,12 +144,16 @@ impl Experiment {
                 })
                 .collect();
             let calibration = self.calibrate(&pairs);
-            let forces = LIGHT.map(|(v, noise)| calibration.force_n(v + noise * share[1] * normal()));
+            let forces =
+                LIGHT.map(|(v, noise)| calibration.force_n(v + noise * share[1] * normal()));
             let after: Vec<_> = (self.after.iter().zip(&self.spread))
                 .map(|(p, l)| p + l * Vector3::from_fn(|_, _| share[2] * normal()))
                 .collect();
             let squeeze = Estimate::exact(Self::squeeze(&self.gradients(&after)));
-            ratio().estimate(&loads(forces, squeeze)).ok().map(|m| m.youngs_modulus_pa)
+            ratio()
+                .estimate(&loads(forces, squeeze))
+                .ok()
+                .map(|m| m.youngs_modulus_pa)
         })
     }
 }
@@ -132,10 +180,16 @@ fn propagation_and_redrawing_agree() {
         propagated.youngs_modulus_pa, propagated.standard_error_pa, redrawn.standard_error
     );
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
-    let ends = [propagated.interval_95.lower, propagated.interval_95.upper.unwrap()];
+    let ends = [
+        propagated.interval_95.lower,
+        propagated.interval_95.upper.unwrap(),
+    ];
     for (one, other) in ends.iter().zip(redrawn.interval_95) {
         // Quantiles of 4000 draws near 2.5 % wander by 4 % of a standard deviation, and the modulus bends a little.
-        assert!((one - other).abs() < 0.25 * redrawn.standard_error, "{one} {other}");
+        assert!(
+            (one - other).abs() < 0.25 * redrawn.standard_error,
+            "{one} {other}"
+        );
     }
 }
 
@@ -143,9 +197,16 @@ fn propagation_and_redrawing_agree() {
 #[test]
 fn every_source_is_carried_rightly() {
     let experiment = Experiment::new();
-    let whole = experiment.propagate([1.0; 3]).unwrap().standard_error_pa.powi(2);
+    let whole = experiment
+        .propagate([1.0; 3])
+        .unwrap()
+        .standard_error_pa
+        .powi(2);
     let mut sum = 0.0;
-    for (k, name) in ["calibration", "light", "displacements"].into_iter().enumerate() {
+    for (k, name) in ["calibration", "light", "displacements"]
+        .into_iter()
+        .enumerate()
+    {
         let share: Shares = std::array::from_fn(|j| f64::from(u8::from(j == k)));
         let propagated = experiment.propagate(share).unwrap().standard_error_pa;
         let redrawn = experiment.redraw(share, 2500).unwrap().standard_error;
@@ -154,7 +215,10 @@ fn every_source_is_carried_rightly() {
             100.0 * propagated.powi(2) / whole
         );
         // 2500 draws know a standard deviation to 1.4 %.
-        assert!((propagated / redrawn - 1.0).abs() < 0.06, "{name}: {propagated} {redrawn}");
+        assert!(
+            (propagated / redrawn - 1.0).abs() < 0.06,
+            "{name}: {propagated} {redrawn}"
+        );
         assert!(propagated.powi(2) > 0.15 * whole, "{name} says nothing");
         sum += propagated.powi(2);
     }

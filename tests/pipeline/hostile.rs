@@ -13,17 +13,30 @@ const SEEDS: usize = 24;
 /// Reference and frame of every kind of trouble and every seed, made once; the kind after the last is a sound press.
 fn frames(kind: usize, seed: usize) -> &'static [Array2<u8>; 2] {
     static FRAMES: OnceLock<Vec<[Array2<u8>; 2]>> = OnceLock::new();
-    let all =
-        || (0..(Hostile::ALL.len() + 1) * SEEDS).map(|i| simulate(i / SEEDS, (i % SEEDS) as u64)).collect();
+    let all = || {
+        (0..(Hostile::ALL.len() + 1) * SEEDS)
+            .map(|i| simulate(i / SEEDS, (i % SEEDS) as u64))
+            .collect()
+    };
     &FRAMES.get_or_init(all)[kind * SEEDS + seed]
 }
 
 fn simulate(kind: usize, seed: u64) -> [Array2<u8>; 2] {
-    let camera = Camera { shape: SHAPE, pixel_size_m: [0.4e-3; 2], ..Camera::default() };
-    let base = PressOptions { camera, seed, ..PressOptions::default() };
+    let camera = Camera {
+        shape: SHAPE,
+        pixel_size_m: [0.4e-3; 2],
+        ..Camera::default()
+    };
+    let base = PressOptions {
+        camera,
+        seed,
+        ..PressOptions::default()
+    };
     let made = match Hostile::ALL.get(kind) {
         Some(hostile) => hostile.simulate(&base).unwrap(),
-        None => tactile_imaging::simulate::PressScene::new(base).unwrap().simulate(),
+        None => tactile_imaging::simulate::PressScene::new(base)
+            .unwrap()
+            .simulate(),
     };
     [made.reference, made.frames[0].clone()]
 }
@@ -36,7 +49,9 @@ fn spoil(frame: &Array2<u8>, how: u8, noise: u64) -> Array2<u8> {
         1 => frame.t().to_owned(),
         2 => Array2::zeros((0, 0)),
         3 => Array2::from_shape_fn((rows, columns), |(r, c)| {
-            let x = (noise | 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add((r * columns + c) as u64);
+            let x = (noise | 1)
+                .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+                .wrapping_add((r * columns + c) as u64);
             (x.wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 56) as u8
         }),
         _ => frame.clone(),
@@ -44,13 +59,22 @@ fn spoil(frame: &Array2<u8>, how: u8, noise: u64) -> Array2<u8> {
 }
 
 fn pipeline(object: u8) -> Pipeline {
-    let pairs: Vec<_> = (0..8).map(|k| CalibrationPair::loading(2e4 * k as f64, 0.3 * k as f64)).collect();
+    let pairs: Vec<_> = (0..8)
+        .map(|k| CalibrationPair::loading(2e4 * k as f64, 0.3 * k as f64))
+        .collect();
     let object = match object {
         0 => Object::sphere(3e-3),
-        1 => Object::FlatPunch { radius_m: 2e-3, poisson_ratio: 0.5 },
-        _ => Object::Unknown { poisson_ratio: 0.45 },
+        1 => Object::FlatPunch {
+            radius_m: 2e-3,
+            poisson_ratio: 0.5,
+        },
+        _ => Object::Unknown {
+            poisson_ratio: 0.45,
+        },
     };
-    Pipeline::from_pairs(&pairs, [0.4e-3; 2], object).unwrap().with_control_points(16)
+    Pipeline::from_pairs(&pairs, [0.4e-3; 2], object)
+        .unwrap()
+        .with_control_points(16)
 }
 
 fn is_sound(m: &Measurement) -> bool {
@@ -58,8 +82,18 @@ fn is_sound(m: &Measurement) -> bool {
     let mut numbers = vec![modulus.value, modulus.standard_error, modulus.interval_95.0];
     for f in &m.frames {
         let (force, radius) = (f.force_n, f.contact_radius_m);
-        numbers.extend([force.value, force.standard_error, radius.value, radius.standard_error]);
-        numbers.extend(f.centroid_px.into_iter().chain(f.centroid_sd_px).chain(f.surface_height_m));
+        numbers.extend([
+            force.value,
+            force.standard_error,
+            radius.value,
+            radius.standard_error,
+        ]);
+        numbers.extend(
+            f.centroid_px
+                .into_iter()
+                .chain(f.centroid_sd_px)
+                .chain(f.surface_height_m),
+        );
     }
     if let Some(strain) = &m.strain {
         numbers.extend(strain.mean.iter().chain(&strain.standard_error).flatten());
@@ -75,22 +109,38 @@ fn stream(stages: Arc<dyn Stages>, reference: &Array2<u8>, frames: [&Array2<u8>;
             && let Some(contact) = update.contact
         {
             let force = contact.force_n.unwrap();
-            let finite = [force.value, force.standard_error, contact.contact_radius_m.value];
-            assert!(finite.iter().all(|v| v.is_finite()) || contact.flags(0).next().is_some(), "{contact:?}");
+            let finite = [
+                force.value,
+                force.standard_error,
+                contact.contact_radius_m.value,
+            ];
+            assert!(
+                finite.iter().all(|v| v.is_finite()) || contact.flags(0).next().is_some(),
+                "{contact:?}"
+            );
             if let Ok(Some(found)) = session.strain() {
-                assert!(found.strain.summary.mean.iter().all(|v| v.is_finite()), "{found:?}");
+                assert!(
+                    found.strain.summary.mean.iter().all(|v| v.is_finite()),
+                    "{found:?}"
+                );
             }
         }
     }
     if let Ok(modulus) = session.modulus() {
-        assert!(modulus.youngs_modulus_pa.is_finite() || !modulus.warnings.is_empty(), "{modulus:?}");
+        assert!(
+            modulus.youngs_modulus_pa.is_finite() || !modulus.warnings.is_empty(),
+            "{modulus:?}"
+        );
     }
 }
 
 fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
     let [reference, first] = frames(kinds[0], seed);
     let [_, second] = frames(kinds[1], SEEDS - 1 - seed);
-    let (first, second) = (spoil(first, spoilt[0], seed as u64), spoil(second, spoilt[1], !(seed as u64)));
+    let (first, second) = (
+        spoil(first, spoilt[0], seed as u64),
+        spoil(second, spoilt[1], !(seed as u64)),
+    );
     let pipeline = Arc::new(pipeline(object));
     stream(pipeline.clone(), reference, [&first, &second]);
     let mut press = Press::new(pipeline.as_ref(), reference.view()).unwrap();
@@ -99,21 +149,36 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
     // Two thirds go without surfaces where they can, to be quick.
     if !(seed + usize::from(object)).is_multiple_of(3) {
         if let Ok(modulus) = press.modulus() {
-            let sound = modulus.youngs_modulus_pa.is_finite() && modulus.standard_error_pa.is_finite();
-            assert!(sound || !modulus.warnings.is_empty(), "a silent NaN: {modulus:?}");
+            let sound =
+                modulus.youngs_modulus_pa.is_finite() && modulus.standard_error_pa.is_finite();
+            assert!(
+                sound || !modulus.warnings.is_empty(),
+                "a silent NaN: {modulus:?}"
+            );
         }
         return;
     }
-    let Ok(measured) = press.measure() else { return };
-    assert!(is_sound(&measured) || !measured.flags.is_empty(), "a silent NaN: {measured:?}");
+    let Ok(measured) = press.measure() else {
+        return;
+    };
+    assert!(
+        is_sound(&measured) || !measured.flags.is_empty(),
+        "a silent NaN: {measured:?}"
+    );
     let flagged = |wanted: fn(&Flag) -> bool| measured.flags.iter().any(wanted);
     let whole = spoilt[0] > 3;
     match Hostile::ALL.get(kinds[0]) {
         Some(Hostile::CutByEdge | Hostile::InCorner | Hostile::FillsFrame) if whole => {
-            assert!(flagged(|f| matches!(f, Flag::TouchesEdge { frame: 0 })), "{kinds:?}");
+            assert!(
+                flagged(|f| matches!(f, Flag::TouchesEdge { frame: 0 })),
+                "{kinds:?}"
+            );
         }
         Some(Hostile::SeveralContacts) if whole => {
-            assert!(flagged(|f| matches!(f, Flag::SeveralContacts { frame: 0, .. })), "{kinds:?}");
+            assert!(
+                flagged(|f| matches!(f, Flag::SeveralContacts { frame: 0, .. })),
+                "{kinds:?}"
+            );
         }
         _ => {}
     }

@@ -12,18 +12,27 @@ use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::io::write_grey_image;
 use tactile_imaging::pipeline::{
-    BallFit, BoxedPipeline, FrameSource, ImageFolder, Object, PipelineError, Press, Report, Session,
-    SkipReason, Skips, Stage, Stages, Trial, Update, contacts,
+    BallFit, BoxedPipeline, FrameSource, ImageFolder, Object, PipelineError, Press, Report,
+    Session, SkipReason, Skips, Stage, Stages, Trial, Update, contacts,
 };
 use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
 fn trial(forces: &[f64], seed: u64) -> Trial {
-    let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+    let camera = Camera {
+        shape: [260, 348],
+        pixel_size_m: [86.2e-6; 2],
+        ..Camera::default()
+    };
     let loads = forces.iter().map(|&f| Load::normal(f)).collect();
     Trial::new(
-        PressOptions { camera, loads, seed, ..PressOptions::default() },
+        PressOptions {
+            camera,
+            loads,
+            seed,
+            ..PressOptions::default()
+        },
         &CalibrationOptions::default(),
     )
     .unwrap()
@@ -40,14 +49,26 @@ fn nothing_runs_before_it_is_asked_for() {
     let mut press = trial.press(&pipeline).unwrap();
     assert_eq!(runs(&press), [0; 6]);
     press.contact(0).unwrap();
-    assert_eq!(runs(&press), [1, 0, 0, 0, 0, 0], "force alone never touches a surface");
+    assert_eq!(
+        runs(&press),
+        [1, 0, 0, 0, 0, 0],
+        "force alone never touches a surface"
+    );
     press.modulus().unwrap();
-    assert_eq!(runs(&press), [2, 0, 0, 0, 0, 1], "a ball's modulus takes the contacts alone");
+    assert_eq!(
+        runs(&press),
+        [2, 0, 0, 0, 0, 1],
+        "a ball's modulus takes the contacts alone"
+    );
     press.surface(1).unwrap();
     assert_eq!(runs(&press), [2, 1, 0, 0, 0, 1]);
     press.strain(1).unwrap();
     press.strain(1).unwrap();
-    assert_eq!(runs(&press), [2, 2, 2, 1, 1, 1], "what is known is not computed again");
+    assert_eq!(
+        runs(&press),
+        [2, 2, 2, 1, 1, 1],
+        "what is known is not computed again"
+    );
 }
 
 #[test]
@@ -69,11 +90,29 @@ fn a_frame_without_contact_stops_there() {
     let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
     press.add_frame(empty.view());
     assert!(press.contact(0).unwrap().is_none());
-    assert_eq!(press.surface(0).unwrap_err(), PipelineError::NoContact { frame: 0 });
-    assert_eq!(press.modulus().unwrap_err(), PipelineError::NoContact { frame: 0 });
+    assert_eq!(
+        press.surface(0).unwrap_err(),
+        PipelineError::NoContact { frame: 0 }
+    );
+    assert_eq!(
+        press.modulus().unwrap_err(),
+        PipelineError::NoContact { frame: 0 }
+    );
     assert_eq!(runs(&press), [1, 0, 0, 0, 0, 0]);
-    assert!(press.report().skips.iter().any(|s| s.reason == SkipReason::NoContact));
-    assert!(matches!(press.contact(1).unwrap_err(), PipelineError::NoSuchFrame { frame: 1, frames: 1 }));
+    assert!(
+        press
+            .report()
+            .skips
+            .iter()
+            .any(|s| s.reason == SkipReason::NoContact)
+    );
+    assert!(matches!(
+        press.contact(1).unwrap_err(),
+        PipelineError::NoSuchFrame {
+            frame: 1,
+            frames: 1
+        }
+    ));
 }
 
 /// All answers of a press that must not depend on what is skipped.
@@ -88,12 +127,32 @@ fn answers(trial: &Trial, stages: &dyn Stages, twice: bool) -> (Vec<u64>, [usize
     let last = press.frames() - 1;
     let mut bits = Vec::new();
     for frame in 0..=last {
-        bits.push(press.contact(frame).unwrap().unwrap().contact_radius_m.value.to_bits());
+        bits.push(
+            press
+                .contact(frame)
+                .unwrap()
+                .unwrap()
+                .contact_radius_m
+                .value
+                .to_bits(),
+        );
         bits.extend(
-            press.control_points(frame).unwrap().iter().flat_map(|p| [p.x, p.y, p.z].map(f64::to_bits)),
+            press
+                .control_points(frame)
+                .unwrap()
+                .iter()
+                .flat_map(|p| [p.x, p.y, p.z].map(f64::to_bits)),
         );
     }
-    bits.extend(press.strain(last).unwrap().summary.mean.iter().map(|v| v.to_bits()));
+    bits.extend(
+        press
+            .strain(last)
+            .unwrap()
+            .summary
+            .mean
+            .iter()
+            .map(|v| v.to_bits()),
+    );
     bits.push(press.modulus().unwrap().youngs_modulus_pa.to_bits());
     let work = runs(&press);
     (bits, work)
@@ -103,7 +162,10 @@ fn answers(trial: &Trial, stages: &dyn Stages, twice: bool) -> (Vec<u64>, [usize
 fn equal_frames_are_measured_once_with_the_same_bits() {
     let trial = trial(&[0.7, 1.2], 2);
     let with = trial.pipeline().unwrap();
-    let skips = Skips { equal_frames: false, ..Skips::default() };
+    let skips = Skips {
+        equal_frames: false,
+        ..Skips::default()
+    };
     let without = trial.pipeline().unwrap().with_skips(skips);
     let (a, few) = answers(&trial, &with, true);
     let (b, many) = answers(&trial, &without, true);
@@ -116,14 +178,21 @@ fn equal_frames_are_measured_once_with_the_same_bits() {
 fn surfaces_of_the_box_alone_equal_those_of_the_whole_frame() {
     let trial = trial(&[0.7, 1.2], 3);
     let inside = trial.pipeline().unwrap();
-    let skips = Skips { outside_contact: false, ..Skips::default() };
+    let skips = Skips {
+        outside_contact: false,
+        ..Skips::default()
+    };
     let whole = trial.pipeline().unwrap().with_skips(skips);
     let (mut a, mut b) = (trial.press(&inside).unwrap(), trial.press(&whole).unwrap());
     let (a, b) = (a.surface(0).unwrap(), b.surface(0).unwrap());
-    assert!(a.surface.heights.len() < b.surface.heights.len() / 2, "the box is smaller");
+    assert!(
+        a.surface.heights.len() < b.surface.heights.len() / 2,
+        "the box is smaller"
+    );
     for ((row, column), h) in a.surface.heights.indexed_iter() {
         if a.surface.mask[[row, column]] {
-            let other = b.surface.heights[[a.region.row_start + row, a.region.column_start + column]];
+            let other =
+                b.surface.heights[[a.region.row_start + row, a.region.column_start + column]];
             // Sweeps run in another order over another box: rounding alone may differ.
             assert!((h - other).abs() < 1e-9, "{h} against {other}");
         }
@@ -148,7 +217,11 @@ impl ControlPointSampler<f64> for Half {
 #[test]
 fn every_stage_can_be_swapped_in_one_line() {
     let trial = trial(&[0.7, 1.2], 4);
-    let pipeline = trial.pipeline().unwrap().with_sampler(Half).with_strain(Hencky);
+    let pipeline = trial
+        .pipeline()
+        .unwrap()
+        .with_sampler(Half)
+        .with_strain(Hencky);
     let mut press = trial.press(&pipeline).unwrap();
     assert_eq!(press.control_points(0).unwrap().len(), 100);
     assert!(press.strain(1).unwrap().measure.contains("Hencky"));
@@ -164,7 +237,10 @@ fn swapped_loads_give_the_same_modulus() {
     let (a, b) = (modulus(&up), modulus(&down));
     // Other noise in each frame: six standard errors.
     let apart = (a.youngs_modulus_pa - b.youngs_modulus_pa).abs();
-    assert!(apart < 6.0 * a.standard_error_pa.hypot(b.standard_error_pa), "{apart}");
+    assert!(
+        apart < 6.0 * a.standard_error_pa.hypot(b.standard_error_pa),
+        "{apart}"
+    );
 }
 
 #[test]
@@ -173,12 +249,20 @@ fn a_flat_field_makes_the_force_the_same_in_a_corner() {
     options.centre_px = Some([50.0, 45.0]);
     options.camera.vignetting = 0.15;
     let corner = Trial::new(options.clone(), &CalibrationOptions::default()).unwrap();
-    let scene = PressScene::new(PressOptions { centre_px: None, ..options }).unwrap();
+    let scene = PressScene::new(PressOptions {
+        centre_px: None,
+        ..options
+    })
+    .unwrap();
     // The sensor is calibrated in the frame's middle.
     let series = scene.calibrate(&CalibrationOptions::default()).unwrap();
-    let pairs: Vec<_> = series.pairs().map(|(sum, force)| CalibrationPair::loading(sum, force)).collect();
+    let pairs: Vec<_> = series
+        .pairs()
+        .map(|(sum, force)| CalibrationPair::loading(sum, force))
+        .collect();
     let error = |flat: bool| {
-        let pipeline = Pipeline::from_pairs(&pairs, corner.simulation.pixel_size_m, Object::sphere(3e-3));
+        let pipeline =
+            Pipeline::from_pairs(&pairs, corner.simulation.pixel_size_m, Object::sphere(3e-3));
         let pipeline = pipeline.unwrap().with_flat_field(flat);
         let mut press = corner.press(&pipeline).unwrap();
         press.contact(0).unwrap().unwrap().force_n.unwrap().value / 0.5 - 1.0
@@ -195,7 +279,10 @@ fn frames_of_another_size_are_an_error() {
     let small = Array2::zeros((10, 10));
     let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
     press.add_frame(small.view());
-    assert!(matches!(press.contact(0), Err(PipelineError::Contact { frame: 0, .. })));
+    assert!(matches!(
+        press.contact(0),
+        Err(PipelineError::Contact { frame: 0, .. })
+    ));
 }
 
 #[test]
@@ -224,13 +311,27 @@ fn told<T: std::fmt::Display + serde::Serialize>(result: &T) -> String {
 fn every_result_can_be_read_by_people_and_programs() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
-    let mut session = Session::new(Arc::new(pipeline.clone()), trial.simulation.reference.view()).unwrap();
+    let mut session = Session::new(
+        Arc::new(pipeline.clone()),
+        trial.simulation.reference.view(),
+    )
+    .unwrap();
     let empty = trial.scene.reference(3);
-    assert_eq!(told(&session.push(empty.view()).unwrap()), "frame 1: no contact");
-    assert!(told(&session.drift()).ends_with("1 frame without contact"), "{}", session.drift());
+    assert_eq!(
+        told(&session.push(empty.view()).unwrap()),
+        "frame 1: no contact"
+    );
+    assert!(
+        told(&session.drift()).ends_with("1 frame without contact"),
+        "{}",
+        session.drift()
+    );
     let update = session.push(trial.simulation.frames[0].view()).unwrap();
     let line = told(&update);
-    assert!(line.starts_with("frame 2: force 0.") && line.contains(" ± "), "{line}");
+    assert!(
+        line.starts_with("frame 2: force 0.") && line.contains(" ± "),
+        "{line}"
+    );
     assert!(told(&update.contact.unwrap()).contains(" mm   centroid ("));
     let mut press = trial.press(&pipeline).unwrap();
     let measured = press.measure().unwrap();
@@ -241,7 +342,13 @@ fn every_result_can_be_read_by_people_and_programs() {
     assert!(told(measured.strain.as_ref().unwrap()).contains("e_zz"));
     assert!(measured.flags.iter().all(|flag| !told(flag).is_empty()));
     assert!(told(press.report()).contains("surface"));
-    assert!(press.report().skips.iter().all(|skip| told(skip).ends_with("saved)")));
+    assert!(
+        press
+            .report()
+            .skips
+            .iter()
+            .all(|skip| told(skip).ends_with("saved)"))
+    );
     let ball = BallFit {
         radius_m: 3e-3,
         centre_m: [1e-3, 2e-3],
@@ -250,9 +357,15 @@ fn every_result_can_be_read_by_people_and_programs() {
         pixels: 900,
         iterations: 4,
     };
-    assert!(told(&ball).starts_with("ball of radius 3.000 mm at (1.000, 2.000) mm"), "{ball}");
+    assert!(
+        told(&ball).starts_with("ball of radius 3.000 mm at (1.000, 2.000) mm"),
+        "{ball}"
+    );
     let truth = trial.truth();
-    assert!(told(&truth).contains("103.0000 kPa") && told(&truth.frames[1]).starts_with("force 1.2000 N"));
+    assert!(
+        told(&truth).contains("103.0000 kPa")
+            && told(&truth.frames[1]).starts_with("force 1.2000 N")
+    );
 }
 
 #[test]
@@ -263,7 +376,10 @@ fn a_batch_reads_as_frames_one_by_one() {
     let batch = contacts(&pipeline, trial.simulation.reference.view(), &views).unwrap();
     let mut press = trial.press(&pipeline).unwrap();
     for (i, reading) in batch.iter().enumerate() {
-        assert_eq!(reading.as_ref().unwrap().as_ref(), press.contact(i).unwrap());
+        assert_eq!(
+            reading.as_ref().unwrap().as_ref(),
+            press.contact(i).unwrap()
+        );
     }
 }
 
@@ -278,7 +394,10 @@ fn a_folder_of_images_streams_as_the_frames_it_was_written_from() {
     let mut source = ImageFolder::open(folder.path(), 80.0).unwrap();
     let mut frame = Array2::zeros((0, 0));
     for (i, written) in trial.simulation.frames.iter().enumerate() {
-        assert_eq!(source.next_frame(&mut frame).unwrap(), Some(i as f64 / 80.0));
+        assert_eq!(
+            source.next_frame(&mut frame).unwrap(),
+            Some(i as f64 / 80.0)
+        );
         assert_eq!(frame, written);
     }
     assert_eq!(source.next_frame(&mut frame).unwrap(), None);

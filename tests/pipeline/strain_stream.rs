@@ -40,14 +40,25 @@ fn two_frames_of_a_stream_strain_as_two_of_a_press() {
 fn matches_that_go_on_from_the_last_one_strain_as_those_made_anew() {
     let trial = trial(&[0.7, 0.8, 0.9, 1.0, 1.1, 1.2], 5);
     let (on, few, session) = strains(&trial, Skips::default());
-    let (anew, many, other) = strains(&trial, Skips { last_answer: false, ..Skips::default() });
+    let (anew, many, other) = strains(
+        &trial,
+        Skips {
+            last_answer: false,
+            ..Skips::default()
+        },
+    );
     for (a, b) in on.iter().zip(&anew) {
         // A match may end in another of the pairings that fit alike; strains then differ by less than their own error, 0.01.
         assert!((a - b).amax() < 5e-3, "{a} {b}");
     }
     assert!(few < many, "{few} iterations, {many} without");
-    let saved =
-        |s: &Session, reason| s.report().skips.iter().find(|k| k.reason == reason).map_or(0, |k| k.saved);
+    let saved = |s: &Session, reason| {
+        s.report()
+            .skips
+            .iter()
+            .find(|k| k.reason == reason)
+            .map_or(0, |k| k.saved)
+    };
     assert!(saved(&session, SkipReason::NearLastAnswer) > 0);
     assert_eq!(saved(&other, SkipReason::NearLastAnswer), 0);
     // Five surfaces of the first load need not be made again.
@@ -64,7 +75,10 @@ fn an_object_that_needs_strain_gets_its_modulus_from_the_stream() {
     let mut press = trial.press(&pipeline).unwrap();
     let expected = press.modulus().unwrap();
     let mut session = session(&trial, pipeline.clone());
-    assert!(matches!(session.modulus().unwrap_err(), PipelineError::Modulus(_)), "no strain yet");
+    assert!(
+        matches!(session.modulus().unwrap_err(), PipelineError::Modulus(_)),
+        "no strain yet"
+    );
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();
         session.strain().unwrap();
@@ -80,9 +94,15 @@ fn an_object_that_needs_strain_gets_its_modulus_from_the_stream() {
 fn strain_is_measured_once_a_frame_and_starts_anew_when_told() {
     let trial = trial(&[0.7, 1.2], 7);
     let mut session = session(&trial, trial.pipeline().unwrap());
-    assert_eq!(session.strain().unwrap_err(), PipelineError::NoContact { frame: 0 });
+    assert_eq!(
+        session.strain().unwrap_err(),
+        PipelineError::NoContact { frame: 0 }
+    );
     session.push(trial.scene.reference(9).view()).unwrap();
-    assert_eq!(session.strain().unwrap_err(), PipelineError::NoContact { frame: 0 });
+    assert_eq!(
+        session.strain().unwrap_err(),
+        PipelineError::NoContact { frame: 0 }
+    );
     let [low, high] = [0, 1].map(|k| trial.simulation.frames[k].view());
     session.push(low).unwrap();
     assert!(session.strain().unwrap().is_none() && session.strain().unwrap().is_none());
@@ -98,7 +118,10 @@ fn strain_is_measured_once_a_frame_and_starts_anew_when_told() {
     session.push(low).unwrap();
     assert_eq!(to(&mut session), Some((2, 4)));
     let eased = session.strain().unwrap().unwrap().strain.summary.mean[(0, 0)];
-    assert!(eased < 0.0, "the surface shrinks when the load falls: {eased}");
+    assert!(
+        eased < 0.0,
+        "the surface shrinks when the load falls: {eased}"
+    );
 }
 
 #[test]
@@ -110,10 +133,26 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
         let found = press.modulus().map(|m| m.estimator);
         (found, press.report().work(Stage::Surface).runs)
     };
-    assert_eq!(modulus(EstimatorChoice::Best), modulus(EstimatorChoice::Sphere));
-    assert_eq!(modulus(EstimatorChoice::Sphere).1, 0, "no surface for a ball");
-    assert_eq!(modulus(EstimatorChoice::PaperRatio), (Ok(EstimatorKind::PaperRatio), 3));
-    assert_eq!(modulus(EstimatorChoice::Regression), (Ok(EstimatorKind::StressStrainRegression), 3));
+    assert_eq!(
+        modulus(EstimatorChoice::Best),
+        modulus(EstimatorChoice::Sphere)
+    );
+    assert_eq!(
+        modulus(EstimatorChoice::Sphere).1,
+        0,
+        "no surface for a ball"
+    );
+    assert_eq!(
+        modulus(EstimatorChoice::PaperRatio),
+        (Ok(EstimatorKind::PaperRatio), 3)
+    );
+    assert_eq!(
+        modulus(EstimatorChoice::Regression),
+        (Ok(EstimatorKind::StressStrainRegression), 3)
+    );
     let error = modulus(EstimatorChoice::FlatPunch).0.unwrap_err();
-    assert_eq!(error.to_string(), "the estimator \"flat-punch\" needs a flat punch as the object");
+    assert_eq!(
+        error.to_string(),
+        "the estimator \"flat-punch\" needs a flat punch as the object"
+    );
 }

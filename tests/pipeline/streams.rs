@@ -32,7 +32,11 @@ fn a_session_over_a_stream_keeps_its_memory_and_its_answer() {
     let references: Vec<_> = (1..4).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
     let mut session = Session::from_frames(stages, &views).unwrap();
-    let cycle = LoadCycle { largest_force_n: 1.5, cycles: 2, ..LoadCycle::default() };
+    let cycle = LoadCycle {
+        largest_force_n: 1.5,
+        cycles: 2,
+        ..LoadCycle::default()
+    };
     let mut stream = trial.scene.stream(cycle).unwrap();
     let mut frame = Array2::zeros((0, 0));
     while stream.next_frame(&mut frame).unwrap().is_some() {
@@ -48,28 +52,62 @@ fn a_session_over_a_stream_keeps_its_memory_and_its_answer() {
 fn shear_is_the_way_of_the_centroid_since_contact_began() {
     let mut options = trial(&[0.7], 9).scene.options().clone();
     let shear_n = [0.05, -0.08];
-    options.loads = vec![Load::normal(0.9), Load { shear_n, ..Load::normal(1.1) }];
+    options.loads = vec![
+        Load::normal(0.9),
+        Load {
+            shear_n,
+            ..Load::normal(1.1)
+        },
+    ];
     let stiffness = options.shear_stiffness_n_per_m;
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let calibration = ShearCalibration {
-        stiffness_n_per_m: stiffness.map(|value| Estimate { value, standard_error: 0.0 }),
+        stiffness_n_per_m: stiffness.map(|value| Estimate {
+            value,
+            standard_error: 0.0,
+        }),
         residual_sd_n: [0.0; 2],
     };
     let stages = Arc::new(trial.pipeline().unwrap());
     let session = Session::new(stages, trial.simulation.reference.view()).unwrap();
     let mut session = session.with_shear(calibration);
     let [first, second] = [0, 1].map(|k| trial.simulation.frames[k].view());
-    assert_eq!(session.push(first).unwrap().shear.unwrap().force_n.map(|f| f.value), [0.0; 2]);
+    assert_eq!(
+        session
+            .push(first)
+            .unwrap()
+            .shear
+            .unwrap()
+            .force_n
+            .map(|f| f.value),
+        [0.0; 2]
+    );
     let shear = session.push(second).unwrap().shear.unwrap();
     for (found, truth) in shear.force_n.iter().zip(shear_n) {
         // Six standard errors, and a hundredth of a pixel for what rounding and vignetting do to the centroid.
         let tolerance = 6.0 * found.standard_error + 0.01 * 86.2e-6 * stiffness[0];
-        assert!((found.value - truth).abs() < tolerance, "{found} N, true {truth} N");
+        assert!(
+            (found.value - truth).abs() < tolerance,
+            "{found} N, true {truth} N"
+        );
     }
-    assert_eq!(session.push(second).unwrap().shear.unwrap().displacement_m, shear.displacement_m);
-    assert!(session.push(trial.scene.reference(3).view()).unwrap().shear.is_none());
+    assert_eq!(
+        session.push(second).unwrap().shear.unwrap().displacement_m,
+        shear.displacement_m
+    );
+    assert!(
+        session
+            .push(trial.scene.reference(3).view())
+            .unwrap()
+            .shear
+            .is_none()
+    );
     let anew = session.push(second).unwrap().shear.unwrap();
-    assert_eq!(anew.force_n.map(|f| f.value), [0.0; 2], "a new contact starts anew");
+    assert_eq!(
+        anew.force_n.map(|f| f.value),
+        [0.0; 2],
+        "a new contact starts anew"
+    );
 }
 
 #[test]
@@ -83,28 +121,50 @@ fn drift_of_the_light_is_seen_in_frames_without_contact() {
     let darker = trial.scene.reference(5).mapv(|v| v - 2);
     session.push(darker.view()).unwrap();
     // The means of two exposures of 90 000 pixels with a noise of one level differ by 0.005.
-    assert!((session.drift().last_grey + 2.0).abs() < 0.05, "{:?}", session.drift());
+    assert!(
+        (session.drift().last_grey + 2.0).abs() < 0.05,
+        "{:?}",
+        session.drift()
+    );
     assert!(session.drift_flag().is_some());
 }
 
 /// An hour of camera in small: the answer after 20 000 frames is that after the first cycles, and the truth.
 #[test]
 fn twenty_thousand_frames_leave_memory_and_answer_alone() {
-    let camera = Camera { shape: [65, 87], pixel_size_m: [344.8e-6; 2], ..Camera::default() };
+    let camera = Camera {
+        shape: [65, 87],
+        pixel_size_m: [344.8e-6; 2],
+        ..Camera::default()
+    };
     let (loads, gain) = (vec![Load::normal(1.5)], Gain::PeakGrey(180.0));
-    let options = PressOptions { camera, loads, gain, seed: 3, ..PressOptions::default() };
+    let options = PressOptions {
+        camera,
+        loads,
+        gain,
+        seed: 3,
+        ..PressOptions::default()
+    };
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
     let mut session = Session::from_frames(Arc::new(trial.pipeline().unwrap()), &views).unwrap();
-    let cycle = LoadCycle { largest_force_n: 1.5, cycles: 249, rest_s: 1.0, ..LoadCycle::default() };
+    let cycle = LoadCycle {
+        largest_force_n: 1.5,
+        cycles: 249,
+        rest_s: 1.0,
+        ..LoadCycle::default()
+    };
     let mut early = None;
     for (k, streamed) in trial.scene.stream(cycle).unwrap().enumerate() {
         let count = allocation_counter::measure(|| {
             session.push(streamed.frame.view()).unwrap();
         });
         assert!(k < 1_000 || count.count_total == 0, "frame {k}: {count:?}");
-        assert!(session.loads() <= SESSION_LOADS && session.report().skips.len() <= 2, "memory is flat");
+        assert!(
+            session.loads() <= SESSION_LOADS && session.report().skips.len() <= 2,
+            "memory is flat"
+        );
         if k == 1_000 {
             early = Some(session.modulus().unwrap());
         }

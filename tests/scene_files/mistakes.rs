@@ -2,8 +2,16 @@
 
 /// Replacement in the valid file, and what the sentence must contain.
 pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
-    ("reference = \"reference.png\"", "", &["`reference` is missing"]),
-    ("reference = \"reference.png\"", "reference = 3", &["`reference` must be", "found 3"]),
+    (
+        "reference = \"reference.png\"",
+        "",
+        &["`reference` is missing"],
+    ),
+    (
+        "reference = \"reference.png\"",
+        "reference = 3",
+        &["`reference` must be", "found 3"],
+    ),
     (
         "reference = \"reference.png\"",
         "reference = \"none.png\"",
@@ -14,7 +22,11 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "reference = \"pairs.csv\"",
         &["`reference`", "pairs.csv", "cannot decode"],
     ),
-    ("pixel_size_m = [1e-4, 1e-4]", "", &["`pixel_size_m` is missing"]),
+    (
+        "pixel_size_m = [1e-4, 1e-4]",
+        "",
+        &["`pixel_size_m` is missing"],
+    ),
     (
         "pixel_size_m = [1e-4, 1e-4]",
         "pixel_size_m = [1e-4]",
@@ -30,15 +42,39 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "pixel_size_m = [nan, 1e-4]",
         &["`pixel_size_m` must be two positive numbers"],
     ),
-    ("pixel_size_m = [1e-4, 1e-4]", "pixel_size_m = 1e-4", &["`pixel_size_m` must be two positive numbers"]),
-    ("pairs = \"pairs.csv\"", "", &["`calibration.pairs` is missing"]),
-    ("pairs = \"pairs.csv\"", "pairs = \"none.csv\"", &["`calibration.pairs`", "none.csv"]),
-    ("pairs = \"pairs.csv\"", "pairs = \"depth.csv\"", &["`calibration.pairs`", "integrated_pixel_value"]),
-    ("pairs = \"pairs.csv\"", "pairs = \"short.csv\"", &["`calibration.pairs`", "cannot be fitted"]),
+    (
+        "pixel_size_m = [1e-4, 1e-4]",
+        "pixel_size_m = 1e-4",
+        &["`pixel_size_m` must be two positive numbers"],
+    ),
+    (
+        "pairs = \"pairs.csv\"",
+        "",
+        &["`calibration.pairs` is missing"],
+    ),
+    (
+        "pairs = \"pairs.csv\"",
+        "pairs = \"none.csv\"",
+        &["`calibration.pairs`", "none.csv"],
+    ),
+    (
+        "pairs = \"pairs.csv\"",
+        "pairs = \"depth.csv\"",
+        &["`calibration.pairs`", "integrated_pixel_value"],
+    ),
+    (
+        "pairs = \"pairs.csv\"",
+        "pairs = \"short.csv\"",
+        &["`calibration.pairs`", "cannot be fitted"],
+    ),
     (
         "pairs = \"pairs.csv\"",
         "pairs = \"bad.csv\"",
-        &["`calibration.pairs`", "bad.csv, line 3, column 2", "found `x`"],
+        &[
+            "`calibration.pairs`",
+            "bad.csv, line 3, column 2",
+            "found `x`",
+        ],
     ),
     (
         "pairs = \"pairs.csv\"",
@@ -50,27 +86,79 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "depth_table = \"pairs.csv\"",
         &["`calibration.depth_table`", "darkness_grey_levels"],
     ),
-    ("[calibration]", "[calibrations]", &["unknown field `calibrations`"]),
+    (
+        "[calibration]",
+        "[calibrations]",
+        &["unknown field `calibrations`"],
+    ),
     ("image = \"one.png\"", "", &["`frames[1].image` is missing"]),
-    ("image = \"two.pgm\"", "image = \"three.pgm\"", &["`frames[2].image`", "three.pgm"]),
-    ("image = \"two.pgm\"", "image = \"small.png\"", &["`frames[2].image`", "small.png is 7 × 5", "80 × 60"]),
-    ("image = \"two.pgm\"", "image = \"reference.png\"", &["frames[2].image", "reference.png", "no contact"]),
-    ("image = \"two.pgm\"", "image = \"white.png\"", &["frames[2].image", "white.png", "saturated"]),
-    ("force_N = 0.8", "force_N = -1.0", &["`frames[1].force_N` must be a positive number"]),
-    ("force_N = 0.8", "force = 1.0", &["unknown field `frames[1].force`"]),
+    (
+        "image = \"two.pgm\"",
+        "image = \"three.pgm\"",
+        &["`frames[2].image`", "three.pgm"],
+    ),
+    (
+        "image = \"two.pgm\"",
+        "image = \"small.png\"",
+        &["`frames[2].image`", "small.png is 7 × 5", "80 × 60"],
+    ),
+    (
+        "image = \"two.pgm\"",
+        "image = \"reference.png\"",
+        &["frames[2].image", "reference.png", "no contact"],
+    ),
+    (
+        "image = \"two.pgm\"",
+        "image = \"white.png\"",
+        &["frames[2].image", "white.png", "saturated"],
+    ),
+    (
+        "force_N = 0.8",
+        "force_N = -1.0",
+        &["`frames[1].force_N` must be a positive number"],
+    ),
+    (
+        "force_N = 0.8",
+        "force = 1.0",
+        &["unknown field `frames[1].force`"],
+    ),
     ("shape = \"sphere\"", "", &["`object.shape` is missing"]),
-    ("shape = \"sphere\"", "shape = \"cube\"", &["`object.shape` must be", "cube"]),
+    (
+        "shape = \"sphere\"",
+        "shape = \"cube\"",
+        &["`object.shape` must be", "cube"],
+    ),
     ("radius_m = 0.02", "", &["`object.radius_m` is missing"]),
-    ("radius_m = 0.02", "radius_m = inf", &["`object.radius_m` must be a positive number"]),
-    ("radius_m = 0.02", "radius_m = \"big\"", &["`object.radius_m` must be a positive number", "big"]),
-    ("poisson_ratio = 0.5", "poisson_ratio = 0.6", &["`object.poisson_ratio` must be"]),
-    ("[waveguide]", "[waveguides]", &["unknown field `waveguides`"]),
+    (
+        "radius_m = 0.02",
+        "radius_m = inf",
+        &["`object.radius_m` must be a positive number"],
+    ),
+    (
+        "radius_m = 0.02",
+        "radius_m = \"big\"",
+        &["`object.radius_m` must be a positive number", "big"],
+    ),
+    (
+        "poisson_ratio = 0.5",
+        "poisson_ratio = 0.6",
+        &["`object.poisson_ratio` must be"],
+    ),
+    (
+        "[waveguide]",
+        "[waveguides]",
+        &["unknown field `waveguides`"],
+    ),
     (
         "thickness_m = 0.1",
         "thickness_m = 0",
         &["`waveguide.layers[1].thickness_m` must be a positive number"],
     ),
-    ("thickness_m = 0.1, ", "", &["`waveguide.layers[1].thickness_m` is missing"]),
+    (
+        "thickness_m = 0.1, ",
+        "",
+        &["`waveguide.layers[1].thickness_m` is missing"],
+    ),
     (
         "refractive_index = 1.41",
         "refractive_index = 0.5",
@@ -97,7 +185,11 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "flat_field = true\n[calibration]",
         &["`flat_field` must be \"reference\"", "found true"],
     ),
-    ("[calibration]", "flat_field = \"flat.png\"\n[calibration]", &["`flat_field` must be", "\"flat.png\""]),
+    (
+        "[calibration]",
+        "flat_field = \"flat.png\"\n[calibration]",
+        &["`flat_field` must be", "\"flat.png\""],
+    ),
     (
         "[object]",
         "[stages]\nmatcher = \"icp\"\n[object]",
@@ -106,7 +198,11 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
     (
         "[object]",
         "[stages]\nreconstruction = 3\n[object]",
-        &["`stages.reconstruction` must be", "\"tsai-shah\"", "found 3"],
+        &[
+            "`stages.reconstruction` must be",
+            "\"tsai-shah\"",
+            "found 3",
+        ],
     ),
     (
         "[object]",

@@ -1,14 +1,19 @@
 //! Uniaxial compression: the law of its states, its frames and its limits.
 
 use super::{camera, relative};
-use tactile_imaging::simulate::{Elastic, SimulateError, SurfacePattern, UniaxialOptions, UniaxialScene};
+use tactile_imaging::simulate::{
+    Elastic, SimulateError, SurfacePattern, UniaxialOptions, UniaxialScene,
+};
 
 #[test]
 fn uniaxial_states_obey_their_law_and_balance_the_force() {
     let forces = vec![0.01, 0.3, 0.7, 1.1];
     let scene = UniaxialScene::new(UniaxialOptions {
         forces_n: forces.clone(),
-        material: Elastic { youngs_modulus_pa: 62e3, poisson_ratio: 0.45 },
+        material: Elastic {
+            youngs_modulus_pa: 62e3,
+            poisson_ratio: 0.45,
+        },
         face_m: [9e-3, 11e-3],
         camera: camera(600, 700),
         ..UniaxialOptions::default()
@@ -19,7 +24,10 @@ fn uniaxial_states_obey_their_law_and_balance_the_force() {
         let close = |x: f64, y: f64| assert!(relative(x, y) < 1e-12, "{x} {y}");
         close(-s.cauchy_zz_pa * s.area_m2, force);
         // Cauchy from second Piola–Kirchhoff: σ = F S Fᵀ / det F.
-        close(s.cauchy_zz_pa, s.second_piola_zz_pa * s.stretch_z / s.stretch_lateral.powi(2));
+        close(
+            s.cauchy_zz_pa,
+            s.second_piola_zz_pa * s.stretch_z / s.stretch_lateral.powi(2),
+        );
         close(s.second_piola_zz_pa, 62e3 * s.strain_zz);
         close(0.5 * (s.stretch_lateral.powi(2) - 1.0), -0.45 * s.strain_zz);
         assert!(s.stretch_z < 1.0 && s.stretch_lateral > 1.0);
@@ -34,7 +42,10 @@ fn uniaxial_states_obey_their_law_and_balance_the_force() {
 
 #[test]
 fn uniaxial_frames_carry_the_force_and_the_points_deform_as_the_states_say() {
-    let mut options = UniaxialOptions { camera: camera(261, 348).ideal(), ..UniaxialOptions::default() };
+    let mut options = UniaxialOptions {
+        camera: camera(261, 348).ideal(),
+        ..UniaxialOptions::default()
+    };
     options.centre_px = Some([170.2, 133.9]);
     let background = options.camera.background_grey;
     let scene = UniaxialScene::new(options).unwrap();
@@ -70,7 +81,13 @@ fn largest_inner_difference(a: &ndarray::Array2<f64>, b: &ndarray::Array2<f64>) 
     let mut worst = 0.0_f64;
     for r in 1..rows - 1 {
         for c in 1..cols - 1 {
-            let near = [a[[r - 1, c]], a[[r + 1, c]], a[[r, c - 1]], a[[r, c + 1]], a[[r, c]]];
+            let near = [
+                a[[r - 1, c]],
+                a[[r + 1, c]],
+                a[[r, c - 1]],
+                a[[r, c + 1]],
+                a[[r, c]],
+            ];
             if near.iter().all(|&h| h > 0.0) {
                 worst = worst.max((a[[r, c]] - b[[r, c]]).abs());
             }
@@ -90,10 +107,31 @@ fn a_force_beyond_the_material_law_is_an_error_and_so_are_bad_patterns() {
         })
     };
     assert!(at(0.999 * limit).is_ok());
-    assert!(matches!(at(1.001 * limit), Err(SimulateError::Overload { .. })));
+    assert!(matches!(
+        at(1.001 * limit),
+        Err(SimulateError::Overload { .. })
+    ));
     assert!(at(f64::NAN).is_err());
-    let pattern = SurfacePattern { bump_share: 0.6, ..SurfacePattern::default() };
-    assert!(UniaxialScene::new(UniaxialOptions { pattern, ..UniaxialOptions::default() }).is_err());
-    let pattern = SurfacePattern { bump_height_m: [2e-3, 1e-3], ..SurfacePattern::default() };
-    assert!(UniaxialScene::new(UniaxialOptions { pattern, ..UniaxialOptions::default() }).is_err());
+    let pattern = SurfacePattern {
+        bump_share: 0.6,
+        ..SurfacePattern::default()
+    };
+    assert!(
+        UniaxialScene::new(UniaxialOptions {
+            pattern,
+            ..UniaxialOptions::default()
+        })
+        .is_err()
+    );
+    let pattern = SurfacePattern {
+        bump_height_m: [2e-3, 1e-3],
+        ..SurfacePattern::default()
+    };
+    assert!(
+        UniaxialScene::new(UniaxialOptions {
+            pattern,
+            ..UniaxialOptions::default()
+        })
+        .is_err()
+    );
 }

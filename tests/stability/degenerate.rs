@@ -4,7 +4,8 @@ use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{
-    ContactReading, EstimatorChoice, Measurement, Object, PipelineError, Press, Session, SessionStrain,
+    ContactReading, EstimatorChoice, Measurement, Object, PipelineError, Press, Session,
+    SessionStrain,
 };
 
 /// Hertz's hemisphere of this radius in pixels and peak in grey levels, in the middle of a frame over a background of 15.
@@ -45,18 +46,31 @@ fn frames_of_every_kind() -> Vec<Case> {
         ("a level above the reference", even(16)),
         ("brighter all over", even(115)),
         ("saturated contact", dome(SHAPE, 12.0, 900.0)),
-        ("a contact of white alone", sound.mapv(|v| if v > 15 { 255 } else { 15 })),
+        (
+            "a contact of white alone",
+            sound.mapv(|v| if v > 15 { 255 } else { 15 }),
+        ),
         ("one bright pixel", pixels(SHAPE, &[(0, 0)])),
-        ("one bright pixel in the corner", pixels(SHAPE, &[(-24, -32)])),
+        (
+            "one bright pixel in the corner",
+            pixels(SHAPE, &[(-24, -32)]),
+        ),
         ("a contact of five pixels", pixels(SHAPE, &five)),
-        ("five pixels in a row", pixels(SHAPE, &[(0, -2), (0, -1), (0, 0), (0, 1), (0, 2)])),
+        (
+            "five pixels in a row",
+            pixels(SHAPE, &[(0, -2), (0, -1), (0, 0), (0, 1), (0, 2)]),
+        ),
         ("a contact as large as the frame", dome(SHAPE, 45.0, 150.0)),
         ("a contact larger than the frame", dome(SHAPE, 400.0, 150.0)),
         ("stripes", stripes),
         ("a board of black and white", board),
         ("a sound contact", sound.clone()),
     ];
-    let references = [("constant", even(15)), ("black", even(0)), ("white", even(255))];
+    let references = [
+        ("constant", even(15)),
+        ("black", even(0)),
+        ("white", even(255)),
+    ];
     let mut cases = Vec::new();
     for (on, reference) in &references {
         for (what, frame) in &frames {
@@ -72,7 +86,16 @@ fn frames_of_every_kind() -> Vec<Case> {
 
 fn frames_of_every_size() -> Vec<Case> {
     let mut cases = Vec::new();
-    for shape in [(1, 1), (2, 2), (3, 3), (1, 1000), (1000, 1), (2, 500), (5, 5), (8, 8)] {
+    for shape in [
+        (1, 1),
+        (2, 2),
+        (3, 3),
+        (1, 1000),
+        (1000, 1),
+        (2, 500),
+        (5, 5),
+        (8, 8),
+    ] {
         let flat = |grey: u8| Array2::from_elem(shape, grey);
         let small = dome(shape, 2.0, 150.0);
         let wide = dome(shape, 30.0, 200.0);
@@ -94,8 +117,19 @@ fn pipelines() -> Vec<Pipeline> {
     let objects = [
         (Object::sphere(3e-3), EstimatorChoice::Best),
         (Object::sphere(3e-3), EstimatorChoice::PaperRatio),
-        (Object::FlatPunch { radius_m: 2e-3, poisson_ratio: 0.5 }, EstimatorChoice::FlatPunch),
-        (Object::Unknown { poisson_ratio: 0.45 }, EstimatorChoice::Best),
+        (
+            Object::FlatPunch {
+                radius_m: 2e-3,
+                poisson_ratio: 0.5,
+            },
+            EstimatorChoice::FlatPunch,
+        ),
+        (
+            Object::Unknown {
+                poisson_ratio: 0.45,
+            },
+            EstimatorChoice::Best,
+        ),
     ];
     let made = objects.map(|(object, estimator)| {
         let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], object).unwrap();
@@ -111,21 +145,36 @@ fn all_finite<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> bool {
 
 fn is_sound(contact: &ContactReading) -> bool {
     let [x, y] = contact.centroid_px;
-    let estimates = [contact.contact_radius_m, x, y].into_iter().chain(contact.force_n);
+    let estimates = [contact.contact_radius_m, x, y]
+        .into_iter()
+        .chain(contact.force_n);
     let mut numbers = vec![contact.area_m2, contact.peak_grey, contact.saturated_share];
     numbers.extend(estimates.flat_map(|e| [e.value, e.standard_error]));
     all_finite(&numbers) || contact.flags(0).next().is_some()
 }
 
 /// Every stage on its own, whatever became of the one before.
-fn press_stage_by_stage(case: &str, pipeline: &Pipeline, [reference, first, second]: &[Array2<u8>; 3]) {
-    let Ok(mut press) = Press::new(pipeline, reference.view()) else { return };
+fn press_stage_by_stage(
+    case: &str,
+    pipeline: &Pipeline,
+    [reference, first, second]: &[Array2<u8>; 3],
+) {
+    let Ok(mut press) = Press::new(pipeline, reference.view()) else {
+        return;
+    };
     press.add_frame(first.view());
     press.add_frame(second.view());
     (0..2).for_each(|frame| stages_are_sound(case, &mut press, frame));
-    for estimate in press.modulus().into_iter().chain(press.estimates().into_iter().flatten()) {
+    for estimate in press
+        .modulus()
+        .into_iter()
+        .chain(press.estimates().into_iter().flatten())
+    {
         let finite = all_finite(&[estimate.youngs_modulus_pa, estimate.standard_error_pa]);
-        assert!(finite || !estimate.warnings.is_empty(), "{case}: {estimate:?}");
+        assert!(
+            finite || !estimate.warnings.is_empty(),
+            "{case}: {estimate:?}"
+        );
     }
     match press.measure() {
         Ok(measured) => measured_is_sound(case, &measured),
@@ -139,18 +188,29 @@ fn stages_are_sound(case: &str, press: &mut Press<'_>, frame: usize) {
     }
     if let Ok(surface) = press.surface(frame) {
         let heights = surface.surface.heights.iter().zip(&surface.surface.mask);
-        assert!(heights.into_iter().all(|(h, inside)| !inside || h.is_finite()), "{case}");
+        assert!(
+            heights
+                .into_iter()
+                .all(|(h, inside)| !inside || h.is_finite()),
+            "{case}"
+        );
     }
     if let Ok(points) = press.control_points(frame) {
         assert!(points.iter().all(|p| all_finite(p.iter())), "{case}");
     }
     if let Ok(matching) = press.matching(frame) {
         assert!(all_finite(&matching.confidence), "{case}");
-        assert!(matching.warped.iter().all(|p| all_finite(p.iter())), "{case}");
+        assert!(
+            matching.warped.iter().all(|p| all_finite(p.iter())),
+            "{case}"
+        );
     }
     if let Ok(strain) = press.strain(frame) {
         let summary = &strain.summary;
-        assert!(all_finite(summary.mean.iter().chain(&summary.standard_error)), "{case}: {summary:?}");
+        assert!(
+            all_finite(summary.mean.iter().chain(&summary.standard_error)),
+            "{case}: {summary:?}"
+        );
     }
 }
 
@@ -158,26 +218,64 @@ fn measured_is_sound(case: &str, measured: &Measurement) {
     let modulus = &measured.youngs_modulus_pa;
     let mut numbers = vec![modulus.value, modulus.standard_error, modulus.interval_95.0];
     for frame in &measured.frames {
-        numbers.extend([frame.force_n.value, frame.contact_radius_m.value, frame.contact_area_m2]);
-        numbers.extend(frame.centroid_px.iter().chain(&frame.centroid_sd_px).chain(&frame.surface_height_m));
+        numbers.extend([
+            frame.force_n.value,
+            frame.contact_radius_m.value,
+            frame.contact_area_m2,
+        ]);
+        numbers.extend(
+            frame
+                .centroid_px
+                .iter()
+                .chain(&frame.centroid_sd_px)
+                .chain(&frame.surface_height_m),
+        );
     }
     if let Some(strain) = &measured.strain {
-        numbers.extend(strain.mean.iter().chain(&strain.standard_error).chain(&strain.spread).flatten());
+        numbers.extend(
+            strain
+                .mean
+                .iter()
+                .chain(&strain.standard_error)
+                .chain(&strain.spread)
+                .flatten(),
+        );
     }
     if let Some(matching) = &measured.matching {
-        numbers.extend([matching.mean_confidence, matching.residual_m, matching.mean_displacement_m]);
+        numbers.extend([
+            matching.mean_confidence,
+            matching.residual_m,
+            matching.mean_displacement_m,
+        ]);
     }
-    assert!(all_finite(&numbers) || !measured.flags.is_empty(), "{case}: {measured:?}");
+    assert!(
+        all_finite(&numbers) || !measured.flags.is_empty(),
+        "{case}: {measured:?}"
+    );
 }
 
 /// A stream of the same frames, twice, in which no error may stick: a sound frame pushed after an error is measured as ever.
 fn stream(case: &str, pipeline: &Pipeline, [reference, first, second]: &[Array2<u8>; 3]) {
-    let Ok(mut session) = Session::new(Arc::new(pipeline.clone()), reference.view()) else { return };
-    let finite =
-        |s: &SessionStrain| all_finite(s.strain.summary.mean.iter().chain(&s.strain.summary.standard_error));
+    let Ok(mut session) = Session::new(Arc::new(pipeline.clone()), reference.view()) else {
+        return;
+    };
+    let finite = |s: &SessionStrain| {
+        all_finite(
+            s.strain
+                .summary
+                .mean
+                .iter()
+                .chain(&s.strain.summary.standard_error),
+        )
+    };
     for frame in [first, second, first, second] {
-        let Ok(update) = session.push(frame.view()) else { continue };
-        assert!(update.contact.is_none_or(|contact| is_sound(&contact)), "{case}: {update:?}");
+        let Ok(update) = session.push(frame.view()) else {
+            continue;
+        };
+        assert!(
+            update.contact.is_none_or(|contact| is_sound(&contact)),
+            "{case}: {update:?}"
+        );
         match session.strain() {
             Ok(strain) => assert!(strain.is_none_or(finite), "{case}"),
             Err(error) => assert!(
@@ -191,7 +289,10 @@ fn stream(case: &str, pipeline: &Pipeline, [reference, first, second]: &[Array2<
         }
     }
     let drift = session.drift();
-    assert!(drift.last_grey.is_finite() && drift.greatest_grey.is_finite(), "{case}: {drift:?}");
+    assert!(
+        drift.last_grey.is_finite() && drift.greatest_grey.is_finite(),
+        "{case}: {drift:?}"
+    );
 }
 
 #[test]

@@ -28,15 +28,28 @@ pub(crate) fn many(table: &mut Table) {
         let truth = trial.truth().youngs_modulus_pa;
         let press = trial.press(&pipeline).unwrap().modulus().unwrap();
         let session = streamed(&trial, &pipeline);
-        let gap = relative(&[session.youngs_modulus_pa], &[press.youngs_modulus_pa], 1.0);
+        let gap = relative(
+            &[session.youngs_modulus_pa],
+            &[press.youngs_modulus_pa],
+            1.0,
+        );
         // A session has its loads in rising order; those that it merges are 3 % apart and follow one law, of which they are means.
-        let allowed =
-            if forces.len() > SESSION_LOADS { 0.1 * press.standard_error_pa / truth } else { EXACT };
+        let allowed = if forces.len() > SESSION_LOADS {
+            0.1 * press.standard_error_pa / truth
+        } else {
+            EXACT
+        };
         table.enter(&format!("{what}: session against press"), gap, allowed);
         for (how, modulus) in [("press", press), ("session", session)] {
-            let (error, own) =
-                (relative(&[modulus.youngs_modulus_pa], &[truth], 1.0), modulus.standard_error_pa);
-            table.enter(&format!("{what}, {how}: modulus over its error"), error * truth / own, 6.0);
+            let (error, own) = (
+                relative(&[modulus.youngs_modulus_pa], &[truth], 1.0),
+                modulus.standard_error_pa,
+            );
+            table.enter(
+                &format!("{what}, {how}: modulus over its error"),
+                error * truth / own,
+                6.0,
+            );
             table.enter(&format!("{what}, {how}: that error"), own / truth, 0.02);
             assert!(own > 1e-3 * truth, "{what}, {how}: {own}");
         }
@@ -56,9 +69,15 @@ fn streamed(trial: &Trial, pipeline: &Pipeline) -> ModulusEstimate<f64> {
 fn the_order_of_loads_is_no_matter() {
     let mut trial = trial(coarse_camera(), 200.0, &steps(8));
     let pipeline = pipeline(&trial, SI);
-    let rising = [trial.press(&pipeline).unwrap().modulus().unwrap(), streamed(&trial, &pipeline)];
+    let rising = [
+        trial.press(&pipeline).unwrap().modulus().unwrap(),
+        streamed(&trial, &pipeline),
+    ];
     trial.simulation.frames.reverse();
-    let falling = [trial.press(&pipeline).unwrap().modulus().unwrap(), streamed(&trial, &pipeline)];
+    let falling = [
+        trial.press(&pipeline).unwrap().modulus().unwrap(),
+        streamed(&trial, &pipeline),
+    ];
     for (a, b) in rising.iter().zip(&falling) {
         let gap = relative(
             &[a.youngs_modulus_pa, a.standard_error_pa],
@@ -72,7 +91,10 @@ fn the_order_of_loads_is_no_matter() {
 /// Estimators that look at strain say how many loads they need.
 #[test]
 fn one_load_has_no_strain() {
-    for (choice, needed) in [(EstimatorChoice::PaperRatio, 2), (EstimatorChoice::Regression, 3)] {
+    for (choice, needed) in [
+        (EstimatorChoice::PaperRatio, 2),
+        (EstimatorChoice::Regression, 3),
+    ] {
         match strained(&[0.7], choice) {
             Err(PipelineError::Modulus(ElasticityError::TooFewLoads { expected, .. })) => {
                 assert_eq!(expected, needed, "{choice}");
@@ -91,15 +113,23 @@ fn equal_loads_have_no_ratio() {
             Err(error) => panic!("{choice}: {error}"),
             Ok(modulus) => {
                 let (value, error) = (modulus.youngs_modulus_pa, modulus.standard_error_pa);
-                assert!(value.abs() < 6.0 * error && error.is_finite(), "{choice}: {value} ± {error}");
+                assert!(
+                    value.abs() < 6.0 * error && error.is_finite(),
+                    "{choice}: {value} ± {error}"
+                );
                 assert!(!modulus.warnings.is_empty(), "{choice}");
             }
         }
     }
 }
 
-fn strained(forces: &[f64], choice: EstimatorChoice) -> Result<ModulusEstimate<f64>, PipelineError> {
+fn strained(
+    forces: &[f64],
+    choice: EstimatorChoice,
+) -> Result<ModulusEstimate<f64>, PipelineError> {
     let trial = trial(coarse_camera(), 200.0, forces);
-    let pipeline = pipeline(&trial, SI).with_estimator(choice).with_control_points(60);
+    let pipeline = pipeline(&trial, SI)
+        .with_estimator(choice)
+        .with_control_points(60);
     trial.press(&pipeline)?.modulus()
 }

@@ -10,21 +10,38 @@ use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, PressOpt
 
 /// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
 pub(crate) fn camera() -> Camera {
-    Camera { shape: [260, 348], pixel_size_m: [43.1e-6; 2], ..Camera::default() }
+    Camera {
+        shape: [260, 348],
+        pixel_size_m: [43.1e-6; 2],
+        ..Camera::default()
+    }
 }
 
 /// 174 × 130 pixels on 30 mm: enough for force, radius and modulus.
 pub(crate) fn coarse_camera() -> Camera {
-    Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() }
+    Camera {
+        shape: [130, 174],
+        pixel_size_m: [172.4e-6; 2],
+        ..Camera::default()
+    }
 }
 
 /// A press at these forces seen by a camera, its brightest pixel at this grey above the background.
 pub(crate) fn trial(camera: Camera, peak_grey: f64, forces: &[f64]) -> Trial {
     let loads = forces.iter().map(|&f| Load::normal(f)).collect();
     let gain = Gain::PeakGrey(peak_grey);
-    let options = PressOptions { camera, loads, gain, seed: 3, ..PressOptions::default() };
+    let options = PressOptions {
+        camera,
+        loads,
+        gain,
+        seed: 3,
+        ..PressOptions::default()
+    };
     // The calibration's contact, too, lies wholly within the finer camera's view.
-    let calibration = CalibrationOptions { largest_force_n: 1.5, ..CalibrationOptions::default() };
+    let calibration = CalibrationOptions {
+        largest_force_n: 1.5,
+        ..CalibrationOptions::default()
+    };
     Trial::new(options, &calibration).expect("a scene")
 }
 
@@ -36,14 +53,19 @@ pub(crate) struct Units {
     pub(crate) grey: f64,
 }
 
-pub(crate) const SI: Units = Units { length: 1.0, force: 1.0, grey: 1.0 };
+pub(crate) const SI: Units = Units {
+    length: 1.0,
+    force: 1.0,
+    grey: 1.0,
+};
 
 /// The trial's pipeline with its sensor described in other units: the layers' moduli too, in force over length².
 pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     let options = trial.scene.options();
     let layers = options.waveguide.layers.iter().map(|l| Layer {
         thickness_m: l.thickness_m * units.length,
-        youngs_modulus_pa: l.material.youngs_modulus_pa * units.force / (units.length * units.length),
+        youngs_modulus_pa: l.material.youngs_modulus_pa * units.force
+            / (units.length * units.length),
         poisson_ratio: l.material.poisson_ratio,
     });
     let scaled = |p: &CalibrationPair<f64>| CalibrationPair {
@@ -54,10 +76,14 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     let pairs: Vec<_> = trial.pairs.iter().map(scaled).collect();
     let size = trial.simulation.pixel_size_m.map(|s| s * units.length);
     let ball = options.object;
-    let object =
-        Object::Sphere { radius_m: ball.radius_m * units.length, poisson_ratio: ball.material.poisson_ratio };
+    let object = Object::Sphere {
+        radius_m: ball.radius_m * units.length,
+        poisson_ratio: ball.material.poisson_ratio,
+    };
     let waveguide = Waveguide::new(layers.collect()).expect("layers");
-    Pipeline::from_pairs(&pairs, size, object).expect("a calibration").with_waveguide(waveguide)
+    Pipeline::from_pairs(&pairs, size, object)
+        .expect("a calibration")
+        .with_waveguide(waveguide)
 }
 
 /// Exposures without contact, from which the noise of all pixels is measured, and the frames of a press.
@@ -70,12 +96,18 @@ pub(crate) struct Images {
 impl Images {
     pub(crate) fn of(trial: &Trial) -> Self {
         let references = [0, 1].map(|repeat| trial.scene.reference(repeat));
-        Self { references, frames: trial.simulation.frames.clone() }
+        Self {
+            references,
+            frames: trial.simulation.frames.clone(),
+        }
     }
 
     pub(crate) fn map(&self, change: impl Fn(&Array2<u8>) -> Array2<u8>) -> Self {
         let references = [0, 1].map(|k| change(&self.references[k]));
-        Self { references, frames: self.frames.iter().map(change).collect() }
+        Self {
+            references,
+            frames: self.frames.iter().map(change).collect(),
+        }
     }
 }
 
@@ -102,7 +134,10 @@ pub(crate) fn answer(pipeline: &Pipeline, images: &Images) -> Answer {
     });
     let (mut force_n, mut radius_m, mut centroid_px) = (Vec::new(), Vec::new(), Vec::new());
     for frame in 0..press.frames() {
-        let contact = press.contact(frame).expect("sound frames").expect("a contact");
+        let contact = press
+            .contact(frame)
+            .expect("sound frames")
+            .expect("a contact");
         force_n.push(contact.force_n.expect("a force").value);
         radius_m.push(contact.contact_radius_m.value);
         centroid_px.push(contact.centroid_px.map(|c| c.value));

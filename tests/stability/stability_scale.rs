@@ -1,5 +1,7 @@
 //! Units, brightness and position: what the numbers are against the truth, and what must not change them.
-use crate::press::{Answer, Images, SI, Units, answer, camera, coarse_camera, pipeline, relative, trial};
+use crate::press::{
+    Answer, Images, SI, Units, answer, camera, coarse_camera, pipeline, relative, trial,
+};
 use crate::table::{EXACT, STRAIN, Table};
 use crate::{loads, steps, symmetry};
 use tactile_imaging::pipeline::Trial;
@@ -27,7 +29,10 @@ fn truth(table: &mut Table) {
         let (fine, coarse) = (camera().ideal(), coarse_camera().ideal());
         for (what, camera) in [("fine", fine), ("coarse", coarse)] {
             let trial = trial(camera, grey, &[0.7, 1.2]);
-            let (found, truth) = (answer(&pipeline(&trial, SI), &Images::of(&trial)), trial.truth());
+            let (found, truth) = (
+                answer(&pipeline(&trial, SI), &Images::of(&trial)),
+                trial.truth(),
+            );
             let force: Vec<_> = truth.frames.iter().map(|f| f.force_n).collect();
             let radius: Vec<_> = truth.frames.iter().map(|f| f.contact_radius_m).collect();
             let modulus = relative(&[found.modulus_pa], &[truth.youngs_modulus_pa], 1.0);
@@ -35,7 +40,11 @@ fn truth(table: &mut Table) {
             // The gauge's mean is good for 0.1 % of these forces, and of 60 grey levels half of one is lost at the rim of few
             // pixels: 0.2 %. E goes as F/a³, and as the layers yield too its error is 1.7 times theirs.
             table.enter(&case("force"), relative(&found.force_n, &force, 1.0), 0.004);
-            table.enter(&case("radius"), relative(&found.radius_m, &radius, 1.0), 1e-3);
+            table.enter(
+                &case("radius"),
+                relative(&found.radius_m, &radius, 1.0),
+                1e-3,
+            );
             table.enter(&case("modulus"), modulus, 0.01);
             surface(table, &case("height of the surface"), &trial);
             let strain = truth.strain.filter(|_| what == "fine");
@@ -55,7 +64,12 @@ fn surface(table: &mut Table, case: &str, trial: &Trial) {
     let mut press = trial.press(&pipeline).unwrap();
     for (k, truth) in trial.truth().frames.iter().enumerate() {
         let found = press.surface(k).unwrap();
-        let inside = found.surface.heights.iter().zip(&found.surface.mask).filter(|(_, inside)| **inside);
+        let inside = found
+            .surface
+            .heights
+            .iter()
+            .zip(&found.surface.mask)
+            .filter(|(_, inside)| **inside);
         let top = inside.map(|(height, _)| *height).fold(f64::NAN, f64::max);
         let ring = (0.5 * found.pixel_size_m[0] / truth.contact_radius_m).sqrt();
         table.enter(case, (top / truth.surface_height_m - 1.0).abs(), ring);
@@ -77,15 +91,37 @@ fn units(table: &mut Table, trial: &Trial, expected: &Answer) {
 }
 
 /// Lengths, forces and moduli follow their units, strains have none.
-fn scaled(table: &mut Table, case: &str, found: &Answer, expected: &Answer, [force, length]: [f64; 2]) {
+fn scaled(
+    table: &mut Table,
+    case: &str,
+    found: &Answer,
+    expected: &Answer,
+    [force, length]: [f64; 2],
+) {
     let pressure = force / (length * length);
     let rows = [
         ("force", relative(&found.force_n, &expected.force_n, force)),
-        ("radius", relative(&found.radius_m, &expected.radius_m, length)),
-        ("modulus", relative(&[found.modulus_pa], &[expected.modulus_pa], pressure)),
-        ("its error", relative(&[found.modulus_error_pa], &[expected.modulus_error_pa], pressure)),
+        (
+            "radius",
+            relative(&found.radius_m, &expected.radius_m, length),
+        ),
+        (
+            "modulus",
+            relative(&[found.modulus_pa], &[expected.modulus_pa], pressure),
+        ),
+        (
+            "its error",
+            relative(
+                &[found.modulus_error_pa],
+                &[expected.modulus_error_pa],
+                pressure,
+            ),
+        ),
         ("strain", (found.strain - expected.strain).amax()),
-        ("its error", (found.strain_error - expected.strain_error).amax()),
+        (
+            "its error",
+            (found.strain_error - expected.strain_error).amax(),
+        ),
     ];
     for (k, (what, error)) in rows.into_iter().enumerate() {
         let of = if k == 5 { "strain's error" } else { what };
@@ -95,13 +131,24 @@ fn scaled(table: &mut Table, case: &str, found: &Answer, expected: &Answer, [for
 
 /// As much grey everywhere, in reference and frames: the differences, and so all bits, stay.
 fn pedestal(table: &mut Table, trial: &Trial, expected: &Answer) {
-    let brightest = trial.simulation.frames.iter().flatten().max().copied().unwrap_or(0);
+    let brightest = trial
+        .simulation
+        .frames
+        .iter()
+        .flatten()
+        .max()
+        .copied()
+        .unwrap_or(0);
     // A grey level of 255 would count as saturated.
     let room = 254 - brightest;
     for grey in [1, room / 2, room] {
         let raised = Images::of(trial).map(|image| image.mapv(|v| v + grey));
         let found = answer(&pipeline(trial, SI), &raised);
-        let error = if found == *expected { 0.0 } else { f64::INFINITY };
+        let error = if found == *expected {
+            0.0
+        } else {
+            f64::INFINITY
+        };
         table.enter("constant offset of all grey values: any bit", error, 0.0);
     }
 }
@@ -115,9 +162,21 @@ fn light(table: &mut Table) {
     let expected = answer(&pipeline(&trial, SI), &Images::of(&trial));
     let bright = Images::of(&trial).map(|image| image * 2);
     let found = answer(&pipeline(&trial, Units { grey: 2.0, ..SI }), &bright);
-    table.enter("twice the light: force", relative(&found.force_n, &expected.force_n, 1.0), EXACT);
-    table.enter("twice the light: radius", relative(&found.radius_m, &expected.radius_m, 1.0), 1e-5);
-    table.enter("twice the light: modulus", relative(&[found.modulus_pa], &[expected.modulus_pa], 1.0), 1e-4);
+    table.enter(
+        "twice the light: force",
+        relative(&found.force_n, &expected.force_n, 1.0),
+        EXACT,
+    );
+    table.enter(
+        "twice the light: radius",
+        relative(&found.radius_m, &expected.radius_m, 1.0),
+        1e-5,
+    );
+    table.enter(
+        "twice the light: modulus",
+        relative(&[found.modulus_pa], &[expected.modulus_pa], 1.0),
+        1e-4,
+    );
     for (k, name) in ["xx", "yy", "zz"].into_iter().enumerate() {
         let gap = (found.strain - expected.strain)[(k, k)].abs();
         table.enter(&format!("twice the light: strain e_{name}"), gap, STRAIN[k]);

@@ -14,7 +14,9 @@ const RIM: [f64; 3] = [1e-5, 1e-6, 1e-3];
 fn shifted(image: &Array2<u8>, [x, y]: [isize; 2]) -> Array2<u8> {
     let (rows, columns) = image.dim();
     let from = |i: usize, by: isize, n: usize| (i as isize - by).rem_euclid(n as isize) as usize;
-    Array2::from_shape_fn((rows, columns), |(r, c)| image[[from(r, y, rows), from(c, x, columns)]])
+    Array2::from_shape_fn((rows, columns), |(r, c)| {
+        image[[from(r, y, rows), from(c, x, columns)]]
+    })
 }
 
 pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
@@ -22,7 +24,14 @@ pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
         let moved = Images::of(trial).map(|image| shifted(image, by));
         let found = answer(&pipeline(trial, SI), &moved);
         let there = |c: [f64; 2]| [c[0] + by[0] as f64, c[1] + by[1] as f64];
-        compare(table, "moved by whole pixels", &found, expected, (there, Matrix3::identity()), RIM);
+        compare(
+            table,
+            "moved by whole pixels",
+            &found,
+            expected,
+            (there, Matrix3::identity()),
+            RIM,
+        );
     }
 }
 
@@ -35,7 +44,11 @@ struct Turn {
 
 impl Turn {
     fn image(self, image: &Array2<u8>) -> Array2<u8> {
-        let mut view = if self.transposed { image.t() } else { image.view() };
+        let mut view = if self.transposed {
+            image.t()
+        } else {
+            image.view()
+        };
         for (k, axis) in [Axis(1), Axis(0)].into_iter().enumerate() {
             if self.reversed[k] {
                 view.invert_axis(axis);
@@ -46,8 +59,18 @@ impl Turn {
 
     /// Where (x, y) of a frame of this many columns and rows goes.
     fn point(self, [x, y]: [f64; 2], [columns, rows]: [f64; 2]) -> [f64; 2] {
-        let (p, n) = if self.transposed { ([y, x], [rows, columns]) } else { ([x, y], [columns, rows]) };
-        std::array::from_fn(|k| if self.reversed[k] { n[k] - 1.0 - p[k] } else { p[k] })
+        let (p, n) = if self.transposed {
+            ([y, x], [rows, columns])
+        } else {
+            ([x, y], [columns, rows])
+        };
+        std::array::from_fn(|k| {
+            if self.reversed[k] {
+                n[k] - 1.0 - p[k]
+            } else {
+                p[k]
+            }
+        })
     }
 
     /// The same for directions.
@@ -61,12 +84,26 @@ impl Turn {
 pub(crate) fn turns(table: &mut Table, trial: &Trial, expected: &Answer) {
     let (rows, columns) = trial.simulation.reference.dim();
     for k in 1..8 {
-        let turn = Turn { transposed: k & 4 != 0, reversed: [k & 1 != 0, k & 2 != 0] };
+        let turn = Turn {
+            transposed: k & 4 != 0,
+            reversed: [k & 1 != 0, k & 2 != 0],
+        };
         let turned = Images::of(trial).map(|image| turn.image(image));
         let found = answer(&pipeline(trial, SI), &turned);
         let there = |c| turn.point(c, [columns as f64, rows as f64]);
-        let case = if turn.transposed { "turned" } else { "mirrored" };
-        compare(table, case, &found, expected, (there, turn.rotation()), [EXACT, EXACT, 1e-10]);
+        let case = if turn.transposed {
+            "turned"
+        } else {
+            "mirrored"
+        };
+        compare(
+            table,
+            case,
+            &found,
+            expected,
+            (there, turn.rotation()),
+            [EXACT, EXACT, 1e-10],
+        );
     }
 }
 
@@ -80,17 +117,29 @@ fn compare(
     (there, rotation): (impl Fn([f64; 2]) -> [f64; 2], Matrix3<f64>),
     [of_force, of_radius, of_pixel]: [f64; 3],
 ) {
-    let centroid = found.centroid_px.iter().zip(&expected.centroid_px).map(|(f, e)| {
-        let e = there(*e);
-        (f[0] - e[0]).hypot(f[1] - e[1])
-    });
+    let centroid = found
+        .centroid_px
+        .iter()
+        .zip(&expected.centroid_px)
+        .map(|(f, e)| {
+            let e = there(*e);
+            (f[0] - e[0]).hypot(f[1] - e[1])
+        });
     let strain = rotation * expected.strain * rotation.transpose();
     let gap = (found.strain - strain).abs();
     let across = gap[(0, 0)].max(gap[(1, 1)]).max(gap[(0, 1)]);
     let up = gap[(2, 2)].max(gap[(0, 2)]).max(gap[(1, 2)]);
     let rows = [
-        ("force", relative(&found.force_n, &expected.force_n, 1.0), of_force),
-        ("radius", relative(&found.radius_m, &expected.radius_m, 1.0), of_radius),
+        (
+            "force",
+            relative(&found.force_n, &expected.force_n, 1.0),
+            of_force,
+        ),
+        (
+            "radius",
+            relative(&found.radius_m, &expected.radius_m, 1.0),
+            of_radius,
+        ),
         ("centroid in pixels", centroid.fold(0.0, f64::max), of_pixel),
         (
             "modulus",

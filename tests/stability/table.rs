@@ -26,9 +26,15 @@ impl Table {
     #[allow(clippy::print_stdout)]
     pub(crate) fn finish(self) {
         println!("pipeline: worst error");
-        println!("  {:<56} {:>10} {:>10} {:>8}", "case", "worst", "allowed", "ratio");
+        println!(
+            "  {:<56} {:>10} {:>10} {:>8}",
+            "case", "worst", "allowed", "ratio"
+        );
         for (case, error, tolerance) in &self.0 {
-            println!("  {case:<56} {error:>10.2e} {tolerance:>10.1e} {:>8.3}", ratio(*error, *tolerance));
+            println!(
+                "  {case:<56} {error:>10.2e} {tolerance:>10.1e} {:>8.3}",
+                ratio(*error, *tolerance)
+            );
         }
         let within = |error: f64, tolerance: f64| error.is_finite() && error <= tolerance;
         let bad: Vec<_> = self.0.iter().filter(|row| !within(row.1, row.2)).collect();

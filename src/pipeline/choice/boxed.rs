@@ -1,15 +1,17 @@
 //! The default stage behind every name, as an object.
 use super::{MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice};
-use crate::elasticity::strain::{Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure};
+use crate::elasticity::strain::{
+    Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
+};
 use crate::matching::{
-    CoherentPointDrift, DenseRelaxation, LinearAssignment, NearestNeighbour, PointMatcher, RelaxationMatcher,
-    RelaxationOptions, Search,
+    CoherentPointDrift, DenseRelaxation, LinearAssignment, NearestNeighbour, PointMatcher,
+    RelaxationMatcher, RelaxationOptions, Search,
 };
 use crate::pipeline::stages::BoxedWarp;
 use crate::pipeline::strain_spline::StrainSpline;
 use crate::sfs::{
-    BrooksHorn, ControlPointSampler, CurvatureAdaptive, Eikonal, EquallySpaced, Lighting, Random, Rim,
-    SfsError, SurfaceReconstruction, TsaiShah,
+    BrooksHorn, ControlPointSampler, CurvatureAdaptive, Eikonal, EquallySpaced, Lighting, Random,
+    Rim, SfsError, SurfaceReconstruction, TsaiShah,
 };
 use crate::tps::{AffineModel, FitOptions, R3, RigidModel, Smoothing, TpsError, WarpModel};
 use nalgebra::Point3;
@@ -133,9 +135,9 @@ impl SamplerChoice {
 impl MatcherChoice {
     pub(in crate::pipeline) fn boxed(self) -> BoxedMatcher {
         match self {
-            Self::Relaxation => {
-                Box::new(RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near)))
-            }
+            Self::Relaxation => Box::new(RelaxationMatcher::new(
+                RelaxationOptions::default().search(Search::Near),
+            )),
             Self::DenseRelaxation => Box::new(DenseRelaxation::default()),
             Self::CoherentPointDrift => Box::new(CoherentPointDrift::default()),
             Self::LinearAssignment => Box::new(LinearAssignment::default()),

@@ -1,7 +1,9 @@
 //! Stages by name: what a configuration may say, and the default stage behind every name.
 mod boxed;
 
-pub use boxed::{BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, FitWarp};
+pub use boxed::{
+    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, FitWarp,
+};
 use std::fmt;
 
 /// A name that no stage of this kind has.

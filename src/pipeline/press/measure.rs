@@ -3,7 +3,9 @@ use super::Press;
 use crate::matching::StopReason;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::flag::Flag;
-use crate::pipeline::measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
+use crate::pipeline::measurement::{
+    FrameResult, MatchResult, Measurement, ModulusResult, StrainResult,
+};
 use nalgebra::Matrix3;
 
 impl Press<'_> {
@@ -33,27 +35,48 @@ impl Press<'_> {
         if last > 0 {
             match self.match_and_strain(last, &mut flags) {
                 Ok((m, s)) => (matching, strain) = (Some(m), Some(s)),
-                Err(error) => flags.push(Flag::NoStrain { reason: error.to_string() }),
+                Err(error) => flags.push(Flag::NoStrain {
+                    reason: error.to_string(),
+                }),
             }
         }
         let estimators: Vec<_> = self.estimates()?.iter().map(ModulusResult::from).collect();
-        let frames =
-            (0..self.frames()).map(|i| self.frame_result(i, &mut flags)).collect::<Result<_, _>>()?;
+        let frames = (0..self.frames())
+            .map(|i| self.frame_result(i, &mut flags))
+            .collect::<Result<_, _>>()?;
         let warnings = youngs_modulus_pa.warnings.iter().cloned();
         flags.extend(warnings.map(|warning| Flag::Assumption { warning }));
         let report = self.report().clone();
-        Ok(Measurement { youngs_modulus_pa, estimators, frames, strain, matching, flags, report })
+        Ok(Measurement {
+            youngs_modulus_pa,
+            estimators,
+            frames,
+            strain,
+            matching,
+            flags,
+            report,
+        })
     }
 
-    fn frame_result(&mut self, frame: usize, flags: &mut Vec<Flag>) -> Result<FrameResult, PipelineError> {
-        let reading = *self.contact(frame)?.ok_or(PipelineError::NoContact { frame })?;
+    fn frame_result(
+        &mut self,
+        frame: usize,
+        flags: &mut Vec<Flag>,
+    ) -> Result<FrameResult, PipelineError> {
+        let reading = *self
+            .contact(frame)?
+            .ok_or(PipelineError::NoContact { frame })?;
         let force_n = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
         let gauge_force_n = self.gauge_n(frame);
         flags.extend(reading.flags(frame));
         if let Some(gauge_n) = gauge_force_n {
             let apart = (gauge_n - force_n.value).abs();
             if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {
-                flags.push(Flag::GaugeDisagrees { frame, measured_n: force_n.value, gauge_n });
+                flags.push(Flag::GaugeDisagrees {
+                    frame,
+                    measured_n: force_n.value,
+                    gauge_n,
+                });
             }
         }
         let radius = self.stages().settings().object.sphere_radius_m();
@@ -82,7 +105,10 @@ impl Press<'_> {
         let model = self.control_points(0)?.to_vec();
         let matching = self.matching(frame)?;
         let n = model.len() as f64;
-        let lengths = model.iter().zip(&matching.warped).map(|(a, b)| (b - a).norm());
+        let lengths = model
+            .iter()
+            .zip(&matching.warped)
+            .map(|(a, b)| (b - a).norm());
         let result = MatchResult {
             points: model.len(),
             matched: matching.assignment.iter().flatten().count(),
@@ -96,12 +122,16 @@ impl Press<'_> {
             flags.push(Flag::MatchNotConverged);
         }
         if result.matched < result.points {
-            flags.push(Flag::Unmatched { points: result.points - result.matched });
+            flags.push(Flag::Unmatched {
+                points: result.points - result.matched,
+            });
         }
         let strain = self.strain(frame)?;
         let summary = &strain.summary;
         if !summary.folded.is_empty() {
-            flags.push(Flag::Folded { points: summary.folded.len() });
+            flags.push(Flag::Folded {
+                points: summary.folded.len(),
+            });
         }
         let strain = StrainResult {
             measure: strain.measure.into(),

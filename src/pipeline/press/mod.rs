@@ -82,8 +82,14 @@ impl<'a> Press<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
-    pub fn new(stages: &'a dyn Stages, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
-        Ok(Self::with_reference(stages, Arc::new(reference_frame(stages, &[reference])?)))
+    pub fn new(
+        stages: &'a dyn Stages,
+        reference: ArrayView2<'_, u8>,
+    ) -> Result<Self, PipelineError> {
+        Ok(Self::with_reference(
+            stages,
+            Arc::new(reference_frame(stages, &[reference])?),
+        ))
     }
 
     /// Starts a press on a reference made before: its noise is measured once for many presses.
@@ -173,13 +179,26 @@ impl<'a> Press<'a> {
         let index = self.frames.len();
         let equal = |f: &Loaded<'_>| f.gauge_n == gauge_n && f.image == image;
         let skip = self.stages.settings().skips.equal_frames;
-        let twin = if skip { self.frames.iter().position(equal) } else { None };
+        let twin = if skip {
+            self.frames.iter().position(equal)
+        } else {
+            None
+        };
         if twin.is_some() {
-            self.report.skipped(Stage::Contact, index, SkipReason::EqualFrame, image.len());
+            self.report
+                .skipped(Stage::Contact, index, SkipReason::EqualFrame, image.len());
         }
         self.twins.push(twin.unwrap_or(index));
         let (contact, surface, points, matching, strain) = (None, None, None, None, None);
-        self.frames.push(Loaded { image, gauge_n, contact, surface, points, matching, strain });
+        self.frames.push(Loaded {
+            image,
+            gauge_n,
+            contact,
+            surface,
+            points,
+            matching,
+            strain,
+        });
         index
     }
 
@@ -210,6 +229,9 @@ impl<'a> Press<'a> {
 
     fn twin(&self, frame: usize) -> Result<usize, PipelineError> {
         let frames = self.frames.len();
-        self.twins.get(frame).copied().ok_or(PipelineError::NoSuchFrame { frame, frames })
+        self.twins
+            .get(frame)
+            .copied()
+            .ok_or(PipelineError::NoSuchFrame { frame, frames })
     }
 }

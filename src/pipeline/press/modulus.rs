@@ -69,13 +69,21 @@ impl Press<'_> {
         };
         let start = Instant::now();
         let settings = self.stages.settings();
-        let estimates = all_estimates(&settings.object, settings.waveguide.as_ref(), &loads, shared);
+        let estimates = all_estimates(
+            &settings.object,
+            settings.waveguide.as_ref(),
+            &loads,
+            shared,
+        );
         self.report.ran(Stage::Modulus, start.elapsed());
         Ok(estimates)
     }
 
     /// What every frame says of its load, and the relative errors that all share.
-    fn loads(&mut self, with_strain: bool) -> Result<(Vec<LoadState<f64>>, SharedErrors), PipelineError> {
+    fn loads(
+        &mut self,
+        with_strain: bool,
+    ) -> Result<(Vec<LoadState<f64>>, SharedErrors), PipelineError> {
         let mut readings = Vec::with_capacity(self.frames.len());
         let mut depths = Vec::with_capacity(self.frames.len());
         let size = self.stages.contact().pixel_size_m();
@@ -101,7 +109,8 @@ impl Press<'_> {
                 let summary = &self.strain(frame)?.summary;
                 // (31) takes the strain's size; its sign says whether the load rose.
                 let value = summary.mean[(2, 2)].abs().copysign(step);
-                loads[frame].mean_strain = Some(Estimate::new(value, summary.standard_error[(2, 2)]));
+                loads[frame].mean_strain =
+                    Some(Estimate::new(value, summary.standard_error[(2, 2)]));
             }
         }
         Ok((loads, shared))

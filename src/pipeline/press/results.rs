@@ -22,26 +22,40 @@ impl Press<'_> {
             let loaded = &self.frames[at];
             self.stages
                 .contact()
-                .measure(&mut self.force, loaded.image, &self.reference, loaded.gauge_n, &mut contact)
+                .measure(
+                    &mut self.force,
+                    loaded.image,
+                    &self.reference,
+                    loaded.gauge_n,
+                    &mut contact,
+                )
                 .map_err(|source| PipelineError::Contact { frame, source })?;
             let pixels = loaded.image.len();
             match contact.region {
-                None => self.report.skipped(Stage::Surface, frame, SkipReason::NoContact, pixels),
+                None => self
+                    .report
+                    .skipped(Stage::Surface, frame, SkipReason::NoContact, pixels),
                 Some(region) if self.stages.settings().skips.outside_contact => {
                     let saved = pixels - region.rows() * region.columns();
-                    self.report.skipped(Stage::Surface, frame, SkipReason::OutsideContact, saved);
+                    self.report
+                        .skipped(Stage::Surface, frame, SkipReason::OutsideContact, saved);
                 }
                 Some(_) => contact = contact.widened(loaded.image.dim()),
             }
             self.report.ran(Stage::Contact, start.elapsed());
             self.frames[at].contact = Some(contact);
         }
-        Ok(self.frames[at].contact.as_ref().and_then(|c| c.reading.as_ref()))
+        Ok(self.frames[at]
+            .contact
+            .as_ref()
+            .and_then(|c| c.reading.as_ref()))
     }
 
     /// The contact of a frame that must have one.
     pub(super) fn reading(&mut self, frame: usize) -> Result<ContactReading, PipelineError> {
-        self.contact(frame)?.copied().ok_or(PipelineError::NoContact { frame })
+        self.contact(frame)?
+            .copied()
+            .ok_or(PipelineError::NoContact { frame })
     }
 
     /// The surface of a frame's contact.
@@ -69,17 +83,24 @@ impl Press<'_> {
         if self.frames[at].surface.is_none() {
             let start = Instant::now();
             let loaded = &self.frames[at];
-            let contact = loaded.contact.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let contact = loaded
+                .contact
+                .as_ref()
+                .ok_or(PipelineError::NoContact { frame })?;
             let images = [loaded.image, self.reference.image()];
             // All surfaces have the first one's grid, so that what the grid does to them leaves no strain.
             let first = self.frames[0].contact.as_ref().unwrap_or(contact);
             let pixels = first.mask.iter().filter(|m| **m).count();
-            let surface = surface::reconstruct(self.stages, &mut self.surface, images, contact, pixels)
-                .map_err(|source| PipelineError::Surface { frame, source })?;
+            let surface =
+                surface::reconstruct(self.stages, &mut self.surface, images, contact, pixels)
+                    .map_err(|source| PipelineError::Surface { frame, source })?;
             self.report.ran(Stage::Surface, start.elapsed());
             self.frames[at].surface = Some(surface);
         }
-        self.frames[at].surface.as_ref().ok_or(PipelineError::NoContact { frame })
+        self.frames[at]
+            .surface
+            .as_ref()
+            .ok_or(PipelineError::NoContact { frame })
     }
 
     /// Control points on a frame's surface, in metres from the frame's first pixel.
@@ -105,7 +126,10 @@ impl Press<'_> {
         let at = self.twin(frame)?;
         if self.frames[at].points.is_none() {
             let start = Instant::now();
-            let surface = self.frames[at].surface.as_ref().ok_or(PipelineError::NoContact { frame })?;
+            let surface = self.frames[at]
+                .surface
+                .as_ref()
+                .ok_or(PipelineError::NoContact { frame })?;
             let points = surface::sample(self.stages, surface)
                 .map_err(|source| PipelineError::Surface { frame, source })?;
             self.report.ran(Stage::ControlPoints, start.elapsed());
@@ -142,7 +166,10 @@ impl Press<'_> {
             self.report.ran(Stage::Match, start.elapsed());
             self.frames[at].matching = Some(matching);
         }
-        self.frames[at].matching.as_ref().ok_or(PipelineError::NoContact { frame })
+        self.frames[at]
+            .matching
+            .as_ref()
+            .ok_or(PipelineError::NoContact { frame })
     }
 
     /// The strain between the first frame and a later one.
@@ -156,13 +183,28 @@ impl Press<'_> {
         if self.frames[at].strain.is_none() {
             let start = Instant::now();
             let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
-            let matching = self.frames[at].matching.as_ref().ok_or(PipelineError::NoContact { frame })?;
-            let grid_m =
-                self.frames[at].surface.as_ref().map_or(0.0, |s| s.pixel_size_m[0].max(s.pixel_size_m[1]));
-            let strain = pair::strain(self.stages, [0, frame], points(0), points(at), matching, grid_m)?;
+            let matching = self.frames[at]
+                .matching
+                .as_ref()
+                .ok_or(PipelineError::NoContact { frame })?;
+            let grid_m = self.frames[at]
+                .surface
+                .as_ref()
+                .map_or(0.0, |s| s.pixel_size_m[0].max(s.pixel_size_m[1]));
+            let strain = pair::strain(
+                self.stages,
+                [0, frame],
+                points(0),
+                points(at),
+                matching,
+                grid_m,
+            )?;
             self.report.ran(Stage::Strain, start.elapsed());
             self.frames[at].strain = Some(strain);
         }
-        self.frames[at].strain.as_ref().ok_or(PipelineError::NoContact { frame })
+        self.frames[at]
+            .strain
+            .as_ref()
+            .ok_or(PipelineError::NoContact { frame })
     }
 }

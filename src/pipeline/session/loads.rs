@@ -92,7 +92,10 @@ impl SeenLoads {
     }
 
     /// What all loads say.
-    pub(super) fn readings(&self, pixel_size_m: [f64; 2]) -> impl Iterator<Item = LoadReading> + Clone {
+    pub(super) fn readings(
+        &self,
+        pixel_size_m: [f64; 2],
+    ) -> impl Iterator<Item = LoadReading> + Clone {
         self.0.iter().map(move |load| load.reading(pixel_size_m))
     }
 
@@ -106,7 +109,8 @@ impl SeenLoads {
         let whole = !reading.touches_edge && reading.other_contacts == 0;
         let trusted = whole && !reading.out_of_calibration && reading.converged;
         let trusted = trusted && reading.saturated_share == 0.0;
-        let Some(load) = MergedLoad::of(reading, strain).filter(|l| trusted && l.force_n > 0.0) else {
+        let Some(load) = MergedLoad::of(reading, strain).filter(|l| trusted && l.force_n > 0.0)
+        else {
             return;
         };
         let at = self.0.partition_point(|l| l.force_n < load.force_n);
@@ -119,7 +123,9 @@ impl SeenLoads {
     /// The neighbours that are closest by ratio become one.
     fn merge_closest(&mut self) {
         let gap = |i: usize| self.0[i + 1].force_n / self.0[i].force_n;
-        let closest = (0..self.0.len() - 1).min_by(|&i, &j| gap(i).total_cmp(&gap(j))).unwrap_or(0);
+        let closest = (0..self.0.len() - 1)
+            .min_by(|&i, &j| gap(i).total_cmp(&gap(j)))
+            .unwrap_or(0);
         self.0[closest] = self.0[closest].merged(self.0[closest + 1]);
         self.0.remove(closest + 1);
     }

@@ -65,7 +65,10 @@ impl Session {
     ///
     /// # Errors
     /// [`PipelineError::Sensor`].
-    pub fn new(stages: Arc<dyn Stages>, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
+    pub fn new(
+        stages: Arc<dyn Stages>,
+        reference: ArrayView2<'_, u8>,
+    ) -> Result<Self, PipelineError> {
         Self::from_frames(stages, &[reference])
     }
 
@@ -151,15 +154,24 @@ impl Session {
         let skip = self.stages.settings().skips.equal_frames;
         let repeated = skip && self.measured && self.last == frame;
         if repeated {
-            self.report.count_skip(Stage::Contact, SkipReason::EqualFrame, frame.len());
+            self.report
+                .count_skip(Stage::Contact, SkipReason::EqualFrame, frame.len());
         } else {
             self.measure(number, frame)?;
         }
         let contact = self.contact.reading;
         let size = self.stages.contact().pixel_size_m();
         let centroid = contact.map(|c| std::array::from_fn(|k| c.centroid_px[k].scaled(size[k])));
-        let shear = self.shear.as_mut().and_then(|tracker| tracker.update_centroid(centroid));
-        Ok(Update { frame: number, contact, repeated, shear })
+        let shear = self
+            .shear
+            .as_mut()
+            .and_then(|tracker| tracker.update_centroid(centroid));
+        Ok(Update {
+            frame: number,
+            contact,
+            repeated,
+            shear,
+        })
     }
 
     fn measure(&mut self, number: u64, frame: ArrayView2<'_, u8>) -> Result<(), PipelineError> {
@@ -169,13 +181,24 @@ impl Session {
         self.last.assign(&frame);
         self.stages
             .contact()
-            .measure(&mut self.workspace, frame, &self.reference, None, &mut self.contact)
-            .map_err(|source| PipelineError::Contact { frame: number as usize, source })?;
+            .measure(
+                &mut self.workspace,
+                frame,
+                &self.reference,
+                None,
+                &mut self.contact,
+            )
+            .map_err(|source| PipelineError::Contact {
+                frame: number as usize,
+                source,
+            })?;
         self.measured = true;
         self.measured_frame = number;
         self.report.ran(Stage::Contact, start.elapsed());
         match self.contact.reading {
-            None => self.report.count_skip(Stage::Surface, SkipReason::NoContact, frame.len()),
+            None => self
+                .report
+                .count_skip(Stage::Surface, SkipReason::NoContact, frame.len()),
             Some(reading) => self.loads.learn(&reading, None),
         }
         if let Some(grey) = self.contact.background_step_grey {

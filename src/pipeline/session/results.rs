@@ -37,7 +37,9 @@ impl Session {
     /// [`PipelineError::NoContact`] where nothing touches; those of a [`Press`](crate::pipeline::Press)'s strain.
     pub fn strain(&mut self) -> Result<Option<&SessionStrain>, PipelineError> {
         let Some(reading) = self.contact.reading.filter(|_| self.measured) else {
-            return Err(PipelineError::NoContact { frame: self.frames.saturating_sub(1) as usize });
+            return Err(PipelineError::NoContact {
+                frame: self.frames.saturating_sub(1) as usize,
+            });
         };
         let frame = Frame {
             number: self.measured_frame,
@@ -46,7 +48,8 @@ impl Session {
             contact: &self.contact,
             reading,
         };
-        self.strain.follow(self.stages.as_ref(), &frame, &mut self.report)
+        self.strain
+            .follow(self.stages.as_ref(), &frame, &mut self.report)
     }
 
     /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.

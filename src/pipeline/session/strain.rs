@@ -92,13 +92,23 @@ impl FollowedStrain {
                 let pixels = frame.contact.mask.iter().filter(|m| **m).count();
                 let (points, grid_m) = self.points(stages, frame, pixels, report)?;
                 let reading = frame.reading;
-                self.anchor = Some(Anchor { frame: frame.number, reading, pixels, points, grid_m });
+                self.anchor = Some(Anchor {
+                    frame: frame.number,
+                    reading,
+                    pixels,
+                    points,
+                    grid_m,
+                });
                 return Ok(None);
             }
             Some(anchor) if anchor.frame == frame.number => return Ok(None),
             Some(_) => {}
         }
-        if self.last.as_ref().is_none_or(|last| last.to != frame.number) {
+        if self
+            .last
+            .as_ref()
+            .is_none_or(|last| last.to != frame.number)
+        {
             self.last = None;
             self.last = self.measure(stages, frame, report)?;
         }
@@ -113,7 +123,10 @@ impl FollowedStrain {
         pixels: usize,
         report: &mut Report,
     ) -> Result<(Vec<Point3<f64>>, f64), PipelineError> {
-        let failed = |source| PipelineError::Surface { frame: frame.number as usize, source };
+        let failed = |source| PipelineError::Surface {
+            frame: frame.number as usize,
+            source,
+        };
         let start = Instant::now();
         let images = [frame.image, frame.reference.image()];
         let surface = if stages.settings().skips.outside_contact {
@@ -136,9 +149,13 @@ impl FollowedStrain {
         frame: &Frame<'_>,
         report: &mut Report,
     ) -> Result<Option<SessionStrain>, PipelineError> {
-        let Some(pixels) = self.anchor.as_ref().map(|anchor| anchor.pixels) else { return Ok(None) };
+        let Some(pixels) = self.anchor.as_ref().map(|anchor| anchor.pixels) else {
+            return Ok(None);
+        };
         let (target, _) = self.points(stages, frame, pixels, report)?;
-        let Some(anchor) = &self.anchor else { return Ok(None) };
+        let Some(anchor) = &self.anchor else {
+            return Ok(None);
+        };
         report.count_skip(Stage::Surface, SkipReason::KeptFromBefore, anchor.pixels);
         let frames = [anchor.frame as usize, frame.number as usize];
         let start = Instant::now();
@@ -151,18 +168,29 @@ impl FollowedStrain {
         if self.first_iterations == 0 {
             self.first_iterations = found.report.iterations;
         } else if stages.settings().skips.last_answer {
-            let saved = self.first_iterations.saturating_sub(found.report.iterations);
+            let saved = self
+                .first_iterations
+                .saturating_sub(found.report.iterations);
             report.count_skip(Stage::Match, SkipReason::NearLastAnswer, saved);
         }
         let start = Instant::now();
-        let strain = pair::strain(stages, frames, &anchor.points, &target, &found, anchor.grid_m)?;
+        let strain = pair::strain(
+            stages,
+            frames,
+            &anchor.points,
+            &target,
+            &found,
+            anchor.grid_m,
+        )?;
         report.ran(Stage::Strain, start.elapsed());
         let step = force_n(&frame.reading) - force_n(&anchor.reading);
         let zz = |m: &nalgebra::Matrix3<f64>| m[(2, 2)];
         // (31) takes the strain's size; its sign says whether the load rose.
         let value = zz(&strain.summary.mean).abs().copysign(step);
         let load = Estimate::new(value, zz(&strain.summary.standard_error));
-        self.loads.get_or_insert_with(SeenLoads::new).learn(&frame.reading, Some(load));
+        self.loads
+            .get_or_insert_with(SeenLoads::new)
+            .learn(&frame.reading, Some(load));
         let matched = found.assignment.iter().flatten().count();
         Ok(Some(SessionStrain {
             from: anchor.frame,
@@ -189,10 +217,17 @@ impl FollowedStrain {
                 radius_m: radius_with_floor(a.value, a.standard_error, pixel_size_m),
             })
         });
-        let later = self.loads.iter().flat_map(|loads| loads.readings(pixel_size_m));
+        let later = self
+            .loads
+            .iter()
+            .flat_map(|loads| loads.readings(pixel_size_m));
         let (mut loads, shared) = split_errors(first.into_iter().chain(later), settings);
         let strains = self.loads.iter().flat_map(SeenLoads::strains);
-        for (load, strain) in loads.iter_mut().skip(usize::from(first.is_some())).zip(strains) {
+        for (load, strain) in loads
+            .iter_mut()
+            .skip(usize::from(first.is_some()))
+            .zip(strains)
+        {
             load.mean_strain = strain;
         }
         (loads, shared)

@@ -12,7 +12,9 @@ use super::strain_spline::StrainSpline;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
 use crate::matching::{PointMatcher, RelaxationMatcher, RelaxationOptions, Search};
-use crate::sfs::{ControlPointSampler, Eikonal, EquallySpaced, Lighting, Rim, SurfaceReconstruction};
+use crate::sfs::{
+    ControlPointSampler, Eikonal, EquallySpaced, Lighting, Rim, SurfaceReconstruction,
+};
 use crate::tps::{TpsError, WarpModel};
 use nalgebra::Point3;
 use ndarray::ArrayView2;
@@ -76,7 +78,10 @@ impl Pipeline {
         pixel_size_m: [f64; 2],
         object: Object,
     ) -> Result<Self, PipelineError> {
-        Ok(Self::new(LightContact::from_pairs(pairs, pixel_size_m)?, object))
+        Ok(Self::new(
+            LightContact::from_pairs(pairs, pixel_size_m)?,
+            object,
+        ))
     }
 }
 

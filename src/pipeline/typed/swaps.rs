@@ -25,8 +25,24 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// ```
     #[must_use]
     pub fn with_contact<C2: ContactStage>(self, contact: C2) -> Pipeline<C2, R, P, M, W, S> {
-        let Self { surface, sampler, matcher, warp, strain, settings, .. } = self;
-        Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
+        let Self {
+            surface,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            settings,
+            ..
+        } = self;
+        Pipeline {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            settings,
+        }
     }
 
     /// Takes another way from image to surface, looking at `input`.
@@ -52,13 +68,29 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
         surface: R2,
         input: SurfaceInput,
     ) -> Pipeline<C, R2, P, M, W, S> {
-        let Self { contact, sampler, matcher, warp, strain, mut settings, .. } = self;
+        let Self {
+            contact,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            mut settings,
+            ..
+        } = self;
         settings.surface_input = input;
         if input == SurfaceInput::Signal {
             settings.smoothing_px = 1;
             settings.binning = Binning::Blocks(1);
         }
-        Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
+        Pipeline {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            settings,
+        }
     }
 
     /// Takes another choice of control points.
@@ -76,9 +108,28 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_sampler<P2: ControlPointSampler<f64>>(self, sampler: P2) -> Pipeline<C, R, P2, M, W, S> {
-        let Self { contact, surface, matcher, warp, strain, settings, .. } = self;
-        Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
+    pub fn with_sampler<P2: ControlPointSampler<f64>>(
+        self,
+        sampler: P2,
+    ) -> Pipeline<C, R, P2, M, W, S> {
+        let Self {
+            contact,
+            surface,
+            matcher,
+            warp,
+            strain,
+            settings,
+            ..
+        } = self;
+        Pipeline {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            settings,
+        }
     }
 
     /// Takes another matcher.
@@ -95,9 +146,28 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_matcher<M2: PointMatcher<f64, 3>>(self, matcher: M2) -> Pipeline<C, R, P, M2, W, S> {
-        let Self { contact, surface, sampler, warp, strain, settings, .. } = self;
-        Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
+    pub fn with_matcher<M2: PointMatcher<f64, 3>>(
+        self,
+        matcher: M2,
+    ) -> Pipeline<C, R, P, M2, W, S> {
+        let Self {
+            contact,
+            surface,
+            sampler,
+            warp,
+            strain,
+            settings,
+            ..
+        } = self;
+        Pipeline {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            settings,
+        }
     }
 
     /// Takes another measure of strain.
@@ -117,8 +187,24 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// ```
     #[must_use]
     pub fn with_strain<S2: StrainMeasure<f64>>(self, strain: S2) -> Pipeline<C, R, P, M, W, S2> {
-        let Self { contact, surface, sampler, matcher, warp, settings, .. } = self;
-        Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
+        let Self {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            warp,
+            settings,
+            ..
+        } = self;
+        Pipeline {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            settings,
+        }
     }
 
     /// Takes another family of warps for the strain.
@@ -136,7 +222,23 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// ```
     #[must_use]
     pub fn with_warp<W2: WarpModel<f64, 3>>(self, warp: W2) -> Pipeline<C, R, P, M, W2, S> {
-        let Self { contact, surface, sampler, matcher, strain, settings, .. } = self;
-        Pipeline { contact, surface, sampler, matcher, warp, strain, settings }
+        let Self {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            strain,
+            settings,
+            ..
+        } = self;
+        Pipeline {
+            contact,
+            surface,
+            sampler,
+            matcher,
+            warp,
+            strain,
+            settings,
+        }
     }
 }

@@ -8,10 +8,16 @@ fn sampled(disc: &Disc, profile: Profile, row: isize, col: isize, n: usize) -> f
     let mut sum = 0.0;
     for i in 0..n {
         for j in 0..n {
-            let x = (col as f64 + offset(j) - disc.centre_px[0]) * disc.pixel_size_m[0] / disc.radius_m;
-            let y = (row as f64 + offset(i) - disc.centre_px[1]) * disc.pixel_size_m[1] / disc.radius_m;
+            let x =
+                (col as f64 + offset(j) - disc.centre_px[0]) * disc.pixel_size_m[0] / disc.radius_m;
+            let y =
+                (row as f64 + offset(i) - disc.centre_px[1]) * disc.pixel_size_m[1] / disc.radius_m;
             let rest = (1.0 - x * x - y * y).max(0.0);
-            sum += if profile == Profile::Hemisphere { rest.sqrt() } else { rest };
+            sum += if profile == Profile::Hemisphere {
+                rest.sqrt()
+            } else {
+                rest
+            };
         }
     }
     sum / (n * n) as f64
@@ -19,46 +25,78 @@ fn sampled(disc: &Disc, profile: Profile, row: isize, col: isize, n: usize) -> f
 
 #[test]
 fn averages_agree_with_brute_force_for_oblong_pixels_inside_and_at_the_rim() {
-    let disc = Disc { centre_px: [6.3, 4.8], radius_m: 4.1, pixel_size_m: [0.9, 1.3] };
+    let disc = Disc {
+        centre_px: [6.3, 4.8],
+        radius_m: 4.1,
+        pixel_size_m: [0.9, 1.3],
+    };
     for profile in [Profile::Hemisphere, Profile::Paraboloid] {
         let patch = disc.average(profile, [[0, 10], [0, 13]]);
         for ((r, c), &value) in patch.values.indexed_iter() {
             let slow = sampled(&disc, profile, r as isize, c as isize, 400);
             // 400 midpoints a side miss about h^1.5 = 1e-4 of a pixel at the rim, where the slope is infinite.
-            assert!((value - slow).abs() < 1e-4, "{profile:?} row {r} column {c}: {value} {slow}");
+            assert!(
+                (value - slow).abs() < 1e-4,
+                "{profile:?} row {r} column {c}: {value} {slow}"
+            );
         }
     }
 }
 
 #[test]
 fn the_sum_over_pixels_is_the_integral() {
-    for (centre, radius) in [([40.2, 33.9], 27.3), ([40.0, 33.5], 12.0), ([40.13, 33.4], 0.3)] {
-        let disc = Disc { centre_px: centre, radius_m: radius, pixel_size_m: [1.0, 0.8] };
+    for (centre, radius) in [
+        ([40.2, 33.9], 27.3),
+        ([40.0, 33.5], 12.0),
+        ([40.13, 33.4], 0.3),
+    ] {
+        let disc = Disc {
+            centre_px: centre,
+            radius_m: radius,
+            pixel_size_m: [1.0, 0.8],
+        };
         let window = disc.window([80, 80], 0);
         let hemisphere = disc.average(Profile::Hemisphere, window).values.sum() * 0.8;
         let paraboloid = disc.average(Profile::Paraboloid, window).values.sum() * 0.8;
         let (a2, eps) = (radius * radius, f64::EPSILON);
         // The corners telescope; what remains is the rounding of about a² pixels of size eps·a².
-        assert!((hemisphere / (2.0 / 3.0 * PI * a2) - 1.0).abs() < 1e3 * eps, "{hemisphere}");
-        assert!((paraboloid / (0.5 * PI * a2) - 1.0).abs() < 1e3 * eps, "{paraboloid}");
+        assert!(
+            (hemisphere / (2.0 / 3.0 * PI * a2) - 1.0).abs() < 1e3 * eps,
+            "{hemisphere}"
+        );
+        assert!(
+            (paraboloid / (0.5 * PI * a2) - 1.0).abs() < 1e3 * eps,
+            "{paraboloid}"
+        );
     }
 }
 
 #[test]
 fn a_disc_cut_by_the_frame_keeps_the_values_of_its_visible_pixels() {
-    let disc = Disc { centre_px: [1.4, 9.2], radius_m: 6.0, pixel_size_m: [1.0; 2] };
+    let disc = Disc {
+        centre_px: [1.4, 9.2],
+        radius_m: 6.0,
+        pixel_size_m: [1.0; 2],
+    };
     let whole = disc.average(Profile::Hemisphere, [[-10, 30], [-10, 30]]);
     let cut = disc.average(Profile::Hemisphere, disc.window([12, 12], 0));
     assert_eq!(cut.origin, [3, 0]);
     for ((r, c), &value) in cut.values.indexed_iter() {
         let same = whole.values[[r + 3 + 10, c + 10]];
-        assert!((value - same).abs() < 1e-13, "the corner sums differ by rounding only");
+        assert!(
+            (value - same).abs() < 1e-13,
+            "the corner sums differ by rounding only"
+        );
     }
 }
 
 #[test]
 fn quadrature_and_corners_agree_where_both_hold() {
-    let disc = Disc { centre_px: [50.3, 49.8], radius_m: 60.0, pixel_size_m: [1.1, 0.7] };
+    let disc = Disc {
+        centre_px: [50.3, 49.8],
+        radius_m: 60.0,
+        pixel_size_m: [1.1, 0.7],
+    };
     for profile in [Profile::Hemisphere, Profile::Paraboloid] {
         let patch = disc.average(profile, disc.window([100, 100], 0));
         let (mut smooth, mut worst) = (0, 0.0_f64);
@@ -83,25 +121,45 @@ fn quadrature_and_corners_agree_where_both_hold() {
 #[test]
 fn averages_agree_with_the_reference_numbers() {
     let home = std::env::var_os("TACTILE_DATA").map(std::path::PathBuf::from);
-    let home = home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data").into());
+    let home =
+        home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data").into());
     let Ok(text) = std::fs::read_to_string(home.join("reference/image.json")) else {
         eprintln!("skipped: no reference numbers at {}", home.display());
         return;
     };
     let data: serde_json::Value = serde_json::from_str(&text).unwrap();
     let mut cases = 0;
-    for case in data["cases"].as_array().unwrap().iter().filter(|c| c["kind"] == "hertz") {
-        let (pitch, size) = (case["pitch"].as_f64().unwrap(), case["size"].as_u64().unwrap() as usize);
+    for case in data["cases"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|c| c["kind"] == "hertz")
+    {
+        let (pitch, size) = (
+            case["pitch"].as_f64().unwrap(),
+            case["size"].as_u64().unwrap() as usize,
+        );
         let at = |name: &str| case["params"][name].as_f64().unwrap();
         // There, pixel (0, 0) covers [0, h] × [0, h]; here its centre is the origin.
         let centre_px = [at("cx") / pitch - 0.5, at("cy") / pitch - 0.5];
-        let disc = Disc { centre_px, radius_m: at("a"), pixel_size_m: [pitch; 2] };
-        let found = disc.average(Profile::Hemisphere, [[0, size as isize], [0, size as isize]]);
+        let disc = Disc {
+            centre_px,
+            radius_m: at("a"),
+            pixel_size_m: [pitch; 2],
+        };
+        let found = disc.average(
+            Profile::Hemisphere,
+            [[0, size as isize], [0, size as isize]],
+        );
         // Near the rim, corners are of size 1 in units of the radius, a pixel of (h/a)²; the discs met by the rim have
         // radii below 10 pixels.
         let cancelled = 20.0 * f64::EPSILON * (at("a") / pitch).clamp(1.0, 10.0).powi(2);
         let Some(expected) = case["expected"]["pixels"].as_array() else {
-            assert!(found.values.iter().all(|&v| v == 0.0), "{} is empty", case["id"]);
+            assert!(
+                found.values.iter().all(|&v| v == 0.0),
+                "{} is empty",
+                case["id"]
+            );
             continue;
         };
         let expected = expected.iter().flat_map(|line| line.as_array().unwrap());

@@ -29,7 +29,8 @@ impl<T: RealField + Copy> Body<T> {
         positive(widen(youngs_modulus_pa), Quantity::YoungsModulus)?;
         poisson(widen(poisson_ratio))?;
         Ok(Self {
-            compliance_per_pa: (T::one() - poisson_ratio) * (T::one() + poisson_ratio) / youngs_modulus_pa,
+            compliance_per_pa: (T::one() - poisson_ratio) * (T::one() + poisson_ratio)
+                / youngs_modulus_pa,
         })
     }
 
@@ -39,7 +40,9 @@ impl<T: RealField + Copy> Body<T> {
 
     /// A body that does not yield.
     pub fn rigid() -> Self {
-        Self { compliance_per_pa: T::zero() }
+        Self {
+            compliance_per_pa: T::zero(),
+        }
     }
 
     /// (1 − ν²)/E in 1/Pa, the inverse of the plane-strain modulus.
@@ -59,7 +62,10 @@ impl<T: RealField + Copy> Body<T> {
 /// assert!((reduced_modulus_pa(Body::rigid(), gel)? - 20_000.0f64 / 0.75).abs() < 1e-9);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn reduced_modulus_pa<T: RealField + Copy>(one: Body<T>, other: Body<T>) -> Result<T, ElasticityError> {
+pub fn reduced_modulus_pa<T: RealField + Copy>(
+    one: Body<T>,
+    other: Body<T>,
+) -> Result<T, ElasticityError> {
     let compliance = one.compliance_per_pa + other.compliance_per_pa;
     positive(widen(compliance), Quantity::ReducedModulus)?;
     Ok(T::one() / compliance)
@@ -84,7 +90,10 @@ pub fn relative_radius_m<T: RealField + Copy>(
     for radius in [one, other].into_iter().flatten() {
         let radius = finite(widen(radius), Quantity::Radius)?;
         if radius == 0.0 {
-            return Err(ElasticityError::NotPositive { quantity: Quantity::Radius, found: radius });
+            return Err(ElasticityError::NotPositive {
+                quantity: Quantity::Radius,
+                found: radius,
+            });
         }
     }
     let radius = match (one, other) {
@@ -92,17 +101,25 @@ pub fn relative_radius_m<T: RealField + Copy>(
             // The sum of the radii is exact where they nearly cancel; that of the curvatures is not.
             let curvature = (a + b) / a / b;
             if curvature <= T::zero() {
-                return Err(ElasticityError::Conforming { curvature_per_m: widen(curvature) });
+                return Err(ElasticityError::Conforming {
+                    curvature_per_m: widen(curvature),
+                });
             }
             a / (a + b) * b
         }
         (Some(radius), None) | (None, Some(radius)) => radius,
-        (None, None) => return Err(ElasticityError::Conforming { curvature_per_m: 0.0 }),
+        (None, None) => {
+            return Err(ElasticityError::Conforming {
+                curvature_per_m: 0.0,
+            });
+        }
     };
     if radius > T::zero() {
         Ok(radius)
     } else {
-        Err(ElasticityError::Conforming { curvature_per_m: 1.0 / widen(radius) })
+        Err(ElasticityError::Conforming {
+            curvature_per_m: 1.0 / widen(radius),
+        })
     }
 }
 
@@ -130,7 +147,9 @@ pub fn sample_modulus_pa<T: RealField + Copy>(
     // 1/E* − C = (1 − C E*)/E*, the product rounded once.
     let left = (-other.compliance_per_pa).mul_add(reduced_modulus_pa, T::one());
     if left <= T::zero() {
-        return Err(ElasticityError::StifferThanResolvable { lower_bound_pa: 0.0 });
+        return Err(ElasticityError::StifferThanResolvable {
+            lower_bound_pa: 0.0,
+        });
     }
     Ok((T::one() - poisson_ratio) * (T::one() + poisson_ratio) * reduced_modulus_pa / left)
 }

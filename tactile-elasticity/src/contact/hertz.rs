@@ -41,13 +41,21 @@ impl<T: RealField + Copy> HertzContact<T> {
     ///
     /// # Errors
     /// [`ElasticityError::Negative`] force, [`ElasticityError::NotPositive`] radius or modulus.
-    pub fn from_force(force_n: T, radius_m: T, reduced_modulus_pa: T) -> Result<Self, ElasticityError> {
+    pub fn from_force(
+        force_n: T,
+        radius_m: T,
+        reduced_modulus_pa: T,
+    ) -> Result<Self, ElasticityError> {
         not_negative(widen(force_n), Quantity::Force)?;
         positive(widen(radius_m), Quantity::Radius)?;
         positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
         let three_quarters: T = narrow(0.75);
         let a = (three_quarters * force_n / reduced_modulus_pa * radius_m).cbrt();
-        let mean = if a > T::zero() { force_n / a / a / T::pi() } else { T::zero() };
+        let mean = if a > T::zero() {
+            force_n / a / a / T::pi()
+        } else {
+            T::zero()
+        };
         Ok(Self {
             force_n,
             radius_m,
@@ -96,7 +104,12 @@ impl<T: RealField + Copy> HertzContact<T> {
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn surface_displacement_m(&self, r: T) -> T {
-        hertz_surface_displacement_m(r, self.contact_radius_m, self.peak_pressure_pa, self.reduced_modulus_pa)
+        hertz_surface_displacement_m(
+            r,
+            self.contact_radius_m,
+            self.peak_pressure_pa,
+            self.reduced_modulus_pa,
+        )
     }
 }
 

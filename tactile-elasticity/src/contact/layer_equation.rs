@@ -53,7 +53,10 @@ pub struct LayerEquation {
 impl LayerEquation {
     /// Of a layer kernel, for a sphere that does not yield.
     pub fn new(kernel: &LayerKernel) -> Self {
-        Self { kernel: *kernel, share: 1.0 }
+        Self {
+            kernel: *kernel,
+            share: 1.0,
+        }
     }
 
     /// Of a sphere that yields too: `share` is the layer's part of 1/E*, in [0, 1].
@@ -104,7 +107,10 @@ impl LayerEquation {
         let (flat, round) = flat_and_round(&rule, &kernel, scale).ok_or(unsolvable)?;
         // φ at the rim by Nyström's own interpolation; the last row of the kernel belongs to s = a.
         let rim = |phi: &DVector<f64>, rhs: f64| {
-            rhs + scale * (0..n).map(|j| kernel[(n, j)] * rule[j].1 * phi[j]).sum::<f64>()
+            rhs + scale
+                * (0..n)
+                    .map(|j| kernel[(n, j)] * rule[j].1 * phi[j])
+                    .sum::<f64>()
         };
         let ratio = rim(&round, 1.0) / rim(&flat, 1.0);
         let integral = |phi: &DVector<f64>| (0..n).map(|j| rule[j].1 * phi[j]).sum::<f64>();
@@ -125,7 +131,9 @@ impl LayerEquation {
         let rows = rule.len() + 1;
         let at = |i: usize| rule.get(i).map_or(1.0, |r| r.0);
         let cosines = DMatrix::from_fn(rows, samples.len(), |i, q| cosine(samples[q].0, at(i)));
-        let weighted = DMatrix::from_fn(samples.len(), rule.len(), |q, j| cosines[(j, q)] * samples[q].1);
+        let weighted = DMatrix::from_fn(samples.len(), rule.len(), |q, j| {
+            cosines[(j, q)] * samples[q].1
+        });
         cosines * weighted
     }
 }
@@ -137,7 +145,9 @@ fn flat_and_round(
     scale: f64,
 ) -> Option<(DVector<f64>, DVector<f64>)> {
     let n = rule.len();
-    let matrix = DMatrix::from_fn(n, n, |i, j| f64::from(i == j) - scale * kernel[(i, j)] * rule[j].1);
+    let matrix = DMatrix::from_fn(n, n, |i, j| {
+        f64::from(i == j) - scale * kernel[(i, j)] * rule[j].1
+    });
     let ones = DVector::from_element(n, 1.0);
     let squares = DVector::from_fn(n, |i, _| rule[i].0 * rule[i].0);
     let lu = matrix.lu();
@@ -158,7 +168,9 @@ impl LayerTable {
         let span = (LARGEST_A_OVER_H / SMALLEST_A_OVER_H).ln();
         let at = |k: usize| SMALLEST_A_OVER_H * (span * k as f64 / (NODES - 1) as f64).exp();
         let solved = (0..NODES).filter_map(|k| equation.solve(at(k).min(LARGEST_A_OVER_H)).ok());
-        Self { rows: solved.map(|c| (c.chi.ln(), c.force_ratio.ln())).collect() }
+        Self {
+            rows: solved.map(|c| (c.chi.ln(), c.force_ratio.ln())).collect(),
+        }
     }
 
     /// ln(F/F_Hertz) at χ and its slope in ln χ, by four-point Lagrange interpolation; None beyond the table.
@@ -205,7 +217,8 @@ mod tests {
 
     #[test]
     fn without_a_share_the_layer_does_not_matter() {
-        let equation = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5).unwrap()).with_share(0.0);
+        let equation =
+            LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5).unwrap()).with_share(0.0);
         assert!((equation.solve(3.0).unwrap().force_ratio - 1.0).abs() < 1e-14);
     }
 
@@ -228,8 +241,13 @@ mod tests {
 
     #[test]
     fn the_slope_is_the_derivative() {
-        let table = LayerTable::new(&LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.4).unwrap()));
-        let (high, low) = (table.of_chi(0.5 * 1.001).unwrap().0, table.of_chi(0.5 / 1.001).unwrap().0);
+        let table = LayerTable::new(&LayerEquation::new(
+            &LayerKernel::new(Bond::Bonded, 0.4).unwrap(),
+        ));
+        let (high, low) = (
+            table.of_chi(0.5 * 1.001).unwrap().0,
+            table.of_chi(0.5 / 1.001).unwrap().0,
+        );
         let slope = (high - low) / (2.0 * 1.001f64.ln());
         assert!((table.of_chi(0.5).unwrap().1 - slope).abs() < 1e-5);
     }
@@ -239,7 +257,10 @@ mod tests {
         // The force of a layer 20 times thinner than the contact changes by less than 10⁻⁹ with one more node: compare
         // with the solution at nearly the same a/h, whose node count differs.
         let equation = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.3).unwrap());
-        let (a, b) = (equation.solve(5.0 - 1e-9).unwrap(), equation.solve(5.0).unwrap());
+        let (a, b) = (
+            equation.solve(5.0 - 1e-9).unwrap(),
+            equation.solve(5.0).unwrap(),
+        );
         assert!((a.force_ratio / b.force_ratio - 1.0).abs() < 1e-8);
     }
 }

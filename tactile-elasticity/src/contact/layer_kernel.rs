@@ -43,7 +43,10 @@ impl LayerKernel {
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
     pub fn new<T: RealField + Copy>(bond: Bond, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        Ok(Self { bond, kolosov: 3.0 - 4.0 * poisson(widen(poisson_ratio))? })
+        Ok(Self {
+            bond,
+            kolosov: 3.0 - 4.0 * poisson(widen(poisson_ratio))?,
+        })
     }
 
     /// 1 − L(s), in [0, 1]-ish, without cancellation or overflow.
@@ -82,12 +85,17 @@ impl LayerKernel {
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn moments(&self) -> (f64, f64) {
-        samples(self, 0.0).iter().fold((0.0, 0.0), |(m0, m2), &(s, w)| (m0 + w, m2 + w * s * s))
+        samples(self, 0.0)
+            .iter()
+            .fold((0.0, 0.0), |(m0, m2), &(s, w)| (m0 + w, m2 + w * s * s))
     }
 }
 
 /// Nodes s and weights w·(1 − L(s)), for integrands that turn as fast as cos(s·x): the deficit falls as s²e^(−2s), beyond
 /// 30 it is below 10⁻²².
 pub(crate) fn samples(kernel: &LayerKernel, x: f64) -> Vec<(f64, f64)> {
-    panels(30.0, 12 + (2.0 * x) as usize).into_iter().map(|(s, w)| (s, w * kernel.deficit(s))).collect()
+    panels(30.0, 12 + (2.0 * x) as usize)
+        .into_iter()
+        .map(|(s, w)| (s, w * kernel.deficit(s)))
+        .collect()
 }

@@ -25,12 +25,16 @@ impl LayerSeries {
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
-    pub fn published<T: RealField + Copy>(bond: Bond, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub fn published<T: RealField + Copy>(
+        bond: Bond,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
         let nu = poisson(widen(poisson_ratio))?;
         let (alpha, beta) = match bond {
-            Bond::Bonded => {
-                (-(1.2876 - 1.4678 * nu + 1.3442 * nu * nu), 0.6387 - 1.0277 * nu + 1.5164 * nu * nu)
-            }
+            Bond::Bonded => (
+                -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu),
+                0.6387 - 1.0277 * nu + 1.5164 * nu * nu,
+            ),
             Bond::Free => (-0.347 * (3.0 - 2.0 * nu), 0.056 * (5.0 - 2.0 * nu)),
         };
         let (alpha, beta) = (alpha / (1.0 - nu), beta / (1.0 - nu));
@@ -83,7 +87,10 @@ impl LayerSeries {
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn force_ratio(&self, chi: f64) -> f64 {
-        self.coefficients.iter().rev().fold(0.0, |sum, c| sum * chi + c)
+        self.coefficients
+            .iter()
+            .rev()
+            .fold(0.0, |sum, c| sum * chi + c)
     }
 
     /// d ln(F/F_Hertz)/d ln χ.

@@ -41,7 +41,10 @@ pub fn flat_punch<T: RealField + Copy>(
     positive(widen(radius_m), Quantity::Radius)?;
     not_negative(widen(indentation_m), Quantity::Indentation)?;
     let force_n = narrow::<T>(2.0) * reduced_modulus_pa * radius_m * indentation_m;
-    Ok(PunchContact { force_n, mean_pressure_pa: force_n / radius_m / radius_m / T::pi() })
+    Ok(PunchContact {
+        force_n,
+        mean_pressure_pa: force_n / radius_m / radius_m / T::pi(),
+    })
 }
 
 /// A cone: F = (2/π)E* tan α δ².
@@ -113,10 +116,18 @@ pub fn tangent_of_degrees<T: RealField + Copy>(degrees: T) -> Result<T, Elastici
     let found = positive(widen(degrees), Quantity::HalfAngle)?;
     let right: T = narrow(90.0);
     if degrees >= right {
-        return Err(ElasticityError::OutOfRange { quantity: Quantity::HalfAngle, found, limit: 90.0 });
+        return Err(ElasticityError::OutOfRange {
+            quantity: Quantity::HalfAngle,
+            found,
+            limit: 90.0,
+        });
     }
     let radian = T::pi() / narrow(180.0);
     let half: T = narrow(45.0);
     // 90° − α is exact from 45° on.
-    Ok(if degrees <= half { (degrees * radian).tan() } else { T::one() / ((right - degrees) * radian).tan() })
+    Ok(if degrees <= half {
+        (degrees * radian).tan()
+    } else {
+        T::one() / ((right - degrees) * radian).tan()
+    })
 }

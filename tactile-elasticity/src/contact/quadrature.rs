@@ -34,7 +34,12 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
 pub(crate) fn panels(end: f64, count: usize) -> Vec<(f64, f64)> {
     let unit = gauss_legendre(16);
     let width = end / count as f64;
-    (0..count).flat_map(|p| unit.iter().map(move |&(x, w)| ((p as f64 + x) * width, w * width))).collect()
+    (0..count)
+        .flat_map(|p| {
+            unit.iter()
+                .map(move |&(x, w)| ((p as f64 + x) * width, w * width))
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -47,7 +52,10 @@ mod tests {
         for degree in 0..10 {
             let sum: f64 = rule.iter().map(|(x, w)| w * x.powi(degree)).sum();
             // Five terms of order one: a few roundings.
-            assert!((sum - 1.0 / f64::from(degree + 1)).abs() < 1e-15, "{degree}");
+            assert!(
+                (sum - 1.0 / f64::from(degree + 1)).abs() < 1e-15,
+                "{degree}"
+            );
         }
     }
 }

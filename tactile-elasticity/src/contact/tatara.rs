@@ -29,8 +29,11 @@ pub fn tatara_indentation_m<T: RealField + Copy>(
     poisson_ratio: T,
 ) -> Result<T, ElasticityError> {
     let a = not_negative(widen(contact_radius_m), Quantity::ContactRadius)?;
-    let squeeze =
-        Squeeze::new(positive(widen(radius_m), Quantity::Radius)?, poisson(widen(poisson_ratio))?, 1.0);
+    let squeeze = Squeeze::new(
+        positive(widen(radius_m), Quantity::Radius)?,
+        poisson(widen(poisson_ratio))?,
+        1.0,
+    );
     Ok(narrow(squeeze.indentation(a)))
 }
 
@@ -44,7 +47,11 @@ pub(crate) struct Squeeze {
 
 impl Squeeze {
     pub(crate) fn new(radius_m: f64, poisson_ratio: f64, share: f64) -> Self {
-        Self { radius_m, poisson_ratio, share }
+        Self {
+            radius_m,
+            poisson_ratio,
+            share,
+        }
     }
 
     pub(crate) fn indentation(&self, a: f64) -> f64 {
@@ -55,7 +62,8 @@ impl Squeeze {
     /// (4x³/3π)·[1/√(x² + 4) + 2/((1 − ν)(x² + 4)^{3⁄2})].
     fn far_side(&self, x: f64) -> f64 {
         let q = x * x + 4.0;
-        4.0 * x.powi(3) / (3.0 * PI) * (1.0 / q.sqrt() + 2.0 / ((1.0 - self.poisson_ratio) * q.powf(1.5)))
+        4.0 * x.powi(3) / (3.0 * PI)
+            * (1.0 / q.sqrt() + 2.0 / ((1.0 - self.poisson_ratio) * q.powf(1.5)))
     }
 
     /// dδ/da.

@@ -114,8 +114,9 @@ impl<T: RealField + Copy> Waveguide<T> {
     ///
     /// True while the contact is small beside every layer's thickness and the layers are alike.
     pub fn compliance_per_pa(&self) -> T {
-        self.sum(|l| (T::one() - l.poisson_ratio) * (T::one() + l.poisson_ratio) / l.youngs_modulus_pa)
-            / self.thickness_m()
+        self.sum(|l| {
+            (T::one() - l.poisson_ratio) * (T::one() + l.poisson_ratio) / l.youngs_modulus_pa
+        }) / self.thickness_m()
     }
 
     /// [`compliance_per_pa`](Self::compliance_per_pa) as a [`Body`].
@@ -124,6 +125,8 @@ impl<T: RealField + Copy> Waveguide<T> {
     }
 
     fn sum(&self, density: impl Fn(&Layer<T>) -> T) -> T {
-        self.layers.iter().fold(T::zero(), |sum, l| sum + l.thickness_m * density(l))
+        self.layers
+            .iter()
+            .fold(T::zero(), |sum, l| sum + l.thickness_m * density(l))
     }
 }

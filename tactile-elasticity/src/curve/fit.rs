@@ -144,7 +144,11 @@ pub fn fit_curve(
     };
     let law = indenter.law(model, poisson(nu)?)?.ok_or(unreachable)?;
     let solve = |offset: bool| {
-        let problem = Problem { curve, law: &*law, offset };
+        let problem = Problem {
+            curve,
+            law: &*law,
+            offset,
+        };
         solve(&problem, options.contact_point).map(|p| (problem, p))
     };
     let (problem, best) = match options.baseline {
@@ -183,13 +187,29 @@ fn worth_an_offset(plain: &Profile, shifted: &Profile, n: usize) -> bool {
 fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions) -> CurveFit {
     let (curve, law) = (problem.curve, problem.law);
     let n = curve.force_n().len();
-    let parameters =
-        1 + usize::from(problem.offset) + usize::from(options.contact_point == ContactPoint::Search);
-    let fitted_n: Vec<f64> = curve.position_m().iter().map(|&z| force(law, best, z)).collect();
-    let residuals: Vec<f64> = curve.force_n().iter().zip(&fitted_n).map(|(f, g)| f - g).collect();
+    let parameters = 1
+        + usize::from(problem.offset)
+        + usize::from(options.contact_point == ContactPoint::Search);
+    let fitted_n: Vec<f64> = curve
+        .position_m()
+        .iter()
+        .map(|&z| force(law, best, z))
+        .collect();
+    let residuals: Vec<f64> = curve
+        .force_n()
+        .iter()
+        .zip(&fitted_n)
+        .map(|(f, g)| f - g)
+        .collect();
     let correlation = autocorrelation(&residuals);
     let degrees = n - parameters;
-    let limits = interval(problem, best, degrees, inflation(correlation), options.contact_point);
+    let limits = interval(
+        problem,
+        best,
+        degrees,
+        inflation(correlation),
+        options.contact_point,
+    );
     let to_modulus = 1.0 - nu * nu;
     let (lower, upper) = (limits.0 * to_modulus, limits.1 * to_modulus);
     let minus_two_log = n as f64 * (best.squares / n as f64).ln();
@@ -199,7 +219,10 @@ fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions
         model: law.kind(),
         youngs_modulus_pa: best.modulus * to_modulus,
         standard_error_pa: (upper - lower) / (2.0 * quantile_95(Some(degrees as f64))),
-        interval_95: Interval { lower, upper: Some(upper) },
+        interval_95: Interval {
+            lower,
+            upper: Some(upper),
+        },
         contact_point_m: best.contact_m,
         offset_n: best.offset,
         residual_sd_n: (best.squares / degrees as f64).sqrt(),
@@ -214,14 +237,23 @@ fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions
 
 fn force(law: &dyn ContactLaw, p: &Profile, z: f64) -> f64 {
     let d = z - p.contact_m;
-    let pressed = if d > 0.0 { law.of_indentation(d, 0.0).map_or(f64::NAN, |l| l.value.exp()) } else { 0.0 };
+    let pressed = if d > 0.0 {
+        law.of_indentation(d, 0.0)
+            .map_or(f64::NAN, |l| l.value.exp())
+    } else {
+        0.0
+    };
     p.offset + p.modulus * pressed
 }
 
 /// Lag-one autocorrelation.
 fn autocorrelation(r: &[f64]) -> f64 {
     let total: f64 = r.iter().map(|x| x * x).sum();
-    if total > 0.0 { r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / total } else { 0.0 }
+    if total > 0.0 {
+        r.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / total
+    } else {
+        0.0
+    }
 }
 
 /// n points that follow one another say as much as n(1 − ρ)/(1 + ρ) that do not.
@@ -261,12 +293,21 @@ fn reach_of(inside: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.5 * step, step);
     for _ in 0..20 {
         let middle = 0.5 * (low + high);
-        if inside(middle) { low = middle } else { high = middle }
+        if inside(middle) {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
 
-fn warnings(law: &dyn ContactLaw, depth: f64, ratio: Option<f64>, load: usize) -> Vec<Warning<f64>> {
+fn warnings(
+    law: &dyn ContactLaw,
+    depth: f64,
+    ratio: Option<f64>,
+    load: usize,
+) -> Vec<Warning<f64>> {
     let limit = law.contact_ratio_limit();
     let mut all = Vec::new();
     if let Some(ratio) = ratio.filter(|&r| r > limit) {

@@ -2,7 +2,9 @@
 
 use crate::contact::Bond;
 use crate::error::ElasticityError;
-use crate::modulus::{ConeLaw, ContactLaw, EstimatorKind, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw};
+use crate::modulus::{
+    ConeLaw, ContactLaw, EstimatorKind, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw,
+};
 
 /// A rigid indenter and its sample. Lengths in m.
 ///
@@ -67,10 +69,19 @@ impl Indenter {
     pub fn candidates(&self) -> Vec<EstimatorKind> {
         use EstimatorKind as K;
         match self {
-            Self::Sphere { thickness_m: Some(_), .. } => {
-                vec![K::LayerIntegralEquation, K::LayerCorrectedSeries, K::HertzSphere]
+            Self::Sphere {
+                thickness_m: Some(_),
+                ..
+            } => {
+                vec![
+                    K::LayerIntegralEquation,
+                    K::LayerCorrectedSeries,
+                    K::HertzSphere,
+                ]
             }
-            Self::Sphere { thickness_m: None, .. } => vec![K::HertzSphere],
+            Self::Sphere {
+                thickness_m: None, ..
+            } => vec![K::HertzSphere],
             Self::Ball { .. } => vec![K::TataraSphere, K::HertzSphere],
             Self::Punch { .. } => vec![K::FlatPunch],
             Self::Cone { .. } => vec![K::Cone],
@@ -84,28 +95,50 @@ impl Indenter {
         nu: f64,
     ) -> Result<Option<Box<dyn ContactLaw>>, ElasticityError> {
         use EstimatorKind as K;
-        let layer =
-            |radius, thickness, bond, theory| -> Result<Option<Box<dyn ContactLaw>>, ElasticityError> {
-                Ok(Some(Box::new(LayerLaw::new(radius, thickness, nu, bond, theory)?.tabulated())))
-            };
+        let layer = |radius,
+                     thickness,
+                     bond,
+                     theory|
+         -> Result<Option<Box<dyn ContactLaw>>, ElasticityError> {
+            Ok(Some(Box::new(
+                LayerLaw::new(radius, thickness, nu, bond, theory)?.tabulated(),
+            )))
+        };
         match (*self, kind) {
             (Self::Sphere { radius_m, .. } | Self::Ball { radius_m }, K::HertzSphere) => {
                 Ok(Some(Box::new(Sphere::new(radius_m)?)))
             }
-            (Self::Ball { radius_m }, K::TataraSphere) => Ok(Some(Box::new(TataraLaw::new(radius_m, nu)?))),
+            (Self::Ball { radius_m }, K::TataraSphere) => {
+                Ok(Some(Box::new(TataraLaw::new(radius_m, nu)?)))
+            }
             (Self::Punch { radius_m }, K::FlatPunch) => Ok(Some(Box::new(Punch::new(radius_m)?))),
             (Self::Cone { half_angle_tangent }, K::Cone) => {
                 Ok(Some(Box::new(ConeLaw::new(half_angle_tangent)?)))
             }
-            (Self::Sphere { radius_m, thickness_m: Some(h), bond }, K::LayerIntegralEquation) => {
-                layer(radius_m, h, bond, LayerTheory::IntegralEquation)
-            }
-            (Self::Sphere { radius_m, thickness_m: Some(h), bond }, K::LayerCorrectedSeries) => {
-                layer(radius_m, h, bond, LayerTheory::CorrectedSeries)
-            }
-            (Self::Sphere { radius_m, thickness_m: Some(h), bond }, K::LayerPublishedSeries) => {
-                layer(radius_m, h, bond, LayerTheory::PublishedSeries)
-            }
+            (
+                Self::Sphere {
+                    radius_m,
+                    thickness_m: Some(h),
+                    bond,
+                },
+                K::LayerIntegralEquation,
+            ) => layer(radius_m, h, bond, LayerTheory::IntegralEquation),
+            (
+                Self::Sphere {
+                    radius_m,
+                    thickness_m: Some(h),
+                    bond,
+                },
+                K::LayerCorrectedSeries,
+            ) => layer(radius_m, h, bond, LayerTheory::CorrectedSeries),
+            (
+                Self::Sphere {
+                    radius_m,
+                    thickness_m: Some(h),
+                    bond,
+                },
+                K::LayerPublishedSeries,
+            ) => layer(radius_m, h, bond, LayerTheory::PublishedSeries),
             _ => Ok(None),
         }
     }

@@ -46,17 +46,30 @@ impl IndentationCurve {
     /// # Errors
     /// [`ElasticityError::LengthMismatch`], [`ElasticityError::TooFewLoads`] below six points,
     /// [`ElasticityError::NotFinite`], and [`ElasticityError::EqualLoads`] where all forces or all positions are equal.
-    pub fn new<T: RealField + Copy>(position_m: &[T], force_n: &[T]) -> Result<Self, ElasticityError> {
+    pub fn new<T: RealField + Copy>(
+        position_m: &[T],
+        force_n: &[T],
+    ) -> Result<Self, ElasticityError> {
         let (expected, found) = (position_m.len(), force_n.len());
         if expected != found {
-            return Err(ElasticityError::LengthMismatch { quantity: Quantity::Force, expected, found });
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::Force,
+                expected,
+                found,
+            });
         }
         if found < FEWEST_POINTS {
-            return Err(ElasticityError::TooFewLoads { expected: FEWEST_POINTS, found });
+            return Err(ElasticityError::TooFewLoads {
+                expected: FEWEST_POINTS,
+                found,
+            });
         }
         let [position_m, force_n] =
             [position_m, force_n].map(|v| v.iter().map(|&x| widen(x)).collect::<Vec<_>>());
-        for (values, quantity) in [(&position_m, Quantity::Indentation), (&force_n, Quantity::Force)] {
+        for (values, quantity) in [
+            (&position_m, Quantity::Indentation),
+            (&force_n, Quantity::Force),
+        ] {
             if !values.iter().all(|x| x.is_finite()) {
                 return Err(ElasticityError::NotFinite { quantity });
             }
@@ -67,7 +80,10 @@ impl IndentationCurve {
         let mut order: Vec<usize> = (0..found).collect();
         order.sort_by(|&i, &j| position_m[i].total_cmp(&position_m[j]));
         let sorted = |v: Vec<f64>| order.iter().map(|&i| v[i]).collect();
-        Ok(Self { position_m: sorted(position_m), force_n: sorted(force_n) })
+        Ok(Self {
+            position_m: sorted(position_m),
+            force_n: sorted(force_n),
+        })
     }
 
     /// Positions, ascending.
@@ -82,6 +98,9 @@ impl IndentationCurve {
 
     /// First and last position.
     pub(crate) fn span(&self) -> (f64, f64) {
-        (self.position_m[0], self.position_m[self.position_m.len() - 1])
+        (
+            self.position_m[0],
+            self.position_m[self.position_m.len() - 1],
+        )
     }
 }

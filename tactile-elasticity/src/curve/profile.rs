@@ -28,7 +28,11 @@ impl Problem<'_> {
     fn shape(&self, contact: f64) -> Option<Vec<f64>> {
         let of = |z: &f64| {
             let d = z - contact;
-            if d > 0.0 { self.law.of_indentation(d, 0.0).map(|l| l.value.exp()) } else { Some(0.0) }
+            if d > 0.0 {
+                self.law.of_indentation(d, 0.0).map(|l| l.value.exp())
+            } else {
+                Some(0.0)
+            }
         };
         self.curve.position_m().iter().map(of).collect()
     }
@@ -38,8 +42,11 @@ impl Problem<'_> {
         let g = self.shape(contact)?;
         let f = self.curve.force_n();
         let n = g.len() as f64;
-        let (mg, mf) =
-            if self.offset { (g.iter().sum::<f64>() / n, f.iter().sum::<f64>() / n) } else { (0.0, 0.0) };
+        let (mg, mf) = if self.offset {
+            (g.iter().sum::<f64>() / n, f.iter().sum::<f64>() / n)
+        } else {
+            (0.0, 0.0)
+        };
         let scale = g.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let (mut sgg, mut sgf) = (0.0, 0.0);
         for (g, f) in g.iter().zip(f) {
@@ -47,7 +54,8 @@ impl Problem<'_> {
             sgf += (g - mg) / scale * (f - mf);
         }
         let modulus = sgf / sgg / scale;
-        self.finish(contact, &g, modulus).filter(|p| p.modulus > 0.0 && p.squares.is_finite())
+        self.finish(contact, &g, modulus)
+            .filter(|p| p.modulus > 0.0 && p.squares.is_finite())
     }
 
     /// Minimum over the offset alone.
@@ -58,8 +66,17 @@ impl Problem<'_> {
     fn finish(&self, contact_m: f64, g: &[f64], modulus: f64) -> Option<Profile> {
         let f = self.curve.force_n();
         let rest = || g.iter().zip(f).map(|(g, f)| f - modulus * g);
-        let offset = if self.offset { rest().sum::<f64>() / f.len() as f64 } else { 0.0 };
-        Some(Profile { contact_m, modulus, offset, squares: rest().map(|r| (r - offset).powi(2)).sum() })
+        let offset = if self.offset {
+            rest().sum::<f64>() / f.len() as f64
+        } else {
+            0.0
+        };
+        Some(Profile {
+            contact_m,
+            modulus,
+            offset,
+            squares: rest().map(|r| (r - offset).powi(2)).sum(),
+        })
     }
 
     /// The contact point that leaves the least, from one span before the first point up to the fifth last point.
@@ -70,9 +87,16 @@ impl Problem<'_> {
         let step = (to - from) / SCAN as f64;
         let scanned = (0..=SCAN).filter_map(|k| self.at(from + step * k as f64));
         let start = scanned.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
-        let (low, high) = ((start.contact_m - step).max(from), (start.contact_m + step).min(to));
+        let (low, high) = (
+            (start.contact_m - step).max(from),
+            (start.contact_m + step).min(to),
+        );
         let refined = golden(low, high, |x| self.at(x))?;
-        Some(if refined.squares <= start.squares { refined } else { start })
+        Some(if refined.squares <= start.squares {
+            refined
+        } else {
+            start
+        })
     }
 
     /// The least at a given modulus, the contact point sought around `near`.
@@ -85,7 +109,10 @@ impl Problem<'_> {
 fn golden(mut low: f64, mut high: f64, at: impl Fn(f64) -> Option<Profile>) -> Option<Profile> {
     let ratio = 0.5 * (5.0f64.sqrt() - 1.0);
     let value = |p: &Option<Profile>| p.map_or(f64::INFINITY, |p| p.squares);
-    let (mut a, mut b) = (at(high - ratio * (high - low)), at(low + ratio * (high - low)));
+    let (mut a, mut b) = (
+        at(high - ratio * (high - low)),
+        at(low + ratio * (high - low)),
+    );
     for _ in 0..70 {
         if value(&a) <= value(&b) {
             high = low + ratio * (high - low);

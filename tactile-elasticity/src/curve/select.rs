@@ -71,11 +71,19 @@ pub fn select_model(
     let fits = fit_each(curve, indenter, nu, &candidates, options)?;
     let criteria: Vec<f64> = fits.iter().map(|f| f.statistics.aicc).collect();
     let (order, reason) = rank(&criteria);
-    let reason = if matches!(model, Model::Named(_)) { SelectionReason::Asked } else { reason };
+    let reason = if matches!(model, Model::Named(_)) {
+        SelectionReason::Asked
+    } else {
+        reason
+    };
     let weights = akaike_weights(order.iter().map(|&k| criteria[k]));
     let mut taken: Vec<_> = fits.into_iter().map(Some).collect();
     let fits = order.iter().filter_map(|&k| taken[k].take()).collect();
-    Ok(CurveSelection { fits, weights, reason })
+    Ok(CurveSelection {
+        fits,
+        weights,
+        reason,
+    })
 }
 
 /// The fits of the laws that can be fitted; the first error where none can.
@@ -95,7 +103,10 @@ fn fit_each(
         }
     }
     if fits.is_empty() {
-        let missing = ElasticityError::TooFewLoads { expected: super::FEWEST_POINTS, found: 0 };
+        let missing = ElasticityError::TooFewLoads {
+            expected: super::FEWEST_POINTS,
+            found: 0,
+        };
         return Err(first_error.unwrap_or(missing));
     }
     Ok(fits)

@@ -62,7 +62,11 @@ pub fn mean_strain_covariance<T: RealField + Copy>(
 ) -> Result<Matrix6<T>, ElasticityError> {
     if weights.len() != gradients.len() {
         let (expected, found) = (gradients.len(), weights.len());
-        return Err(ElasticityError::LengthMismatch { quantity: Quantity::Weight, expected, found });
+        return Err(ElasticityError::LengthMismatch {
+            quantity: Quantity::Weight,
+            expected,
+            found,
+        });
     }
     let total = weights.iter().fold(T::zero(), |s, &w| s + w);
     crate::error::positive(crate::scalar::widen(total), Quantity::Weight)?;
@@ -72,7 +76,10 @@ pub fn mean_strain_covariance<T: RealField + Copy>(
         // Row ab: what a displacement of point j adds to the mean E_ab.
         let mut response = SMatrix::<T, 6, 3>::zeros();
         for (i, h) in gradients.iter().enumerate() {
-            let (f, a) = (h + Matrix3::identity(), influence(i, j) * (weights[i] / total));
+            let (f, a) = (
+                h + Matrix3::identity(),
+                influence(i, j) * (weights[i] / total),
+            );
             for (row, &(p, q)) in PAIRS.iter().enumerate() {
                 for k in 0..3 {
                     response[(row, k)] += (f[(k, p)] * a[q] + f[(k, q)] * a[p]) * half;

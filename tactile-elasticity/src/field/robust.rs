@@ -37,8 +37,14 @@ const K: f64 = 1.345;
 
 /// The value below which half of the weight lies.
 pub(crate) fn weighted_median<T: RealField + Copy>(values: &[T], weights: &[T]) -> T {
-    let mut order: Vec<usize> = (0..values.len()).filter(|&i| weights[i] > T::zero()).collect();
-    order.sort_by(|&i, &j| values[i].partial_cmp(&values[j]).unwrap_or(core::cmp::Ordering::Equal));
+    let mut order: Vec<usize> = (0..values.len())
+        .filter(|&i| weights[i] > T::zero())
+        .collect();
+    order.sort_by(|&i, &j| {
+        values[i]
+            .partial_cmp(&values[j])
+            .unwrap_or(core::cmp::Ordering::Equal)
+    });
     let total = order.iter().fold(T::zero(), |s, &i| s + weights[i]);
     let half = total * nalgebra::convert(0.5);
     let mut below = T::zero();
@@ -56,7 +62,11 @@ pub(crate) fn weighted_median<T: RealField + Copy>(values: &[T], weights: &[T]) 
 }
 
 /// Centre and spread of one component.
-pub(crate) fn centre_and_spread<T: RealField + Copy>(values: &[T], weights: &[T], how: Averaging) -> (T, T) {
+pub(crate) fn centre_and_spread<T: RealField + Copy>(
+    values: &[T],
+    weights: &[T],
+    how: Averaging,
+) -> (T, T) {
     let median = weighted_median(values, weights);
     let deviations: Vec<T> = values.iter().map(|&v| (v - median).abs()).collect();
     let spread = weighted_median(&deviations, weights) / nalgebra::convert(MAD);

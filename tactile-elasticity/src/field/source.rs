@@ -41,7 +41,9 @@ pub struct JacobianOf<F>(
     pub F,
 );
 
-impl<T: RealField + Copy, F: Fn(&Point3<T>) -> Matrix3<T>> DisplacementGradient<T> for JacobianOf<F> {
+impl<T: RealField + Copy, F: Fn(&Point3<T>) -> Matrix3<T>> DisplacementGradient<T>
+    for JacobianOf<F>
+{
     fn displacement_gradient(&self, point: &Point3<T>) -> Matrix3<T> {
         (self.0)(point) - Matrix3::identity()
     }
@@ -50,7 +52,10 @@ impl<T: RealField + Copy, F: Fn(&Point3<T>) -> Matrix3<T>> DisplacementGradient<
 /// Points with the area or volume each stands for.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize"))
+)]
 pub struct Samples<T: RealField> {
     /// Where.
     pub points: Vec<Point3<T>>,
@@ -73,15 +78,25 @@ impl<T: RealField + Copy> Samples<T> {
     /// assert!((block.weights.iter().sum::<f64>() - 2.0).abs() < 1e-14);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn grid(low: Point3<T>, high: Point3<T>, counts: [usize; 3]) -> Result<Self, ElasticityError> {
+    pub fn grid(
+        low: Point3<T>,
+        high: Point3<T>,
+        counts: [usize; 3],
+    ) -> Result<Self, ElasticityError> {
         if low.iter().chain(high.iter()).any(|x| !x.is_finite()) {
-            return Err(ElasticityError::NotFinite { quantity: Quantity::Distance });
+            return Err(ElasticityError::NotFinite {
+                quantity: Quantity::Distance,
+            });
         }
         if counts.contains(&0) {
-            return Err(ElasticityError::TooFewLoads { expected: 1, found: 0 });
+            return Err(ElasticityError::TooFewLoads {
+                expected: 1,
+                found: 0,
+            });
         }
         let size = high - low;
-        let at = |k: usize, i: usize| low[k] + size[k] * narrow((i as f64 + 0.5) / counts[k] as f64);
+        let at =
+            |k: usize, i: usize| low[k] + size[k] * narrow((i as f64 + 0.5) / counts[k] as f64);
         let mut points = Vec::with_capacity(counts.iter().product());
         for z in 0..counts[2] {
             for y in 0..counts[1] {
@@ -89,9 +104,16 @@ impl<T: RealField + Copy> Samples<T> {
             }
         }
         let cell = (0..3).fold(T::one(), |v, k| {
-            if size[k] == T::zero() { v } else { v * size[k].abs() / narrow(counts[k] as f64) }
+            if size[k] == T::zero() {
+                v
+            } else {
+                v * size[k].abs() / narrow(counts[k] as f64)
+            }
         });
-        Ok(Self { weights: vec![cell; points.len()], points })
+        Ok(Self {
+            weights: vec![cell; points.len()],
+            points,
+        })
     }
 
     /// The volume of a contact: a disc of radius a around `centre`, from its z down to `depth` above it, in rings and sectors of
@@ -117,7 +139,10 @@ impl<T: RealField + Copy> Samples<T> {
         positive(widen(radius), Quantity::ContactRadius)?;
         positive(widen(depth), Quantity::Thickness)?;
         if [rings, sectors, layers].contains(&0) {
-            return Err(ElasticityError::TooFewLoads { expected: 1, found: 0 });
+            return Err(ElasticityError::TooFewLoads {
+                expected: 1,
+                found: 0,
+            });
         }
         let mut points = Vec::with_capacity(rings * sectors * layers);
         for layer in 0..layers {
@@ -135,6 +160,9 @@ impl<T: RealField + Copy> Samples<T> {
             }
         }
         let cell = T::pi() * radius * radius * depth / narrow(points.len() as f64);
-        Ok(Self { weights: vec![cell; points.len()], points })
+        Ok(Self {
+            weights: vec![cell; points.len()],
+            points,
+        })
     }
 }

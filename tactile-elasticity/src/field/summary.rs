@@ -21,7 +21,10 @@ use nalgebra::{Matrix3, RealField};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize"))
+)]
 pub struct StrainSummary<T> {
     /// Weighted mean.
     pub mean: Matrix3<T>,
@@ -66,7 +69,11 @@ impl<T: RealField + Copy> StrainField<T> {
         measure: &dyn StrainMeasure<T>,
     ) -> Result<Self, ElasticityError> {
         let weights = checked_weights(gradients.len(), weights)?;
-        let mut field = Self { strains: Vec::with_capacity(gradients.len()), weights, folded: Vec::new() };
+        let mut field = Self {
+            strains: Vec::with_capacity(gradients.len()),
+            weights,
+            folded: Vec::new(),
+        };
         for (i, h) in gradients.iter().enumerate() {
             let deformation = Deformation::from_displacement_gradient(*h);
             if deformation.is_finite() && deformation.jacobian() <= T::zero() {
@@ -103,7 +110,11 @@ impl<T: RealField + Copy> StrainField<T> {
         samples: &Samples<T>,
         measure: &dyn StrainMeasure<T>,
     ) -> Result<Self, ElasticityError> {
-        let gradients: Vec<_> = samples.points.iter().map(|p| field.displacement_gradient(p)).collect();
+        let gradients: Vec<_> = samples
+            .points
+            .iter()
+            .map(|p| field.displacement_gradient(p))
+            .collect();
         Self::from_gradients(&gradients, Some(&samples.weights), measure)
     }
 
@@ -190,21 +201,39 @@ impl<T: RealField + Copy> StrainField<T> {
             let d = e - mean;
             variance += d.component_mul(&d) * w;
         }
-        let effective = if squares > T::zero() { total * total / squares } else { T::zero() };
+        let effective = if squares > T::zero() {
+            total * total / squares
+        } else {
+            T::zero()
+        };
         let (spread, standard_error) = if effective > T::one() {
             let unbiased = effective / (effective - T::one());
             let variance = variance * (unbiased / total);
-            (variance.map(|v| v.sqrt()), variance.map(|v| (v / effective).sqrt()))
+            (
+                variance.map(|v| v.sqrt()),
+                variance.map(|v| (v / effective).sqrt()),
+            )
         } else {
             (Matrix3::zeros(), Matrix3::zeros())
         };
         let used = self.weights.iter().filter(|&&w| w > T::zero()).count();
-        StrainSummary { mean, spread, standard_error, used, folded: self.folded.clone() }
+        StrainSummary {
+            mean,
+            spread,
+            standard_error,
+            used,
+            folded: self.folded.clone(),
+        }
     }
 }
 
-fn checked_weights<T: RealField + Copy>(n: usize, weights: Option<&[T]>) -> Result<Vec<T>, ElasticityError> {
-    let Some(weights) = weights else { return Ok(vec![T::one(); n]) };
+fn checked_weights<T: RealField + Copy>(
+    n: usize,
+    weights: Option<&[T]>,
+) -> Result<Vec<T>, ElasticityError> {
+    let Some(weights) = weights else {
+        return Ok(vec![T::one(); n]);
+    };
     if weights.len() != n {
         return Err(ElasticityError::LengthMismatch {
             quantity: Quantity::Weight,

@@ -44,7 +44,10 @@ pub struct BootstrapSummary {
 impl Default for Bootstrap {
     /// A thousand repetitions from seed 1.
     fn default() -> Self {
-        Self { replicates: 1000, seed: 1 }
+        Self {
+            replicates: 1000,
+            seed: 1,
+        }
     }
 }
 
@@ -66,12 +69,16 @@ impl Bootstrap {
     ) -> Result<BootstrapSummary, ElasticityError> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let mut normal = || rng.sample::<f64, _>(StandardNormal);
-        let mut all: Vec<f64> =
-            (0..self.replicates).map(|_| experiment(&mut normal).unwrap_or(f64::INFINITY)).collect();
+        let mut all: Vec<f64> = (0..self.replicates)
+            .map(|_| experiment(&mut normal).unwrap_or(f64::INFINITY))
+            .collect();
         all.sort_by(f64::total_cmp);
         let good = all.partition_point(|x| x.is_finite());
         if good < 2 {
-            return Err(ElasticityError::TooFewLoads { expected: 2, found: good });
+            return Err(ElasticityError::TooFewLoads {
+                expected: 2,
+                found: good,
+            });
         }
         let mean = all[..good].iter().sum::<f64>() / good as f64;
         let squares: f64 = all[..good].iter().map(|x| (x - mean).powi(2)).sum();
@@ -95,11 +102,15 @@ impl Bootstrap {
         loads: &[LoadState<T>],
         force_scale_error: T,
     ) -> Result<BootstrapSummary, ElasticityError> {
-        let scale_error = crate::error::not_negative(widen(force_scale_error), Quantity::StandardError)?;
+        let scale_error =
+            crate::error::not_negative(widen(force_scale_error), Quantity::StandardError)?;
         self.run(|normal| {
             let scale: T = narrow(1.0 + scale_error * normal());
             let redrawn: Vec<_> = loads.iter().map(|l| redraw(l, scale, normal)).collect();
-            estimator.estimate(&redrawn).ok().map(|m| widen(m.youngs_modulus_pa))
+            estimator
+                .estimate(&redrawn)
+                .ok()
+                .map(|m| widen(m.youngs_modulus_pa))
         })
     }
 }

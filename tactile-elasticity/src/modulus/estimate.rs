@@ -174,7 +174,12 @@ pub struct LoadDiagnostics<T> {
 
 impl<T: RealField + Copy> LoadDiagnostics<T> {
     pub(crate) fn unused() -> Self {
-        Self { used: false, contact_ratio: None, youngs_modulus_pa: None, standardized_residual: None }
+        Self {
+            used: false,
+            contact_ratio: None,
+            youngs_modulus_pa: None,
+            standardized_residual: None,
+        }
     }
 }
 
@@ -220,7 +225,11 @@ impl<T: RealField + Copy> FitStatistics<T> {
         minus_two_log_likelihood: f64,
     ) -> Self {
         let (n, k) = (observations as f64, parameters as f64);
-        let correction = if n > k + 1.0 { 2.0 * k * (k + 1.0) / (n - k - 1.0) } else { f64::INFINITY };
+        let correction = if n > k + 1.0 {
+            2.0 * k * (k + 1.0) / (n - k - 1.0)
+        } else {
+            f64::INFINITY
+        };
         Self {
             observations,
             parameters,

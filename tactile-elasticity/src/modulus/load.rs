@@ -20,7 +20,11 @@ pub struct Estimate<T> {
 impl<T: RealField + Copy> Estimate<T> {
     /// A value with its standard error.
     pub fn new(value: T, standard_error: T) -> Self {
-        Self { value, standard_error, degrees_of_freedom: None }
+        Self {
+            value,
+            standard_error,
+            degrees_of_freedom: None,
+        }
     }
 
     /// With a standard error that was learnt from so few repetitions that it is itself uncertain.
@@ -172,7 +176,8 @@ impl LoadState<f64> {
             standard_error: 2.0 * std::f64::consts::PI * a.value.abs() * a.standard_error,
             ..a
         };
-        self.contact_area_m2.or_else(|| self.contact_radius_m.map(disc))
+        self.contact_area_m2
+            .or_else(|| self.contact_radius_m.map(disc))
     }
 }
 

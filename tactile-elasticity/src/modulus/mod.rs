@@ -22,11 +22,14 @@ pub use estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 pub use law::{
-    ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw, WaveguideLaw,
+    ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw,
+    WaveguideLaw,
 };
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::{Intercept, StressStrainRegression};
-pub use select::{Candidates, ModulusSelection, select_estimator, sphere_as_sample, sphere_on_sample};
+pub use select::{
+    Candidates, ModulusSelection, select_estimator, sphere_as_sample, sphere_on_sample,
+};
 pub(crate) use statistics::quantile_95;
 pub use warning::Warning;

@@ -96,7 +96,10 @@ impl PaperRatio {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`].
-    pub fn with_sphere_radius<T: RealField + Copy>(mut self, radius_m: T) -> Result<Self, ElasticityError> {
+    pub fn with_sphere_radius<T: RealField + Copy>(
+        mut self,
+        radius_m: T,
+    ) -> Result<Self, ElasticityError> {
         self.sphere_radius_m = Some(positive(widen(radius_m), Quantity::Radius)?);
         Ok(self)
     }
@@ -141,9 +144,15 @@ impl PaperRatio {
     fn ratios(&self, loads: &[LoadState<f64>]) -> Result<Vec<Ratio>, ElasticityError> {
         let mut ratios = Vec::new();
         let from_first = self.reference == StrainReference::FirstLoad;
-        let base = if from_first { loads.first().map(|l| stress(0, l)).transpose()? } else { None };
+        let base = if from_first {
+            loads.first().map(|l| stress(0, l)).transpose()?
+        } else {
+            None
+        };
         for (load, state) in loads.iter().enumerate().skip(usize::from(from_first)) {
-            let Some(strain) = state.mean_strain else { continue };
+            let Some(strain) = state.mean_strain else {
+                continue;
+            };
             let strain = strain.validated(Quantity::Strain)?.value;
             let stress_pa = stress(load, state)?.value - base.map_or(0.0, |b| b.value);
             if stress_pa == 0.0 && from_first {
@@ -155,11 +164,18 @@ impl PaperRatio {
             if stress_pa * strain <= 0.0 {
                 return Err(ElasticityError::OppositeSigns { stress_pa, strain });
             }
-            ratios.push(Ratio { load, stress_pa, strain });
+            ratios.push(Ratio {
+                load,
+                stress_pa,
+                strain,
+            });
         }
         if ratios.is_empty() {
             let expected = if from_first { 2 } else { 1 };
-            return Err(ElasticityError::TooFewLoads { expected, found: loads.len().min(expected - 1) });
+            return Err(ElasticityError::TooFewLoads {
+                expected,
+                found: loads.len().min(expected - 1),
+            });
         }
         Ok(ratios)
     }
@@ -167,23 +183,31 @@ impl PaperRatio {
     /// Covariances of the ln E, from forces, areas and strains, each with its degrees of freedom.
     ///
     /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A.
-    fn sources(&self, loads: &[LoadState<f64>], ratios: &[Ratio]) -> Result<[LogErrors; 3], ElasticityError> {
+    fn sources(
+        &self,
+        loads: &[LoadState<f64>],
+        ratios: &[Ratio],
+    ) -> Result<[LogErrors; 3], ElasticityError> {
         let areas: Vec<_> = loads.iter().map(LoadState::area).collect();
         let area_of = |k: usize| areas[k].map_or(1.0, |a| a.value);
         let stress_slope = |i: usize, k: usize| {
             let base = self.reference == StrainReference::FirstLoad && k == 0;
             (f64::from(ratios[i].load == k) - f64::from(base)) / ratios[i].stress_pa
         };
-        let slopes = |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(ratios.len(), loads.len(), f);
+        let slopes =
+            |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(ratios.len(), loads.len(), f);
         let by_force = slopes(&|i, k| stress_slope(i, k) / area_of(k));
-        let by_area = slopes(&|i, k| -stress_slope(i, k) * loads[k].force_n.value / area_of(k).powi(2));
+        let by_area =
+            slopes(&|i, k| -stress_slope(i, k) * loads[k].force_n.value / area_of(k).powi(2));
         let by_strain = slopes(&|i, k| -f64::from(ratios[i].load == k) / ratios[i].strain);
         let forces: Vec<_> = loads.iter().map(|l| Some(l.force_n)).collect();
         let strains: Vec<_> = loads.iter().map(|l| l.mean_strain).collect();
         Ok([
-            Source::new(&forces, self.force_covariance.as_ref(), Quantity::Force)?.through(&by_force),
+            Source::new(&forces, self.force_covariance.as_ref(), Quantity::Force)?
+                .through(&by_force),
             Source::new(&areas, None, Quantity::ContactArea)?.through(&by_area),
-            Source::new(&strains, self.strain_covariance.as_ref(), Quantity::Strain)?.through(&by_strain),
+            Source::new(&strains, self.strain_covariance.as_ref(), Quantity::Strain)?
+                .through(&by_strain),
         ])
     }
 
@@ -195,10 +219,15 @@ impl PaperRatio {
     ) -> Vec<Warning<T>> {
         let mut warnings = strain_warnings(loads);
         let on_sphere = |(load, d): (usize, &LoadDiagnostics<T>)| {
-            Some(Warning::RatioOnSphere { load, ratio: d.contact_ratio? })
+            Some(Warning::RatioOnSphere {
+                load,
+                ratio: d.contact_ratio?,
+            })
         };
         warnings.extend(diagnostics.iter().enumerate().filter_map(on_sphere));
-        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
+        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter {
+            reduced_chi_squared: narrow(x),
+        }));
         if mean.standard_error.is_infinite() {
             warnings.push(Warning::NoErrorEstimate);
         }
@@ -213,7 +242,10 @@ impl PaperRatio {
     ) -> Vec<LoadDiagnostics<T>> {
         let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
         for (d, state) in diagnostics.iter_mut().zip(loads) {
-            let ratio = self.sphere_radius_m.zip(state.contact_radius_m).map(|(radius, a)| a.value / radius);
+            let ratio = self
+                .sphere_radius_m
+                .zip(state.contact_radius_m)
+                .map(|(radius, a)| a.value / radius);
             d.contact_ratio = ratio.map(narrow);
         }
         for (r, &residual) in ratios.iter().zip(&mean.standardized_residuals) {
@@ -238,20 +270,36 @@ impl Ratio {
 }
 
 /// Mean stress of a load with its error; the area must be above zero.
-pub(crate) fn stress(load: usize, state: &LoadState<f64>) -> Result<Estimate<f64>, ElasticityError> {
+pub(crate) fn stress(
+    load: usize,
+    state: &LoadState<f64>,
+) -> Result<Estimate<f64>, ElasticityError> {
     let force = state.force_n.validated(Quantity::Force)?;
-    let quantity =
-        if state.contact_area_m2.is_some() { Quantity::ContactArea } else { Quantity::ContactRadius };
-    if let Some(radius) = state.contact_radius_m.filter(|_| state.contact_area_m2.is_none()) {
+    let quantity = if state.contact_area_m2.is_some() {
+        Quantity::ContactArea
+    } else {
+        Quantity::ContactRadius
+    };
+    if let Some(radius) = state
+        .contact_radius_m
+        .filter(|_| state.contact_area_m2.is_none())
+    {
         positive(radius.value, quantity)?;
     }
-    let missing = ElasticityError::Missing { load, quantity: Quantity::ContactArea };
+    let missing = ElasticityError::Missing {
+        load,
+        quantity: Quantity::ContactArea,
+    };
     let area = state.area().ok_or(missing)?.validated(quantity)?;
     positive(area.value, quantity)?;
     let value = force.value / area.value;
     let standard_error = (force.standard_error / area.value).hypot(value * area.relative_error());
     let parts = [force, area].map(|e| (e.relative_error().powi(2), e.degrees_of_freedom));
-    Ok(Estimate { value, standard_error, degrees_of_freedom: effective_degrees(&parts) })
+    Ok(Estimate {
+        value,
+        standard_error,
+        degrees_of_freedom: effective_degrees(&parts),
+    })
 }
 
 impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
@@ -277,7 +325,12 @@ impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
             estimator: EstimatorKind::PaperRatio,
             warnings: self.warnings(&loads, &diagnostics, &mean),
             loads: diagnostics,
-            fit: FitStatistics::new(ratios.len(), 1, mean.chi_squared, mean.minus_two_log_likelihood),
+            fit: FitStatistics::new(
+                ratios.len(),
+                1,
+                mean.chi_squared,
+                mean.minus_two_log_likelihood,
+            ),
         })
     }
 

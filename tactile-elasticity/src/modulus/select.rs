@@ -1,8 +1,8 @@
 //! Which estimator the loads speak for.
 
 use super::{
-    BondedLayer, EstimatorKind, HertzSphere, LayerTheory, LoadState, ModulusEstimate, ModulusEstimator,
-    SphereBetweenPlates, SphereOnWaveguide, TataraSphere,
+    BondedLayer, EstimatorKind, HertzSphere, LayerTheory, LoadState, ModulusEstimate,
+    ModulusEstimator, SphereBetweenPlates, SphereOnWaveguide, TataraSphere,
 };
 use crate::contact::{Bond, Waveguide};
 use crate::error::ElasticityError;
@@ -97,24 +97,37 @@ pub fn select_estimator<T: RealField + Copy>(
         }
     }
     let Some(observations) = estimates.first().map(|e| e.fit.observations) else {
-        return Err(first_error.unwrap_or(ElasticityError::TooFewLoads { expected: 1, found: 0 }));
+        return Err(first_error.unwrap_or(ElasticityError::TooFewLoads {
+            expected: 1,
+            found: 0,
+        }));
     };
-    let (mut estimates, others): (Vec<_>, Vec<_>) =
-        estimates.into_iter().partition(|e| e.fit.observations == observations);
+    let (mut estimates, others): (Vec<_>, Vec<_>) = estimates
+        .into_iter()
+        .partition(|e| e.fit.observations == observations);
     left_out.extend(others.iter().map(|e| e.estimator));
     let criteria: Vec<f64> = estimates.iter().map(criterion).collect();
     let (order, reason) = rank(&criteria);
     let weights = akaike_weights(order.iter().map(|&k| criteria[k]));
     let mut taken: Vec<_> = estimates.drain(..).map(Some).collect();
     let estimates = order.iter().filter_map(|&k| taken[k].take()).collect();
-    Ok(ModulusSelection { estimates, weights, reason, left_out })
+    Ok(ModulusSelection {
+        estimates,
+        weights,
+        reason,
+        left_out,
+    })
 }
 
 /// AICc; where the loads are too few for it, AIC from χ², which differs by a constant between laws of the same loads.
 fn criterion<T: RealField + Copy>(estimate: &ModulusEstimate<T>) -> f64 {
     let fit = &estimate.fit;
     let corrected = widen(fit.aicc);
-    if corrected.is_finite() { corrected } else { widen(fit.chi_squared) + 2.0 * fit.parameters as f64 }
+    if corrected.is_finite() {
+        corrected
+    } else {
+        widen(fit.chi_squared) + 2.0 * fit.parameters as f64
+    }
 }
 
 /// A rigid sphere of radius R (m) on a sample with Poisson ratio ν: Hertz, and with a thickness h (m) the layer's integral equation,
@@ -137,9 +150,21 @@ pub fn sphere_on_sample<T: RealField + Copy>(
     thickness_m: Option<T>,
 ) -> Result<Candidates<T>, ElasticityError> {
     let mut candidates: Candidates<T> = Vec::new();
-    for bond in [Bond::Bonded, Bond::Free].into_iter().filter(|_| thickness_m.is_some()) {
-        let (h, theory) = (thickness_m.unwrap_or(radius_m), LayerTheory::IntegralEquation);
-        candidates.push(Box::new(BondedLayer::new(radius_m, h, poisson_ratio, bond, theory)?));
+    for bond in [Bond::Bonded, Bond::Free]
+        .into_iter()
+        .filter(|_| thickness_m.is_some())
+    {
+        let (h, theory) = (
+            thickness_m.unwrap_or(radius_m),
+            LayerTheory::IntegralEquation,
+        );
+        candidates.push(Box::new(BondedLayer::new(
+            radius_m,
+            h,
+            poisson_ratio,
+            bond,
+            theory,
+        )?));
     }
     candidates.push(Box::new(HertzSphere::new(radius_m, poisson_ratio)?));
     Ok(candidates)
@@ -166,7 +191,12 @@ pub fn sphere_as_sample<T: RealField + Copy>(
     waveguide: &Waveguide<T>,
 ) -> Result<Candidates<T>, ElasticityError> {
     Ok(vec![
-        Box::new(SphereOnWaveguide::new(radius_m, poisson_ratio, waveguide, Bond::Bonded)?),
+        Box::new(SphereOnWaveguide::new(
+            radius_m,
+            poisson_ratio,
+            waveguide,
+            Bond::Bonded,
+        )?),
         Box::new(TataraSphere::new(radius_m, poisson_ratio)?.with_waveguide(waveguide)),
         Box::new(SphereBetweenPlates::new(radius_m, poisson_ratio)?.with_waveguide(waveguide)),
         Box::new(HertzSphere::new(radius_m, poisson_ratio)?.with_waveguide(waveguide)),

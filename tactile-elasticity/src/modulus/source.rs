@@ -24,12 +24,17 @@ impl Source {
         quantity: Quantity,
     ) -> Result<Self, ElasticityError> {
         let degrees = fewest(estimates.iter().flatten().map(|e| e.degrees_of_freedom));
-        let own = estimates.iter().map(|e| e.map_or(0.0, |e| e.standard_error.powi(2)));
+        let own = estimates
+            .iter()
+            .map(|e| e.map_or(0.0, |e| e.standard_error.powi(2)));
         let covariance = match covariance {
             Some(given) => checked(given, estimates.len(), quantity)?.clone(),
             None => DMatrix::from_diagonal(&DVector::from_iterator(estimates.len(), own)),
         };
-        Ok(Self { covariance, degrees })
+        Ok(Self {
+            covariance,
+            degrees,
+        })
     }
 
     /// Covariance, with its degrees of freedom, of what follows the quantity with these slopes: a row a result, a column a load.
@@ -56,8 +61,15 @@ pub(super) fn checked(
     loads: usize,
     quantity: Quantity,
 ) -> Result<&DMatrix<f64>, ElasticityError> {
-    match [covariance.nrows(), covariance.ncols()].into_iter().find(|&n| n != loads) {
-        Some(found) => Err(ElasticityError::LengthMismatch { quantity, expected: loads, found }),
+    match [covariance.nrows(), covariance.ncols()]
+        .into_iter()
+        .find(|&n| n != loads)
+    {
+        Some(found) => Err(ElasticityError::LengthMismatch {
+            quantity,
+            expected: loads,
+            found,
+        }),
         None => Ok(covariance),
     }
 }

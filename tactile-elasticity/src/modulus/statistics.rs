@@ -17,7 +17,10 @@ pub(crate) fn quantile_95(degrees: Option<f64>) -> f64 {
 /// where all are known.
 pub(crate) fn effective_degrees(parts: &[(f64, Option<f64>)]) -> Option<f64> {
     let total: f64 = parts.iter().map(|p| p.0).sum();
-    let learnt: f64 = parts.iter().filter_map(|(v, degrees)| Some(v * v / (*degrees)?)).sum();
+    let learnt: f64 = parts
+        .iter()
+        .filter_map(|(v, degrees)| Some(v * v / (*degrees)?))
+        .sum();
     (learnt > 0.0).then(|| total * total / learnt)
 }
 
@@ -72,10 +75,17 @@ impl CommonMean {
 const EXCESS_PROBABILITY: f64 = 1e-3;
 
 /// θ = (1ᵀΣ⁻¹z)/(1ᵀΣ⁻¹1). Σ = 0 means unknown: equal weights and the error from the scatter.
-pub(crate) fn common_mean(z: &[f64], covariance: &DMatrix<f64>) -> Result<CommonMean, ElasticityError> {
+pub(crate) fn common_mean(
+    z: &[f64],
+    covariance: &DMatrix<f64>,
+) -> Result<CommonMean, ElasticityError> {
     let n = z.len();
     let known = covariance.diagonal().iter().any(|&v| v > 0.0);
-    let sigma = if known { covariance.clone() } else { DMatrix::identity(n, n) };
+    let sigma = if known {
+        covariance.clone()
+    } else {
+        DMatrix::identity(n, n)
+    };
     let factor = ridged_cholesky(sigma)?;
     let z = DVector::from_column_slice(z);
     let ones = DVector::from_element(n, 1.0);
@@ -86,13 +96,22 @@ pub(crate) fn common_mean(z: &[f64], covariance: &DMatrix<f64>) -> Result<Common
     let chi_squared = residual.dot(&factor.solve(&residual));
     let degrees = n - 1;
     let scale = chi_squared / degrees.max(1) as f64;
-    let excess = degrees > 0 && known && chi_squared_tail(chi_squared, degrees) < EXCESS_PROBABILITY;
+    let excess =
+        degrees > 0 && known && chi_squared_tail(chi_squared, degrees) < EXCESS_PROBABILITY;
     let learnt = !known || excess;
-    let variance = if learnt { scale / information } else { 1.0 / information };
+    let variance = if learnt {
+        scale / information
+    } else {
+        1.0 / information
+    };
     let unit = if learnt { scale } else { 1.0 };
     Ok(CommonMean {
         mean,
-        standard_error: if !known && degrees == 0 { f64::INFINITY } else { variance.sqrt() },
+        standard_error: if !known && degrees == 0 {
+            f64::INFINITY
+        } else {
+            variance.sqrt()
+        },
         chi_squared,
         minus_two_log_likelihood: minus_two_log_likelihood(chi_squared, n, known),
         degrees: (learnt && degrees > 0).then_some(degrees as f64),
@@ -105,7 +124,13 @@ pub(crate) fn common_mean(z: &[f64], covariance: &DMatrix<f64>) -> Result<Common
 /// Residuals over their standard deviations, the variances times `unit`; without a covariance all have one variance.
 fn standardized(residual: &DVector<f64>, covariance: Option<&DMatrix<f64>>, unit: f64) -> Vec<f64> {
     let spread = |i: usize| (covariance.map_or(1.0, |c| c[(i, i)]) * unit).sqrt();
-    let over_spread = |i: usize| if spread(i) > 0.0 { residual[i] / spread(i) } else { 0.0 };
+    let over_spread = |i: usize| {
+        if spread(i) > 0.0 {
+            residual[i] / spread(i)
+        } else {
+            0.0
+        }
+    };
     (0..residual.len()).map(over_spread).collect()
 }
 
@@ -113,11 +138,17 @@ fn standardized(residual: &DVector<f64>, covariance: Option<&DMatrix<f64>>, unit
 fn minus_two_log_likelihood(chi_squared: f64, n: usize, known: bool) -> f64 {
     let n = n as f64;
     let full = (2.0 * std::f64::consts::PI).ln() * n;
-    if known { full + chi_squared } else { full + n * (1.0 + (chi_squared / n).ln()) }
+    if known {
+        full + chi_squared
+    } else {
+        full + n * (1.0 + (chi_squared / n).ln())
+    }
 }
 
 /// Cholesky of a covariance; perfectly correlated parts get a ridge of 10⁻¹² of the mean variance.
-fn ridged_cholesky(sigma: DMatrix<f64>) -> Result<nalgebra::Cholesky<f64, nalgebra::Dyn>, ElasticityError> {
+fn ridged_cholesky(
+    sigma: DMatrix<f64>,
+) -> Result<nalgebra::Cholesky<f64, nalgebra::Dyn>, ElasticityError> {
     let ridge = 1e-12 * sigma.trace() / sigma.nrows() as f64;
     if let Some(factor) = sigma.clone().cholesky() {
         let d = factor.l_dirty().diagonal();
@@ -128,7 +159,9 @@ fn ridged_cholesky(sigma: DMatrix<f64>) -> Result<nalgebra::Cholesky<f64, nalgeb
     let n = sigma.nrows();
     (sigma + DMatrix::identity(n, n) * ridge)
         .cholesky()
-        .ok_or(ElasticityError::Covariance { quantity: Quantity::Force })
+        .ok_or(ElasticityError::Covariance {
+            quantity: Quantity::Force,
+        })
 }
 
 #[cfg(test)]
@@ -138,9 +171,21 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_tables() {
-        assert_relative_eq!(quantile_95(None), 1.959_963_984_540_054, max_relative = 1e-9);
-        assert_relative_eq!(quantile_95(Some(1.0)), 12.706_204_736_174_7, max_relative = 1e-7);
-        assert_relative_eq!(quantile_95(Some(10.0)), 2.228_138_851_964_94, max_relative = 1e-7);
+        assert_relative_eq!(
+            quantile_95(None),
+            1.959_963_984_540_054,
+            max_relative = 1e-9
+        );
+        assert_relative_eq!(
+            quantile_95(Some(1.0)),
+            12.706_204_736_174_7,
+            max_relative = 1e-7
+        );
+        assert_relative_eq!(
+            quantile_95(Some(10.0)),
+            2.228_138_851_964_94,
+            max_relative = 1e-7
+        );
     }
 
     #[test]
@@ -148,6 +193,10 @@ mod tests {
         let shared = DMatrix::from_element(4, 4, 0.01) + DMatrix::identity(4, 4) * 0.04;
         let mean = common_mean(&[1.0, 1.2, 0.9, 0.9], &shared).unwrap();
         assert_relative_eq!(mean.mean, 1.0, epsilon = 1e-12);
-        assert_relative_eq!(mean.standard_error.powi(2), 0.01 + 0.04 / 4.0, max_relative = 1e-12);
+        assert_relative_eq!(
+            mean.standard_error.powi(2),
+            0.01 + 0.04 / 4.0,
+            max_relative = 1e-12
+        );
     }
 }

@@ -79,24 +79,45 @@ impl<T: core::fmt::Display> core::fmt::Display for Warning<T> {
                     "load {load}: contact over layer thickness = {ratio:.3} is beyond {limit:.2} for this law"
                 )
             }
-            Self::LargeStrain { load, strain, limit } => {
+            Self::LargeStrain {
+                load,
+                strain,
+                limit,
+            } => {
                 write!(
                     f,
                     "load {load}: strain {strain:.3} is beyond {limit:.2}, the linear law does not hold"
                 )
             }
-            Self::ExcessScatter { reduced_chi_squared } => {
-                write!(f, "scatter exceeds the stated errors (reduced chi-squared {reduced_chi_squared:.2})")
+            Self::ExcessScatter {
+                reduced_chi_squared,
+            } => {
+                write!(
+                    f,
+                    "scatter exceeds the stated errors (reduced chi-squared {reduced_chi_squared:.2})"
+                )
             }
             Self::UnboundedAbove => write!(f, "the data do not bound the modulus from above"),
-            Self::Intercept { intercept_pa, p_value } => {
-                write!(f, "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero")
+            Self::Intercept {
+                intercept_pa,
+                p_value,
+            } => {
+                write!(
+                    f,
+                    "the stress at zero strain is {intercept_pa:.1} Pa (p = {p_value:.4}), not zero"
+                )
             }
             Self::NoErrorEstimate => {
-                write!(f, "no standard errors and no repetition: the interval is unknown")
+                write!(
+                    f,
+                    "no standard errors and no repetition: the interval is unknown"
+                )
             }
             Self::RatioOnSphere { load, ratio } => {
-                write!(f, "load {load}: stress over strain is biased on a sphere (a/R = {ratio:.3})")
+                write!(
+                    f,
+                    "load {load}: stress over strain is biased on a sphere (a/R = {ratio:.3})"
+                )
             }
         }
     }

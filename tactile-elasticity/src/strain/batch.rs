@@ -55,7 +55,10 @@ pub fn green_lagrange_par_into<T: RealField + Copy>(
     use rayon::prelude::*;
     const CHUNK: usize = 4096;
     same_length(gradients, strains)?;
-    gradients.par_chunks(CHUNK).zip(strains.par_chunks_mut(CHUNK)).for_each(|(h, e)| fill(h, e));
+    gradients
+        .par_chunks(CHUNK)
+        .zip(strains.par_chunks_mut(CHUNK))
+        .for_each(|(h, e)| fill(h, e));
     Ok(())
 }
 
@@ -64,17 +67,27 @@ fn same_length<A, B>(gradients: &[A], strains: &[B]) -> Result<(), ElasticityErr
     if expected == found {
         return Ok(());
     }
-    Err(ElasticityError::LengthMismatch { quantity: Quantity::Strain, expected, found })
+    Err(ElasticityError::LengthMismatch {
+        quantity: Quantity::Strain,
+        expected,
+        found,
+    })
 }
 
 fn fill<T: RealField + Copy>(gradients: &[Matrix3<T>], strains: &mut [Matrix3<T>]) {
     for (h, strain) in gradients.iter().zip(strains) {
         let plain = green_lagrange_plain(h);
-        *strain = if cancels(h, &plain) { careful(h) } else { plain };
+        *strain = if cancels(h, &plain) {
+            careful(h)
+        } else {
+            plain
+        };
     }
 }
 
 #[cold]
 fn careful<T: RealField + Copy>(h: &Matrix3<T>) -> Matrix3<T> {
-    GreenLagrange.strain(h).unwrap_or_else(|_| Matrix3::repeat(nalgebra::convert(f64::NAN)))
+    GreenLagrange
+        .strain(h)
+        .unwrap_or_else(|_| Matrix3::repeat(nalgebra::convert(f64::NAN)))
 }

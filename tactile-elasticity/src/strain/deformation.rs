@@ -31,7 +31,11 @@ enum Given {
 impl<T: RealField + Copy> Deformation<T> {
     /// From H = ∂u/∂X, row = component of u, column = direction of the derivative.
     pub fn from_displacement_gradient(h: Matrix3<T>) -> Self {
-        Self { f: h + Matrix3::identity(), h, given: Given::H }
+        Self {
+            f: h + Matrix3::identity(),
+            h,
+            given: Given::H,
+        }
     }
 
     /// From F = ∂x/∂X, the Jacobian of a map of positions.
@@ -48,7 +52,11 @@ impl<T: RealField + Copy> Deformation<T> {
     /// assert_eq!(in_the_plane.deformation_gradient()[(2, 2)], 1.0_f64);
     /// ```
     pub fn from_deformation_gradient(f: Matrix3<T>) -> Self {
-        Self { f, h: f - Matrix3::identity(), given: Given::F }
+        Self {
+            f,
+            h: f - Matrix3::identity(),
+            given: Given::F,
+        }
     }
 
     /// From a displacement gradient of the plane: nothing happens along z (plane strain).
@@ -92,7 +100,9 @@ impl<T: RealField + Copy> Deformation<T> {
         let mut sum = determinant(h);
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            sum = sum.add_product(h[(j, j)], h[(k, k)]).add_product(-h[(j, k)], h[(k, j)]);
+            sum = sum
+                .add_product(h[(j, j)], h[(k, k)])
+                .add_product(-h[(j, k)], h[(k, j)]);
         }
         sum.add(h[(0, 0)]).add(h[(1, 1)]).add(h[(2, 2)]).value()
     }
@@ -115,7 +125,11 @@ impl<T: RealField + Copy> Deformation<T> {
     /// E = ½(H + Hᵀ + HᵀH), carried twofold where the terms cancel (large rotation, little strain).
     pub(crate) fn green_lagrange(&self) -> Matrix3<T> {
         let plain = green_lagrange_plain(&self.h);
-        if cancels(&self.h, &plain) { self.green_lagrange_twofold() } else { plain }
+        if cancels(&self.h, &plain) {
+            self.green_lagrange_twofold()
+        } else {
+            plain
+        }
     }
 
     fn green_lagrange_twofold(&self) -> Matrix3<T> {
@@ -123,7 +137,11 @@ impl<T: RealField + Copy> Deformation<T> {
         let mut e = Matrix3::zeros();
         for i in 0..3 {
             for j in i..3 {
-                let m = if self.given == Given::F { &self.f } else { &self.h };
+                let m = if self.given == Given::F {
+                    &self.f
+                } else {
+                    &self.h
+                };
                 let mut sum = Twofold::zero();
                 for k in 0..3 {
                     sum = sum.add_product(m[(k, i)], m[(k, j)]);
@@ -159,7 +177,8 @@ pub(crate) fn green_lagrange_plain<T: RealField + Copy>(h: &Matrix3<T>) -> Matri
 pub(crate) fn cancels<T: RealField + Copy>(h: &Matrix3<T>, e: &Matrix3<T>) -> bool {
     // Summed as trees: a chain of additions would take longer than the strain itself.
     let of_h = ((h[(0, 0)].abs() + h[(1, 1)].abs()) + (h[(2, 2)].abs() + h[(0, 1)].abs()))
-        + ((h[(1, 0)].abs() + h[(0, 2)].abs()) + (h[(2, 0)].abs() + (h[(1, 2)].abs() + h[(2, 1)].abs())));
+        + ((h[(1, 0)].abs() + h[(0, 2)].abs())
+            + (h[(2, 0)].abs() + (h[(1, 2)].abs() + h[(2, 1)].abs())));
     let diagonal = (e[(0, 0)].abs() + e[(1, 1)].abs()) + e[(2, 2)].abs();
     let shear = (e[(0, 1)].abs() + e[(0, 2)].abs()) + e[(1, 2)].abs();
     let many: T = nalgebra::convert(128.0);

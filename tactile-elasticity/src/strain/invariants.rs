@@ -6,7 +6,10 @@ use nalgebra::{Matrix3, RealField};
 /// Principal values, largest first, and their directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize"))
+)]
 pub struct PrincipalValues<T> {
     /// The eigenvalues, largest first.
     pub values: [T; 3],
@@ -52,7 +55,11 @@ impl<T: RealField + Copy> Invariants<T> {
     /// ```
     pub fn of(a: &Matrix3<T>) -> Self {
         let minor = |i: usize, j: usize| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(j, i)];
-        Self { first: a.trace(), second: minor(0, 1) + minor(0, 2) + minor(1, 2), third: a.determinant() }
+        Self {
+            first: a.trace(),
+            second: minor(0, 1) + minor(0, 2) + minor(1, 2),
+            third: a.determinant(),
+        }
     }
 }
 

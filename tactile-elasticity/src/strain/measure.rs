@@ -138,7 +138,9 @@ impl<T: RealField + Copy> StrainMeasure<T> for GreenLagrange {
 impl<T: RealField + Copy> StrainMeasure<T> for EulerAlmansi {
     fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
         upright(deformation)?;
-        let inverse = deformation.inverse().ok_or(ElasticityError::SingularDeformation)?;
+        let inverse = deformation
+            .inverse()
+            .ok_or(ElasticityError::SingularDeformation)?;
         let e = deformation.green_lagrange();
         let quarter: T = nalgebra::convert(0.25);
         let small = e.iter().all(|x| x.abs() < quarter);
@@ -191,16 +193,22 @@ impl<T: RealField + Copy> StrainMeasure<T> for Infinitesimal {
     }
 }
 
-fn finite<T: RealField + Copy>(deformation: &Deformation<T>) -> Result<&Deformation<T>, ElasticityError> {
+fn finite<T: RealField + Copy>(
+    deformation: &Deformation<T>,
+) -> Result<&Deformation<T>, ElasticityError> {
     if deformation.is_finite() {
         Ok(deformation)
     } else {
-        Err(ElasticityError::NotFinite { quantity: Quantity::DeformationGradient })
+        Err(ElasticityError::NotFinite {
+            quantity: Quantity::DeformationGradient,
+        })
     }
 }
 
 /// Refuses det F ≤ 0.
-pub(crate) fn upright<T: RealField + Copy>(deformation: &Deformation<T>) -> Result<(), ElasticityError> {
+pub(crate) fn upright<T: RealField + Copy>(
+    deformation: &Deformation<T>,
+) -> Result<(), ElasticityError> {
     let determinant = crate::scalar::widen(finite(deformation)?.jacobian());
     if determinant > 0.0 {
         Ok(())

@@ -17,7 +17,10 @@ use nalgebra::{Matrix3, RealField, Vector3};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(feature = "serde", serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize")))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize"))
+)]
 pub struct PrincipalStretches<T> {
     /// λᵢ, the singular values of F.
     pub stretches: [T; 3],
@@ -69,7 +72,13 @@ impl<T: RealField + Copy> PrincipalStretches<T> {
         Self {
             stretches: s,
             elongations: s.map(|x| x - T::one()),
-            logarithms: s.map(|x| if x > T::zero() { x.ln() } else { T::min_value().unwrap_or(-x) }),
+            logarithms: s.map(|x| {
+                if x > T::zero() {
+                    x.ln()
+                } else {
+                    T::min_value().unwrap_or(-x)
+                }
+            }),
             directions,
         }
     }
@@ -113,7 +122,9 @@ pub(crate) fn symmetric_eigen<T: RealField + Copy>(m: &Matrix3<T>) -> ([T; 3], M
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let apq = a[(p, q)];
             let scale = a[(p, p)].abs().max(a[(q, q)].abs());
-            if apq == T::zero() || (scale + apq.abs() == scale && apq.abs() < scale * T::default_epsilon()) {
+            if apq == T::zero()
+                || (scale + apq.abs() == scale && apq.abs() < scale * T::default_epsilon())
+            {
                 continue;
             }
             done = false;
@@ -171,7 +182,11 @@ fn rotate_columns<T: RealField + Copy>(m: &mut Matrix3<T>, p: usize, q: usize, c
 
 fn sorted<T: RealField + Copy>(values: [T; 3], v: Matrix3<T>) -> ([T; 3], Matrix3<T>) {
     let mut order = [0, 1, 2];
-    order.sort_by(|&i, &j| values[j].partial_cmp(&values[i]).unwrap_or(core::cmp::Ordering::Equal));
+    order.sort_by(|&i, &j| {
+        values[j]
+            .partial_cmp(&values[i])
+            .unwrap_or(core::cmp::Ordering::Equal)
+    });
     let columns = order.map(|i| v.column(i).into_owned());
     (order.map(|i| values[i]), Matrix3::from_columns(&columns))
 }

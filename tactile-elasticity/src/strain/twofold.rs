@@ -15,25 +15,37 @@ pub(crate) struct Twofold<T> {
 fn two_sum<T: RealField + Copy>(a: T, b: T) -> Twofold<T> {
     let hi = a + b;
     let of_b = hi - a;
-    Twofold { hi, lo: (a - (hi - of_b)) + (b - of_b) }
+    Twofold {
+        hi,
+        lo: (a - (hi - of_b)) + (b - of_b),
+    }
 }
 
 /// a · b exactly (unless it underflows).
 fn two_product<T: RealField + Copy>(a: T, b: T) -> Twofold<T> {
     let hi = a * b;
-    Twofold { hi, lo: a.mul_add(b, -hi) }
+    Twofold {
+        hi,
+        lo: a.mul_add(b, -hi),
+    }
 }
 
 impl<T: RealField + Copy> Twofold<T> {
     pub(crate) fn zero() -> Self {
-        Self { hi: T::zero(), lo: T::zero() }
+        Self {
+            hi: T::zero(),
+            lo: T::zero(),
+        }
     }
 
     pub(crate) fn add(self, x: T) -> Self {
         let sum = two_sum(self.hi, x);
         let low = self.lo + sum.lo;
         let hi = sum.hi + low;
-        Self { hi, lo: low - (hi - sum.hi) }
+        Self {
+            hi,
+            lo: low - (hi - sum.hi),
+        }
     }
 
     pub(crate) fn add_twofold(self, other: Self) -> Self {
@@ -64,9 +76,15 @@ mod tests {
     fn cancelling_products_keep_their_difference() {
         // (1 + u)(1 - u) - 1 = -u², far below the rounding of the product itself.
         let u = 2f64.powi(-40);
-        let difference = Twofold::zero().add_product(1.0 + u, 1.0 - u).add(-1.0).value();
+        let difference = Twofold::zero()
+            .add_product(1.0 + u, 1.0 - u)
+            .add(-1.0)
+            .value();
         assert_eq!(difference, -u * u);
-        let triple = Twofold::<f32>::zero().add_triple(3.0, 5.0, 7.0).add(-105.0).value();
+        let triple = Twofold::<f32>::zero()
+            .add_triple(3.0, 5.0, 7.0)
+            .add(-105.0)
+            .value();
         assert_eq!(triple, 0.0);
     }
 }

@@ -21,9 +21,14 @@ impl<T: RealField + Copy> Stress<SecondPiolaKirchhoff, T> {
     /// assert_eq!(s.to_cauchy(&twice)?.tensor_pa()[(0, 0)], 50.0); // 2·100·2/8
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn to_cauchy(&self, deformation: &Deformation<T>) -> Result<Stress<Cauchy, T>, ElasticityError> {
+    pub fn to_cauchy(
+        &self,
+        deformation: &Deformation<T>,
+    ) -> Result<Stress<Cauchy, T>, ElasticityError> {
         let (f, j) = checked(deformation)?;
-        Ok(Stress::new(symmetric(&(f * self.tensor * f.transpose() / j))))
+        Ok(Stress::new(symmetric(
+            &(f * self.tensor * f.transpose() / j),
+        )))
     }
 
     /// P = F S.
@@ -41,7 +46,10 @@ impl<T: RealField + Copy> Stress<SecondPiolaKirchhoff, T> {
     ///
     /// # Errors
     /// See the impl.
-    pub fn to_biot(&self, deformation: &Deformation<T>) -> Result<Stress<BiotStress, T>, ElasticityError> {
+    pub fn to_biot(
+        &self,
+        deformation: &Deformation<T>,
+    ) -> Result<Stress<BiotStress, T>, ElasticityError> {
         let stretch = Biot.of(deformation)? + Matrix3::identity();
         Ok(Stress::new(symmetric(&(stretch * self.tensor))))
     }
@@ -57,8 +65,12 @@ impl<T: RealField + Copy> Stress<Cauchy, T> {
         deformation: &Deformation<T>,
     ) -> Result<Stress<SecondPiolaKirchhoff, T>, ElasticityError> {
         let (_, j) = checked(deformation)?;
-        let inverse = deformation.inverse().ok_or(ElasticityError::SingularDeformation)?;
-        Ok(Stress::new(symmetric(&(inverse * self.tensor * inverse.transpose() * j))))
+        let inverse = deformation
+            .inverse()
+            .ok_or(ElasticityError::SingularDeformation)?;
+        Ok(Stress::new(symmetric(
+            &(inverse * self.tensor * inverse.transpose() * j),
+        )))
     }
 
     /// τ = J σ.
@@ -78,7 +90,10 @@ impl<T: RealField + Copy> Stress<Kirchhoff, T> {
     ///
     /// # Errors
     /// As [`Stress::to_second`].
-    pub fn to_cauchy(&self, deformation: &Deformation<T>) -> Result<Stress<Cauchy, T>, ElasticityError> {
+    pub fn to_cauchy(
+        &self,
+        deformation: &Deformation<T>,
+    ) -> Result<Stress<Cauchy, T>, ElasticityError> {
         Ok(Stress::new(self.tensor / checked(deformation)?.1))
     }
 }
@@ -93,12 +108,16 @@ impl<T: RealField + Copy> Stress<FirstPiolaKirchhoff, T> {
         deformation: &Deformation<T>,
     ) -> Result<Stress<SecondPiolaKirchhoff, T>, ElasticityError> {
         upright(deformation)?;
-        let inverse = deformation.inverse().ok_or(ElasticityError::SingularDeformation)?;
+        let inverse = deformation
+            .inverse()
+            .ok_or(ElasticityError::SingularDeformation)?;
         Ok(Stress::new(symmetric(&(inverse * self.tensor))))
     }
 }
 
-fn checked<T: RealField + Copy>(deformation: &Deformation<T>) -> Result<(Matrix3<T>, T), ElasticityError> {
+fn checked<T: RealField + Copy>(
+    deformation: &Deformation<T>,
+) -> Result<(Matrix3<T>, T), ElasticityError> {
     upright(deformation)?;
     Ok((deformation.deformation_gradient(), deformation.jacobian()))
 }

@@ -27,7 +27,11 @@ pub fn uniaxial_second_piola_pa<T: RealField + Copy>(
     positive(widen(area_m2), Quantity::ContactArea)?;
     let found = finite(widen(squeeze), Quantity::Strain)?;
     if found >= 0.5 {
-        return Err(ElasticityError::OutOfRange { quantity: Quantity::Strain, found, limit: 0.5 });
+        return Err(ElasticityError::OutOfRange {
+            quantity: Quantity::Strain,
+            found,
+            limit: 0.5,
+        });
     }
     Ok(force_n / area_m2 / (T::one() - squeeze - squeeze).sqrt())
 }
@@ -59,7 +63,10 @@ pub fn secant_modulus_pa<M: StressMeasure, T: RealField + Copy>(
     }
     let ratio = s / e;
     if ratio <= T::zero() {
-        return Err(ElasticityError::OppositeSigns { stress_pa: widen(s), strain: widen(e) });
+        return Err(ElasticityError::OppositeSigns {
+            stress_pa: widen(s),
+            strain: widen(e),
+        });
     }
     Ok(ratio)
 }
@@ -96,5 +103,7 @@ pub fn saint_venant_kirchhoff<T: RealField + Copy>(
     let twice_mu = youngs_modulus_pa / (one + nu);
     let lambda = twice_mu * nu / (one - nu - nu);
     let e = strain.tensor;
-    Ok(Stress::new(Matrix3::from_diagonal_element(lambda * e.trace()) + e * twice_mu))
+    Ok(Stress::new(
+        Matrix3::from_diagonal_element(lambda * e.trace()) + e * twice_mu,
+    ))
 }

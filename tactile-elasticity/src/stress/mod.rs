@@ -29,7 +29,8 @@ mod measure;
 
 pub use law::{saint_venant_kirchhoff, secant_modulus_pa, uniaxial_second_piola_pa};
 pub use measure::{
-    BiotStress, Cauchy, FirstPiolaKirchhoff, Gradient, Kirchhoff, SecondPiolaKirchhoff, StressMeasure,
+    BiotStress, Cauchy, FirstPiolaKirchhoff, Gradient, Kirchhoff, SecondPiolaKirchhoff,
+    StressMeasure,
 };
 
 use crate::error::ElasticityError;
@@ -82,7 +83,10 @@ impl<M: StrainMeasure<T> + Default, T: RealField + Copy> Strain<M, T> {
     /// # Errors
     /// As [`StrainMeasure::of`].
     pub fn of(deformation: &Deformation<T>) -> Result<Self, ElasticityError> {
-        Ok(Self { tensor: M::default().of(deformation)?, measure: PhantomData })
+        Ok(Self {
+            tensor: M::default().of(deformation)?,
+            measure: PhantomData,
+        })
     }
 }
 
@@ -96,7 +100,10 @@ impl<M, T: RealField + Copy> Strain<M, T> {
 impl<M, T: RealField + Copy> Stress<M, T> {
     /// A tensor (Pa) said to be of this measure.
     pub fn new(tensor_pa: Matrix3<T>) -> Self {
-        Self { tensor: tensor_pa, measure: PhantomData }
+        Self {
+            tensor: tensor_pa,
+            measure: PhantomData,
+        }
     }
 
     /// The tensor in Pa.

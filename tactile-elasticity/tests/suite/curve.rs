@@ -12,7 +12,11 @@ const NU: f64 = 0.5;
 const R: f64 = 2e-3;
 
 fn sphere(thickness_m: Option<f64>) -> Indenter {
-    Indenter::Sphere { radius_m: R, thickness_m, bond: Bond::Bonded }
+    Indenter::Sphere {
+        radius_m: R,
+        thickness_m,
+        bond: Bond::Bonded,
+    }
 }
 
 /// Force of the law `f` beyond contact at 0.3 mm, 200 positions up to 0.3 mm deep, offset and noise added.
@@ -45,9 +49,19 @@ fn layer(d: f64) -> f64 {
 fn clean_curves_are_found_exactly() {
     for offset in [0.0, 0.01] {
         let c = curve(hertz, offset, 0.0, 0);
-        let fit =
-            fit_curve(&c, &sphere(None), NU, EstimatorKind::HertzSphere, &CurveOptions::default()).unwrap();
-        assert!((fit.youngs_modulus_pa / E - 1.0).abs() < 1e-6, "{}", fit.youngs_modulus_pa);
+        let fit = fit_curve(
+            &c,
+            &sphere(None),
+            NU,
+            EstimatorKind::HertzSphere,
+            &CurveOptions::default(),
+        )
+        .unwrap();
+        assert!(
+            (fit.youngs_modulus_pa / E - 1.0).abs() < 1e-6,
+            "{}",
+            fit.youngs_modulus_pa
+        );
         assert!((fit.contact_point_m - 3e-4).abs() < 1e-9 && (fit.offset_n - offset).abs() < 1e-8);
     }
 }
@@ -58,8 +72,14 @@ fn intervals_cover() {
     let covered = (0..200)
         .filter(|&seed| {
             let c = curve(hertz, 0.002, 0.01, seed);
-            let fit = fit_curve(&c, &sphere(None), NU, EstimatorKind::HertzSphere, &CurveOptions::default())
-                .unwrap();
+            let fit = fit_curve(
+                &c,
+                &sphere(None),
+                NU,
+                EstimatorKind::HertzSphere,
+                &CurveOptions::default(),
+            )
+            .unwrap();
             fit.interval_95.contains(E)
         })
         .count();
@@ -79,7 +99,11 @@ fn the_law_is_chosen_that_made_the_curve() {
         "{}",
         chosen.chosen().youngs_modulus_pa
     );
-    let half_space = chosen.fits.iter().find(|f| f.model == EstimatorKind::HertzSphere).unwrap();
+    let half_space = chosen
+        .fits
+        .iter()
+        .find(|f| f.model == EstimatorKind::HertzSphere)
+        .unwrap();
     assert!(half_space.youngs_modulus_pa > 1.1 * E);
     let only = auto(&curve(hertz, 0.0, 0.002, 2), &sphere(None));
     assert_eq!(only.reason, SelectionReason::OnlyCandidate);
@@ -108,7 +132,14 @@ fn a_thin_layer_needs_the_integral_equation() {
     let z: Vec<f64> = points.iter().map(|p| p.0).collect();
     let f: Vec<f64> = points.iter().map(|p| p.1).collect();
     let c = IndentationCurve::new(&z, &f).unwrap();
-    let found = select_model(&c, &sphere(Some(h)), NU, Model::Auto, &CurveOptions::default()).unwrap();
+    let found = select_model(
+        &c,
+        &sphere(Some(h)),
+        NU,
+        Model::Auto,
+        &CurveOptions::default(),
+    )
+    .unwrap();
     assert_eq!(found.chosen().model, EstimatorKind::LayerIntegralEquation);
     assert!(matches!(found.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
     assert!(
@@ -116,10 +147,20 @@ fn a_thin_layer_needs_the_integral_equation() {
         "{}",
         found.chosen().youngs_modulus_pa
     );
-    let published =
-        fit_curve(&c, &sphere(Some(h)), NU, EstimatorKind::LayerPublishedSeries, &CurveOptions::default());
+    let published = fit_curve(
+        &c,
+        &sphere(Some(h)),
+        NU,
+        EstimatorKind::LayerPublishedSeries,
+        &CurveOptions::default(),
+    );
     let published = published.unwrap();
-    assert!(published.warnings.iter().any(|w| matches!(w, Warning::ThinLayer { .. })));
+    assert!(
+        published
+            .warnings
+            .iter()
+            .any(|w| matches!(w, Warning::ThinLayer { .. }))
+    );
     assert!(published.residual_autocorrelation > 0.5);
 }
 
@@ -148,23 +189,53 @@ fn squeezed_balls_are_tataras() {
 #[test]
 fn bad_curves_are_named() {
     use ElasticityError as Bad;
-    assert!(matches!(IndentationCurve::new(&[0.0; 3], &[0.0; 4]), Err(Bad::LengthMismatch { .. })));
+    assert!(matches!(
+        IndentationCurve::new(&[0.0; 3], &[0.0; 4]),
+        Err(Bad::LengthMismatch { .. })
+    ));
     assert!(matches!(
         IndentationCurve::new(&[0.0; 3], &[0.0; 3]),
-        Err(Bad::TooFewLoads { expected: 6, found: 3 })
+        Err(Bad::TooFewLoads {
+            expected: 6,
+            found: 3
+        })
     ));
     let z = [0.0, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 6e-4, 7e-4];
-    assert!(matches!(IndentationCurve::new(&z, &[1.0; 8]), Err(Bad::EqualLoads)));
+    assert!(matches!(
+        IndentationCurve::new(&z, &[1.0; 8]),
+        Err(Bad::EqualLoads)
+    ));
     let mut f = z.map(|z| z * 10.0);
     f[3] = f64::NAN;
-    assert!(matches!(IndentationCurve::new(&z, &f), Err(Bad::NotFinite { .. })));
+    assert!(matches!(
+        IndentationCurve::new(&z, &f),
+        Err(Bad::NotFinite { .. })
+    ));
     // Force that falls with depth has no modulus.
     let falling = IndentationCurve::new(&z, &z.map(|z| -z)).unwrap();
-    let options = CurveOptions { baseline: Baseline::Zero, ..CurveOptions::default() };
-    assert!(fit_curve(&falling, &sphere(None), NU, EstimatorKind::HertzSphere, &options).is_err());
+    let options = CurveOptions {
+        baseline: Baseline::Zero,
+        ..CurveOptions::default()
+    };
+    assert!(
+        fit_curve(
+            &falling,
+            &sphere(None),
+            NU,
+            EstimatorKind::HertzSphere,
+            &options
+        )
+        .is_err()
+    );
     let rising = IndentationCurve::new(&z, &z).unwrap();
     assert!(matches!(
-        fit_curve(&rising, &sphere(None), 0.7, EstimatorKind::HertzSphere, &options),
+        fit_curve(
+            &rising,
+            &sphere(None),
+            0.7,
+            EstimatorKind::HertzSphere,
+            &options
+        ),
         Err(Bad::PoissonRatio { .. })
     ));
     assert!(fit_curve(&rising, &sphere(None), NU, EstimatorKind::Cone, &options).is_err());

@@ -6,16 +6,26 @@ use tactile_elasticity::ElasticityError;
 use tactile_elasticity::contact::*;
 
 fn of_kind(kind: &str) -> Vec<Value> {
-    reference("hertz.json").unwrap_or_default().into_iter().filter(|c| c["kind"] == kind).collect()
+    reference("hertz.json")
+        .unwrap_or_default()
+        .into_iter()
+        .filter(|c| c["kind"] == kind)
+        .collect()
 }
 
 fn close(case: &Value, what: &str, found: f64, expected: f64, tolerance: f64) {
     let gap = (found - expected).abs() / if expected == 0.0 { 1.0 } else { expected.abs() };
-    assert!(gap <= tolerance, "{} {what}: {found:e} for {expected:e}, off by {gap:.1e}", case["id"]);
+    assert!(
+        gap <= tolerance,
+        "{} {what}: {found:e} for {expected:e}, off by {gap:.1e}",
+        case["id"]
+    );
 }
 
 fn body(modulus: &Value, nu: &Value) -> Body<f64> {
-    modulus.as_f64().map_or_else(Body::rigid, |e| Body::elastic(e, number(nu)).unwrap())
+    modulus
+        .as_f64()
+        .map_or_else(Body::rigid, |e| Body::elastic(e, number(nu)).unwrap())
 }
 
 #[test]
@@ -23,10 +33,17 @@ fn contacts() {
     for case in of_kind("hertz") {
         let radius = relative_radius_m(optional(&case["R1"]), optional(&case["R2"]));
         if case["status"] == "conforming" {
-            assert!(matches!(radius, Err(ElasticityError::Conforming { .. })), "{}", case["id"]);
+            assert!(
+                matches!(radius, Err(ElasticityError::Conforming { .. })),
+                "{}",
+                case["id"]
+            );
             continue;
         }
-        let (one, other) = (body(&case["E1"], &case["nu1"]), body(&case["E2"], &case["nu2"]));
+        let (one, other) = (
+            body(&case["E1"], &case["nu1"]),
+            body(&case["E2"], &case["nu2"]),
+        );
         let contact = HertzContact::from_force(
             number(&case["F"]),
             radius.unwrap(),
@@ -56,8 +73,15 @@ fn inverses() {
         let from_delta = |d| reduced_modulus_from_indentation(force, radius, d);
         for (key, input) in [("from_a", "a"), ("from_delta", "delta")] {
             let expected = &case["expected"][key];
-            let Some(x) = case[input].as_f64().filter(|_| !expected.is_null()) else { continue };
-            let reduced = if key == "from_a" { from_a(x) } else { from_delta(x) }.unwrap();
+            let Some(x) = case[input].as_f64().filter(|_| !expected.is_null()) else {
+                continue;
+            };
+            let reduced = if key == "from_a" {
+                from_a(x)
+            } else {
+                from_delta(x)
+            }
+            .unwrap();
             close(&case, "E*", reduced, number(&expected["E_star"]), 1e-12);
             match sample_modulus_pa(reduced, nu, other) {
                 Ok(e2) => {
@@ -67,7 +91,11 @@ fn inverses() {
                     close(&case, "E2", e2, number(&expected["E2"]), tolerance);
                 }
                 Err(ElasticityError::StifferThanResolvable { .. }) => {
-                    assert_eq!(expected["status"], "stiffer_than_indenter", "{}", case["id"]);
+                    assert_eq!(
+                        expected["status"], "stiffer_than_indenter",
+                        "{}",
+                        case["id"]
+                    );
                 }
                 Err(e) => panic!("{}: {e}", case["id"]),
             }
@@ -78,7 +106,11 @@ fn inverses() {
 #[test]
 fn surfaces() {
     for case in of_kind("surface") {
-        let (a, p0, e) = (number(&case["a"]), number(&case["p0"]), number(&case["E_star"]));
+        let (a, p0, e) = (
+            number(&case["a"]),
+            number(&case["p0"]),
+            number(&case["E_star"]),
+        );
         for (i, r) in case["r"].as_array().unwrap().iter().enumerate() {
             let found = hertz_surface_displacement_m(number(r), a, p0, e);
             close(&case, "u", found, number(&case["expected"]["u"][i]), 1e-12);
@@ -98,8 +130,20 @@ fn stacks() {
             })
             .collect();
         let stack = Waveguide::new(layers).unwrap();
-        close(&case, "series", stack.series_modulus_pa(), number(&case["expected"]["series_E"]), 1e-12);
-        close(&case, "parallel", stack.parallel_modulus_pa(), number(&case["expected"]["parallel_E"]), 1e-12);
+        close(
+            &case,
+            "series",
+            stack.series_modulus_pa(),
+            number(&case["expected"]["series_E"]),
+            1e-12,
+        );
+        close(
+            &case,
+            "parallel",
+            stack.parallel_modulus_pa(),
+            number(&case["expected"]["parallel_E"]),
+            1e-12,
+        );
         match case["expected"]["confined_M"].as_f64() {
             Some(m) => close(&case, "confined", stack.confined_modulus_pa(), m, 1e-12),
             None => assert!(stack.confined_modulus_pa().is_infinite()),
@@ -110,39 +154,93 @@ fn stacks() {
 #[test]
 fn punches_and_cones() {
     for case in of_kind("punch") {
-        let (e, d, a) = (number(&case["E_star"]), number(&case["delta"]), number(&case["a"]));
+        let (e, d, a) = (
+            number(&case["E_star"]),
+            number(&case["delta"]),
+            number(&case["a"]),
+        );
         let expected = |key: &str| number(&case["expected"][key]);
         let flat = flat_punch(e, a, d).unwrap();
         close(&case, "flat F", flat.force_n, expected("flat_F"), 1e-12);
-        close(&case, "flat p", flat.mean_pressure_pa, expected("flat_p_mean"), 1e-12);
-        let cone = cone(e, tangent_of_degrees(number(&case["half_angle_deg"])).unwrap(), d).unwrap();
+        close(
+            &case,
+            "flat p",
+            flat.mean_pressure_pa,
+            expected("flat_p_mean"),
+            1e-12,
+        );
+        let cone = cone(
+            e,
+            tangent_of_degrees(number(&case["half_angle_deg"])).unwrap(),
+            d,
+        )
+        .unwrap();
         close(&case, "cone F", cone.force_n, expected("cone_F"), 1e-12);
-        close(&case, "cone a", cone.contact_radius_m, expected("cone_a"), 1e-12);
-        close(&case, "cone p", cone.mean_pressure_pa, expected("cone_p_mean"), 1e-12);
+        close(
+            &case,
+            "cone a",
+            cone.contact_radius_m,
+            expected("cone_a"),
+            1e-12,
+        );
+        close(
+            &case,
+            "cone p",
+            cone.mean_pressure_pa,
+            expected("cone_p_mean"),
+            1e-12,
+        );
     }
 }
 
 #[test]
 fn layers() {
     for case in of_kind("layer") {
-        let (e, nu, r, h) = (number(&case["E"]), number(&case["nu"]), number(&case["R"]), number(&case["h"]));
-        let bond = if case["bonded"].as_bool().unwrap() { Bond::Bonded } else { Bond::Free };
+        let (e, nu, r, h) = (
+            number(&case["E"]),
+            number(&case["nu"]),
+            number(&case["R"]),
+            number(&case["h"]),
+        );
+        let bond = if case["bonded"].as_bool().unwrap() {
+            Bond::Bonded
+        } else {
+            Bond::Free
+        };
         let published = LayerSeries::published(bond, nu).unwrap();
         for (k, c) in published.coefficients.iter().enumerate() {
-            close(&case, "coefficient", *c, number(&case["expected"]["coefficients"][k]), 1e-12);
+            close(
+                &case,
+                "coefficient",
+                *c,
+                number(&case["expected"]["coefficients"][k]),
+                1e-12,
+            );
         }
         for row in case["expected"]["rows"].as_array().unwrap() {
             let d = number(&row["delta"]);
             let chi = (r * d).sqrt() / h;
             close(&case, "chi", chi, number(&row["chi"]), 1e-12);
-            close(&case, "correction", published.force_ratio(chi), number(&row["correction"]), 1e-12);
+            close(
+                &case,
+                "correction",
+                published.force_ratio(chi),
+                number(&row["correction"]),
+                1e-12,
+            );
             let hertz = 4.0 / 3.0 * e / (1.0 - nu * nu) * r.sqrt() * d.powf(1.5);
             close(&case, "F_hertz", hertz, number(&row["F_hertz"]), 1e-12);
-            close(&case, "F", hertz * published.force_ratio(chi), number(&row["F"]), 1e-12);
+            close(
+                &case,
+                "F",
+                hertz * published.force_ratio(chi),
+                number(&row["F"]),
+                1e-12,
+            );
             if let Some(modulus) = row["E_from_F_of_1N"].as_f64() {
                 let reduced = reduced_modulus_from_indentation(1.0, r, d).unwrap();
-                let found =
-                    sample_modulus_pa(reduced, nu, Body::rigid()).unwrap() / published.force_ratio(chi);
+                let found = sample_modulus_pa(reduced, nu, Body::rigid()).unwrap()
+                    / published.force_ratio(chi);
                 close(&case, "E", found, modulus, 1e-12);
             }
         }
@@ -153,7 +251,11 @@ fn layers() {
 #[test]
 fn layers_solved() {
     for case in of_kind("layer") {
-        let bond = if case["bonded"].as_bool().unwrap() { Bond::Bonded } else { Bond::Free };
+        let bond = if case["bonded"].as_bool().unwrap() {
+            Bond::Bonded
+        } else {
+            Bond::Free
+        };
         let kernel = LayerKernel::new(bond, number(&case["nu"])).unwrap();
         let expected = &case["integral_equation"];
         let (m0, m2) = kernel.moments();
@@ -161,12 +263,26 @@ fn layers_solved() {
         close(&case, "m2", m2, number(&expected["m2"]), 1e-12);
         let series = LayerSeries::corrected(&kernel, 1.0);
         for (k, c) in series.coefficients.iter().enumerate() {
-            close(&case, "series", *c, number(&expected["series_exact"][k]), 1e-9);
+            close(
+                &case,
+                "series",
+                *c,
+                number(&expected["series_exact"][k]),
+                1e-9,
+            );
         }
         for sample in expected["samples"].as_array().unwrap() {
-            let contact = LayerEquation::new(&kernel).solve(number(&sample["a_over_h"])).unwrap();
+            let contact = LayerEquation::new(&kernel)
+                .solve(number(&sample["a_over_h"]))
+                .unwrap();
             close(&case, "chi", contact.chi, number(&sample["chi"]), 1e-9);
-            close(&case, "F ratio", contact.force_ratio, number(&sample["F_ratio"]), 1e-9);
+            close(
+                &case,
+                "F ratio",
+                contact.force_ratio,
+                number(&sample["F_ratio"]),
+                1e-9,
+            );
             close(
                 &case,
                 "series ratio",

@@ -2,17 +2,25 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
-use tactile_elasticity::contact::{Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa};
+use tactile_elasticity::contact::{
+    Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa,
+};
 use tactile_elasticity::field::{Averaging, StrainField};
 use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
 use tactile_elasticity::strain::{
-    Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, Invariants, PrincipalStretches,
-    StrainMeasure, green_lagrange_into,
+    Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, Invariants,
+    PrincipalStretches, StrainMeasure, green_lagrange_into,
 };
 use tactile_elasticity::{ElasticityError, Quantity};
 
 fn measures() -> [&'static dyn StrainMeasure<f64>; 5] {
-    [&GreenLagrange, &EulerAlmansi, &Hencky, &Biot, &Infinitesimal]
+    [
+        &GreenLagrange,
+        &EulerAlmansi,
+        &Hencky,
+        &Biot,
+        &Infinitesimal,
+    ]
 }
 
 fn rotation() -> impl Strategy<Value = Matrix3<f64>> {
@@ -107,7 +115,11 @@ fn a_batch_has_the_bits_of_one_at_a_time() {
             let x = f64::from(i);
             // Every third a large rotation with little strain, for the careful path.
             let q = Rotation3::from_scaled_axis(Vector3::new(0.3 * x, 1.0, 0.1)).into_inner();
-            if i % 3 == 0 { q - Matrix3::identity() } else { q * 1e-3 * x }
+            if i % 3 == 0 {
+                q - Matrix3::identity()
+            } else {
+                q * 1e-3 * x
+            }
         })
         .collect();
     let mut batch = vec![Matrix3::zeros(); 300];
@@ -124,7 +136,11 @@ fn a_batch_has_the_bits_of_one_at_a_time() {
     let missing = green_lagrange_into(&gradients, &mut batch[1..]).unwrap_err();
     assert_eq!(
         missing,
-        ElasticityError::LengthMismatch { quantity: Quantity::Strain, expected: 300, found: 299 }
+        ElasticityError::LengthMismatch {
+            quantity: Quantity::Strain,
+            expected: 300,
+            found: 299
+        }
     );
 }
 
@@ -150,37 +166,58 @@ fn bad_gradients_are_named() {
         let error = measure.strain(&broken).unwrap_err();
         assert_eq!(
             error,
-            ElasticityError::NotFinite { quantity: Quantity::DeformationGradient },
+            ElasticityError::NotFinite {
+                quantity: Quantity::DeformationGradient
+            },
             "{}",
             measure.name()
         );
     }
-    let flat = Deformation::from_deformation_gradient(Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0)));
-    assert_eq!(Hencky.of(&flat).unwrap_err(), ElasticityError::SingularDeformation);
+    let flat = Deformation::from_deformation_gradient(Matrix3::from_diagonal(&Vector3::new(
+        1.0, 1.0, 0.0,
+    )));
+    assert_eq!(
+        Hencky.of(&flat).unwrap_err(),
+        ElasticityError::SingularDeformation
+    );
     let field = StrainField::from_gradients(&[broken], None, &GreenLagrange);
     assert!(matches!(field, Err(ElasticityError::NotFinite { .. })));
     let weights = StrainField::from_gradients(&[Matrix3::zeros()], Some(&[-1.0]), &GreenLagrange);
-    assert!(matches!(weights, Err(ElasticityError::Negative { quantity: Quantity::Weight, .. })));
+    assert!(matches!(
+        weights,
+        Err(ElasticityError::Negative {
+            quantity: Quantity::Weight,
+            ..
+        })
+    ));
 }
 
 #[test]
 fn robust_averages_withstand_wild_points() {
-    let mut gradients: Vec<_> =
-        (0..99).map(|i| Matrix3::from_diagonal_element(0.01 + 1e-4 * f64::from(i % 11 - 5))).collect();
+    let mut gradients: Vec<_> = (0..99)
+        .map(|i| Matrix3::from_diagonal_element(0.01 + 1e-4 * f64::from(i % 11 - 5)))
+        .collect();
     gradients[7] = Matrix3::from_diagonal_element(5.0);
     gradients[40] = Matrix3::from_diagonal_element(3.0);
     let field = StrainField::from_gradients(&gradients, None, &Infinitesimal).unwrap();
     assert!(field.summary().mean[(0, 0)] > 0.08);
     for averaging in [Averaging::Huber, Averaging::Median] {
         let summary = field.summary_with(averaging);
-        assert!((summary.mean[(0, 0)] - 0.01).abs() < 2e-5, "{averaging:?} {}", summary.mean[(0, 0)]);
+        assert!(
+            (summary.mean[(0, 0)] - 0.01).abs() < 2e-5,
+            "{averaging:?} {}",
+            summary.mean[(0, 0)]
+        );
         assert!(summary.spread[(0, 0)] < 6e-4 && summary.standard_error[(0, 0)] < 1e-4);
     }
 }
 
 #[test]
 fn weights_are_areas() {
-    let gradients = [Matrix3::from_diagonal_element(0.0), Matrix3::from_diagonal_element(0.04)];
+    let gradients = [
+        Matrix3::from_diagonal_element(0.0),
+        Matrix3::from_diagonal_element(0.04),
+    ];
     let field = StrainField::from_gradients(&gradients, Some(&[3.0, 1.0]), &Infinitesimal).unwrap();
     assert!((field.summary().mean[(1, 1)] - 0.01f64).abs() < 1e-17);
 }

@@ -7,7 +7,9 @@ mod worst;
 use nalgebra::Matrix3;
 use serde_json::Value;
 use tactile_elasticity::contact::HertzContact;
-use tactile_elasticity::strain::{Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, StrainMeasure};
+use tactile_elasticity::strain::{
+    Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, StrainMeasure,
+};
 use worst::{Worst, cases, rows};
 
 fn matrix(value: &Value) -> Matrix3<f64> {
@@ -28,16 +30,27 @@ fn strains_have_all_their_digits() {
         ("hencky", &Hencky),
     ];
     for case in cases(include_str!("../reference/strain.json")) {
-        let (name, condition) = (case["name"].as_str().unwrap(), case["condition"].as_f64().unwrap());
+        let (name, condition) = (
+            case["name"].as_str().unwrap(),
+            case["condition"].as_f64().unwrap(),
+        );
         let deformation = Deformation::from_deformation_gradient(matrix(&case["f"]));
         for (key, measure) in measures {
             let expected = matrix(&case[key]);
             let error = (measure.of(&deformation).unwrap() - expected).amax() / expected.amax();
-            table.enter(&format!("{key}, {name}"), error / (f64::EPSILON * condition), ALLOWED);
+            table.enter(
+                &format!("{key}, {name}"),
+                error / (f64::EPSILON * condition),
+                ALLOWED,
+            );
         }
         let jacobian = case["jacobian"].as_f64().unwrap();
         let error = (deformation.jacobian() / jacobian - 1.0).abs();
-        table.enter(&format!("J, {name}"), error / (f64::EPSILON * condition), ALLOWED);
+        table.enter(
+            &format!("J, {name}"),
+            error / (f64::EPSILON * condition),
+            ALLOWED,
+        );
     }
     hertz(&mut table);
     table.finish();
@@ -54,7 +67,11 @@ fn hertz(table: &mut Worst) {
             ("peak_pressure", contact.peak_pressure_pa),
         ] {
             let units = (found / at(key) - 1.0).abs() / f64::EPSILON;
-            table.enter(&format!("Hertz {key}, {}", case["name"].as_str().unwrap()), units, 8.0);
+            table.enter(
+                &format!("Hertz {key}, {}", case["name"].as_str().unwrap()),
+                units,
+                8.0,
+            );
         }
     }
 }

@@ -6,12 +6,13 @@ use crate::common::{number, reference};
 use nalgebra::Matrix3;
 use serde_json::Value;
 use tactile_elasticity::strain::{
-    Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, PrincipalStretches, StrainMeasure,
-    von_mises_strain,
+    Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, PrincipalStretches,
+    StrainMeasure, von_mises_strain,
 };
 
 fn matrix(v: &Value) -> Option<Matrix3<f64>> {
-    v.as_array().map(|rows| Matrix3::from_fn(|i, j| number(&rows[i][j])))
+    v.as_array()
+        .map(|rows| Matrix3::from_fn(|i, j| number(&rows[i][j])))
 }
 
 fn deformation(case: &Value) -> Deformation<f64> {
@@ -23,7 +24,11 @@ fn deformation(case: &Value) -> Deformation<f64> {
 
 fn tolerance(case: &Value) -> f64 {
     let cond = case["cond_F"].as_f64().unwrap_or(1.0);
-    if cond <= 100.0 { 1e-12 } else { 100.0 * f64::EPSILON * cond }
+    if cond <= 100.0 {
+        1e-12
+    } else {
+        100.0 * f64::EPSILON * cond
+    }
 }
 
 /// Largest error relative to the largest entry.
@@ -35,7 +40,9 @@ fn error(found: &Matrix3<f64>, expected: &Matrix3<f64>) -> f64 {
 
 #[test]
 fn every_measure_of_every_case() {
-    let Some(cases) = reference("strain.json") else { return };
+    let Some(cases) = reference("strain.json") else {
+        return;
+    };
     let measures: [(&str, &dyn StrainMeasure<f64>); 5] = [
         ("green_lagrange", &GreenLagrange),
         ("almansi", &EulerAlmansi),
@@ -53,30 +60,49 @@ fn every_measure_of_every_case() {
                     assert!(e <= 1.0, "{} {key}: {e:.2e} of the tolerance", case["id"]);
                     worst = worst.max(e);
                 }
-                None => assert!(measure.of(&d).is_err(), "{} {key} does not exist", case["id"]),
+                None => assert!(
+                    measure.of(&d).is_err(),
+                    "{} {key} does not exist",
+                    case["id"]
+                ),
             }
         }
     }
-    println!("{} cases, worst error {worst:.2e} of the tolerance", cases.len());
+    println!(
+        "{} cases, worst error {worst:.2e} of the tolerance",
+        cases.len()
+    );
 }
 
 #[test]
 fn every_scalar_of_every_case() {
-    let Some(cases) = reference("strain.json") else { return };
+    let Some(cases) = reference("strain.json") else {
+        return;
+    };
     for case in &cases {
         let (d, expected, tol) = (deformation(case), &case["expected"], tolerance(case));
         // The deviator of a near-dilation is a difference of the tensor's entries: relative to these.
         let deviatoric = |key: &str, e: Matrix3<f64>| {
-            let Some(expected) = expected[key].as_f64() else { return };
+            let Some(expected) = expected[key].as_f64() else {
+                return;
+            };
             let gap = (von_mises_strain(&e) - expected).abs();
-            assert!(gap <= tol * expected.max(e.amax()), "{} {key}: off by {gap:e}", case["id"]);
+            assert!(
+                gap <= tol * expected.max(e.amax()),
+                "{} {key}: off by {gap:e}",
+                case["id"]
+            );
         };
         let check = |key: &str, found: f64, index: Option<usize>| {
             let v = index.map_or(&expected[key], |i| &expected[key][i]);
             let Some(e) = v.as_f64() else { return };
             // A zero of the reference is a zero of the mathematics; rounding may leave an ulp of one.
             let gap = (found - e).abs() / if e == 0.0 { 1.0 } else { e.abs() };
-            assert!(gap <= tol, "{} {key} {index:?}: {found:e} for {e:e}", case["id"]);
+            assert!(
+                gap <= tol,
+                "{} {key} {index:?}: {found:e} for {e:e}",
+                case["id"]
+            );
         };
         check("J", d.jacobian(), None);
         check("J_minus_1", d.volume_change(), None);
@@ -93,7 +119,9 @@ fn every_scalar_of_every_case() {
 #[test]
 fn cauchy_stress_of_every_case() {
     use tactile_elasticity::stress::{SecondPiolaKirchhoff, Stress};
-    let Some(cases) = reference("strain.json") else { return };
+    let Some(cases) = reference("strain.json") else {
+        return;
+    };
     for case in &cases {
         let d = deformation(case);
         let second = Stress::<SecondPiolaKirchhoff, f64>::new(matrix(&case["S"]).expect("S"));
@@ -103,9 +131,17 @@ fn cauchy_stress_of_every_case() {
                 assert!(e <= tolerance(case), "{}: {e:.2e}", case["id"]);
                 if tolerance(case) < 1e-9 {
                     let back = found.to_second(&d).expect("upright");
-                    assert!(error(back.tensor_pa(), second.tensor_pa()) < 1e-9, "{}", case["id"]);
+                    assert!(
+                        error(back.tensor_pa(), second.tensor_pa()) < 1e-9,
+                        "{}",
+                        case["id"]
+                    );
                     let first = second.to_first(&d).unwrap().to_second(&d).unwrap();
-                    assert!(error(first.tensor_pa(), second.tensor_pa()) < 1e-9, "{}", case["id"]);
+                    assert!(
+                        error(first.tensor_pa(), second.tensor_pa()) < 1e-9,
+                        "{}",
+                        case["id"]
+                    );
                     let kirchhoff = found.to_kirchhoff(&d).unwrap().to_cauchy(&d).unwrap();
                     assert!(error(kirchhoff.tensor_pa(), found.tensor_pa()) < 1e-15);
                 }

@@ -12,11 +12,14 @@ use tactile_elasticity::strain::GreenLagrange;
 /// A cloud of points and the gradient of its least-squares affine map: u ↦ Σⱼ uⱼ aⱼᵀ.
 fn cloud() -> (Vec<Point3<f64>>, Vec<Vector3<f64>>) {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let points: Vec<Point3<f64>> =
-        (0..60).map(|_| Point3::from([(); 3].map(|()| rng.random::<f64>() * 2e-3))).collect();
+    let points: Vec<Point3<f64>> = (0..60)
+        .map(|_| Point3::from([(); 3].map(|()| rng.random::<f64>() * 2e-3)))
+        .collect();
     let design = DMatrix::from_fn(60, 4, |i, k| if k == 0 { 1.0 } else { points[i][k - 1] });
     let solve = (design.transpose() * &design).try_inverse().unwrap() * design.transpose();
-    let influence = (0..60).map(|j| Vector3::from_fn(|k, _| solve[(k + 1, j)])).collect();
+    let influence = (0..60)
+        .map(|j| Vector3::from_fn(|k, _| solve[(k + 1, j)]))
+        .collect();
     (points, influence)
 }
 
@@ -29,33 +32,51 @@ fn displacements_through_strain_to_the_modulus() {
     let noise = Vector3::new(2e-6, 2e-6, 5e-6);
     let (force, force_error, area) = (0.03, 2e-4, 1e-5);
     let modulus_of = |force: Estimate<f64>, strain: Estimate<f64>| {
-        let load = LoadState::new(force).with_contact_area(Estimate::exact(area)).with_mean_strain(strain);
+        let load = LoadState::new(force)
+            .with_contact_area(Estimate::exact(area))
+            .with_mean_strain(strain);
         PaperRatio::new().estimate(&[load])
     };
     let gradient = |u: &dyn Fn(usize) -> Vector3<f64>| {
         (0..60).fold(Matrix3::zeros(), |h, j| h + u(j) * influence[j].transpose())
     };
     let strain_of = |h: Matrix3<f64>| {
-        -StrainField::from_gradients(&[h; 60], None, &GreenLagrange).unwrap().summary().mean[(2, 2)]
+        -StrainField::from_gradients(&[h; 60], None, &GreenLagrange)
+            .unwrap()
+            .summary()
+            .mean[(2, 2)]
     };
     let exact = gradient(&|j| squeeze * points[j].coords);
     assert!((exact - squeeze).amax() < 1e-12);
     let covariance = Matrix3::from_diagonal(&noise.component_mul(&noise));
-    let strain_covariance =
-        mean_strain_covariance(&[exact; 60], &[1.0; 60], |_, j| influence[j], &[covariance; 60]).unwrap();
+    let strain_covariance = mean_strain_covariance(
+        &[exact; 60],
+        &[1.0; 60],
+        |_, j| influence[j],
+        &[covariance; 60],
+    )
+    .unwrap();
     let strain = Estimate::new(strain_of(exact), strain_covariance[(2, 2)].sqrt());
     let propagated = modulus_of(Estimate::new(force, force_error), strain).unwrap();
-    let redrawn = Bootstrap { replicates: 4000, seed: 11 }
-        .run(|normal| {
-            let f = Estimate::exact(force + force_error * normal());
-            let shifts: Vec<Vector3<f64>> = (0..60).map(|_| noise.map(|s| s * normal())).collect();
-            let h = gradient(&|j| squeeze * points[j].coords + shifts[j]);
-            modulus_of(f, Estimate::exact(strain_of(h))).ok().map(|m| m.youngs_modulus_pa)
-        })
-        .unwrap();
+    let redrawn = Bootstrap {
+        replicates: 4000,
+        seed: 11,
+    }
+    .run(|normal| {
+        let f = Estimate::exact(force + force_error * normal());
+        let shifts: Vec<Vector3<f64>> = (0..60).map(|_| noise.map(|s| s * normal())).collect();
+        let h = gradient(&|j| squeeze * points[j].coords + shifts[j]);
+        modulus_of(f, Estimate::exact(strain_of(h)))
+            .ok()
+            .map(|m| m.youngs_modulus_pa)
+    })
+    .unwrap();
     let ratio = propagated.standard_error_pa / redrawn.standard_error;
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
-    let interval = [propagated.interval_95.lower, propagated.interval_95.upper.unwrap()];
+    let interval = [
+        propagated.interval_95.lower,
+        propagated.interval_95.upper.unwrap(),
+    ];
     for (one, other) in interval.iter().zip(redrawn.interval_95) {
         // Quantiles of 4000 draws near 2.5 % wander by 7 % of a standard deviation; four of these.
         assert!((one - other).abs() < 0.3 * redrawn.standard_error);
@@ -68,16 +89,35 @@ fn a_calibrations_error_does_not_average_out() {
     let loads: Vec<_> = (1..9)
         .map(|k| {
             let f = 1e-3 * f64::from(k);
-            let a = HertzContact::from_force(f, 4e-3, reduced).unwrap().contact_radius_m;
-            LoadState::new(Estimate::new(f, 0.004 * f)).with_contact_radius(Estimate::new(a, 0.002 * a))
+            let a = HertzContact::from_force(f, 4e-3, reduced)
+                .unwrap()
+                .contact_radius_m;
+            LoadState::new(Estimate::new(f, 0.004 * f))
+                .with_contact_radius(Estimate::new(a, 0.002 * a))
         })
         .collect();
-    let estimator = HertzSphere::new(4e-3, 0.5).unwrap().with_force_scale_error(0.01).unwrap();
+    let estimator = HertzSphere::new(4e-3, 0.5)
+        .unwrap()
+        .with_force_scale_error(0.01)
+        .unwrap();
     let propagated = estimator.estimate(&loads).unwrap();
-    let redrawn = Bootstrap { replicates: 4000, seed: 2 }.modulus(&estimator, &loads, 0.01).unwrap();
+    let redrawn = Bootstrap {
+        replicates: 4000,
+        seed: 2,
+    }
+    .modulus(&estimator, &loads, 0.01)
+    .unwrap();
     let ratio = propagated.standard_error_pa / redrawn.standard_error;
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
     assert!(propagated.standard_error_pa / propagated.youngs_modulus_pa > 0.01);
     // The same seed is the same experiment.
-    assert_eq!(redrawn, Bootstrap { replicates: 4000, seed: 2 }.modulus(&estimator, &loads, 0.01).unwrap());
+    assert_eq!(
+        redrawn,
+        Bootstrap {
+            replicates: 4000,
+            seed: 2
+        }
+        .modulus(&estimator, &loads, 0.01)
+        .unwrap()
+    );
 }

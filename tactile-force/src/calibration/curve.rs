@@ -30,27 +30,37 @@ impl Basis {
                 None => each(k, value, by_v),
                 Some(scale) => each(k, v / scale * value, (value + v * by_v) / scale),
             }
-            let after = [2.0 * t * next[0] - now[0], 2.0 * next[0] + 2.0 * t * next[1] - now[1]];
+            let after = [
+                2.0 * t * next[0] - now[0],
+                2.0 * next[0] + 2.0 * t * next[1] - now[1],
+            ];
             (now, next) = (next, after);
         }
     }
 
     pub(super) fn value(&self, coefficients: &[f64], v: f64) -> f64 {
         let mut sum = 0.0;
-        self.each(v, coefficients.len(), |k, value, _| sum += coefficients[k] * value);
+        self.each(v, coefficients.len(), |k, value, _| {
+            sum += coefficients[k] * value
+        });
         sum
     }
 
     pub(super) fn slope(&self, coefficients: &[f64], v: f64) -> f64 {
         let mut sum = 0.0;
-        self.each(v, coefficients.len(), |k, _, slope| sum += coefficients[k] * slope);
+        self.each(v, coefficients.len(), |k, _, slope| {
+            sum += coefficients[k] * slope
+        });
         sum
     }
 }
 
 pub(super) fn extremes(values: &[f64]) -> [f64; 2] {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    [least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+    [
+        least,
+        values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+    ]
 }
 
 /// The V in [low, high] where a rising function takes the value `target`, by bisection to the last bit of sense.
@@ -64,7 +74,11 @@ pub(super) fn invert(low: f64, high: f64, target: f64, f: impl Fn(f64) -> f64) -
         if middle <= low || middle >= high {
             break;
         }
-        if f(middle) < target { low = middle } else { high = middle }
+        if f(middle) < target {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     Some(0.5 * (low + high))
 }

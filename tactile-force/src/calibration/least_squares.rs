@@ -27,7 +27,11 @@ pub(crate) struct Fit {
 
 impl Fit {
     /// A fit whose curve is not a combination of columns.
-    pub(super) fn without_coefficients(residuals: Vec<f64>, weights: Vec<f64>, residual_sd: f64) -> Self {
+    pub(super) fn without_coefficients(
+        residuals: Vec<f64>,
+        weights: Vec<f64>,
+        residual_sd: f64,
+    ) -> Self {
         Self {
             coefficients: Vec::new(),
             covariance: DMatrix::zeros(0, 0),
@@ -41,7 +45,11 @@ impl Fit {
 }
 
 /// Solves for the coefficients of the design's columns.
-pub(crate) fn solve(design: &DMatrix<f64>, y: &[f64], robustness: Robustness) -> Result<Fit, ForceError> {
+pub(crate) fn solve(
+    design: &DMatrix<f64>,
+    y: &[f64],
+    robustness: Robustness,
+) -> Result<Fit, ForceError> {
     let y = DVector::from_column_slice(y);
     let mut weights = vec![1.0; y.len()];
     let mut coefficients = weighted(design, &y, &weights)?;
@@ -61,7 +69,15 @@ pub(crate) fn solve(design: &DMatrix<f64>, y: &[f64], robustness: Robustness) ->
     let (variance, residual_sd) = error_variance(robustness, &residuals, scale, design.ncols());
     let covariance = inverse_gram(design)? * variance;
     let coefficients = coefficients.iter().copied().collect();
-    Ok(Fit { coefficients, covariance, residuals, weights, residual_sd, iterations, stop })
+    Ok(Fit {
+        coefficients,
+        covariance,
+        residuals,
+        weights,
+        residual_sd,
+        iterations,
+        stop,
+    })
 }
 
 /// Solves again and again with the weights of the last residuals until the curve stands still; returns the robust scale, the
@@ -90,7 +106,11 @@ fn reweighted(
     Ok((scale, SWEEPS, StopReason::IterationLimit))
 }
 
-fn weighted(design: &DMatrix<f64>, y: &DVector<f64>, weights: &[f64]) -> Result<DVector<f64>, ForceError> {
+fn weighted(
+    design: &DMatrix<f64>,
+    y: &DVector<f64>,
+    weights: &[f64],
+) -> Result<DVector<f64>, ForceError> {
     let root = DVector::from_iterator(y.len(), weights.iter().map(|w| w.sqrt()));
     let mut scaled = design.clone();
     for mut column in scaled.column_iter_mut() {
@@ -100,7 +120,8 @@ fn weighted(design: &DMatrix<f64>, y: &DVector<f64>, weights: &[f64]) -> Result<
     let rhs = qr.q().transpose() * y.component_mul(&root);
     let r = qr.r();
     check_rank(&r)?;
-    r.solve_upper_triangular(&rhs).ok_or(ForceError::DegeneratePairs { span: 0.0 })
+    r.solve_upper_triangular(&rhs)
+        .ok_or(ForceError::DegeneratePairs { span: 0.0 })
 }
 
 /// (XᵀX)⁻¹ by QR.
@@ -108,7 +129,9 @@ fn inverse_gram(design: &DMatrix<f64>) -> Result<DMatrix<f64>, ForceError> {
     let r = design.clone().qr().r();
     check_rank(&r)?;
     let identity = DMatrix::identity(r.ncols(), r.ncols());
-    let inverse = r.solve_upper_triangular(&identity).ok_or(ForceError::DegeneratePairs { span: 0.0 })?;
+    let inverse = r
+        .solve_upper_triangular(&identity)
+        .ok_or(ForceError::DegeneratePairs { span: 0.0 })?;
     Ok(&inverse * inverse.transpose())
 }
 
@@ -116,7 +139,11 @@ fn inverse_gram(design: &DMatrix<f64>) -> Result<DMatrix<f64>, ForceError> {
 fn check_rank(r: &DMatrix<f64>) -> Result<(), ForceError> {
     let diagonal = r.diagonal().abs();
     let (least, greatest) = (diagonal.min(), diagonal.max());
-    if least > 1e-13 * greatest { Ok(()) } else { Err(ForceError::DegeneratePairs { span: least }) }
+    if least > 1e-13 * greatest {
+        Ok(())
+    } else {
+        Err(ForceError::DegeneratePairs { span: least })
+    }
 }
 
 /// Normalised median absolute residual, with the p residuals that a fit makes zero left out.
@@ -154,12 +181,23 @@ fn error_variance(robustness: Robustness, residuals: &[f64], scale: f64, p: usiz
         Robustness::Huber => f64::from(r.abs() <= HUBER * scale),
         _ => {
             let q = (r / (TUKEY * scale)).powi(2);
-            if q < 1.0 { (1.0 - q) * (1.0 - 5.0 * q) } else { 0.0 }
+            if q < 1.0 {
+                (1.0 - q) * (1.0 - 5.0 * q)
+            } else {
+                0.0
+            }
         }
     };
     let mean = residuals.iter().map(|&r| slope(r)).sum::<f64>() / n;
-    let spread = residuals.iter().map(|&r| (slope(r) - mean).powi(2)).sum::<f64>() / n;
+    let spread = residuals
+        .iter()
+        .map(|&r| (slope(r) - mean).powi(2))
+        .sum::<f64>()
+        / n;
     let correction = 1.0 + p as f64 / n * spread / (mean * mean);
     let psi2 = residuals.iter().map(|&r| psi(r).powi(2)).sum::<f64>() / freedom;
-    (correction.powi(2) * scale * scale * psi2 / (mean * mean), scale)
+    (
+        correction.powi(2) * scale * scale * psi2 / (mean * mean),
+        scale,
+    )
 }

@@ -5,8 +5,8 @@ use nalgebra::DMatrix;
 use super::curve::extremes;
 use super::report::{self, Parameters, Shape};
 use super::{
-    CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs, least_squares,
-    least_squares::Fit,
+    CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs,
+    least_squares, least_squares::Fit,
 };
 use crate::{Estimate, ForceError, Real};
 
@@ -37,13 +37,25 @@ impl<T: Real> LinearCalibration<T> {
     ///
     /// # Errors
     /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value only.
-    pub fn fit(pairs: &[CalibrationPair<T>], options: &CalibrationOptions) -> Result<Self, ForceError> {
+    pub fn fit(
+        pairs: &[CalibrationPair<T>],
+        options: &CalibrationOptions,
+    ) -> Result<Self, ForceError> {
         let columns = if options.through_origin { 1 } else { 2 };
         check_pairs(pairs, columns)?;
-        let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value.as_f64()).collect();
+        let values: Vec<f64> = pairs
+            .iter()
+            .map(|p| p.integrated_pixel_value.as_f64())
+            .collect();
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
         let (centre, scale) = axis(&values, options.through_origin)?;
-        let entry = |i: usize, j: usize| if j + 1 == columns { (values[i] - centre) / scale } else { 1.0 };
+        let entry = |i: usize, j: usize| {
+            if j + 1 == columns {
+                (values[i] - centre) / scale
+            } else {
+                1.0
+            }
+        };
         let design = DMatrix::from_fn(values.len(), columns, entry);
         let fit = least_squares::solve(&design, &forces, options.robustness)?;
         let line = Line::of(&fit, centre, scale);
@@ -52,8 +64,10 @@ impl<T: Real> LinearCalibration<T> {
             sensitivity: line.slope.0,
             monotone: line.slope.0 > 0.0,
         };
-        let parameters =
-            Parameters { estimates: line.parameters(), degrees_of_freedom: pairs.len() - columns };
+        let parameters = Parameters {
+            estimates: line.parameters(),
+            degrees_of_freedom: pairs.len() - columns,
+        };
         Ok(Self {
             centre: T::nearest(centre),
             level_n: Estimate::nearest(line.level.0, line.level.1),
@@ -92,14 +106,24 @@ impl<T: Real> LinearCalibration<T> {
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
     pub fn offset_n(&self) -> Estimate<T> {
-        Estimate { value: self.force_n(T::zero()), standard_error: self.standard_error_n(T::zero()) }
+        Estimate {
+            value: self.force_n(T::zero()),
+            standard_error: self.standard_error_n(T::zero()),
+        }
     }
 }
 
 /// Centre and half width of the pixel values, which keep the two parameters apart.
 fn axis(values: &[f64], through_origin: bool) -> Result<(f64, f64), ForceError> {
-    let centre = if through_origin { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 };
-    let scale = values.iter().map(|v| (v - centre).abs()).fold(0.0, f64::max);
+    let centre = if through_origin {
+        0.0
+    } else {
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    let scale = values
+        .iter()
+        .map(|v| (v - centre).abs())
+        .fold(0.0, f64::max);
     let reach = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
     if scale <= 4.0 * f64::EPSILON * reach || scale == 0.0 {
         return Err(ForceError::DegeneratePairs { span: scale });
@@ -121,13 +145,25 @@ impl Line {
     fn of(fit: &Fit, centre: f64, scale: f64) -> Self {
         let last = fit.coefficients.len() - 1;
         let through_origin = last == 0;
-        let slope = (fit.coefficients[last] / scale, fit.covariance[(last, last)] / (scale * scale));
+        let slope = (
+            fit.coefficients[last] / scale,
+            fit.covariance[(last, last)] / (scale * scale),
+        );
         let (level, covariance) = if through_origin {
             ((0.0, 0.0), 0.0)
         } else {
-            ((fit.coefficients[0], fit.covariance[(0, 0)]), fit.covariance[(0, 1)] / scale)
+            (
+                (fit.coefficients[0], fit.covariance[(0, 0)]),
+                fit.covariance[(0, 1)] / scale,
+            )
         };
-        Self { centre, level, slope, covariance, through_origin }
+        Self {
+            centre,
+            level,
+            slope,
+            covariance,
+            through_origin,
+        }
     }
 
     /// [offset, slope], or the slope alone through the origin.
@@ -156,7 +192,9 @@ impl<T: Real> StressCalibration<T> for LinearCalibration<T> {
     }
 
     fn standard_error_n(&self, integrated_pixel_value: T) -> T {
-        self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value).max(T::zero()).sqrt()
+        self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value)
+            .max(T::zero())
+            .sqrt()
     }
 
     fn error_covariance_n2(&self, a: T, b: T) -> T {

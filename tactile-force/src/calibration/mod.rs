@@ -70,12 +70,20 @@ pub struct CalibrationPair<T> {
 impl<T> CalibrationPair<T> {
     /// A pair taken while the force was rising.
     pub fn loading(integrated_pixel_value: T, force_n: T) -> Self {
-        Self { integrated_pixel_value, force_n, branch: Branch::Loading }
+        Self {
+            integrated_pixel_value,
+            force_n,
+            branch: Branch::Loading,
+        }
     }
 
     /// A pair taken while the force was falling.
     pub fn unloading(integrated_pixel_value: T, force_n: T) -> Self {
-        Self { integrated_pixel_value, force_n, branch: Branch::Unloading }
+        Self {
+            integrated_pixel_value,
+            force_n,
+            branch: Branch::Unloading,
+        }
     }
 }
 
@@ -220,7 +228,10 @@ pub trait StressCalibration<T: Real>: Send + Sync {
     fn force_covariance_n2(&self, integrated_pixel_values: &[Estimate<T>]) -> Array2<T> {
         let n = integrated_pixel_values.len();
         Array2::from_shape_fn((n, n), |(i, j)| {
-            let (a, b) = (integrated_pixel_values[i.min(j)], integrated_pixel_values[i.max(j)]);
+            let (a, b) = (
+                integrated_pixel_values[i.min(j)],
+                integrated_pixel_values[i.max(j)],
+            );
             let shared = self.error_covariance_n2(a.value, b.value);
             let own = self.sensitivity_n(a.value) * a.standard_error;
             if i == j { shared + own * own } else { shared }
@@ -246,7 +257,10 @@ pub trait StressCalibration<T: Real>: Send + Sync {
         let share = (calibration_n / standard_error).powi(4);
         let degrees = T::nearest(self.report().degrees_of_freedom as f64);
         ForceReading {
-            force_n: Estimate { value: self.force_n(v), standard_error },
+            force_n: Estimate {
+                value: self.force_n(v),
+                standard_error,
+            },
             noise_n,
             calibration_n,
             degrees_of_freedom: (share > T::zero()).then(|| degrees / share),
@@ -258,7 +272,11 @@ pub trait StressCalibration<T: Real>: Send + Sync {
     /// F(V)/(V A). Where V is zero, its limit along the curve, (dF/dV)/A.
     fn stress_per_grey_level_pa(&self, integrated_pixel_value: T, pixel_area_m2: T) -> T {
         let v = integrated_pixel_value;
-        let secant = if v == T::zero() { self.sensitivity_n(v) } else { self.force_n(v) / v };
+        let secant = if v == T::zero() {
+            self.sensitivity_n(v)
+        } else {
+            self.force_n(v) / v
+        };
         secant / pixel_area_m2
     }
 
@@ -271,12 +289,16 @@ pub trait StressCalibration<T: Real>: Send + Sync {
 
 /// Rejects what no fit can use.
 fn check_pairs<T: Real>(pairs: &[CalibrationPair<T>], parameters: usize) -> Result<(), ForceError> {
-    let finite = |p: &CalibrationPair<T>| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
+    let finite =
+        |p: &CalibrationPair<T>| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
     if let Some(index) = pairs.iter().position(|p| !finite(p)) {
         return Err(ForceError::NonFinitePair { index });
     }
     if pairs.len() <= parameters {
-        return Err(ForceError::TooFewPairs { required: parameters + 1, found: pairs.len() });
+        return Err(ForceError::TooFewPairs {
+            required: parameters + 1,
+            found: pairs.len(),
+        });
     }
     Ok(())
 }

@@ -4,8 +4,8 @@ use super::curve::{extremes, invert};
 use super::least_squares::{Fit, robust_weight};
 use super::report::{self, Parameters, Shape};
 use super::{
-    CalibrationOptions, CalibrationPair, CalibrationReport, Robustness, StopReason, StressCalibration,
-    check_pairs,
+    CalibrationOptions, CalibrationPair, CalibrationReport, Robustness, StopReason,
+    StressCalibration, check_pairs,
 };
 use crate::{ForceError, Real};
 
@@ -59,7 +59,10 @@ impl<T: Real> MonotoneCalibration<T> {
     /// # Errors
     /// Fewer than three pairs, a pair that is not finite, all at one pixel value, or forces that fall where the pixel value
     /// rises throughout, so that nothing but a constant is left.
-    pub fn fit(pairs: &[CalibrationPair<T>], options: &CalibrationOptions) -> Result<Self, ForceError> {
+    pub fn fit(
+        pairs: &[CalibrationPair<T>],
+        options: &CalibrationOptions,
+    ) -> Result<Self, ForceError> {
         check_pairs(pairs, 2)?;
         let points = sorted(pairs);
         let values: Vec<f64> = points.iter().map(|p| p.0).collect();
@@ -70,14 +73,25 @@ impl<T: Real> MonotoneCalibration<T> {
         let scale = neighbour_noise(&points, options.robustness);
         let (blocks, iterations, stop) = reweighted(&points, scale, options);
         if blocks.len() < 2 {
-            return Err(ForceError::NotMonotone { from: low, to: high });
+            return Err(ForceError::NotMonotone {
+                from: low,
+                to: high,
+            });
         }
         let knots = knots(&blocks, scale);
         let curve = |v: f64| evaluate(&knots, v).0;
-        let residual = |p: &CalibrationPair<T>| p.force_n.as_f64() - curve(p.integrated_pixel_value.as_f64());
+        let residual =
+            |p: &CalibrationPair<T>| p.force_n.as_f64() - curve(p.integrated_pixel_value.as_f64());
         let residuals: Vec<f64> = pairs.iter().map(residual).collect();
-        let weights = residuals.iter().map(|r| robust_weight(options.robustness, *r, scale)).collect();
-        let fit = Fit { iterations, stop, ..Fit::without_coefficients(residuals, weights, scale) };
+        let weights = residuals
+            .iter()
+            .map(|r| robust_weight(options.robustness, *r, scale))
+            .collect();
+        let fit = Fit {
+            iterations,
+            stop,
+            ..Fit::without_coefficients(residuals, weights, scale)
+        };
         let shape = shape(&points, &knots)?;
         let levels: Vec<_> = blocks.iter().map(|b| (b.force, scale, b.count)).collect();
         let parameters = Parameters::levels(&levels, pairs.len());
@@ -91,8 +105,10 @@ impl<T: Real> MonotoneCalibration<T> {
 
 /// (pixel value, force), in order.
 fn sorted<T: Real>(pairs: &[CalibrationPair<T>]) -> Vec<(f64, f64)> {
-    let mut points: Vec<(f64, f64)> =
-        pairs.iter().map(|p| (p.integrated_pixel_value.as_f64(), p.force_n.as_f64())).collect();
+    let mut points: Vec<(f64, f64)> = pairs
+        .iter()
+        .map(|p| (p.integrated_pixel_value.as_f64(), p.force_n.as_f64()))
+        .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     points
 }
@@ -102,7 +118,9 @@ fn shape(points: &[(f64, f64)], knots: &[Knot<f64>]) -> Result<Shape, ForceError
     let (values, forces): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
     let [low, high] = extremes(&values);
     let curve = |v: f64| evaluate(knots, v).0;
-    let grid: Vec<f64> = (0..=256).map(|k| low + (high - low) * f64::from(k) / 256.0).collect();
+    let grid: Vec<f64> = (0..=256)
+        .map(|k| low + (high - low) * f64::from(k) / 256.0)
+        .collect();
     Ok(Shape {
         linearity_error: report::linearity_error(&values, &forces, &grid, curve)?,
         sensitivity: (curve(high) - curve(low)) / (high - low),
@@ -127,7 +145,11 @@ fn reweighted(
             *w = robust_weight(options.robustness, f - level(&blocks, *v), scale);
         }
         blocks = pool(points, &weights, options.through_origin);
-        if before.iter().zip(&weights).all(|(a, b)| (a - b).abs() < 1e-9) {
+        if before
+            .iter()
+            .zip(&weights)
+            .all(|(a, b)| (a - b).abs() < 1e-9)
+        {
             return (blocks, sweep + 1, StopReason::Converged);
         }
     }
@@ -141,7 +163,11 @@ fn neighbour_noise(points: &[(f64, f64)], robustness: Robustness) -> f64 {
         .windows(3)
         .map(|w| {
             let span = w[2].0 - w[0].0;
-            let b = if span > 0.0 { (w[1].0 - w[0].0) / span } else { 0.5 };
+            let b = if span > 0.0 {
+                (w[1].0 - w[0].0) / span
+            } else {
+                0.5
+            };
             let a = 1.0 - b;
             (a * w[0].1 + b * w[2].1 - w[1].1).powi(2) / (1.0 + a * a + b * b)
         })
@@ -155,18 +181,31 @@ fn neighbour_noise(points: &[(f64, f64)], robustness: Robustness) -> f64 {
 
 /// Pool adjacent violators on points sorted by value.
 fn pool(points: &[(f64, f64)], weights: &[f64], through_origin: bool) -> Vec<Block> {
-    let origin = through_origin.then_some(Block { value: 0.0, force: 0.0, weight: ANCHOR, count: 1 });
+    let origin = through_origin.then_some(Block {
+        value: 0.0,
+        force: 0.0,
+        weight: ANCHOR,
+        count: 1,
+    });
     let mut blocks: Vec<Block> = points
         .iter()
         .zip(weights)
         .filter(|(_, w)| **w > 0.0)
-        .map(|(&(value, force), &weight)| Block { value, force, weight, count: 1 })
+        .map(|(&(value, force), &weight)| Block {
+            value,
+            force,
+            weight,
+            count: 1,
+        })
         .chain(origin)
         .collect();
     blocks.sort_by(|a, b| a.value.total_cmp(&b.value));
     let mut pooled: Vec<Block> = Vec::with_capacity(blocks.len());
     for mut block in blocks {
-        while let Some(last) = pooled.last().filter(|l| l.force >= block.force || l.value == block.value) {
+        while let Some(last) = pooled
+            .last()
+            .filter(|l| l.force >= block.force || l.value == block.value)
+        {
             let weight = last.weight + block.weight;
             block = Block {
                 value: (last.weight * last.value + block.weight * block.value) / weight,
@@ -193,11 +232,16 @@ fn level(blocks: &[Block], v: f64) -> f64 {
 
 /// Slopes after Fritsch & Carlson, by the harmonic mean of Fritsch & Butland (1984).
 fn knots(blocks: &[Block], scale: f64) -> Vec<Knot<f64>> {
-    let secant = |k: usize| (blocks[k + 1].force - blocks[k].force) / (blocks[k + 1].value - blocks[k].value);
+    let secant = |k: usize| {
+        (blocks[k + 1].force - blocks[k].force) / (blocks[k + 1].value - blocks[k].value)
+    };
     let width = |k: usize| blocks[k + 1].value - blocks[k].value;
     let last = blocks.len() - 1;
     let slope = |k: usize| match k {
-        0 => end_slope(secant(0), (last > 1).then(|| (secant(1), width(0), width(1)))),
+        0 => end_slope(
+            secant(0),
+            (last > 1).then(|| (secant(1), width(0), width(1))),
+        ),
         k if k == last => end_slope(
             secant(last - 1),
             (last > 1).then(|| (secant(last - 2), width(last - 1), width(last - 2))),
@@ -219,7 +263,9 @@ fn knots(blocks: &[Block], scale: f64) -> Vec<Knot<f64>> {
 
 /// Three-point slope at an end, kept between zero and three secants.
 fn end_slope(secant: f64, next: Option<(f64, f64, f64)>) -> f64 {
-    let Some((other, h0, h1)) = next else { return secant };
+    let Some((other, h0, h1)) = next else {
+        return secant;
+    };
     (((2.0 * h0 + h1) * secant - h0 * other) / (h0 + h1)).clamp(0.0, 3.0 * secant)
 }
 
@@ -251,7 +297,8 @@ fn hermite<T: Real>(a: &Knot<T>, b: &Knot<T>, v: T) -> (T, T, T) {
     let t = (v - a.value) / h;
     let s = one - t;
     let rise = b.force - a.force;
-    let force = a.force + rise * t * t * (three - two * t) + h * t * s * (a.slope * s - b.slope * t);
+    let force =
+        a.force + rise * t * t * (three - two * t) + h * t * s * (a.slope * s - b.slope * t);
     let slope = T::nearest(6.0) * t * s * rise / h
         + a.slope * s * (one - three * t)
         + b.slope * t * (three * t - two);

@@ -5,7 +5,8 @@ use nalgebra::DMatrix;
 use super::curve::{Basis, extremes, invert};
 use super::report::{self, Parameters, Shape};
 use super::{
-    CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs, least_squares,
+    CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs,
+    least_squares,
 };
 use crate::{ForceError, Real, error::Requirement};
 
@@ -47,9 +48,16 @@ impl<T: Real> PolynomialCalibration<T> {
         options: &CalibrationOptions,
     ) -> Result<Self, ForceError> {
         Requirement::AtLeastOne.check("degree", degree as f64)?;
-        let terms = if options.through_origin { degree } else { degree + 1 };
+        let terms = if options.through_origin {
+            degree
+        } else {
+            degree + 1
+        };
         check_pairs(pairs, terms)?;
-        let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value.as_f64()).collect();
+        let values: Vec<f64> = pairs
+            .iter()
+            .map(|p| p.integrated_pixel_value.as_f64())
+            .collect();
         let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
         let basis = spanned(&values, options.through_origin)?;
         let design = design(&basis, &values, terms);
@@ -98,7 +106,9 @@ impl<T: Real> PolynomialCalibration<T> {
 fn spanned(values: &[f64], through_origin: bool) -> Result<Basis, ForceError> {
     let basis = Basis::over(values, through_origin);
     if basis.half <= 4.0 * f64::EPSILON * basis.middle.abs() {
-        return Err(ForceError::DegeneratePairs { span: 2.0 * basis.half });
+        return Err(ForceError::DegeneratePairs {
+            span: 2.0 * basis.half,
+        });
     }
     Ok(basis)
 }
@@ -122,7 +132,9 @@ fn shape(
     forces: &[f64],
 ) -> Result<Shape, ForceError> {
     let steps = 64 * coefficients.len();
-    let grid: Vec<f64> = (0..=steps).map(|k| low + (high - low) * k as f64 / steps as f64).collect();
+    let grid: Vec<f64> = (0..=steps)
+        .map(|k| low + (high - low) * k as f64 / steps as f64)
+        .collect();
     let curve = |v: f64| basis.value(coefficients, v);
     Ok(Shape {
         linearity_error: report::linearity_error(values, forces, &grid, curve)?,
@@ -134,25 +146,33 @@ fn shape(
 impl<T: Real> StressCalibration<T> for PolynomialCalibration<T> {
     fn force_n(&self, integrated_pixel_value: T) -> T {
         let mut sum = 0.0;
-        self.each(integrated_pixel_value, |k, value, _| sum += self.coefficients[k].as_f64() * value);
+        self.each(integrated_pixel_value, |k, value, _| {
+            sum += self.coefficients[k].as_f64() * value
+        });
         T::nearest(sum)
     }
 
     fn sensitivity_n(&self, integrated_pixel_value: T) -> T {
         let mut sum = 0.0;
-        self.each(integrated_pixel_value, |k, _, slope| sum += self.coefficients[k].as_f64() * slope);
+        self.each(integrated_pixel_value, |k, _, slope| {
+            sum += self.coefficients[k].as_f64() * slope
+        });
         T::nearest(sum)
     }
 
     fn standard_error_n(&self, integrated_pixel_value: T) -> T {
-        self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value).max(T::zero()).sqrt()
+        self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value)
+            .max(T::zero())
+            .sqrt()
     }
 
     fn error_covariance_n2(&self, a: T, b: T) -> T {
         let terms = self.coefficients.len();
         let mut covariance = 0.0;
         self.each(a, |i, a, _| {
-            self.each(b, |j, b, _| covariance += a * b * self.covariance[i * terms + j].as_f64());
+            self.each(b, |j, b, _| {
+                covariance += a * b * self.covariance[i * terms + j].as_f64()
+            });
         });
         T::nearest(covariance)
     }
@@ -160,7 +180,10 @@ impl<T: Real> StressCalibration<T> for PolynomialCalibration<T> {
     fn integrated_pixel_value(&self, force_n: T) -> Option<T> {
         let [low, high] = self.range.map(T::as_f64);
         let curve = |v: f64| self.force_n(T::nearest(v)).as_f64();
-        let v = self.report.monotone.then(|| invert(low, high, force_n.as_f64(), curve))??;
+        let v = self
+            .report
+            .monotone
+            .then(|| invert(low, high, force_n.as_f64(), curve))??;
         Some(T::nearest(v))
     }
 

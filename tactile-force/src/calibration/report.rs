@@ -128,22 +128,36 @@ pub(super) struct Parameters {
 impl Parameters {
     /// Coefficients as fitted.
     pub(super) fn of(fit: &Fit) -> Self {
-        let estimates =
-            fit.coefficients.iter().zip(fit.covariance.diagonal().iter()).map(|(c, v)| (*c, *v)).collect();
-        Self { estimates, degrees_of_freedom: fit.residuals.len() - fit.coefficients.len() }
+        let estimates = fit
+            .coefficients
+            .iter()
+            .zip(fit.covariance.diagonal().iter())
+            .map(|(c, v)| (*c, *v))
+            .collect();
+        Self {
+            estimates,
+            degrees_of_freedom: fit.residuals.len() - fit.coefficients.len(),
+        }
     }
 
     /// Levels, each of (force, sd of a pair, number of pairs).
     pub(super) fn levels(levels: &[(f64, f64, usize)], pairs: usize) -> Self {
-        let estimates = levels.iter().map(|(f, sd, n)| (*f, sd * sd / *n as f64)).collect();
-        Self { estimates, degrees_of_freedom: pairs.saturating_sub(levels.len()).max(1) }
+        let estimates = levels
+            .iter()
+            .map(|(f, sd, n)| (*f, sd * sd / *n as f64))
+            .collect();
+        Self {
+            estimates,
+            degrees_of_freedom: pairs.saturating_sub(levels.len()).max(1),
+        }
     }
 
     fn intervals<T: Real>(&self) -> Vec<[T; 2]> {
         let t = StudentsT::new(0.0, 1.0, self.degrees_of_freedom.max(1) as f64)
             .map_or(f64::NAN, |d| d.inverse_cdf(0.975));
-        let interval =
-            |(value, variance): &(f64, f64)| [-t, t].map(|t| T::nearest(value + t * variance.sqrt()));
+        let interval = |(value, variance): &(f64, f64)| {
+            [-t, t].map(|t| T::nearest(value + t * variance.sqrt()))
+        };
         self.estimates.iter().map(interval).collect()
     }
 }
@@ -161,7 +175,11 @@ pub(super) fn build<T: Real>(
         pairs: pairs.len(),
         intervals_95: parameters.intervals(),
         degrees_of_freedom: parameters.degrees_of_freedom,
-        parameters: parameters.estimates.iter().map(|(c, v)| Estimate::nearest(*c, *v)).collect(),
+        parameters: parameters
+            .estimates
+            .iter()
+            .map(|(c, v)| Estimate::nearest(*c, *v))
+            .collect(),
         r_squared: T::nearest(r_squared(&forces, &fit.residuals)),
         residual_sd_n: T::nearest(fit.residual_sd),
         residuals_n: cast(&fit.residuals),
@@ -198,9 +216,17 @@ pub(super) fn linearity_error(
     curve: impl Fn(f64) -> f64,
 ) -> Result<f64, ForceError> {
     let middle = values.iter().sum::<f64>() / values.len() as f64;
-    let half = values.iter().map(|v| (v - middle).abs()).fold(0.0, f64::max);
-    let design =
-        DMatrix::from_fn(values.len(), 2, |i, j| if j == 0 { 1.0 } else { (values[i] - middle) / half });
+    let half = values
+        .iter()
+        .map(|v| (v - middle).abs())
+        .fold(0.0, f64::max);
+    let design = DMatrix::from_fn(values.len(), 2, |i, j| {
+        if j == 0 {
+            1.0
+        } else {
+            (values[i] - middle) / half
+        }
+    });
     let line = least_squares::solve(&design, forces, Robustness::None)?.coefficients;
     let distance = |v: &f64| (curve(*v) - line[0] - line[1] * (v - middle) / half).abs();
     Ok(grid.iter().map(distance).fold(0.0, f64::max) / full_scale(forces))
@@ -224,13 +250,21 @@ fn hysteresis<T: Real>(
         points
     };
     let (up, down) = (branch(Branch::Loading), branch(Branch::Unloading));
-    let at_loading = up.iter().filter_map(|&(v, r)| interpolate(&down, v).map(|other| r - other));
-    let at_unloading = down.iter().filter_map(|&(v, r)| interpolate(&up, v).map(|other| other - r));
+    let at_loading = up
+        .iter()
+        .filter_map(|&(v, r)| interpolate(&down, v).map(|other| r - other));
+    let at_unloading = down
+        .iter()
+        .filter_map(|&(v, r)| interpolate(&up, v).map(|other| other - r));
     let differences: Vec<f64> = at_loading.chain(at_unloading).collect();
-    let greatest = differences.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    let greatest = differences
+        .iter()
+        .copied()
+        .max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n;
-    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0) / n;
+    let variance =
+        differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0) / n;
     Some(Hysteresis {
         greatest_n: T::nearest(greatest),
         mean_n: Estimate::nearest(mean, variance),

@@ -64,7 +64,8 @@ impl DetectorWorkspace {
     /// if there was no contact.
     pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
         let place = self.region.place?;
-        let view = ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
+        let view =
+            ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
         Some((place, view))
     }
 }
@@ -105,22 +106,41 @@ impl ContactDetector {
         workspace.region.place = None;
         let sd = reference.difference_variance().sqrt();
         // Half of the false alarms go to single pixels (either sign), half to tiles.
-        let pixel_limit = (quantile(0.25 * self.options.false_alarm_rate, frame.len()) * sd).min(255.0);
+        let pixel_limit =
+            (quantile(0.25 * self.options.false_alarm_rate, frame.len()) * sd).min(255.0);
         let statistics = reference.compare_with(&mut workspace.pass, frame, pixel_limit as u8);
         let drift = self.drift(workspace, reference, frame.dim(), sd);
-        let none = Detection { statistics, drift, noise: None, contact: None };
-        let Some(suspect) = self.suspect(&workspace.pass, reference, &statistics, &drift, sd, pixel_limit)
-        else {
+        let none = Detection {
+            statistics,
+            drift,
+            noise: None,
+            contact: None,
+        };
+        let Some(suspect) = self.suspect(
+            &workspace.pass,
+            reference,
+            &statistics,
+            &drift,
+            sd,
+            pixel_limit,
+        ) else {
             return Ok(none);
         };
-        let Some(extent) = self.segment(&mut workspace.region, frame, reference, &drift, suspect, sd) else {
+        let Some(extent) =
+            self.segment(&mut workspace.region, frame, reference, &drift, suspect, sd)
+        else {
             workspace.region.place = None;
             return Ok(none);
         };
         let peak = peak(&workspace.region);
         let noise = self.noise(workspace, reference, &drift, peak);
         let contact = self.summarise(&workspace.region, extent, peak, frame, &noise)?;
-        Ok(Detection { statistics, drift, noise: Some(noise), contact: Some(contact) })
+        Ok(Detection {
+            statistics,
+            drift,
+            noise: Some(noise),
+            contact: Some(contact),
+        })
     }
 
     fn drift(
@@ -153,15 +173,19 @@ impl ContactDetector {
             region.load(frame, reference, place, drift, sign);
             let z = quantile(self.options.false_alarm_rate, region.difference.len());
             let signal = greatest(&region.difference);
-            let width =
-                self.options.smoothing_px.unwrap_or_else(|| smoothing_width(z * sd, f64::from(signal)));
+            let width = self
+                .options
+                .smoothing_px
+                .unwrap_or_else(|| smoothing_width(z * sd, f64::from(signal)));
             let limit = z * sd / width as f64;
             let extent = region.segment(width, limit as f32, self.options.minimum_area_px);
             if extent.area < self.options.minimum_area_px {
                 return None;
             }
             region.finish(self.options.margin_px);
-            let needed = region.bounds(&region.mask)?.grown(self.options.margin_px + 1, frame.dim());
+            let needed = region
+                .bounds(&region.mask)?
+                .grown(self.options.margin_px + 1, frame.dim());
             if needed.union(place) == place {
                 return Some(extent);
             }
@@ -176,11 +200,16 @@ impl ContactDetector {
         drift: &Drift,
         peak: f32,
     ) -> DifferenceNoise {
-        let DetectorWorkspace { region, histogram, .. } = workspace;
-        let (x, y) = region.bounds(&region.mask).map_or((0.0, 0.0), |b| b.middle());
+        let DetectorWorkspace {
+            region, histogram, ..
+        } = workspace;
+        let (x, y) = region
+            .bounds(&region.mask)
+            .map_or((0.0, 0.0), |b| b.middle());
         // Flattening divides signal and noise alike.
-        let (light, uncertain) =
-            reference.flat_field().map_or((1.0, 0.0), |f| (f.at(x, y), f.variance_at(x, y)));
+        let (light, uncertain) = reference
+            .flat_field()
+            .map_or((1.0, 0.0), |f| (f.at(x, y), f.variance_at(x, y)));
         let flat_field = uncertain / (light * light);
         let background = reference.difference_variance() / (light * light);
         let [common, scale] = drift.variances(x, y);
@@ -188,7 +217,13 @@ impl ContactDetector {
             Some(gain) => gain / light,
             None => noise::gain(region, histogram, background, peak),
         };
-        DifferenceNoise { background, gain, common: common / (light * light), scale, flat_field }
+        DifferenceNoise {
+            background,
+            gain,
+            common: common / (light * light),
+            scale,
+            flat_field,
+        }
     }
 
     fn summarise<T: Real>(
@@ -199,14 +234,19 @@ impl ContactDetector {
         frame: ArrayView2<'_, u8>,
         noise: &DifferenceNoise,
     ) -> Result<Contact<T>, ForceError> {
-        let whole =
-            BoundingBox { row_start: 0, row_end: frame.nrows(), column_start: 0, column_end: frame.ncols() };
+        let whole = BoundingBox {
+            row_start: 0,
+            row_end: frame.nrows(),
+            column_start: 0,
+            column_end: frame.ncols(),
+        };
         let place = region.place.unwrap_or(whole);
         let saturated_px = self.saturated(region, place.of(frame), extent.area)?;
         let sums = Sums::over(region);
         let local = sums.centroid();
         let origin = [place.column_start as f64, place.row_start as f64];
-        let centroid = |k: usize| Estimate::nearest(origin[k] + local[k], sums.centroid_variance(k, noise));
+        let centroid =
+            |k: usize| Estimate::nearest(origin[k] + local[k], sums.centroid_variance(k, noise));
         let aperture = region.bounds(&region.aperture).unwrap_or(place);
         Ok(Contact {
             bounding_box: region.bounds(&region.mask).unwrap_or(place),
@@ -229,7 +269,11 @@ impl ContactDetector {
         frame: ArrayView2<'_, u8>,
         area: usize,
     ) -> Result<usize, ForceError> {
-        let full = if self.options.polarity.sign() > 0 { u8::MAX } else { 0 };
+        let full = if self.options.polarity.sign() > 0 {
+            u8::MAX
+        } else {
+            0
+        };
         let in_run = |run: &Run| {
             let row = frame.row(run.row as usize);
             let row = row.slice_axis(Axis(0), Slice::from(run.start as usize..run.end as usize));
@@ -239,15 +283,26 @@ impl ContactDetector {
             }
         };
         let saturated = region.mask.iter().map(in_run).sum();
-        let (share, limit) = (saturated as f64 / area as f64, self.options.saturation_limit);
-        if share > limit { Err(ForceError::SaturatedContact { share, limit }) } else { Ok(saturated) }
+        let (share, limit) = (
+            saturated as f64 / area as f64,
+            self.options.saturation_limit,
+        );
+        if share > limit {
+            Err(ForceError::SaturatedContact { share, limit })
+        } else {
+            Ok(saturated)
+        }
     }
 }
 
 /// Greatest difference in the mask.
 fn peak(region: &Region) -> f32 {
     let columns = region.columns();
-    region.mask.iter().map(|run| greatest(&region.difference[run.span(columns)])).fold(0.0, f32::max)
+    region
+        .mask
+        .iter()
+        .map(|run| greatest(&region.difference[run.span(columns)]))
+        .fold(0.0, f32::max)
 }
 
 /// The box one pixel larger on every side, whether or not the frame is; a box at the first row or column cannot be.

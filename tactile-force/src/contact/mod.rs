@@ -19,8 +19,8 @@ pub use detector::{ContactDetector, DetectorWorkspace};
 pub(crate) use region::Region;
 
 use crate::{
-    BoundingBox, DifferenceNoise, Drift, DriftCorrection, Estimate, ForceError, FrameStatistics, Real,
-    error::Requirement,
+    BoundingBox, DifferenceNoise, Drift, DriftCorrection, Estimate, ForceError, FrameStatistics,
+    Real, error::Requirement,
 };
 
 /// Whether pressing makes the image brighter (light leaks out) or darker (light is blocked).
@@ -106,7 +106,8 @@ impl ContactOptions {
         Requirement::OpenUnitInterval.check("false_alarm_rate", self.false_alarm_rate)?;
         Requirement::UnitInterval.check("saturation_limit", self.saturation_limit)?;
         Requirement::AtLeastOne.check("minimum_area_px", self.minimum_area_px as f64)?;
-        self.smoothing_px.map_or(Ok(()), |w| Requirement::Odd.check("smoothing_px", w as f64))
+        self.smoothing_px
+            .map_or(Ok(()), |w| Requirement::Odd.check("smoothing_px", w as f64))
     }
 }
 

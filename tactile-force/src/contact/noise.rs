@@ -25,8 +25,9 @@ pub(super) fn gain(region: &Region, histogram: &mut Vec<u64>, background: f64, p
     let (mut count, mut signal) = (0_u64, 0.0);
     let area: usize = region.mask.iter().map(Run::len).sum();
     let stride = (area / ENOUGH).max(1);
-    let judged =
-        |r: &&Run| r.row > 0 && (r.row as usize) + 1 < rows && (r.row as usize).is_multiple_of(stride);
+    let judged = |r: &&Run| {
+        r.row > 0 && (r.row as usize) + 1 < rows && (r.row as usize).is_multiple_of(stride)
+    };
     for run in region.mask.iter().filter(judged) {
         let span = run.span(columns);
         let first = span.start.max(run.row as usize * columns + 1);

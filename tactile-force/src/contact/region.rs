@@ -61,7 +61,10 @@ impl Region {
                 _ => extend(&mut self.difference, f.iter().zip(r), line, sign),
             }
             if let Some(line) = flat.map(|f| f.line(row, place.column_start)) {
-                self.difference[start..].iter_mut().enumerate().for_each(|(x, d)| *d /= line.at(x));
+                self.difference[start..]
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(x, d)| *d /= line.at(x));
             }
         }
     }
@@ -74,7 +77,13 @@ impl Region {
         let smooth = if width == 1 {
             &self.difference
         } else {
-            box_sums(&self.difference, columns, width, &mut self.column_sums, &mut self.smooth);
+            box_sums(
+                &self.difference,
+                columns,
+                width,
+                &mut self.column_sums,
+                &mut self.smooth,
+            );
             &self.smooth
         };
         self.mask.clear();
@@ -82,14 +91,25 @@ impl Region {
             push_runs(&mut self.mask, y, row, |s| *s > limit);
         }
         let (kept, others) = self.components.keep_largest(&mut self.mask, notable);
-        let filled = self.components.fill_holes(&mut self.mask, &mut self.scratch, rows, columns);
-        Extent { area: kept + filled, others }
+        let filled = self
+            .components
+            .fill_holes(&mut self.mask, &mut self.scratch, rows, columns);
+        Extent {
+            area: kept + filled,
+            others,
+        }
     }
 
     /// Grows the mask to the aperture and paints the pixels.
     pub(super) fn finish(&mut self, margin: usize) {
         let columns = self.columns();
-        runs::grow(&self.mask, &mut self.aperture, margin, self.difference.len() / columns, columns);
+        runs::grow(
+            &self.mask,
+            &mut self.aperture,
+            margin,
+            self.difference.len() / columns,
+            columns,
+        );
         self.pixels.clear();
         self.pixels.resize(self.difference.len(), 0);
         for run in &self.mask {
@@ -121,7 +141,11 @@ fn extend<'a>(
     match line {
         None => differences.extend(pairs.map(|(f, r)| sign * (f - r))),
         Some(line) => {
-            differences.extend(pairs.enumerate().map(|(x, (f, r))| sign * line.difference(x, f, r)));
+            differences.extend(
+                pairs
+                    .enumerate()
+                    .map(|(x, (f, r))| sign * line.difference(x, f, r)),
+            );
         }
     }
 }
@@ -138,7 +162,13 @@ pub(super) fn greatest(values: &[f32]) -> f32 {
 }
 
 /// Sums over a box of odd width centred at every pixel; beyond the region there is nothing to add.
-fn box_sums(difference: &[f32], columns: usize, width: usize, scratch: &mut Vec<f32>, sums: &mut Vec<f32>) {
+fn box_sums(
+    difference: &[f32],
+    columns: usize,
+    width: usize,
+    scratch: &mut Vec<f32>,
+    sums: &mut Vec<f32>,
+) {
     let (rows, half) = (difference.len() / columns, width / 2);
     scratch.clear();
     scratch.resize(columns, 0.0);
@@ -150,10 +180,16 @@ fn box_sums(difference: &[f32], columns: usize, width: usize, scratch: &mut Vec<
     }
     for y in 0..rows {
         if y + half < rows {
-            scratch.iter_mut().zip(row(y + half)).for_each(|(s, d)| *s += d);
+            scratch
+                .iter_mut()
+                .zip(row(y + half))
+                .for_each(|(s, d)| *s += d);
         }
         if y > half {
-            scratch.iter_mut().zip(row(y - half - 1)).for_each(|(s, d)| *s -= d);
+            scratch
+                .iter_mut()
+                .zip(row(y - half - 1))
+                .for_each(|(s, d)| *s -= d);
         }
         let mut running: f32 = scratch[..half.min(columns)].iter().sum();
         for (x, sum) in sums[y * columns..(y + 1) * columns].iter_mut().enumerate() {

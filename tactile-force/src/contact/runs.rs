@@ -24,7 +24,12 @@ impl Run {
 const BLOCK: usize = 32;
 
 /// Appends the runs of a row where `inside` holds.
-pub(super) fn push_runs<P>(runs: &mut Vec<Run>, row: usize, pixels: &[P], inside: impl Fn(&P) -> bool) {
+pub(super) fn push_runs<P>(
+    runs: &mut Vec<Run>,
+    row: usize,
+    pixels: &[P],
+    inside: impl Fn(&P) -> bool,
+) {
     let mut start = None;
     for (block, pixels) in pixels.chunks(BLOCK).enumerate() {
         // Most blocks lie wholly inside or outside; counting takes wide instructions, edges are looked at one by one.
@@ -32,11 +37,19 @@ pub(super) fn push_runs<P>(runs: &mut Vec<Run>, row: usize, pixels: &[P], inside
         if count == if start.is_some() { pixels.len() } else { 0 } {
             continue;
         }
-        for (x, pixel) in pixels.iter().enumerate().map(|(x, p)| (block * BLOCK + x, p)) {
+        for (x, pixel) in pixels
+            .iter()
+            .enumerate()
+            .map(|(x, p)| (block * BLOCK + x, p))
+        {
             match (inside(pixel), start) {
                 (true, None) => start = Some(x),
                 (false, Some(first)) => {
-                    runs.push(Run { row: row as u32, start: first as u32, end: x as u32 });
+                    runs.push(Run {
+                        row: row as u32,
+                        start: first as u32,
+                        end: x as u32,
+                    });
                     start = None;
                 }
                 _ => {}
@@ -44,7 +57,11 @@ pub(super) fn push_runs<P>(runs: &mut Vec<Run>, row: usize, pixels: &[P], inside
         }
     }
     if let Some(first) = start {
-        runs.push(Run { row: row as u32, start: first as u32, end: pixels.len() as u32 });
+        runs.push(Run {
+            row: row as u32,
+            start: first as u32,
+            end: pixels.len() as u32,
+        });
     }
 }
 
@@ -102,7 +119,8 @@ impl Components {
             self.area[root] += run.len();
         }
         // The first of equals, so that the answer does not depend on anything but the image.
-        let Some((best, &area)) = self.area.iter().enumerate().rev().max_by_key(|(_, a)| **a) else {
+        let Some((best, &area)) = self.area.iter().enumerate().rev().max_by_key(|(_, a)| **a)
+        else {
             return (0, 0);
         };
         let others = self
@@ -176,12 +194,20 @@ fn complement(runs: &[Run], background: &mut Vec<Run>, rows: usize, columns: usi
         let mut start = 0;
         while let Some(run) = next.next_if(|r| r.row == row) {
             if run.start > start {
-                background.push(Run { row, start, end: run.start });
+                background.push(Run {
+                    row,
+                    start,
+                    end: run.start,
+                });
             }
             start = run.end;
         }
         if start < width {
-            background.push(Run { row, start, end: width });
+            background.push(Run {
+                row,
+                start,
+                end: width,
+            });
         }
     }
 }
@@ -200,7 +226,9 @@ fn merge(runs: &mut Vec<Run>) {
 /// The runs, sorted by row and start, grown by a square of half width `margin` and clipped to the region.
 pub(super) fn grow(runs: &[Run], grown: &mut Vec<Run>, margin: usize, rows: usize, columns: usize) {
     grown.clear();
-    let (Some(top), Some(bottom)) = (runs.first(), runs.last()) else { return };
+    let (Some(top), Some(bottom)) = (runs.first(), runs.last()) else {
+        return;
+    };
     let (margin, columns) = (margin as u32, columns as u32);
     let (mut first, mut end) = (0, 0);
     for row in top.row.saturating_sub(margin)..=(bottom.row + margin).min(rows as u32 - 1) {
@@ -230,7 +258,9 @@ mod tests {
 
     fn runs_of(mask: &[bool]) -> Vec<Run> {
         let mut runs = Vec::new();
-        mask.chunks(COLUMNS).enumerate().for_each(|(y, row)| push_runs(&mut runs, y, row, |m| *m));
+        mask.chunks(COLUMNS)
+            .enumerate()
+            .for_each(|(y, row)| push_runs(&mut runs, y, row, |m| *m));
         runs
     }
 
@@ -248,8 +278,15 @@ mod tests {
             let before = set.clone();
             for p in (0..mask.len()).filter(|p| before[*p]) {
                 for q in (0..mask.len()).filter(|q| mask[*q] == mask[seed]) {
-                    let (dy, dx) = ((p / COLUMNS).abs_diff(q / COLUMNS), (p % COLUMNS).abs_diff(q % COLUMNS));
-                    set[q] |= if diagonal { dy.max(dx) <= 1 } else { dy + dx <= 1 };
+                    let (dy, dx) = (
+                        (p / COLUMNS).abs_diff(q / COLUMNS),
+                        (p % COLUMNS).abs_diff(q % COLUMNS),
+                    );
+                    set[q] |= if diagonal {
+                        dy.max(dx) <= 1
+                    } else {
+                        dy + dx <= 1
+                    };
                 }
             }
             if set == before {

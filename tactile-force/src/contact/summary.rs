@@ -21,10 +21,21 @@ impl Sums {
             let (first, last) = (f64::from(run.start), f64::from(run.end) - 1.0);
             // Σ x and Σ x² of consecutive whole numbers.
             let cubes = |t: f64| t * (t + 1.0) * (2.0 * t + 1.0) / 6.0;
-            let plain = [n, 0.5 * n * (first + last), y * n, cubes(last) - cubes(first - 1.0), y * y * n];
+            let plain = [
+                n,
+                0.5 * n * (first + last),
+                y * n,
+                cubes(last) - cubes(first - 1.0),
+                y * y * n,
+            ];
             let [d0, d1, d2] = moments(&region.difference[run.span(columns)]);
-            let weighted =
-                [d0, d1 + first * d0, y * d0, d2 + 2.0 * first * d1 + first * first * d0, y * y * d0];
+            let weighted = [
+                d0,
+                d1 + first * d0,
+                y * d0,
+                d2 + 2.0 * first * d1 + first * first * d0,
+                y * y * d0,
+            ];
             for k in 0..5 {
                 total.plain[k] += plain[k];
                 total.weighted[k] += weighted[k];
@@ -38,7 +49,10 @@ impl Sums {
     }
 
     pub(super) fn centroid(&self) -> [f64; 2] {
-        [self.weighted[1] / self.weighted[0], self.weighted[2] / self.weighted[0]]
+        [
+            self.weighted[1] / self.weighted[0],
+            self.weighted[2] / self.weighted[0],
+        ]
     }
 
     /// Variance of Σ d: every pixel's, and that of errors of background and scale common to all, which go together.
@@ -55,7 +69,8 @@ impl Sums {
         let about = |s: &[f64; 5]| s[3 + axis] - 2.0 * at * s[1 + axis] + at * at * s[0];
         let lever = self.plain[1 + axis] - at * self.plain[0];
         let total = self.weighted[0];
-        let white = noise.background * about(&self.plain) + noise.gain * about(&self.weighted).max(0.0);
+        let white =
+            noise.background * about(&self.plain) + noise.gain * about(&self.weighted).max(0.0);
         (white + noise.common * lever * lever) / (total * total)
     }
 }

@@ -50,7 +50,9 @@ impl ContactDetector {
         };
         (0..tiles.rows)
             .filter(|&band| !quiet(band))
-            .flat_map(|band| (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k)))
+            .flat_map(|band| {
+                (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k))
+            })
             .map(|k| tiles.pixels(k, size))
             .reduce(BoundingBox::union)
     }

@@ -75,13 +75,22 @@ impl FlatField {
     pub(crate) fn variance_at(&self, x: f64, y: f64) -> f64 {
         let mut by = terms(self.middle, x, y);
         by[0] -= self.at(x, y);
-        let row = |i: usize| by.iter().zip(&self.covariance[i]).map(|(b, c)| b * c).sum::<f64>();
+        let row = |i: usize| {
+            by.iter()
+                .zip(&self.covariance[i])
+                .map(|(b, c)| b * c)
+                .sum::<f64>()
+        };
         by.iter().enumerate().map(|(i, b)| b * row(i)).sum()
     }
 
     /// Relative brightness at a pixel.
     pub fn at(&self, x: f64, y: f64) -> f64 {
-        terms(self.middle, x, y).iter().zip(&self.coefficients).map(|(t, c)| t * c).sum()
+        terms(self.middle, x, y)
+            .iter()
+            .zip(&self.coefficients)
+            .map(|(t, c)| t * c)
+            .sum()
     }
 
     pub(crate) fn line(&self, row: usize, first_column: usize) -> FlatLine {
@@ -93,6 +102,9 @@ impl FlatField {
 }
 
 fn terms(middle: [f64; 2], x: f64, y: f64) -> [f64; 6] {
-    let (u, v) = ((x - middle[0]) / middle[0].max(1.0), (y - middle[1]) / middle[1].max(1.0));
+    let (u, v) = (
+        (x - middle[0]) / middle[0].max(1.0),
+        (y - middle[1]) / middle[1].max(1.0),
+    );
     [1.0, u, v, u * u, u * v, v * v]
 }

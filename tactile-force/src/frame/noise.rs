@@ -65,7 +65,10 @@ impl NoiseModel {
     pub fn new(read_sd: f64, gain: f64) -> Result<Self, ForceError> {
         Requirement::NonNegative.check("read_sd", read_sd)?;
         Requirement::NonNegative.check("gain", gain)?;
-        Ok(Self { read_variance: read_sd * read_sd + QUANTISATION, gain })
+        Ok(Self {
+            read_variance: read_sd * read_sd + QUANTISATION,
+            gain,
+        })
     }
 
     /// Variance of a pixel at a grey level.
@@ -89,7 +92,10 @@ impl NoiseModel {
                 histogram[(corners - 2 * edges + 4 * p(1, 1)).unsigned_abs() as usize] += 1;
             }
         }
-        Self { read_variance: (trimmed_variance(&histogram) / 36.0).max(QUANTISATION), gain: 0.0 }
+        Self {
+            read_variance: (trimmed_variance(&histogram) / 36.0).max(QUANTISATION),
+            gain: 0.0,
+        }
     }
 }
 
@@ -98,11 +104,17 @@ impl NoiseModel {
     pub(crate) fn of_repeats(frames: &[ArrayView2<'_, u8>], mean: ArrayView2<'_, f32>) -> Self {
         let mut squares = 0.0;
         for frame in frames {
-            squares +=
-                frame.iter().zip(mean).map(|(f, m)| (f64::from(*f) - f64::from(*m)).powi(2)).sum::<f64>();
+            squares += frame
+                .iter()
+                .zip(mean)
+                .map(|(f, m)| (f64::from(*f) - f64::from(*m)).powi(2))
+                .sum::<f64>();
         }
         let variance = squares / (mean.len() * (frames.len() - 1)) as f64;
-        Self { read_variance: variance.max(QUANTISATION), gain: 0.0 }
+        Self {
+            read_variance: variance.max(QUANTISATION),
+            gain: 0.0,
+        }
     }
 }
 
@@ -114,7 +126,11 @@ pub(crate) fn trimmed_variance(histogram: &[u64]) -> f64 {
     for _ in 0..50 {
         let limit = 3.0 * variance.sqrt();
         let (mut count, mut total) = (0.0, 0.0);
-        for (value, &n) in histogram.iter().enumerate().take_while(|(v, _)| *v as f64 <= limit) {
+        for (value, &n) in histogram
+            .iter()
+            .enumerate()
+            .take_while(|(v, _)| *v as f64 <= limit)
+        {
             count += n as f64;
             total += n as f64 * (value * value) as f64;
         }

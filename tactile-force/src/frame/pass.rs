@@ -57,13 +57,21 @@ pub(super) fn scan(
     let mut s = FrameStatistics::empty(size);
     let brightest = reference.map(|(_, b)| b);
     let reference = reference.map(|(r, _)| r);
-    let pass = Pass { kernel: Kernel::best(), frame, reference, size, threshold };
+    let pass = Pass {
+        kernel: Kernel::best(),
+        frame,
+        reference,
+        size,
+        threshold,
+    };
     for band in 0..tiles.rows {
         let sums = &mut tiles.sums[band * tiles.columns..(band + 1) * tiles.columns];
         let above = pass.band(band, sums, &mut s);
         if above >= u8::MAX - brightest.map_or(0, |b| b[band]) {
-            s.saturated +=
-                pixels_of(band, frame, size.1).iter().map(|&p| usize::from(p == u8::MAX)).sum::<usize>();
+            s.saturated += pixels_of(band, frame, size.1)
+                .iter()
+                .map(|&p| usize::from(p == u8::MAX))
+                .sum::<usize>();
         }
     }
     s
@@ -115,7 +123,10 @@ impl Pass<'_> {
     fn margin(&self, band: usize, whole: usize, sums: &mut [i32]) -> Strip {
         let columns = whole * TILE_COLUMNS..self.size.1;
         let f = padded(rows(self.frame, self.size, band, columns.clone()));
-        let r = padded(self.reference.map_or([&[]; TILE_ROWS], |r| rows(r, self.size, band, columns)));
+        let r = padded(
+            self.reference
+                .map_or([&[]; TILE_ROWS], |r| rows(r, self.size, band, columns)),
+        );
         let (f, r) = (f.each_ref().map(|p| &p[..]), r.each_ref().map(|p| &p[..]));
         self.kernel.run(&f, &r, self.threshold, sums)
     }
@@ -128,7 +139,12 @@ pub(super) fn pixels_of(band: usize, image: &[u8], columns: usize) -> &[u8] {
 }
 
 /// Part of the eight rows of a band; rows below the image are black.
-fn rows(image: &[u8], (height, width): (usize, usize), band: usize, columns: Range<usize>) -> Rows<'_> {
+fn rows(
+    image: &[u8],
+    (height, width): (usize, usize),
+    band: usize,
+    columns: Range<usize>,
+) -> Rows<'_> {
     std::array::from_fn(|k| {
         let y = band * TILE_ROWS + k;
         if y < height {
@@ -204,7 +220,11 @@ impl FrameStatistics {
     }
 
     /// The strips know extremes on their own side of zero only; where every difference is on one side, look again.
-    pub(super) fn correct_extremes(&mut self, frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) {
+    pub(super) fn correct_extremes(
+        &mut self,
+        frame: ArrayView2<'_, u8>,
+        reference: ArrayView2<'_, u8>,
+    ) {
         let all_equal = self.least == 0 && self.greatest == 0;
         if all_equal || (self.least < 0 && self.greatest > 0) {
             return;
@@ -228,7 +248,10 @@ pub(super) fn tighten(
     let over = |(f, r): (&u8, &u8)| f.abs_diff(*r) > threshold;
     let line = |within: BoundingBox, axis: usize, at: usize| {
         let (f, r) = (within.of(frame), within.of(reference));
-        f.index_axis(Axis(axis), at).iter().zip(r.index_axis(Axis(axis), at)).any(over)
+        f.index_axis(Axis(axis), at)
+            .iter()
+            .zip(r.index_axis(Axis(axis), at))
+            .any(over)
     };
     while tight.rows() > 1 && !line(tight, 0, 0) {
         tight.row_start += 1;

@@ -75,10 +75,21 @@ impl ReferenceFrame {
         let mut tiles = Tiles::default();
         let pixels = image.as_slice().unwrap_or_default();
         let sums = scan(pixels, None, size, u8::MAX, &mut tiles);
-        let band = |k: usize| pixels_of(k, pixels, size.1).iter().copied().max().unwrap_or(0);
+        let band = |k: usize| {
+            pixels_of(k, pixels, size.1)
+                .iter()
+                .copied()
+                .max()
+                .unwrap_or(0)
+        };
         let brightest = (0..size.0.div_ceil(TILE_ROWS)).map(band).collect();
         for tile in 0..tiles.sums.len() {
-            let mean_sum: f64 = tiles.pixels(tile, size).of(mean.view()).iter().map(|m| f64::from(*m)).sum();
+            let mean_sum: f64 = tiles
+                .pixels(tile, size)
+                .of(mean.view())
+                .iter()
+                .map(|m| f64::from(*m))
+                .sum();
             tiles.sums[tile] = mean_sum.round() as i32;
         }
         Ok(Self {
@@ -122,9 +133,16 @@ impl ReferenceFrame {
     /// ```
     pub fn with_flat_field(mut self) -> Result<Self, ForceError> {
         let mean = self.sums.sum as f64 / self.image.len() as f64;
-        let too_dark = ForceError::ReferenceTooDark { mean, required: 1.0 };
-        let flat = FlatField::fit(self.image.dim(), self.tile_sums(&self.tiles), self.own_variance())
-            .filter(|_| mean >= 1.0);
+        let too_dark = ForceError::ReferenceTooDark {
+            mean,
+            required: 1.0,
+        };
+        let flat = FlatField::fit(
+            self.image.dim(),
+            self.tile_sums(&self.tiles),
+            self.own_variance(),
+        )
+        .filter(|_| mean >= 1.0);
         self.flat = Some(flat.ok_or(too_dark)?);
         Ok(self)
     }
@@ -160,7 +178,11 @@ impl ReferenceFrame {
     /// assert_eq!(statistics.centroid_px(), Some([30.0, 20.0]));
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
-    pub fn compare(&self, frame: ArrayView2<'_, u8>, threshold: u8) -> Result<FrameStatistics, ForceError> {
+    pub fn compare(
+        &self,
+        frame: ArrayView2<'_, u8>,
+        threshold: u8,
+    ) -> Result<FrameStatistics, ForceError> {
         self.check(frame)?;
         Ok(self.compare_with(&mut PassWorkspace::default(), frame, threshold))
     }
@@ -178,11 +200,20 @@ impl ReferenceFrame {
             copy.extend(frame.iter());
             copy
         });
-        let reference = (self.image.as_slice().unwrap_or_default(), &self.brightest[..]);
+        let reference = (
+            self.image.as_slice().unwrap_or_default(),
+            &self.brightest[..],
+        );
         let mut s = scan(pixels, Some(reference), frame.dim(), threshold, tiles);
-        tiles.sums.iter_mut().zip(&self.tiles.sums).for_each(|(f, r)| *f -= r);
+        tiles
+            .sums
+            .iter_mut()
+            .zip(&self.tiles.sums)
+            .for_each(|(f, r)| *f -= r);
         s.subtract(&self.sums);
-        s.bounding_box = s.bounding_box.map(|b| tighten(b, frame, self.image(), threshold));
+        s.bounding_box = s
+            .bounding_box
+            .map(|b| tighten(b, frame, self.image(), threshold));
         s.correct_extremes(frame, self.image());
         s
     }
@@ -209,7 +240,10 @@ impl ReferenceFrame {
     }
 
     /// Every tile of the last pass.
-    pub(crate) fn tile_sums<'a>(&'a self, passed: &'a Tiles) -> impl Iterator<Item = TileSum> + Clone + 'a {
+    pub(crate) fn tile_sums<'a>(
+        &'a self,
+        passed: &'a Tiles,
+    ) -> impl Iterator<Item = TileSum> + Clone + 'a {
         (0..passed.sums.len()).map(move |k| self.tile_sum(passed, k))
     }
 
@@ -227,7 +261,11 @@ impl ReferenceFrame {
 
     pub(crate) fn check(&self, frame: ArrayView2<'_, u8>) -> Result<(), ForceError> {
         let (expected, found) = (self.image.dim(), frame.dim());
-        if expected == found { Ok(()) } else { Err(ForceError::SizeMismatch { expected, found }) }
+        if expected == found {
+            Ok(())
+        } else {
+            Err(ForceError::SizeMismatch { expected, found })
+        }
     }
 }
 
@@ -236,7 +274,10 @@ fn common_size(frames: &[ArrayView2<'_, u8>]) -> Result<(usize, usize), ForceErr
     let size = frames.first().map_or((0, 0), |f| f.dim());
     check_size(size)?;
     match frames.iter().find(|f| f.dim() != size) {
-        Some(other) => Err(ForceError::SizeMismatch { expected: size, found: other.dim() }),
+        Some(other) => Err(ForceError::SizeMismatch {
+            expected: size,
+            found: other.dim(),
+        }),
         None => Ok(size),
     }
 }
@@ -255,7 +296,10 @@ fn check_size((rows, columns): (usize, usize)) -> Result<(), ForceError> {
         return Err(ForceError::EmptyImage { rows, columns });
     }
     if rows.max(columns) > LONGEST_SIDE {
-        return Err(ForceError::ImageTooLarge { found: rows.max(columns), limit: LONGEST_SIDE });
+        return Err(ForceError::ImageTooLarge {
+            found: rows.max(columns),
+            limit: LONGEST_SIDE,
+        });
     }
     Ok(())
 }

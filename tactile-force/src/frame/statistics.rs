@@ -44,7 +44,10 @@ impl BoundingBox {
     /// Centre (x, y).
     pub(crate) fn middle(&self) -> (f64, f64) {
         let half = |from: usize, to: usize| 0.5 * ((from + to) as f64 - 1.0);
-        (half(self.column_start, self.column_end), half(self.row_start, self.row_end))
+        (
+            half(self.column_start, self.column_end),
+            half(self.row_start, self.row_end),
+        )
     }
 
     /// The part of an image inside the box.

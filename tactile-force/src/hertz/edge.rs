@@ -37,7 +37,11 @@ impl BlurredEdge {
                 table[node].copy_from_slice(&series[..TERMS]);
                 h = horner(&series, direction * STEP);
                 d = horner_derivative(&series, direction * STEP);
-                match if direction > 0.0 { node.checked_add(1) } else { node.checked_sub(1) } {
+                match if direction > 0.0 {
+                    node.checked_add(1)
+                } else {
+                    node.checked_sub(1)
+                } {
                     Some(next) if next < NODES => node = next,
                     _ => break,
                 }
@@ -93,7 +97,11 @@ fn horner(c: &[f64], t: f64) -> f64 {
 }
 
 fn horner_derivative(c: &[f64], t: f64) -> f64 {
-    c.iter().enumerate().skip(1).rev().fold(0.0, |sum, (k, c)| sum * t + k as f64 * c)
+    c.iter()
+        .enumerate()
+        .skip(1)
+        .rev()
+        .fold(0.0, |sum, (k, c)| sum * t + k as f64 * c)
 }
 
 #[cfg(test)]
@@ -104,7 +112,10 @@ mod tests {
     fn by_quadrature(z: f64) -> f64 {
         let step = 1e-3;
         let phi = |n: f64| (-0.5 * n * n).exp() / (2.0 * std::f64::consts::PI).sqrt();
-        (1..8000).map(|k| step * f64::from(k)).map(|u| 2.0 * u * u * phi(u * u - z) * step).sum()
+        (1..8000)
+            .map(|k| step * f64::from(k))
+            .map(|u| 2.0 * u * u * phi(u * u - z) * step)
+            .sum()
     }
 
     #[test]
@@ -113,7 +124,10 @@ mod tests {
         for k in -90..400 {
             let z = 0.1 * f64::from(k) + 0.013;
             // Table: Taylor remainder 0.125⁹; series at 16: 1e-9.
-            assert!((edge.derivatives(z)[0] - by_quadrature(z)).abs() < 3e-9, "z = {z}");
+            assert!(
+                (edge.derivatives(z)[0] - by_quadrature(z)).abs() < 3e-9,
+                "z = {z}"
+            );
         }
     }
 
@@ -122,12 +136,19 @@ mod tests {
         let edge = BlurredEdge::new();
         for z in [-3.3, -0.4, 0.7, 2.9, 9.1, 15.6, 40.0] {
             let e = 1e-4;
-            let (above, below, here) =
-                (edge.derivatives(z + e), edge.derivatives(z - e), edge.derivatives(z));
+            let (above, below, here) = (
+                edge.derivatives(z + e),
+                edge.derivatives(z - e),
+                edge.derivatives(z),
+            );
             for k in 0..5 {
                 // Differences: e² h⁽ᵏ⁺³⁾/6; far series: its last term.
                 let slope = (above[k] - below[k]) / (2.0 * e);
-                assert!((slope - here[k + 1]).abs() < 2e-6, "z = {z}, order {k}: {slope} {}", here[k + 1]);
+                assert!(
+                    (slope - here[k + 1]).abs() < 2e-6,
+                    "z = {z}, order {k}: {slope} {}",
+                    here[k + 1]
+                );
             }
         }
     }

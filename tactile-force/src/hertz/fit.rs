@@ -58,7 +58,10 @@ impl HertzFitter {
     /// An option outside its domain.
     pub fn new(options: HertzFitOptions) -> Result<Self, ForceError> {
         options.validate()?;
-        Ok(Self { options, edge: BlurredEdge::new() })
+        Ok(Self {
+            options,
+            edge: BlurredEdge::new(),
+        })
     }
 
     /// Fits the aperture's pixels. `None` if they do not determine the parameters.
@@ -73,9 +76,15 @@ impl HertzFitter {
         let place = region.place?;
         let aspect = pixel_size_m[1] / pixel_size_m[0];
         let blur = self.options.blur_px.map_or(0.5, |b| b * b) + PIXEL;
-        let peak = 1.5 * start.integral * aspect / (std::f64::consts::PI * start.radius * start.radius);
+        let peak =
+            1.5 * start.integral * aspect / (std::f64::consts::PI * start.radius * start.radius);
         let mut state = State {
-            shape: Shape { peak, background: 0.0, radius: start.radius, blur },
+            shape: Shape {
+                peak,
+                background: 0.0,
+                radius: start.radius,
+                blur,
+            },
             centre: start.centre,
             iterations: 0,
             stop: StopReason::IterationLimit,
@@ -95,7 +104,13 @@ impl HertzFitter {
     /// Gauss–Newton steps on fixed rings until nothing moves; returns how far the centre went, in pixels.
     ///
     /// Weights follow the shape, so χ² may rise by a hair near the end: only a step that makes it clearly worse is halved.
-    fn descend(&self, rings: &Rings, state: &mut State, noise: DifferenceNoise, aspect: f64) -> Option<f64> {
+    fn descend(
+        &self,
+        rings: &Rings,
+        state: &mut State,
+        noise: DifferenceNoise,
+        aspect: f64,
+    ) -> Option<f64> {
         let mut here = self.assemble(rings, &state.shape, noise);
         state.stop = StopReason::IterationLimit;
         let mut shift = [0.0; 2];
@@ -140,7 +155,12 @@ impl HertzFitter {
 
     /// Normal equations over all pixels of the rings; rows of parameters that are not fitted are those of the identity.
     fn assemble(&self, rings: &Rings, shape: &Shape, noise: DifferenceNoise) -> Equations {
-        let mut e = Equations { normal: Normal::zeros(), gradient: Step::zeros(), chi2: 0.0, pixels: 0.0 };
+        let mut e = Equations {
+            normal: Normal::zeros(),
+            gradient: Step::zeros(),
+            chi2: 0.0,
+            pixels: 0.0,
+        };
         for ring in rings.filled() {
             let r2 = ring.r2 / ring.n;
             let spread = (ring.r4 / ring.n - r2 * r2).max(0.0);
@@ -160,7 +180,10 @@ impl HertzFitter {
 
     /// The parameters that need not be fitted, and whether they are not.
     fn fixed(&self) -> [(usize, bool); 2] {
-        [(1, !self.options.fit_background), (3, self.options.blur_px.is_some())]
+        [
+            (1, !self.options.fit_background),
+            (3, self.options.blur_px.is_some()),
+        ]
     }
 
     /// The parameters' covariance, scaled by the residuals and in pixels along both axes, and the reduced χ².
@@ -189,7 +212,8 @@ impl HertzFitter {
         let (covariance, reduced) = self.covariance(equations, aspect)?;
         let s = &state.shape;
         let radius_px = Estimate::<T>::nearest(s.radius, covariance[(2, 2)]);
-        let centre = |k: usize| Estimate::nearest(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)]);
+        let centre =
+            |k: usize| Estimate::nearest(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)]);
         Some(HertzFit {
             centre_px: [centre(0), centre(1)],
             radius_px,
@@ -198,7 +222,9 @@ impl HertzFitter {
             background: Estimate::nearest(s.background, covariance[(1, 1)]),
             blur_px: T::nearest((s.blur - PIXEL).max(0.0).sqrt()),
             integrated_pixel_value: integral(s, &covariance, aspect),
-            covariance: std::array::from_fn(|i| std::array::from_fn(|j| T::nearest(covariance[(i, j)]))),
+            covariance: std::array::from_fn(|i| {
+                std::array::from_fn(|j| T::nearest(covariance[(i, j)]))
+            }),
             reduced_chi_squared: T::nearest(reduced),
             iterations: state.iterations,
             stop: state.stop,
@@ -232,7 +258,8 @@ impl Equations {
         self.gradient[5] += slope * (ring.dv - along(ring.v, ring.r2v));
         // Along a ring the model itself varies; that is no misfit.
         let within = ring.n * l.by_r2 * l.by_r2 * spread;
-        self.chi2 += weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value - within);
+        self.chi2 +=
+            weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value - within);
         self.pixels += ring.n;
     }
 }

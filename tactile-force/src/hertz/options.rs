@@ -24,14 +24,19 @@ pub struct HertzFitOptions {
 
 impl Default for HertzFitOptions {
     fn default() -> Self {
-        Self { blur_px: None, fit_background: false, max_iterations: 50 }
+        Self {
+            blur_px: None,
+            fit_background: false,
+            max_iterations: 50,
+        }
     }
 }
 
 impl HertzFitOptions {
     pub(super) fn validate(&self) -> Result<(), ForceError> {
         Requirement::AtLeastOne.check("max_iterations", self.max_iterations as f64)?;
-        self.blur_px.map_or(Ok(()), |b| Requirement::NonNegative.check("blur_px", b))
+        self.blur_px
+            .map_or(Ok(()), |b| Requirement::NonNegative.check("blur_px", b))
     }
 }
 

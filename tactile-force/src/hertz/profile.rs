@@ -42,13 +42,14 @@ pub(super) fn level(edge: &BlurredEdge, shape: &Shape, r2: f64, spread: f64) -> 
     let by_mean = (h[1] + q * h[4]) / root;
     let by_variance = 0.5 * (h[2] + q * h[5]) / (root * sd);
     let by_skew = root * h[3] / (6.0 * variance * sd);
-    let by_radius =
-        (2.0 * (r2 + 2.0 * w) * inverse * by_mean - 4.0 * variance * by_variance - 6.0 * skew * by_skew)
-            / shape.radius;
+    let by_radius = (2.0 * (r2 + 2.0 * w) * inverse * by_mean
+        - 4.0 * variance * by_variance
+        - 6.0 * skew * by_skew)
+        / shape.radius;
     let by_blur = -2.0 * inverse * by_mean + (4.0 * r2 + 8.0 * w) * inverse2 * by_variance
         - 48.0 * (r2 * w + w * w) * inverse2 * inverse * by_skew;
-    let by_r2 =
-        -inverse * by_mean + 4.0 * w * inverse2 * by_variance - 24.0 * w * w * inverse2 * inverse * by_skew;
+    let by_r2 = -inverse * by_mean + 4.0 * w * inverse2 * by_variance
+        - 24.0 * w * w * inverse2 * inverse * by_skew;
     Level {
         value: shape.background + shape.peak * value,
         by_peak: value,

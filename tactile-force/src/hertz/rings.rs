@@ -52,7 +52,21 @@ impl Ring {
         let [n, u, v, r2] = self.place;
         let [uu, uv, r2u, r2v] = self.product;
         let [d, du, dv, dd] = self.difference;
-        RingSums { n, r2, r4: self.r4, u, v, uu, uv, r2u, r2v, d, du, dv, dd }
+        RingSums {
+            n,
+            r2,
+            r4: self.r4,
+            u,
+            v,
+            uu,
+            uv,
+            r2u,
+            r2v,
+            d,
+            du,
+            dv,
+            dd,
+        }
     }
 }
 
@@ -82,7 +96,14 @@ impl Rings {
         self.rings.clear();
         let wide = (radius - EDGE).max(0.0).floor();
         let stride = (std::f64::consts::PI * wide * wide / aspect / ENOUGH).max(1.0) as u32;
-        let gather = Gather { rings: &mut self.rings, region, centre, aspect, wide, stride };
+        let gather = Gather {
+            rings: &mut self.rings,
+            region,
+            centre,
+            aspect,
+            wide,
+            stride,
+        };
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
             return simd.vectorize(gather);
@@ -146,7 +167,11 @@ impl pulp::NullaryFnOnce for Gather<'_> {
                 self.rings.resize(needed, Ring::default());
             }
             let pixels = &self.region.difference[run.span(columns)];
-            let inner = if run.row % self.stride == 0 { 0..0 } else { self.inner(v, first, pixels.len()) };
+            let inner = if run.row % self.stride == 0 {
+                0..0
+            } else {
+                self.inner(v, first, pixels.len())
+            };
             self.row(v, first, &pixels[..inner.start]);
             self.row(v, first + inner.end as f64, &pixels[inner.end..]);
         }

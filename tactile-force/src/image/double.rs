@@ -25,7 +25,11 @@ impl Double {
     }
 
     pub(super) fn abs(self) -> Self {
-        if self.value() < 0.0 { Self::default() - self } else { self }
+        if self.value() < 0.0 {
+            Self::default() - self
+        } else {
+            self
+        }
     }
 
     /// a/b to about 30 digits.
@@ -41,12 +45,18 @@ impl Double {
 fn two_sum(a: f64, b: f64) -> Double {
     let high = a + b;
     let other = high - a;
-    Double { high, low: (a - (high - other)) + (b - other) }
+    Double {
+        high,
+        low: (a - (high - other)) + (b - other),
+    }
 }
 
 fn quick(a: f64, b: f64) -> Double {
     let high = a + b;
-    Double { high, low: b - (high - a) }
+    Double {
+        high,
+        low: b - (high - a),
+    }
 }
 
 impl Add for Double {
@@ -63,7 +73,10 @@ impl Sub for Double {
     type Output = Self;
 
     fn sub(self, b: Self) -> Self {
-        self + Self { high: -b.high, low: -b.low }
+        self + Self {
+            high: -b.high,
+            low: -b.low,
+        }
     }
 }
 
@@ -87,6 +100,9 @@ mod tests {
         let sum = third + third + third - 1.0.into();
         assert!(sum.value().abs() < 1e-31);
         let a = Double::from(1e16) + 1.0.into();
-        assert_eq!((a * a - Double::from(1e16) * 1e16.into()).value(), 2e16 + 1.0);
+        assert_eq!(
+            (a * a - Double::from(1e16) * 1e16.into()).value(),
+            2e16 + 1.0
+        );
     }
 }

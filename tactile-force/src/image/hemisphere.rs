@@ -34,7 +34,11 @@ impl<T: Real> HertzProfile<T> {
         }
         Requirement::Positive.check("radius", radius.as_f64())?;
         Requirement::Finite.check("peak", peak.as_f64())?;
-        Ok(Self { centre, radius, peak })
+        Ok(Self {
+            centre,
+            radius,
+            peak,
+        })
     }
 
     /// Moments over the whole plane: ⅔πa²A, the centre, a√(2/5).
@@ -63,7 +67,9 @@ impl<T: Real> HertzProfile<T> {
         let (c, a) = (self.centre.map(T::as_f64), self.radius.as_f64());
         let scaled = |ends: [T; 2], c: f64| ends.map(|e| (e.as_f64() - c) / a);
         let (x, y) = (scaled(part.x, c[0]), scaled(part.y, c[1]));
-        let along = |x: [f64; 2], y: [f64; 2], origin: f64, about: f64| strip(&gauss, x, y, [origin, about]);
+        let along = |x: [f64; 2], y: [f64; 2], origin: f64, about: f64| {
+            strip(&gauss, x, y, [origin, about])
+        };
         // Moments about the rectangle's own first corner, then about the centroid: no sum cancels.
         let [volume, mx, _] = along(x, y, x[0], 0.0);
         let [_, my, _] = along(y, x, y[0], 0.0);
@@ -86,7 +92,10 @@ impl<T: Real> HertzProfile<T> {
         let (c, a) = (self.centre.map(T::as_f64), self.radius.as_f64());
         Array2::from_shape_fn((grid.rows, grid.columns), |(row, column)| {
             let pixel = grid.pixel(row, column);
-            let (x, y) = (pixel.x.map(|e| (e - c[0]) / a), pixel.y.map(|e| (e - c[1]) / a));
+            let (x, y) = (
+                pixel.x.map(|e| (e - c[0]) / a),
+                pixel.y.map(|e| (e - c[1]) / a),
+            );
             let volume = strip(&gauss, x, y, [0.0; 2])[0];
             T::nearest(self.peak.as_f64() * volume / ((x[1] - x[0]) * (y[1] - y[0])))
         })
@@ -118,13 +127,27 @@ fn strip(gauss: &Gauss<32>, x: [f64; 2], y: [f64; 2], [origin, about]: [f64; 2])
 /// the end) lies away, so that pieces shrink towards places where the integrand is not smooth.
 fn graded(from: f64, end: f64, special: &[f64; 6]) -> f64 {
     let away = |d: f64| if d > 0.0 { d } else { f64::INFINITY };
-    let behind = special.iter().map(|s| away(from - s)).fold(f64::INFINITY, f64::min);
-    let beyond = special.iter().map(|s| away(s - end)).fold(f64::INFINITY, f64::min);
+    let behind = special
+        .iter()
+        .map(|s| away(from - s))
+        .fold(f64::INFINITY, f64::min);
+    let beyond = special
+        .iter()
+        .map(|s| away(s - end))
+        .fold(f64::INFINITY, f64::min);
     let length = end - from;
     let reach = length.min(3.0 * behind);
     // From the far end: keep a quarter of what is left until that is thrice the distance beyond.
-    let reach = if length > 3.0 * beyond { reach.min(0.75 * length) } else { reach };
-    if reach >= length || from + reach <= from { end } else { from + reach }
+    let reach = if length > 3.0 * beyond {
+        reach.min(0.75 * length)
+    } else {
+        reach
+    };
+    if reach >= length || from + reach <= from {
+        end
+    } else {
+        from + reach
+    }
 }
 
 /// The same over a piece without special places inside, with x = m + h sin φ.
@@ -149,7 +172,11 @@ fn chord(w2: f64, y: [f64; 2]) -> f64 {
     // The half with the larger |y| on the positive side; the integrand is even.
     let (p, q) = if p + q < 0.0 { (-q, -p) } else { (p, q) };
     let [sp, sq] = [p, q].map(|y| ((w - y) * (w + y)).max(0.0).sqrt());
-    let sine = if p > 0.0 { (q - p) * (q + p) / (q * sp + p * sq) } else { (q * sp - p * sq) / w2 };
+    let sine = if p > 0.0 {
+        (q - p) * (q + p) / (q * sp + p * sq)
+    } else {
+        (q * sp - p * sq) / w2
+    };
     let cosine = (sp * sq + p * q) / w2;
     let delta = sine.atan2(cosine);
     let cos_sum = (sp * sq - p * q) / w2;
@@ -184,11 +211,18 @@ mod tests {
     #[test]
     fn chord_agrees_with_the_antiderivative() {
         let area = |w: f64, y: f64| 0.5 * (y * (w * w - y * y).sqrt() + w * w * (y / w).asin());
-        for (w, p, q) in
-            [(1.0, -0.3, 0.8), (0.7, 0.1, 0.2), (2.0, -1.9, -0.5), (1.0, -1.0, 1.0), (0.9, 0.6, 0.9)]
-        {
+        for (w, p, q) in [
+            (1.0, -0.3, 0.8),
+            (0.7, 0.1, 0.2),
+            (2.0, -1.9, -0.5),
+            (1.0, -1.0, 1.0),
+            (0.9, 0.6, 0.9),
+        ] {
             // The antiderivative's rounding is some ulps of w².
-            assert!((chord(w * w, [p, q]) - (area(w, q) - area(w, p))).abs() < 1e-15 * 4.0, "{w} {p} {q}");
+            assert!(
+                (chord(w * w, [p, q]) - (area(w, q) - area(w, p))).abs() < 1e-15 * 4.0,
+                "{w} {p} {q}"
+            );
         }
     }
 }

@@ -140,9 +140,13 @@ impl Sums {
             return (None, None, MomentStatus::Empty);
         }
         let [x, y] = [self.x.over(self.sum), self.y.over(self.sum)];
-        let centroid = Some([(x + middle[0].into()).value(), (y + middle[1].into()).value()]);
+        let centroid = Some([
+            (x + middle[0].into()).value(),
+            (y + middle[1].into()).value(),
+        ]);
         let spread = (self.square.over(self.sum) - x * x - y * y).value();
-        let rounding = NOTHING * (self.size.value() / self.sum.value().abs() + (x * x + y * y).value());
+        let rounding =
+            NOTHING * (self.size.value() / self.sum.value().abs() + (x * x + y * y).value());
         match spread {
             s if s.abs() <= rounding => (centroid, Some(0.0), MomentStatus::Ok),
             s if s < 0.0 => (centroid, None, MomentStatus::NegativeSecondMoment),

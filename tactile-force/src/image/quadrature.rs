@@ -32,7 +32,10 @@ impl<const N: usize> Gauss<N> {
         let mut total = [0.0; M];
         for (x, w) in &self.nodes {
             let values = f(middle + half * x);
-            total.iter_mut().zip(values).for_each(|(t, v)| *t += half * w * v);
+            total
+                .iter_mut()
+                .zip(values)
+                .for_each(|(t, v)| *t += half * w * v);
         }
         total
     }

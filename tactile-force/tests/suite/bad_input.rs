@@ -3,14 +3,16 @@
 use ndarray::{Array2, array};
 use proptest::prelude::*;
 use tactile_force::{
-    CalibrationPair, ContactDetector, ContactOptions, ForceError, ForceMeter, ForceOptions, GaussianProfile,
-    HertzFitOptions, HertzFitter, HertzProfile, ImageMoments, LinearCalibration, NoiseModel, ReferenceFrame,
-    ShearCalibration, ShearPair, measure_force,
+    CalibrationPair, ContactDetector, ContactOptions, ForceError, ForceMeter, ForceOptions,
+    GaussianProfile, HertzFitOptions, HertzFitter, HertzProfile, ImageMoments, LinearCalibration,
+    NoiseModel, ReferenceFrame, ShearCalibration, ShearPair, measure_force,
 };
 
 fn calibration() -> LinearCalibration<f64> {
-    let pairs: Vec<_> =
-        (0..5).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
+    let pairs: Vec<_> = (0..5)
+        .map(|k| 1e5 * f64::from(k))
+        .map(|v| CalibrationPair::loading(v, 1e-6 * v))
+        .collect();
     LinearCalibration::fit(&pairs, &Default::default()).unwrap()
 }
 
@@ -30,18 +32,39 @@ fn options_outside_their_domain() {
     };
     rejected(detector(|o| o.false_alarm_rate = 0.0), "false_alarm_rate");
     rejected(detector(|o| o.false_alarm_rate = 1.0), "false_alarm_rate");
-    rejected(detector(|o| o.false_alarm_rate = f64::NAN), "false_alarm_rate");
+    rejected(
+        detector(|o| o.false_alarm_rate = f64::NAN),
+        "false_alarm_rate",
+    );
     rejected(detector(|o| o.saturation_limit = -0.1), "saturation_limit");
-    rejected(detector(|o| o.saturation_limit = f64::NAN), "saturation_limit");
+    rejected(
+        detector(|o| o.saturation_limit = f64::NAN),
+        "saturation_limit",
+    );
     rejected(detector(|o| o.minimum_area_px = 0), "minimum_area_px");
     rejected(detector(|o| o.smoothing_px = Some(4)), "smoothing_px");
     rejected(detector(|o| o.smoothing_px = Some(0)), "smoothing_px");
     for blur in [-1.0, f64::NAN, f64::INFINITY] {
-        rejected(HertzFitter::new(HertzFitOptions { blur_px: Some(blur), ..Default::default() }), "blur_px");
+        rejected(
+            HertzFitter::new(HertzFitOptions {
+                blur_px: Some(blur),
+                ..Default::default()
+            }),
+            "blur_px",
+        );
     }
-    rejected(HertzFitter::new(HertzFitOptions { max_iterations: 0, ..Default::default() }), "max_iterations");
+    rejected(
+        HertzFitter::new(HertzFitOptions {
+            max_iterations: 0,
+            ..Default::default()
+        }),
+        "max_iterations",
+    );
     for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        rejected(ForceMeter::new([1e-5, size], &ForceOptions::default()), "pixel_size_m");
+        rejected(
+            ForceMeter::new([1e-5, size], &ForceOptions::default()),
+            "pixel_size_m",
+        );
         rejected(HertzProfile::new([0.0; 2], size, 1.0), "radius");
         rejected(GaussianProfile::new([0.0; 2], size, 1.0), "sd");
     }
@@ -55,15 +78,33 @@ fn options_outside_their_domain() {
 fn images_that_do_not_fit() {
     let (small, large) = (Array2::<u8>::zeros((20, 30)), Array2::<u8>::zeros((20, 31)));
     let measure = |f: &Array2<u8>, r: &Array2<u8>| {
-        measure_force(f.view(), r.view(), [1e-5; 2], &calibration(), &ForceOptions::default())
+        measure_force(
+            f.view(),
+            r.view(),
+            [1e-5; 2],
+            &calibration(),
+            &ForceOptions::default(),
+        )
     };
     assert_eq!(
         measure(&large, &small),
-        Err(ForceError::SizeMismatch { expected: (20, 30), found: (20, 31) })
+        Err(ForceError::SizeMismatch {
+            expected: (20, 30),
+            found: (20, 31)
+        })
     );
     let empty = Array2::<u8>::zeros((0, 30));
-    assert_eq!(measure(&empty, &empty), Err(ForceError::EmptyImage { rows: 0, columns: 30 }));
-    assert!(matches!(ReferenceFrame::from_frames(&[]), Err(ForceError::EmptyImage { .. })));
+    assert_eq!(
+        measure(&empty, &empty),
+        Err(ForceError::EmptyImage {
+            rows: 0,
+            columns: 30
+        })
+    );
+    assert!(matches!(
+        ReferenceFrame::from_frames(&[]),
+        Err(ForceError::EmptyImage { .. })
+    ));
     assert!(matches!(
         ReferenceFrame::from_frames(&[small.view(), large.view()]),
         Err(ForceError::SizeMismatch { .. })
@@ -71,10 +112,22 @@ fn images_that_do_not_fit() {
     let black = ReferenceFrame::new(small.view()).unwrap().with_flat_field();
     assert!(matches!(black, Err(ForceError::ReferenceTooDark { .. })));
     let long = Array2::<u8>::zeros((1, 20_000));
-    assert_eq!(measure(&long, &long), Err(ForceError::ImageTooLarge { found: 20_000, limit: 16_384 }));
+    assert_eq!(
+        measure(&long, &long),
+        Err(ForceError::ImageTooLarge {
+            found: 20_000,
+            limit: 16_384
+        })
+    );
     let nan = array![[1.0, 2.0], [f64::NAN, 3.0]];
-    assert_eq!(ImageMoments::of(nan.view(), 0.0), Err(ForceError::NonFinitePixel { row: 1, column: 0 }));
-    rejected(ImageMoments::of(array![[1.0]].view(), f64::INFINITY), "background");
+    assert_eq!(
+        ImageMoments::of(nan.view(), 0.0),
+        Err(ForceError::NonFinitePixel { row: 1, column: 0 })
+    );
+    rejected(
+        ImageMoments::of(array![[1.0]].view(), f64::INFINITY),
+        "background",
+    );
     assert!(matches!(
         ImageMoments::of(Array2::<f64>::zeros((3, 0)).view(), 0.0),
         Err(ForceError::EmptyImage { .. })
@@ -91,26 +144,56 @@ fn saturation_beyond_the_stated_share_is_an_error_and_below_it_a_count() {
         }
     }
     let with = |limit| {
-        let contact = ContactOptions { saturation_limit: limit, ..Default::default() };
-        let options = ForceOptions { contact, ..Default::default() };
-        measure_force(frame.view(), reference.view(), [1e-5; 2], &calibration(), &options)
+        let contact = ContactOptions {
+            saturation_limit: limit,
+            ..Default::default()
+        };
+        let options = ForceOptions {
+            contact,
+            ..Default::default()
+        };
+        measure_force(
+            frame.view(),
+            reference.view(),
+            [1e-5; 2],
+            &calibration(),
+            &options,
+        )
     };
-    assert_eq!(with(0.1), Err(ForceError::SaturatedContact { share: 0.15, limit: 0.1 }));
+    assert_eq!(
+        with(0.1),
+        Err(ForceError::SaturatedContact {
+            share: 0.15,
+            limit: 0.1
+        })
+    );
     let contact = with(0.2).unwrap().contact.unwrap();
     assert_eq!((contact.saturated_px, contact.area_px), (90, 600));
 }
 
 #[test]
 fn shear_pairs_that_say_nothing() {
-    let pair = |u: f64, f: f64| ShearPair { centroid_step_m: [u, u], force_n: [f, f] };
+    let pair = |u: f64, f: f64| ShearPair {
+        centroid_step_m: [u, u],
+        force_n: [f, f],
+    };
     assert_eq!(
         ShearCalibration::fit(&[pair(1.0, 2.0)]),
-        Err(ForceError::TooFewPairs { required: 2, found: 1 })
+        Err(ForceError::TooFewPairs {
+            required: 2,
+            found: 1
+        })
     );
     let nan = [pair(1.0, 2.0), pair(f64::NAN, 1.0)];
-    assert_eq!(ShearCalibration::fit(&nan), Err(ForceError::NonFinitePair { index: 1 }));
+    assert_eq!(
+        ShearCalibration::fit(&nan),
+        Err(ForceError::NonFinitePair { index: 1 })
+    );
     let still = [pair(0.0, 2.0), pair(0.0, 1.0)];
-    assert!(matches!(ShearCalibration::fit(&still), Err(ForceError::DegeneratePairs { .. })));
+    assert!(matches!(
+        ShearCalibration::fit(&still),
+        Err(ForceError::DegeneratePairs { .. })
+    ));
 }
 
 proptest! {

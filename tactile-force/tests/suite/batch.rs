@@ -2,13 +2,19 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
-    CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, HertzProfile, LinearCalibration, PixelGrid,
-    ReferenceFrame, measure_force,
+    CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, HertzProfile, LinearCalibration,
+    PixelGrid, ReferenceFrame, measure_force,
 };
 
 fn frame(radius: f64, x: f64) -> Array2<u8> {
-    let grid = PixelGrid { rows: 120, columns: 150, size: [1.0; 2], first: [0.0; 2] };
-    let blob = HertzProfile::new([x, 61.3], radius, if radius > 1.0 { 140.0 } else { 0.0 }).unwrap();
+    let grid = PixelGrid {
+        rows: 120,
+        columns: 150,
+        size: [1.0; 2],
+        first: [0.0; 2],
+    };
+    let blob =
+        HertzProfile::new([x, 61.3], radius, if radius > 1.0 { 140.0 } else { 0.0 }).unwrap();
     let mut image = blob.image(&grid);
     image
         .indexed_iter_mut()
@@ -18,12 +24,16 @@ fn frame(radius: f64, x: f64) -> Array2<u8> {
 
 #[test]
 fn the_same_bits_alone_in_series_and_in_parallel() {
-    let frames: Vec<_> = (0..12).map(|k| frame([30.0, 0.5, 12.0][k % 3], 60.0 + k as f64)).collect();
+    let frames: Vec<_> = (0..12)
+        .map(|k| frame([30.0, 0.5, 12.0][k % 3], 60.0 + k as f64))
+        .collect();
     let views: Vec<ArrayView2<'_, u8>> = frames.iter().map(|f| f.view()).collect();
     let dark = frame(0.5, 3.0);
     let reference = ReferenceFrame::new(dark.view()).unwrap();
-    let pairs: Vec<_> =
-        (0..5).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
+    let pairs: Vec<_> = (0..5)
+        .map(|k| 1e5 * f64::from(k))
+        .map(|v| CalibrationPair::loading(v, 1e-6 * v))
+        .collect();
     let calibration = LinearCalibration::fit(&pairs, &Default::default()).unwrap();
     let options = ForceOptions::default();
     let meter = ForceMeter::new([2e-5; 2], &options).unwrap();
@@ -32,17 +42,26 @@ fn the_same_bits_alone_in_series_and_in_parallel() {
         .map(|v| measure_force(v.view(), dark.view(), [2e-5; 2], &calibration, &options).unwrap())
         .collect();
     assert!(single[0].contact.is_some() && single[1].contact.is_none());
-    let series: Vec<_> =
-        meter.measure_all(&views, &reference, &calibration).into_iter().map(Result::unwrap).collect();
+    let series: Vec<_> = meter
+        .measure_all(&views, &reference, &calibration)
+        .into_iter()
+        .map(Result::unwrap)
+        .collect();
     assert_eq!(series, single);
     #[cfg(feature = "rayon")]
     {
         let parallel = meter.measure_all_in_parallel(&views, &reference, &calibration);
-        assert_eq!(parallel.into_iter().map(Result::unwrap).collect::<Vec<_>>(), single);
+        assert_eq!(
+            parallel.into_iter().map(Result::unwrap).collect::<Vec<_>>(),
+            single
+        );
     }
     #[cfg(feature = "serde")]
     {
         let text = serde_json::to_string(&single).unwrap();
-        assert_eq!(serde_json::from_str::<Vec<ForceMeasurement<f64>>>(&text).unwrap(), single);
+        assert_eq!(
+            serde_json::from_str::<Vec<ForceMeasurement<f64>>>(&text).unwrap(),
+            single
+        );
     }
 }

@@ -4,7 +4,11 @@ use ndarray::{Array2, ArrayView2, Axis, ShapeBuilder, Slice};
 use proptest::prelude::*;
 use tactile_force::{BoundingBox, FrameStatistics, ReferenceFrame};
 
-fn slow(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>, threshold: u8) -> FrameStatistics {
+fn slow(
+    frame: ArrayView2<'_, u8>,
+    reference: ArrayView2<'_, u8>,
+    threshold: u8,
+) -> FrameStatistics {
     let (rows, columns) = frame.dim();
     let mut s = FrameStatistics {
         rows,
@@ -33,7 +37,12 @@ fn slow(frame: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>, threshold: u8)
         s.greatest = s.greatest.max(d);
         s.saturated += usize::from(f == 255);
         if d.unsigned_abs() > u16::from(threshold) {
-            let here = BoundingBox { row_start: y, row_end: y + 1, column_start: x, column_end: x + 1 };
+            let here = BoundingBox {
+                row_start: y,
+                row_end: y + 1,
+                column_start: x,
+                column_end: x + 1,
+            };
             s.bounding_box = Some(s.bounding_box.map_or(here, |b| b.union(here)));
         }
     }
@@ -47,7 +56,9 @@ fn images() -> impl Strategy<Value = (Array2<u8>, Array2<u8>)> {
         |((h, w), seed, level, spread, bright)| {
             let mut state = seed | 1;
             let mut next = move || {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
                 (state >> 56) as u8
             };
             let mut image = || {
@@ -58,7 +69,8 @@ fn images() -> impl Strategy<Value = (Array2<u8>, Array2<u8>)> {
             let (mut frame, reference) = (image(), image());
             if bright {
                 let mut part = frame.slice_axis_mut(Axis(0), Slice::from(h / 3..h / 2 + 1));
-                part.slice_axis_mut(Axis(1), Slice::from(w / 4..w / 3 + 1)).fill(255);
+                part.slice_axis_mut(Axis(1), Slice::from(w / 4..w / 3 + 1))
+                    .fill(255);
             }
             (frame, reference)
         },
@@ -90,7 +102,10 @@ fn strides_do_not_matter() {
     }
     let from_columns =
         ReferenceFrame::new(Array2::from_shape_fn((70, 90).f(), |i| reference[i]).view()).unwrap();
-    assert_eq!(from_columns.compare(rows_first.view(), 9).unwrap(), expected);
+    assert_eq!(
+        from_columns.compare(rows_first.view(), 9).unwrap(),
+        expected
+    );
 }
 
 #[test]
@@ -101,7 +116,10 @@ fn moments_of_a_far_away_point_are_exact() {
     for (y, x, v) in [(2990, 3990, 9), (2992, 3990, 9), (2991, 3991, 18)] {
         frame[[y, x]] = v;
     }
-    let s = ReferenceFrame::new(reference.view()).unwrap().compare(frame.view(), 1).unwrap();
+    let s = ReferenceFrame::new(reference.view())
+        .unwrap()
+        .compare(frame.view(), 1)
+        .unwrap();
     assert_eq!(s.centroid_px(), Some([3990.5, 2991.0]));
     assert_eq!(s.central_moments_px2(), Some([0.25, 0.0, 0.5]));
 }

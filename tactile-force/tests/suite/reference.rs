@@ -12,22 +12,33 @@ const EPS: f64 = f64::EPSILON;
 fn load() -> Option<Value> {
     let folder = std::env::var("TACTILE_DATA")
         .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data").into());
-    let text = std::fs::read_to_string(std::path::Path::new(&folder).join("reference/image.json")).ok()?;
+    let text =
+        std::fs::read_to_string(std::path::Path::new(&folder).join("reference/image.json")).ok()?;
     let data: Value = serde_json::from_str(&text).expect("valid JSON");
     for check in data["header"]["parse_check"].as_array().unwrap() {
         let bits = u64::from_str_radix(&check["bits"].as_str().unwrap()[2..], 16).unwrap();
-        assert_eq!(check["value"].as_f64().unwrap().to_bits(), bits, "numbers must be read exactly");
+        assert_eq!(
+            check["value"].as_f64().unwrap().to_bits(),
+            bits,
+            "numbers must be read exactly"
+        );
     }
     Some(data)
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("a number, found {value}"))
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("a number, found {value}"))
 }
 
 fn image(value: &Value) -> Option<Array2<f64>> {
     let rows = value.as_array()?;
-    let flat: Vec<f64> = rows.iter().flat_map(|r| r.as_array().unwrap()).map(number).collect();
+    let flat: Vec<f64> = rows
+        .iter()
+        .flat_map(|r| r.as_array().unwrap())
+        .map(number)
+        .collect();
     Some(Array2::from_shape_vec((rows.len(), flat.len() / rows.len()), flat).unwrap())
 }
 
@@ -43,8 +54,9 @@ impl Judge {
     fn check(&mut self, what: String, found: f64, expected: f64, allowed: f64) {
         let ratio = (found - expected).abs() / allowed;
         if ratio.is_nan() || ratio > 1.0 {
-            self.failed
-                .push(format!("{what}: found {found:e}, expected {expected:e}, {ratio:.2} of the allowance"));
+            self.failed.push(format!(
+                "{what}: found {found:e}, expected {expected:e}, {ratio:.2} of the allowance"
+            ));
         }
         if ratio > self.worst.0 {
             self.worst = (ratio, what);
@@ -78,7 +90,11 @@ impl Moments<'_> {
     fn check(&self, judge: &mut Judge) {
         let m = ImageMoments::of(self.pixels.view(), self.background).unwrap();
         let d = self.pixels.mapv(|p| p - self.background);
-        let condition = if self.rounded { d.mapv(f64::abs).sum() / d.sum().abs() } else { 1.0 };
+        let condition = if self.rounded {
+            d.mapv(f64::abs).sum() / d.sum().abs()
+        } else {
+            1.0
+        };
         self.relative(judge, "sum", m.sum, condition);
         self.relative(judge, "force", m.sum * self.pitch * self.pitch, condition);
         self.relative(judge, "min", m.least, 1.0);
@@ -91,22 +107,41 @@ impl Moments<'_> {
             MomentStatus::Empty => "empty",
             MomentStatus::NegativeSecondMoment => "negative_second_moment",
         };
-        assert_eq!(status, self.expected["status"].as_str().unwrap(), "{}", self.id);
+        assert_eq!(
+            status,
+            self.expected["status"].as_str().unwrap(),
+            "{}",
+            self.id
+        );
         self.place(judge, &m, condition);
     }
 
     fn relative(&self, judge: &mut Judge, key: &str, found: f64, condition: f64) {
         if !self.expected[key].is_null() {
-            judge.relative(format!("{} {key}", self.id), found, number(&self.expected[key]), condition);
+            judge.relative(
+                format!("{} {key}", self.id),
+                found,
+                number(&self.expected[key]),
+                condition,
+            );
         }
     }
 
     fn variance(&self, judge: &mut Judge, m: &ImageMoments<f64>) {
         if number(&self.expected.get("variance").cloned().unwrap_or(0.0.into())) == 0.0 {
-            assert!(m.variance == 0.0, "{}: variance of equal pixels {}", self.id, m.variance);
+            assert!(
+                m.variance == 0.0,
+                "{}: variance of equal pixels {}",
+                self.id,
+                m.variance
+            );
         } else {
             let scale = m.greatest.abs().max(m.least.abs());
-            let condition = if self.rounded { scale * scale / m.variance } else { 1.0 };
+            let condition = if self.rounded {
+                scale * scale / m.variance
+            } else {
+                1.0
+            };
             self.relative(judge, "variance", m.variance, condition);
         }
     }
@@ -114,14 +149,21 @@ impl Moments<'_> {
     /// Centroid and radius of gyration.
     fn place(&self, judge: &mut Judge, m: &ImageMoments<f64>, condition: f64) {
         let (id, expected, pitch) = (self.id, self.expected, self.pitch);
-        assert_eq!(m.centroid_px.is_none(), expected["centroid"].is_null(), "{id}");
+        assert_eq!(
+            m.centroid_px.is_none(),
+            expected["centroid"].is_null(),
+            "{id}"
+        );
         if let (Some(c), Some(e)) = (m.centroid_px, expected["centroid"].as_array()) {
             for (k, axis) in ["x", "y"].iter().enumerate() {
                 let what = format!("{id} centroid {axis}");
                 judge.relative(what, (c[k] + 0.5) * pitch, number(&e[k]), condition);
             }
         }
-        if let (Some(r), Some(e)) = (m.radius_of_gyration_px, expected["radius_of_gyration"].as_f64()) {
+        if let (Some(r), Some(e)) = (
+            m.radius_of_gyration_px,
+            expected["radius_of_gyration"].as_f64(),
+        ) {
             if e == 0.0 {
                 assert_eq!(r, 0.0, "{id}")
             } else {
@@ -141,7 +183,12 @@ fn profile(
 ) {
     assert_eq!(found.is_none(), expected.is_null(), "{id}");
     let Some(m) = found else { return };
-    judge.relative(format!("{id} integral"), m.integral, number(&expected["force"]), condition);
+    judge.relative(
+        format!("{id} integral"),
+        m.integral,
+        number(&expected["force"]),
+        condition,
+    );
     for k in 0..2 {
         judge.relative(
             format!("{id} centroid {k}"),
@@ -170,19 +217,34 @@ impl Blob {
     fn of(case: &Value, size: usize, pitch: f64, centre: [f64; 2]) -> Self {
         let p = &case["params"];
         let peak = number(&p["amplitude"]);
-        let grid = PixelGrid { rows: size, columns: size, size: [pitch; 2], first: [0.5 * pitch; 2] };
+        let grid = PixelGrid {
+            rows: size,
+            columns: size,
+            size: [pitch; 2],
+            first: [0.5 * pitch; 2],
+        };
         let side = [0.0, size as f64 * pitch];
         let frame = Rectangle { x: side, y: side };
         if case["kind"] == "gaussian" {
             let sd = number(&p["sigma"]);
             let blob = GaussianProfile::new(centre, sd, peak).unwrap();
             let condition = gaussian_condition(centre, sd);
-            Self { pixels: blob.image(&grid), whole: blob.whole(), within: blob.within(&frame), condition }
+            Self {
+                pixels: blob.image(&grid),
+                whole: blob.whole(),
+                within: blob.within(&frame),
+                condition,
+            }
         } else {
             let a = number(&p["a"]);
             let blob = HertzProfile::new(centre, a, peak).unwrap();
             let condition = hertz_condition(centre, a, pitch);
-            Self { pixels: blob.image(&grid), whole: blob.whole(), within: blob.within(&frame), condition }
+            Self {
+                pixels: blob.image(&grid),
+                whole: blob.whole(),
+                within: blob.within(&frame),
+                condition,
+            }
         }
     }
 }
@@ -222,9 +284,21 @@ fn check_blob(judge: &mut Judge, case: &Value, id: &str, pitch: f64) {
     let (size, expected) = (case["size"].as_u64().unwrap() as usize, &case["expected"]);
     let centre = ["cx", "cy"].map(|c| number(&case["params"][c]));
     let blob = Blob::of(case, size, pitch, centre);
-    profile(judge, &format!("{id} plane"), Some(blob.whole), &expected["plane"], 1.0);
+    profile(
+        judge,
+        &format!("{id} plane"),
+        Some(blob.whole),
+        &expected["plane"],
+        1.0,
+    );
     let [x, y] = centre.map(|c| 0.0_f64.max(c.min(size as f64 * pitch)));
-    profile(judge, &format!("{id} frame"), blob.within, &expected["frame"], (blob.condition)(x, y));
+    profile(
+        judge,
+        &format!("{id} frame"),
+        blob.within,
+        &expected["frame"],
+        (blob.condition)(x, y),
+    );
     let reference = image(&expected["pixels"]);
     match &reference {
         None => assert!(blob.pixels.iter().all(|v| *v == 0.0), "{id}"),
@@ -235,7 +309,15 @@ fn check_blob(judge: &mut Judge, case: &Value, id: &str, pitch: f64) {
         Some(reference) => (format!("{id} of pixels"), reference),
     };
     let expected = &expected["moments"];
-    Moments { id: &id, pixels, background: 0.0, pitch, expected, rounded: true }.check(judge);
+    Moments {
+        id: &id,
+        pixels,
+        background: 0.0,
+        pitch,
+        expected,
+        rounded: true,
+    }
+    .check(judge);
 }
 
 #[test]
@@ -244,19 +326,38 @@ fn every_image_case() {
         println!("skipped: no reference data (set TACTILE_DATA)");
         return;
     };
-    let mut judge = Judge { worst: (0.0, String::new()), failed: Vec::new() };
+    let mut judge = Judge {
+        worst: (0.0, String::new()),
+        failed: Vec::new(),
+    };
     let cases = data["cases"].as_array().unwrap();
     for case in cases {
         let (id, pitch) = (case["id"].as_str().unwrap(), number(&case["pitch"]));
         if case["kind"] == "given" {
-            let (pixels, background) = (&image(&case["pixels"]).unwrap(), number(&case["background"]));
+            let (pixels, background) = (
+                &image(&case["pixels"]).unwrap(),
+                number(&case["background"]),
+            );
             let expected = &case["expected"]["moments"];
-            Moments { id, pixels, background, pitch, expected, rounded: false }.check(&mut judge);
+            Moments {
+                id,
+                pixels,
+                background,
+                pitch,
+                expected,
+                rounded: false,
+            }
+            .check(&mut judge);
         } else {
             check_blob(&mut judge, case, id, pitch);
         }
     }
-    println!("{} cases; worst {:.3} of the allowance: {}", cases.len(), judge.worst.0, judge.worst.1);
+    println!(
+        "{} cases; worst {:.3} of the allowance: {}",
+        cases.len(),
+        judge.worst.0,
+        judge.worst.1
+    );
     assert!(
         judge.failed.is_empty(),
         "{} failed:\n{}",

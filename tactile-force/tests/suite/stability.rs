@@ -10,12 +10,19 @@ use tactile_force::{
 #[test]
 fn a_pedestal_of_a_billion_costs_no_digit_that_the_pixels_have() {
     let blob = GaussianProfile::new([13.3_f64, 17.7], 4.0, 1.0).unwrap();
-    let grid = PixelGrid { rows: 32, columns: 32, size: [1.0; 2], first: [0.0; 2] };
+    let grid = PixelGrid {
+        rows: 32,
+        columns: 32,
+        size: [1.0; 2],
+        first: [0.0; 2],
+    };
     // Rounded to what 1e9 + x can hold, so that subtracting the pedestal is exact.
     let raised = blob.image(&grid).mapv(|v| v + 1e9);
     let plain = raised.mapv(|v| v - 1e9);
-    let (a, b) =
-        (ImageMoments::of(raised.view(), 1e9).unwrap(), ImageMoments::of(plain.view(), 0.0).unwrap());
+    let (a, b) = (
+        ImageMoments::of(raised.view(), 1e9).unwrap(),
+        ImageMoments::of(plain.view(), 0.0).unwrap(),
+    );
     assert_eq!(
         (a.sum, a.centroid_px, a.radius_of_gyration_px),
         (b.sum, b.centroid_px, b.radius_of_gyration_px)
@@ -29,7 +36,10 @@ fn equal_pixels_have_no_variance_at_all() {
     for value in [0.1, 1e300, 1e-300, -7.7e9] {
         for size in [(1, 1), (3, 7), (16, 16)] {
             let m = ImageMoments::of(Array2::from_elem(size, value).view(), value).unwrap();
-            assert_eq!((m.variance, m.mean, m.sum, m.status), (0.0, value, 0.0, MomentStatus::Empty));
+            assert_eq!(
+                (m.variance, m.mean, m.sum, m.status),
+                (0.0, value, 0.0, MomentStatus::Empty)
+            );
         }
     }
 }
@@ -45,7 +55,10 @@ fn negative_second_moments_are_a_status() {
 
 #[test]
 fn order_does_not_matter_where_everything_cancels() {
-    let mut image = Array2::from_shape_fn((16, 16), |(y, x)| if (x + y) % 2 == 0 { -1e16 } else { 1e16 });
+    let mut image = Array2::from_shape_fn(
+        (16, 16),
+        |(y, x)| if (x + y) % 2 == 0 { -1e16 } else { 1e16 },
+    );
     image[[3, 4]] += 2.0;
     image[[9, 12]] += 2.0;
     let m = ImageMoments::of(image.view(), 0.0).unwrap();
@@ -55,9 +68,17 @@ fn order_does_not_matter_where_everything_cancels() {
 }
 
 fn pressed<const DARK: bool>(flip: bool) -> ForceMeasurement<f64> {
-    let grid = PixelGrid { rows: 150, columns: 170, size: [1.0; 2], first: [0.0; 2] };
-    let light = HertzProfile::new([80.2, 70.9], 33.4, 120.0).unwrap().image(&grid);
-    let noise = |y: usize, x: usize, k: usize| ((y * 7919 + x * 104_729 + k * 31) % 13) as f64 / 4.0 - 1.5;
+    let grid = PixelGrid {
+        rows: 150,
+        columns: 170,
+        size: [1.0; 2],
+        first: [0.0; 2],
+    };
+    let light = HertzProfile::new([80.2, 70.9], 33.4, 120.0)
+        .unwrap()
+        .image(&grid);
+    let noise =
+        |y: usize, x: usize, k: usize| ((y * 7919 + x * 104_729 + k * 31) % 13) as f64 / 4.0 - 1.5;
     let sign = if DARK { -1.0 } else { 1.0 };
     let image = |k: usize, scale: f64| {
         let image = Array2::from_shape_fn((150, 170), |(y, x)| {
@@ -65,12 +86,25 @@ fn pressed<const DARK: bool>(flip: bool) -> ForceMeasurement<f64> {
         });
         if flip { image.t().to_owned() } else { image }
     };
-    let pairs: Vec<_> =
-        (0..5).map(|k| 1e5 * f64::from(k)).map(|v| CalibrationPair::loading(v, 1e-6 * v)).collect();
+    let pairs: Vec<_> = (0..5)
+        .map(|k| 1e5 * f64::from(k))
+        .map(|v| CalibrationPair::loading(v, 1e-6 * v))
+        .collect();
     let calibration = LinearCalibration::fit(&pairs, &Default::default()).unwrap();
     let mut options = ForceOptions::default();
-    options.contact.polarity = if DARK { Polarity::Darker } else { Polarity::Brighter };
-    measure_force(image(1, 1.0).view(), image(0, 0.0).view(), [2e-5; 2], &calibration, &options).unwrap()
+    options.contact.polarity = if DARK {
+        Polarity::Darker
+    } else {
+        Polarity::Brighter
+    };
+    measure_force(
+        image(1, 1.0).view(),
+        image(0, 0.0).view(),
+        [2e-5; 2],
+        &calibration,
+        &options,
+    )
+    .unwrap()
 }
 
 #[test]
@@ -97,10 +131,26 @@ fn single_precision_is_double_precision_rounded_once() {
     let wide = HertzProfile::new([7.25_f64, 8.5], 5.5, 100.0).unwrap();
     let narrow = HertzProfile::new([7.25_f32, 8.5], 5.5, 100.0).unwrap();
     let (a, b) = (wide.whole(), narrow.whole());
-    assert_eq!((a.integral as f32, a.radius_of_gyration as f32), (b.integral, b.radius_of_gyration));
-    let part = wide.within(&Rectangle { x: [0.0, 6.0], y: [2.0, 9.5] }).unwrap();
-    let same = narrow.within(&Rectangle { x: [0.0, 6.0], y: [2.0, 9.5] }).unwrap();
-    assert_eq!((part.integral as f32, part.centroid.map(|c| c as f32)), (same.integral, same.centroid));
+    assert_eq!(
+        (a.integral as f32, a.radius_of_gyration as f32),
+        (b.integral, b.radius_of_gyration)
+    );
+    let part = wide
+        .within(&Rectangle {
+            x: [0.0, 6.0],
+            y: [2.0, 9.5],
+        })
+        .unwrap();
+    let same = narrow
+        .within(&Rectangle {
+            x: [0.0, 6.0],
+            y: [2.0, 9.5],
+        })
+        .unwrap();
+    assert_eq!(
+        (part.integral as f32, part.centroid.map(|c| c as f32)),
+        (same.integral, same.centroid)
+    );
 }
 
 proptest! {
@@ -138,7 +188,10 @@ proptest! {
 /// Of a wide contact only every so many rows are looked at well inside the edge: the answer stays that of the profile.
 #[test]
 fn rows_left_out_of_a_wide_contact_do_not_move_the_fit() {
-    let pairs: Vec<_> = (0..5).map(|k| 1e6 * f64::from(k)).map(|v| CalibrationPair::loading(v, v)).collect();
+    let pairs: Vec<_> = (0..5)
+        .map(|k| 1e6 * f64::from(k))
+        .map(|v| CalibrationPair::loading(v, v))
+        .collect();
     let calibration = LinearCalibration::fit(&pairs, &Default::default()).unwrap();
     let reference = Array2::from_elem((600, 620), 12_u8);
     for radius in [118.3, 190.7, 268.4] {
@@ -147,12 +200,22 @@ fn rows_left_out_of_a_wide_contact_do_not_move_the_fit() {
             let r2 = (column as f64 - x).powi(2) + (row as f64 - y).powi(2);
             12 + (200.0 * (1.0 - r2 / (radius * radius)).max(0.0).sqrt()).round() as u8
         });
-        let m = measure_force(frame.view(), reference.view(), [1.0, 1.0], &calibration, &Default::default())
-            .unwrap();
+        let m = measure_force(
+            frame.view(),
+            reference.view(),
+            [1.0, 1.0],
+            &calibration,
+            &Default::default(),
+        )
+        .unwrap();
         let (fit, found) = (m.profile.unwrap(), m.contact_radius_m.unwrap().value);
         // Rounding to grey levels and one sample a pixel at the edge leave 10⁻⁴, as for contacts whose pixels all count.
         assert!((found / radius - 1.0).abs() < 2e-4, "{radius}: {found}");
-        assert!((fit.peak.value / 200.0 - 1.0).abs() < 2e-3, "{}", fit.peak.value);
+        assert!(
+            (fit.peak.value / 200.0 - 1.0).abs() < 2e-3,
+            "{}",
+            fit.peak.value
+        );
         assert!((fit.centre_px[0].value - x).hypot(fit.centre_px[1].value - y) < 0.01);
     }
 }

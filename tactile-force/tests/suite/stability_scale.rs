@@ -27,10 +27,18 @@ fn moments_have_all_their_digits() {
             ("variance", found.variance, at("variance")),
             ("centroid x", centroid[0], expected[0]),
             ("centroid y", centroid[1], expected[1]),
-            ("gyration", found.radius_of_gyration_px.expect("light"), at("radius_of_gyration")),
+            (
+                "gyration",
+                found.radius_of_gyration_px.expect("light"),
+                at("radius_of_gyration"),
+            ),
         ] {
             let gap = (found - expected).abs();
-            let units = if gap == 0.0 { 0.0 } else { gap / expected.abs() / f64::EPSILON };
+            let units = if gap == 0.0 {
+                0.0
+            } else {
+                gap / expected.abs() / f64::EPSILON
+            };
             table.enter(&format!("{quantity}, {name}"), units, ALLOWED);
         }
     }

@@ -85,7 +85,11 @@ impl<T: RealField + Copy> Search<T> {
             self.column_of[row] = best.0;
             if displaced != NONE {
                 self.column_of[displaced] = NONE;
-                if lowers { self.free.push(displaced) } else { self.waiting.push(displaced) }
+                if lowers {
+                    self.free.push(displaced)
+                } else {
+                    self.waiting.push(displaced)
+                }
             }
         }
         std::mem::swap(&mut self.free, &mut self.waiting);
@@ -127,7 +131,8 @@ impl<T: RealField + Copy> Search<T> {
         for at in 1..open {
             let (column, holder) = (self.order[at], self.order[best]);
             let (found, least) = (self.distance[column], self.distance[holder]);
-            if found < least || (found == least && self.row_of[column] == NONE && self.row_of[holder] != NONE)
+            if found < least
+                || (found == least && self.row_of[column] == NONE && self.row_of[holder] != NONE)
             {
                 best = at;
             }

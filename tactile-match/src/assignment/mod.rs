@@ -95,16 +95,25 @@ impl<T: RealField + Copy> AssignmentWorkspace<T> {
         self.column_prices.clear();
         if rows <= columns {
             self.search.run(costs, rows, columns);
-            self.assignment.extend(self.search.column_of.iter().map(|&j| (j != NONE).then_some(j)));
-            self.row_prices.extend((0..rows).map(|i| self.search.row_price(costs, i)));
+            self.assignment.extend(
+                self.search
+                    .column_of
+                    .iter()
+                    .map(|&j| (j != NONE).then_some(j)),
+            );
+            self.row_prices
+                .extend((0..rows).map(|i| self.search.row_price(costs, i)));
             self.column_prices.extend_from_slice(&self.search.prices);
         } else {
             self.turned.clear();
-            self.turned.extend((0..columns).flat_map(|j| (0..rows).map(move |i| costs[i * columns + j])));
+            self.turned
+                .extend((0..columns).flat_map(|j| (0..rows).map(move |i| costs[i * columns + j])));
             self.search.run(&self.turned, columns, rows);
-            self.assignment.extend(self.search.row_of.iter().map(|&j| (j != NONE).then_some(j)));
+            self.assignment
+                .extend(self.search.row_of.iter().map(|&j| (j != NONE).then_some(j)));
             self.row_prices.extend_from_slice(&self.search.prices);
-            self.column_prices.extend((0..columns).map(|j| self.search.row_price(&self.turned, j)));
+            self.column_prices
+                .extend((0..columns).map(|j| self.search.row_price(&self.turned, j)));
         }
         Ok(&self.assignment)
     }
@@ -125,10 +134,20 @@ impl<T: RealField + Copy> AssignmentWorkspace<T> {
 fn check<T: RealField + Copy>(costs: &[T], rows: usize, columns: usize) -> Result<(), MatchError> {
     let expected = rows.saturating_mul(columns);
     if costs.len() != expected {
-        return Err(MatchError::Shape { what: "costs", expected, found: costs.len() });
+        return Err(MatchError::Shape {
+            what: "costs",
+            expected,
+            found: costs.len(),
+        });
     }
-    match costs.iter().position(|&c| !(c.is_finite() || c > T::zero())) {
-        Some(at) => Err(MatchError::Cost { row: at / columns, column: at % columns }),
+    match costs
+        .iter()
+        .position(|&c| !(c.is_finite() || c > T::zero()))
+    {
+        Some(at) => Err(MatchError::Cost {
+            row: at / columns,
+            column: at % columns,
+        }),
         None => Ok(()),
     }
 }

@@ -54,7 +54,10 @@ mod tests {
             let x = -f64::from(k) * 0.003_541;
             let (found, expected) = (exp_of_negative(x), x.exp());
             if x > -708.0 {
-                assert!((found - expected).abs() <= 2.0 * f64::EPSILON * expected, "exp({x}) = {found:e}");
+                assert!(
+                    (found - expected).abs() <= 2.0 * f64::EPSILON * expected,
+                    "exp({x}) = {found:e}"
+                );
             }
         }
     }

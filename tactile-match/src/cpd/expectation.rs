@@ -46,15 +46,31 @@ pub(super) fn uniform_weight<const D: usize>(
 
 impl<const D: usize> Posterior<D> {
     /// All sums for model points that have moved to `moved`; `O(M N)`.
-    pub(super) fn update(&mut self, moved: &Columns<D>, target: &Columns<D>, sigma2: f64, uniform: f64) {
+    pub(super) fn update(
+        &mut self,
+        moved: &Columns<D>,
+        target: &Columns<D>,
+        sigma2: f64,
+        uniform: f64,
+    ) {
         let (model_len, target_len) = (moved[0].len(), target[0].len());
-        for sums in self.weighted.iter_mut().chain([&mut self.model_mass, &mut self.column]) {
+        for sums in self
+            .weighted
+            .iter_mut()
+            .chain([&mut self.model_mass, &mut self.column])
+        {
             sums.clear();
             sums.resize(model_len, 0.0);
         }
         self.target_mass.clear();
         self.target_mass.resize(target_len, 0.0);
-        vectorised(Accumulate { posterior: self, moved, target, sigma2, uniform });
+        vectorised(Accumulate {
+            posterior: self,
+            moved,
+            target,
+            sigma2,
+            uniform,
+        });
         self.energy += 0.5 * (D * target_len) as f64 * sigma2.ln();
     }
 }

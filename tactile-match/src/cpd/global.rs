@@ -21,7 +21,13 @@ pub(super) struct GlobalStep<const D: usize> {
 impl<const D: usize> Default for GlobalStep<D> {
     fn default() -> Self {
         let (sources, means, weights) = Default::default();
-        Self { linear: SMatrix::identity(), offset: SVector::zeros(), sources, means, weights }
+        Self {
+            linear: SMatrix::identity(),
+            offset: SVector::zeros(),
+            sources,
+            means,
+            weights,
+        }
     }
 }
 
@@ -59,26 +65,44 @@ impl<const D: usize> GlobalStep<D> {
         self.sources.clear();
         self.means.clear();
         self.weights.clear();
-        for (m, &mass) in
-            posterior.model_mass.iter().enumerate().filter(|(_, mass)| **mass > f64::MIN_POSITIVE)
+        for (m, &mass) in posterior
+            .model_mass
+            .iter()
+            .enumerate()
+            .filter(|(_, mass)| **mass > f64::MIN_POSITIVE)
         {
-            self.sources.push(Point::from(SVector::from_fn(|d, _| model[d][m])));
-            self.means.push(Point::from(SVector::from_fn(|d, _| posterior.weighted[d][m] / mass)));
+            self.sources
+                .push(Point::from(SVector::from_fn(|d, _| model[d][m])));
+            self.means.push(Point::from(SVector::from_fn(|d, _| {
+                posterior.weighted[d][m] / mass
+            })));
             self.weights.push(mass);
         }
     }
 
     fn fit_rigid(&mut self, scaled: bool) {
-        let Ok(fit) = RigidModel.fit(&self.sources, &self.means, Some(&self.weights)) else { return };
-        let scale = if scaled { self.scale(&fit.rotation) } else { 1.0 };
-        let (source, mean) = (self.weighted_mean(&self.sources), self.weighted_mean(&self.means));
+        let Ok(fit) = RigidModel.fit(&self.sources, &self.means, Some(&self.weights)) else {
+            return;
+        };
+        let scale = if scaled {
+            self.scale(&fit.rotation)
+        } else {
+            1.0
+        };
+        let (source, mean) = (
+            self.weighted_mean(&self.sources),
+            self.weighted_mean(&self.means),
+        );
         self.linear = fit.rotation * scale;
         self.offset = mean - self.linear * source;
     }
 
     /// `tr(Aᵀ R) / tr(Yᵀ diag(P1) Y)` about the weighted means; one where the model has no extent.
     fn scale(&self, rotation: &SMatrix<f64, D, D>) -> f64 {
-        let (source, mean) = (self.weighted_mean(&self.sources), self.weighted_mean(&self.means));
+        let (source, mean) = (
+            self.weighted_mean(&self.sources),
+            self.weighted_mean(&self.means),
+        );
         let (mut along, mut extent) = (0.0, 0.0);
         for ((y, x), w) in self.sources.iter().zip(&self.means).zip(&self.weights) {
             let y = y.coords - source;
@@ -90,6 +114,10 @@ impl<const D: usize> GlobalStep<D> {
 
     fn weighted_mean(&self, points: &[Point<f64, D>]) -> SVector<f64, D> {
         let total: f64 = self.weights.iter().sum();
-        points.iter().zip(&self.weights).map(|(p, w)| p.coords * (w / total)).sum()
+        points
+            .iter()
+            .zip(&self.weights)
+            .map(|(p, w)| p.coords * (w / total))
+            .sum()
     }
 }

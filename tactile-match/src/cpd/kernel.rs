@@ -69,14 +69,22 @@ impl KernelFactor {
         }
         self.rows.clear();
         let (columns, len, rank) = (&self.columns, self.len, self.pivots.len());
-        self.rows.extend((0..len).flat_map(|m| (0..rank).map(move |k| columns[k * len + m])));
+        self.rows
+            .extend((0..len).flat_map(|m| (0..rank).map(move |k| columns[k * len + m])));
     }
 
     fn append<const D: usize>(&mut self, model: &Columns<D>, beta: f64, pivot: usize, root: f64) {
         let done = self.columns.len();
         self.columns.resize(done + self.len, 0.0);
         let (before, column) = self.columns.split_at_mut(done);
-        vectorised(NextColumn { before, column, model, beta, pivot, root });
+        vectorised(NextColumn {
+            before,
+            column,
+            model,
+            beta,
+            pivot,
+            root,
+        });
         for (rest, c) in self.residual.iter_mut().zip(column.iter()) {
             *rest -= c * c;
         }
@@ -130,7 +138,10 @@ impl<const D: usize> Loop for NextColumn<'_, D> {
         }
         for earlier in self.before.chunks_exact(len) {
             let factor = earlier[self.pivot];
-            self.column.iter_mut().zip(earlier).for_each(|(c, e)| *c -= factor * e);
+            self.column
+                .iter_mut()
+                .zip(earlier)
+                .for_each(|(c, e)| *c -= factor * e);
         }
         self.column.iter_mut().for_each(|c| *c /= self.root);
     }

@@ -70,7 +70,11 @@ pub enum Motion {
 
 impl Motion {
     /// Non-rigid with the customary β = 2, λ = 3, and no bound on the rank.
-    pub const NON_RIGID: Self = Self::NonRigid { beta: 2.0, lambda: 3.0, rank: None };
+    pub const NON_RIGID: Self = Self::NonRigid {
+        beta: 2.0,
+        lambda: 3.0,
+        rank: None,
+    };
 }
 
 /// How the two sets are brought to size one.
@@ -171,9 +175,21 @@ impl CoherentPointDrift {
     /// [`MatchError::InvalidOption`] for an option out of its range.
     pub fn new(options: DriftOptions) -> Result<Self, MatchError> {
         const POSITIVE: &str = "(0, ∞)";
-        option_within("outlier_weight", options.outlier_weight, 0.0, 1.0 - f64::EPSILON, "[0, 1)")?;
+        option_within(
+            "outlier_weight",
+            options.outlier_weight,
+            0.0,
+            1.0 - f64::EPSILON,
+            "[0, 1)",
+        )?;
         option_within("tolerance", options.tolerance, 0.0, f64::MAX, "[0, ∞)")?;
-        option_within("max_iterations", options.max_iterations as f64, 1.0, f64::MAX, "[1, ∞)")?;
+        option_within(
+            "max_iterations",
+            options.max_iterations as f64,
+            1.0,
+            f64::MAX,
+            "[1, ∞)",
+        )?;
         if let Motion::NonRigid { beta, lambda, rank } = options.motion {
             option_within("beta", beta, f64::MIN_POSITIVE, f64::MAX, POSITIVE)?;
             option_within("lambda", lambda, f64::MIN_POSITIVE, f64::MAX, POSITIVE)?;
@@ -213,7 +229,12 @@ impl CoherentPointDrift {
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
         self.register_with(workspace, model, target)?;
-        Ok(outcome::matching(&self.options, workspace, model.len(), target.len()))
+        Ok(outcome::matching(
+            &self.options,
+            workspace,
+            model.len(),
+            target.len(),
+        ))
     }
 
     /// The registration alone, without pairs and covariances: what it found stays in the workspace.

@@ -37,11 +37,18 @@ impl NonRigidStep {
         self.normal.resize(rank * rank, 0.0);
         self.coefficients.clear();
         self.coefficients.resize(rank * D, 0.0);
-        vectorised(Assemble { step: self, kernel, posterior, model, ridge });
+        vectorised(Assemble {
+            step: self,
+            kernel,
+            posterior,
+            model,
+            ridge,
+        });
         let storage = VecStorage::new(Dyn(rank), Dyn(rank), std::mem::take(&mut self.normal));
         // Positive definite by construction; were it not, z = 0 leaves the model where it was.
         if let Some(factor) = Cholesky::new(DMatrix::from_data(storage)) {
-            let storage = VecStorage::new(Dyn(rank), Dyn(D), std::mem::take(&mut self.coefficients));
+            let storage =
+                VecStorage::new(Dyn(rank), Dyn(D), std::mem::take(&mut self.coefficients));
             let mut coefficients = DMatrix::from_data(storage);
             factor.solve_mut(&mut coefficients);
             self.coefficients = coefficients.data.into();
@@ -49,7 +56,12 @@ impl NonRigidStep {
         } else {
             self.coefficients.fill(0.0);
         }
-        vectorised(Apply { coefficients: &self.coefficients, kernel, model, moved });
+        vectorised(Apply {
+            coefficients: &self.coefficients,
+            kernel,
+            model,
+            moved,
+        });
     }
 }
 
@@ -66,7 +78,11 @@ impl<const D: usize> Loop for Assemble<'_, D> {
     #[inline(always)]
     fn run(self) {
         let rank = self.kernel.rank();
-        let NonRigidStep { coefficients, normal, .. } = self.step;
+        let NonRigidStep {
+            coefficients,
+            normal,
+            ..
+        } = self.step;
         let mass = &self.posterior.model_mass;
         for (m, &p) in mass.iter().enumerate() {
             let row = self.kernel.row(m);
@@ -79,7 +95,11 @@ impl<const D: usize> Loop for Assemble<'_, D> {
         for (block, p) in blocks.iter().enumerate() {
             let rows: [&[f64]; 4] = std::array::from_fn(|v| self.kernel.row(4 * block + v));
             for k in 0..rank {
-                add_four(&mut normal[k * rank..][k..rank], rows.map(|row| &row[k..]), p);
+                add_four(
+                    &mut normal[k * rank..][k..rank],
+                    rows.map(|row| &row[k..]),
+                    p,
+                );
             }
         }
         for (at, p) in rest.iter().enumerate() {
@@ -125,7 +145,10 @@ impl<const D: usize> Loop for Apply<'_, D> {
         for d in 0..D {
             self.moved[d].copy_from_slice(&self.model[d]);
             for (k, z) in self.coefficients[d * rank..][..rank].iter().enumerate() {
-                self.moved[d].iter_mut().zip(self.kernel.column(k)).for_each(|(t, l)| *t += l * z);
+                self.moved[d]
+                    .iter_mut()
+                    .zip(self.kernel.column(k))
+                    .for_each(|(t, l)| *t += l * z);
             }
         }
     }

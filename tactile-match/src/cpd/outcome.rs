@@ -33,8 +33,14 @@ fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<u
     let mut workspace = AssignmentWorkspace::new();
     let mut assignment = vec![None; model_len];
     // The costs are probabilities: finite, and of the right number.
-    let columns = workspace.solve(&costs, target_len, model_len).unwrap_or_default();
-    for (n, m) in columns.iter().enumerate().filter_map(|(n, m)| m.map(|m| (n, m))) {
+    let columns = workspace
+        .solve(&costs, target_len, model_len)
+        .unwrap_or_default();
+    for (n, m) in columns
+        .iter()
+        .enumerate()
+        .filter_map(|(n, m)| m.map(|m| (n, m)))
+    {
         let row = &posterior[n * model_len..][..model_len];
         let outlier = 1.0 - row.iter().sum::<f64>();
         if row[m] > 0.0 && row[m] >= outlier {
@@ -56,11 +62,16 @@ pub(super) fn matching<T: Scalar, const D: usize>(
     let scale = workspace.target_frame.scale;
     let (mut soft, mut confidence, mut covariance) = (SoftMatches::new(), Vec::new(), Vec::new());
     for (m, partner) in assignment.iter().enumerate() {
-        let row: Vec<(usize, f64)> =
-            (0..target_len).map(|n| (n, posterior[n * model_len + m])).filter(|p| p.1 > NEGLIGIBLE).collect();
+        let row: Vec<(usize, f64)> = (0..target_len)
+            .map(|n| (n, posterior[n * model_len + m]))
+            .filter(|p| p.1 > NEGLIGIBLE)
+            .collect();
         let mass = row.iter().map(|p| p.1).sum::<f64>();
         let share = |p: f64| p / mass.max(1.0); // many targets may have one model point; a row of M has sum one
-        soft.push_row(row.iter().map(|&(n, p)| (n, nalgebra::convert::<f64, T>(share(p)))));
+        soft.push_row(
+            row.iter()
+                .map(|&(n, p)| (n, nalgebra::convert::<f64, T>(share(p)))),
+        );
         let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * model_len + m]));
         confidence.push(nalgebra::convert(sure.clamp(0.0, 1.0)));
         covariance.push((spread(workspace, &row, mass) * (scale * scale)).map(nalgebra::convert));
@@ -76,7 +87,11 @@ pub(super) fn matching<T: Scalar, const D: usize>(
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
-        energy: workspace.energy.iter().map(|&e| nalgebra::convert(e)).collect(),
+        energy: workspace
+            .energy
+            .iter()
+            .map(|&e| nalgebra::convert(e))
+            .collect(),
         report: report(workspace, &assignment),
         assignment,
     }
@@ -104,9 +119,14 @@ fn report<T: Scalar, const D: usize>(
     workspace: &DriftWorkspace<D>,
     assignment: &[Option<usize>],
 ) -> MatchReport<T> {
-    let squares =
-        assignment.iter().enumerate().filter_map(|(m, n)| n.map(|n| (m, n))).map(|(m, n)| {
-            (0..D).map(|d| (workspace.moved[d][m] - workspace.target[d][n]).powi(2)).sum::<f64>()
+    let squares = assignment
+        .iter()
+        .enumerate()
+        .filter_map(|(m, n)| n.map(|n| (m, n)))
+        .map(|(m, n)| {
+            (0..D)
+                .map(|d| (workspace.moved[d][m] - workspace.target[d][n]).powi(2))
+                .sum::<f64>()
         });
     let (count, sum) = squares.fold((0.0_f64, 0.0), |(count, sum), s| (count + 1.0, sum + s));
     let scale = workspace.target_frame.scale;

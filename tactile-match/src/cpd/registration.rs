@@ -105,7 +105,12 @@ impl<const D: usize> DriftWorkspace<D> {
         self.global.reset();
         self.motion = options.motion;
         if let Motion::NonRigid { beta, rank, .. } = options.motion {
-            self.kernel.build(&self.model, beta, rank.unwrap_or(model.len()), KERNEL_TOLERANCE);
+            self.kernel.build(
+                &self.model,
+                beta,
+                rank.unwrap_or(model.len()),
+                KERNEL_TOLERANCE,
+            );
         }
         self.energy.clear();
         self.sigma2 = self.initial_variance();
@@ -154,7 +159,10 @@ impl<const D: usize> DriftWorkspace<D> {
         for (y, x) in self.model.iter().zip(&self.target) {
             let moments = |v: &[f64]| {
                 let n = v.len() as f64;
-                (v.iter().sum::<f64>() / n, v.iter().map(|c| c * c).sum::<f64>() / n)
+                (
+                    v.iter().sum::<f64>() / n,
+                    v.iter().map(|c| c * c).sum::<f64>() / n,
+                )
             };
             let ((mean_y, square_y), (mean_x, square_x)) = (moments(y), moments(x));
             sum += square_y + square_x - 2.0 * mean_y * mean_x;
@@ -165,21 +173,35 @@ impl<const D: usize> DriftWorkspace<D> {
     /// One E-step and one M-step.
     fn iterate(&mut self, options: &DriftOptions) {
         let uniform = self.uniform(options);
-        self.posterior.update(&self.moved, &self.target, self.sigma2, uniform);
+        self.posterior
+            .update(&self.moved, &self.target, self.sigma2, uniform);
         self.energy.push(self.posterior.energy);
         match options.motion {
             Motion::NonRigid { lambda, .. } => {
                 let ridge = lambda * self.sigma2;
-                self.non_rigid.solve(&self.kernel, &self.posterior, &self.model, ridge, &mut self.moved);
+                self.non_rigid.solve(
+                    &self.kernel,
+                    &self.posterior,
+                    &self.model,
+                    ridge,
+                    &mut self.moved,
+                );
             }
-            motion => self.global.solve(motion, &self.posterior, &self.model, &mut self.moved),
+            motion => self
+                .global
+                .solve(motion, &self.posterior, &self.model, &mut self.moved),
         }
         self.update_variance(options.tolerance);
     }
 
     /// Weight of the uniform component at the present variance.
     pub(super) fn uniform(&self, options: &DriftOptions) -> f64 {
-        uniform_weight::<D>(self.sigma2, options.outlier_weight, self.model[0].len(), self.target[0].len())
+        uniform_weight::<D>(
+            self.sigma2,
+            options.outlier_weight,
+            self.model[0].len(),
+            self.target[0].len(),
+        )
     }
 
     /// `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`; a tenth of the tolerance where rounding makes it nought or less.
@@ -194,27 +216,45 @@ impl<const D: usize> DriftWorkspace<D> {
         let mut sum = 0.0;
         for d in 0..D {
             let (x, t) = (&self.target[d], &self.moved[d]);
-            let cross: f64 = self.posterior.weighted[d].iter().zip(t).map(|(p, t)| p * t).sum();
+            let cross: f64 = self.posterior.weighted[d]
+                .iter()
+                .zip(t)
+                .map(|(p, t)| p * t)
+                .sum();
             sum += weighted(&self.posterior.target_mass, x, x) - 2.0 * cross
                 + weighted(&self.posterior.model_mass, t, t);
         }
         // Coordinates of size one are not known better than ε, and 1/σ² must stay finite.
         let least = f64::EPSILON * f64::EPSILON;
         let variance = sum / (mass * D as f64);
-        self.sigma2 = if variance > 0.0 { variance } else { 0.1 * tolerance }.max(least);
+        self.sigma2 = if variance > 0.0 {
+            variance
+        } else {
+            0.1 * tolerance
+        }
+        .max(least);
     }
 
     /// The model points where the last registration left them.
     ///
     /// # Errors
     /// [`MatchError::Shape`] if `warped` has not as many entries as the model.
-    pub fn warped_into<T: RealField + Copy>(&self, warped: &mut [Point<T, D>]) -> Result<(), MatchError> {
+    pub fn warped_into<T: RealField + Copy>(
+        &self,
+        warped: &mut [Point<T, D>],
+    ) -> Result<(), MatchError> {
         let (expected, found) = (self.moved[0].len(), warped.len());
         if found != expected {
-            return Err(MatchError::Shape { what: "warped", expected, found });
+            return Err(MatchError::Shape {
+                what: "warped",
+                expected,
+                found,
+            });
         }
         for (m, point) in warped.iter_mut().enumerate() {
-            *point = self.target_frame.leave(SVector::from_fn(|d, _| self.moved[d][m]));
+            *point = self
+                .target_frame
+                .leave(SVector::from_fn(|d, _| self.moved[d][m]));
         }
         Ok(())
     }
@@ -233,9 +273,15 @@ impl<const D: usize> DriftWorkspace<D> {
         };
         if let (Motion::NonRigid { beta, .. }, false) = (self.motion, self.energy.is_empty()) {
             (warp.linear, warp.offset, warp.beta) = (SMatrix::identity(), SVector::zeros(), beta);
-            let coefficients: Vec<_> =
-                (0..self.kernel.rank()).map(|k| self.non_rigid.coefficient(k)).collect();
-            warp.weights = self.kernel.pivot_weights(&coefficients).into_iter().map(SVector::from).collect();
+            let coefficients: Vec<_> = (0..self.kernel.rank())
+                .map(|k| self.non_rigid.coefficient(k))
+                .collect();
+            warp.weights = self
+                .kernel
+                .pivot_weights(&coefficients)
+                .into_iter()
+                .map(SVector::from)
+                .collect();
             let at = |&m: &usize| SVector::from_fn(|d, _| self.model[d][m]);
             warp.centres = self.kernel.pivots.iter().map(at).collect();
         }

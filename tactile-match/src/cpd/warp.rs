@@ -55,7 +55,8 @@ impl<T: Scalar, const D: usize> Warp<T, D> for DriftWarp<D> {
         let mut jacobian = self.linear;
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
             let step = y - centre;
-            jacobian -= weight * step.transpose() * (self.gaussian(&step) / (self.beta * self.beta));
+            jacobian -=
+                weight * step.transpose() * (self.gaussian(&step) / (self.beta * self.beta));
         }
         (jacobian * (self.target.scale / self.model.scale)).map(nalgebra::convert)
     }

@@ -61,7 +61,11 @@ pub enum Compatibility {
 #[must_use]
 pub fn alpha<T: RealField + Copy>(d: T, e: T) -> T {
     let longer = d.max(e);
-    if longer > T::zero() { d.min(e) / longer } else { T::one() }
+    if longer > T::zero() {
+        d.min(e) / longer
+    } else {
+        T::one()
+    }
 }
 
 /// α (16), the maximum over all edges: `1 − |d − e| / longest`; one where `longest` is nought.
@@ -72,7 +76,11 @@ pub fn alpha<T: RealField + Copy>(d: T, e: T) -> T {
 /// ```
 #[must_use]
 pub fn alpha_global<T: RealField + Copy>(d: T, e: T, longest: T) -> T {
-    if longest > T::zero() { T::one() - (d - e).abs() / longest } else { T::one() }
+    if longest > T::zero() {
+        T::one() - (d - e).abs() / longest
+    } else {
+        T::one()
+    }
 }
 
 /// β (17): `1 − ∠(u, v) / π`, one for parallel and nought for opposite edges, in any dimension; nought if an edge has
@@ -115,7 +123,11 @@ pub fn beta<T: RealField + Copy, const D: usize>(u: &SVector<T, D>, v: &SVector<
 /// ```
 #[must_use]
 pub fn gamma<T: RealField + Copy>(d: T, longest: T) -> T {
-    if longest > T::zero() { (longest - d) / longest } else { T::one() }
+    if longest > T::zero() {
+        (longest - d) / longest
+    } else {
+        T::one()
+    }
 }
 
 /// A [`Compatibility`] ready to be evaluated: the factors and the maximum in α.

@@ -24,14 +24,24 @@ impl<T: RealField + Copy> MatchMatrix<T> {
     /// All entries nought.
     #[must_use]
     pub fn zeros(rows: usize, columns: usize) -> Self {
-        Self { rows, columns, entries: vec![T::zero(); (rows + 1) * (columns + 1)] }
+        Self {
+            rows,
+            columns,
+            entries: vec![T::zero(); (rows + 1) * (columns + 1)],
+        }
     }
 
     /// Every row uniform over the targets and the slack, `1/(J + 1)`; the slack row `1/(I + 1)`.
     #[must_use]
     pub fn uniform(rows: usize, columns: usize) -> Self {
         let share = |n: usize| T::one() / nalgebra::convert((n + 1) as f64);
-        Self::from_fn(rows, columns, |i, _| if i < rows { share(columns) } else { share(rows) })
+        Self::from_fn(rows, columns, |i, _| {
+            if i < rows {
+                share(columns)
+            } else {
+                share(rows)
+            }
+        })
     }
 
     /// Entry by entry, `i` in `0..=rows` and `j` in `0..=columns`; the corner is set to nought.
@@ -102,7 +112,10 @@ impl<T: RealField + Copy> MatchMatrix<T> {
     /// ```
     #[must_use]
     pub fn largest_change(&self, other: &Self) -> T {
-        self.entries.iter().zip(&other.entries).fold(T::zero(), |worst, (&a, &b)| worst.max((a - b).abs()))
+        self.entries
+            .iter()
+            .zip(&other.entries)
+            .fold(T::zero(), |worst, (&a, &b)| worst.max((a - b).abs()))
     }
 }
 

@@ -96,11 +96,18 @@ impl DenseRelaxation {
     /// # Errors
     /// [`MatchError::InvalidOption`] for an option out of its range.
     pub fn new(options: DenseOptions) -> Result<Self, MatchError> {
-        let count = |option, value: usize| option_within(option, value as f64, 1.0, f64::MAX, "[1, ∞)");
+        let count =
+            |option, value: usize| option_within(option, value as f64, 1.0, f64::MAX, "[1, ∞)");
         if let Neighbourhood::Nearest(k) = options.neighbourhood {
             count("neighbourhood", k)?;
         }
-        option_within("temperature", options.temperature, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+        option_within(
+            "temperature",
+            options.temperature,
+            f64::MIN_POSITIVE,
+            f64::MAX,
+            "(0, ∞)",
+        )?;
         option_within("slack", options.slack, 0.0, 1.0, "[0, 1]")?;
         option_within("settled", options.settled, 0.0, 1.0, "[0, 1]")?;
         option_within("smoothing", options.smoothing, 0.0, f64::MAX, "[0, ∞)")?;
@@ -129,10 +136,13 @@ impl DenseRelaxation {
         target: &[Point<T, D>],
     ) -> MatchMatrix<T> {
         let options = &self.options;
-        let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
+        let graphs =
+            [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
         let compatibilities = Compatibilities::new(&graphs, options.rule(&graphs));
         let first = first_matches(model, target, options.temperature, options.slack);
-        relax_with(options, first, |m| support_by(m, &graphs[0], &graphs[1], |x, y| compatibilities.of(x, y)))
+        relax_with(options, first, |m| {
+            support_by(m, &graphs[0], &graphs[1], |x, y| compatibilities.of(x, y))
+        })
     }
 }
 
@@ -146,7 +156,10 @@ impl DenseOptions {
             LengthMaximum::PerPair => None,
             LengthMaximum::Global => Some(graphs[0].longest().max(graphs[1].longest())),
         };
-        CompatibilityRule { factors: self.factors, longest }
+        CompatibilityRule {
+            factors: self.factors,
+            longest,
+        }
     }
 }
 
@@ -179,7 +192,10 @@ pub(super) fn match_with<T: Scalar, const D: usize>(
     point_sets(model, target)?;
     let frames = [Frame::of(model), Frame::of(target)];
     let enter = |frame: &Frame<D>, points: &[Point<T, D>]| -> Vec<Point<T, D>> {
-        points.iter().map(|p| Point::from(frame.inside(p).map(nalgebra::convert))).collect()
+        points
+            .iter()
+            .map(|p| Point::from(frame.inside(p).map(nalgebra::convert)))
+            .collect()
     };
     let (start, goal) = (enter(&frames[0], model), enter(&frames[1], target));
     let mut run = super::outcome::Run::new(start, goal, frames[1]);
@@ -199,7 +215,9 @@ pub(super) fn match_with<T: Scalar, const D: usize>(
 /// Gain of the slack: a share of what the best partners get, so that it means the same for every neighbourhood.
 fn slack_gain<T: Scalar>(support: &[T], columns: usize, share: f64) -> T {
     let rows = support.len() / columns;
-    let best = support.chunks_exact(columns).map(|row| row.iter().fold(T::zero(), |m, &s| m.max(s)));
+    let best = support
+        .chunks_exact(columns)
+        .map(|row| row.iter().fold(T::zero(), |m, &s| m.max(s)));
     best.fold(T::zero(), |sum, s| sum + s) * nalgebra::convert(share / rows as f64)
 }
 
@@ -217,7 +235,11 @@ impl<'a, T: Scalar, const D: usize> Compatibilities<'a, T, D> {
         if x.len().saturating_mul(y.len()) <= TABLE_LIMIT {
             table.extend(x.iter().flat_map(|x| y.iter().map(move |y| rule.of(x, y))));
         }
-        Self { graphs, rule, table }
+        Self {
+            graphs,
+            rule,
+            table,
+        }
     }
 
     fn of(&self, x: usize, y: usize) -> T {
@@ -235,6 +257,8 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for DenseRelaxation {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        match_with(&self.options, model, target, |model, target| self.relax(model, target))
+        match_with(&self.options, model, target, |model, target| {
+            self.relax(model, target)
+        })
     }
 }

@@ -34,7 +34,9 @@ mod sparse;
 mod support;
 mod update;
 
-pub use compatibility::{Compatibility, CompatibilityRule, LengthMaximum, alpha, alpha_global, beta, gamma};
+pub use compatibility::{
+    Compatibility, CompatibilityRule, LengthMaximum, alpha, alpha_global, beta, gamma,
+};
 pub use match_matrix::MatchMatrix;
 pub use matcher::{DenseOptions, DenseRelaxation};
 pub use neighbourhood::{Edge, NeighbourGraph, Neighbourhood, median_pairwise_distance};

@@ -74,7 +74,11 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
     #[must_use]
     pub fn new(points: &[Point<T, D>], neighbourhood: Neighbourhood) -> Self {
         let radius = median_pairwise_distance(points);
-        let mut graph = Self { edges: Vec::new(), starts: vec![0], radius };
+        let mut graph = Self {
+            edges: Vec::new(),
+            starts: vec![0],
+            radius,
+        };
         for i in 0..points.len() {
             let mut neighbours: Vec<usize> = (0..points.len()).filter(|&a| a != i).collect();
             match neighbourhood {
@@ -85,7 +89,9 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
                 Neighbourhood::Nearest(k) => {
                     let distance = |&a: &usize| (points[a] - points[i]).norm();
                     neighbours.sort_by(|a, b| {
-                        distance(a).partial_cmp(&distance(b)).unwrap_or(std::cmp::Ordering::Equal)
+                        distance(a)
+                            .partial_cmp(&distance(b))
+                            .unwrap_or(std::cmp::Ordering::Equal)
                     });
                     neighbours.truncate(k);
                     neighbours.sort_unstable();
@@ -111,7 +117,11 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
     /// If a list names a point that does not exist.
     #[must_use]
     pub fn from_lists(points: &[Point<T, D>], lists: &[Vec<usize>]) -> Self {
-        let mut graph = Self { edges: Vec::new(), starts: vec![0], radius: None };
+        let mut graph = Self {
+            edges: Vec::new(),
+            starts: vec![0],
+            radius: None,
+        };
         for (i, list) in lists.iter().enumerate() {
             graph.push_point(points, i, list);
         }
@@ -122,9 +132,17 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
         let first = self.edges.len();
         for &a in neighbours {
             let vector = points[a] - points[i];
-            self.edges.push(Edge { from: i, to: a, vector, length: vector.norm(), gamma: T::zero() });
+            self.edges.push(Edge {
+                from: i,
+                to: a,
+                vector,
+                length: vector.norm(),
+                gamma: T::zero(),
+            });
         }
-        let longest = self.edges[first..].iter().fold(T::zero(), |m, e| m.max(e.length));
+        let longest = self.edges[first..]
+            .iter()
+            .fold(T::zero(), |m, e| m.max(e.length));
         for edge in &mut self.edges[first..] {
             edge.gamma = gamma(edge.length, longest);
         }
@@ -172,7 +190,10 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
 
 /// What rounding may add to a distance of about `radius`: the coordinates themselves carry half a unit in the last place.
 fn rounding<T: RealField + Copy, const D: usize>(points: &[Point<T, D>], radius: T) -> T {
-    let largest = points.iter().flat_map(|p| p.iter()).fold(radius, |m, c| m.max(c.abs()));
+    let largest = points
+        .iter()
+        .flat_map(|p| p.iter())
+        .fold(radius, |m, c| m.max(c.abs()));
     T::default_epsilon() * (largest + largest)
 }
 
@@ -186,7 +207,9 @@ fn rounding<T: RealField + Copy, const D: usize>(points: &[Point<T, D>], radius:
 /// assert_eq!(median_pairwise_distance(&points), Some(2.0));
 /// ```
 #[must_use]
-pub fn median_pairwise_distance<T: RealField + Copy, const D: usize>(points: &[Point<T, D>]) -> Option<T> {
+pub fn median_pairwise_distance<T: RealField + Copy, const D: usize>(
+    points: &[Point<T, D>],
+) -> Option<T> {
     let mut distances = Vec::with_capacity(points.len() * points.len().saturating_sub(1) / 2);
     for (i, p) in points.iter().enumerate() {
         distances.extend(points[i + 1..].iter().map(|q| (q - p).norm()));

@@ -2,7 +2,9 @@
 
 use super::{MatchMatrix, NeighbourGraph, Neighbourhood, energy};
 use crate::frame::Frame;
-use crate::{MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment, unmatched_rows};
+use crate::{
+    MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment, unmatched_rows,
+};
 use nalgebra::{Point, SMatrix, SVector};
 use tactile_tps::{Scalar, Smoothing};
 
@@ -36,7 +38,8 @@ impl<T: Scalar, const D: usize> Run<T, D> {
 
     /// Keeps the energy (14) of the present match matrix.
     pub(super) fn record_energy(&mut self, neighbourhood: Neighbourhood) {
-        let [x, y] = [&self.warped, &self.target].map(|points| NeighbourGraph::new(points, neighbourhood));
+        let [x, y] =
+            [&self.warped, &self.target].map(|points| NeighbourGraph::new(points, neighbourhood));
         self.energy.push(energy(&self.matches, &x, &y));
     }
 
@@ -44,13 +47,22 @@ impl<T: Scalar, const D: usize> Run<T, D> {
     fn partner(&self, i: usize) -> (SVector<T, D>, T) {
         let weights = &self.matches.row(i)[..self.target.len()];
         let mass = weights.iter().fold(T::zero(), |sum, &w| sum + w);
-        let sum = self.target.iter().zip(weights).fold(SVector::zeros(), |sum, (y, &w)| sum + y.coords * w);
-        if mass > T::zero() { (sum / mass, mass) } else { (self.warped[i].coords, mass) }
+        let sum = self
+            .target
+            .iter()
+            .zip(weights)
+            .fold(SVector::zeros(), |sum, (y, &w)| sum + y.coords * w);
+        if mass > T::zero() {
+            (sum / mass, mass)
+        } else {
+            (self.warped[i].coords, mass)
+        }
     }
 
     /// Fits the spline to the mean partners, moves the model, and returns the largest step.
     pub(super) fn fit(&mut self, smoothing: Smoothing<T>) -> T {
-        let (means, weights): (Vec<_>, Vec<_>) = (0..self.model.len()).map(|i| self.partner(i)).unzip();
+        let (means, weights): (Vec<_>, Vec<_>) =
+            (0..self.model.len()).map(|i| self.partner(i)).unzip();
         let floor: T = nalgebra::convert(1e-6);
         let kept: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > floor).collect();
         if kept.is_empty() {
@@ -58,10 +70,17 @@ impl<T: Scalar, const D: usize> Run<T, D> {
         }
         let sources: Vec<_> = kept.iter().map(|&i| self.model[i]).collect();
         let images: Vec<_> = kept.iter().map(|&i| Point::from(means[i])).collect();
-        let warp =
-            hard::spline(&sources, &images, Some(kept.iter().map(|&i| weights[i]).collect()), smoothing);
+        let warp = hard::spline(
+            &sources,
+            &images,
+            Some(kept.iter().map(|&i| weights[i]).collect()),
+            smoothing,
+        );
         let moved: Vec<_> = self.model.iter().map(|p| warp.apply(p)).collect();
-        let step = moved.iter().zip(&self.warped).fold(T::zero(), |m, (a, b)| m.max((a - b).norm()));
+        let step = moved
+            .iter()
+            .zip(&self.warped)
+            .fold(T::zero(), |m, (a, b)| m.max((a - b).norm()));
         self.warped = moved;
         step
     }
@@ -69,13 +88,16 @@ impl<T: Scalar, const D: usize> Run<T, D> {
     /// Distinct partners of most probability in sum; none where the slack is likelier.
     fn assignment(&self) -> Vec<Option<usize>> {
         let (rows, columns) = (self.model.len(), self.target.len());
-        let costs: Vec<T> =
-            (0..rows).flat_map(|i| self.matches.row(i)[..columns].iter().map(|&p| -p)).collect();
+        let costs: Vec<T> = (0..rows)
+            .flat_map(|i| self.matches.row(i)[..columns].iter().map(|&p| -p))
+            .collect();
         // Probabilities: finite, and as many as there are pairs.
-        let mut assignment = linear_assignment(&costs, rows, columns).unwrap_or_else(|_| vec![None; rows]);
+        let mut assignment =
+            linear_assignment(&costs, rows, columns).unwrap_or_else(|_| vec![None; rows]);
         for (i, partner) in assignment.iter_mut().enumerate() {
             let slack = self.matches.slack_of_row(i);
-            *partner = partner.filter(|&j| self.matches[(i, j)] > T::zero() && self.matches[(i, j)] >= slack);
+            *partner = partner
+                .filter(|&j| self.matches[(i, j)] > T::zero() && self.matches[(i, j)] >= slack);
         }
         assignment
     }
@@ -83,8 +105,11 @@ impl<T: Scalar, const D: usize> Run<T, D> {
     /// The result, in the units of the caller.
     pub(super) fn finish(self, model: &[Point<T, D>], target: &[Point<T, D>]) -> Matching<T, D> {
         let assignment = self.assignment();
-        let positions: Vec<Point<T, D>> =
-            self.warped.iter().map(|p| self.frame.leave(p.coords.map(nalgebra::convert_unchecked))).collect();
+        let positions: Vec<Point<T, D>> = self
+            .warped
+            .iter()
+            .map(|p| self.frame.leave(p.coords.map(nalgebra::convert_unchecked)))
+            .collect();
         // The spline's values determine it: interpolating them gives it back in the units of the caller.
         let warp = hard::spline(model, &positions, None, Smoothing::None);
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
@@ -93,14 +118,28 @@ impl<T: Scalar, const D: usize> Run<T, D> {
         for (i, partner) in assignment.iter().enumerate() {
             let row = &self.matches.row(i)[..target.len()];
             // Sinkhorn's normalisation ends with the columns: a row may sum to a little more than one.
-            let sum = self.matches.row(i).iter().fold(T::zero(), |sum, &p| sum + p).max(T::one());
-            let kept = row.iter().copied().enumerate().filter(|p| p.1 > nalgebra::convert(NEGLIGIBLE));
+            let sum = self
+                .matches
+                .row(i)
+                .iter()
+                .fold(T::zero(), |sum, &p| sum + p)
+                .max(T::one());
+            let kept = row
+                .iter()
+                .copied()
+                .enumerate()
+                .filter(|p| p.1 > nalgebra::convert(NEGLIGIBLE));
             soft.push_row(kept.map(|(j, p)| (j, p / sum)));
             confidence.push(partner.map_or(self.matches.slack_of_row(i), |j| row[j]) / sum);
             covariance.push(spread(target, row));
         }
         let squares = |(i, j): (usize, usize)| (warped[i] - target[j]).norm_squared();
-        let pairs = || assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j)));
+        let pairs = || {
+            assignment
+                .iter()
+                .enumerate()
+                .filter_map(|(i, j)| j.map(|j| (i, j)))
+        };
         let count: T = nalgebra::convert(pairs().count().max(1) as f64);
         let residual = (pairs().map(squares).fold(T::zero(), |s, r| s + r) / count).sqrt();
         let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
@@ -134,9 +173,17 @@ fn spread<T: Scalar, const D: usize>(target: &[Point<T, D>], row: &[T]) -> SMatr
         return SMatrix::zeros();
     }
     let origin = target[0];
-    let mean = target.iter().zip(row).fold(SVector::zeros(), |sum, (y, &p)| sum + (y - origin) * (p / mass));
-    target.iter().zip(row).fold(SMatrix::zeros(), |sum, (y, &p)| {
-        let step = y - origin - mean;
-        sum + step * step.transpose() * (p / mass)
-    })
+    let mean = target
+        .iter()
+        .zip(row)
+        .fold(SVector::zeros(), |sum, (y, &p)| {
+            sum + (y - origin) * (p / mass)
+        });
+    target
+        .iter()
+        .zip(row)
+        .fold(SMatrix::zeros(), |sum, (y, &p)| {
+            let step = y - origin - mean;
+            sum + step * step.transpose() * (p / mass)
+        })
 }

@@ -8,7 +8,9 @@ use tactile_tps::Scalar;
 
 /// The contexts reach twice the mean distance of two points; none where all coincide.
 fn contexts<T: Scalar, const D: usize>(points: &[Point<T, D>]) -> Option<ShapeContexts> {
-    let distances = points.iter().flat_map(|p| points.iter().map(move |q| (q - p).norm()));
+    let distances = points
+        .iter()
+        .flat_map(|p| points.iter().map(move |q| (q - p).norm()));
     let sum = distances.fold(T::zero(), |sum, d| sum + d);
     let pairs = points.len() * points.len().saturating_sub(1);
     let two: T = nalgebra::convert(2.0);
@@ -33,9 +35,14 @@ pub fn first_matches<T: Scalar, const D: usize>(
     slack: f64,
 ) -> MatchMatrix<T> {
     let contexts = contexts(model).zip(contexts(target));
-    let cost = |i, j| contexts.as_ref().map_or(0.0, |(g, h)| f64::from(g.cost(i, h, j)));
-    let costs: Vec<Vec<f64>> =
-        (0..model.len()).map(|i| (0..target.len()).map(|j| cost(i, j)).collect()).collect();
+    let cost = |i, j| {
+        contexts
+            .as_ref()
+            .map_or(0.0, |(g, h)| f64::from(g.cost(i, h, j)))
+    };
+    let costs: Vec<Vec<f64>> = (0..model.len())
+        .map(|i| (0..target.len()).map(|j| cost(i, j)).collect())
+        .collect();
     let least = |row: &[f64]| row.iter().copied().fold(f64::INFINITY, f64::min);
     let columns = target.len();
     let mut m = MatchMatrix::from_fn(model.len(), columns, |i, j| {

@@ -1,7 +1,9 @@
 //! The same method over few candidates a point, with the links between them computed once.
 
 use super::matcher::{match_with, relax_with};
-use super::{CompatibilityRule, DenseOptions, DenseRelaxation, MatchMatrix, NeighbourGraph, first_matches};
+use super::{
+    CompatibilityRule, DenseOptions, DenseRelaxation, MatchMatrix, NeighbourGraph, first_matches,
+};
 use crate::validate::option_within;
 use crate::{MatchError, Matching, PointMatcher};
 use nalgebra::Point;
@@ -35,7 +37,10 @@ pub struct SparseRelaxation {
 impl Default for SparseRelaxation {
     /// Ten candidates.
     fn default() -> Self {
-        Self { options: DenseOptions::default(), candidates: 10 }
+        Self {
+            options: DenseOptions::default(),
+            candidates: 10,
+        }
     }
 }
 
@@ -47,7 +52,10 @@ impl SparseRelaxation {
     pub fn new(options: DenseOptions, candidates: usize) -> Result<Self, MatchError> {
         DenseRelaxation::new(options)?;
         option_within("candidates", candidates as f64, 1.0, f64::MAX, "[1, ∞)")?;
-        Ok(Self { options, candidates })
+        Ok(Self {
+            options,
+            candidates,
+        })
     }
 
     /// One outer iteration's match matrix, as [`DenseRelaxation::relax`] with all other pairs at nought.
@@ -66,7 +74,8 @@ impl SparseRelaxation {
         target: &[Point<T, D>],
     ) -> MatchMatrix<T> {
         let options = &self.options;
-        let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
+        let graphs =
+            [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
         let mut m = first_matches(model, target, options.temperature, options.slack);
         keep_likeliest(&mut m, self.candidates);
         let links = Links::new(&m, &graphs, options.rule(&graphs));
@@ -80,7 +89,9 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for SparseRelaxation {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        match_with(&self.options, model, target, |model, target| self.relax(model, target))
+        match_with(&self.options, model, target, |model, target| {
+            self.relax(model, target)
+        })
     }
 }
 
@@ -88,7 +99,9 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for SparseRelaxation {
 fn settled_on<T: Scalar>(row: &[T]) -> Option<usize> {
     let sum = row.iter().fold(T::zero(), |sum, &p| sum + p);
     let enough = sum * T::narrow(1.0 - 100.0 * T::UNIT_ROUNDOFF);
-    row[..row.len() - 1].iter().position(|&p| p > T::zero() && p >= enough)
+    row[..row.len() - 1]
+        .iter()
+        .position(|&p| p > T::zero() && p >= enough)
 }
 
 /// Sets all but the `count` likeliest partners of every model point to nought; of equal ones the lower rows stay.
@@ -100,7 +113,10 @@ fn keep_likeliest<T: Scalar>(m: &mut MatchMatrix<T>, count: usize) {
         order.extend(0..columns);
         let row = m.row_mut(i);
         let unlikely = |a: &usize, b: &usize| {
-            row[*b].partial_cmp(&row[*a]).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(b))
+            row[*b]
+                .partial_cmp(&row[*a])
+                .unwrap_or(std::cmp::Ordering::Equal)
+                .then(a.cmp(b))
         };
         order.sort_unstable_by(unlikely);
         order.iter().skip(count).for_each(|&j| row[j] = T::zero());
@@ -125,15 +141,27 @@ impl<T: Scalar> Links<T> {
     ) -> Self {
         let columns = m.columns();
         let candidates = |i: usize| {
-            m.row(i)[..columns].iter().enumerate().filter(|(_, p)| **p > T::zero()).map(|(j, _)| j)
+            m.row(i)[..columns]
+                .iter()
+                .enumerate()
+                .filter(|(_, p)| **p > T::zero())
+                .map(|(j, _)| j)
         };
-        let mut links =
-            Self { columns, pairs: Vec::new(), starts: vec![0], from: Vec::new(), compatibility: Vec::new() };
+        let mut links = Self {
+            columns,
+            pairs: Vec::new(),
+            starts: vec![0],
+            from: Vec::new(),
+            compatibility: Vec::new(),
+        };
         let mut edge_to = vec![None; columns];
         for i in 0..m.rows() {
             for j in candidates(i) {
                 edge_to.fill(None);
-                graphs[1].of(j).iter().for_each(|edge| edge_to[edge.to] = Some(edge));
+                graphs[1]
+                    .of(j)
+                    .iter()
+                    .for_each(|edge| edge_to[edge.to] = Some(edge));
                 for x in graphs[0].of(i) {
                     for b in candidates(x.to) {
                         if let Some(y) = edge_to[b] {
@@ -158,9 +186,12 @@ impl<T: Scalar> Links<T> {
             if settled[i].is_some_and(|on| on != j) {
                 continue;
             }
-            let links = self.from[ends[0]..ends[1]].iter().zip(&self.compatibility[ends[0]..ends[1]]);
-            support[i * self.columns + j] =
-                links.fold(T::zero(), |sum, (&(a, b), &r)| sum + m[(a as usize, b as usize)] * r);
+            let links = self.from[ends[0]..ends[1]]
+                .iter()
+                .zip(&self.compatibility[ends[0]..ends[1]]);
+            support[i * self.columns + j] = links.fold(T::zero(), |sum, (&(a, b), &r)| {
+                sum + m[(a as usize, b as usize)] * r
+            });
         }
         support
     }

@@ -24,7 +24,9 @@ pub fn support<T: RealField + Copy, const D: usize>(
     target: &NeighbourGraph<T, D>,
     rule: &CompatibilityRule<T>,
 ) -> Vec<T> {
-    support_by(m, model, target, |x, y| rule.of(&model.edges()[x], &target.edges()[y]))
+    support_by(m, model, target, |x, y| {
+        rule.of(&model.edges()[x], &target.edges()[y])
+    })
 }
 
 /// [`support`] with a compatibility of the caller's choice: `r(x, y)` of the `x`-th model edge and the `y`-th target edge,
@@ -49,7 +51,11 @@ pub fn support_by<T: RealField + Copy, const D: usize>(
     target: &NeighbourGraph<T, D>,
     r: impl Fn(usize, usize) -> T,
 ) -> Vec<T> {
-    assert_eq!((m.rows(), m.columns()), (model.points(), target.points()), "size of M");
+    assert_eq!(
+        (m.rows(), m.columns()),
+        (model.points(), target.points()),
+        "size of M"
+    );
     let mut support = Vec::with_capacity(m.rows() * m.columns());
     for i in 0..m.rows() {
         for j in 0..m.columns() {
@@ -87,7 +93,11 @@ pub fn energy<T: RealField + Copy, const D: usize>(
     model: &NeighbourGraph<T, D>,
     target: &NeighbourGraph<T, D>,
 ) -> T {
-    assert_eq!((m.rows(), m.columns()), (model.points(), target.points()), "size of M");
+    assert_eq!(
+        (m.rows(), m.columns()),
+        (model.points(), target.points()),
+        "size of M"
+    );
     let mut energy = T::zero();
     for i in 0..m.rows() {
         for j in (0..m.columns()).filter(|&j| m[(i, j)] > T::zero()) {

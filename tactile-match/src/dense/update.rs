@@ -36,17 +36,29 @@ pub struct SinkhornReport<T> {
 ///
 /// # Panics
 /// If `support` has not `I · J` entries.
-pub fn update<T: RealField + Copy>(m: &mut MatchMatrix<T>, support: &[T], slack_gain: T) -> Vec<usize> {
+pub fn update<T: RealField + Copy>(
+    m: &mut MatchMatrix<T>,
+    support: &[T],
+    slack_gain: T,
+) -> Vec<usize> {
     let columns = m.columns();
     assert_eq!(support.len(), m.rows() * columns, "size of the support");
     let mut zero_rows = Vec::new();
     for i in 0..m.rows() {
-        let gains = support[i * columns..][..columns].iter().copied().chain([slack_gain]);
-        let largest = m.row(i).iter().copied().zip(gains.clone()).fold(None, |best, (p, s)| match best {
-            _ if p <= T::zero() || s <= T::zero() => best,
-            Some((_, _, log)) if p.ln() + s.ln() <= log => best,
-            _ => Some((p, s, p.ln() + s.ln())),
-        });
+        let gains = support[i * columns..][..columns]
+            .iter()
+            .copied()
+            .chain([slack_gain]);
+        let largest = m
+            .row(i)
+            .iter()
+            .copied()
+            .zip(gains.clone())
+            .fold(None, |best, (p, s)| match best {
+                _ if p <= T::zero() || s <= T::zero() => best,
+                Some((_, _, log)) if p.ln() + s.ln() <= log => best,
+                _ => Some((p, s, p.ln() + s.ln())),
+            });
         let Some((largest_p, largest_s, largest_log)) = largest else {
             zero_rows.push(i);
             continue;
@@ -83,7 +95,10 @@ pub fn sinkhorn<T: RealField + Copy>(
     sweeps: usize,
     tolerance: T,
 ) -> SinkhornReport<T> {
-    let mut report = SinkhornReport { sweeps: 0, row_defect: row_defect(m) };
+    let mut report = SinkhornReport {
+        sweeps: 0,
+        row_defect: row_defect(m),
+    };
     while report.sweeps < sweeps {
         for i in 0..m.rows() {
             divide_by_sum(m.row_mut(i));
@@ -94,7 +109,10 @@ pub fn sinkhorn<T: RealField + Copy>(
                 (0..=m.rows()).for_each(|i| m[(i, j)] /= sum);
             }
         }
-        report = SinkhornReport { sweeps: report.sweeps + 1, row_defect: row_defect(m) };
+        report = SinkhornReport {
+            sweeps: report.sweeps + 1,
+            row_defect: row_defect(m),
+        };
         if report.row_defect <= tolerance {
             break;
         }

@@ -100,11 +100,19 @@ impl<const D: usize> Annealer<D> {
     /// Soft matches of `warped` at this temperature, with their moments.
     ///
     /// The slack weighs `(2πσ²)^{D/2}` times the density of stray points, beside Gaussian affinities.
-    pub(crate) fn assign(&mut self, warped: &[[f64; D]], variance: f64, slack: Slack, sweeps: usize) {
+    pub(crate) fn assign(
+        &mut self,
+        warped: &[[f64; D]],
+        variance: f64,
+        slack: Slack,
+        sweeps: usize,
+    ) {
         let density = slack.share / (1.0 - slack.share) * warped.len() as f64 / self.volume;
         let weight = (TAU * variance).powf(0.5 * D as f64) * density;
-        let [rows, columns] = [slack.model, slack.target].map(|side| (side * weight).max(1e-30) as f32);
-        self.soft.affinities(warped, variance, FAINTER * f64::from(rows.min(columns)));
+        let [rows, columns] =
+            [slack.model, slack.target].map(|side| (side * weight).max(1e-30) as f32);
+        self.soft
+            .affinities(warped, variance, FAINTER * f64::from(rows.min(columns)));
         self.soft.normalise(sweeps, rows, columns);
         self.soft.moments(warped);
     }
@@ -146,7 +154,12 @@ impl<const D: usize> Annealer<D> {
 
     /// One step from `state` in `scratch`: sets soft matches and regression to those of `state`; how undecided they are,
     /// see [`ambiguity`](Self::ambiguity).
-    pub(crate) fn look(&mut self, state: &State<D>, scratch: &mut State<D>, schedule: &Schedule) -> f64 {
+    pub(crate) fn look(
+        &mut self,
+        state: &State<D>,
+        scratch: &mut State<D>,
+        schedule: &Schedule,
+    ) -> f64 {
         scratch.copy_from(state);
         self.predicted.clone_from(&state.warped);
         self.step(scratch, schedule, state.sigma * state.sigma);
@@ -158,13 +171,20 @@ impl<const D: usize> Annealer<D> {
         self.predicted.clone_from(&state.warped);
         for _ in 0..rounds {
             let residual = self.step(state, schedule, state.sigma * state.sigma);
-            let spread =
-                self.soft.weight.iter().zip(&self.regression.variance).map(|(w, v)| w * v).sum::<f64>();
+            let spread = self
+                .soft
+                .weight
+                .iter()
+                .zip(&self.regression.variance)
+                .map(|(w, v)| w * v)
+                .sum::<f64>();
             let open = spread / self.soft.weight.iter().sum::<f64>().max(1e-9);
             state.sigma = (residual + open).sqrt().max(schedule.floor);
             self.predicted.clone_from(&state.warped);
             state.iterations += 1;
-            state.trace.push(self.free_energy(state, state.sigma * state.sigma));
+            state
+                .trace
+                .push(self.free_energy(state, state.sigma * state.sigma));
         }
     }
 
@@ -195,19 +215,25 @@ impl<const D: usize> Annealer<D> {
         }
         state.matched = total;
         self.ambiguity = within / (D as f64 * total.max(1e-9) * variance);
-        if total > 0.0 { squares / (D as f64 * total) } else { variance }
+        if total > 0.0 {
+            squares / (D as f64 * total)
+        } else {
+            variance
+        }
     }
 
     /// Fits the warp to the moments of the soft assignment about the predicted positions.
     fn fit(&mut self, state: &State<D>, variance: f64) {
         let stride = self.prior.stride;
         let rows = self.predicted.iter().zip(&state.base).zip(&self.soft.shift);
-        let target =
-            |((p, b), s): ((&[f64; D], &[f64; D]), &[f64; D])| std::array::from_fn(|k| p[k] + s[k] - b[k]);
+        let target = |((p, b), s): ((&[f64; D], &[f64; D]), &[f64; D])| {
+            std::array::from_fn(|k| p[k] + s[k] - b[k])
+        };
         self.residuals.fill(stride, rows.map(target));
         self.weights.clone_from(&self.soft.weight);
         self.weights.resize(stride, 0.0);
-        self.regression.fit(&self.prior, &self.weights, &self.residuals, variance);
+        self.regression
+            .fit(&self.prior, &self.weights, &self.residuals, variance);
         self.regression.variances(&self.prior);
     }
 
@@ -225,24 +251,37 @@ impl<const D: usize> Annealer<D> {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
         let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
-        self.soft.affinities(&state.warped, variance, FAINTER * LEAST_SHARE * gaussian / self.volume);
+        self.soft.affinities(
+            &state.warped,
+            variance,
+            FAINTER * LEAST_SHARE * gaussian / self.volume,
+        );
         self.soft.column_totals(&mut self.sums);
         let sums = &self.sums[..m];
         let density = 1.0 / gaussian;
         let mut share = share;
         for _ in 0..SHARE_ROUNDS {
             let stray = share / self.volume;
-            let strays = sums.iter().map(|s| stray / ((1.0 - share) * density * s + stray));
+            let strays = sums
+                .iter()
+                .map(|s| stray / ((1.0 - share) * density * s + stray));
             share = (strays.sum::<f64>() / m as f64).clamp(LEAST_SHARE, 0.95);
         }
         let (gauss, stray) = ((1.0 - share) * density, share / self.volume);
         let data: f64 = sums.iter().map(|s| -(gauss * s + stray).ln()).sum();
-        self.sums.iter_mut().for_each(|s| *s = gauss / (gauss * *s + stray));
+        self.sums
+            .iter_mut()
+            .for_each(|s| *s = gauss / (gauss * *s + stray));
         self.soft.row_totals(&self.sums, &mut self.weights);
         self.weights.resize(self.prior.stride, 0.0);
         let rows = state.warped.iter().zip(&state.base);
-        self.residuals.fill(self.prior.stride, rows.map(|(w, b)| std::array::from_fn(|k| w[k] - b[k])));
-        self.regression.fit(&self.prior, &self.weights, &self.residuals, variance);
-        state.energy = data + 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
+        self.residuals.fill(
+            self.prior.stride,
+            rows.map(|(w, b)| std::array::from_fn(|k| w[k] - b[k])),
+        );
+        self.regression
+            .fit(&self.prior, &self.weights, &self.residuals, variance);
+        state.energy =
+            data + 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
     }
 }

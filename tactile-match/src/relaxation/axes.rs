@@ -15,7 +15,10 @@ impl<const D: usize> Axes<D> {
     pub(crate) fn fill(&mut self, stride: usize, rows: impl Iterator<Item = [f64; D]>) {
         self.0.iter_mut().for_each(Vec::clear);
         for row in rows {
-            self.0.iter_mut().zip(row).for_each(|(axis, value)| axis.push(value));
+            self.0
+                .iter_mut()
+                .zip(row)
+                .for_each(|(axis, value)| axis.push(value));
         }
         self.0.iter_mut().for_each(|axis| axis.resize(stride, 0.0));
     }

@@ -34,7 +34,10 @@ impl RelaxationMatcher {
         pairs: &[PointSets<'_, T, D>],
     ) -> Vec<Result<Matching<T, D>, MatchError>> {
         let mut workspace = RelaxationWorkspace::new();
-        pairs.iter().map(|pair| self.match_one(&mut workspace, pair)).collect()
+        pairs
+            .iter()
+            .map(|pair| self.match_one(&mut workspace, pair))
+            .collect()
     }
 
     /// As [`match_all`](Self::match_all) on all threads of the current pool, with the same bits.
@@ -55,7 +58,10 @@ impl RelaxationMatcher {
     ) -> Vec<Result<Matching<T, D>, MatchError>> {
         use rayon::prelude::*;
         let one = |workspace: &mut _, pair: &_| self.match_one(workspace, pair);
-        pairs.par_iter().map_init(RelaxationWorkspace::new, one).collect()
+        pairs
+            .par_iter()
+            .map_init(RelaxationWorkspace::new, one)
+            .collect()
     }
 
     fn match_one<T: Scalar, const D: usize>(
@@ -64,6 +70,8 @@ impl RelaxationMatcher {
         &(model, target): &PointSets<'_, T, D>,
     ) -> Result<Matching<T, D>, MatchError> {
         let go = |_, _| ControlFlow::Continue(());
-        Ok(self.match_points_with(workspace, model, target, go)?.to_matching(model))
+        Ok(self
+            .match_points_with(workspace, model, target, go)?
+            .to_matching(model))
     }
 }

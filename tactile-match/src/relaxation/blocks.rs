@@ -30,8 +30,12 @@ impl<const D: usize> Blocks<D> {
         for k in 0..D {
             axes.extend(order.iter().map(|&j| points[j][k] as f32));
             let real = axes[k * width..].chunks(LANES);
-            self.low.extend(real.clone().map(|block| block.iter().copied().fold(f32::MAX, f32::min)));
-            self.high.extend(real.map(|block| block.iter().copied().fold(f32::MIN, f32::max)));
+            self.low.extend(
+                real.clone()
+                    .map(|block| block.iter().copied().fold(f32::MAX, f32::min)),
+            );
+            self.high
+                .extend(real.map(|block| block.iter().copied().fold(f32::MIN, f32::max)));
             axes.resize((k + 1) * width, FAR);
         }
     }
@@ -71,13 +75,17 @@ fn split<const D: usize>(points: &[[f64; D]], rows: &mut [usize]) {
         return;
     }
     let side = |k: usize| {
-        let (low, high) =
-            rows.iter().map(|&j| points[j][k]).fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c), h.max(c)));
+        let (low, high) = rows
+            .iter()
+            .map(|&j| points[j][k])
+            .fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c), h.max(c)));
         high - low
     };
     let axis = (1..D).fold(0, |best, k| if side(k) > side(best) { k } else { best });
     let half = (rows.len() / 2).next_multiple_of(LANES).min(rows.len() - 1);
-    rows.select_nth_unstable_by(half, |&a, &b| points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b)));
+    rows.select_nth_unstable_by(half, |&a, &b| {
+        points[a][axis].total_cmp(&points[b][axis]).then(a.cmp(&b))
+    });
     let (left, right) = rows.split_at_mut(half);
     split(points, left);
     split(points, right);
@@ -89,8 +97,9 @@ mod tests {
 
     #[test]
     fn blocks_hold_every_point_once_and_keep_their_distance() {
-        let points: Vec<[f64; 2]> =
-            (0..101).map(|i| [f64::from(i * 37 % 101), f64::from(i * 53 % 89)]).collect();
+        let points: Vec<[f64; 2]> = (0..101)
+            .map(|i| [f64::from(i * 37 % 101), f64::from(i * 53 % 89)])
+            .collect();
         let mut blocks = Blocks::default();
         blocks.build(&points);
         let mut sorted = blocks.order.clone();

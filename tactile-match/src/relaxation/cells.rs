@@ -22,7 +22,8 @@ impl<const D: usize> Cells<D> {
         self.points.extend_from_slice(points);
         self.per_side = side.recip();
         self.heads.clear();
-        self.heads.resize((2 * points.len()).next_power_of_two(), NONE);
+        self.heads
+            .resize((2 * points.len()).next_power_of_two(), NONE);
         self.next.clear();
         for (i, p) in points.iter().enumerate() {
             let head = self.chain(&p.map(|c| self.cell(c)));
@@ -46,7 +47,9 @@ impl<const D: usize> Cells<D> {
                 }
                 row = self.next[row as usize];
             }
-            let Some(axis) = (0..D).find(|&k| cell[k] < high[k]) else { return };
+            let Some(axis) = (0..D).find(|&k| cell[k] < high[k]) else {
+                return;
+            };
             cell[axis] += 1;
             cell[..axis].copy_from_slice(&low[..axis]);
         }
@@ -64,13 +67,17 @@ impl<const D: usize> Cells<D> {
     }
 
     fn cell(&self, coordinate: f64) -> i64 {
-        (coordinate * self.per_side).floor().clamp(-FARTHEST, FARTHEST) as i64
+        (coordinate * self.per_side)
+            .floor()
+            .clamp(-FARTHEST, FARTHEST) as i64
     }
 
     fn chain(&self, cell: &[i64; D]) -> usize {
-        let mixed = cell
-            .iter()
-            .fold(0_u64, |hash, &c| (hash ^ c as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29));
+        let mixed = cell.iter().fold(0_u64, |hash, &c| {
+            (hash ^ c as u64)
+                .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                .rotate_left(29)
+        });
         (mixed ^ (mixed >> 32)) as usize & (self.heads.len() - 1)
     }
 }

@@ -66,12 +66,17 @@ impl<const D: usize> Constellations<D> {
         self.distances.clear();
         for i in (0..target.len()).step_by(step) {
             let others = target.iter().enumerate().filter(|&(j, _)| j != i);
-            let nearest =
-                others.map(|(_, t)| squared(&difference(t, &target[i]))).fold(f64::INFINITY, f64::min);
+            let nearest = others
+                .map(|(_, t)| squared(&difference(t, &target[i])))
+                .fold(f64::INFINITY, f64::min);
             self.distances.push((nearest, i));
         }
         let middle = self.distances.len() / 2;
-        self.distances.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0)).1.0.sqrt()
+        self.distances
+            .select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0))
+            .1
+            .0
+            .sqrt()
     }
 
     /// The nearest neighbours of model point `i`, as offsets from it.
@@ -82,7 +87,8 @@ impl<const D: usize> Constellations<D> {
         // Twice as far until there are enough; a point far from all others makes do with fewer.
         for _ in 0..4 {
             near.clear();
-            self.model.within(&warped[i], radius, |a, square| near.push((square, a)));
+            self.model
+                .within(&warped[i], radius, |a, square| near.push((square, a)));
             near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             near.dedup();
             if near.len() > wanted {
@@ -93,14 +99,23 @@ impl<const D: usize> Constellations<D> {
         near.retain(|&(_, a)| a != i);
         near.truncate(wanted);
         self.offsets.clear();
-        self.offsets.extend(near.iter().map(|&(_, a)| difference(&warped[a], &warped[i])));
+        self.offsets.extend(
+            near.iter()
+                .map(|&(_, a)| difference(&warped[a], &warped[i])),
+        );
     }
 
     /// The candidate of least misfit for model point `i`, with its misfit and that of the second.
-    fn best_candidate(&mut self, warped: &[[f64; D]], target: &[[f64; D]], i: usize) -> (usize, f64, f64) {
+    fn best_candidate(
+        &mut self,
+        warped: &[[f64; D]],
+        target: &[[f64; D]],
+        i: usize,
+    ) -> (usize, f64, f64) {
         let candidates = &mut self.candidates;
         candidates.clear();
-        self.targets.within(&warped[i], REACH, |j, _| candidates.push(j));
+        self.targets
+            .within(&warped[i], REACH, |j, _| candidates.push(j));
         candidates.sort_unstable();
         candidates.dedup();
         let mut best = (0, f64::INFINITY, f64::INFINITY);
@@ -151,7 +166,10 @@ impl<const D: usize> Constellations<D> {
             outer += (rest + bend * offset) * offset.transpose();
             gram += offset * offset.transpose();
         }
-        (misfit, outer * gram.try_inverse().unwrap_or_else(SMatrix::zeros))
+        (
+            misfit,
+            outer * gram.try_inverse().unwrap_or_else(SMatrix::zeros),
+        )
     }
 
     /// Probabilities from misfits, with the noise at which the typical best candidate fits as it does.
@@ -160,12 +178,19 @@ impl<const D: usize> Constellations<D> {
         self.distances.clear();
         self.distances.extend(self.best.iter().map(|b| (b.1, 0)));
         let place = self.distances.len() / 4;
-        let typical = self.distances.select_nth_unstable_by(place, |a, b| a.0.total_cmp(&b.0)).1.0;
+        let typical = self
+            .distances
+            .select_nth_unstable_by(place, |a, b| a.0.total_cmp(&b.0))
+            .1
+            .0;
         let variance = (typical / values).max((RESOLUTION * self.spacing).powi(2));
         self.pairs.clear();
         let pair = |&(j, best, second): &(usize, f64, f64)| {
-            let trust =
-                if best.is_finite() { 1.0 / (1.0 + (-0.5 * (second - best) / variance).exp()) } else { 0.0 };
+            let trust = if best.is_finite() {
+                1.0 / (1.0 + (-0.5 * (second - best) / variance).exp())
+            } else {
+                0.0
+            };
             // A misfit three times the typical is no longer one.
             let fits = (-0.5 * best / (9.0 * variance * values)).exp();
             (j, trust * fits)

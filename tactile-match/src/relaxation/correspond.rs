@@ -37,9 +37,10 @@ impl Correspondence {
         self.propose(model, target);
         self.relax(model, target);
         let likeliest = |i| {
-            self.labels
-                .row(i)
-                .fold((0, 0.0), |best: (usize, f64), entry| if entry.1 > best.1 { entry } else { best })
+            self.labels.row(i).fold(
+                (0, 0.0),
+                |best: (usize, f64), entry| if entry.1 > best.1 { entry } else { best },
+            )
         };
         self.pairs.clear();
         self.pairs.extend((0..model.len()).map(likeliest));
@@ -51,7 +52,8 @@ impl Correspondence {
         self.target_contexts.build(target, RADIUS);
         self.labels.reset(target.len(), SLACK);
         for i in 0..model.len() {
-            self.model_contexts.costs_into(i, &self.target_contexts, &mut self.costs);
+            self.model_contexts
+                .costs_into(i, &self.target_contexts, &mut self.costs);
             let costs = &self.costs;
             self.order.clear();
             self.order.extend(0..target.len());
@@ -61,10 +63,19 @@ impl Correspondence {
                 self.order.select_nth_unstable_by(kept - 1, by_cost);
             }
             self.order.truncate(kept);
-            let least = self.order.iter().map(|&j| costs[j]).fold(f32::MAX, f32::min);
+            let least = self
+                .order
+                .iter()
+                .map(|&j| costs[j])
+                .fold(f32::MAX, f32::min);
             let raw = |j: usize| (-f64::from(costs[j] - least) / COST_SCALE).exp();
             let sum: f64 = self.order.iter().map(|&j| raw(j)).sum();
-            self.labels.push_row(self.order.iter().map(|&j| (j, (1.0 - SLACK) * raw(j) / sum)), SLACK);
+            self.labels.push_row(
+                self.order
+                    .iter()
+                    .map(|&j| (j, (1.0 - SLACK) * raw(j) / sum)),
+                SLACK,
+            );
         }
     }
 
@@ -77,7 +88,10 @@ impl Correspondence {
             if j == b {
                 return 0.0;
             }
-            let (u, v) = (difference(&model[a], &model[i]), difference(&target[b], &target[j]));
+            let (u, v) = (
+                difference(&model[a], &model[i]),
+                difference(&target[b], &target[j]),
+            );
             let gamma = 1.0 - 0.7 * norm(&u) / reach[i];
             compatibility(&u, &v) * gamma / kept as f64
         };
@@ -105,7 +119,12 @@ impl Correspondence {
                 });
             }
             self.order.truncate(kept);
-            self.reach.push(self.order.iter().map(|&a| square(a)).fold(f64::MIN_POSITIVE, f64::max));
+            self.reach.push(
+                self.order
+                    .iter()
+                    .map(|&a| square(a))
+                    .fold(f64::MIN_POSITIVE, f64::max),
+            );
             self.neighbours.extend_from_slice(&self.order);
         }
         kept

@@ -33,7 +33,12 @@ impl<const D: usize> Answer<D> {
         let n = state.warped.len();
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
-        annealer.assign(&state.warped, variance, slack, if state.sigma <= CLEAN { 3 } else { 8 });
+        annealer.assign(
+            &state.warped,
+            variance,
+            slack,
+            if state.sigma <= CLEAN { 3 } else { 8 },
+        );
         annealer.soft.cap_rows();
         self.assign(&annealer.soft, n, targets.len());
         self.place(state, targets);
@@ -41,7 +46,13 @@ impl<const D: usize> Answer<D> {
         annealer.regression.variances(&annealer.prior);
         for i in 0..n {
             let variance = annealer.regression.variance[i];
-            self.covariance.push(covariance(&annealer.soft, targets, &self.warped[i], i, variance));
+            self.covariance.push(covariance(
+                &annealer.soft,
+                targets,
+                &self.warped[i],
+                i,
+                variance,
+            ));
         }
     }
 
@@ -62,7 +73,8 @@ impl<const D: usize> Answer<D> {
             let free = (1.0 - soft.weight[i]).max(0.0);
             let matched = best.1 != usize::MAX && soft.weight[i] > 0.5;
             self.assignment.push(matched.then_some(best.1));
-            self.confidence.push(if matched { best.0.min(1.0) } else { free });
+            self.confidence
+                .push(if matched { best.0.min(1.0) } else { free });
         }
         for i in 0..n {
             if self.assignment[i].is_some_and(|j| self.column_best[j].1 != i) {
@@ -74,14 +86,25 @@ impl<const D: usize> Answer<D> {
     fn place(&mut self, state: &State<D>, targets: &[[f64; D]]) {
         self.warped.clone_from(&state.warped);
         let (mut squares, mut pairs) = (0.0, 0);
-        for (i, j) in self.assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))) {
+        for (i, j) in self
+            .assignment
+            .iter()
+            .enumerate()
+            .filter_map(|(i, j)| j.map(|j| (i, j)))
+        {
             if state.sigma <= CLEAN {
                 self.warped[i] = targets[j];
             }
-            squares += (0..D).map(|k| (self.warped[i][k] - targets[j][k]).powi(2)).sum::<f64>();
+            squares += (0..D)
+                .map(|k| (self.warped[i][k] - targets[j][k]).powi(2))
+                .sum::<f64>();
             pairs += 1;
         }
-        self.residual = if pairs > 0 { (squares / f64::from(pairs)).sqrt() } else { 0.0 };
+        self.residual = if pairs > 0 {
+            (squares / f64::from(pairs)).sqrt()
+        } else {
+            0.0
+        };
     }
 }
 

@@ -30,7 +30,8 @@ impl RelaxationMatcher {
             Some(found) => found,
             None => {
                 let (interpolation, workspace) = series.parts(model);
-                self.match_points_with(workspace, model, target, go)?.interpolated(model, interpolation)
+                self.match_points_with(workspace, model, target, go)?
+                    .interpolated(model, interpolation)
             }
         };
         series.remember(model, &found);
@@ -44,7 +45,9 @@ impl RelaxationMatcher {
         target: &[Point<T, D>],
     ) -> Result<Option<Matching<T, D>>, MatchError> {
         let (matched, sigma) = (series.matched as f64, series.sigma);
-        let Some(last) = series.last_for(model) else { return Ok(None) };
+        let Some(last) = series.last_for(model) else {
+            return Ok(None);
+        };
         let last = last.to_vec();
         let (interpolation, workspace) = series.parts(model);
         workspace.take(model, target)?;
@@ -52,7 +55,9 @@ impl RelaxationMatcher {
         let start: Vec<[f64; D]> = last.iter().map(|p| frame.target(p)).collect();
         let warmth = MARGIN * apart(&start, &workspace.target);
         self.solve_from(workspace, &start, warmth);
-        let found = RelaxationMatch { workspace: &*workspace };
+        let found = RelaxationMatch {
+            workspace: &*workspace,
+        };
         let noise = (WORSE * sigma.widen() / frame.scale).max(finish::CLEAN);
         let kept = found.assignment().iter().flatten().count() as f64 >= LOST * matched
             && workspace.best.sigma <= noise;
@@ -65,7 +70,10 @@ fn apart<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
     let [(p, r), (q, s)] = [a, b].map(|points| {
         let centre = mean(points);
         let square = |p: &[f64; D]| (0..D).map(|k| (p[k] - centre[k]).powi(2)).sum::<f64>();
-        (centre, (points.iter().map(square).sum::<f64>() / points.len() as f64).sqrt())
+        (
+            centre,
+            (points.iter().map(square).sum::<f64>() / points.len() as f64).sqrt(),
+        )
     });
     (0..D).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt() + (r - s).abs()
 }

@@ -33,7 +33,11 @@ impl<'w, const D: usize> RelaxationMatch<'w, D> {
     /// The warped model points.
     pub fn warped<T: Scalar>(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + use<'w, T, D> {
         let workspace = self.workspace;
-        workspace.answer.warped.iter().map(|w| workspace.frame.outward(w))
+        workspace
+            .answer
+            .warped
+            .iter()
+            .map(|w| workspace.frame.outward(w))
     }
 
     /// Target row of every model point.
@@ -80,13 +84,16 @@ impl<'w, const D: usize> RelaxationMatch<'w, D> {
         let (mut soft, mut row) = (SoftMatches::new(), Vec::new());
         for i in 0..model.len() {
             row.clear();
-            row.extend(finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))));
+            row.extend(
+                finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))),
+            );
             row.sort_unstable_by_key(|entry| entry.0);
             soft.push_row(row.iter().copied());
         }
         let square = frame.scale * frame.scale;
         let covariance = |c: &[[f64; D]; D]| SMatrix::from_fn(|a, b| T::narrow(c[a][b] * square));
-        let (unmatched_model, unmatched_target) = unmatched_rows(&answer.assignment, workspace.target.len());
+        let (unmatched_model, unmatched_target) =
+            unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
             warp,
             warped,
@@ -137,7 +144,10 @@ fn warp_through<T: Scalar, const D: usize>(
         return exact;
     }
     let warp = hard::spline(model, warped, None, Smoothing::Lambda(T::narrow(SMOOTHING)));
-    model.iter().zip(warped).for_each(|(p, w)| *w = warp.apply(p));
+    model
+        .iter()
+        .zip(warped)
+        .for_each(|(p, w)| *w = warp.apply(p));
     warp
 }
 
@@ -147,7 +157,12 @@ fn agrees<T: Scalar, const D: usize>(
     model: &[Point<T, D>],
     warped: &[Point<T, D>],
 ) -> bool {
-    let size = warped.iter().fold(T::zero(), |size, p| size.max(p.coords.amax()));
+    let size = warped
+        .iter()
+        .fold(T::zero(), |size, p| size.max(p.coords.amax()));
     let tolerance = size * T::narrow(T::UNIT_ROUNDOFF.sqrt());
-    model.iter().zip(warped).all(|(p, w)| (warp.apply(p) - w).amax() <= tolerance)
+    model
+        .iter()
+        .zip(warped)
+        .all(|(p, w)| (warp.apply(p) - w).amax() <= tolerance)
 }

@@ -19,7 +19,11 @@ pub(crate) struct Frame<const D: usize> {
 
 impl<const D: usize> Default for Frame<D> {
     fn default() -> Self {
-        Self { model: SVector::zeros(), target: SVector::zeros(), scale: 1.0 }
+        Self {
+            model: SVector::zeros(),
+            target: SVector::zeros(),
+            scale: 1.0,
+        }
     }
 }
 
@@ -28,10 +32,18 @@ impl<const D: usize> Frame<D> {
     pub(crate) fn new<T: Scalar>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
         let sets = [model, target].map(centre_and_radius);
         // Below the rounding of the coordinates the radius is noise: such a set is one point.
-        let extended =
-            |(centre, radius): &(SVector<f64, D>, f64)| *radius > 8.0 * f64::EPSILON * centre.amax();
-        let scale = sets.iter().find(|set| extended(set)).map_or(1.0, |set| set.1);
-        Self { model: sets[0].0, target: sets[1].0, scale }
+        let extended = |(centre, radius): &(SVector<f64, D>, f64)| {
+            *radius > 8.0 * f64::EPSILON * centre.amax()
+        };
+        let scale = sets
+            .iter()
+            .find(|set| extended(set))
+            .map_or(1.0, |set| set.1);
+        Self {
+            model: sets[0].0,
+            target: sets[1].0,
+            scale,
+        }
     }
 
     /// A model point in the frame.
@@ -50,7 +62,9 @@ impl<const D: usize> Frame<D> {
 
     /// A warped point, which lies among the targets, in the units of the caller.
     pub(crate) fn outward<T: Scalar>(&self, point: &[f64; D]) -> Point<T, D> {
-        Point::from(std::array::from_fn(|k| T::narrow(point[k] * self.scale + self.target[k])))
+        Point::from(std::array::from_fn(|k| {
+            T::narrow(point[k] * self.scale + self.target[k])
+        }))
     }
 }
 

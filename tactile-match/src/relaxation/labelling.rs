@@ -35,8 +35,16 @@ impl Labelling {
     /// # Panics
     /// If a candidate is not below `targets`.
     #[must_use]
-    pub fn new(targets: usize, candidates: impl IntoIterator<Item = Vec<usize>>, slack: f64) -> Self {
-        let mut this = Self { starts: vec![0], column_slack: vec![slack; targets], ..Self::default() };
+    pub fn new(
+        targets: usize,
+        candidates: impl IntoIterator<Item = Vec<usize>>,
+        slack: f64,
+    ) -> Self {
+        let mut this = Self {
+            starts: vec![0],
+            column_slack: vec![slack; targets],
+            ..Self::default()
+        };
         for row in candidates {
             let share = (1.0 - slack) / row.len().max(1) as f64;
             this.push_row(row.into_iter().map(|j| (j, share)), slack);
@@ -58,7 +66,10 @@ impl Labelling {
     /// Appends a model point with its candidates.
     pub(crate) fn push_row(&mut self, row: impl Iterator<Item = (usize, f64)>, slack: f64) {
         for (column, probability) in row {
-            assert!(column < self.column_slack.len(), "candidate beyond the targets");
+            assert!(
+                column < self.column_slack.len(),
+                "candidate beyond the targets"
+            );
             self.columns.push(column);
             self.entries.push(probability);
         }
@@ -103,13 +114,18 @@ impl Labelling {
     /// Candidates of model point `i` with their probabilities.
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.starts[i]..self.starts[i + 1];
-        self.columns[range.clone()].iter().copied().zip(self.entries[range].iter().copied())
+        self.columns[range.clone()]
+            .iter()
+            .copied()
+            .zip(self.entries[range].iter().copied())
     }
 
     /// `M_ij`; nought for a pair that is no candidate.
     #[must_use]
     pub fn probability(&self, i: usize, j: usize) -> f64 {
-        self.row(i).find(|&(column, _)| column == j).map_or(0.0, |(_, p)| p)
+        self.row(i)
+            .find(|&(column, _)| column == j)
+            .map_or(0.0, |(_, p)| p)
     }
 
     /// Probability that model point `i` has no partner.
@@ -124,12 +140,17 @@ impl Labelling {
         self.support.clear();
         for links in self.link_starts.windows(2) {
             let range = links[0]..links[1];
-            let pairs = self.link_from[range.clone()].iter().zip(&self.link_weight[range]);
-            self.support.push(pairs.map(|(&f, w)| w * self.entries[f as usize]).sum());
+            let pairs = self.link_from[range.clone()]
+                .iter()
+                .zip(&self.link_weight[range]);
+            self.support
+                .push(pairs.map(|(&f, w)| w * self.entries[f as usize]).sum());
         }
         for i in 0..self.rows() {
             let range = self.starts[i]..self.starts[i + 1];
-            let gains = self.entries[range.clone()].iter().zip(&self.support[range.clone()]);
+            let gains = self.entries[range.clone()]
+                .iter()
+                .zip(&self.support[range.clone()]);
             let total = gains.map(|(p, s)| p * s).sum::<f64>() + self.row_slack[i] * slack_gain;
             if total > 0.0 {
                 for e in range {
@@ -155,7 +176,12 @@ impl Labelling {
     /// ```
     #[must_use]
     pub fn is_settled(&self, certainty: f64) -> bool {
-        (0..self.rows()).all(|i| self.row(i).map(|(_, p)| p).fold(self.row_slack[i], f64::max) >= certainty)
+        (0..self.rows()).all(|i| {
+            self.row(i)
+                .map(|(_, p)| p)
+                .fold(self.row_slack[i], f64::max)
+                >= certainty
+        })
     }
 
     fn normalise(&mut self) {
@@ -170,9 +196,16 @@ impl Labelling {
             }
             self.row_slack[i] /= if sum > 0.0 { sum } else { 1.0 };
         }
-        self.entries.iter_mut().zip(&self.columns).for_each(|(p, &j)| {
-            *p /= if self.sums[j] > 0.0 { self.sums[j] } else { 1.0 };
-        });
+        self.entries
+            .iter_mut()
+            .zip(&self.columns)
+            .for_each(|(p, &j)| {
+                *p /= if self.sums[j] > 0.0 {
+                    self.sums[j]
+                } else {
+                    1.0
+                };
+            });
         self.column_slack
             .iter_mut()
             .zip(&self.sums)

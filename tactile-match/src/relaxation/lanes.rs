@@ -27,7 +27,11 @@ pub(super) struct Moments<const D: usize> {
 impl<const D: usize> Moments<D> {
     #[inline(always)]
     pub(super) fn new() -> Self {
-        Self { weight: [0.0; LANES], shift: [[0.0; LANES]; D], spread: [0.0; LANES] }
+        Self {
+            weight: [0.0; LANES],
+            shift: [[0.0; LANES]; D],
+            spread: [0.0; LANES],
+        }
     }
 
     #[inline(always)]
@@ -62,8 +66,10 @@ fn exp(x: f32) -> f32 {
     let f = (x - n * 0.693_359_4) - n * -2.121_944_4e-4;
     let p = 1.0
         + f * (1.0
-            + f * (0.5 + f * (0.166_666_57 + f * (0.041_665_795 + f * (8.334_52e-3 + f * 1.388_89e-3)))));
-    let power = f32::from_bits((((n + MAGIC).to_bits() << 23) as i32).wrapping_add(0x3f80_0000) as u32);
+            + f * (0.5
+                + f * (0.166_666_57 + f * (0.041_665_795 + f * (8.334_52e-3 + f * 1.388_89e-3)))));
+    let power =
+        f32::from_bits((((n + MAGIC).to_bits() << 23) as i32).wrapping_add(0x3f80_0000) as u32);
     if x > -87.0 { p * power } else { 0.0 }
 }
 
@@ -77,7 +83,10 @@ mod tests {
             let x = -0.043 * i as f32;
             let (found, expected) = (f64::from(exp(x)), f64::from(x).exp());
             // Two units of single precision; below the normal range zero is right.
-            assert!((found - expected).abs() <= 2.4e-7 * expected + 1e-37, "{x}: {found} {expected}");
+            assert!(
+                (found - expected).abs() <= 2.4e-7 * expected + 1e-37,
+                "{x}: {found} {expected}"
+            );
         }
         assert_eq!(exp(f32::MIN), 0.0);
     }

@@ -122,7 +122,11 @@ impl<const D: usize> RelaxationWorkspace<D> {
     }
 
     /// Takes two sets, in the frame's units.
-    fn take<T: Scalar>(&mut self, model: &[Point<T, D>], target: &[Point<T, D>]) -> Result<(), MatchError> {
+    fn take<T: Scalar>(
+        &mut self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<(), MatchError> {
         validate::point_sets(model, target)?;
         let frame = Frame::new(model, target);
         self.frame = frame;
@@ -196,8 +200,9 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for RelaxationMatcher {
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
         let mut workspace = RelaxationWorkspace::new();
-        let found =
-            self.match_points_with(&mut workspace, model, target, |_, _| ControlFlow::Continue(()))?;
+        let found = self.match_points_with(&mut workspace, model, target, |_, _| {
+            ControlFlow::Continue(())
+        })?;
         Ok(found.to_matching(model))
     }
 

@@ -19,7 +19,11 @@ const RARE: f64 = 0.01;
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Rotation {
     /// By up to about half a right angle.
     #[default]
@@ -43,7 +47,11 @@ pub enum Rotation {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Outliers {
     /// Every point may lack its partner.
     #[default]
@@ -71,7 +79,11 @@ pub enum Outliers {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Search {
     /// Until an answer is exact, or every start is tried and the scales of the prior are fitted to the data: any scene.
     #[default]
@@ -165,6 +177,10 @@ impl RelaxationOptions {
             Outliers::Target => (RARE, 1.0),
             Outliers::None => (RARE, RARE),
         };
-        Slack { share: self.share, model, target }
+        Slack {
+            share: self.share,
+            model,
+            target,
+        }
     }
 }

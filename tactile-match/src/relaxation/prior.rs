@@ -63,7 +63,8 @@ impl Prior {
             bending * (gaussian * square).exp() + affine * dot
         };
         self.diagonal.clear();
-        self.diagonal.extend(points.iter().map(|p| covariance(p, p)));
+        self.diagonal
+            .extend(points.iter().map(|p| covariance(p, p)));
         self.columns.clear();
         self.stride = n.next_multiple_of(LANES);
         self.pivots.clear();
@@ -87,7 +88,8 @@ impl Prior {
     ) {
         let root = self.diagonal[pivot].sqrt();
         let start = self.columns.len();
-        self.columns.extend(points.iter().map(|p| covariance(p, &points[pivot])));
+        self.columns
+            .extend(points.iter().map(|p| covariance(p, &points[pivot])));
         self.columns.resize(start + self.stride, 0.0);
         let (earlier, new) = self.columns.split_at_mut(start);
         for column in earlier.chunks_exact(self.stride) {

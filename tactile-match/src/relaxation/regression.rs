@@ -45,13 +45,16 @@ impl<const D: usize> Regression<D> {
                     self.gram[p * r + q] = dot(&self.weighted, prior.column(q));
                 }
                 self.gram[p * r + p] += noise;
-                self.solution.push(std::array::from_fn(|k| dot(&self.weighted, &targets.0[k])));
+                self.solution
+                    .push(std::array::from_fn(|k| dot(&self.weighted, &targets.0[k])));
             }
             cholesky(&mut self.gram, r);
             solve(&self.gram, r, &mut self.solution);
             self.displace(prior);
         });
-        self.log_det = (0..r).map(|p| 2.0 * self.gram[p * r + p].ln() - noise.ln()).sum();
+        self.log_det = (0..r)
+            .map(|p| 2.0 * self.gram[p * r + p].ln() - noise.ln())
+            .sum();
     }
 
     #[inline(always)]
@@ -129,7 +132,12 @@ fn cholesky(a: &mut [f64], n: usize) {
 fn short_dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (x, y) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = x.remainder().iter().zip(y.remainder()).map(|(p, q)| p * q).sum();
+    let rest: f64 = x
+        .remainder()
+        .iter()
+        .zip(y.remainder())
+        .map(|(p, q)| p * q)
+        .sum();
     for (p, q) in x.zip(y) {
         for l in 0..4 {
             sums[l] += p[l] * q[l];
@@ -162,14 +170,28 @@ mod tests {
     use super::*;
 
     fn scene() -> (Prior, Vec<f64>, Axes<2>) {
-        let points: Vec<[f64; 2]> =
-            (0..19).map(|i| [f64::from(i % 5) * 0.4, f64::from(i / 5) * 0.3]).collect();
+        let points: Vec<[f64; 2]> = (0..19)
+            .map(|i| [f64::from(i % 5) * 0.4, f64::from(i / 5) * 0.3])
+            .collect();
         let mut prior = Prior::default();
-        prior.build(&points, PriorScales { length: 1.2, bending: 0.35, affine: 0.5 });
-        let pad =
-            |f: &dyn Fn(usize) -> f64| (0..prior.stride).map(|i| if i < 19 { f(i) } else { 0.0 }).collect();
+        prior.build(
+            &points,
+            PriorScales {
+                length: 1.2,
+                bending: 0.35,
+                affine: 0.5,
+            },
+        );
+        let pad = |f: &dyn Fn(usize) -> f64| {
+            (0..prior.stride)
+                .map(|i| if i < 19 { f(i) } else { 0.0 })
+                .collect()
+        };
         let weights: Vec<f64> = pad(&|i| 0.2 + 0.04 * i as f64);
-        let targets = Axes([pad(&|i| (i as f64).sin() * 0.2), pad(&|i| 0.1 * (i % 3) as f64)]);
+        let targets = Axes([
+            pad(&|i| (i as f64).sin() * 0.2),
+            pad(&|i| 0.1 * (i % 3) as f64),
+        ]);
         (prior, weights, targets)
     }
 

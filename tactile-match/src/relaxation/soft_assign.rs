@@ -46,7 +46,10 @@ impl<const D: usize> SoftAssignment<D> {
     /// below a millionth, are left out.
     pub(crate) fn affinities(&mut self, warped: &[[f64; D]], variance: f64, least: f64) {
         let blocks = &self.blocks;
-        let (scale, cut) = ((-0.5 / variance) as f32, (-2.0 * variance * least.min(1e-6).ln()) as f32);
+        let (scale, cut) = (
+            (-0.5 / variance) as f32,
+            (-2.0 * variance * least.min(1e-6).ln()) as f32,
+        );
         self.starts.clear();
         self.starts.push(0);
         self.active.clear();
@@ -56,7 +59,12 @@ impl<const D: usize> SoftAssignment<D> {
             for y in warped {
                 let (y, from) = (y.map(|v| v as f32), self.active.len());
                 blocks.squared_distances(&y, &mut self.reach);
-                self.active.extend((0..).zip(&self.reach).filter(|(_, r)| **r <= cut).map(|(b, _)| b));
+                self.active.extend(
+                    (0..)
+                        .zip(&self.reach)
+                        .filter(|(_, r)| **r <= cut)
+                        .map(|(b, _)| b),
+                );
                 let kernel = self.kernel[from * LANES..].as_chunks_mut::<LANES>().0;
                 for (row, &block) in kernel.iter_mut().zip(&self.active[from..]) {
                     gaussians(row, blocks.at(block), &y, scale);
@@ -82,11 +90,22 @@ impl<const D: usize> SoftAssignment<D> {
         let rows = self.rows();
         refill(&mut self.row_scale, rows, 1.0);
         refill(&mut self.column_scale, self.blocks.width(), 1.0);
-        let Self { starts, active, kernel, row_scale, column_scale, column_sum, .. } = self;
+        let Self {
+            starts,
+            active,
+            kernel,
+            row_scale,
+            column_scale,
+            column_sum,
+            ..
+        } = self;
         Arch::new().dispatch(|| {
             for _ in 0..sweeps {
                 refill(column_sum, column_scale.len(), column_slack);
-                let (b, sums) = (column_scale.as_chunks::<LANES>().0, column_sum.as_chunks_mut::<LANES>().0);
+                let (b, sums) = (
+                    column_scale.as_chunks::<LANES>().0,
+                    column_sum.as_chunks_mut::<LANES>().0,
+                );
                 for (i, a) in row_scale.iter_mut().enumerate() {
                     let mut dots = [0.0_f32; LANES];
                     for (block, k) in row_of(starts, active, kernel, i) {
@@ -97,7 +116,10 @@ impl<const D: usize> SoftAssignment<D> {
                         (0..LANES).for_each(|l| sums[block][l] += *a * k[l]);
                     }
                 }
-                column_scale.iter_mut().zip(&*column_sum).for_each(|(b, s)| *b = 1.0 / s);
+                column_scale
+                    .iter_mut()
+                    .zip(&*column_sum)
+                    .for_each(|(b, s)| *b = 1.0 / s);
             }
         });
     }
@@ -107,8 +129,18 @@ impl<const D: usize> SoftAssignment<D> {
         self.weight.clear();
         self.shift.clear();
         self.spread.clear();
-        let Self { blocks, starts, active, kernel, row_scale, column_scale, weight, shift, spread, .. } =
-            self;
+        let Self {
+            blocks,
+            starts,
+            active,
+            kernel,
+            row_scale,
+            column_scale,
+            weight,
+            shift,
+            spread,
+            ..
+        } = self;
         let columns = column_scale.as_chunks::<LANES>().0;
         Arch::new().dispatch(|| {
             for ((i, y), &a) in warped.iter().enumerate().zip(&*row_scale) {
@@ -141,7 +173,8 @@ impl<const D: usize> SoftAssignment<D> {
         let (scale, columns) = (self.row_scale[i], self.column_scale.as_chunks::<LANES>().0);
         self.row(i).flat_map(move |(block, k)| {
             let real = self.blocks.order[block * LANES..].iter().take(LANES);
-            real.enumerate().map(move |(l, &j)| (j, f64::from(scale * k[l] * columns[block][l])))
+            real.enumerate()
+                .map(move |(l, &j)| (j, f64::from(scale * k[l] * columns[block][l])))
         })
     }
 
@@ -151,7 +184,8 @@ impl<const D: usize> SoftAssignment<D> {
         let totals = totals.as_chunks_mut::<LANES>().0;
         Arch::new().dispatch(|| {
             for i in 0..self.rows() {
-                self.row(i).for_each(|(b, k)| (0..LANES).for_each(|l| totals[b][l] += f64::from(k[l])));
+                self.row(i)
+                    .for_each(|(b, k)| (0..LANES).for_each(|l| totals[b][l] += f64::from(k[l])));
             }
         });
     }
@@ -181,7 +215,10 @@ fn row_of<'a>(
 ) -> impl Iterator<Item = (usize, &'a [f32; LANES])> + use<'a> {
     let range = starts[i]..starts[i + 1];
     let rows = kernel.as_chunks::<LANES>().0;
-    active[range.clone()].iter().map(|&b| b as usize).zip(&rows[range])
+    active[range.clone()]
+        .iter()
+        .map(|&b| b as usize)
+        .zip(&rows[range])
 }
 
 fn refill<V: Clone>(values: &mut Vec<V>, len: usize, value: V) {
@@ -194,11 +231,19 @@ mod tests {
     use super::*;
 
     fn scene() -> (Vec<[f64; 2]>, SoftAssignment<2>) {
-        let targets: Vec<[f64; 2]> =
-            (0..41).map(|i| [f64::from(i) * 0.1, f64::from(i * i % 7) * 0.2]).collect();
+        let targets: Vec<[f64; 2]> = (0..41)
+            .map(|i| [f64::from(i) * 0.1, f64::from(i * i % 7) * 0.2])
+            .collect();
         let mut soft = SoftAssignment::default();
         soft.set_targets(&targets);
-        (targets.iter().take(37).map(|t| [t[0] + 0.02, t[1] - 0.01]).collect(), soft)
+        (
+            targets
+                .iter()
+                .take(37)
+                .map(|t| [t[0] + 0.02, t[1] - 0.01])
+                .collect(),
+            soft,
+        )
     }
 
     #[test]

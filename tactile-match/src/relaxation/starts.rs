@@ -4,10 +4,18 @@ use super::frame::mean;
 use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen};
 
 /// The model moved so that the centroids meet.
-pub(crate) fn centred<const D: usize>(model: &[[f64; D]], target: &[[f64; D]], base: &mut Vec<[f64; D]>) {
+pub(crate) fn centred<const D: usize>(
+    model: &[[f64; D]],
+    target: &[[f64; D]],
+    base: &mut Vec<[f64; D]>,
+) {
     let (from, to) = (mean(model), mean(target));
     base.clear();
-    base.extend(model.iter().map(|x| std::array::from_fn(|k| x[k] - from[k] + to[k])));
+    base.extend(
+        model
+            .iter()
+            .map(|x| std::array::from_fn(|k| x[k] - from[k] + to[k])),
+    );
 }
 
 /// The model stretched so that centroid and covariance are the target's, and turned by `rotation` before the stretch.
@@ -52,7 +60,9 @@ fn roots<const D: usize>(matrix: &SMatrix<f64, D, D>) -> [SMatrix<f64, D, D>; 3]
     let function = |f: &dyn Fn(f64) -> f64| {
         SMatrix::from_fn(|r, c| {
             let v = &eigen.eigenvectors;
-            (0..3).map(|k| v[(r, k)] * f(eigen.eigenvalues[k]) * v[(c, k)]).sum()
+            (0..3)
+                .map(|k| v[(r, k)] * f(eigen.eigenvalues[k]) * v[(c, k)])
+                .sum()
         })
     };
     [
@@ -69,13 +79,22 @@ pub(crate) struct Choice {
 }
 
 /// All angles: every 30° in the plane, the 24 rotations of the cube in space.
-pub(crate) const ANY: Choice =
-    Choice { plane: &[0., 30., -30., 60., -60., 90., -90., 120., -120., 150., -150., 180.], space: 24 };
+pub(crate) const ANY: Choice = Choice {
+    plane: &[
+        0., 30., -30., 60., -60., 90., -90., 120., -120., 150., -150., 180.,
+    ],
+    space: 24,
+};
 /// Little: none, and 30° each way in the plane.
-pub(crate) const LIMITED: Choice = Choice { plane: &[0., -30., 30.], space: 1 };
+pub(crate) const LIMITED: Choice = Choice {
+    plane: &[0., -30., 30.],
+    space: 1,
+};
 
 /// The rotations of a choice.
-pub(crate) fn rotations<const D: usize>(choice: Choice) -> impl Iterator<Item = SMatrix<f64, D, D>> {
+pub(crate) fn rotations<const D: usize>(
+    choice: Choice,
+) -> impl Iterator<Item = SMatrix<f64, D, D>> {
     let count = match D {
         2 => choice.plane.len(),
         3 => choice.space,
@@ -90,7 +109,8 @@ pub(crate) fn rotations<const D: usize>(choice: Choice) -> impl Iterator<Item = 
 
 fn turn<const D: usize>(a: usize, b: usize, angle: f64) -> SMatrix<f64, D, D> {
     let mut r = SMatrix::identity();
-    (r[(a, a)], r[(a, b)], r[(b, a)], r[(b, b)]) = (angle.cos(), -angle.sin(), angle.sin(), angle.cos());
+    (r[(a, a)], r[(a, b)], r[(b, a)], r[(b, b)]) =
+        (angle.cos(), -angle.sin(), angle.sin(), angle.cos());
     r
 }
 

@@ -44,12 +44,24 @@ impl ShapeContexts {
     /// # Errors
     /// [`MatchError::NotFinite`] for a coordinate that is not finite, [`MatchError::InvalidOption`] for a radius that is
     /// not positive and finite.
-    pub fn new<T: Scalar, const D: usize>(points: &[Point<T, D>], radius: T) -> Result<Self, MatchError> {
-        validate::option_within("radius", radius.widen(), f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
+    pub fn new<T: Scalar, const D: usize>(
+        points: &[Point<T, D>],
+        radius: T,
+    ) -> Result<Self, MatchError> {
+        validate::option_within(
+            "radius",
+            radius.widen(),
+            f64::MIN_POSITIVE,
+            f64::MAX,
+            "(0, ∞)",
+        )?;
         if !points.is_empty() {
             validate::point_set(crate::PointSet::Model, points)?;
         }
-        let plain: Vec<[f64; D]> = points.iter().map(|p| std::array::from_fn(|k| p[k].widen())).collect();
+        let plain: Vec<[f64; D]> = points
+            .iter()
+            .map(|p| std::array::from_fn(|k| p[k].widen()))
+            .collect();
         let mut contexts = Self::default();
         contexts.build(&plain, radius.widen());
         Ok(contexts)
@@ -99,7 +111,10 @@ impl ShapeContexts {
         let (g, total) = (self.row(i), self.totals[i]);
         Arch::new().dispatch(|| {
             let rows = other.histograms.chunks_exact(other.width.max(1));
-            costs.extend(rows.zip(&other.totals).map(|(h, t)| chi_squared(g, h) / (total + t).max(1.0)));
+            costs.extend(
+                rows.zip(&other.totals)
+                    .map(|(h, t)| chi_squared(g, h) / (total + t).max(1.0)),
+            );
         });
     }
 
@@ -163,7 +178,10 @@ fn sector<const D: usize>(offset: &[f64; D]) -> usize {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| offset[b].abs().total_cmp(&offset[a].abs()));
     let (mut sum, mut choice) = (0.0, (-1.0, 0));
-    for (axes, root) in [1.0, std::f64::consts::SQRT_2, 1.732_050_807_568_877_2].into_iter().enumerate() {
+    for (axes, root) in [1.0, std::f64::consts::SQRT_2, 1.732_050_807_568_877_2]
+        .into_iter()
+        .enumerate()
+    {
         sum += offset[order[axes]].abs();
         choice = best(choice, (sum / root, axes));
     }
@@ -194,11 +212,15 @@ mod tests {
 
     #[test]
     fn every_neighbour_within_the_radius_is_counted_once() {
-        let points: Vec<Point2<f64>> =
-            (0..30).map(|i| Point2::new(f64::from(i % 6), f64::from(i / 6))).collect();
+        let points: Vec<Point2<f64>> = (0..30)
+            .map(|i| Point2::new(f64::from(i % 6), f64::from(i / 6)))
+            .collect();
         let contexts = ShapeContexts::new(&points, 3.0).unwrap();
         for (i, p) in points.iter().enumerate() {
-            let near = points.iter().filter(|q| (1e-9..=3.0).contains(&(*q - p).norm())).count();
+            let near = points
+                .iter()
+                .filter(|q| (1e-9..=3.0).contains(&(*q - p).norm()))
+                .count();
             // Shares of one are summed in single precision.
             assert!((contexts.histogram(i).iter().sum::<f32>() - near as f32).abs() < 1e-4);
         }
@@ -214,7 +236,11 @@ mod tests {
             assert_eq!(sector(d), index);
         }
         for i in 0..200 {
-            let v = [(i as f64).sin(), (1.7 * i as f64).cos(), (0.3 * i as f64).sin() - 0.2];
+            let v = [
+                (i as f64).sin(),
+                (1.7 * i as f64).cos(),
+                (0.3 * i as f64).sin() - 0.2,
+            ];
             let along = |d: &[f64; 3]| {
                 let dot: f64 = (0..3).map(|k| d[k] * v[k]).sum();
                 dot / d.iter().map(|x| x * x).sum::<f64>().sqrt()
@@ -227,8 +253,9 @@ mod tests {
 
     #[test]
     fn costs_are_symmetric_and_nought_for_the_same_context() {
-        let points: Vec<Point3<f64>> =
-            (0..20).map(|i| Point3::new((i as f64).sin(), (2.1 * i as f64).cos(), 0.1 * i as f64)).collect();
+        let points: Vec<Point3<f64>> = (0..20)
+            .map(|i| Point3::new((i as f64).sin(), (2.1 * i as f64).cos(), 0.1 * i as f64))
+            .collect();
         let contexts = ShapeContexts::new(&points, 2.0).unwrap();
         let mut costs = Vec::new();
         for i in 0..20 {

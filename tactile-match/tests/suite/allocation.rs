@@ -6,7 +6,12 @@ use tactile_match::{RelaxationMatcher, RelaxationWorkspace};
 #[test]
 fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
     let model: Vec<Point2<f64>> = (0..24)
-        .map(|i| Point2::new((0.618 * f64::from(i * i + 1)).fract(), (0.755 * f64::from(3 * i + 1)).fract()))
+        .map(|i| {
+            Point2::new(
+                (0.618 * f64::from(i * i + 1)).fract(),
+                (0.755 * f64::from(3 * i + 1)).fract(),
+            )
+        })
         .collect();
     // Every other target is noisy, so that the long way with all starts is covered as well.
     let target = |shift: f64, noise: f64| -> Vec<Point2<f64>> {
@@ -22,8 +27,9 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
     let mut workspace = RelaxationWorkspace::new();
     let mut run = |k: usize| {
         let go = |_, _| ControlFlow::Continue(());
-        let found =
-            matcher.match_points_with(&mut workspace, &model, &targets[k % 2], go).expect("finite points");
+        let found = matcher
+            .match_points_with(&mut workspace, &model, &targets[k % 2], go)
+            .expect("finite points");
         assert_eq!(found.assignment().len(), 24);
     };
     (0..2).for_each(&mut run);
@@ -35,8 +41,14 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
 fn a_dense_set_allocates_nothing_the_second_time() {
     // Turned so far that the first run leaves parts aside: the patterns of the points are looked at as well.
     let place = |i: u32, angle: f64| {
-        let (r, turn) = (((f64::from(i) + 0.5) / 700.0).sqrt(), 2.399_963 * f64::from(i) + angle);
-        Point2::new(r * turn.cos() + 0.005 * (0.618 * f64::from(i * i)).fract(), r * turn.sin())
+        let (r, turn) = (
+            ((f64::from(i) + 0.5) / 700.0).sqrt(),
+            2.399_963 * f64::from(i) + angle,
+        );
+        Point2::new(
+            r * turn.cos() + 0.005 * (0.618 * f64::from(i * i)).fract(),
+            r * turn.sin(),
+        )
     };
     let model: Vec<_> = (0..700).map(|i| place(i, 0.0)).collect();
     let target: Vec<_> = (0..700).map(|i| place(i, 0.15)).collect();
@@ -44,8 +56,15 @@ fn a_dense_set_allocates_nothing_the_second_time() {
     let mut workspace = RelaxationWorkspace::new();
     let mut run = || {
         let go = |_, _| ControlFlow::Continue(());
-        matcher.match_points_with(&mut workspace, &model, &target, go).expect("finite points").report().starts
+        matcher
+            .match_points_with(&mut workspace, &model, &target, go)
+            .expect("finite points")
+            .report()
+            .starts
     };
     assert!(run() > 1);
-    assert_eq!(allocation_counter::measure(|| assert!(run() > 1)).count_total, 0);
+    assert_eq!(
+        allocation_counter::measure(|| assert!(run() > 1)).count_total,
+        0
+    );
 }

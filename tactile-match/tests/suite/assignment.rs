@@ -4,7 +4,11 @@ use proptest::prelude::*;
 use tactile_match::{AssignmentWorkspace, MatchError, linear_assignment};
 
 fn total(costs: &[f64], columns: usize, assignment: &[Option<usize>]) -> f64 {
-    assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| costs[i * columns + j])).sum()
+    assignment
+        .iter()
+        .enumerate()
+        .filter_map(|(i, j)| j.map(|j| costs[i * columns + j]))
+        .sum()
 }
 
 /// Every row to every column left, recursively: (pairs, cost) with the most pairs and then the least cost.
@@ -40,8 +44,11 @@ fn slow_hungarian(costs: &[f64], rows: usize, columns: usize) -> f64 {
     let (mut u, mut v) = (vec![0.0; rows + 1], vec![0.0; columns + 1]);
     let mut row_of = vec![0; columns + 1]; // counted from one; nought is none
     for row in 1..=rows {
-        let (mut slack, mut used, mut way) =
-            (vec![f64::INFINITY; columns + 1], vec![false; columns + 1], vec![0; columns + 1]);
+        let (mut slack, mut used, mut way) = (
+            vec![f64::INFINITY; columns + 1],
+            vec![false; columns + 1],
+            vec![0; columns + 1],
+        );
         row_of[0] = row;
         let mut at = 0;
         while row_of[at] != 0 {
@@ -71,7 +78,10 @@ fn slow_hungarian(costs: &[f64], rows: usize, columns: usize) -> f64 {
             at = way[at];
         }
     }
-    (1..=columns).filter(|&j| row_of[j] != 0).map(|j| costs[(row_of[j] - 1) * columns + j - 1]).sum()
+    (1..=columns)
+        .filter(|&j| row_of[j] != 0)
+        .map(|j| costs[(row_of[j] - 1) * columns + j - 1])
+        .sum()
 }
 
 fn assert_distinct(assignment: &[Option<usize>], columns: usize) {
@@ -90,13 +100,19 @@ fn assert_optimal(
     workspace: &AssignmentWorkspace<f64>,
     assignment: &[Option<usize>],
 ) {
-    let scale = costs.iter().filter(|c| c.is_finite()).fold(0.0_f64, |m, c| m.max(c.abs()));
+    let scale = costs
+        .iter()
+        .filter(|c| c.is_finite())
+        .fold(0.0_f64, |m, c| m.max(c.abs()));
     let tolerance = f64::EPSILON * scale * (8 * (rows + columns)) as f64;
     let (u, v) = (workspace.row_prices(), workspace.column_prices());
     for i in 0..rows {
         for j in 0..columns {
             let reduced = costs[i * columns + j] - u[i] - v[j];
-            assert!(reduced >= -tolerance, "pair ({i}, {j}) is cheaper by {reduced:e}");
+            assert!(
+                reduced >= -tolerance,
+                "pair ({i}, {j}) is cheaper by {reduced:e}"
+            );
             assert!(assignment[i] != Some(j) || reduced.abs() <= tolerance);
         }
         if assignment[i].is_none() {
@@ -110,11 +126,18 @@ fn assert_optimal(
     assert!(rows == columns || longer.iter().all(|&p| p <= 0.0));
 }
 
-fn matrix(side: std::ops::RangeInclusive<usize>) -> impl Strategy<Value = (usize, usize, Vec<f64>)> {
+fn matrix(
+    side: std::ops::RangeInclusive<usize>,
+) -> impl Strategy<Value = (usize, usize, Vec<f64>)> {
     // Few distinct values make ties, many make none.
     let entry = prop_oneof![(0..4_i32).prop_map(f64::from), -1e3..1e3_f64];
-    (side.clone(), side)
-        .prop_flat_map(move |(n, m)| (Just(n), Just(m), prop::collection::vec(entry.clone(), n * m)))
+    (side.clone(), side).prop_flat_map(move |(n, m)| {
+        (
+            Just(n),
+            Just(m),
+            prop::collection::vec(entry.clone(), n * m),
+        )
+    })
 }
 
 proptest! {
@@ -203,18 +226,38 @@ fn nothing_to_assign_is_an_answer() {
 
 #[test]
 fn extreme_costs_are_answered() {
-    assert_eq!(linear_assignment(&[1e300, 1.0, 1.0, 1e300], 2, 2), Ok(vec![Some(1), Some(0)]));
-    assert_eq!(linear_assignment(&[-1e300, 1e-300, 1e-300, 0.0], 2, 2), Ok(vec![Some(0), Some(1)]));
-    assert_eq!(linear_assignment(&[5.0; 16], 4, 4).unwrap().iter().flatten().count(), 4);
+    assert_eq!(
+        linear_assignment(&[1e300, 1.0, 1.0, 1e300], 2, 2),
+        Ok(vec![Some(1), Some(0)])
+    );
+    assert_eq!(
+        linear_assignment(&[-1e300, 1e-300, 1e-300, 0.0], 2, 2),
+        Ok(vec![Some(0), Some(1)])
+    );
+    assert_eq!(
+        linear_assignment(&[5.0; 16], 4, 4)
+            .unwrap()
+            .iter()
+            .flatten()
+            .count(),
+        4
+    );
 }
 
 #[test]
 fn unusable_costs_are_typed_errors() {
-    let shape = MatchError::Shape { what: "costs", expected: 6, found: 5 };
+    let shape = MatchError::Shape {
+        what: "costs",
+        expected: 6,
+        found: 5,
+    };
     assert_eq!(linear_assignment(&[0.0; 5], 2, 3), Err(shape));
     for bad in [f64::NAN, f64::NEG_INFINITY] {
         let costs = [0.0, 1.0, 2.0, 3.0, bad, 5.0];
-        assert_eq!(linear_assignment(&costs, 2, 3), Err(MatchError::Cost { row: 1, column: 1 }));
+        assert_eq!(
+            linear_assignment(&costs, 2, 3),
+            Err(MatchError::Cost { row: 1, column: 1 })
+        );
     }
 }
 
@@ -226,7 +269,9 @@ fn no_allocation_after_the_first_call() {
     workspace.solve(&costs, 60, 80).unwrap();
     let counted = allocation_counter::measure(|| {
         for (rows, columns) in [(60, 80), (80, 60), (10, 10)] {
-            workspace.solve(&costs[..rows * columns], rows, columns).unwrap();
+            workspace
+                .solve(&costs[..rows * columns], rows, columns)
+                .unwrap();
         }
     });
     assert_eq!(counted.count_total, 0);

@@ -1,6 +1,8 @@
 //! What every [`PointMatcher`] must do, in 2-D and 3-D, single and double precision.
 
-use crate::common::{Stream, assert_consistent, bend, grid, largest_step, matchers, reordered, scattered};
+use crate::common::{
+    Stream, assert_consistent, bend, grid, largest_step, matchers, reordered, scattered,
+};
 use nalgebra::{Point, SVector};
 use tactile_match::{MatchError, PointMatcher, PointSet};
 use tactile_tps::Scalar;
@@ -27,7 +29,9 @@ fn run<T: Scalar, const D: usize>(
     model: &[Point<T, D>],
     target: &[Point<T, D>],
 ) -> tactile_match::Matching<T, D> {
-    let matching = matcher.match_points(model, target).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let matching = matcher
+        .match_points(model, target)
+        .unwrap_or_else(|error| panic!("{name}: {error}"));
     assert_consistent(name, model, target, &matching);
     matching
 }
@@ -53,13 +57,30 @@ fn the_order_of_the_points_does_not_matter() {
         let plain = run(name, matcher, &model, &target);
         let mut stream = Stream::new(3);
         let (rows, columns) = (stream.permutation(40), stream.permutation(40));
-        let shuffled = run(name, matcher, &reordered(&model, &rows), &reordered(&target, &columns));
-        let place: Vec<_> = (0..40).map(|j| columns.iter().position(|&c| c == j)).collect();
-        let expected: Vec<_> = rows.iter().map(|&i| plain.assignment[i].and_then(|j| place[j])).collect();
+        let shuffled = run(
+            name,
+            matcher,
+            &reordered(&model, &rows),
+            &reordered(&target, &columns),
+        );
+        let place: Vec<_> = (0..40)
+            .map(|j| columns.iter().position(|&c| c == j))
+            .collect();
+        let expected: Vec<_> = rows
+            .iter()
+            .map(|&i| plain.assignment[i].and_then(|j| place[j]))
+            .collect();
         assert_eq!(shuffled.assignment, expected, "{name}");
         // Sums in another order differ by rounding, which iterations may enlarge.
-        let tolerance = if std::mem::size_of::<T>() == 4 { 1e-3 } else { 1e-6 };
-        assert!(largest_step(&shuffled.warped, &reordered(&plain.warped, &rows)) < tolerance, "{name}");
+        let tolerance = if std::mem::size_of::<T>() == 4 {
+            1e-3
+        } else {
+            1e-6
+        };
+        assert!(
+            largest_step(&shuffled.warped, &reordered(&plain.warped, &rows)) < tolerance,
+            "{name}"
+        );
     }
     for_all!(check);
 }
@@ -71,7 +92,9 @@ fn a_small_deformation_is_found() {
         let target = bend(&model, 0.02);
         let order = Stream::new(5).permutation(60);
         let matching = run(name, matcher, &model, &reordered(&target, &order));
-        let right = (0..60).filter(|&i| matching.assignment[i].is_some_and(|j| order[j] == i)).count();
+        let right = (0..60)
+            .filter(|&i| matching.assignment[i].is_some_and(|j| order[j] == i))
+            .count();
         assert_eq!(right, 60, "{name}");
     }
     for_all!(check);
@@ -83,7 +106,9 @@ fn sets_of_different_size_are_matched() {
         let points = scattered::<T, D>(50, 6);
         for (model, target) in [(&points[..], &points[..45]), (&points[..45], &points[..])] {
             let matching = run(name, matcher, model, target);
-            let right = (0..45).filter(|&i| matching.assignment[i] == Some(i)).count();
+            let right = (0..45)
+                .filter(|&i| matching.assignment[i] == Some(i))
+                .count();
             // What the leftover points lie on has no answer of its own; nine tenths of the rest must be right.
             assert!(right >= 41, "{name}: {right} of 45");
         }
@@ -97,8 +122,18 @@ fn few_points_are_answered() {
         let points = scattered::<T, D>(9, 7);
         for rows in 1..=4 {
             for columns in (1..=4).chain([9]) {
-                run(&format!("{name}, {rows} to {columns}"), matcher, &points[..rows], &points[..columns]);
-                run(&format!("{name}, {columns} to {rows}"), matcher, &points[..columns], &points[..rows]);
+                run(
+                    &format!("{name}, {rows} to {columns}"),
+                    matcher,
+                    &points[..rows],
+                    &points[..columns],
+                );
+                run(
+                    &format!("{name}, {columns} to {rows}"),
+                    matcher,
+                    &points[..columns],
+                    &points[..rows],
+                );
             }
         }
     }
@@ -110,10 +145,16 @@ fn coincident_and_collinear_points_are_answered() {
     fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
         let all = scattered::<T, D>(12, 8);
         let same = vec![all[0]; 12];
-        let line: Vec<_> =
-            (0..12).map(|k| all[0] + (all[1] - all[0]) * nalgebra::convert::<f64, T>(f64::from(k))).collect();
+        let line: Vec<_> = (0..12)
+            .map(|k| all[0] + (all[1] - all[0]) * nalgebra::convert::<f64, T>(f64::from(k)))
+            .collect();
         let twice = [&all[..6], &all[..6]].concat();
-        let sets = [("scattered", &all), ("coincident", &same), ("collinear", &line), ("twice", &twice)];
+        let sets = [
+            ("scattered", &all),
+            ("coincident", &same),
+            ("collinear", &line),
+            ("twice", &twice),
+        ];
         for (a, model) in sets {
             for (b, target) in sets {
                 run(&format!("{name}, {a} to {b}"), matcher, model, target);
@@ -142,8 +183,16 @@ fn empty_sets_and_numbers_that_are_none_are_typed_errors() {
     fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
         let good = scattered::<T, D>(5, 9);
         let empty = |set| MatchError::Empty { set };
-        assert_eq!(matcher.match_points(&[], &good).err(), Some(empty(PointSet::Model)), "{name}");
-        assert_eq!(matcher.match_points(&good, &[]).err(), Some(empty(PointSet::Target)), "{name}");
+        assert_eq!(
+            matcher.match_points(&[], &good).err(),
+            Some(empty(PointSet::Model)),
+            "{name}"
+        );
+        assert_eq!(
+            matcher.match_points(&good, &[]).err(),
+            Some(empty(PointSet::Target)),
+            "{name}"
+        );
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let mut points = good.clone();
             points[3] = Point::from(SVector::from_element(nalgebra::convert(bad)));
@@ -168,9 +217,16 @@ fn the_same_input_gives_the_same_bits() {
     fn check<T: Scalar, const D: usize>(name: &str, matcher: &dyn PointMatcher<T, D>) {
         let model = scattered::<T, D>(30, 10);
         let target = bend(&model, 0.05);
-        let (a, b) = (run(name, matcher, &model, &target), run(name, matcher, &model, &target));
+        let (a, b) = (
+            run(name, matcher, &model, &target),
+            run(name, matcher, &model, &target),
+        );
         assert_eq!(a.warped, b.warped, "{name}");
-        assert_eq!((a.assignment, a.confidence, a.energy), (b.assignment, b.confidence, b.energy), "{name}");
+        assert_eq!(
+            (a.assignment, a.confidence, a.energy),
+            (b.assignment, b.confidence, b.energy),
+            "{name}"
+        );
     }
     for_all!(check);
 }

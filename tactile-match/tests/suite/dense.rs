@@ -5,8 +5,8 @@ use nalgebra::{Point, Point2, Point3, Vector3};
 use proptest::prelude::*;
 use tactile_match::dense::{
     Compatibility, CompatibilityRule, DenseOptions, DenseRelaxation, LengthMaximum, MatchMatrix,
-    NeighbourGraph, Neighbourhood, alpha, beta, energy, first_matches, gamma, sinkhorn, support, sweep,
-    update,
+    NeighbourGraph, Neighbourhood, alpha, beta, energy, first_matches, gamma, sinkhorn, support,
+    sweep, update,
 };
 use tactile_match::{MatchError, PointMatcher};
 
@@ -23,7 +23,10 @@ fn relaxed<const D: usize>(
     neighbourhood: Neighbourhood,
 ) -> MatchMatrix<f64> {
     let graphs = [model, target].map(|points| NeighbourGraph::new(points, neighbourhood));
-    let rule = CompatibilityRule { factors: Compatibility::Full, longest: None };
+    let rule = CompatibilityRule {
+        factors: Compatibility::Full,
+        longest: None,
+    };
     for _ in 0..3 {
         let s = support(&m, &graphs[0], &graphs[1], &rule);
         sweep(&mut m, &s, 0.5, 20);
@@ -32,7 +35,11 @@ fn relaxed<const D: usize>(
 }
 
 fn neighbourhood(k: usize) -> Neighbourhood {
-    if k == 0 { Neighbourhood::MedianRadius } else { Neighbourhood::Nearest(k) }
+    if k == 0 {
+        Neighbourhood::MedianRadius
+    } else {
+        Neighbourhood::Nearest(k)
+    }
 }
 
 proptest! {
@@ -143,12 +150,20 @@ proptest! {
 fn the_ties_of_a_grid_do_not_depend_on_where_it_lies() {
     let grid = crate::common::grid::<f64, 2>(5);
     let count = |shift: f64, step: f64| {
-        let moved: Vec<_> =
-            grid.iter().map(|p| Point2::new(p.x * step + shift, p.y * step - shift)).collect();
-        NeighbourGraph::new(&moved, Neighbourhood::MedianRadius).edges().len()
+        let moved: Vec<_> = grid
+            .iter()
+            .map(|p| Point2::new(p.x * step + shift, p.y * step - shift))
+            .collect();
+        NeighbourGraph::new(&moved, Neighbourhood::MedianRadius)
+            .edges()
+            .len()
     };
     for (shift, step) in [(0.1, 0.1), (1.0 / 3.0, 0.7), (1e5, 0.1), (-7e3, 1e-2)] {
-        assert_eq!(count(shift, step), count(0.0, 1.0), "grid of step {step} at {shift}");
+        assert_eq!(
+            count(shift, step),
+            count(0.0, 1.0),
+            "grid of step {step} at {shift}"
+        );
     }
 }
 
@@ -162,10 +177,18 @@ fn a_row_without_support_stays_as_it_was() {
 
 #[test]
 fn products_that_overflow_or_underflow_are_taken_relative_to_their_row() {
-    let mut m: MatchMatrix<f64> =
-        MatchMatrix::from_fn(1, 2, |i, j| if i == 0 && j < 2 { [1e-200, 1e-300][j] } else { 0.0 });
+    let mut m: MatchMatrix<f64> = MatchMatrix::from_fn(1, 2, |i, j| {
+        if i == 0 && j < 2 {
+            [1e-200, 1e-300][j]
+        } else {
+            0.0
+        }
+    });
     update(&mut m, &[1e-200, 1e-100], 0.5);
-    assert!((m[(0, 0)] - 0.5).abs() < 1e-15 && (m[(0, 1)] - 0.5).abs() < 1e-15, "{m:?}");
+    assert!(
+        (m[(0, 0)] - 0.5).abs() < 1e-15 && (m[(0, 1)] - 0.5).abs() < 1e-15,
+        "{m:?}"
+    );
 }
 
 /// The whole method with every combination of its options, on a case it must solve.
@@ -176,10 +199,24 @@ fn every_option_solves_a_smooth_deformation() {
     let target = reordered(&bend(&model, 0.08), &order);
     for neighbourhood in [Neighbourhood::MedianRadius, Neighbourhood::Nearest(6)] {
         for maximum in [LengthMaximum::PerPair, LengthMaximum::Global] {
-            for factors in [Compatibility::Length, Compatibility::LengthDirection, Compatibility::Full] {
-                let options = DenseOptions { neighbourhood, maximum, factors, ..Default::default() };
-                let found = DenseRelaxation::new(options).unwrap().match_points(&model, &target).unwrap();
-                let right = (0..30).filter(|&i| found.assignment[i].is_some_and(|j| order[j] == i)).count();
+            for factors in [
+                Compatibility::Length,
+                Compatibility::LengthDirection,
+                Compatibility::Full,
+            ] {
+                let options = DenseOptions {
+                    neighbourhood,
+                    maximum,
+                    factors,
+                    ..Default::default()
+                };
+                let found = DenseRelaxation::new(options)
+                    .unwrap()
+                    .match_points(&model, &target)
+                    .unwrap();
+                let right = (0..30)
+                    .filter(|&i| found.assignment[i].is_some_and(|j| order[j] == i))
+                    .count();
                 assert!(right >= 27, "{options:?}: {right} of 30");
             }
         }
@@ -189,8 +226,14 @@ fn every_option_solves_a_smooth_deformation() {
 #[test]
 fn one_energy_is_kept_for_every_iteration() {
     let model = scattered::<f64, 2>(12, 7);
-    let options = DenseOptions { max_iterations: 2, ..Default::default() };
-    let found = DenseRelaxation::new(options).unwrap().match_points(&model, &bend(&model, 0.1)).unwrap();
+    let options = DenseOptions {
+        max_iterations: 2,
+        ..Default::default()
+    };
+    let found = DenseRelaxation::new(options)
+        .unwrap()
+        .match_points(&model, &bend(&model, 0.1))
+        .unwrap();
     assert!(found.report.iterations <= 2 && found.energy.len() == found.report.iterations);
 }
 
@@ -199,17 +242,62 @@ fn options_out_of_range_are_typed_errors() {
     let good = DenseOptions::default();
     let invalid = |options, name| {
         let error = DenseRelaxation::new(options).unwrap_err();
-        assert!(matches!(error, MatchError::InvalidOption { option, .. } if option == name), "{error}");
+        assert!(
+            matches!(error, MatchError::InvalidOption { option, .. } if option == name),
+            "{error}"
+        );
     };
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
-        invalid(DenseOptions { temperature: bad, ..good }, "temperature");
+        invalid(
+            DenseOptions {
+                temperature: bad,
+                ..good
+            },
+            "temperature",
+        );
         invalid(DenseOptions { slack: bad, ..good }, "slack");
-        invalid(DenseOptions { settled: bad, ..good }, "settled");
-        invalid(DenseOptions { smoothing: bad, ..good }, "smoothing");
+        invalid(
+            DenseOptions {
+                settled: bad,
+                ..good
+            },
+            "settled",
+        );
+        invalid(
+            DenseOptions {
+                smoothing: bad,
+                ..good
+            },
+            "smoothing",
+        );
     }
-    invalid(DenseOptions { temperature: 0.0, ..good }, "temperature");
+    invalid(
+        DenseOptions {
+            temperature: 0.0,
+            ..good
+        },
+        "temperature",
+    );
     invalid(DenseOptions { sweeps: 0, ..good }, "sweeps");
-    invalid(DenseOptions { sinkhorn_sweeps: 0, ..good }, "sinkhorn_sweeps");
-    invalid(DenseOptions { max_iterations: 0, ..good }, "max_iterations");
-    invalid(DenseOptions { neighbourhood: Neighbourhood::Nearest(0), ..good }, "neighbourhood");
+    invalid(
+        DenseOptions {
+            sinkhorn_sweeps: 0,
+            ..good
+        },
+        "sinkhorn_sweeps",
+    );
+    invalid(
+        DenseOptions {
+            max_iterations: 0,
+            ..good
+        },
+        "max_iterations",
+    );
+    invalid(
+        DenseOptions {
+            neighbourhood: Neighbourhood::Nearest(0),
+            ..good
+        },
+        "neighbourhood",
+    );
 }

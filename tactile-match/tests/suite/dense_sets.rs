@@ -6,7 +6,8 @@ use tactile_match::{PointMatcher, RelaxationMatcher, RelaxationWorkspace};
 /// A number of (−1, 1), without pattern and the same on every machine.
 fn scatter(i: usize, k: usize) -> f64 {
     let square = (i * i) as f64;
-    2.0 * (square * [0.618_033_988_75, 0.754_877_666_25][k] + i as f64 * 0.569_840_291).fract() - 1.0
+    2.0 * (square * [0.618_033_988_75, 0.754_877_666_25][k] + i as f64 * 0.569_840_291).fract()
+        - 1.0
 }
 
 /// A sunflower's disc of radius 1, its points moved by up to an eighth of their spacing.
@@ -14,7 +15,10 @@ fn sunflower(n: usize) -> Vec<Point2<f64>> {
     let place = |i: usize| {
         let (r, angle) = (((i as f64 + 0.5) / n as f64).sqrt(), 2.399_963 * i as f64);
         let jitter = 0.22 / (n as f64).sqrt();
-        Point2::new(r * angle.cos() + jitter * scatter(i, 0), r * angle.sin() + jitter * scatter(i, 1))
+        Point2::new(
+            r * angle.cos() + jitter * scatter(i, 0),
+            r * angle.sin() + jitter * scatter(i, 1),
+        )
     };
     (0..n).map(place).collect()
 }
@@ -24,18 +28,29 @@ fn warp(p: &Point2<f64>, angle: f64) -> Point2<f64> {
     let bump = |x: f64, y: f64| (-((p.x - x).powi(2) + (p.y - y).powi(2)) / 0.8).exp();
     let (a, b) = (bump(0.5, 0.3), bump(-0.6, -0.2));
     let (sin, cos) = angle.sin_cos();
-    Point2::new(cos * p.x - sin * p.y + 0.1 * a, sin * p.x + cos * p.y - 0.08 * b)
+    Point2::new(
+        cos * p.x - sin * p.y + 0.1 * a,
+        sin * p.x + cos * p.y - 0.08 * b,
+    )
 }
 
 /// Matches and counts: pairs that are right, and pairs that are not.
-fn score<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>], strays: usize) -> (usize, usize) {
+fn score<const D: usize>(
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+    strays: usize,
+) -> (usize, usize) {
     let n = model.len();
     // Row i of the model is row (7 i + 3) mod n of the target, strays follow.
     assert!(target.len() == n + strays && !n.is_multiple_of(7));
     let mut shuffled = target.to_vec();
     (0..n).for_each(|i| shuffled[(7 * i + 3) % n] = target[i]);
-    let found = RelaxationMatcher::default().match_points(model, &shuffled).unwrap();
-    let right = (0..n).filter(|&i| found.assignment[i] == Some((7 * i + 3) % n)).count();
+    let found = RelaxationMatcher::default()
+        .match_points(model, &shuffled)
+        .unwrap();
+    let right = (0..n)
+        .filter(|&i| found.assignment[i] == Some((7 * i + 3) % n))
+        .count();
     (right, found.assignment.iter().flatten().count() - right)
 }
 
@@ -44,7 +59,11 @@ fn no_part_of_a_turned_disc_lies_one_point_aside() {
     for (n, angle) in [(600, 0.12), (1000, -0.1), (1681, 0.08)] {
         let model = sunflower(n);
         let target: Vec<_> = model.iter().map(|p| warp(p, angle)).collect();
-        assert_eq!(score(&model, &target, 0), (n, 0), "{n} points turned by {angle}");
+        assert_eq!(
+            score(&model, &target, 0),
+            (n, 0),
+            "{n} points turned by {angle}"
+        );
     }
 }
 
@@ -64,10 +83,14 @@ fn strays_and_a_little_noise_do_not_mislead_the_patterns() {
 
 #[test]
 fn a_dense_surface_in_space_is_matched() {
-    let lift =
-        |p: Point2<f64>, height: f64| Point3::new(p.x, p.y, height * (-p.coords.norm_squared() / 0.4).exp());
+    let lift = |p: Point2<f64>, height: f64| {
+        Point3::new(p.x, p.y, height * (-p.coords.norm_squared() / 0.4).exp())
+    };
     let model: Vec<_> = sunflower(1000).into_iter().map(|p| lift(p, 0.5)).collect();
-    let target: Vec<_> = sunflower(1000).iter().map(|p| lift(warp(p, 0.12), 0.6)).collect();
+    let target: Vec<_> = sunflower(1000)
+        .iter()
+        .map(|p| lift(warp(p, 0.12), 0.6))
+        .collect();
     assert_eq!(score(&model, &target, 0), (1000, 0));
 }
 
@@ -76,19 +99,28 @@ fn what_a_workspace_did_before_changes_no_answer() {
     let scene = |n: usize, noise: f64| {
         let model = sunflower(n);
         let off = |i: usize| noise * Point2::new(scatter(i + 7, 0), scatter(i + 7, 1)).coords;
-        let target: Vec<_> = model.iter().enumerate().map(|(i, p)| warp(p, 0.0) + off(i)).collect();
+        let target: Vec<_> = model
+            .iter()
+            .enumerate()
+            .map(|(i, p)| warp(p, 0.0) + off(i))
+            .collect();
         (model, target)
     };
     let matcher = RelaxationMatcher::default();
     let run = |workspace: &mut RelaxationWorkspace<2>,
                (model, target): &(Vec<Point2<f64>>, Vec<Point2<f64>>)| {
         let go = |_, _| ControlFlow::Continue(());
-        let found = matcher.match_points_with(workspace, model, target, go).unwrap();
+        let found = matcher
+            .match_points_with(workspace, model, target, go)
+            .unwrap();
         (found.report(), found.assignment().to_vec())
     };
     // In the first scene patterns are looked at, with a wider spacing than the second's, whose first run is nearly right.
     let (coarse, dense) = (scene(500, 0.01), scene(700, 0.006));
     let mut used = RelaxationWorkspace::new();
     run(&mut used, &coarse);
-    assert_eq!(run(&mut used, &dense), run(&mut RelaxationWorkspace::new(), &dense));
+    assert_eq!(
+        run(&mut used, &dense),
+        run(&mut RelaxationWorkspace::new(), &dense)
+    );
 }

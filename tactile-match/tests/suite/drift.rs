@@ -31,19 +31,27 @@ fn slow_non_rigid<const D: usize>(
     let (m, n) = (model.len(), target.len());
     let columns = |points: &[Point<f64, D>]| DMatrix::from_fn(points.len(), D, |i, d| points[i][d]);
     let (y, x) = (columns(model), columns(target));
-    let squared =
-        |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| (a.row(i) - b.row(j)).norm_squared();
-    let g = DMatrix::from_fn(m, m, |i, j| (-squared(&y, i, &y, j) / (2.0 * beta * beta)).exp());
+    let squared = |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| {
+        (a.row(i) - b.row(j)).norm_squared()
+    };
+    let g = DMatrix::from_fn(m, m, |i, j| {
+        (-squared(&y, i, &y, j) / (2.0 * beta * beta)).exp()
+    });
     let mut moved = y.clone();
-    let mut sigma2 =
-        (0..m).flat_map(|i| (0..n).map(move |j| (i, j))).map(|(i, j)| squared(&y, i, &x, j)).sum::<f64>()
-            / (D * m * n) as f64;
+    let mut sigma2 = (0..m)
+        .flat_map(|i| (0..n).map(move |j| (i, j)))
+        .map(|(i, j)| squared(&y, i, &x, j))
+        .sum::<f64>()
+        / (D * m * n) as f64;
     let (first, mut done) = (sigma2, 0);
     while done < iterations && sigma2 > 1e-4 * first {
         done += 1;
-        let c =
-            (2.0 * std::f64::consts::PI * sigma2).powf(D as f64 / 2.0) * w / (1.0 - w) * m as f64 / n as f64;
-        let mut p = DMatrix::from_fn(m, n, |i, j| (-squared(&moved, i, &x, j) / (2.0 * sigma2)).exp());
+        let c = (2.0 * std::f64::consts::PI * sigma2).powf(D as f64 / 2.0) * w / (1.0 - w)
+            * m as f64
+            / n as f64;
+        let mut p = DMatrix::from_fn(m, n, |i, j| {
+            (-squared(&moved, i, &x, j) / (2.0 * sigma2)).exp()
+        });
         for mut column in p.column_iter_mut() {
             let sum = column.sum() + c;
             column /= sum;
@@ -58,11 +66,19 @@ fn slow_non_rigid<const D: usize>(
             .sum::<f64>()
             / (D as f64 * p.sum());
     }
-    ((0..m).map(|i| Point::from(SVector::from_fn(|d, _| moved[(i, d)]))).collect(), done)
+    (
+        (0..m)
+            .map(|i| Point::from(SVector::from_fn(|d, _| moved[(i, d)])))
+            .collect(),
+        done,
+    )
 }
 
 fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, D>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max)
 }
 
 /// The tolerance is that of the kernel's factorisation, 1e-12, over the ridge λσ² ≥ 1e-4 of the first iterations.
@@ -75,18 +91,35 @@ fn check_against_slow<const D: usize>(
     w: f64,
 ) {
     let model = scattered::<f64, D>(rows, seed);
-    let target =
-        reordered(&bend(&scattered::<f64, D>(columns, seed), 0.1), &Stream::new(seed).permutation(columns));
+    let target = reordered(
+        &bend(&scattered::<f64, D>(columns, seed), 0.1),
+        &Stream::new(seed).permutation(columns),
+    );
     let options = DriftOptions {
-        motion: Motion::NonRigid { beta, lambda, rank: None },
+        motion: Motion::NonRigid {
+            beta,
+            lambda,
+            rank: None,
+        },
         outlier_weight: w,
         tolerance: 0.0,
         max_iterations: 1,
         normalization: Normalization::Off,
     };
     let (expected, iterations) = slow_non_rigid(&model, &target, (beta, lambda, w), 8);
-    let found = drift(DriftOptions { max_iterations: iterations, ..options }, &model, &target);
-    assert!(largest_step(&found.warped, &expected) <= 1e-7, "{}", largest_step(&found.warped, &expected));
+    let found = drift(
+        DriftOptions {
+            max_iterations: iterations,
+            ..options
+        },
+        &model,
+        &target,
+    );
+    assert!(
+        largest_step(&found.warped, &expected) <= 1e-7,
+        "{}",
+        largest_step(&found.warped, &expected)
+    );
 }
 
 proptest! {
@@ -153,21 +186,43 @@ proptest! {
 fn single_precision_gives_the_same_answer() {
     let model = scattered::<f64, 3>(50, 1);
     let target = bend(&model, 0.05);
-    let single = |points: &[Point3<f64>]| points.iter().map(|p| p.map(|c| c as f32)).collect::<Vec<_>>();
+    let single = |points: &[Point3<f64>]| {
+        points
+            .iter()
+            .map(|p| p.map(|c| c as f32))
+            .collect::<Vec<_>>()
+    };
     let double = drift(DriftOptions::default(), &model, &target);
-    let found = CoherentPointDrift::default().match_points(&single(&model), &single(&target)).unwrap();
+    let found = CoherentPointDrift::default()
+        .match_points(&single(&model), &single(&target))
+        .unwrap();
     assert_eq!(found.assignment, double.assignment);
     let widened: Vec<_> = found.warped.iter().map(|p| p.map(f64::from)).collect();
-    assert!(largest_step(&widened, &double.warped) < 1e-5, "rounding of the input to f32");
+    assert!(
+        largest_step(&widened, &double.warped) < 1e-5,
+        "rounding of the input to f32"
+    );
 }
 
 #[test]
 fn a_low_rank_kernel_is_close() {
     let model = scattered::<f64, 2>(100, 2);
     let target = bend(&model, 0.05);
-    let motion = |rank| Motion::NonRigid { beta: 2.0, lambda: 3.0, rank };
-    let [whole, thirty] = [None, Some(30)]
-        .map(|rank| drift(DriftOptions { motion: motion(rank), ..Default::default() }, &model, &target));
+    let motion = |rank| Motion::NonRigid {
+        beta: 2.0,
+        lambda: 3.0,
+        rank,
+    };
+    let [whole, thirty] = [None, Some(30)].map(|rank| {
+        drift(
+            DriftOptions {
+                motion: motion(rank),
+                ..Default::default()
+            },
+            &model,
+            &target,
+        )
+    });
     assert_eq!(whole.assignment, thirty.assignment);
     assert!(
         largest_step(&whole.warped, &thirty.warped) < 1e-4,
@@ -182,10 +237,17 @@ fn outliers_are_left_without_a_partner() {
     let mut target = bend(&model, 0.03);
     let mut stream = Stream::new(4);
     target.extend((0..15).map(|_| Point2::new(1.5 + stream.next(), 3.0 * stream.next())));
-    let options =
-        DriftOptions { outlier_weight: 0.2, normalization: Normalization::Model, ..Default::default() };
+    let options = DriftOptions {
+        outlier_weight: 0.2,
+        normalization: Normalization::Model,
+        ..Default::default()
+    };
     let found = drift(options, &model, &target);
-    assert!((0..60).all(|i| found.assignment[i] == Some(i)), "{:?}", found.assignment);
+    assert!(
+        (0..60).all(|i| found.assignment[i] == Some(i)),
+        "{:?}",
+        found.assignment
+    );
     assert_eq!(found.unmatched_target, (60..75).collect::<Vec<_>>());
 }
 
@@ -195,15 +257,25 @@ fn a_workspace_forgets_the_last_match_and_registers_without_allocating() {
     let mut workspace = DriftWorkspace::new();
     let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
         .into_iter()
-        .map(|(n, seed)| (scattered::<f64, 3>(n, seed), bend(&scattered::<f64, 3>(n, seed), 0.05)))
+        .map(|(n, seed)| {
+            (
+                scattered::<f64, 3>(n, seed),
+                bend(&scattered::<f64, 3>(n, seed), 0.05),
+            )
+        })
         .collect();
     for (model, target) in &sets {
         let again = matcher.match_with(&mut workspace, model, target).unwrap();
-        assert_eq!(again.warped, matcher.match_points(model, target).unwrap().warped);
+        assert_eq!(
+            again.warped,
+            matcher.match_points(model, target).unwrap().warped
+        );
     }
     let counted = allocation_counter::measure(|| {
         for (model, target) in &sets {
-            matcher.register_with(&mut workspace, model, target).unwrap();
+            matcher
+                .register_with(&mut workspace, model, target)
+                .unwrap();
         }
     });
     assert_eq!(counted.count_total, 0);
@@ -214,8 +286,17 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
     let model = scattered::<f64, 3>(40, 9);
     let target = bend(&model, 0.05);
     let mut workspace = DriftWorkspace::new();
-    for motion in [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID] {
-        let matcher = CoherentPointDrift::new(DriftOptions { motion, ..Default::default() }).unwrap();
+    for motion in [
+        Motion::Rigid,
+        Motion::Similarity,
+        Motion::Affine,
+        Motion::NON_RIGID,
+    ] {
+        let matcher = CoherentPointDrift::new(DriftOptions {
+            motion,
+            ..Default::default()
+        })
+        .unwrap();
         let found = matcher.match_with(&mut workspace, &model, &target).unwrap();
         let warp = workspace.warp();
         let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
@@ -241,24 +322,58 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
 #[test]
 fn options_out_of_range_are_typed_errors() {
     let good = DriftOptions::default();
-    let non_rigid =
-        |beta, lambda| DriftOptions { motion: Motion::NonRigid { beta, lambda, rank: None }, ..good };
+    let non_rigid = |beta, lambda| DriftOptions {
+        motion: Motion::NonRigid {
+            beta,
+            lambda,
+            rank: None,
+        },
+        ..good
+    };
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
         for (name, options) in [
-            ("outlier_weight", DriftOptions { outlier_weight: bad, ..good }),
-            ("tolerance", DriftOptions { tolerance: bad, ..good }),
+            (
+                "outlier_weight",
+                DriftOptions {
+                    outlier_weight: bad,
+                    ..good
+                },
+            ),
+            (
+                "tolerance",
+                DriftOptions {
+                    tolerance: bad,
+                    ..good
+                },
+            ),
             ("beta", non_rigid(bad, 1.0)),
             ("lambda", non_rigid(1.0, bad)),
         ] {
             let error = CoherentPointDrift::new(options).unwrap_err();
-            assert!(matches!(error, MatchError::InvalidOption { option, .. } if option == name), "{error}");
+            assert!(
+                matches!(error, MatchError::InvalidOption { option, .. } if option == name),
+                "{error}"
+            );
         }
     }
-    let rank = Motion::NonRigid { beta: 1.0, lambda: 1.0, rank: Some(0) };
+    let rank = Motion::NonRigid {
+        beta: 1.0,
+        lambda: 1.0,
+        rank: Some(0),
+    };
     for options in [
-        DriftOptions { outlier_weight: 1.0, ..good },
-        DriftOptions { max_iterations: 0, ..good },
-        DriftOptions { motion: rank, ..good },
+        DriftOptions {
+            outlier_weight: 1.0,
+            ..good
+        },
+        DriftOptions {
+            max_iterations: 0,
+            ..good
+        },
+        DriftOptions {
+            motion: rank,
+            ..good
+        },
         non_rigid(0.0, 1.0),
         non_rigid(1.0, 0.0),
     ] {
@@ -270,8 +385,22 @@ fn options_out_of_range_are_typed_errors() {
 fn the_report_says_why_it_stopped() {
     let model = scattered::<f64, 2>(20, 8);
     let target = bend(&model, 0.05);
-    let few = DriftOptions { max_iterations: 2, ..Default::default() };
-    assert_eq!(drift(few, &model, &target).report.stop, StopReason::IterationLimit);
-    assert_eq!(drift(DriftOptions::default(), &model, &target).report.stop, StopReason::Converged);
-    assert_eq!(drift(DriftOptions::default(), &model[..1], &target[..1]).report.stop, StopReason::Exact);
+    let few = DriftOptions {
+        max_iterations: 2,
+        ..Default::default()
+    };
+    assert_eq!(
+        drift(few, &model, &target).report.stop,
+        StopReason::IterationLimit
+    );
+    assert_eq!(
+        drift(DriftOptions::default(), &model, &target).report.stop,
+        StopReason::Converged
+    );
+    assert_eq!(
+        drift(DriftOptions::default(), &model[..1], &target[..1])
+            .report
+            .stop,
+        StopReason::Exact
+    );
 }

@@ -7,7 +7,9 @@ use tactile_match::dense::{
 use tactile_match::{Labelling, linear_assignment};
 
 fn points<const D: usize>(flat: &[f64]) -> Vec<Point<f64, D>> {
-    flat.chunks_exact(D).map(|c| Point::from(std::array::from_fn(|k| c[k]))).collect()
+    flat.chunks_exact(D)
+        .map(|c| Point::from(std::array::from_fn(|k| c[k])))
+        .collect()
 }
 
 fn agrees<const D: usize>(x: &[Point<f64, D>], y: &[Point<f64, D>]) -> Result<(), TestCaseError> {
@@ -17,8 +19,15 @@ fn agrees<const D: usize>(x: &[Point<f64, D>], y: &[Point<f64, D>]) -> Result<()
     );
     let slack = 1.0 / (y.len() + 1) as f64;
     let mut dense = MatchMatrix::from_fn(x.len(), y.len(), |_, _| slack);
-    let mut sparse = Labelling::new(y.len(), x.iter().map(|_| (0..y.len()).collect::<Vec<_>>()), slack);
-    let rule = CompatibilityRule { factors: Compatibility::Full, longest: None };
+    let mut sparse = Labelling::new(
+        y.len(),
+        x.iter().map(|_| (0..y.len()).collect::<Vec<_>>()),
+        slack,
+    );
+    let rule = CompatibilityRule {
+        factors: Compatibility::Full,
+        longest: None,
+    };
     let weight = |(i, j): (usize, usize), (a, b): (usize, usize)| {
         let edge = |graph: &NeighbourGraph<f64, D>, from: usize, to: usize| {
             graph.of(from).iter().find(|edge| edge.to == to).copied()
@@ -28,7 +37,9 @@ fn agrees<const D: usize>(x: &[Point<f64, D>], y: &[Point<f64, D>]) -> Result<()
             _ => 0.0,
         }
     };
-    sparse.link(weight, |i| graph_x.of(i).iter().map(|edge| edge.to).collect::<Vec<_>>());
+    sparse.link(weight, |i| {
+        graph_x.of(i).iter().map(|edge| edge.to).collect::<Vec<_>>()
+    });
     for _ in 0..4 {
         let gains = support(&dense, &graph_x, &graph_y, &rule);
         sweep(&mut dense, &gains, 0.05, 6);
@@ -41,7 +52,12 @@ fn agrees<const D: usize>(x: &[Point<f64, D>], y: &[Point<f64, D>]) -> Result<()
         }
         prop_assert!((dense.slack_of_row(i) - sparse.slack_of_row(i)).abs() < 1e-10);
     }
-    same_partners(x.len(), y.len(), |i, j| dense[(i, j)], |i, j| sparse.probability(i, j))
+    same_partners(
+        x.len(),
+        y.len(),
+        |i, j| dense[(i, j)],
+        |i, j| sparse.probability(i, j),
+    )
 }
 
 /// The partners read from the sparse matrix are the best ones of the dense matrix as well: the same, or tied with them.
@@ -52,11 +68,17 @@ fn same_partners(
     sparse: impl Fn(usize, usize) -> f64,
 ) -> Result<(), TestCaseError> {
     let partners = |m: &dyn Fn(usize, usize) -> f64| {
-        let costs: Vec<f64> = (0..rows * columns).map(|e| -m(e / columns, e % columns)).collect();
+        let costs: Vec<f64> = (0..rows * columns)
+            .map(|e| -m(e / columns, e % columns))
+            .collect();
         linear_assignment(&costs, rows, columns).expect("probabilities")
     };
     let total = |assignment: Vec<Option<usize>>| -> f64 {
-        assignment.iter().enumerate().filter_map(|(i, j)| j.map(|j| dense(i, j))).sum()
+        assignment
+            .iter()
+            .enumerate()
+            .filter_map(|(i, j)| j.map(|j| dense(i, j)))
+            .sum()
     };
     let (best, found) = (total(partners(&dense)), total(partners(&sparse)));
     // Entries agree to 1e-10, and either choice may gain that much on every row.

@@ -12,8 +12,8 @@ use nalgebra::Point;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use tactile_match::dense::{
-    Compatibility, CompatibilityRule, MatchMatrix, NeighbourGraph, Neighbourhood, alpha, alpha_global, beta,
-    energy, sinkhorn, support, update,
+    Compatibility, CompatibilityRule, MatchMatrix, NeighbourGraph, Neighbourhood, alpha,
+    alpha_global, beta, energy, sinkhorn, support, update,
 };
 
 const TOLERANCE: f64 = 1e-12;
@@ -26,8 +26,11 @@ impl Table {
     /// Compares with error relative to `max(|expected|, floor)`.
     fn check(&mut self, quantity: &str, case: &str, found: f64, expected: f64, floor: f64) {
         assert!(found.is_finite(), "{case}: {quantity} is {found}");
-        let error =
-            if found == expected { 0.0 } else { (found - expected).abs() / expected.abs().max(floor) };
+        let error = if found == expected {
+            0.0
+        } else {
+            (found - expected).abs() / expected.abs().max(floor)
+        };
         let worst = self.0.entry(quantity.to_owned()).or_default();
         if error >= worst.0 {
             *worst = (error, case.to_owned());
@@ -40,16 +43,28 @@ impl Table {
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().expect("array").iter().map(|v| v.as_f64().expect("number")).collect()
+    value
+        .as_array()
+        .expect("array")
+        .iter()
+        .map(|v| v.as_f64().expect("number"))
+        .collect()
 }
 
 fn rows(value: &Value) -> Vec<Vec<f64>> {
-    value.as_array().expect("array").iter().map(numbers).collect()
+    value
+        .as_array()
+        .expect("array")
+        .iter()
+        .map(numbers)
+        .collect()
 }
 
 fn matrix(value: &Value) -> MatchMatrix<f64> {
     let entries = rows(value);
-    MatchMatrix::from_fn(entries.len() - 1, entries[0].len() - 1, |i, j| entries[i][j])
+    MatchMatrix::from_fn(entries.len() - 1, entries[0].len() - 1, |i, j| {
+        entries[i][j]
+    })
 }
 
 fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
@@ -65,9 +80,19 @@ fn agrees_with_the_reference_numbers() {
         return;
     };
     let file: Value = serde_json::from_str(&text).expect("matching.json is JSON");
-    for check in file["header"]["parse_check"].as_array().expect("parse_check") {
-        let bits = format!("0x{:016x}", check["value"].as_f64().expect("value").to_bits());
-        assert_eq!(check["bits"].as_str(), Some(bits.as_str()), "the parser must round correctly");
+    for check in file["header"]["parse_check"]
+        .as_array()
+        .expect("parse_check")
+    {
+        let bits = format!(
+            "0x{:016x}",
+            check["value"].as_f64().expect("value").to_bits()
+        );
+        assert_eq!(
+            check["bits"].as_str(),
+            Some(bits.as_str()),
+            "the parser must round correctly"
+        );
     }
     let mut table = Table::default();
     let cases = file["cases"].as_array().expect("cases");
@@ -82,7 +107,10 @@ fn agrees_with_the_reference_numbers() {
     for (quantity, (error, case)) in &table.0 {
         println!("  {quantity:<42} {error:9.2e}  {case}");
     }
-    assert_eq!(Some(cases.len() as u64), file["header"]["case_count"].as_u64());
+    assert_eq!(
+        Some(cases.len() as u64),
+        file["header"]["case_count"].as_u64()
+    );
 }
 
 fn run_case<const D: usize>(case: &Value, table: &mut Table) {
@@ -93,21 +121,46 @@ fn run_case<const D: usize>(case: &Value, table: &mut Table) {
     let m = matrix(&case["M"]);
     check_graphs(id, expected, [("x", &model), ("y", &target)], table);
     check_edge_pairs(id, expected, &model, &target, table);
-    table.check("energy (14)", id, energy(&m, &model, &target), number(&expected["energy"]), 0.0);
+    table.check(
+        "energy (14)",
+        id,
+        energy(&m, &model, &target),
+        number(&expected["energy"]),
+        0.0,
+    );
     check_support(id, expected, &m, &model, &target, table);
-    for (name, factors) in [("count", Compatibility::Count), ("full", Compatibility::Full)] {
-        let rule = CompatibilityRule { factors, longest: None };
+    for (name, factors) in [
+        ("count", Compatibility::Count),
+        ("full", Compatibility::Full),
+    ] {
+        let rule = CompatibilityRule {
+            factors,
+            longest: None,
+        };
         let gain = number(&case["slack_gain"]);
         let s = support(&m, &model, &target, &rule);
         let exact = rows(&expected["support"][name]).concat();
-        let alone =
-            if name == "count" { exact.clone() } else { rows(&expected["support"]["alpha"]).concat() };
+        let alone = if name == "count" {
+            exact.clone()
+        } else {
+            rows(&expected["support"]["alpha"]).concat()
+        };
         let lost = |i: usize, j: usize| match (m.columns(), i * m.columns() + j) {
-            (columns, at) if i < m.rows() && j < columns && exact[at] > 0.0 => alone[at] / exact[at],
+            (columns, at) if i < m.rows() && j < columns && exact[at] > 0.0 => {
+                alone[at] / exact[at]
+            }
             _ => 1.0,
         };
         let relaxed = &expected["update"][name];
-        check_relaxation(id, name, relaxed, (m.clone(), &s, gain), lost, (&model, &target), table);
+        check_relaxation(
+            id,
+            name,
+            relaxed,
+            (m.clone(), &s, gain),
+            lost,
+            (&model, &target),
+            table,
+        );
     }
 }
 
@@ -123,13 +176,29 @@ fn check_graphs<const D: usize>(
 ) {
     for (set, graph) in graphs {
         let radius = expected[format!("radius_{set}")].as_f64();
-        assert_eq!(graph.radius().is_some(), radius.is_some(), "{id}: radius of {set}");
+        assert_eq!(
+            graph.radius().is_some(),
+            radius.is_some(),
+            "{id}: radius of {set}"
+        );
         if let (Some(found), Some(expected)) = (graph.radius(), radius) {
             table.check("radius (13)", id, found, expected, 0.0);
         }
-        let edges: Vec<_> = graph.edges().iter().map(|e| vec![e.from as f64, e.to as f64]).collect();
-        assert_eq!(edges, rows(&expected[format!("edges_{set}")]), "{id}: edges of {set}");
-        for (edge, expected) in graph.edges().iter().zip(numbers(&expected[format!("gamma_{set}")])) {
+        let edges: Vec<_> = graph
+            .edges()
+            .iter()
+            .map(|e| vec![e.from as f64, e.to as f64])
+            .collect();
+        assert_eq!(
+            edges,
+            rows(&expected[format!("edges_{set}")]),
+            "{id}: edges of {set}"
+        );
+        for (edge, expected) in graph
+            .edges()
+            .iter()
+            .zip(numbers(&expected[format!("gamma_{set}")]))
+        {
             table.check("gamma (18)", id, edge.gamma, expected, 1.0);
         }
     }
@@ -147,7 +216,9 @@ fn check_edge_pairs<const D: usize>(
         table.check("longest edge", id, longest, d_max, 0.0);
     }
     for (name, floor) in [("alpha", 0.0), ("alpha_global", 1.0), ("beta", 1.0)] {
-        let Some(expected) = expected.get(name) else { continue };
+        let Some(expected) = expected.get(name) else {
+            continue;
+        };
         for (x, expected) in model.edges().iter().zip(rows(expected)) {
             for (y, expected) in target.edges().iter().zip(expected) {
                 let found = match name {
@@ -208,15 +279,38 @@ fn check_relaxation<const D: usize>(
     table: &mut Table,
 ) {
     let zero_rows = update(&mut m, s, slack_gain);
-    let expected_zero: Vec<_> = numbers(&expected["zero_rows"]).iter().map(|&r| r as usize).collect();
+    let expected_zero: Vec<_> = numbers(&expected["zero_rows"])
+        .iter()
+        .map(|&r| r as usize)
+        .collect();
     assert_eq!(zero_rows, expected_zero, "{id}: rows without support");
-    compare(&format!("update (20), {name}"), id, &m, &expected["after_row_normalisation"], &lost, table);
+    compare(
+        &format!("update (20), {name}"),
+        id,
+        &m,
+        &expected["after_row_normalisation"],
+        &lost,
+        table,
+    );
     for expected in expected["sinkhorn"].as_array().expect("sinkhorn") {
         let sweeps = expected["sweeps"].as_u64().expect("sweeps") as usize;
         let mut m = m.clone();
         let report = sinkhorn(&mut m, sweeps, 0.0);
-        compare(&format!("Sinkhorn (15), {name}"), id, &m, &expected["M"], &lost, table);
-        table.check("row defect", id, report.row_defect, number(&expected["max_row_defect"]), 1.0);
+        compare(
+            &format!("Sinkhorn (15), {name}"),
+            id,
+            &m,
+            &expected["M"],
+            &lost,
+            table,
+        );
+        table.check(
+            "row defect",
+            id,
+            report.row_defect,
+            number(&expected["max_row_defect"]),
+            1.0,
+        );
         table.check(
             "energy after Sinkhorn",
             id,
@@ -238,7 +332,13 @@ fn compare(
 ) {
     for (i, row) in rows(expected).iter().enumerate() {
         for (j, (&found, &expected)) in m.row(i).iter().zip(row).enumerate() {
-            table.check(quantity, id, found, expected, (expected * lost(i, j)).max(f64::MIN_POSITIVE));
+            table.check(
+                quantity,
+                id,
+                found,
+                expected,
+                (expected * lost(i, j)).max(f64::MIN_POSITIVE),
+            );
         }
     }
 }

@@ -2,24 +2,29 @@
 use nalgebra::{Point, Point2, Point3, Rotation2};
 use std::ops::ControlFlow;
 use tactile_match::{
-    MatchError, Outliers, PointMatcher, PointSet, RelaxationMatcher, RelaxationOptions, RelaxationWorkspace,
-    Rotation, StopReason,
+    MatchError, Outliers, PointMatcher, PointSet, RelaxationMatcher, RelaxationOptions,
+    RelaxationWorkspace, Rotation, StopReason,
 };
 
 /// Fractional part of a multiple of the golden ratio: points without pattern, the same on every machine.
 fn scatter(i: usize, k: usize) -> f64 {
-    ((i * 7 + k * 131 + i * i * 3 + 1) as f64 * [0.618_033_988_75, 0.754_877_666_25, 0.569_840_291][k])
+    ((i * 7 + k * 131 + i * i * 3 + 1) as f64
+        * [0.618_033_988_75, 0.754_877_666_25, 0.569_840_291][k])
         .fract()
 }
 
 fn cloud<const D: usize>(n: usize) -> Vec<Point<f64, D>> {
-    (0..n).map(|i| Point::from(std::array::from_fn(|k| scatter(i, k)))).collect()
+    (0..n)
+        .map(|i| Point::from(std::array::from_fn(|k| scatter(i, k))))
+        .collect()
 }
 
 /// A smooth warp without folds.
 fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
     let bump: f64 = (-p.coords.norm_squared() / 0.3).exp();
-    Point::from(std::array::from_fn(|k| 1.1 * p[k] + 0.12 * p[(k + 1) % D] + 0.08 * bump - 0.3))
+    Point::from(std::array::from_fn(|k| {
+        1.1 * p[k] + 0.12 * p[(k + 1) % D] + 0.08 * bump - 0.3
+    }))
 }
 
 /// Row `i` of the model is row `(5 i + 3) mod n` of the target; 5 and n have no common factor.
@@ -27,15 +32,23 @@ fn shuffled<const D: usize>(points: &[Point<f64, D>]) -> (Vec<Point<f64, D>>, Ve
     let n = points.len();
     let partner: Vec<usize> = (0..n).map(|i| (5 * i + 3) % n).collect();
     let mut target = vec![Point::origin(); n];
-    partner.iter().zip(points).for_each(|(&j, p)| target[j] = bend(p));
+    partner
+        .iter()
+        .zip(points)
+        .for_each(|(&j, p)| target[j] = bend(p));
     (target, partner)
 }
 
 fn all_right<const D: usize>(n: usize) {
     let model = cloud::<D>(n);
     let (target, partner) = shuffled(&model);
-    let found = RelaxationMatcher::default().match_points(&model, &target).unwrap();
-    assert_eq!(found.assignment, partner.iter().map(|&j| Some(j)).collect::<Vec<_>>());
+    let found = RelaxationMatcher::default()
+        .match_points(&model, &target)
+        .unwrap();
+    assert_eq!(
+        found.assignment,
+        partner.iter().map(|&j| Some(j)).collect::<Vec<_>>()
+    );
     assert_eq!(found.report.stop, StopReason::Exact);
     for (i, p) in model.iter().enumerate() {
         // Interpolation of clean pairs: rounding of the spline's solution alone.
@@ -71,13 +84,27 @@ fn a_dense_nearly_regular_set_does_not_slip() {
         .collect();
     let bulge = |p: &Point2<f64>| {
         let pull = |x: f64, y: f64| (-((p.x - x).powi(2) + (p.y - y).powi(2)) / 1.28).exp();
-        Point2::new(p.x + 0.15 * pull(0.5, 0.2) - 0.1 * pull(-0.6, 0.4), p.y - 0.2 * pull(-0.2, -0.6))
+        Point2::new(
+            p.x + 0.15 * pull(0.5, 0.2) - 0.1 * pull(-0.6, 0.4),
+            p.y - 0.2 * pull(-0.2, -0.6),
+        )
     };
     let partner: Vec<usize> = (0..n).map(|i| (5 * i + 3) % n).collect();
     let mut target = vec![Point2::origin(); n];
-    partner.iter().zip(&model).for_each(|(&j, p)| target[j] = bulge(p));
-    let found = RelaxationMatcher::default().match_points(&model, &target).unwrap();
-    assert!(found.assignment.iter().zip(&partner).all(|(a, &j)| *a == Some(j)));
+    partner
+        .iter()
+        .zip(&model)
+        .for_each(|(&j, p)| target[j] = bulge(p));
+    let found = RelaxationMatcher::default()
+        .match_points(&model, &target)
+        .unwrap();
+    assert!(
+        found
+            .assignment
+            .iter()
+            .zip(&partner)
+            .all(|(a, &j)| *a == Some(j))
+    );
 }
 
 #[test]
@@ -86,10 +113,22 @@ fn units_and_origin_do_not_matter() {
     let (target, partner) = shuffled(&model);
     for (scale, offset) in [(1e-6, 0.0), (1e6, 3e6), (1.0, -40.0)] {
         let change = |points: &[Point2<f64>]| -> Vec<Point2<f64>> {
-            points.iter().map(|p| Point2::new(p.x * scale + offset, p.y * scale - offset)).collect()
+            points
+                .iter()
+                .map(|p| Point2::new(p.x * scale + offset, p.y * scale - offset))
+                .collect()
         };
-        let found = RelaxationMatcher::default().match_points(&change(&model), &change(&target)).unwrap();
-        assert!(found.assignment.iter().zip(&partner).all(|(a, &j)| *a == Some(j)), "{scale} {offset}");
+        let found = RelaxationMatcher::default()
+            .match_points(&change(&model), &change(&target))
+            .unwrap();
+        assert!(
+            found
+                .assignment
+                .iter()
+                .zip(&partner)
+                .all(|(a, &j)| *a == Some(j)),
+            "{scale} {offset}"
+        );
     }
 }
 
@@ -102,7 +141,14 @@ fn any_rotation_is_found_when_asked_for() {
         let turn = Rotation2::new(degrees.to_radians());
         let turned: Vec<Point2<f64>> = target.iter().map(|p| turn * p).collect();
         let found = matcher.match_points(&model, &turned).unwrap();
-        assert!(found.assignment.iter().zip(&partner).all(|(a, &j)| *a == Some(j)), "{degrees}");
+        assert!(
+            found
+                .assignment
+                .iter()
+                .zip(&partner)
+                .all(|(a, &j)| *a == Some(j)),
+            "{degrees}"
+        );
     }
 }
 
@@ -111,8 +157,16 @@ fn strays_stay_without_partner() {
     let model = cloud::<3>(61);
     let (mut target, partner) = shuffled(&model);
     target.extend([[3.0, 0.2, 0.1], [-2.0, 0.3, 0.3], [0.1, 2.5, -1.0]].map(Point3::from));
-    let found = RelaxationMatcher::default().match_points(&model, &target).unwrap();
-    assert!(found.assignment.iter().zip(&partner).all(|(a, &j)| *a == Some(j)));
+    let found = RelaxationMatcher::default()
+        .match_points(&model, &target)
+        .unwrap();
+    assert!(
+        found
+            .assignment
+            .iter()
+            .zip(&partner)
+            .all(|(a, &j)| *a == Some(j))
+    );
     assert_eq!(found.unmatched_target, [61, 62, 63]);
 }
 
@@ -120,9 +174,18 @@ fn strays_stay_without_partner() {
 fn single_precision_gives_the_same_matches() {
     let model = cloud::<2>(52);
     let (target, partner) = shuffled(&model);
-    let narrow = |points: &[Point2<f64>]| points.iter().map(|p| p.cast::<f32>()).collect::<Vec<_>>();
-    let found = RelaxationMatcher::default().match_points(&narrow(&model), &narrow(&target)).unwrap();
-    assert!(found.assignment.iter().zip(&partner).all(|(a, &j)| *a == Some(j)));
+    let narrow =
+        |points: &[Point2<f64>]| points.iter().map(|p| p.cast::<f32>()).collect::<Vec<_>>();
+    let found = RelaxationMatcher::default()
+        .match_points(&narrow(&model), &narrow(&target))
+        .unwrap();
+    assert!(
+        found
+            .assignment
+            .iter()
+            .zip(&partner)
+            .all(|(a, &j)| *a == Some(j))
+    );
 }
 
 /// An answer for every odd input: as many rows as model points, all of them finite, no target twice.
@@ -132,7 +195,12 @@ fn is_sound<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
     assert_eq!(found.warped.len(), model.len());
     assert!(found.warped.iter().all(|p| p.iter().all(|v| v.is_finite())));
     assert!(found.confidence.iter().all(|c| (0.0..=1.0).contains(c)));
-    assert!(found.displacement_covariance.iter().all(|c| c.iter().all(|v| v.is_finite())));
+    assert!(
+        found
+            .displacement_covariance
+            .iter()
+            .all(|c| c.iter().all(|v| v.is_finite()))
+    );
     let mut rows: Vec<usize> = found.assignment.iter().flatten().copied().collect();
     let matched = rows.len();
     rows.sort_unstable();
@@ -146,19 +214,39 @@ fn is_sound<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
 fn degenerate_sets_have_answers() {
     let (one, few) = (cloud::<2>(1), cloud::<2>(3));
     let many = cloud::<2>(40);
-    for (a, b) in [(&one, &one), (&one, &many), (&many, &one), (&few, &many), (&many, &few), (&many, &many)] {
+    for (a, b) in [
+        (&one, &one),
+        (&one, &many),
+        (&many, &one),
+        (&few, &many),
+        (&many, &few),
+        (&many, &many),
+    ] {
         is_sound(a, b);
     }
     let same = vec![Point3::new(1.0, 2.0, 3.0); 7];
     is_sound(&same, &same);
     is_sound(&same, &cloud::<3>(9));
     is_sound(&cloud::<3>(9), &same);
-    let line: Vec<Point2<f64>> = (0..20).map(|i| Point2::new(f64::from(i), 2.0 * f64::from(i))).collect();
+    let line: Vec<Point2<f64>> = (0..20)
+        .map(|i| Point2::new(f64::from(i), 2.0 * f64::from(i)))
+        .collect();
     is_sound(&line, &line);
-    let grid: Vec<Point2<f64>> = (0..49).map(|i| Point2::new(f64::from(i % 7), f64::from(i / 7))).collect();
+    let grid: Vec<Point2<f64>> = (0..49)
+        .map(|i| Point2::new(f64::from(i % 7), f64::from(i / 7)))
+        .collect();
     is_sound(&grid, &grid);
-    let found = RelaxationMatcher::default().match_points(&grid, &grid).unwrap();
-    assert!(found.assignment.iter().enumerate().all(|(i, a)| *a == Some(i)), "a set is matched to itself");
+    let found = RelaxationMatcher::default()
+        .match_points(&grid, &grid)
+        .unwrap();
+    assert!(
+        found
+            .assignment
+            .iter()
+            .enumerate()
+            .all(|(i, a)| *a == Some(i)),
+        "a set is matched to itself"
+    );
 }
 
 #[test]
@@ -166,10 +254,25 @@ fn bad_input_is_a_typed_error() {
     let good = cloud::<2>(5);
     let mut bad = good.clone();
     bad[3].y = f64::NAN;
-    let error =
-        |a: &[Point2<f64>], b: &[Point2<f64>]| RelaxationMatcher::default().match_points(a, b).err().unwrap();
-    assert_eq!(error(&bad, &good), MatchError::NotFinite { set: PointSet::Model, row: 3 });
-    assert_eq!(error(&good, &[]), MatchError::Empty { set: PointSet::Target });
+    let error = |a: &[Point2<f64>], b: &[Point2<f64>]| {
+        RelaxationMatcher::default()
+            .match_points(a, b)
+            .err()
+            .unwrap()
+    };
+    assert_eq!(
+        error(&bad, &good),
+        MatchError::NotFinite {
+            set: PointSet::Model,
+            row: 3
+        }
+    );
+    assert_eq!(
+        error(&good, &[]),
+        MatchError::Empty {
+            set: PointSet::Target
+        }
+    );
     for slack in [f64::NAN, 0.0, 1.0, -1.0] {
         assert!(RelaxationOptions::default().stray_share(slack).is_err());
     }
@@ -186,10 +289,17 @@ fn the_callback_hears_every_iteration_and_stops_the_search() {
         .match_points_with(&mut workspace, &model, &target, |_, energy| {
             assert!(energy.is_finite());
             heard += 1;
-            if heard == 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if heard == 4 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         })
         .unwrap();
-    assert_eq!((heard, found.report().stop, found.report().iterations), (4, StopReason::Callback, 4));
+    assert_eq!(
+        (heard, found.report().stop, found.report().iterations),
+        (4, StopReason::Callback, 4)
+    );
 }
 
 #[test]
@@ -199,8 +309,12 @@ fn a_used_workspace_gives_the_same_bits() {
     let matcher = RelaxationMatcher::default();
     let go = |_, _| ControlFlow::Continue(());
     let mut workspace = RelaxationWorkspace::new();
-    matcher.match_points_with(&mut workspace, &b, &target_b, go).unwrap();
-    let again = matcher.match_points_with(&mut workspace, &a, &target_a, go).unwrap();
+    matcher
+        .match_points_with(&mut workspace, &b, &target_b, go)
+        .unwrap();
+    let again = matcher
+        .match_points_with(&mut workspace, &a, &target_a, go)
+        .unwrap();
     let fresh = matcher.match_points(&a, &target_a).unwrap();
     assert_eq!(again.warped::<f64>().collect::<Vec<_>>(), fresh.warped);
     assert_eq!(again.assignment(), fresh.assignment);
@@ -222,7 +336,11 @@ fn a_batch_gives_the_bits_of_single_matches() {
                 .collect()
         })
         .collect();
-    let pairs: Vec<_> = models.iter().zip(&targets).map(|(m, t)| (&m[..], &t[..])).collect();
+    let pairs: Vec<_> = models
+        .iter()
+        .zip(&targets)
+        .map(|(m, t)| (&m[..], &t[..]))
+        .collect();
     let matcher = RelaxationMatcher::default();
     let check = |batch: Vec<Result<tactile_match::Matching<f64, 2>, MatchError>>| {
         assert_eq!(batch.len(), pairs.len());
@@ -230,7 +348,10 @@ fn a_batch_gives_the_bits_of_single_matches() {
             match (found, matcher.match_points(model, target)) {
                 (Ok(found), Ok(single)) => {
                     assert_eq!(found.warped, single.warped);
-                    assert_eq!((found.assignment, found.confidence), (single.assignment, single.confidence));
+                    assert_eq!(
+                        (found.assignment, found.confidence),
+                        (single.assignment, single.confidence)
+                    );
                     assert_eq!((found.energy, found.report), (single.energy, single.report));
                 }
                 (found, single) => assert!(found.is_err() && single.is_err() && model.is_empty()),
@@ -250,13 +371,27 @@ fn the_outliers_option_says_which_side_may_stay_alone() {
     target.push(Point2::new(2.5, 2.5));
     for side in [Outliers::Both, Outliers::Target] {
         let options = RelaxationOptions::default().outliers(side);
-        let found = RelaxationMatcher::new(options).match_points(&model, &target).unwrap();
-        assert_eq!(found.assignment, partner.iter().map(|&j| Some(j)).collect::<Vec<_>>());
+        let found = RelaxationMatcher::new(options)
+            .match_points(&model, &target)
+            .unwrap();
+        assert_eq!(
+            found.assignment,
+            partner.iter().map(|&j| Some(j)).collect::<Vec<_>>()
+        );
         assert_eq!(found.unmatched_target, [31]);
         // The sides change places: now it is a model point that has no partner.
-        let other = if side == Outliers::Target { Outliers::Model } else { side };
+        let other = if side == Outliers::Target {
+            Outliers::Model
+        } else {
+            side
+        };
         let options = RelaxationOptions::default().outliers(other);
-        let found = RelaxationMatcher::new(options).match_points(&target, &model).unwrap();
-        assert_eq!((found.unmatched_model, found.unmatched_target), (vec![31], vec![]));
+        let found = RelaxationMatcher::new(options)
+            .match_points(&target, &model)
+            .unwrap();
+        assert_eq!(
+            (found.unmatched_model, found.unmatched_target),
+            (vec![31], vec![])
+        );
     }
 }

@@ -12,7 +12,10 @@ fn a_report_comes_back_as_it_was() {
     };
     let text = serde_json::to_string(&report).unwrap();
     assert!(text.contains(r#""stop":"iteration_limit""#), "{text}");
-    assert_eq!(serde_json::from_str::<MatchReport<f64>>(&text).unwrap(), report);
+    assert_eq!(
+        serde_json::from_str::<MatchReport<f64>>(&text).unwrap(),
+        report
+    );
 }
 
 #[test]
@@ -29,5 +32,8 @@ fn soft_matches_are_written_row_by_row() {
     let mut soft = SoftMatches::new();
     soft.push_row([(3, 0.5), (1, 0.25)]);
     let text = serde_json::to_string(&soft).unwrap();
-    assert_eq!(text, r#"{"starts":[0,2],"columns":[3,1],"weights":[0.5,0.25]}"#);
+    assert_eq!(
+        text,
+        r#"{"starts":[0,2],"columns":[3,1],"weights":[0.5,0.25]}"#
+    );
 }

@@ -36,22 +36,35 @@ fn check<const D: usize>(kind: &str, k: usize) {
         println!("skipped: no serialtrack/{kind}_*.csv");
         return;
     };
-    let points = |rows: &[[f64; D]]| rows.iter().map(|row| Point::from(*row)).collect::<Vec<Point<f64, D>>>();
+    let points = |rows: &[[f64; D]]| {
+        rows.iter()
+            .map(|row| Point::from(*row))
+            .collect::<Vec<Point<f64, D>>>()
+    };
     let (model, target) = (points(&model), points(&target));
     let order = Stream::new(1).permutation(target.len()); // the file keeps the order of frame 0
-    let matching =
-        RelaxationMatcher::default().match_points(&model, &reordered(&target, &order)).expect("good points");
+    let matching = RelaxationMatcher::default()
+        .match_points(&model, &reordered(&target, &order))
+        .expect("good points");
     let partner = |i: usize| matching.assignment[i].map(|j| order[j] as f64);
     let pairs = truth.iter().filter(|t| t[0] >= 0.0).count();
     let found = (0..model.len()).filter(|&i| partner(i).is_some()).count();
-    let right = (0..model.len()).filter(|&i| partner(i) == Some(truth[i][0])).count();
-    let (recall, wrong) = (right as f64 / pairs as f64, (found - right) as f64 / found.max(1) as f64);
+    let right = (0..model.len())
+        .filter(|&i| partner(i) == Some(truth[i][0]))
+        .count();
+    let (recall, wrong) = (
+        right as f64 / pairs as f64,
+        (found - right) as f64 / found.max(1) as f64,
+    );
     println!(
         "{kind} 0→{k}: {:.2} % of {pairs} pairs found, {:.2} % of {found} wrong",
         100.0 * recall,
         100.0 * wrong
     );
-    assert!(recall >= 0.99 && wrong < 0.005, "{kind} 0→{k}: {recall} found, {wrong} wrong");
+    assert!(
+        recall >= 0.99 && wrong < 0.005,
+        "{kind} 0→{k}: {recall} found, {wrong} wrong"
+    );
 }
 
 #[test]

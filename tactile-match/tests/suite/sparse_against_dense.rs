@@ -2,7 +2,9 @@
 use crate::common::{Stream, bend, reordered, scattered};
 use nalgebra::Point;
 use proptest::prelude::*;
-use tactile_match::dense::{DenseOptions, DenseRelaxation, LengthMaximum, Neighbourhood, SparseRelaxation};
+use tactile_match::dense::{
+    DenseOptions, DenseRelaxation, LengthMaximum, Neighbourhood, SparseRelaxation,
+};
 use tactile_match::{MatchError, Matching, PointMatcher};
 
 /// A model and a bent copy of it in another order, with points of their own on either side.
@@ -16,7 +18,9 @@ fn scene<const D: usize>(rows: usize, columns: usize, seed: u64) -> [Vec<Point<f
 fn difference<const D: usize>(a: &Matching<f64, D>, b: &Matching<f64, D>, columns: usize) -> f64 {
     let entry = |m: &Matching<f64, D>, i, j| m.soft.row(i).find(|e| e.0 == j).map_or(0.0, |e| e.1);
     let pairs = (0..a.warped.len()).flat_map(|i| (0..columns).map(move |j| (i, j)));
-    pairs.map(|(i, j)| (entry(a, i, j) - entry(b, i, j)).abs()).fold(0.0, f64::max)
+    pairs
+        .map(|(i, j)| (entry(a, i, j) - entry(b, i, j)).abs())
+        .fold(0.0, f64::max)
 }
 
 /// The whole matcher with all candidates gives the dense one's M in one outer iteration and its answer at the end.
@@ -27,9 +31,17 @@ fn all_candidates_give_the_dense_answer<const D: usize>(
     let dense = DenseRelaxation::new(options).expect("valid options");
     let all = SparseRelaxation::new(options, target.len()).expect("valid options");
     // The same positive terms in the same order of magnitude, summed in another order: rounding, grown by ten sweeps.
-    prop_assert!(dense.relax(&model, &target).largest_change(&all.relax(&model, &target)) < 1e-10);
-    let [dense, all] =
-        [dense.match_points(&model, &target), all.match_points(&model, &target)].map(Result::unwrap);
+    prop_assert!(
+        dense
+            .relax(&model, &target)
+            .largest_change(&all.relax(&model, &target))
+            < 1e-10
+    );
+    let [dense, all] = [
+        dense.match_points(&model, &target),
+        all.match_points(&model, &target),
+    ]
+    .map(Result::unwrap);
     // Ten outer iterations pass the rounding on through splines; negligible matches (1e-4) may be listed by one alone.
     prop_assert!(difference(&dense, &all, target.len()) < 2e-4);
     prop_assert_eq!(&dense.assignment, &all.assignment);
@@ -44,14 +56,29 @@ fn ten_candidates_do_no_worse_than_all_and_none_is_refused() {
     let [model, target] = scene::<2>(60, 60, 5);
     let order = Stream::new(5).permutation(60);
     let right = [10, 60].map(|candidates| {
-        let sparse = SparseRelaxation::new(DenseOptions::default(), candidates).expect("valid options");
+        let sparse =
+            SparseRelaxation::new(DenseOptions::default(), candidates).expect("valid options");
         let found = sparse.match_points(&model, &target).expect("finite points");
-        found.assignment.iter().enumerate().filter(|(i, j)| j.is_some_and(|j| order[j] == *i)).count()
+        found
+            .assignment
+            .iter()
+            .enumerate()
+            .filter(|(i, j)| j.is_some_and(|j| order[j] == *i))
+            .count()
     });
     // The plain method leaves one or two points wrong here; fewer candidates have fewer ways to go astray.
-    assert!(right[0] >= right[1] && right[1] >= 57, "{right:?} of 60 right");
+    assert!(
+        right[0] >= right[1] && right[1] >= 57,
+        "{right:?} of 60 right"
+    );
     let none = SparseRelaxation::new(DenseOptions::default(), 0);
-    assert!(matches!(none, Err(MatchError::InvalidOption { option: "candidates", .. })));
+    assert!(matches!(
+        none,
+        Err(MatchError::InvalidOption {
+            option: "candidates",
+            ..
+        })
+    ));
 }
 
 proptest! {

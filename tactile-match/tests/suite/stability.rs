@@ -1,6 +1,8 @@
 //! Every matcher far from size one and from the origin, on points that nearly coincide or lie in a plane, and in single precision.
 
-use crate::common::{Stream, assert_consistent, bend, largest_step, matchers, reordered, scattered};
+use crate::common::{
+    Stream, assert_consistent, bend, largest_step, matchers, reordered, scattered,
+};
 use nalgebra::{Point, Point3, SVector};
 use tactile_match::{Matching, PointMatcher};
 use tactile_tps::Scalar;
@@ -24,13 +26,17 @@ fn run<T: Scalar, const D: usize>(
     model: &[Point<T, D>],
     target: &[Point<T, D>],
 ) -> Matching<T, D> {
-    let matching = matcher.match_points(model, target).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let matching = matcher
+        .match_points(model, target)
+        .unwrap_or_else(|error| panic!("{name}: {error}"));
     assert_consistent(name, model, target, &matching);
     matching
 }
 
 fn right(assignment: &[Option<usize>], order: &[usize]) -> usize {
-    (0..order.len()).filter(|&i| assignment[i].is_some_and(|j| order[j] == i)).count()
+    (0..order.len())
+        .filter(|&i| assignment[i].is_some_and(|j| order[j] == i))
+        .count()
 }
 
 /// The answer must scale with the points. Powers of ten round every coordinate: the input differs by the scalar's epsilon, which
@@ -41,7 +47,8 @@ fn check_scale<T: Scalar, const D: usize>(growth: f64) {
         let plain = run(name, &*matcher, &model, &target);
         for exponent in [-9, -6, -3, 3, 6, 9] {
             let scale: T = nalgebra::convert(10_f64.powi(exponent));
-            let scaled = |points: &[Point<T, D>]| points.iter().map(|p| p * scale).collect::<Vec<_>>();
+            let scaled =
+                |points: &[Point<T, D>]| points.iter().map(|p| p * scale).collect::<Vec<_>>();
             let name = format!("{name}, scale 1e{exponent}, {}-D", D);
             let other = run(&name, &*matcher, &scaled(&model), &scaled(&target));
             assert_eq!(other.assignment, plain.assignment, "{name}");
@@ -69,11 +76,16 @@ fn an_offset_of_a_million_diameters_does_not_matter() {
         let (model, target, order) = scene::<f64, D>(2, 0.03);
         // A power of two keeps what is lost to rounding at 2⁻³³ of the diameter.
         let offset = SVector::<f64, D>::repeat(f64::from(1 << 20));
-        let moved = |points: &[Point<f64, D>]| points.iter().map(|p| p + offset).collect::<Vec<_>>();
+        let moved =
+            |points: &[Point<f64, D>]| points.iter().map(|p| p + offset).collect::<Vec<_>>();
         for (name, matcher) in matchers::<f64, D>() {
             let plain = run(name, &*matcher, &model, &target);
             let other = run(name, &*matcher, &moved(&model), &moved(&target));
-            assert_eq!(right(&other.assignment, &order), right(&plain.assignment, &order), "{name}, {D}-D");
+            assert_eq!(
+                right(&other.assignment, &order),
+                right(&plain.assignment, &order),
+                "{name}, {D}-D"
+            );
             let error = largest_step(&other.warped, &moved(&plain.warped));
             assert!(error <= 1e-5, "{name}, {D}-D: {error:e}"); // rounding 1e-10, enlarged as above
         }
@@ -85,7 +97,10 @@ fn an_offset_of_a_million_diameters_does_not_matter() {
 #[test]
 fn sets_far_apart_are_matched() {
     let (model, target, order) = scene::<f64, 3>(3, 0.03);
-    let far: Vec<_> = target.iter().map(|p| p + SVector::<f64, 3>::repeat(1e5)).collect();
+    let far: Vec<_> = target
+        .iter()
+        .map(|p| p + SVector::<f64, 3>::repeat(1e5))
+        .collect();
     for (name, matcher) in matchers::<f64, 3>() {
         let matching = run(name, &*matcher, &model, &far);
         // Nearest neighbours are the only matcher that goes by where the sets lie.
@@ -104,7 +119,10 @@ fn a_nearly_flat_set_is_matched() {
     let (model, target, order) = scene::<f64, 3>(4, 0.03);
     for thickness in [1e-3, 1e-6, 1e-9, 1e-12, 0.0] {
         let flat = |points: &[Point3<f64>]| {
-            points.iter().map(|p| Point3::new(p.x, p.y, 5.0 + thickness * p.z)).collect::<Vec<_>>()
+            points
+                .iter()
+                .map(|p| Point3::new(p.x, p.y, 5.0 + thickness * p.z))
+                .collect::<Vec<_>>()
         };
         let (model, target) = (flat(&model), flat(&target));
         for (name, matcher) in matchers::<f64, 3>() {
@@ -116,8 +134,15 @@ fn a_nearly_flat_set_is_matched() {
                 "{name}: {}",
                 right(&matching.assignment, &order)
             );
-            let off_plane = matching.warped.iter().map(|p| (p.z - 5.0).abs()).fold(0.0, f64::max);
-            assert!(off_plane <= 2.0 * thickness + 1e-6, "{name}: {off_plane:e} off the plane");
+            let off_plane = matching
+                .warped
+                .iter()
+                .map(|p| (p.z - 5.0).abs())
+                .fold(0.0, f64::max);
+            assert!(
+                off_plane <= 2.0 * thickness + 1e-6,
+                "{name}: {off_plane:e} off the plane"
+            );
         }
     }
 }
@@ -127,14 +152,18 @@ fn near_duplicates_are_answered() {
     let (model, target, order) = scene::<f64, 2>(5, 0.02);
     for distance in [1e-3, 1e-6, 1e-9, 1e-12, 1e-15] {
         let doubled = |points: &[Point<f64, 2>]| {
-            let near = points.iter().map(|p| p + SVector::<f64, 2>::repeat(distance));
+            let near = points
+                .iter()
+                .map(|p| p + SVector::<f64, 2>::repeat(distance));
             points.iter().copied().chain(near).collect::<Vec<_>>()
         };
         for (name, matcher) in matchers::<f64, 2>() {
             let name = format!("{name}, duplicates at {distance:e}");
             let matching = run(&name, &*matcher, &doubled(&model), &doubled(&target));
             let right = (0..2 * POINTS)
-                .filter(|&i| matching.assignment[i].is_some_and(|j| order[j % POINTS] == i % POINTS))
+                .filter(|&i| {
+                    matching.assignment[i].is_some_and(|j| order[j % POINTS] == i % POINTS)
+                })
                 .count();
             // Which of the two is no question of right or wrong.
             assert!(right >= POINTS, "{name}: {right} of {}", 2 * POINTS);
@@ -146,9 +175,15 @@ fn near_duplicates_are_answered() {
 fn single_precision_agrees_with_double() {
     fn check<const D: usize>() {
         let (model, target, _) = scene::<f64, D>(6, 0.03);
-        let single =
-            |points: &[Point<f64, D>]| points.iter().map(|p| p.map(|c| c as f32)).collect::<Vec<_>>();
-        for ((name, double), (_, matcher)) in matchers::<f64, D>().into_iter().zip(matchers::<f32, D>()) {
+        let single = |points: &[Point<f64, D>]| {
+            points
+                .iter()
+                .map(|p| p.map(|c| c as f32))
+                .collect::<Vec<_>>()
+        };
+        for ((name, double), (_, matcher)) in
+            matchers::<f64, D>().into_iter().zip(matchers::<f32, D>())
+        {
             let expected = run(name, &*double, &model, &target);
             let found = run(name, &*matcher, &single(&model), &single(&target));
             assert_eq!(found.assignment, expected.assignment, "{name}, {D}-D");

@@ -14,7 +14,10 @@ use tactile_match::{PointMatcher, RelaxationMatcher};
 use worst::{Worst, cases, rows};
 
 fn points(value: &Value) -> Vec<Point<f64, 2>> {
-    rows(value).iter().map(|row| Point::from_slice(row)).collect()
+    rows(value)
+        .iter()
+        .map(|row| Point::from_slice(row))
+        .collect()
 }
 
 #[test]
@@ -25,11 +28,18 @@ fn relaxation_has_all_its_digits() {
         let entries = rows(&case["m"]);
         let mut m = MatchMatrix::from_fn(4, 5, |i, j| entries[i][j]);
         let graph = |key: &str| NeighbourGraph::new(&points(&case[key]), Neighbourhood::Nearest(9));
-        let rule = CompatibilityRule { factors: Compatibility::LengthDirection, longest: None };
+        let rule = CompatibilityRule {
+            factors: Compatibility::LengthDirection,
+            longest: None,
+        };
         let found = support(&m, &graph("model"), &graph("target"), &rule);
         for (found, expected) in found.iter().zip(rows(&case["support"]).concat()) {
             // A sum of positive terms, each of some ten roundings; β loses no more than one part in its own size.
-            table.enter(&format!("support, {name}"), (found / expected - 1.0).abs() / f64::EPSILON, 64.0);
+            table.enter(
+                &format!("support, {name}"),
+                (found / expected - 1.0).abs() / f64::EPSILON,
+                64.0,
+            );
         }
         sinkhorn(&mut m, case["sweeps"].as_u64().unwrap() as usize, 0.0);
         for (i, row) in rows(&case["sinkhorn"]).iter().enumerate() {
@@ -51,15 +61,39 @@ fn the_fast_matcher_has_no_unit_and_no_origin() {
     let matcher = RelaxationMatcher::default();
     let at = |scale: f64, offset: f64| {
         let place = |points: &[Point<f64, 3>]| -> Vec<_> {
-            points.iter().map(|p| Point::from((p.coords + SVector::repeat(offset)) * scale)).collect()
+            points
+                .iter()
+                .map(|p| Point::from((p.coords + SVector::repeat(offset)) * scale))
+                .collect()
         };
-        matcher.match_points(&place(&model), &place(&target)).unwrap().assignment
+        matcher
+            .match_points(&place(&model), &place(&target))
+            .unwrap()
+            .assignment
     };
     let expected: Vec<_> = (0..60).map(Some).collect();
-    for (scale, offset) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (1.0, 1e6), (1e-9, 1e6), (1e9, -1e6)] {
-        assert_eq!(at(scale, offset), expected, "scale {scale}, offset {offset}");
+    for (scale, offset) in [
+        (1.0, 0.0),
+        (1e-9, 0.0),
+        (1e9, 0.0),
+        (1.0, 1e6),
+        (1e-9, 1e6),
+        (1e9, -1e6),
+    ] {
+        assert_eq!(
+            at(scale, offset),
+            expected,
+            "scale {scale}, offset {offset}"
+        );
     }
-    let short = |points: &[Point<f64, 3>]| points.iter().map(|p| p.map(|x| x as f32)).collect::<Vec<_>>();
-    let single = RelaxationMatcher::default().match_points(&short(&model), &short(&target)).unwrap();
+    let short = |points: &[Point<f64, 3>]| {
+        points
+            .iter()
+            .map(|p| p.map(|x| x as f32))
+            .collect::<Vec<_>>()
+    };
+    let single = RelaxationMatcher::default()
+        .match_points(&short(&model), &short(&target))
+        .unwrap();
     assert_eq!(single.assignment, expected, "single precision");
 }

@@ -35,7 +35,11 @@ impl<T: Real> Dimple<T> {
         }
         within("half width of the dimple", half_width_m, 1e-9, 1e6)?;
         within("depth of the dimple", depth_m, 0.0, 1e6)?;
-        Ok(Self { centre: centre_m, half_width: half_width_m, depth: depth_m })
+        Ok(Self {
+            centre: centre_m,
+            half_width: half_width_m,
+            depth: depth_m,
+        })
     }
 
     /// The dimple of half width w whose steepest slope is `slope`.
@@ -43,7 +47,11 @@ impl<T: Real> Dimple<T> {
     /// # Errors
     /// As [`Dimple::new`].
     pub fn of_slope(centre_m: [T; 2], half_width_m: T, slope: T) -> Result<Self, OpticsError> {
-        Self::new(centre_m, half_width_m, slope * half_width_m * T::FRAC_2_PI())
+        Self::new(
+            centre_m,
+            half_width_m,
+            slope * half_width_m * T::FRAC_2_PI(),
+        )
     }
 
     /// πr/2w, and r.
@@ -55,11 +63,14 @@ impl<T: Real> Dimple<T> {
 
 impl<T: Real> TopSurface<T> for Dimple<T> {
     fn height(&self, x: T, y: T) -> T {
-        self.phase(x, y).map_or(T::zero(), |(phase, _)| -self.depth * phase.cos().powi(2))
+        self.phase(x, y)
+            .map_or(T::zero(), |(phase, _)| -self.depth * phase.cos().powi(2))
     }
 
     fn gradient(&self, x: T, y: T) -> [T; 2] {
-        let Some((phase, r)) = self.phase(x, y) else { return [T::zero(); 2] };
+        let Some((phase, r)) = self.phase(x, y) else {
+            return [T::zero(); 2];
+        };
         if r == T::zero() {
             return [T::zero(); 2];
         }
@@ -76,7 +87,10 @@ impl<T: Real> TopSurface<T> for Dimple<T> {
     }
 
     fn support(&self) -> [T; 2] {
-        [self.centre[0] - self.half_width, self.centre[0] + self.half_width]
+        [
+            self.centre[0] - self.half_width,
+            self.centre[0] + self.half_width,
+        ]
     }
 }
 

@@ -89,11 +89,17 @@ mod tests {
         let gap = |t: f64| surface.height(p[0] + t * u[0], p[1] + t * u[1]) - (p[2] + t * u[2]);
         let steps = 20_000;
         let first = (1..=steps).find(|&k| gap(to * f64::from(k) / f64::from(steps)) <= 0.0)?;
-        let (mut a, mut b) =
-            (to * f64::from(first - 1) / f64::from(steps), to * f64::from(first) / f64::from(steps));
+        let (mut a, mut b) = (
+            to * f64::from(first - 1) / f64::from(steps),
+            to * f64::from(first) / f64::from(steps),
+        );
         for _ in 0..60 {
             let middle = 0.5 * (a + b);
-            if gap(middle) > 0.0 { a = middle } else { b = middle }
+            if gap(middle) > 0.0 {
+                a = middle
+            } else {
+                b = middle
+            }
         }
         Some(b)
     }
@@ -107,7 +113,11 @@ mod tests {
             for j in 0..10 {
                 let angle = -0.3 + 0.02 * f64::from(i);
                 let turn = 0.03 * f64::from(j);
-                let u = [angle.cos() * turn.cos(), angle.cos() * turn.sin(), angle.sin()];
+                let u = [
+                    angle.cos() * turn.cos(),
+                    angle.cos() * turn.sin(),
+                    angle.sin(),
+                ];
                 let p = [0.0, -0.05, -0.05 - 0.02 * f64::from(j)];
                 let found = march(&dimple, &p, &u, [0.0, 1.2], tolerance);
                 match (found, scanned(&dimple, &p, &u, 1.2)) {

@@ -40,13 +40,23 @@ impl<T: Real, S: TopSurface<T>> Touched<S, T> {
         centre_m: [T; 2],
         radius_m: T,
     ) -> Result<Self, OpticsError> {
-        within("refractive index of the object", object.index, f64::MIN_POSITIVE, 1e6)?;
+        within(
+            "refractive index of the object",
+            object.index,
+            f64::MIN_POSITIVE,
+            1e6,
+        )?;
         within("albedo of the object", object.albedo, 0.0, 1.0)?;
         for c in centre_m {
             within("centre of the contact", c, -1e6, 1e6)?;
         }
         within("radius of the contact", radius_m, 0.0, 1e6)?;
-        Ok(Self { surface, object, centre: centre_m, radius: radius_m })
+        Ok(Self {
+            surface,
+            object,
+            centre: centre_m,
+            radius: radius_m,
+        })
     }
 }
 
@@ -67,10 +77,18 @@ impl<T: Real, S: TopSurface<T>> TopSurface<T> for Touched<S, T> {
         let [a, b] = self.surface.support();
         let (left, right) = (self.centre[0] - self.radius, self.centre[0] + self.radius);
         // An empty support (a flat top) must not stretch to the contact.
-        if a < b { [a.min(left), b.max(right)] } else { [left, right] }
+        if a < b {
+            [a.min(left), b.max(right)]
+        } else {
+            [left, right]
+        }
     }
     fn touching(&self, x: T, y: T) -> Option<TouchingObject<T>> {
         let inside = (x - self.centre[0]).hypot(y - self.centre[1]) < self.radius;
-        if inside { Some(self.object) } else { self.surface.touching(x, y) }
+        if inside {
+            Some(self.object)
+        } else {
+            self.surface.touching(x, y)
+        }
     }
 }

@@ -39,9 +39,17 @@ pub struct LightBudget<T> {
 impl<T: Real> LightBudget<T> {
     /// Sum of all shares: 1 to rounding.
     pub fn total(&self) -> T {
-        [self.entry, self.returned, self.above, self.below, self.camera, self.absorbed, self.unresolved]
-            .iter()
-            .fold(self.guided, |sum, &share| sum + share)
+        [
+            self.entry,
+            self.returned,
+            self.above,
+            self.below,
+            self.camera,
+            self.absorbed,
+            self.unresolved,
+        ]
+        .iter()
+        .fold(self.guided, |sum, &share| sum + share)
     }
 
     /// Share that left through top or bottom.
@@ -78,13 +86,20 @@ pub(crate) struct Tally<T> {
 
 impl<T: Real> Tally<T> {
     pub(crate) fn new() -> Self {
-        Self { sums: [T::zero(); 8], errors: [T::zero(); 8] }
+        Self {
+            sums: [T::zero(); 8],
+            errors: [T::zero(); 8],
+        }
     }
 
     pub(crate) fn add(&mut self, fate: Fate, power: T) {
         let k = fate as usize;
         let (old, new) = (self.sums[k], self.sums[k] + power);
-        let lost = if old.abs() >= power.abs() { (old - new) + power } else { (power - new) + old };
+        let lost = if old.abs() >= power.abs() {
+            (old - new) + power
+        } else {
+            (power - new) + old
+        };
         self.sums[k] = new;
         self.errors[k] = self.errors[k] + lost;
     }

@@ -61,11 +61,19 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
     /// Moves the ray to what it meets next; returns what goes on.
     pub(super) fn advance(&mut self, ray: Ray<T>, branches: &mut Branches<T>) -> Option<Ray<T>> {
         let (way, next) = self.next(&ray);
-        let mut ray = Ray { position: ray.at(way), events: ray.events + 1, ..ray };
+        let mut ray = Ray {
+            position: ray.at(way),
+            events: ray.events + 1,
+            ..ray
+        };
         match next {
             Next::Nothing => self.tally.add(Fate::Unresolved, ray.power),
             Next::Edge => {
-                let fate = if ray.direction[0] > T::zero() { Fate::Guided } else { Fate::Returned };
+                let fate = if ray.direction[0] > T::zero() {
+                    Fate::Guided
+                } else {
+                    Fate::Returned
+                };
                 self.tally.add(fate, ray.power);
             }
             Next::Top => return self.top(ray, branches),
@@ -100,7 +108,10 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
             }
         };
         if uz < zero {
-            offer((self.slab.face(ray.layer + 1) - ray.position[2]) / uz, Next::Down);
+            offer(
+                (self.slab.face(ray.layer + 1) - ray.position[2]) / uz,
+                Next::Down,
+            );
         } else if uz > zero && ray.layer > 0 {
             offer((self.slab.face(ray.layer) - ray.position[2]) / uz, Next::Up);
         }
@@ -120,22 +131,42 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         let zero = T::zero();
         let ([x, _, z], [ux, _, uz]) = (ray.position, ray.direction);
         let [left, right] = self.surface.support();
-        let plane = if uz > zero { ((-z) / uz).max(zero) } else { T::infinity() };
+        let plane = if uz > zero {
+            ((-z) / uz).max(zero)
+        } else {
+            T::infinity()
+        };
         // The part of the way inside the support.
         let (enter, leave) = if ux == zero {
-            if x >= left && x <= right { (zero, limit) } else { (T::infinity(), T::infinity()) }
+            if x >= left && x <= right {
+                (zero, limit)
+            } else {
+                (T::infinity(), T::infinity())
+            }
         } else {
             let (a, b) = ((left - x) / ux, (right - x) / ux);
             (a.min(b).max(zero), a.max(b))
         };
-        let meets_plane = |way: T| if way <= limit { Meeting::At(way) } else { Meeting::Missed };
+        let meets_plane = |way: T| {
+            if way <= limit {
+                Meeting::At(way)
+            } else {
+                Meeting::Missed
+            }
+        };
         if left >= right || leave <= zero || plane < enter {
             return meets_plane(plane);
         }
         if enter > limit {
             return Meeting::Missed;
         }
-        match march(self.surface, &ray.position, &ray.direction, [enter, leave.min(limit)], self.tolerance) {
+        match march(
+            self.surface,
+            &ray.position,
+            &ray.direction,
+            [enter, leave.min(limit)],
+            self.tolerance,
+        ) {
             Meeting::Missed => meets_plane(plane.max(leave)),
             met => met,
         }
@@ -146,10 +177,22 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         let [x, y, _] = ray.position;
         let [left, right] = self.surface.support();
         let deformed = x > left && x < right;
-        let [gx, gy] = if deformed { self.surface.gradient(x, y) } else { [T::zero(); 2] };
-        ray.position[2] = if deformed { self.surface.height(x, y) } else { T::zero() };
+        let [gx, gy] = if deformed {
+            self.surface.gradient(x, y)
+        } else {
+            [T::zero(); 2]
+        };
+        ray.position[2] = if deformed {
+            self.surface.height(x, y)
+        } else {
+            T::zero()
+        };
         let normal = normalised([-gx, -gy, T::one()]);
-        let object = if deformed { self.surface.touching(x, y) } else { None };
+        let object = if deformed {
+            self.surface.touching(x, y)
+        } else {
+            None
+        };
         let outside = object.map_or(self.slab.ambient, |o| o.index);
         let transmitted = ray.power * self.transmittance(&ray, &normal, outside);
         match object {
@@ -158,7 +201,14 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
                 let scattered = transmitted * object.albedo;
                 self.tally.add(Fate::Absorbed, transmitted - scattered);
                 let direction = self.scatter(&normal);
-                self.keep(Ray { direction, power: scattered, ..ray }, branches);
+                self.keep(
+                    Ray {
+                        direction,
+                        power: scattered,
+                        ..ray
+                    },
+                    branches,
+                );
             }
         }
         Some(ray.mirrored(&normal, ray.power - transmitted))
@@ -170,7 +220,8 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         let transmitted = ray.power * self.transmittance(&ray, &normal, self.slab.ambient);
         let sine = ray.direction[0].hypot(ray.direction[1]);
         let seen = self.slab.layers[ray.layer].index * sine <= self.slab.ambient * self.camera_sine;
-        self.tally.add(if seen { Fate::Camera } else { Fate::Below }, transmitted);
+        self.tally
+            .add(if seen { Fate::Camera } else { Fate::Below }, transmitted);
         if seen && !self.camera_profile.is_empty() {
             let bins = self.camera_profile.len();
             let share = ray.position[0] / self.slab.length * real(bins as f64);
@@ -183,7 +234,10 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
     /// At an interface inside the slab: the refracted part goes on, the reflected part waits as a branch.
     fn inside(&mut self, ray: Ray<T>, beyond: usize, branches: &mut Branches<T>) -> Option<Ray<T>> {
         let normal = [T::zero(), T::zero(), T::one()];
-        let (n1, n2) = (self.slab.layers[ray.layer].index, self.slab.layers[beyond].index);
+        let (n1, n2) = (
+            self.slab.layers[ray.layer].index,
+            self.slab.layers[beyond].index,
+        );
         let [ux, uy, uz] = ray.direction;
         let (sine, cosine) = (ux.hypot(uy), uz.abs());
         let Some((share, along)) = crossing(n1, n2, sine, cosine) else {
@@ -193,7 +247,12 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         self.keep(ray.mirrored(&normal, ray.power - transmitted), branches);
         let ratio = n1 / n2;
         let direction = normalised([ux * ratio, uy * ratio, (along / n2).copysign(uz)]);
-        Some(Ray { direction, layer: beyond, power: transmitted, ..ray })
+        Some(Ray {
+            direction,
+            layer: beyond,
+            power: transmitted,
+            ..ray
+        })
     }
 
     fn transmittance(&self, ray: &Ray<T>, normal: &[T; 3], outside: T) -> T {
@@ -233,6 +292,8 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
             normal[2] * first[0] - normal[0] * first[2],
             normal[0] * first[1] - normal[1] * first[0],
         ];
-        normalised(core::array::from_fn(|k| radius * (cos * first[k] + sin * second[k]) - inward * normal[k]))
+        normalised(core::array::from_fn(|k| {
+            radius * (cos * first[k] + sin * second[k]) - inward * normal[k]
+        }))
     }
 }

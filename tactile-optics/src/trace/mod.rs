@@ -84,17 +84,25 @@ impl<'a, T: Real> Slab<'a, T> {
         }
         within("refractive index of the ambient", ambient, 1e-6, 1e6)?;
         within("length of the slab", length_m, 1e-9, 1e6)?;
-        Ok(Self { layers, ambient, length: length_m })
+        Ok(Self {
+            layers,
+            ambient,
+            length: length_m,
+        })
     }
 
     /// Thickness of the whole slab in metres.
     pub fn thickness_m(&self) -> T {
-        self.layers.iter().fold(T::zero(), |sum, l| sum + l.thickness_m)
+        self.layers
+            .iter()
+            .fold(T::zero(), |sum, l| sum + l.thickness_m)
     }
 
     /// z of the upper face of layer `k` (of the bottom for `k` = number of layers).
     fn face(&self, k: usize) -> T {
-        self.layers[..k].iter().fold(T::zero(), |z, l| z - l.thickness_m)
+        self.layers[..k]
+            .iter()
+            .fold(T::zero(), |z, l| z - l.thickness_m)
     }
 }
 
@@ -167,7 +175,12 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
     options: &TraceOptions<T>,
     camera_profile: &mut [T],
 ) -> Result<LightBudget<T>, OpticsError> {
-    within("number of rays", real::<T>(f64::from(options.rays)), 1.0, 4.3e9)?;
+    within(
+        "number of rays",
+        real::<T>(f64::from(options.rays)),
+        1.0,
+        4.3e9,
+    )?;
     camera_profile.fill(T::zero());
     let mut tracer = options_tracer(slab, surface, options, camera_profile)?;
     let points = Points::new(options.geometry == Geometry::Volume, options.seed);
@@ -184,10 +197,16 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
         let transmitted = weight * entry.1;
         tracer.tally.add(Fate::Entry, weight - transmitted);
         tracer.stream = sampling::hash(options.seed ^ sampling::hash(i));
-        tracer.follow(Ray { power: transmitted, ..entry.0 });
+        tracer.follow(Ray {
+            power: transmitted,
+            ..entry.0
+        });
     }
     let total = total.budget(T::one()).entry;
-    tracer.camera_profile.iter_mut().for_each(|v| *v = *v / total);
+    tracer
+        .camera_profile
+        .iter_mut()
+        .for_each(|v| *v = *v / total);
     Ok(tracer.tally.budget(total))
 }
 
@@ -200,10 +219,25 @@ fn options_tracer<'a, 's, T: Real, S: TopSurface<T> + ?Sized>(
 ) -> Result<Tracer<'a, 's, T, S>, OpticsError> {
     within("cut-off", options.cutoff, 0.0, 1.0)?;
     let right = core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7);
-    within("half angle of the camera", options.camera_half_angle, 0.0, right)?;
-    within("half width of the emitter", options.emitter_half_width_m, 0.0, 1e6)?;
+    within(
+        "half angle of the camera",
+        options.camera_half_angle,
+        0.0,
+        right,
+    )?;
+    within(
+        "half width of the emitter",
+        options.emitter_half_width_m,
+        0.0,
+        1e6,
+    )?;
     let top = as_f64(slab.layers[0].thickness_m);
-    within("depth of the surface", surface.deepest(), 0.0, top * (1.0 - 1e-6))?;
+    within(
+        "depth of the surface",
+        surface.deepest(),
+        0.0,
+        top * (1.0 - 1e-6),
+    )?;
     Ok(Tracer {
         slab,
         surface,
@@ -232,6 +266,12 @@ fn launch<T: Real>(slab: &Slab<'_, T>, z: T, y: T, outside: [T; 3]) -> (Ray<T>, 
     let (uy, uz) = (outside[1] * ratio, outside[2] * ratio);
     let along = (T::one() - uy * uy - uz * uz).max(T::zero()).sqrt();
     let position = [T::zero(), y, slab.face(layer) - depth];
-    let ray = Ray { position, direction: [along, uy, uz], layer, power: T::zero(), events: 0 };
+    let ray = Ray {
+        position,
+        direction: [along, uy, uz],
+        layer,
+        power: T::zero(),
+        events: 0,
+    };
     (ray, edge.transmittance())
 }

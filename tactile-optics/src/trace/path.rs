@@ -41,7 +41,10 @@ pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
     let mut tracer: Tracer<'_, '_, T, S> = options_tracer(slab, surface, &options, &mut [])?;
     let outside = [angle.cos(), T::zero(), angle.sin()];
     let (ray, _) = launch(slab, depth_share, T::zero(), outside);
-    let mut current = Some(Ray { power: T::one(), ..ray });
+    let mut current = Some(Ray {
+        power: T::one(),
+        ..ray
+    });
     let mut written = 0;
     while let (Some(ray), true) = (current, written < vertices.len()) {
         vertices[written] = ray.position;

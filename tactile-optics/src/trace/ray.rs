@@ -22,7 +22,11 @@ impl<T: Real> Ray<T> {
     pub(crate) fn mirrored(&self, n: &[T; 3], power: T) -> Self {
         let along = dot(&self.direction, n);
         let direction = core::array::from_fn(|k| self.direction[k] - (along + along) * n[k]);
-        Self { direction: normalised(direction), power, ..*self }
+        Self {
+            direction: normalised(direction),
+            power,
+            ..*self
+        }
     }
 }
 
@@ -52,12 +56,17 @@ pub(crate) struct Branches<T> {
 
 impl<T: Real> Branches<T> {
     pub(crate) fn new() -> Self {
-        Self { rays: [None; 32], count: 0 }
+        Self {
+            rays: [None; 32],
+            count: 0,
+        }
     }
 
     /// Whether there was room.
     pub(crate) fn push(&mut self, ray: Ray<T>) -> bool {
-        let Some(slot) = self.rays.get_mut(self.count) else { return false };
+        let Some(slot) = self.rays.get_mut(self.count) else {
+            return false;
+        };
         *slot = Some(ray);
         self.count += 1;
         true

@@ -8,8 +8,12 @@ use crate::real::{Real, real};
 
 /// Fixed-point steps for two and four dimensions.
 const STEPS_2: [f64; 4] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3, 0.0, 0.0];
-const STEPS_4: [f64; 4] =
-    [0.856_674_883_854_503, 0.733_891_856_627_126_1, 0.628_706_724_832_622, 0.538_597_257_223_612_5];
+const STEPS_4: [f64; 4] = [
+    0.856_674_883_854_503,
+    0.733_891_856_627_126_1,
+    0.628_706_724_832_622,
+    0.538_597_257_223_612_5,
+];
 
 /// A sequence of points in the unit square (two dimensions) or hypercube (four).
 #[derive(Debug, Clone, Copy)]
@@ -23,12 +27,17 @@ impl Points {
         let steps = if four { STEPS_4 } else { STEPS_2 };
         let fixed = |s: f64| (s * 18_446_744_073_709_551_616.0) as u64;
         let shift = core::array::from_fn(|k| hash(seed ^ hash(k as u64 + 1)));
-        Self { steps: steps.map(fixed), shift }
+        Self {
+            steps: steps.map(fixed),
+            shift,
+        }
     }
 
     /// The numbers of point `i`, in [0, 1).
     pub(crate) fn point<T: Real>(&self, i: u64) -> [T; 4] {
-        core::array::from_fn(|k| unit(self.shift[k].wrapping_add(self.steps[k].wrapping_mul(i + 1))))
+        core::array::from_fn(|k| {
+            unit(self.shift[k].wrapping_add(self.steps[k].wrapping_mul(i + 1)))
+        })
     }
 }
 

@@ -7,7 +7,9 @@ fn acceptance_angles_and_the_led_cone() {
     let stack = LayerStack::new(&[1.38_f64, 1.39, 1.40, 1.41], 1.0).unwrap();
     let printed = [71.98, 74.89, 78.46, 83.73];
     for (answer, printed) in stack.acceptance_angles().zip(printed) {
-        let AcceptanceAngle::Below(angle) = answer else { panic!("{answer:?}") };
+        let AcceptanceAngle::Below(angle) = answer else {
+            panic!("{answer:?}")
+        };
         // The paper truncates to two decimals.
         assert_eq!((angle.degrees() * 100.0).floor() / 100.0, printed);
     }
@@ -25,8 +27,16 @@ fn cones_at_the_extremes() {
     let thin = LayerStack::new(&[1.4, 1.0], 1.0).unwrap();
     assert!(!thin.led_cone(0.0).unwrap().is_trapped());
     assert!(dense.led_cone(3.2).is_err() && dense.led_cone(f64::NAN).is_err());
-    assert_eq!(LayerStack::<f64>::new(&[], 1.0), Err(OpticsError::Empty { quantity: "stack of layers" }));
-    assert!(LayerStack::new(&[1.4, -1.0], 1.0).is_err() && LayerStack::new(&[1.4], f64::INFINITY).is_err());
+    assert_eq!(
+        LayerStack::<f64>::new(&[], 1.0),
+        Err(OpticsError::Empty {
+            quantity: "stack of layers"
+        })
+    );
+    assert!(
+        LayerStack::new(&[1.4, -1.0], 1.0).is_err()
+            && LayerStack::new(&[1.4], f64::INFINITY).is_err()
+    );
 }
 
 #[test]
@@ -49,18 +59,43 @@ fn the_specification() {
     assert!((sensor.force_resolution_n(3.0) - 3.0 * one_sigma).abs() < 1e-18);
     assert!((sensor.force_levels(3.0) * 3.0 * one_sigma - 2.0).abs() < 1e-12);
     assert_eq!(2.0 / PAPER_FORCE_SENSITIVITY_N, 800.0);
-    assert_eq!(FINGERTIP_FORCE_SENSITIVITY_N / PAPER_FORCE_SENSITIVITY_N, 8.0);
-    assert!(SensorSpecification { side_m: 0.0, ..sensor }.validated().is_err());
-    assert!(SensorSpecification { pixel_noise_grey: f64::NAN, ..sensor }.validated().is_err());
-    assert!(SensorSpecification { pixel_noise_grey: 0.0, ..sensor }.validated().is_ok());
+    assert_eq!(
+        FINGERTIP_FORCE_SENSITIVITY_N / PAPER_FORCE_SENSITIVITY_N,
+        8.0
+    );
+    assert!(
+        SensorSpecification {
+            side_m: 0.0,
+            ..sensor
+        }
+        .validated()
+        .is_err()
+    );
+    assert!(
+        SensorSpecification {
+            pixel_noise_grey: f64::NAN,
+            ..sensor
+        }
+        .validated()
+        .is_err()
+    );
+    assert!(
+        SensorSpecification {
+            pixel_noise_grey: 0.0,
+            ..sensor
+        }
+        .validated()
+        .is_ok()
+    );
 }
 
 #[test]
 fn indices_and_abbe_numbers_of_the_materials() {
     let d = 587.56e-9_f64;
-    for (material, index, abbe, tolerance) in
-        [(Dispersion::N_BK7, 1.5168, 64.17, 2e-5), (Dispersion::BOROFLOAT_33, 1.471, 65.41, 6e-4)]
-    {
+    for (material, index, abbe, tolerance) in [
+        (Dispersion::N_BK7, 1.5168, 64.17, 2e-5),
+        (Dispersion::BOROFLOAT_33, 1.471, 65.41, 6e-4),
+    ] {
         assert!((material.index(d).unwrap() - index).abs() < tolerance);
         assert!((material.abbe_number::<f64>().unwrap() / abbe - 1.0).abs() < 0.02);
     }
@@ -78,9 +113,12 @@ fn indices_and_abbe_numbers_of_the_materials() {
     assert!(Dispersion::N_BK7.index(f64::NAN).is_err());
     // Normal dispersion: the index falls with the wavelength.
     let falling = |m: Dispersion| {
-        (400..700).all(|nm| m.index(nm as f64 * 1e-9).unwrap() > m.index((nm + 1) as f64 * 1e-9).unwrap())
+        (400..700)
+            .all(|nm| m.index(nm as f64 * 1e-9).unwrap() > m.index((nm + 1) as f64 * 1e-9).unwrap())
     };
     assert!(
-        falling(Dispersion::N_BK7) && falling(Dispersion::BOROFLOAT_33) && falling(Dispersion::PDMS_20_1)
+        falling(Dispersion::N_BK7)
+            && falling(Dispersion::BOROFLOAT_33)
+            && falling(Dispersion::PDMS_20_1)
     );
 }

@@ -12,7 +12,8 @@ const EPS: f64 = f64::EPSILON;
 
 fn reference() -> Option<Value> {
     let home = std::env::var_os("TACTILE_DATA").map(PathBuf::from);
-    let home = home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data").into());
+    let home =
+        home.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data").into());
     let path = home.join("reference/optics.json");
     let Ok(text) = std::fs::read_to_string(&path) else {
         eprintln!("skipped: no reference numbers at {}", path.display());
@@ -21,7 +22,11 @@ fn reference() -> Option<Value> {
     let data: Value = serde_json::from_str(&text).unwrap();
     for check in data["header"]["parse_check"].as_array().unwrap() {
         let bits = u64::from_str_radix(&check["bits"].as_str().unwrap()[2..], 16).unwrap();
-        assert_eq!(number(&check["value"]).to_bits(), bits, "numbers must parse to the nearest double");
+        assert_eq!(
+            number(&check["value"]).to_bits(),
+            bits,
+            "numbers must parse to the nearest double"
+        );
     }
     Some(data)
 }
@@ -36,7 +41,11 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 /// Relative error; against zero, the absolute one.
 fn error(found: f64, expected: f64) -> f64 {
-    if expected == 0.0 { found.abs() } else { ((found - expected) / expected).abs() }
+    if expected == 0.0 {
+        found.abs()
+    } else {
+        ((found - expected) / expected).abs()
+    }
 }
 
 /// Largest error seen and number of values compared.
@@ -49,7 +58,10 @@ struct Score {
 impl Score {
     fn check(&mut self, found: f64, expected: f64, tolerance: f64, what: &str) {
         let error = error(found, expected);
-        assert!(error <= tolerance, "{what}: {found} against {expected}, error {error:e} > {tolerance:e}");
+        assert!(
+            error <= tolerance,
+            "{what}: {found} against {expected}, error {error:e} > {tolerance:e}"
+        );
         self.values += 1;
         self.worst = self.worst.max(error / tolerance);
     }
@@ -66,28 +78,58 @@ fn check_stack(case: &Value, score: &mut Score) {
     let (n0, indices) = (number(&case["n0"]), numbers(&case["indices"]));
     let what = case["id"].as_str().unwrap();
     for (&n, layer) in indices.iter().zip(case["layers"].as_array().unwrap()) {
-        match (critical_angle(n, n0).unwrap(), layer["critical_status"].as_str().unwrap()) {
+        match (
+            critical_angle(n, n0).unwrap(),
+            layer["critical_status"].as_str().unwrap(),
+        ) {
             (CriticalAngle::Beyond(angle), "ok") => score.angle(&angle, layer, "critical", what),
             (CriticalAngle::Never, "undefined") => {}
             other => panic!("{what}: {other:?}"),
         }
-        match (acceptance_angle(n, n0).unwrap(), layer["acceptance_status"].as_str().unwrap()) {
+        match (
+            acceptance_angle(n, n0).unwrap(),
+            layer["acceptance_status"].as_str().unwrap(),
+        ) {
             (AcceptanceAngle::Below(angle), "ok") => score.angle(&angle, layer, "acceptance", what),
-            (AcceptanceAngle::AllTrapped, "unlimited") | (AcceptanceAngle::NoneTrapped, "undefined") => {}
+            (AcceptanceAngle::AllTrapped, "unlimited")
+            | (AcceptanceAngle::NoneTrapped, "undefined") => {}
             other => panic!("{what}: {other:?}"),
         }
     }
     let normal = LayerStack::new(&indices, n0).unwrap().normal_incidence();
-    score.check(normal.single_pass, number(&case["normal_T_single_pass"]), 1e-13, what);
-    score.check(normal.transmittance, number(&case["normal_T_incoherent"]), 1e-13, what);
-    score.check(normal.reflectance, number(&case["normal_R_incoherent"]), 1e-13, what);
+    score.check(
+        normal.single_pass,
+        number(&case["normal_T_single_pass"]),
+        1e-13,
+        what,
+    );
+    score.check(
+        normal.transmittance,
+        number(&case["normal_T_incoherent"]),
+        1e-13,
+        what,
+    );
+    score.check(
+        normal.reflectance,
+        number(&case["normal_R_incoherent"]),
+        1e-13,
+        what,
+    );
 }
 
 fn check_snell(case: &Value, score: &mut Score) {
     let (n0, indices) = (number(&case["n0"]), numbers(&case["indices"]));
     let (invariant, what) = (number(&case["invariant"]), case["id"].as_str().unwrap());
-    let expected = case["layers"].as_array().unwrap().iter().chain(std::iter::once(&case["ambient"]));
-    let found: Vec<_> = LayerStack::new(&indices, n0).unwrap().propagation(invariant).unwrap().collect();
+    let expected = case["layers"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .chain(std::iter::once(&case["ambient"]));
+    let found: Vec<_> = LayerStack::new(&indices, n0)
+        .unwrap()
+        .propagation(invariant)
+        .unwrap()
+        .collect();
     let ambient = propagation(n0, invariant).unwrap();
     for (found, expected) in found.iter().chain(std::iter::once(&ambient)).zip(expected) {
         match (found, expected["status"].as_str().unwrap()) {
@@ -103,7 +145,12 @@ fn check_snell(case: &Value, score: &mut Score) {
 
 fn check_fresnel(case: &Value, score: &mut Score) {
     let at = |name: &str| number(&case[name]);
-    let (n1, n2, theta, what) = (at("n1"), at("n2"), at("theta_rad"), case["id"].as_str().unwrap());
+    let (n1, n2, theta, what) = (
+        at("n1"),
+        at("n2"),
+        at("theta_rad"),
+        case["id"].as_str().unwrap(),
+    );
     let found = fresnel(n1, n2, theta).unwrap();
     let total = case["expected"]["status"].as_str() == Some("total");
     if found.is_total() != total {
@@ -116,8 +163,16 @@ fn check_fresnel(case: &Value, score: &mut Score) {
         assert!(found.transmittance() < 1e-6, "{what}");
         score.values += 1;
     } else if total {
-        assert_eq!((found.reflectance_s, found.reflectance_p), (1.0, 1.0), "{what}");
-        assert_eq!((found.transmittance_s, found.transmittance_p), (0.0, 0.0), "{what}");
+        assert_eq!(
+            (found.reflectance_s, found.reflectance_p),
+            (1.0, 1.0),
+            "{what}"
+        );
+        assert_eq!(
+            (found.transmittance_s, found.transmittance_p),
+            (0.0, 0.0),
+            "{what}"
+        );
         score.values += 1;
     } else {
         check_partial(case, &found, score);
@@ -140,7 +195,11 @@ impl Condition {
         let refracted = ((n2 - n1 * sine) * (n2 + n1 * sine)).max(n2 * n2 * EPS);
         let grazing = theta * n1 * n1 * sine * cosine / refracted;
         let brewster = theta * (n2 * sine + n1 * cosine) / (n2 * cosine - n1 * sine).abs().max(EPS);
-        Self { refracted, grazing, brewster }
+        Self {
+            refracted,
+            grazing,
+            brewster,
+        }
     }
 }
 
@@ -150,27 +209,53 @@ fn tolerance(condition: f64) -> f64 {
 
 /// Part of the light passes: angle, transmittances and reflectances.
 fn check_partial(case: &Value, found: &Fresnel<f64>, score: &mut Score) {
-    let (n1, n2, what) = (number(&case["n1"]), number(&case["n2"]), case["id"].as_str().unwrap());
+    let (n1, n2, what) = (
+        number(&case["n1"]),
+        number(&case["n2"]),
+        case["id"].as_str().unwrap(),
+    );
     let value = |name: &str| number(&case["expected"][name]);
     let condition = Condition::of(n1, n2, number(&case["theta_rad"]));
     let (grazing, angle) = (condition.grazing, found.refraction.unwrap().radians());
-    score.check(angle, value("theta_t"), tolerance(grazing * condition.refracted.sqrt()), what);
+    score.check(
+        angle,
+        value("theta_t"),
+        tolerance(grazing * condition.refracted.sqrt()),
+        what,
+    );
     score.check(found.transmittance_s, value("Ts"), tolerance(grazing), what);
     score.check(found.transmittance_p, value("Tp"), tolerance(grazing), what);
     if n1 == n2 {
         // No interface: the reference has the rounding of its own 80 digits.
-        assert_eq!((found.reflectance_s, found.reflectance_p), (0.0, 0.0), "{what}");
+        assert_eq!(
+            (found.reflectance_s, found.reflectance_p),
+            (0.0, 0.0),
+            "{what}"
+        );
         return;
     }
     // R = 1 − T: where T is small, its error is an absolute one of R.
     let of_reflectance = |t: f64| tolerance(2.0 * grazing * t.min(1.0));
-    score.check(found.reflectance_s, value("Rs"), of_reflectance(value("Ts")), what);
-    score.check(found.reflectance(), value("R"), of_reflectance(value("Tp")), what);
+    score.check(
+        found.reflectance_s,
+        value("Rs"),
+        of_reflectance(value("Ts")),
+        what,
+    );
+    score.check(
+        found.reflectance(),
+        value("R"),
+        of_reflectance(value("Tp")),
+        what,
+    );
     if condition.brewster < 1e6 {
         let cond = tolerance(2.0 * condition.brewster).max(of_reflectance(value("Tp")));
         score.check(found.reflectance_p, value("Rp"), cond, what);
     } else {
-        assert!((found.reflectance_p - value("Rp")).abs() < 1e-15, "{what}: Rp at Brewster's angle");
+        assert!(
+            (found.reflectance_p - value("Rp")).abs() < 1e-15,
+            "{what}: Rp at Brewster's angle"
+        );
         score.values += 1;
     }
 }
@@ -188,6 +273,9 @@ fn every_reference_case_agrees() {
         }
         cases += 1;
     }
-    println!("{cases} cases, {} values, worst error {:.3} of its tolerance", score.values, score.worst);
+    println!(
+        "{cases} cases, {} values, worst error {:.3} of its tolerance",
+        score.values, score.worst
+    );
     assert_eq!(cases, data["header"]["case_count"].as_u64().unwrap());
 }

@@ -31,9 +31,15 @@ fn single_precision_keeps_its_digits_within_ulps_of_the_edges() {
                         agrees(a.complement(), b.complement(), 4.0, "its complement");
                     }
                     // Which of the answers it is, is decided exactly in either scalar.
-                    (a, b) => assert_eq!(std::mem::discriminant(&erase(a)), std::mem::discriminant(&b)),
+                    (a, b) => assert_eq!(
+                        std::mem::discriminant(&erase(a)),
+                        std::mem::discriminant(&b)
+                    ),
                 }
-                match (critical_angle(n, n0).unwrap(), critical_angle(f64::from(n), f64::from(n0)).unwrap()) {
+                match (
+                    critical_angle(n, n0).unwrap(),
+                    critical_angle(f64::from(n), f64::from(n0)).unwrap(),
+                ) {
                     (CriticalAngle::Beyond(a), CriticalAngle::Beyond(b)) => {
                         agrees(a.radians(), b.radians(), 4.0, "critical angle");
                         agrees(a.complement(), b.complement(), 4.0, "its complement");
@@ -78,7 +84,11 @@ fn reflectance_of_nearly_equal_media_is_the_square_of_the_step() {
 #[test]
 fn grazing_transmittance_is_linear_in_the_complement() {
     // T_s → 4 n₁ c₁/√(n₂² − n₁²) as the angle nears π/2: halving the complement halves it.
-    let near = |c: f64| fresnel(1.0, 1.4, std::f64::consts::FRAC_PI_2 - c).unwrap().transmittance_s;
+    let near = |c: f64| {
+        fresnel(1.0, 1.4, std::f64::consts::FRAC_PI_2 - c)
+            .unwrap()
+            .transmittance_s
+    };
     for c in [1e-4, 1e-6, 1e-8] {
         let complement = std::f64::consts::FRAC_PI_2 - (std::f64::consts::FRAC_PI_2 - c);
         let expected = 4.0 * complement / (1.4_f64 * 1.4 - 1.0).sqrt();
@@ -88,8 +98,16 @@ fn grazing_transmittance_is_linear_in_the_complement() {
 
 #[test]
 fn nothing_allocates() {
-    let layers =
-        [SlabLayer { index: 1.41_f64, thickness_m: 2e-3 }, SlabLayer { index: 1.40, thickness_m: 8e-3 }];
+    let layers = [
+        SlabLayer {
+            index: 1.41_f64,
+            thickness_m: 2e-3,
+        },
+        SlabLayer {
+            index: 1.40,
+            thickness_m: 8e-3,
+        },
+    ];
     let indices = [1.38, 1.39, 1.40, 1.41];
     let mut profile = [0.0; 16];
     let mut vertices = [[0.0; 3]; 64];
@@ -99,7 +117,10 @@ fn nothing_allocates() {
         assert!(angles > 0.0 && stack.normal_incidence().transmittance > 0.9);
         let slab = Slab::new(&layers, 1.0, 30e-3).unwrap();
         let dimple = Dimple::new([15e-3, 0.0], 4e-3, 1.5e-3).unwrap();
-        let options = TraceOptions { rays: 500, ..TraceOptions::default() };
+        let options = TraceOptions {
+            rays: 500,
+            ..TraceOptions::default()
+        };
         trace(&slab, &Led::lambertian(), &dimple, &options, &mut profile).unwrap();
         path(&slab, &dimple, 0.3, 0.4, &mut vertices).unwrap();
     });
@@ -108,36 +129,104 @@ fn nothing_allocates() {
 
 #[test]
 fn a_path_stays_in_the_slab_and_ends_where_light_leaves() {
-    let layers = [SlabLayer { index: 1.41_f64, thickness_m: 5e-3 }];
+    let layers = [SlabLayer {
+        index: 1.41_f64,
+        thickness_m: 5e-3,
+    }];
     let slab = Slab::new(&layers, 1.0, 30e-3).unwrap();
     let mut vertices = [[0.0; 3]; 200];
-    let guided = path(&slab, &tactile_optics::surface::Flat, 0.5, 1.0, &mut vertices).unwrap();
-    assert!((vertices[guided - 1][0] - 30e-3).abs() < 1e-12, "trapped: it reaches the far edge");
-    assert!(vertices[..guided].iter().all(|v| v[2] <= 0.0 && v[2] >= -5e-3 - 1e-15));
+    let guided = path(
+        &slab,
+        &tactile_optics::surface::Flat,
+        0.5,
+        1.0,
+        &mut vertices,
+    )
+    .unwrap();
+    assert!(
+        (vertices[guided - 1][0] - 30e-3).abs() < 1e-12,
+        "trapped: it reaches the far edge"
+    );
+    assert!(
+        vertices[..guided]
+            .iter()
+            .all(|v| v[2] <= 0.0 && v[2] >= -5e-3 - 1e-15)
+    );
     // In a slab of 1.2 a ray at 60° is beyond the acceptance angle of 41.6° and leaves at the top, which it meets first.
-    let thin = [SlabLayer { index: 1.2_f64, thickness_m: 5e-3 }];
+    let thin = [SlabLayer {
+        index: 1.2_f64,
+        thickness_m: 5e-3,
+    }];
     let slab = Slab::new(&thin, 1.0, 30e-3).unwrap();
-    let leaves =
-        path(&slab, &tactile_optics::surface::Flat, 0.5, 60_f64.to_radians(), &mut vertices).unwrap();
-    assert!(leaves == 2 && vertices[1][2].abs() < 1e-15, "{:?}", &vertices[..leaves]);
-    assert!(path(&slab, &tactile_optics::surface::Flat, 1.5, 0.0, &mut vertices).is_err());
-    assert!(path(&slab, &tactile_optics::surface::Flat, 0.5, f64::NAN, &mut vertices).is_err());
+    let leaves = path(
+        &slab,
+        &tactile_optics::surface::Flat,
+        0.5,
+        60_f64.to_radians(),
+        &mut vertices,
+    )
+    .unwrap();
+    assert!(
+        leaves == 2 && vertices[1][2].abs() < 1e-15,
+        "{:?}",
+        &vertices[..leaves]
+    );
+    assert!(
+        path(
+            &slab,
+            &tactile_optics::surface::Flat,
+            1.5,
+            0.0,
+            &mut vertices
+        )
+        .is_err()
+    );
+    assert!(
+        path(
+            &slab,
+            &tactile_optics::surface::Flat,
+            0.5,
+            f64::NAN,
+            &mut vertices
+        )
+        .is_err()
+    );
 }
 
 #[test]
 fn meaningless_input_is_named() {
     for bad in [f64::NAN, f64::INFINITY, 0.0, -1.4] {
-        assert!(matches!(acceptance_angle(bad, 1.0), Err(OpticsError::OutOfRange { .. })));
-        assert!(matches!(critical_angle(1.4, bad), Err(OpticsError::OutOfRange { .. })));
-        assert!(matches!(fresnel(bad, 1.0, 0.1), Err(OpticsError::OutOfRange { .. })));
-        assert!(matches!(fresnel(1.0, bad, 0.1), Err(OpticsError::OutOfRange { .. })));
-        assert!(matches!(propagation(bad, 0.1), Err(OpticsError::OutOfRange { .. })));
+        assert!(matches!(
+            acceptance_angle(bad, 1.0),
+            Err(OpticsError::OutOfRange { .. })
+        ));
+        assert!(matches!(
+            critical_angle(1.4, bad),
+            Err(OpticsError::OutOfRange { .. })
+        ));
+        assert!(matches!(
+            fresnel(bad, 1.0, 0.1),
+            Err(OpticsError::OutOfRange { .. })
+        ));
+        assert!(matches!(
+            fresnel(1.0, bad, 0.1),
+            Err(OpticsError::OutOfRange { .. })
+        ));
+        assert!(matches!(
+            propagation(bad, 0.1),
+            Err(OpticsError::OutOfRange { .. })
+        ));
     }
     for bad in [f64::NAN, -0.1, 1.6] {
         assert!(fresnel(1.0, 1.4, bad).is_err());
     }
     assert!(propagation(1.4, -0.1).is_err() && propagation(1.4, f64::NAN).is_err());
-    assert!(LayerStack::new(&[1.4], 1.0).unwrap().propagation(f64::INFINITY).is_err());
+    assert!(
+        LayerStack::new(&[1.4], 1.0)
+            .unwrap()
+            .propagation(f64::INFINITY)
+            .is_err()
+    );
 }
 
 proptest! {

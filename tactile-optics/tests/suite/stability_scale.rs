@@ -17,7 +17,10 @@ fn angles_have_all_their_digits() {
         let at = |key: &str| case[key].as_f64().unwrap_or(f64::NAN);
         let name = case["name"].as_str().unwrap();
         let mut enter = |angle: Angle<f64>, which: &str| {
-            for (found, key) in [(angle.radians(), "rad"), (angle.complement(), "complement_rad")] {
+            for (found, key) in [
+                (angle.radians(), "rad"),
+                (angle.complement(), "complement_rad"),
+            ] {
                 let expected = at(&format!("{which}_{key}"));
                 let units = (found / expected - 1.0).abs() / f64::EPSILON;
                 table.enter(&format!("{which} angle, {name}"), units, ALLOWED);

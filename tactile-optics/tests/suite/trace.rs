@@ -8,14 +8,30 @@ use tactile_optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, trace};
 use tactile_optics::{OpticsError, Real, acceptance_angle, fresnel};
 
 const PAPER: [SlabLayer<f64>; 4] = [
-    SlabLayer { index: 1.41, thickness_m: 2e-3 },
-    SlabLayer { index: 1.40, thickness_m: 3e-3 },
-    SlabLayer { index: 1.39, thickness_m: 5e-3 },
-    SlabLayer { index: 1.4715, thickness_m: 2e-3 },
+    SlabLayer {
+        index: 1.41,
+        thickness_m: 2e-3,
+    },
+    SlabLayer {
+        index: 1.40,
+        thickness_m: 3e-3,
+    },
+    SlabLayer {
+        index: 1.39,
+        thickness_m: 5e-3,
+    },
+    SlabLayer {
+        index: 1.4715,
+        thickness_m: 2e-3,
+    },
 ];
 
 fn section(rays: u32) -> TraceOptions<f64> {
-    TraceOptions { geometry: Geometry::Section, rays, ..TraceOptions::default() }
+    TraceOptions {
+        geometry: Geometry::Section,
+        rays,
+        ..TraceOptions::default()
+    }
 }
 
 fn flat(layers: &[SlabLayer<f64>], length: f64, options: &TraceOptions<f64>) -> LightBudget<f64> {
@@ -36,7 +52,9 @@ fn guided_by_unfolding(n: f64, thickness: f64, length: f64, steps: usize) -> f64
         let theta = ((i as f64 + 0.5) / steps as f64 - 0.5) * PI;
         let inside = (theta.sin() / n).asin();
         let entry = fresnel(1.0, n, theta.abs()).unwrap().transmittance();
-        let kept = fresnel(n, 1.0, FRAC_PI_2 - inside.abs()).unwrap().reflectance();
+        let kept = fresnel(n, 1.0, FRAC_PI_2 - inside.abs())
+            .unwrap()
+            .reflectance();
         for k in 0..64 {
             let start = (f64::from(k) + 0.5) / 64.0 * thickness;
             let unfolded = start + length * inside.abs().tan();
@@ -49,21 +67,42 @@ fn guided_by_unfolding(n: f64, thickness: f64, length: f64, steps: usize) -> f64
 
 #[test]
 fn a_flat_layer_guides_what_unfolding_says() {
-    let layer = [SlabLayer { index: 1.38, thickness_m: 10e-3 }];
+    let layer = [SlabLayer {
+        index: 1.38,
+        thickness_m: 10e-3,
+    }];
     let expected = guided_by_unfolding(1.38, 10e-3, 30e-3, 20_000);
     let found = flat(&layer, 30e-3, &section(1 << 16));
     assert_conserved(&found);
     // 65 536 even points against jumps in the number of reflections: the next test shows the rate.
-    assert!((found.guided - expected).abs() < 2e-5, "{} against {expected}", found.guided);
+    assert!(
+        (found.guided - expected).abs() < 2e-5,
+        "{} against {expected}",
+        found.guided
+    );
 }
 
 #[test]
 fn the_error_falls_faster_than_with_random_rays() {
-    let layer = [SlabLayer { index: 1.38, thickness_m: 10e-3 }];
+    let layer = [SlabLayer {
+        index: 1.38,
+        thickness_m: 10e-3,
+    }];
     let expected = guided_by_unfolding(1.38, 10e-3, 30e-3, 40_000);
     // Root mean square over shifts of the starting points.
     let error = |rays: u32| {
-        let of_seed = |seed| flat(&layer, 30e-3, &TraceOptions { seed, ..section(rays) }).guided - expected;
+        let of_seed = |seed| {
+            flat(
+                &layer,
+                30e-3,
+                &TraceOptions {
+                    seed,
+                    ..section(rays)
+                },
+            )
+            .guided
+                - expected
+        };
         ((0..16).map(|s| of_seed(s).powi(2)).sum::<f64>() / 16.0).sqrt()
     };
     let errors = [256, 4096, 65536].map(error);
@@ -76,11 +115,19 @@ fn the_error_falls_faster_than_with_random_rays() {
 fn a_long_slab_keeps_the_trapped_share() {
     // What enters within the acceptance angle stays for ever; of the rest, only rays within 1e-4 rad of it are still on
     // their way after 40 000 thicknesses.
-    let layer = [SlabLayer { index: 1.35, thickness_m: 1e-3 }];
+    let layer = [SlabLayer {
+        index: 1.35,
+        thickness_m: 1e-3,
+    }];
     let acceptance = acceptance_angle(1.35, 1.0).unwrap();
     let led = Led::new(1.0, FRAC_PI_2).unwrap();
     for geometry in [Geometry::Section, Geometry::Volume] {
-        let options = TraceOptions { geometry, rays: 20_000, cutoff: 1e-12, ..TraceOptions::default() };
+        let options = TraceOptions {
+            geometry,
+            rays: 20_000,
+            cutoff: 1e-12,
+            ..TraceOptions::default()
+        };
         let slab = Slab::new(&layer, 1.0, 1.0).unwrap();
         let found = trace(&slab, &led, &Flat, &options, &mut []).unwrap();
         assert_conserved(&found);
@@ -94,7 +141,10 @@ fn a_long_slab_keeps_the_trapped_share() {
         let narrow = Led::new(1.0, acceptance.radians() * 0.99).unwrap();
         assert!((narrow.trapped_share(acceptance, Geometry::Section) - 1.0).abs() < 1e-12);
         let all = trace(&slab, &narrow, &Flat, &options, &mut []).unwrap();
-        assert!(all.leaked() == 0.0 && (all.guided_of_entered() - 1.0).abs() < 1e-12, "{all:?}");
+        assert!(
+            all.leaked() == 0.0 && (all.guided_of_entered() - 1.0).abs() < 1e-12,
+            "{all:?}"
+        );
     }
 }
 
@@ -112,20 +162,32 @@ fn closed_forms_of_the_trapped_share() {
     assert!((even.trapped_share(acceptance, Geometry::Volume) - s).abs() < 1e-10);
     let dense = acceptance_angle(1.5, 1.0).unwrap();
     assert!((led.trapped_share(dense, Geometry::Volume) - 1.0).abs() < 1e-12);
-    assert_eq!(led.trapped_share(acceptance_angle(1.0, 1.2).unwrap(), Geometry::Volume), 0.0);
+    assert_eq!(
+        led.trapped_share(acceptance_angle(1.0, 1.2).unwrap(), Geometry::Volume),
+        0.0
+    );
 }
 
 #[test]
 fn energy_is_conserved_whatever_the_scene() {
-    let object = TouchingObject { index: 1.45, albedo: 0.7 };
+    let object = TouchingObject {
+        index: 1.45,
+        albedo: 0.7,
+    };
     let dimple = Dimple::new([12e-3, 1e-3], 5e-3, 1.9e-3).unwrap();
     let touched = Touched::new(dimple, object, [12e-3, 1e-3], 2e-3).unwrap();
     for geometry in [Geometry::Section, Geometry::Volume] {
         for layers in [&PAPER[..], &PAPER[..1], &PAPER[1..3]] {
-            let options = TraceOptions { geometry, rays: 3000, cutoff: 1e-7, ..TraceOptions::default() };
+            let options = TraceOptions {
+                geometry,
+                rays: 3000,
+                cutoff: 1e-7,
+                ..TraceOptions::default()
+            };
             let slab = Slab::new(layers, 1.0, 30e-3).unwrap();
             let mut profile = [0.0; 30];
-            let budget = trace(&slab, &Led::lambertian(), &touched, &options, &mut profile).unwrap();
+            let budget =
+                trace(&slab, &Led::lambertian(), &touched, &options, &mut profile).unwrap();
             assert_conserved(&budget);
             assert!(budget.unresolved < 1e-4, "{budget:?}");
             assert!((profile.iter().sum::<f64>() - budget.camera).abs() < 1e-13);
@@ -141,8 +203,13 @@ fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_
     let led = Led::new(1.0, 70_f64.to_radians()).unwrap();
     let centre = [15e-3, 0.0];
     let camera = |surface: &dyn TopSurface<f64>| {
-        let options = TraceOptions { camera_half_angle: 1.0, ..section(20_000) };
-        trace(&slab, &led, surface, &options, &mut []).unwrap().camera
+        let options = TraceOptions {
+            camera_half_angle: 1.0,
+            ..section(20_000)
+        };
+        trace(&slab, &led, surface, &options, &mut [])
+            .unwrap()
+            .camera
     };
     let mut before = camera(&Flat);
     for slope in [0.1, 0.2, 0.4] {
@@ -181,11 +248,21 @@ fn every_seed_tells_the_same_and_a_section_stays_in_its_plane() {
                 emitter_half_width_m: 5e-3,
                 ..TraceOptions::default()
             };
-            trace(&slab, &Led::new(1.0, 1.2).unwrap(), &dimple, &options, &mut []).unwrap().leaked()
+            trace(
+                &slab,
+                &Led::new(1.0, 1.2).unwrap(),
+                &dimple,
+                &options,
+                &mut [],
+            )
+            .unwrap()
+            .leaked()
         };
         let seeds: Vec<f64> = [1, 2, 99, 12345].map(leaked).to_vec();
-        let (least, most) =
-            (seeds.iter().copied().fold(1.0, f64::min), seeds.iter().copied().fold(0.0, f64::max));
+        let (least, most) = (
+            seeds.iter().copied().fold(1.0, f64::min),
+            seeds.iter().copied().fold(0.0, f64::max),
+        );
         assert!(most < least * (1.0 + spread), "{geometry:?} {seeds:?}");
     }
 }
@@ -194,10 +271,15 @@ fn every_seed_tells_the_same_and_a_section_stays_in_its_plane() {
 fn mirror_images_shine_alike() {
     // Mirroring y leaves the budget of a symmetric LED alone, to the sampling's error.
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
-    let options = TraceOptions { rays: 40_000, ..TraceOptions::default() };
+    let options = TraceOptions {
+        rays: 40_000,
+        ..TraceOptions::default()
+    };
     let camera = |y: f64| {
         let dimple = Dimple::new([10e-3, y], 4e-3, 1.5e-3).unwrap();
-        trace(&slab, &Led::lambertian(), &dimple, &options, &mut []).unwrap().camera
+        trace(&slab, &Led::lambertian(), &dimple, &options, &mut [])
+            .unwrap()
+            .camera
     };
     let (left, right) = (camera(-2e-3), camera(2e-3));
     assert!((left - right).abs() < 0.02 * left, "{left} {right}");
@@ -206,12 +288,17 @@ fn mirror_images_shine_alike() {
 #[test]
 fn light_leaves_where_the_press_is() {
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
-    let object = TouchingObject { index: 1.45, albedo: 0.9 };
+    let object = TouchingObject {
+        index: 1.45,
+        albedo: 0.9,
+    };
     let touched = Touched::new(Flat, object, [18e-3, 0.0], 2e-3).unwrap();
     let mut profile = [0.0; 30];
     let led = Led::new(1.0, 70_f64.to_radians()).unwrap();
     trace(&slab, &led, &touched, &section(20_000), &mut profile).unwrap();
-    let brightest = (0..30).max_by(|&a, &b| profile[a].total_cmp(&profile[b])).unwrap();
+    let brightest = (0..30)
+        .max_by(|&a, &b| profile[a].total_cmp(&profile[b]))
+        .unwrap();
     // Scattered 12 mm above the bottom within the camera's cone, light leaves some millimetres around the contact.
     assert!((14..=22).contains(&brightest), "{profile:?}");
 }
@@ -219,14 +306,27 @@ fn light_leaves_where_the_press_is() {
 fn conserved_in<T: Real>(tolerance: f64) -> f64 {
     let r = |v: f64| T::from(v).unwrap();
     let layers = [
-        SlabLayer { index: r(1.41), thickness_m: r(2e-3) },
-        SlabLayer { index: r(1.40), thickness_m: r(8e-3) },
+        SlabLayer {
+            index: r(1.41),
+            thickness_m: r(2e-3),
+        },
+        SlabLayer {
+            index: r(1.40),
+            thickness_m: r(8e-3),
+        },
     ];
     let slab = Slab::new(&layers, r(1.0), r(30e-3)).unwrap();
     let dimple = Dimple::new([r(15e-3), r(0.0)], r(4e-3), r(1.5e-3)).unwrap();
-    let options = TraceOptions { rays: 20_000, cutoff: r(1e-5), ..TraceOptions::default() };
+    let options = TraceOptions {
+        rays: 20_000,
+        cutoff: r(1e-5),
+        ..TraceOptions::default()
+    };
     let budget = trace(&slab, &Led::lambertian(), &dimple, &options, &mut []).unwrap();
-    assert!((budget.total() - T::one()).abs().to_f64().unwrap() < tolerance, "{budget:?}");
+    assert!(
+        (budget.total() - T::one()).abs().to_f64().unwrap() < tolerance,
+        "{budget:?}"
+    );
     budget.camera.to_f64().unwrap()
 }
 
@@ -247,17 +347,49 @@ fn options_without_meaning_are_named() {
         )
     };
     assert!(bad(section(0)));
-    assert!(bad(TraceOptions { cutoff: f64::NAN, ..section(10) }));
-    assert!(bad(TraceOptions { cutoff: -1.0, ..section(10) }));
-    assert!(bad(TraceOptions { camera_half_angle: 2.0, ..section(10) }));
-    assert!(bad(TraceOptions { emitter_half_width_m: f64::INFINITY, ..section(10) }));
+    assert!(bad(TraceOptions {
+        cutoff: f64::NAN,
+        ..section(10)
+    }));
+    assert!(bad(TraceOptions {
+        cutoff: -1.0,
+        ..section(10)
+    }));
+    assert!(bad(TraceOptions {
+        camera_half_angle: 2.0,
+        ..section(10)
+    }));
+    assert!(bad(TraceOptions {
+        emitter_half_width_m: f64::INFINITY,
+        ..section(10)
+    }));
     let deep = Dimple::new([15e-3, 0.0], 4e-3, 2e-3).unwrap();
     assert!(trace(&slab, &Led::lambertian(), &deep, &section(10), &mut []).is_err());
-    assert!(Led::new(f64::NAN, 1.0).is_err() && Led::new(1.0, 0.0).is_err() && Led::new(1.0, 1.6).is_err());
+    assert!(
+        Led::new(f64::NAN, 1.0).is_err()
+            && Led::new(1.0, 0.0).is_err()
+            && Led::new(1.0, 1.6).is_err()
+    );
     assert!(Led::from_half_intensity_angle(1.6).is_err());
-    assert!(Dimple::new([0.0, f64::NAN], 1.0, 0.1).is_err() && Dimple::new([0.0, 0.0], 1.0, -0.1).is_err());
+    assert!(
+        Dimple::new([0.0, f64::NAN], 1.0, 0.1).is_err()
+            && Dimple::new([0.0, 0.0], 1.0, -0.1).is_err()
+    );
     assert!(Slab::<f64>::new(&[], 1.0, 1.0).is_err() && Slab::new(&PAPER, 0.0, 1.0).is_err());
-    assert!(Slab::new(&[SlabLayer { index: f64::NAN, thickness_m: 1.0 }], 1.0, 1.0).is_err());
-    let object = TouchingObject { index: 1.4, albedo: 1.1 };
+    assert!(
+        Slab::new(
+            &[SlabLayer {
+                index: f64::NAN,
+                thickness_m: 1.0
+            }],
+            1.0,
+            1.0
+        )
+        .is_err()
+    );
+    let object = TouchingObject {
+        index: 1.4,
+        albedo: 1.1,
+    };
     assert!(Touched::new(Flat, object, [0.0, 0.0], 1.0).is_err());
 }

@@ -104,10 +104,16 @@ impl<T: Scalar> PoissonBuffers<T> {
         aspect: T,
         source: Option<&Divergence<'_, T>>,
     ) -> Result<(), SfsError> {
-        if self.transform.as_ref().is_none_or(|transform| transform.length() != columns) {
+        if self
+            .transform
+            .as_ref()
+            .is_none_or(|transform| transform.length() != columns)
+        {
             self.transform = Some(CosineTransform::new(columns));
         }
-        let Some(transform) = self.transform.as_mut() else { return Ok(()) };
+        let Some(transform) = self.transform.as_mut() else {
+            return Ok(());
+        };
         resize(&mut self.spare, columns);
         for (pair, lines) in self.grid.chunks_mut(2 * columns).enumerate() {
             if let Some(source) = source {
@@ -117,7 +123,8 @@ impl<T: Scalar> PoissonBuffers<T> {
             transform.forward(a, if b.is_empty() { &mut self.spare } else { b });
         }
         let scale = -1.0 / columns as f64;
-        self.tridiagonal.solve(&mut self.grid, rows, columns, aspect * aspect, scale);
+        self.tridiagonal
+            .solve(&mut self.grid, rows, columns, aspect * aspect, scale);
         for lines in self.grid.chunks_mut(2 * columns) {
             let (a, b) = lines.split_at_mut(columns);
             transform.inverse(a, if b.is_empty() { &mut self.spare } else { b });

@@ -30,7 +30,14 @@ impl<T: Scalar> CosineTransform<T> {
             Complex::new(T::of(cos), T::of(-sin))
         };
         let twiddles = (0..length).map(twiddle).collect();
-        Self { length, forward, inverse, twiddles, line: vec![zero; length], scratch: vec![zero; scratch] }
+        Self {
+            length,
+            forward,
+            inverse,
+            twiddles,
+            line: vec![zero; length],
+            scratch: vec![zero; scratch],
+        }
     }
 
     pub(crate) fn length(&self) -> usize {
@@ -100,7 +107,9 @@ mod tests {
             transform.forward(&mut x, &mut y);
             for (line, spectrum) in [(&a, &x), (&b, &y)] {
                 for (k, &found) in spectrum.iter().enumerate() {
-                    let angle = |i: usize| core::f64::consts::PI * (k * (2 * i + 1)) as f64 / (2 * n) as f64;
+                    let angle = |i: usize| {
+                        core::f64::consts::PI * (k * (2 * i + 1)) as f64 / (2 * n) as f64
+                    };
                     let sum: f64 = (0..n).map(|i| line[i] * angle(i).cos()).sum();
                     // Rounding of at most 20 terms of size 6.
                     assert!((sum - found).abs() < 1e-13 * 200.0, "n {n} k {k}");

@@ -59,7 +59,13 @@ impl<'a, T: Scalar> Divergence<'a, T> {
     ) -> Self {
         let [hx, hy] = domain.pixel_size_m;
         let mask = domain.mask.as_ref().map(|mask| area.view(mask.view()));
-        Self { p: area.view(p), q: area.view(q), mask, area, scale: [hy * hy / hx, hy] }
+        Self {
+            p: area.view(p),
+            q: area.view(q),
+            mask,
+            area,
+            scale: [hy * hy / hx, hy],
+        }
     }
 
     /// h_y² div_h for all rows.
@@ -92,7 +98,11 @@ impl<'a, T: Scalar> Divergence<'a, T> {
             along(&lines.p, self.scale[0], out);
             let weights = stencil(row, rows).map(|weight: T| weight * self.scale[1]);
             // Lines beyond the ends have weight 0, whatever the ring holds there.
-            across([3, 4, 0, 1, 2].map(|offset| &lines.q[(row + offset) % 5][..]), weights, out);
+            across(
+                [3, 4, 0, 1, 2].map(|offset| &lines.q[(row + offset) % 5][..]),
+                weights,
+                out,
+            );
         }
         Ok(())
     }
@@ -113,7 +123,10 @@ impl<'a, T: Scalar> Divergence<'a, T> {
             return Ok(());
         }
         let column = line.iter().position(|x| !x.is_finite()).unwrap_or(0);
-        Err(SfsError::NonFiniteSlope { row: self.area.top + row, column: self.area.left + column })
+        Err(SfsError::NonFiniteSlope {
+            row: self.area.top + row,
+            column: self.area.left + column,
+        })
     }
 }
 

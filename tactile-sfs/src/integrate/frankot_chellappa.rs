@@ -95,11 +95,18 @@ impl<T: Scalar> FourierBuffers<T> {
             Complex::new(p, q)
         });
         self.fill(area.rows, area.columns, slopes);
-        wrong.map_or(Ok(()), |(row, column)| Err(SfsError::NonFiniteSlope { row, column }))
+        wrong.map_or(Ok(()), |(row, column)| {
+            Err(SfsError::NonFiniteSlope { row, column })
+        })
     }
 
     /// Fills the field and prepares transforms of its size.
-    pub(crate) fn fill(&mut self, rows: usize, columns: usize, values: impl Iterator<Item = Complex<T>>) {
+    pub(crate) fn fill(
+        &mut self,
+        rows: usize,
+        columns: usize,
+        values: impl Iterator<Item = Complex<T>>,
+    ) {
         self.field.clear();
         self.field.extend(values);
         self.plan(rows, columns);
@@ -120,7 +127,10 @@ impl<T: Scalar> FourierBuffers<T> {
         let [rows, columns] = plans.size;
         let scale = T::one() / T::of((rows * columns) as f64);
         for (i, value) in self.field.iter_mut().enumerate() {
-            let (u, v) = (frequency(i % columns, columns, hx), frequency(i / columns, rows, hy));
+            let (u, v) = (
+                frequency(i % columns, columns, hx),
+                frequency(i / columns, rows, hy),
+            );
             *value = (*value * factor(u, v)).scale(scale);
         }
         self.transform(true);
@@ -134,16 +144,31 @@ impl<T: Scalar> FourierBuffers<T> {
 
     fn take_real(&mut self) {
         resize(&mut self.heights, self.field.len());
-        self.heights.iter_mut().zip(&self.field).for_each(|(z, field)| *z = field.re);
+        self.heights
+            .iter_mut()
+            .zip(&self.field)
+            .for_each(|(z, field)| *z = field.re);
     }
 
     fn plan(&mut self, rows: usize, columns: usize) {
-        if self.plans.as_ref().is_some_and(|plans| plans.size == [rows, columns]) {
+        if self
+            .plans
+            .as_ref()
+            .is_some_and(|plans| plans.size == [rows, columns])
+        {
             return;
         }
         let both = |inverse| [T::plan_fft(rows, inverse), T::plan_fft(columns, inverse)];
-        let plans = Plans { size: [rows, columns], forward: both(false), inverse: both(true) };
-        let lengths = plans.forward.iter().chain(&plans.inverse).map(|fft| fft.scratch_len());
+        let plans = Plans {
+            size: [rows, columns],
+            forward: both(false),
+            inverse: both(true),
+        };
+        let lengths = plans
+            .forward
+            .iter()
+            .chain(&plans.inverse)
+            .map(|fft| fft.scratch_len());
         let zero = Complex::new(T::zero(), T::zero());
         self.scratch.resize(lengths.max().unwrap_or(0), zero);
         self.lines.resize(LANES * rows, zero);
@@ -154,7 +179,11 @@ impl<T: Scalar> FourierBuffers<T> {
     fn transform(&mut self, inverse: bool) {
         let Some(plans) = &self.plans else { return };
         let [rows, columns] = plans.size;
-        let [along_y, along_x] = if inverse { &plans.inverse } else { &plans.forward };
+        let [along_y, along_x] = if inverse {
+            &plans.inverse
+        } else {
+            &plans.forward
+        };
         along_x.process(&mut self.field, &mut self.scratch);
         for left in (0..columns).step_by(LANES) {
             let lanes = LANES.min(columns - left);
@@ -184,7 +213,10 @@ impl<T: Scalar> FourierBuffers<T> {
             let v = frequency(r, rows, hy);
             let mirrored_row = (rows - r) % rows;
             for c in 0..columns {
-                let (i, j) = (r * columns + c, mirrored_row * columns + (columns - c) % columns);
+                let (i, j) = (
+                    r * columns + c,
+                    mirrored_row * columns + (columns - c) % columns,
+                );
                 if j < i {
                     continue;
                 }
@@ -193,7 +225,11 @@ impl<T: Scalar> FourierBuffers<T> {
                 let (p, q) = ((here + there).scale(half), (here - there).scale(half));
                 let q = Complex::new(q.im, -q.re);
                 let square = u * u + v * v;
-                let factor = if square > T::zero() { scale / square } else { T::zero() };
+                let factor = if square > T::zero() {
+                    scale / square
+                } else {
+                    T::zero()
+                };
                 let sum = (p.scale(u) + q.scale(v)).scale(factor);
                 let z = Complex::new(sum.im, -sum.re);
                 self.field[i] = z;

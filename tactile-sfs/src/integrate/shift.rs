@@ -4,7 +4,11 @@ use crate::{Domain, Scalar, Surface};
 
 /// Writes the heights of the surface's box to it, all shifted so that known heights are met on average, or the mean
 /// inside the mask is 0.
-pub(crate) fn write_levelled<T: Scalar>(grid: &[T], domain: &Domain<'_, T>, surface: &mut Surface<T>) {
+pub(crate) fn write_levelled<T: Scalar>(
+    grid: &[T],
+    domain: &Domain<'_, T>,
+    surface: &mut Surface<T>,
+) {
     let area = surface.bounding_box;
     let shift = T::of(shift(grid, domain, surface));
     let mut heights = area.view_mut(surface.heights.view_mut());
@@ -17,7 +21,12 @@ pub(crate) fn write_levelled<T: Scalar>(grid: &[T], domain: &Domain<'_, T>, surf
             continue;
         };
         let mask = area.view(mask);
-        for (((to, &z), inside), &wanted) in to.iter_mut().zip(line).zip(inside.iter_mut()).zip(mask.row(r)) {
+        for (((to, &z), inside), &wanted) in to
+            .iter_mut()
+            .zip(line)
+            .zip(inside.iter_mut())
+            .zip(mask.row(r))
+        {
             if wanted {
                 (*to, *inside) = (z + shift, true);
             }
@@ -47,5 +56,9 @@ fn shift<T: Scalar>(grid: &[T], domain: &Domain<'_, T>, surface: &Surface<T>) ->
             }
         }
     }
-    if known > 0 { excess / known as f64 } else { -sum / count.max(1) as f64 }
+    if known > 0 {
+        excess / known as f64
+    } else {
+        -sum / count.max(1) as f64
+    }
 }

@@ -25,14 +25,22 @@ pub(super) struct Tridiagonal<T> {
 impl<T: Scalar> Tridiagonal<T> {
     /// Solves for every column of `grid`, whose right-hand sides are multiplied by `scale`; system 0, which is
     /// singular, gets the solution of mean 0.
-    pub(super) fn solve(&mut self, grid: &mut [T], rows: usize, columns: usize, aspect2: T, scale: f64) {
+    pub(super) fn solve(
+        &mut self,
+        grid: &mut [T],
+        rows: usize,
+        columns: usize,
+        aspect2: T,
+        scale: f64,
+    ) {
         self.pivots.resize(rows, [T::zero(); BLOCK]);
         self.wide.resize(rows);
         for left in (0..columns).step_by(BLOCK) {
             let lanes = BLOCK.min(columns - left);
             let mut lambda = [1.0; BLOCK];
             for (lane, lambda) in lambda.iter_mut().enumerate().take(lanes) {
-                let sine = (core::f64::consts::PI * (left + lane) as f64 / (2 * columns) as f64).sin();
+                let sine =
+                    (core::f64::consts::PI * (left + lane) as f64 / (2 * columns) as f64).sin();
                 *lambda = aspect2.as_f64() * 4.0 * sine * sine;
             }
             if left == 0 {
@@ -40,7 +48,11 @@ impl<T: Scalar> Tridiagonal<T> {
                 lambda[0] = 1.0;
                 self.sum_constant(grid, columns, scale);
             }
-            let block = Block { rows, stride: columns, lanes };
+            let block = Block {
+                rows,
+                stride: columns,
+                lanes,
+            };
             if lambda[..lanes].iter().any(|&lambda| lambda < WIDE_BELOW) {
                 self.wide.solve(&mut grid[left..], &block, &lambda, scale);
             } else {
@@ -67,7 +79,11 @@ impl<T: Scalar> Tridiagonal<T> {
     }
 
     fn narrow(&mut self, grid: &mut [T], block: &Block, lambda: &[T; BLOCK], scale: T) {
-        let &Block { rows, stride, lanes } = block;
+        let &Block {
+            rows,
+            stride,
+            lanes,
+        } = block;
         let settled = factor(&mut self.pivots, rows, lambda);
         let mut carry = [T::zero(); BLOCK];
         let mut before = [T::zero(); BLOCK];
@@ -82,7 +98,11 @@ impl<T: Scalar> Tridiagonal<T> {
         carry = [T::zero(); BLOCK];
         let last = last(&self.pivots, rows, settled, lambda);
         for r in (0..rows).rev() {
-            let pivots = if r + 1 == rows { &last } else { &self.pivots[r.min(settled)] };
+            let pivots = if r + 1 == rows {
+                &last
+            } else {
+                &self.pivots[r.min(settled)]
+            };
             let line = &mut grid[r * stride..r * stride + lanes];
             for ((x, carry), &pivot) in line.iter_mut().zip(&mut carry).zip(pivots) {
                 *carry = flush(pivot * (*x + *carry));
@@ -112,8 +132,18 @@ impl Wide {
         self.values.resize(rows, [0.0; BLOCK]);
     }
 
-    fn solve<T: Scalar>(&mut self, grid: &mut [T], block: &Block, lambda: &[f64; BLOCK], scale: f64) {
-        let &Block { rows, stride, lanes } = block;
+    fn solve<T: Scalar>(
+        &mut self,
+        grid: &mut [T],
+        block: &Block,
+        lambda: &[f64; BLOCK],
+        scale: f64,
+    ) {
+        let &Block {
+            rows,
+            stride,
+            lanes,
+        } = block;
         let settled = factor(&mut self.pivots, rows, lambda);
         let (mut carry, mut before) = ([0.0; BLOCK], [0.0; BLOCK]);
         for r in 0..rows {
@@ -127,12 +157,18 @@ impl Wide {
         carry = [0.0; BLOCK];
         let last = last(&self.pivots, rows, settled, lambda);
         for r in (0..rows).rev() {
-            let pivots = if r + 1 == rows { &last } else { &self.pivots[r.min(settled)] };
+            let pivots = if r + 1 == rows {
+                &last
+            } else {
+                &self.pivots[r.min(settled)]
+            };
             for ((&y, carry), &pivot) in self.values[r].iter().zip(&mut carry).zip(pivots) {
                 *carry = pivot * (y + *carry);
             }
             let line = &mut grid[r * stride..r * stride + lanes];
-            line.iter_mut().zip(&carry).for_each(|(x, &carry)| *x = T::of(carry));
+            line.iter_mut()
+                .zip(&carry)
+                .for_each(|(x, &carry)| *x = T::of(carry));
         }
     }
 }
@@ -140,7 +176,11 @@ impl Wide {
 /// 0 for what is so small that it would decay into subnormal numbers, which are slow.
 #[inline(always)]
 fn flush<T: Scalar>(x: T) -> T {
-    if x.abs() < T::min_positive_value() / T::epsilon() { T::zero() } else { x }
+    if x.abs() < T::min_positive_value() / T::epsilon() {
+        T::zero()
+    } else {
+        x
+    }
 }
 
 /// Pivots of all rows but the last; returns the row from which on they repeat.
@@ -163,7 +203,12 @@ fn factor<T: Scalar>(pivots: &mut [[T; BLOCK]], rows: usize, lambda: &[T; BLOCK]
 }
 
 /// Pivot of the last row, which has one neighbour (none if it is the only row).
-fn last<T: Scalar>(pivots: &[[T; BLOCK]], rows: usize, settled: usize, lambda: &[T; BLOCK]) -> [T; BLOCK] {
+fn last<T: Scalar>(
+    pivots: &[[T; BLOCK]],
+    rows: usize,
+    settled: usize,
+    lambda: &[T; BLOCK],
+) -> [T; BLOCK] {
     let mut last = *lambda;
     if rows == 1 {
         return last.map(T::recip);

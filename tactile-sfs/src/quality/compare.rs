@@ -62,7 +62,12 @@ impl ErrorSummary {
             pixels += 1;
         }
         let n = (pixels as f64).max(1.0);
-        Self { mean_absolute: sum / n, rms: (square / n).sqrt(), max, pixels }
+        Self {
+            mean_absolute: sum / n,
+            rms: (square / n).sqrt(),
+            max,
+            pixels,
+        }
     }
 }
 
@@ -129,14 +134,28 @@ pub fn height_error<T: Scalar>(
     let (scale, offset) = align(&pairs, alignment);
     let error = ErrorSummary::of(pairs.iter().map(|(z, t)| scale * z + offset - t));
     let [lowest, median, highest] = order_statistics(pairs.iter().map(|pair| pair.1).collect());
-    let constant_guess = pairs.iter().map(|pair| (pair.1 - median).abs()).sum::<f64>() / pairs.len() as f64;
-    Ok(HeightError { error, scale, offset, constant_guess, range: highest - lowest })
+    let constant_guess = pairs
+        .iter()
+        .map(|pair| (pair.1 - median).abs())
+        .sum::<f64>()
+        / pairs.len() as f64;
+    Ok(HeightError {
+        error,
+        scale,
+        offset,
+        constant_guess,
+        range: highest - lowest,
+    })
 }
 
 /// Lowest, median and highest of some values.
 fn order_statistics(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_by(f64::total_cmp);
-    [values[0], values[values.len() / 2], values[values.len() - 1]]
+    [
+        values[0],
+        values[values.len() / 2],
+        values[values.len() - 1],
+    ]
 }
 
 fn align(pairs: &[(f64, f64)], alignment: Alignment) -> (f64, f64) {
@@ -205,7 +224,12 @@ pub fn slope_error<T: Scalar>(
     same_shape(Input::Truth, [rows, columns], truth[1].dim())?;
     let errors: Vec<(f64, f64)> = slopes[0]
         .indexed_iter()
-        .map(|(at, p)| ((*p - truth[0][at]).as_f64(), (slopes[1][at] - truth[1][at]).as_f64()))
+        .map(|(at, p)| {
+            (
+                (*p - truth[0][at]).as_f64(),
+                (slopes[1][at] - truth[1][at]).as_f64(),
+            )
+        })
         .filter(|(p, q)| p.is_finite() && q.is_finite())
         .collect();
     if errors.is_empty() {

@@ -83,9 +83,16 @@ impl<T: Scalar> DepthTable<T> {
         let found = || contact_circle(&signals, threshold.as_f64(), step);
         let (centre_px, radius) = circle.map_or_else(found, Ok)?;
         let ball = ball_radius_m.as_f64();
-        in_range("contact radius", "less than the ball's radius", radius, radius < ball)?;
+        in_range(
+            "contact radius",
+            "less than the ball's radius",
+            radius,
+            radius < ball,
+        )?;
         let samples = cap_depths(&signals, step, centre_px, radius, ball)?;
-        let entries = monotone_means(&samples).into_iter().map(|(s, d)| (T::of(s), T::of(d)));
+        let entries = monotone_means(&samples)
+            .into_iter()
+            .map(|(s, d)| (T::of(s), T::of(d)));
         let table = DepthTable::new(&entries.collect::<Vec<_>>())?.with_signal(signal);
         let mean_residual_m = mean_residual(&table, &samples);
         Ok(BallCalibration {
@@ -101,7 +108,8 @@ impl<T: Scalar> DepthTable<T> {
 
 /// Mean |depth of the table − depth of the ball|.
 fn mean_residual<T: Scalar>(table: &DepthTable<T>, samples: &[(f64, f64)]) -> f64 {
-    let residual = |&(signal, depth): &(f64, f64)| (table.depth(T::of(signal)).0.as_f64() - depth).abs();
+    let residual =
+        |&(signal, depth): &(f64, f64)| (table.depth(T::of(signal)).0.as_f64() - depth).abs();
     samples.iter().map(residual).sum::<f64>() / samples.len() as f64
 }
 
@@ -115,7 +123,11 @@ fn signals<T: Scalar>(
     signal.check_reference(frame.dim())?;
     Ok(Array2::from_shape_fn(frame.dim(), |(row, column)| {
         let inside = domain.contains(row, column);
-        if inside { signal.of_pixel(frame, row, column).as_f64() } else { f64::NAN }
+        if inside {
+            signal.of_pixel(frame, row, column).as_f64()
+        } else {
+            f64::NAN
+        }
     }))
 }
 
@@ -129,14 +141,21 @@ fn cap_depths(
 ) -> Result<Vec<(f64, f64)>, SfsError> {
     let rim = (ball * ball - radius * radius).sqrt();
     let depth = |(row, column): (usize, usize)| {
-        let r2 =
-            ((column as f64 - centre[0]) * step[0]).powi(2) + ((row as f64 - centre[1]) * step[1]).powi(2);
+        let r2 = ((column as f64 - centre[0]) * step[0]).powi(2)
+            + ((row as f64 - centre[1]) * step[1]).powi(2);
         (r2 < radius * radius).then(|| (ball * ball - r2).sqrt() - rim)
     };
-    let finite = signals.indexed_iter().filter(|(_, signal)| signal.is_finite());
-    let samples: Vec<_> = finite.filter_map(|(at, &signal)| Some((signal, depth(at)?))).collect();
+    let finite = signals
+        .indexed_iter()
+        .filter(|(_, signal)| signal.is_finite());
+    let samples: Vec<_> = finite
+        .filter_map(|(at, &signal)| Some((signal, depth(at)?)))
+        .collect();
     if samples.len() < FEWEST {
-        return Err(SfsError::TooFewPixels { needed: FEWEST, available: samples.len() });
+        return Err(SfsError::TooFewPixels {
+            needed: FEWEST,
+            available: samples.len(),
+        });
     }
     Ok(samples)
 }
@@ -151,7 +170,9 @@ fn contact_circle(
     let above = |r: usize, c: usize| signals.get([r, c]).is_some_and(|&s| s > threshold);
     let (mut x, mut y, mut count) = (0.0, 0.0, 0usize);
     for ((r, c), _) in signals.indexed_iter().filter(|(_, s)| **s > threshold) {
-        let near = (0..9).filter(|k| above((r + k / 3).wrapping_sub(1), (c + k % 3).wrapping_sub(1))).count();
+        let near = (0..9)
+            .filter(|k| above((r + k / 3).wrapping_sub(1), (c + k % 3).wrapping_sub(1)))
+            .count();
         if near > 4 {
             x += c as f64;
             y += r as f64;
@@ -159,21 +180,38 @@ fn contact_circle(
         }
     }
     if count < FEWEST {
-        return Err(SfsError::TooFewPixels { needed: FEWEST, available: count });
+        return Err(SfsError::TooFewPixels {
+            needed: FEWEST,
+            available: count,
+        });
     }
     let n = count as f64;
-    Ok(([x / n, y / n], (n * step[0] * step[1] / core::f64::consts::PI).sqrt()))
+    Ok((
+        [x / n, y / n],
+        (n * step[0] * step[1] / core::f64::consts::PI).sqrt(),
+    ))
 }
 
 /// Mean depth of each signal level (steps of one unit), pooled until depths increase; starts at depth 0 for signal 0.
 fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let mut sorted: Vec<(i64, f64, f64)> = samples.iter().map(|&(s, d)| (s.round() as i64, s, d)).collect();
-    sorted.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2)));
+    let mut sorted: Vec<(i64, f64, f64)> = samples
+        .iter()
+        .map(|&(s, d)| (s.round() as i64, s, d))
+        .collect();
+    sorted.sort_by(|a, b| {
+        a.0.cmp(&b.0)
+            .then(a.1.total_cmp(&b.1))
+            .then(a.2.total_cmp(&b.2))
+    });
     // A block: weight, sum of signals, sum of depths.
     let mut blocks: Vec<(f64, f64, f64)> = Vec::new();
     for level in sorted.chunk_by(|a, b| a.0 == b.0) {
         let n = level.len() as f64;
-        blocks.push((n, level.iter().map(|e| e.1).sum(), level.iter().map(|e| e.2).sum()));
+        blocks.push((
+            n,
+            level.iter().map(|e| e.1).sum(),
+            level.iter().map(|e| e.2).sum(),
+        ));
         while let [.., a, b] = blocks[..] {
             if b.2 / b.0 > a.2 / a.0 {
                 break;
@@ -183,6 +221,11 @@ fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
         }
     }
     let mut entries = vec![(0.0, 0.0)];
-    entries.extend(blocks.iter().map(|b| (b.1 / b.0, b.2 / b.0)).filter(|e| e.0 > 0.0));
+    entries.extend(
+        blocks
+            .iter()
+            .map(|b| (b.1 / b.0, b.2 / b.0))
+            .filter(|e| e.0 > 0.0),
+    );
     entries
 }

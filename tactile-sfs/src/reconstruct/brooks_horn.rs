@@ -40,7 +40,14 @@ impl<T: Scalar> BrooksHorn<T> {
     /// λ = 0.02, 300 steps, a projection every 20, no occluding rim, slopes up to 10.
     pub fn new(lighting: Lighting<T>) -> Self {
         let (smoothness, max_slope) = (T::of(0.02), T::of(10.0));
-        Self { lighting, smoothness, iterations: 300, project_every: 20, occluding_rim: false, max_slope }
+        Self {
+            lighting,
+            smoothness,
+            iterations: 300,
+            project_every: 20,
+            occluding_rim: false,
+            max_slope,
+        }
     }
 
     /// λ, the weight of smoothness against the image.
@@ -56,10 +63,18 @@ impl<T: Scalar> BrooksHorn<T> {
     ///
     /// # Errors
     /// [`SfsError::InvalidOption`] if either is 0.
-    pub fn with_iterations(self, iterations: usize, project_every: usize) -> Result<Self, SfsError> {
+    pub fn with_iterations(
+        self,
+        iterations: usize,
+        project_every: usize,
+    ) -> Result<Self, SfsError> {
         positive("iterations", iterations as f64)?;
         positive("steps between projections", project_every as f64)?;
-        Ok(Self { iterations, project_every, ..self })
+        Ok(Self {
+            iterations,
+            project_every,
+            ..self
+        })
     }
 
     /// Whether the mask's border (not the frame's) is an occluding contour of a convex object.
@@ -82,7 +97,10 @@ impl<T: Scalar> BrooksHorn<T> {
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     pub fn with_occluding_rim(self, occluding_rim: bool) -> Self {
-        Self { occluding_rim, ..self }
+        Self {
+            occluding_rim,
+            ..self
+        }
     }
 
     /// Largest slope handed to the projection.
@@ -104,7 +122,9 @@ impl<T: Scalar> SurfaceReconstruction<T> for BrooksHorn<T> {
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
         let area = surface.enter(frame.dim(), domain)?;
-        workspace.field.load(&frame, domain, &self.lighting, surface)?;
+        workspace
+            .field
+            .load(&frame, domain, &self.lighting, surface)?;
         let start = [T::zero(), T::zero(), T::one()];
         for normals in [&mut workspace.field.normals, &mut workspace.field.next] {
             normals.clear();
@@ -160,8 +180,11 @@ impl<T: Scalar> BrooksHorn<T> {
             sum += misfit * misfit;
             count += 1;
             let pull = weight * (reflectance - dot(mean, light));
-            field.next[i] =
-                unit([mean[0] + pull * light[0], mean[1] + pull * light[1], mean[2] + pull * light[2]]);
+            field.next[i] = unit([
+                mean[0] + pull * light[0],
+                mean[1] + pull * light[1],
+                mean[2] + pull * light[2],
+            ]);
         }
         core::mem::swap(&mut field.normals, &mut field.next);
         (sum / T::of(count.max(1) as f64)).sqrt()
@@ -178,8 +201,13 @@ impl<T: Scalar> BrooksHorn<T> {
         let at = [row - area.top, column - area.left];
         let (mut mean, mut outward) = neighbours(&field.normals, &field.reflectance, area, at);
         // Where the frame cuts the surface off there is no rim.
-        let cut = [column == 0 || column + 1 == columns, row == 0 || row + 1 == rows];
-        (0..2).filter(|&axis| cut[axis]).for_each(|axis| outward[axis] = 0);
+        let cut = [
+            column == 0 || column + 1 == columns,
+            row == 0 || row + 1 == rows,
+        ];
+        (0..2)
+            .filter(|&axis| cut[axis])
+            .for_each(|axis| outward[axis] = 0);
         if self.occluding_rim && outward != [0, 0] {
             let length = T::of(f64::from(outward[0]).hypot(f64::from(outward[1])));
             let out = outward.map(|d| T::of(f64::from(d)) / length);
@@ -200,7 +228,11 @@ impl<T: Scalar> BrooksHorn<T> {
             let z = n[2].max(least);
             Complex::new(cut(-n[0] / z), cut(-n[1] / z))
         };
-        fourier.fill(area.rows, area.columns, field.normals.iter().zip(&field.reflectance).map(slope));
+        fourier.fill(
+            area.rows,
+            area.columns,
+            field.normals.iter().zip(&field.reflectance).map(slope),
+        );
         fourier.integrate(domain.pixel_size_m);
     }
 }
@@ -215,10 +247,20 @@ fn follow<T: Scalar>(workspace: &mut Workspace<T>, [hx, hy]: [T; 2], area: Bound
             if field.reflectance[i].is_nan() {
                 continue;
             }
-            let (left, right) = (i - usize::from(c > 0), i + usize::from(c + 1 < area.columns));
+            let (left, right) = (
+                i - usize::from(c > 0),
+                i + usize::from(c + 1 < area.columns),
+            );
             let up = if r > 0 { i - area.columns } else { i };
-            let down = if r + 1 < area.rows { i + area.columns } else { i };
-            let (p, q) = ((z[right] - z[left]) / (two * hx), (z[down] - z[up]) / (two * hy));
+            let down = if r + 1 < area.rows {
+                i + area.columns
+            } else {
+                i
+            };
+            let (p, q) = (
+                (z[right] - z[left]) / (two * hx),
+                (z[down] - z[up]) / (two * hy),
+            );
             field.normals[i] = unit([-p, -q, T::one()]);
         }
     }
@@ -234,7 +276,8 @@ fn neighbours<T: Scalar>(
     let (mut sum, mut outward) = ([T::zero(); 3], [0, 0]);
     for (dr, dc) in [(0, -1), (0, 1), (-1, 0), (1, 0)] {
         let (row, column) = (r as isize + dr, c as isize + dc);
-        let in_box = row >= 0 && column >= 0 && row < area.rows as isize && column < area.columns as isize;
+        let in_box =
+            row >= 0 && column >= 0 && row < area.rows as isize && column < area.columns as isize;
         if !in_box {
             outward = [outward[0] + dc as i32, outward[1] + dr as i32];
             continue;
@@ -257,5 +300,9 @@ fn dot<T: Scalar>(a: [T; 3], b: [T; 3]) -> T {
 
 fn unit<T: Scalar>(v: [T; 3]) -> [T; 3] {
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-    if length > T::zero() { v.map(|x| x / length) } else { [T::zero(), T::zero(), T::one()] }
+    if length > T::zero() {
+        v.map(|x| x / length)
+    } else {
+        [T::zero(), T::zero(), T::one()]
+    }
 }

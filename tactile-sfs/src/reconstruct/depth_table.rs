@@ -9,7 +9,8 @@ use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 use crate::domain::same_shape;
 use crate::error::{Input, non_negative};
 use crate::{
-    BoundingBox, Domain, Frame, PixelFlags, Scalar, SfsError, Surface, SurfaceReconstruction, Workspace,
+    BoundingBox, Domain, Frame, PixelFlags, Scalar, SfsError, Surface, SurfaceReconstruction,
+    Workspace,
 };
 
 /// What is looked up in a [`DepthTable`].
@@ -82,17 +83,24 @@ impl<T: Scalar> DepthTable<T> {
     /// [`SfsError::TableTooShort`] below two entries, [`SfsError::TableNotIncreasing`] for values out of order or NaN.
     pub fn new(entries: &[(T, T)]) -> Result<Self, SfsError> {
         if entries.len() < 2 {
-            return Err(SfsError::TableTooShort { found: entries.len() });
+            return Err(SfsError::TableTooShort {
+                found: entries.len(),
+            });
         }
         for (index, &(signal, depth)) in entries.iter().enumerate() {
             let finite = signal.is_finite() && depth.is_finite();
-            let ordered = index == 0 || (signal > entries[index - 1].0 && depth >= entries[index - 1].1);
+            let ordered =
+                index == 0 || (signal > entries[index - 1].0 && depth >= entries[index - 1].1);
             if !(finite && ordered) {
                 return Err(SfsError::TableNotIncreasing { index });
             }
         }
         let entries = entries.to_vec();
-        Ok(Self { entries, signal: Signal::Intensity, contact_threshold: T::zero() })
+        Ok(Self {
+            entries,
+            signal: Signal::Intensity,
+            contact_threshold: T::zero(),
+        })
     }
 
     /// What is looked up; the intensity itself by default.
@@ -120,7 +128,10 @@ impl<T: Scalar> DepthTable<T> {
     /// [`SfsError::InvalidOption`] unless finite and not negative.
     pub fn with_contact_threshold(self, threshold: T) -> Result<Self, SfsError> {
         non_negative("contact threshold", threshold.as_f64())?;
-        Ok(Self { contact_threshold: threshold, ..self })
+        Ok(Self {
+            contact_threshold: threshold,
+            ..self
+        })
     }
 
     /// What is looked up.
@@ -155,7 +166,14 @@ impl<T: Scalar> DepthTable<T> {
             (T::zero(), PixelFlags::NONE)
         } else {
             let (depth, inside) = self.depth(signal);
-            (depth, if inside { PixelFlags::NONE } else { PixelFlags::OUT_OF_RANGE })
+            (
+                depth,
+                if inside {
+                    PixelFlags::NONE
+                } else {
+                    PixelFlags::OUT_OF_RANGE
+                },
+            )
         }
     }
 }
@@ -197,9 +215,19 @@ impl<T: Scalar> DepthTable<T> {
         pixel: impl Fn(T) -> (T, PixelFlags),
     ) {
         let area = surface.bounding_box;
-        let Surface { heights, mask, flags, report, .. } = surface;
+        let Surface {
+            heights,
+            mask,
+            flags,
+            report,
+            ..
+        } = surface;
         for row in area.top..area.top + area.rows {
-            let line = BoundingBox { top: row, rows: 1, ..area };
+            let line = BoundingBox {
+                top: row,
+                rows: 1,
+                ..area
+            };
             let mut heights = line.view_mut(heights.view_mut());
             let mut mask = line.view_mut(mask.view_mut());
             let mut flags = line.view_mut(flags.view_mut());
@@ -208,9 +236,20 @@ impl<T: Scalar> DepthTable<T> {
                 (*height, *flag) = pixel(*height);
                 *solved = height.is_finite();
             }
-            keep_inside(domain.mask.map(|wanted| line.view(wanted)), &mut heights, &mut mask, &mut flags);
-            report.solved += mask.iter().map(|&solved| usize::from(solved)).sum::<usize>();
-            report.flagged += flags.iter().map(|flag| usize::from(!flag.is_empty())).sum::<usize>();
+            keep_inside(
+                domain.mask.map(|wanted| line.view(wanted)),
+                &mut heights,
+                &mut mask,
+                &mut flags,
+            );
+            report.solved += mask
+                .iter()
+                .map(|&solved| usize::from(solved))
+                .sum::<usize>();
+            report.flagged += flags
+                .iter()
+                .map(|flag| usize::from(!flag.is_empty()))
+                .sum::<usize>();
         }
     }
 
@@ -253,7 +292,10 @@ fn keep_inside<T: Scalar>(
 /// Known heights replace those of the table.
 fn keep_known<T: Scalar>(domain: &Domain<'_, T>, surface: &mut Surface<T>) {
     for (row, column) in surface.bounding_box.pixels() {
-        if let Some(height) = domain.known(row, column).filter(|_| domain.contains(row, column)) {
+        if let Some(height) = domain
+            .known(row, column)
+            .filter(|_| domain.contains(row, column))
+        {
             surface.report.solved += usize::from(!surface.mask[[row, column]]);
             surface.set(row, column, height);
         }
@@ -265,7 +307,9 @@ struct Levels<T>([(T, PixelFlags); 511]);
 
 impl<T: Scalar> Levels<T> {
     fn new(pixel: impl Fn(T) -> (T, PixelFlags)) -> Self {
-        Self(core::array::from_fn(|index| pixel(T::of(index as f64 - 255.0))))
+        Self(core::array::from_fn(|index| {
+            pixel(T::of(index as f64 - 255.0))
+        }))
     }
 
     /// What the table has for a signal, if the signal is one of its levels.

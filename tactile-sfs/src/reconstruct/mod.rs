@@ -57,9 +57,18 @@ pub trait SurfaceReconstruction<T: Scalar> {
     ///
     /// # Errors
     /// As [`reconstruct_with`](Self::reconstruct_with).
-    fn reconstruct(&self, image: ArrayView2<'_, T>, domain: &Domain<'_, T>) -> Result<Surface<T>, SfsError> {
+    fn reconstruct(
+        &self,
+        image: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
         let mut surface = Surface::new();
-        self.reconstruct_with(&mut Workspace::new(), Frame::Real(image), domain, &mut surface)?;
+        self.reconstruct_with(
+            &mut Workspace::new(),
+            Frame::Real(image),
+            domain,
+            &mut surface,
+        )?;
         Ok(surface)
     }
 
@@ -87,7 +96,12 @@ pub trait SurfaceReconstruction<T: Scalar> {
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError> {
         let mut surface = Surface::new();
-        self.reconstruct_with(&mut Workspace::new(), Frame::Bytes(image), domain, &mut surface)?;
+        self.reconstruct_with(
+            &mut Workspace::new(),
+            Frame::Bytes(image),
+            domain,
+            &mut surface,
+        )?;
         Ok(surface)
     }
 }

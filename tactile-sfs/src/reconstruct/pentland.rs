@@ -34,7 +34,10 @@ pub struct Pentland<T> {
 impl<T: Scalar> Pentland<T> {
     /// The method with regularisation 10⁻³.
     pub fn new(lighting: Lighting<T>) -> Self {
-        Self { lighting, regularisation: T::of(1e-3) }
+        Self {
+            lighting,
+            regularisation: T::of(1e-3),
+        }
     }
 
     /// ε in radians per pixel, below which a wave across the light is damped.
@@ -58,7 +61,10 @@ impl<T: Scalar> Pentland<T> {
     /// [`SfsError::InvalidOption`] unless positive and finite.
     pub fn with_regularisation(self, regularisation: T) -> Result<Self, SfsError> {
         positive("regularisation", regularisation.as_f64())?;
-        Ok(Self { regularisation, ..self })
+        Ok(Self {
+            regularisation,
+            ..self
+        })
     }
 }
 
@@ -71,16 +77,30 @@ impl<T: Scalar> SurfaceReconstruction<T> for Pentland<T> {
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
         if self.lighting.is_frontal() {
-            return Err(SfsError::FrontalLight { method: "Pentland's method" });
+            return Err(SfsError::FrontalLight {
+                method: "Pentland's method",
+            });
         }
         let area = surface.enter(frame.dim(), domain)?;
-        workspace.field.load(&frame, domain, &self.lighting, surface)?;
+        workspace
+            .field
+            .load(&frame, domain, &self.lighting, surface)?;
         let [sx, sy, sz] = self.lighting.direction();
         let [hx, hy] = domain.pixel_size_m;
-        let flat = |&reflectance: &T| if reflectance.is_nan() { T::zero() } else { reflectance - sz };
+        let flat = |&reflectance: &T| {
+            if reflectance.is_nan() {
+                T::zero()
+            } else {
+                reflectance - sz
+            }
+        };
         let flat = |reflectance| Complex::new(flat(reflectance), T::zero());
         let fourier = &mut workspace.fourier;
-        fourier.fill(area.rows, area.columns, workspace.field.reflectance.iter().map(flat));
+        fourier.fill(
+            area.rows,
+            area.columns,
+            workspace.field.reflectance.iter().map(flat),
+        );
         let epsilon = self.regularisation / hx;
         fourier.filter([hx, hy], |u, v| {
             // D = −i d, hence D̄/(|D|² + ε²) = i d/(d² + ε²).

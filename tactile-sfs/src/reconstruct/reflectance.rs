@@ -49,11 +49,17 @@ impl<T: Scalar> FieldBuffers<T> {
                 continue;
             }
             let value = lighting.reflectance(frame.at(row, column));
-            surface.flags[[row, column]] = PixelFlags::of_reflectance(value, T::min_positive_value());
+            surface.flags[[row, column]] =
+                PixelFlags::of_reflectance(value, T::min_positive_value());
             usable |= value.is_finite();
             let clamped = value.max(T::zero()).min(T::one());
-            self.reflectance.push(if value.is_finite() { clamped } else { T::nan() });
+            self.reflectance
+                .push(if value.is_finite() { clamped } else { T::nan() });
         }
-        if usable { Ok(()) } else { Err(SfsError::EmptyMask) }
+        if usable {
+            Ok(())
+        } else {
+            Err(SfsError::EmptyMask)
+        }
     }
 }

@@ -18,7 +18,8 @@ use super::FieldBuffers;
 use crate::error::{in_range, positive};
 use crate::integrate::shift::write_levelled;
 use crate::{
-    Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface, SurfaceReconstruction, Workspace,
+    Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface, SurfaceReconstruction,
+    Workspace,
 };
 
 /// Shape from shading by Newton's method on each pixel.
@@ -47,7 +48,13 @@ impl<T: Scalar> TsaiShah<T> {
     /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the nearest of its rim.
     pub fn new(lighting: Lighting<T>) -> Self {
         let (noise, max_slope, start_slope) = (T::of(1e-2), T::of(5.0), T::of(0.5));
-        Self { lighting, iterations: 12, noise, max_slope, start_slope }
+        Self {
+            lighting,
+            iterations: 12,
+            noise,
+            max_slope,
+            start_slope,
+        }
     }
 
     /// Number of iterations; more do not make the method converge to the surface.
@@ -99,16 +106,36 @@ impl<T: Scalar> TsaiShah<T> {
     /// # Errors
     /// [`SfsError::InvalidOption`] unless finite.
     pub fn with_start_slope(self, start_slope: T) -> Result<Self, SfsError> {
-        in_range("slope of the start", "a finite slope", start_slope.as_f64(), true)?;
-        Ok(Self { start_slope, ..self })
+        in_range(
+            "slope of the start",
+            "a finite slope",
+            start_slope.as_f64(),
+            true,
+        )?;
+        Ok(Self {
+            start_slope,
+            ..self
+        })
     }
 
     /// z = −½ s a xᵀ(4C)⁻¹x: the paraboloid whose contours are ellipses of the centre and covariance C of the pixels that
     /// carry data (a uniform ellipse ends at xᵀC⁻¹x = 4), s its slope at the ends of the minor half axis a = 2 √λ_min(C).
     fn start(&self, field: &mut FieldBuffers<T>, grid: &Grid<T>) {
         let aspect = grid.step[1].as_f64();
-        let at = |i: usize| ((i % grid.columns) as f64, (i / grid.columns) as f64 * aspect);
-        let inside = || field.reflectance.iter().enumerate().filter(|(_, r)| !r.is_nan()).map(|(i, _)| at(i));
+        let at = |i: usize| {
+            (
+                (i % grid.columns) as f64,
+                (i / grid.columns) as f64 * aspect,
+            )
+        };
+        let inside = || {
+            field
+                .reflectance
+                .iter()
+                .enumerate()
+                .filter(|(_, r)| !r.is_nan())
+                .map(|(i, _)| at(i))
+        };
         let (mut sum, mut count) = ([0.0; 2], 0.0);
         for (x, y) in inside() {
             sum = [sum[0] + x, sum[1] + y];
@@ -172,7 +199,11 @@ impl<T: Scalar> TsaiShah<T> {
     ) {
         let area = surface.bounding_box;
         let [hx, hy] = domain.pixel_size_m;
-        let grid = Grid { rows: area.rows, columns: area.columns, step: [T::one(), hy / hx] };
+        let grid = Grid {
+            rows: area.rows,
+            columns: area.columns,
+            step: [T::one(), hy / hx],
+        };
         field.reset_heights(area.area());
         self.start(field, &grid);
         surface.report.stop = StopReason::IterationLimit;
@@ -230,7 +261,14 @@ impl<T: Scalar> TsaiShah<T> {
 }
 
 /// Height of the neighbour before or after along one axis; the pixel's own at the border.
-fn neighbour<T: Scalar>(z: &[T], i: usize, at: usize, length: usize, stride: usize, back: bool) -> T {
+fn neighbour<T: Scalar>(
+    z: &[T],
+    i: usize,
+    at: usize,
+    length: usize,
+    stride: usize,
+    back: bool,
+) -> T {
     match back {
         true if at > 0 => z[i - stride],
         false if at + 1 < length => z[i + stride],

@@ -33,7 +33,12 @@ impl CurvatureAdaptive {
     /// # Errors
     /// [`SfsError::InvalidOption`] unless finite and not negative.
     pub fn new(emphasis: f64) -> Result<Self, SfsError> {
-        in_range("emphasis", "a finite number of at least zero", emphasis, emphasis >= 0.0)?;
+        in_range(
+            "emphasis",
+            "a finite number of at least zero",
+            emphasis,
+            emphasis >= 0.0,
+        )?;
         Ok(Self { emphasis })
     }
 }
@@ -47,7 +52,14 @@ impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
         let mut points = Vec::with_capacity(count);
-        self.sample_with(&mut Workspace::new(), surface, mask, pixel_size_m, count, &mut points)?;
+        self.sample_with(
+            &mut Workspace::new(),
+            surface,
+            mask,
+            pixel_size_m,
+            count,
+            &mut points,
+        )?;
         Ok(points)
     }
 
@@ -67,7 +79,11 @@ impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
         let step = pixel_size_m.map(Scalar::as_f64);
         let bends = &mut buffers.bends;
         bends.clear();
-        bends.extend(lattice.nodes().map(|node| bend(surface, lattice.pixel(node), step)));
+        bends.extend(
+            lattice
+                .nodes()
+                .map(|node| bend(surface, lattice.pixel(node), step)),
+        );
         let mean = bends.iter().sum::<f64>() / bends.len() as f64;
         if mean > 0.0 {
             let nodes = lattice.weight.iter_mut().filter(|weight| **weight > 0.0);

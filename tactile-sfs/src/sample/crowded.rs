@@ -16,14 +16,20 @@ pub(super) fn cut<T: Scalar>(
     let weight = |node: &usize| lattice.weight[*node];
     let total: f64 = all.iter().map(weight).sum();
     let width = all.len() as f64 / lattice.rows as f64;
-    let bands = (points as f64 * lattice.rows as f64 * lattice.aspect() / width).sqrt().round() as usize;
+    let bands = (points as f64 * lattice.rows as f64 * lattice.aspect() / width)
+        .sqrt()
+        .round() as usize;
     let bands = bands.clamp(1, points);
     let (mut start, mut done) = (0, 0.0);
     for band in 0..bands {
         // The band gets its share of points and of weight, and leaves a node for every point still to come.
         let (before, after) = (band * points / bands, (band + 1) * points / bands);
         let goal = total * after as f64 / points as f64;
-        let last = if band + 1 == bands { all.len() } else { all.len() - (points - after) };
+        let last = if band + 1 == bands {
+            all.len()
+        } else {
+            all.len() - (points - after)
+        };
         let mut end = start;
         while end < last && (done < goal || end < start + after - before || band + 1 == bands) {
             done += weight(&all[end]);
@@ -37,7 +43,12 @@ pub(super) fn cut<T: Scalar>(
 }
 
 /// The middle node of each of `points` runs of equal weight.
-fn pick<T: Scalar>(lattice: &Lattice<'_, T>, cells: &[usize], points: usize, chosen: &mut Vec<usize>) {
+fn pick<T: Scalar>(
+    lattice: &Lattice<'_, T>,
+    cells: &[usize],
+    points: usize,
+    chosen: &mut Vec<usize>,
+) {
     let weight = |node: usize| lattice.weight[node];
     let total: f64 = cells.iter().map(|&node| weight(node)).sum();
     let (mut start, mut done) = (0, 0.0);
@@ -58,8 +69,10 @@ fn pick<T: Scalar>(lattice: &Lattice<'_, T>, cells: &[usize], points: usize, cho
 /// The node of a run nearest to its centroid.
 fn middle(run: &[usize], columns: usize) -> Option<usize> {
     let place = |node: usize| [(node / columns) as f64, (node % columns) as f64];
-    let [row, column] =
-        [0, 1].map(|axis| run.iter().map(|&node| place(node)[axis]).sum::<f64>() / run.len() as f64);
+    let [row, column] = [0, 1]
+        .map(|axis| run.iter().map(|&node| place(node)[axis]).sum::<f64>() / run.len() as f64);
     let distance = |node: usize| (place(node)[0] - row).powi(2) + (place(node)[1] - column).powi(2);
-    run.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+    run.iter()
+        .copied()
+        .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
 }

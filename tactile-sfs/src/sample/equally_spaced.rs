@@ -44,7 +44,14 @@ impl<T: Scalar> ControlPointSampler<T> for EquallySpaced {
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
         let mut points = Vec::with_capacity(count);
-        self.sample_with(&mut Workspace::new(), surface, mask, pixel_size_m, count, &mut points)?;
+        self.sample_with(
+            &mut Workspace::new(),
+            surface,
+            mask,
+            pixel_size_m,
+            count,
+            &mut points,
+        )?;
         Ok(points)
     }
 
@@ -80,7 +87,11 @@ pub(super) fn spread<T: Scalar>(
     let SampleBuffers { nodes, chosen, .. } = buffers;
     crowded::cut(lattice, count, nodes, chosen);
     points.clear();
-    points.extend(chosen.iter().map(|&node| lattice.point(lattice.pixel(node))));
+    points.extend(
+        chosen
+            .iter()
+            .map(|&node| lattice.point(lattice.pixel(node))),
+    );
 }
 
 /// Adds the centroids of the cells; false if two of them share a pixel.

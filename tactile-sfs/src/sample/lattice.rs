@@ -42,7 +42,11 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         weight: Vec<f64>,
     ) -> Result<Self, SfsError> {
         let (rows, columns) = surface.dim();
-        let domain = Domain { mask, pixel_size_m, known_heights: None };
+        let domain = Domain {
+            mask,
+            pixel_size_m,
+            known_heights: None,
+        };
         let area = domain.validate(rows, columns)?;
         Self::with_stride(surface, domain, area, 1, weight).enough_for(points)
     }
@@ -56,7 +60,11 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         mut weight: Vec<f64>,
     ) -> Result<Self, SfsError> {
         let (rows, columns) = surface.dim();
-        let domain = Domain { mask, pixel_size_m, known_heights: None };
+        let domain = Domain {
+            mask,
+            pixel_size_m,
+            known_heights: None,
+        };
         let area = domain.validate(rows, columns)?;
         let wanted = NODES_PER_POINT * points.max(1);
         let mut stride = (area.area() / wanted).isqrt().max(1);
@@ -77,17 +85,28 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         stride: usize,
         mut weight: Vec<f64>,
     ) -> Self {
-        let [rows, columns] =
-            [area.rows, area.columns].map(|length| (length - 1 - Self::first(stride, length)) / stride + 1);
+        let [rows, columns] = [area.rows, area.columns]
+            .map(|length| (length - 1 - Self::first(stride, length)) / stride + 1);
         weight.clear();
-        let mut lattice = Self { surface, domain, area, stride, columns, rows, weight, count: 0 };
+        let mut lattice = Self {
+            surface,
+            domain,
+            area,
+            stride,
+            columns,
+            rows,
+            weight,
+            count: 0,
+        };
         for node in 0..rows * columns {
             let at @ [row, column] = lattice.pixel(node);
             let there = domain.contains(row, column) && surface[at].is_finite();
             lattice.count += usize::from(there);
             let area = || {
                 let [p, q] = slopes_at(surface, at, domain.pixel_size_m);
-                (T::one() + (p * p + q * q).min(T::of(STEEPEST * STEEPEST))).sqrt().as_f64()
+                (T::one() + (p * p + q * q).min(T::of(STEEPEST * STEEPEST)))
+                    .sqrt()
+                    .as_f64()
             };
             lattice.weight.push(if there { area() } else { 0.0 });
         }
@@ -104,7 +123,10 @@ impl<'a, T: Scalar> Lattice<'a, T> {
             return Err(SfsError::EmptyMask);
         }
         if points > self.count {
-            return Err(SfsError::TooManyPoints { requested: points, available: self.count });
+            return Err(SfsError::TooManyPoints {
+                requested: points,
+                available: self.count,
+            });
         }
         Ok(self)
     }
@@ -148,10 +170,15 @@ impl<'a, T: Scalar> Lattice<'a, T> {
     /// The node on the surface nearest to a place.
     fn nearest(&self, [x, y]: [f64; 2]) -> usize {
         let distance = |node: &usize| {
-            let (dx, dy) = ((node % self.columns) as f64 - x, (node / self.columns) as f64 - y);
+            let (dx, dy) = (
+                (node % self.columns) as f64 - x,
+                (node / self.columns) as f64 - y,
+            );
             dx.hypot(dy * self.aspect())
         };
-        self.nodes().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+        self.nodes()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap_or(0)
     }
 
     /// Height between four pixels, bilinear; `None` unless all four lie on the surface.
@@ -159,17 +186,26 @@ impl<'a, T: Scalar> Lattice<'a, T> {
         let (r, c) = (row.floor() as usize, column.floor() as usize);
         let (down, right) = (T::of(row - r as f64), T::of(column - c as f64));
         let height = |row: usize, column: usize| {
-            let z = self.surface.get([row, column]).copied().filter(|z| z.is_finite())?;
+            let z = self
+                .surface
+                .get([row, column])
+                .copied()
+                .filter(|z| z.is_finite())?;
             self.domain.contains(row, column).then_some(z)
         };
-        let along = |row: usize| Some(height(row, c)? * (T::one() - right) + height(row, c + 1)? * right);
+        let along =
+            |row: usize| Some(height(row, c)? * (T::one() - right) + height(row, c + 1)? * right);
         Some(along(r)? * (T::one() - down) + along(r + 1)? * down)
     }
 
     /// The point at a pixel, in metres.
     pub(super) fn point(&self, [row, column]: [usize; 2]) -> Point3<T> {
         let [hx, hy] = self.domain.pixel_size_m;
-        Point3::new(T::of(column as f64) * hx, T::of(row as f64) * hy, self.surface[[row, column]])
+        Point3::new(
+            T::of(column as f64) * hx,
+            T::of(row as f64) * hy,
+            self.surface[[row, column]],
+        )
     }
 
     /// The nodes on the surface, in reading order.

@@ -41,7 +41,14 @@ impl<T: Scalar> ControlPointSampler<T> for Random {
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
         let mut points = Vec::with_capacity(count);
-        self.sample_with(&mut Workspace::new(), surface, mask, pixel_size_m, count, &mut points)?;
+        self.sample_with(
+            &mut Workspace::new(),
+            surface,
+            mask,
+            pixel_size_m,
+            count,
+            &mut points,
+        )?;
         Ok(points)
     }
 
@@ -71,7 +78,10 @@ impl<T: Scalar> ControlPointSampler<T> for Random {
             keys.truncate(count);
         }
         keys.sort_unstable_by(order);
-        points.extend(keys.iter().map(|&(_, node)| lattice.point(lattice.pixel(node))));
+        points.extend(
+            keys.iter()
+                .map(|&(_, node)| lattice.point(lattice.pixel(node))),
+        );
         buffers.weight = lattice.weight;
         Ok(())
     }

@@ -27,10 +27,15 @@ pub(super) struct Strips {
 impl Strips {
     /// Finds the centroids of `points` cells of equal weight.
     pub(super) fn find<T: Scalar>(&mut self, lattice: &Lattice<'_, T>, points: usize) {
-        let row_weight = |row: usize| lattice.weight[row * lattice.columns..][..lattice.columns].iter().sum();
+        let row_weight = |row: usize| {
+            lattice.weight[row * lattice.columns..][..lattice.columns]
+                .iter()
+                .sum()
+        };
         let bands = bands(lattice, points);
         let share = |band: usize| (band * points / bands) as f64 / points as f64;
-        self.rows.find((0..lattice.rows).map(row_weight), (1..=bands).map(share));
+        self.rows
+            .find((0..lattice.rows).map(row_weight), (1..=bands).map(share));
         self.pieces.clear();
         self.pieces.resize(lattice.columns, Piece::default());
         self.places.clear();
@@ -46,7 +51,8 @@ impl Strips {
     /// Cuts the strip gathered last into `cells` of equal weight; their centroids.
     fn split(&mut self, cells: usize) {
         let shares = (1..=cells).map(|cell| cell as f64 / cells as f64);
-        self.cells.find(self.pieces.iter().map(|piece| piece.weight), shares);
+        self.cells
+            .find(self.pieces.iter().map(|piece| piece.weight), shares);
         let mut from = 0.0;
         for &to in &self.cells.at {
             let (mut weight, mut x, mut y) = (0.0, 0.0, 0.0);
@@ -89,7 +95,11 @@ impl Cuts {
                 before += line[node];
                 node += 1;
             }
-            let part = if line[node] > 0.0 { (share * total - before) / line[node] } else { 1.0 };
+            let part = if line[node] > 0.0 {
+                (share * total - before) / line[node]
+            } else {
+                1.0
+            };
             node as f64 + part.clamp(0.0, 1.0)
         }));
     }
@@ -122,14 +132,25 @@ mod tests {
     #[test]
     fn cuts_run_through_nodes() {
         let mut cuts = Cuts::default();
-        cuts.find([1.0, 0.0, 2.0, 1.0].into_iter(), [0.125, 0.25, 0.5, 1.0].into_iter());
+        cuts.find(
+            [1.0, 0.0, 2.0, 1.0].into_iter(),
+            [0.125, 0.25, 0.5, 1.0].into_iter(),
+        );
         assert_eq!(cuts.at, [0.5, 1.0, 2.5, 4.0]);
     }
 
     #[test]
     fn the_centroid_of_one_cell_is_that_of_all() {
-        let pieces = [1.0, 3.0].map(|weight| Piece { weight, moment: 2.0 * weight }).to_vec();
-        let mut strips = Strips { pieces, ..Strips::default() };
+        let pieces = [1.0, 3.0]
+            .map(|weight| Piece {
+                weight,
+                moment: 2.0 * weight,
+            })
+            .to_vec();
+        let mut strips = Strips {
+            pieces,
+            ..Strips::default()
+        };
         strips.split(1);
         assert_eq!(strips.places, [[0.75, 2.0]]);
     }

@@ -18,8 +18,9 @@ const PATCH: (usize, usize) = (17, 23);
 
 impl Placed {
     fn new(frame: (usize, usize), [top, left]: [usize; 2], axes: [f64; 2], outside: f64) -> Self {
-        let inside =
-            |r: usize, c: usize| ((r as f64 - 8.0) / axes[1]).hypot((c as f64 - 11.0) / axes[0]) <= 1.0;
+        let inside = |r: usize, c: usize| {
+            ((r as f64 - 8.0) / axes[1]).hypot((c as f64 - 11.0) / axes[0]) <= 1.0
+        };
         let place = |value: &dyn Fn(usize, usize) -> f64| {
             let mut placed = Array2::from_elem(frame, outside);
             for r in 0..PATCH.0 {
@@ -33,7 +34,8 @@ impl Placed {
         };
         let mut mask = Array2::from_elem(frame, false);
         let patch = Array2::from_shape_fn(PATCH, |(r, c)| inside(r, c));
-        mask.slice_mut(s![top..top + PATCH.0, left..left + PATCH.1]).assign(&patch);
+        mask.slice_mut(s![top..top + PATCH.0, left..left + PATCH.1])
+            .assign(&patch);
         Self {
             image: place(&|r, c| 0.7 + 0.2 * (0.9 * r as f64).sin() * (0.4 * c as f64).cos()),
             p: place(&|r, c| (0.3 * c as f64).sin() + 0.1 * r as f64),
@@ -52,7 +54,10 @@ impl Placed {
             ("eikonal oblique", Box::new(rim(light))),
             ("tsai-shah", Box::new(TsaiShah::new(light))),
             ("pentland", Box::new(Pentland::new(light))),
-            ("brooks-horn", Box::new(BrooksHorn::new(light).with_iterations(20, 5).unwrap())),
+            (
+                "brooks-horn",
+                Box::new(BrooksHorn::new(light).with_iterations(20, 5).unwrap()),
+            ),
         ];
         let integrators: [(_, Box<dyn SlopeIntegrator<f64>>); 3] = [
             ("poisson", Box::new(CosinePoisson::new())),
@@ -61,15 +66,29 @@ impl Placed {
         ];
         let patch = |surface: Surface<f64>| {
             assert_eq!(surface.mask, self.mask);
-            assert!(surface.heights.indexed_iter().all(|(at, z)| self.mask[at] || z.is_nan()));
-            surface.heights.slice(s![top..top + PATCH.0, left..left + PATCH.1]).to_owned()
+            assert!(
+                surface
+                    .heights
+                    .indexed_iter()
+                    .all(|(at, z)| self.mask[at] || z.is_nan())
+            );
+            surface
+                .heights
+                .slice(s![top..top + PATCH.0, left..left + PATCH.1])
+                .to_owned()
         };
-        let images = methods
-            .iter()
-            .map(|(name, m)| (*name, patch(m.reconstruct(self.image.view(), &domain).unwrap())));
-        let slopes = integrators
-            .iter()
-            .map(|(name, m)| (*name, patch(m.integrate(self.p.view(), self.q.view(), &domain).unwrap())));
+        let images = methods.iter().map(|(name, m)| {
+            (
+                *name,
+                patch(m.reconstruct(self.image.view(), &domain).unwrap()),
+            )
+        });
+        let slopes = integrators.iter().map(|(name, m)| {
+            (
+                *name,
+                patch(m.integrate(self.p.view(), self.q.view(), &domain).unwrap()),
+            )
+        });
         images.chain(slopes).collect()
     }
 }
@@ -133,12 +152,16 @@ fn normal_intensity_of_a_sphere_is_that_of_its_pole() {
     let case = Sampled::new(64, sphere);
     let image = case.image.mapv(|value| 20.0 + 180.0 * value);
     let domain = Domain::pixels().with_mask(case.mask.view());
-    let at = |quantile| estimate_normal_intensity(Frame::Real(image.view()), &domain, 20.0, quantile);
+    let at =
+        |quantile| estimate_normal_intensity(Frame::Real(image.view()), &domain, 20.0, quantile);
     // The brightest pixel lies within half a pixel of the pole: 1 − cos θ < 10⁻³.
     assert!((at(1.0).unwrap() - 180.0).abs() < 0.2);
     assert!(at(0.995).unwrap() <= at(1.0).unwrap());
     for quantile in [0.0, 1.1, f64::NAN] {
-        assert!(matches!(at(quantile), Err(SfsError::InvalidOption { .. })), "{quantile}");
+        assert!(
+            matches!(at(quantile), Err(SfsError::InvalidOption { .. })),
+            "{quantile}"
+        );
     }
 }
 
@@ -149,7 +172,10 @@ fn light_of_a_sphere_is_found_roughly() {
     let at = |v: usize| (v as f64 - 50.0) / 48.0;
     let mask = Array2::from_shape_fn((n, n), |(r, c)| at(r).hypot(at(c)) < 0.999);
     for (x, y) in [(0.5, 0.0), (-0.4, 0.3), (0.0, -0.6)] {
-        let light = Lighting::new([x, y, 1.0]).unwrap().with_albedo(0.8).unwrap();
+        let light = Lighting::new([x, y, 1.0])
+            .unwrap()
+            .with_albedo(0.8)
+            .unwrap();
         let image = Array2::from_shape_fn((n, n), |(r, c)| {
             let z = (1.0 - at(r).powi(2) - at(c).powi(2)).max(1e-6).sqrt();
             light.shade(-at(c) / z, -at(r) / z).max(0.0)
@@ -164,5 +190,11 @@ fn light_of_a_sphere_is_found_roughly() {
     }
     let few = Array2::from_elem((3, 5), 0.5);
     let refused = estimate_lighting(Frame::Real(few.view()), &Domain::pixels());
-    assert!(matches!(refused, Err(SfsError::TooFewPixels { needed: 16, available: 15 })));
+    assert!(matches!(
+        refused,
+        Err(SfsError::TooFewPixels {
+            needed: 16,
+            available: 15
+        })
+    ));
 }

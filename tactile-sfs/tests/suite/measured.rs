@@ -23,9 +23,18 @@ fn data(name: &str) -> Option<PathBuf> {
 fn channel_mean(name: &str) -> Option<Array2<f64>> {
     let image = image::open(data(name)?).unwrap().into_rgb8();
     let (width, height) = image.dimensions();
-    Some(Array2::from_shape_fn((height as usize, width as usize), |(r, c)| {
-        image.get_pixel(c as u32, r as u32).0.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0
-    }))
+    Some(Array2::from_shape_fn(
+        (height as usize, width as usize),
+        |(r, c)| {
+            image
+                .get_pixel(c as u32, r as u32)
+                .0
+                .iter()
+                .map(|&v| f64::from(v))
+                .sum::<f64>()
+                / 3.0
+        },
+    ))
 }
 
 /// The survey's vase at 128 pixels: heights in pixels, slopes and mask.
@@ -37,28 +46,47 @@ fn vase() -> (Array2<f64>, [Array2<f64>; 2], Array2<bool>) {
         Array2::from_shape_fn((128, 128), |(r, c)| {
             let (x, y) = (c as f64 / 128.0 - 0.5075, r as f64 / 128.0);
             let square = f(y).powi(2) - x * x;
-            if square > 0.0 { of(x, y, square.sqrt()) } else { 0.0 }
+            if square > 0.0 {
+                of(x, y, square.sqrt())
+            } else {
+                0.0
+            }
         })
     };
     let z = field(&|_, _, z| 128.0 * z);
     let mask = z.mapv(|z| z > 0.0);
-    (z, [field(&|x, _, z| -x / z), field(&|_, y, z| f(y) * slope(y) / z)], mask)
+    (
+        z,
+        [
+            field(&|x, _, z| -x / z),
+            field(&|_, y, z| f(y) * slope(y) / z),
+        ],
+        mask,
+    )
 }
 
 #[test]
 fn survey_vase_from_its_rim() {
     let (z, [p, q], mask) = vase();
     let light = Lighting::frontal().with_normal_intensity(255.0).unwrap();
-    let image =
-        Array2::from_shape_fn(
-            z.dim(),
-            |at| {
-                if mask[at] { light.shade(p[at], q[at]).round() as u8 } else { 0 }
-            },
-        );
+    let image = Array2::from_shape_fn(z.dim(), |at| {
+        if mask[at] {
+            light.shade(p[at], q[at]).round() as u8
+        } else {
+            0
+        }
+    });
     let method = Eikonal::new(light).with_rim(Rim::Height(0.0)).unwrap();
-    let surface = method.reconstruct_u8(image.view(), &Domain::pixels().with_mask(mask.view())).unwrap();
-    let error = height_error(surface.heights.view(), z.view(), Some(mask.view()), Alignment::None).unwrap();
+    let surface = method
+        .reconstruct_u8(image.view(), &Domain::pixels().with_mask(mask.view()))
+        .unwrap();
+    let error = height_error(
+        surface.heights.view(),
+        z.view(),
+        Some(mask.view()),
+        Alignment::None,
+    )
+    .unwrap();
     println!("vase, 8 bits, rim at 0: {error:?}");
     assert!((error.range - 36.2).abs() < 0.1 && error.constant_guess > 7.0);
     assert!(error.error.mean_absolute < 0.6);
@@ -66,11 +94,16 @@ fn survey_vase_from_its_rim() {
 
 #[test]
 fn light_from_the_right_is_bright_on_the_right() {
-    let Some(path) = data("sfs/vase_light101_128.pgm") else { return };
+    let Some(path) = data("sfs/vase_light101_128.pgm") else {
+        return;
+    };
     let image = image::open(path).unwrap().into_luma8();
     // Half-way along the vase both flanks are in the frame; the light's direction is (1, 0, 1).
     let row: Vec<u8> = (0..128).map(|c| image.get_pixel(c, 64).0[0]).collect();
-    let light = Lighting::new([1.0, 0.0, 1.0]).unwrap().with_normal_intensity(255.0).unwrap();
+    let light = Lighting::new([1.0, 0.0, 1.0])
+        .unwrap()
+        .with_normal_intensity(255.0)
+        .unwrap();
     assert!(row[88] > row[40] && light.shade(-0.5, 0.0) > light.shade(0.5, 0.0));
 }
 
@@ -93,13 +126,20 @@ impl PressedBall {
     fn read() -> Option<Self> {
         let reference = channel_mean("9dtact/rectify_crop_ref.png")?;
         let pressed = channel_mean("9dtact/rectify_crop_sample.png")?;
-        let r =
-            |(row, column): (usize, usize)| (column as f64 - CENTRE[0]).hypot(row as f64 - CENTRE[1]) * PIXEL;
+        let r = |(row, column): (usize, usize)| {
+            (column as f64 - CENTRE[0]).hypot(row as f64 - CENTRE[1]) * PIXEL
+        };
         let inside = Array2::from_shape_fn(pressed.dim(), |at| r(at) < CONTACT);
         let rim = (BALL * BALL - CONTACT * CONTACT).sqrt();
-        let cap =
-            Array2::from_shape_fn(pressed.dim(), |at| (BALL * BALL - r(at) * r(at)).max(0.0).sqrt() - rim);
-        Some(Self { pressed, signal: Signal::Darkening(reference), inside, cap })
+        let cap = Array2::from_shape_fn(pressed.dim(), |at| {
+            (BALL * BALL - r(at) * r(at)).max(0.0).sqrt() - rim
+        });
+        Some(Self {
+            pressed,
+            signal: Signal::Darkening(reference),
+            inside,
+            cap,
+        })
     }
 
     /// A table calibrated on the ball: on its contact circle within a mask, or on the contact it finds.
@@ -117,16 +157,22 @@ impl PressedBall {
     fn error(&self, table: &DepthTable<f64>, mask: &Array2<bool>) -> f64 {
         let domain = Domain::new([PIXEL, PIXEL]).unwrap().with_mask(mask.view());
         let surface = table.reconstruct(self.pressed.view(), &domain).unwrap();
-        height_error(surface.heights.view(), self.cap.view(), Some(mask.view()), Alignment::None)
-            .unwrap()
-            .error
-            .mean_absolute
+        height_error(
+            surface.heights.view(),
+            self.cap.view(),
+            Some(mask.view()),
+            Alignment::None,
+        )
+        .unwrap()
+        .error
+        .mean_absolute
     }
 
     /// The contact circle's even or odd sixteenths.
     fn sectors(&self, half: usize) -> Array2<bool> {
         Array2::from_shape_fn(self.pressed.dim(), |(row, column)| {
-            let angle = (row as f64 - CENTRE[1]).atan2(column as f64 - CENTRE[0]) / core::f64::consts::TAU;
+            let angle =
+                (row as f64 - CENTRE[1]).atan2(column as f64 - CENTRE[0]) / core::f64::consts::TAU;
             let sector = (((angle + 0.5) * 16.0) as usize).min(15);
             self.inside[(row, column)] && sector % 2 == half
         })
@@ -137,7 +183,8 @@ impl PressedBall {
 fn makers_table() -> Option<DepthTable<f64>> {
     let text = std::fs::read_to_string(data("9dtact/grey_to_depth_mm.csv")?).unwrap();
     let row = |line: &str| {
-        line.split_once(',').map(|(s, d)| (s.parse().unwrap(), 1e-3 * d.parse::<f64>().unwrap()))
+        line.split_once(',')
+            .map(|(s, d)| (s.parse().unwrap(), 1e-3 * d.parse::<f64>().unwrap()))
     };
     let mut entries: Vec<(f64, f64)> = text.lines().skip(1).filter_map(row).collect();
     entries[0].1 = 0.0;
@@ -146,23 +193,35 @@ fn makers_table() -> Option<DepthTable<f64>> {
 
 #[test]
 fn ball_of_9dtact() {
-    let (Some(ball), Some(makers)) = (PressedBall::read(), makers_table()) else { return };
+    let (Some(ball), Some(makers)) = (PressedBall::read(), makers_table()) else {
+        return;
+    };
     // Each sixteenth of the circle from a table calibrated on the others.
     let mut sum = 0.0;
     for half in 0..2 {
         let fitted = ball.calibrated(Some(&ball.sectors(half)));
         let held_out = ball.error(&fitted.table, &ball.sectors(1 - half));
-        println!("ball, calibrated on half {half}: {:.4} mm on the other", 1e3 * held_out);
+        println!(
+            "ball, calibrated on half {half}: {:.4} mm on the other",
+            1e3 * held_out
+        );
         sum += 0.5 * held_out;
     }
     assert!(sum < 0.04e-3, "{sum}");
 
     // For comparison: the makers' own zero is some 0.06 mm lower than that of the contact circle.
     let makers = makers.with_signal(ball.signal.clone());
-    println!("ball, makers' table: {:.4} mm", 1e3 * ball.error(&makers, &ball.inside));
+    println!(
+        "ball, makers' table: {:.4} mm",
+        1e3 * ball.error(&makers, &ball.inside)
+    );
 
     let found = ball.calibrated(None);
-    println!("ball, found: {:?} px, {:.3} mm", found.centre_px, 1e3 * found.contact_radius_m);
+    println!(
+        "ball, found: {:?} px, {:.3} mm",
+        found.centre_px,
+        1e3 * found.contact_radius_m
+    );
 }
 
 /// Mean errors of Tsai–Shah's heights, after an offset and after scale and offset, under the survey's three lights.
@@ -176,13 +235,25 @@ fn tsai_shah_errors(
         let lighting = Lighting::new(light).unwrap();
         let image = Array2::from_shape_fn(z.dim(), |at| lighting.shade(p[at], q[at]));
         let domain = Domain::pixels().with_mask(mask.view());
-        let surface = TsaiShah::new(lighting).reconstruct(image.view(), &domain).unwrap();
-        let error =
-            |alignment| height_error(surface.heights.view(), z.view(), Some(mask.view()), alignment).unwrap();
+        let surface = TsaiShah::new(lighting)
+            .reconstruct(image.view(), &domain)
+            .unwrap();
+        let error = |alignment| {
+            height_error(
+                surface.heights.view(),
+                z.view(),
+                Some(mask.view()),
+                alignment,
+            )
+            .unwrap()
+        };
         let (offset, affine) = (error(Alignment::Offset), error(Alignment::Affine));
         let errors = [offset.error.mean_absolute, affine.error.mean_absolute];
         let [a, b] = errors;
-        println!("tsai-shah, {name}, {light:?}: {a:.2} px, scaled by {:.2} {b:.2} px", affine.scale);
+        println!(
+            "tsai-shah, {name}, {light:?}: {a:.2} px, scaled by {:.2} {b:.2} px",
+            affine.scale
+        );
         // A scale that turned the surface over would be no agreement.
         assert!(affine.scale > 0.0 && a < offset.constant_guess);
         errors
@@ -191,15 +262,22 @@ fn tsai_shah_errors(
 
 #[test]
 fn tsai_shah_is_no_worse_than_the_plain_method_on_mozart() {
-    let Some(path) = data("sfs/mozart_256_depth.csv") else { return };
+    let Some(path) = data("sfs/mozart_256_depth.csv") else {
+        return;
+    };
     let text = std::fs::read_to_string(path).unwrap();
-    let values: Vec<f64> =
-        text.lines().flat_map(|line| line.split(',').map(|v| v.trim().parse::<f64>().unwrap())).collect();
+    let values: Vec<f64> = text
+        .lines()
+        .flat_map(|line| line.split(',').map(|v| v.trim().parse::<f64>().unwrap()))
+        .collect();
     let z = Array2::from_shape_vec((256, 256), values).unwrap();
     let (p, q) = slopes(z.view(), [1.0, 1.0]);
     let errors = tsai_shah_errors("mozart", &z, &[p, q], &z.mapv(|z| z > 0.0));
     // The plain method's best of several lights and settings is 10.8 px; a constant has 11.65.
-    assert!(errors.iter().flatten().all(|&error| error < 10.8), "{errors:?}");
+    assert!(
+        errors.iter().flatten().all(|&error| error < 10.8),
+        "{errors:?}"
+    );
 }
 
 #[test]
@@ -208,5 +286,10 @@ fn tsai_shah_is_no_worse_than_the_plain_method_on_the_vase() {
     let errors = tsai_shah_errors("vase", &z, &slopes, &mask);
     // The plain method has, over several lights and settings, 5.3 to 7.3 px with scale and offset fitted, and 7.4 px
     // or more (a constant: 7.4) with the offset alone.
-    assert!(errors.iter().all(|&[offset, affine]| offset < 7.3 && affine < 5.3), "{errors:?}");
+    assert!(
+        errors
+            .iter()
+            .all(|&[offset, affine]| offset < 7.3 && affine < 5.3),
+        "{errors:?}"
+    );
 }

@@ -4,31 +4,50 @@
 use crate::common::{Sampled, Shape, ellipsoid, gaussian, paraboloid, sphere, waves};
 use ndarray::Array2;
 use tactile_sfs::{
-    Alignment, Branch, CosinePoisson, Domain, Eikonal, Lighting, MaskedLeastSquares, Rim, SlopeIntegrator,
-    StopReason, SurfaceReconstruction, height_error,
+    Alignment, Branch, CosinePoisson, Domain, Eikonal, Lighting, MaskedLeastSquares, Rim,
+    SlopeIntegrator, StopReason, SurfaceReconstruction, height_error,
 };
 
 const SIZES: [usize; 3] = [64, 128, 256];
 
 /// Mean absolute error, as orders between successive halvings of the pixel.
 fn orders(errors: &[f64]) -> Vec<f64> {
-    errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
+    errors
+        .windows(2)
+        .map(|pair| (pair[0] / pair[1]).log2())
+        .collect()
 }
 
 fn rising(n: usize, shape: Shape) -> f64 {
     let sampled = Sampled::new(n, shape);
-    let domain = Domain::new([sampled.pixel; 2]).unwrap().with_mask(sampled.mask.view());
-    let method = Eikonal::new(Lighting::frontal()).with_rim(Rim::Height(0.0)).unwrap();
-    let surface = method.with_branch(Branch::Rising).reconstruct(sampled.image.view(), &domain).unwrap();
-    let error =
-        height_error(surface.heights.view(), sampled.z.view(), Some(sampled.mask.view()), Alignment::None);
+    let domain = Domain::new([sampled.pixel; 2])
+        .unwrap()
+        .with_mask(sampled.mask.view());
+    let method = Eikonal::new(Lighting::frontal())
+        .with_rim(Rim::Height(0.0))
+        .unwrap();
+    let surface = method
+        .with_branch(Branch::Rising)
+        .reconstruct(sampled.image.view(), &domain)
+        .unwrap();
+    let error = height_error(
+        surface.heights.view(),
+        sampled.z.view(),
+        Some(sampled.mask.view()),
+        Alignment::None,
+    );
     error.unwrap().error.mean_absolute
 }
 
 fn falling(n: usize, shape: Shape) -> f64 {
     let sampled = Sampled::new(n, shape);
     let mut known = Array2::from_elem(sampled.z.dim(), f64::NAN);
-    let peak = sampled.z.indexed_iter().max_by(|a, b| a.1.total_cmp(b.1)).unwrap().0;
+    let peak = sampled
+        .z
+        .indexed_iter()
+        .max_by(|a, b| a.1.total_cmp(b.1))
+        .unwrap()
+        .0;
     known[peak] = sampled.z[peak];
     let domain = Domain::new([sampled.pixel; 2])
         .unwrap()
@@ -36,13 +55,21 @@ fn falling(n: usize, shape: Shape) -> f64 {
         .with_known_heights(known.view());
     let method = Eikonal::new(Lighting::frontal()).with_branch(Branch::Falling);
     let surface = method.reconstruct(sampled.image.view(), &domain).unwrap();
-    let error =
-        height_error(surface.heights.view(), sampled.z.view(), Some(sampled.mask.view()), Alignment::None);
+    let error = height_error(
+        surface.heights.view(),
+        sampled.z.view(),
+        Some(sampled.mask.view()),
+        Alignment::None,
+    );
     error.unwrap().error.mean_absolute
 }
 
-const SHAPES: [(&str, Shape); 4] =
-    [("sphere", sphere), ("ellipsoid", ellipsoid), ("paraboloid", paraboloid), ("gaussian", gaussian)];
+const SHAPES: [(&str, Shape); 4] = [
+    ("sphere", sphere),
+    ("ellipsoid", ellipsoid),
+    ("paraboloid", paraboloid),
+    ("gaussian", gaussian),
+];
 
 #[test]
 fn eikonal_error_falls_faster_than_linearly_from_a_known_peak() {
@@ -50,7 +77,10 @@ fn eikonal_error_falls_faster_than_linearly_from_a_known_peak() {
         let errors = SIZES.map(|n| falling(n, shape));
         println!("{name}: {errors:.5?}, orders {:.2?}", orders(&errors));
         // Second order but for the peak, which the nearest pixel misses by up to half a pixel.
-        assert!(orders(&errors).iter().all(|&order| order > 1.3), "{name}: {errors:?}");
+        assert!(
+            orders(&errors).iter().all(|&order| order > 1.3),
+            "{name}: {errors:?}"
+        );
     }
 }
 
@@ -61,7 +91,10 @@ fn eikonal_from_a_rim_is_right_to_a_fraction_of_a_pixel() {
     for ((name, shape), bound) in SHAPES.into_iter().zip([0.1, 0.2, 0.5]) {
         let errors = SIZES.map(|n| rising(n, shape) * n as f64 / 2.0);
         println!("{name}: {errors:.3?} pixels");
-        assert!(errors.iter().all(|&error| error < bound), "{name}: {errors:?}");
+        assert!(
+            errors.iter().all(|&error| error < bound),
+            "{name}: {errors:?}"
+        );
     }
 }
 
@@ -70,16 +103,30 @@ fn integrators_are_of_fourth_order() {
     let solve = |n: usize, method: &dyn SlopeIntegrator<f64>, shape: Shape| {
         let sampled = Sampled::new(n, shape);
         let domain = Domain::new([sampled.pixel; 2]).unwrap();
-        let surface = method.integrate(sampled.p.view(), sampled.q.view(), &domain).unwrap();
-        let error = height_error(surface.heights.view(), sampled.z.view(), None, Alignment::Offset).unwrap();
+        let surface = method
+            .integrate(sampled.p.view(), sampled.q.view(), &domain)
+            .unwrap();
+        let error = height_error(
+            surface.heights.view(),
+            sampled.z.view(),
+            None,
+            Alignment::Offset,
+        )
+        .unwrap();
         error.error.rms
     };
     for shape in [gaussian as Shape, waves] {
-        for method in [&CosinePoisson::new() as &dyn SlopeIntegrator<f64>, &MaskedLeastSquares::new()] {
+        for method in [
+            &CosinePoisson::new() as &dyn SlopeIntegrator<f64>,
+            &MaskedLeastSquares::new(),
+        ] {
             let errors = SIZES.map(|n| solve(n, method, shape));
             println!("{errors:.5?}, orders {:.2?}", orders(&errors));
             // 4 up to terms of higher order; the rises at the border are of third order, but few.
-            assert!(orders(&errors).iter().all(|&order| order > 3.4), "{errors:?}");
+            assert!(
+                orders(&errors).iter().all(|&order| order > 3.4),
+                "{errors:?}"
+            );
         }
     }
 }
@@ -94,9 +141,17 @@ fn pixels_need_not_be_square() {
     let mask = Array2::from_shape_fn(shape, |(r, c)| at(r, c).is_some());
     let image = z.mapv(|z| z / 0.8);
     let domain = Domain::new([wide, high]).unwrap().with_mask(mask.view());
-    let method = Eikonal::new(Lighting::frontal()).with_rim(Rim::Height(0.0)).unwrap();
+    let method = Eikonal::new(Lighting::frontal())
+        .with_rim(Rim::Height(0.0))
+        .unwrap();
     let surface = method.reconstruct(image.view(), &domain).unwrap();
-    let error = height_error(surface.heights.view(), z.view(), Some(mask.view()), Alignment::None).unwrap();
+    let error = height_error(
+        surface.heights.view(),
+        z.view(),
+        Some(mask.view()),
+        Alignment::None,
+    )
+    .unwrap();
     // A hundredth of the radius, half a pixel: square pixels of this size reach the same.
     assert!(error.error.mean_absolute < 0.012, "{error:?}");
     let [p, q] = [1, 2].map(|k| {
@@ -108,9 +163,18 @@ fn pixels_need_not_be_square() {
         gaussian(c as f64 * wide - 1.0, r as f64 * high - 1.0).unwrap()[0]
     });
     let domain = Domain::new([wide, high]).unwrap();
-    for method in [&CosinePoisson::new() as &dyn SlopeIntegrator<f64>, &MaskedLeastSquares::new()] {
+    for method in [
+        &CosinePoisson::new() as &dyn SlopeIntegrator<f64>,
+        &MaskedLeastSquares::new(),
+    ] {
         let surface = method.integrate(p.view(), q.view(), &domain).unwrap();
-        let error = height_error(surface.heights.view(), truth.view(), None, Alignment::Offset).unwrap();
+        let error = height_error(
+            surface.heights.view(),
+            truth.view(),
+            None,
+            Alignment::Offset,
+        )
+        .unwrap();
         // Of fourth order, h⁴ = 10⁻⁶ times derivatives of some hundred; rises by the mean of two slopes miss this.
         assert!(error.error.max < 2e-4, "{error:?}");
     }
@@ -122,12 +186,26 @@ fn least_squares_by_steps_is_the_direct_solution() {
     let domain = Domain::new([sampled.pixel, 0.7 * sampled.pixel]).unwrap();
     let (p, q, weights) = (sampled.p.view(), sampled.q.view(), Array2::ones((48, 48)));
     let direct = MaskedLeastSquares::new().integrate(p, q, &domain).unwrap();
-    let steps = MaskedLeastSquares::new().with_weights(weights.view()).integrate(p, q, &domain).unwrap();
-    assert_eq!((direct.report.stop, steps.report.stop), (StopReason::Direct, StopReason::Converged));
-    let parts = [&direct, &steps]
-        .map(|surface| surface.report.components.iter().map(|c| c.pixels).collect::<Vec<_>>());
+    let steps = MaskedLeastSquares::new()
+        .with_weights(weights.view())
+        .integrate(p, q, &domain)
+        .unwrap();
+    assert_eq!(
+        (direct.report.stop, steps.report.stop),
+        (StopReason::Direct, StopReason::Converged)
+    );
+    let parts = [&direct, &steps].map(|surface| {
+        surface
+            .report
+            .components
+            .iter()
+            .map(|c| c.pixels)
+            .collect::<Vec<_>>()
+    });
     assert_eq!(parts[0], parts[1]);
     // The steps end at a residual of 10⁻⁹; the smallest eigenvalue makes some hundred times that of it, of heights near 1.
-    let difference = (&direct.heights - &steps.heights).iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+    let difference = (&direct.heights - &steps.heights)
+        .iter()
+        .fold(0.0_f64, |most, d| most.max(d.abs()));
     assert!(difference < 1e-6, "{difference}");
 }

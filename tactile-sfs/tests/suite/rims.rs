@@ -4,13 +4,25 @@ use tactile_sfs::{ControlPointSampler, EquallySpaced};
 
 /// Root mean square distance of a hemisphere's control points from its axis, over its radius in pixels.
 fn spread(radius: f64, centre: [f64; 2], count: usize) -> f64 {
-    let square = |r: usize, c: usize| (r as f64 - centre[0]).powi(2) + (c as f64 - centre[1]).powi(2);
+    let square =
+        |r: usize, c: usize| (r as f64 - centre[0]).powi(2) + (c as f64 - centre[1]).powi(2);
     let n = 2 * (radius.ceil() as usize + 3);
-    let z = Array2::from_shape_fn((n, n), |(r, c)| (radius * radius - square(r, c)).max(0.0).sqrt());
+    let z = Array2::from_shape_fn((n, n), |(r, c)| {
+        (radius * radius - square(r, c)).max(0.0).sqrt()
+    });
     let mask = Array2::from_shape_fn((n, n), |(r, c)| square(r, c) < radius * radius);
-    let points = EquallySpaced::new().sample(z.view(), Some(mask.view()), [1.0; 2], count).unwrap();
-    let middle = points.iter().map(|p| p.coords.xy()).sum::<nalgebra::Vector2<f64>>() / count as f64;
-    let squares: f64 = points.iter().map(|p| (p.coords.xy() - middle).norm_squared()).sum();
+    let points = EquallySpaced::new()
+        .sample(z.view(), Some(mask.view()), [1.0; 2], count)
+        .unwrap();
+    let middle = points
+        .iter()
+        .map(|p| p.coords.xy())
+        .sum::<nalgebra::Vector2<f64>>()
+        / count as f64;
+    let squares: f64 = points
+        .iter()
+        .map(|p| (p.coords.xy() - middle).norm_squared())
+        .sum();
     (squares / count as f64).sqrt() / radius
 }
 

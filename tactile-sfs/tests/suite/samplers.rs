@@ -5,21 +5,40 @@ use ndarray::Array2;
 use tactile_sfs::*;
 
 fn samplers() -> [Box<dyn ControlPointSampler<f64>>; 3] {
-    [Box::new(EquallySpaced::new()), Box::new(Random::new(3)), Box::new(CurvatureAdaptive::new(2.0).unwrap())]
+    [
+        Box::new(EquallySpaced::new()),
+        Box::new(Random::new(3)),
+        Box::new(CurvatureAdaptive::new(2.0).unwrap()),
+    ]
 }
 
 #[test]
 fn samplers_with_a_workspace_do_not_allocate() {
     let case = Sampled::new(60, sphere);
-    for (sampler, count) in samplers().iter().flat_map(|sampler| [(sampler, 40), (sampler, 900)]) {
+    for (sampler, count) in samplers()
+        .iter()
+        .flat_map(|sampler| [(sampler, 40), (sampler, 900)])
+    {
         let (z, mask, step) = (case.z.view(), Some(case.mask.view()), [case.pixel; 2]);
         let (mut workspace, mut points) = (Workspace::new(), Vec::new());
-        let mut run = || sampler.sample_with(&mut workspace, z, mask, step, count, &mut points).unwrap();
+        let mut run = || {
+            sampler
+                .sample_with(&mut workspace, z, mask, step, count, &mut points)
+                .unwrap()
+        };
         run();
-        assert_eq!(allocation_counter::measure(&mut run).count_total, 0, "{count}");
+        assert_eq!(
+            allocation_counter::measure(&mut run).count_total,
+            0,
+            "{count}"
+        );
         // 40 points move freely, 900 are nearly as dense as the pixels.
         assert_eq!(points, sampler.sample(z, mask, step, count).unwrap());
-        assert!(sampler.sample_with(&mut workspace, z, mask, step, 9000, &mut points).is_err());
+        assert!(
+            sampler
+                .sample_with(&mut workspace, z, mask, step, 9000, &mut points)
+                .is_err()
+        );
         assert!(points.is_empty());
     }
 }
@@ -27,30 +46,53 @@ fn samplers_with_a_workspace_do_not_allocate() {
 #[test]
 fn samplers_give_the_count_inside_the_mask() {
     let case = Sampled::new(60, sphere);
-    let z = Array2::from_shape_fn((60, 60), |at| if case.mask[at] { case.z[at] } else { f64::NAN });
+    let z = Array2::from_shape_fn(
+        (60, 60),
+        |at| if case.mask[at] { case.z[at] } else { f64::NAN },
+    );
     let pixels = case.mask.iter().filter(|&&inside| inside).count();
     for sampler in samplers() {
         for count in [0, 1, 2, 17, 200, 1000, pixels] {
-            let points = sampler.sample(z.view(), Some(case.mask.view()), [case.pixel; 2], count).unwrap();
+            let points = sampler
+                .sample(z.view(), Some(case.mask.view()), [case.pixel; 2], count)
+                .unwrap();
             assert_eq!(points.len(), count);
             let mut seen = std::collections::HashSet::new();
             for point in &points {
-                let at = [(point.y / case.pixel).round() as usize, (point.x / case.pixel).round() as usize];
+                let at = [
+                    (point.y / case.pixel).round() as usize,
+                    (point.x / case.pixel).round() as usize,
+                ];
                 assert!(case.mask[at] && seen.insert(at));
                 assert!(lies_between(&z, case.pixel, point), "{point}");
             }
         }
-        let error = sampler.sample(z.view(), Some(case.mask.view()), [1.0; 2], pixels + 1).unwrap_err();
-        assert_eq!(error, SfsError::TooManyPoints { requested: pixels + 1, available: pixels });
+        let error = sampler
+            .sample(z.view(), Some(case.mask.view()), [1.0; 2], pixels + 1)
+            .unwrap_err();
+        assert_eq!(
+            error,
+            SfsError::TooManyPoints {
+                requested: pixels + 1,
+                available: pixels
+            }
+        );
     }
 }
 
 /// Whether a point's height is one of those of the pixels around it, or between them.
 fn lies_between(z: &Array2<f64>, pixel: f64, point: &nalgebra::Point3<f64>) -> bool {
-    let near = |at: f64| [(at / pixel + 1e-9).floor() as usize, (at / pixel - 1e-9).ceil() as usize];
+    let near = |at: f64| {
+        [
+            (at / pixel + 1e-9).floor() as usize,
+            (at / pixel - 1e-9).ceil() as usize,
+        ]
+    };
     let corners = near(point.y).map(|row| near(point.x).map(|column| z[[row, column]]));
     let heights = corners.iter().flatten();
-    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), &h| (low.min(h), high.max(h)));
+    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), &h| {
+        (low.min(h), high.max(h))
+    });
     // Rounding of a sum of four products.
     low - 1e-12 <= point.z && point.z <= high + 1e-12
 }
@@ -64,11 +106,18 @@ fn the_same_surface_larger_gives_the_same_points_of_it() {
             unit * 0.6 * (-3.0 * ((at(r) - 0.1).powi(2) + at(c).powi(2))).exp()
         })
     };
-    let sample = |n: usize| EquallySpaced::new().sample(bump(n).view(), None, [1.0; 2], 120).unwrap();
+    let sample = |n: usize| {
+        EquallySpaced::new()
+            .sample(bump(n).view(), None, [1.0; 2], 120)
+            .unwrap()
+    };
     let (small, large) = (sample(90), sample(108));
     // Middles of pixels: the frame's corner, half a pixel away, is what scales.
     let scaled = |p: &nalgebra::Point3<f64>| (p.coords.xy().add_scalar(0.5) * 1.2).add_scalar(-0.5);
-    let apart = small.iter().zip(&large).map(|(a, b)| (scaled(a) - b.coords.xy()).norm());
+    let apart = small
+        .iter()
+        .zip(&large)
+        .map(|(a, b)| (scaled(a) - b.coords.xy()).norm());
     let mean = apart.sum::<f64>() / 120.0;
     // Points stand 8 pixels apart; what is left is the error of areas from central differences, second order in the pixel.
     assert!(mean < 0.01, "{mean}");
@@ -78,13 +127,17 @@ fn the_same_surface_larger_gives_the_same_points_of_it() {
 fn equal_spacing_is_even_on_the_surface() {
     let case = Sampled::new(200, gaussian);
     let z = case.z.mapv(|z| 3.0 * z);
-    let points = EquallySpaced::new().sample(z.view(), None, [case.pixel; 2], 200).unwrap();
+    let points = EquallySpaced::new()
+        .sample(z.view(), None, [case.pixel; 2], 200)
+        .unwrap();
     let nearest: Vec<f64> = points
         .iter()
         .enumerate()
         .map(|(i, a)| {
             let others = points.iter().enumerate().filter(|&(j, _)| j != i);
-            others.map(|(_, b)| (a - b).norm()).fold(f64::INFINITY, f64::min)
+            others
+                .map(|(_, b)| (a - b).norm())
+                .fold(f64::INFINITY, f64::min)
         })
         .collect();
     let mean = nearest.iter().sum::<f64>() / 200.0;

@@ -10,12 +10,24 @@ use tactile_sfs::*;
 use worst::Worst;
 
 /// A method in both precisions.
-type Integrators = (&'static str, Box<dyn SlopeIntegrator<f64>>, Box<dyn SlopeIntegrator<f32>>);
+type Integrators = (
+    &'static str,
+    Box<dyn SlopeIntegrator<f64>>,
+    Box<dyn SlopeIntegrator<f32>>,
+);
 
 fn integrators() -> [Integrators; 3] {
     [
-        ("Frankot-Chellappa", Box::new(FrankotChellappa::new()), Box::new(FrankotChellappa::new())),
-        ("cosine Poisson", Box::new(CosinePoisson::new()), Box::new(CosinePoisson::new())),
+        (
+            "Frankot-Chellappa",
+            Box::new(FrankotChellappa::new()),
+            Box::new(FrankotChellappa::new()),
+        ),
+        (
+            "cosine Poisson",
+            Box::new(CosinePoisson::new()),
+            Box::new(CosinePoisson::new()),
+        ),
         (
             "masked least squares",
             Box::new(MaskedLeastSquares::default()),
@@ -33,20 +45,36 @@ fn integrals_have_no_unit() {
     for (name, method, single) in integrators() {
         let heights = |unit: f64| {
             let domain = Domain::new([scene.pixel * unit; 2]).unwrap();
-            method.integrate(scene.p.view(), scene.q.view(), &domain).unwrap().heights
+            method
+                .integrate(scene.p.view(), scene.q.view(), &domain)
+                .unwrap()
+                .heights
         };
         let expected = heights(1.0);
         let size = expected.iter().fold(0.0, |m: f64, z| m.max(z.abs()));
         for unit in [1e-9, 1e-3, 1e9] {
-            let error =
-                heights(unit).iter().zip(&expected).map(|(z, e)| (z / unit - e).abs()).fold(0.0, f64::max);
-            table.enter(&format!("{name}: scale"), error / size / (f64::EPSILON * 48.0), 10.0);
+            let error = heights(unit)
+                .iter()
+                .zip(&expected)
+                .map(|(z, e)| (z / unit - e).abs())
+                .fold(0.0, f64::max);
+            table.enter(
+                &format!("{name}: scale"),
+                error / size / (f64::EPSILON * 48.0),
+                10.0,
+            );
         }
         let domain = Domain::new([scene.pixel as f32; 2]).unwrap();
         let short = |a: &Array2<f64>| a.mapv(|x| x as f32);
-        let found =
-            single.integrate(short(&scene.p).view(), short(&scene.q).view(), &domain).unwrap().heights;
-        let error = found.iter().zip(&expected).map(|(z, e)| (f64::from(*z) - e).abs()).fold(0.0, f64::max);
+        let found = single
+            .integrate(short(&scene.p).view(), short(&scene.q).view(), &domain)
+            .unwrap()
+            .heights;
+        let error = found
+            .iter()
+            .zip(&expected)
+            .map(|(z, e)| (f64::from(*z) - e).abs())
+            .fold(0.0, f64::max);
         // An iterative solver in single precision stops at its own tolerance, some hundred roundings.
         table.enter(
             &format!("{name}: f32 against f64"),
@@ -63,26 +91,47 @@ fn saturated_and_constant_images_have_surfaces() {
     let scene = Sampled::new(24, sphere);
     let light = Lighting::frontal();
     let methods: [(&str, Box<dyn SurfaceReconstruction<f64>>); 4] = [
-        ("eikonal", Box::new(Eikonal::new(light).with_rim(Rim::Height(0.0)).unwrap())),
+        (
+            "eikonal",
+            Box::new(Eikonal::new(light).with_rim(Rim::Height(0.0)).unwrap()),
+        ),
         ("Tsai-Shah", Box::new(TsaiShah::new(light))),
-        ("Pentland", Box::new(Pentland::new(Lighting::new([0.3, -0.2, 1.0]).unwrap()))),
-        ("Brooks-Horn", Box::new(BrooksHorn::new(light).with_iterations(20, 5).unwrap())),
+        (
+            "Pentland",
+            Box::new(Pentland::new(Lighting::new([0.3, -0.2, 1.0]).unwrap())),
+        ),
+        (
+            "Brooks-Horn",
+            Box::new(BrooksHorn::new(light).with_iterations(20, 5).unwrap()),
+        ),
     ];
     let images = [
         ("black", Array2::zeros((24, 24))),
         ("saturated", Array2::from_elem((24, 24), 1.0)),
         ("constant", Array2::from_elem((24, 24), 0.4)),
         ("over-exposed", Array2::from_elem((24, 24), 40.0)),
-        ("one bright pixel", Array2::from_shape_fn((24, 24), |at| f64::from(u8::from(at == (12, 12))))),
+        (
+            "one bright pixel",
+            Array2::from_shape_fn((24, 24), |at| f64::from(u8::from(at == (12, 12)))),
+        ),
         ("clipped ball", scene.image.mapv(|v| v.min(0.8))),
         ("tiny values", Array2::from_elem((24, 24), 1e-300)),
     ];
     for (name, method) in &methods {
         for (what, image) in &images {
             let domain = Domain::new([1e-5; 2]).unwrap().with_mask(scene.mask.view());
-            let Ok(surface) = method.reconstruct(image.view(), &domain) else { continue };
-            let inside = surface.heights.iter().zip(&surface.mask).filter(|(_, inside)| **inside);
-            assert!(inside.into_iter().all(|(z, _)| z.is_finite()), "{name}: {what}");
+            let Ok(surface) = method.reconstruct(image.view(), &domain) else {
+                continue;
+            };
+            let inside = surface
+                .heights
+                .iter()
+                .zip(&surface.mask)
+                .filter(|(_, inside)| **inside);
+            assert!(
+                inside.into_iter().all(|(z, _)| z.is_finite()),
+                "{name}: {what}"
+            );
         }
     }
 }

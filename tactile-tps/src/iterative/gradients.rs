@@ -33,11 +33,22 @@ pub(crate) struct Run<'a, K, const D: usize> {
 
 impl<K: Kernel, const D: usize> Run<'_, K, D> {
     /// Solves for the targets in `buffers`; weights come there. Stops early if `watch` says so.
-    pub(crate) fn solve<const M: usize>(&self, buffers: &mut Buffers, watch: &mut Watch<'_>) -> Solution<M> {
+    pub(crate) fn solve<const M: usize>(
+        &self,
+        buffers: &mut Buffers,
+        watch: &mut Watch<'_>,
+    ) -> Solution<M> {
         let (active, n) = (&self.system.active, self.system.active.len());
-        let Buffers { targets, weights, vectors, .. } = buffers;
+        let Buffers {
+            targets,
+            weights,
+            vectors,
+            ..
+        } = buffers;
         let sites = targets.len() / M;
-        let Vectors { target, solution, .. } = vectors;
+        let Vectors {
+            target, solution, ..
+        } = vectors;
         target.clear();
         (0..M).for_each(|m| target.extend(active.iter().map(|&site| targets[m * sites + site])));
         solution.clear();
@@ -47,7 +58,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
             let (affine, residual) = self.residual::<M>(vectors);
             (answer.affine, answer.residual) = (affine, Some(residual));
             answer.converged = residual <= self.tolerance;
-            let stopped = answer.converged || start == STARTS || broken || answer.iterations >= STEPS;
+            let stopped =
+                answer.converged || start == STARTS || broken || answer.iterations >= STEPS;
             if stopped {
                 break;
             }
@@ -56,7 +68,10 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         weights.clear();
         weights.resize(M * sites, 0.0);
         for (m, column) in vectors.solution.chunks_exact(n).enumerate() {
-            active.iter().zip(column).for_each(|(&site, w)| weights[m * sites + site] = *w);
+            active
+                .iter()
+                .zip(column)
+                .for_each(|(&site, w)| weights[m * sites + site] = *w);
         }
         answer
     }
@@ -74,7 +89,12 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         while answer.iterations < STEPS {
             let left = relative(largest(&vectors.residual), &vectors.target);
             let (stage, done) = (Stage::Iteration, answer.iterations);
-            watch(&Progress { stage, done, total: STEPS, residual: Some(left) })?;
+            watch(&Progress {
+                stage,
+                done,
+                total: STEPS,
+                residual: Some(left),
+            })?;
             if left < 0.5 * best.0 {
                 best = (left, done);
             }
@@ -91,14 +111,25 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
     /// The next direction p ← M⁻¹r + βp; `size` is rᵀM⁻¹r of each output.
     fn turn<const M: usize>(&self, vectors: &mut Vectors, size: &mut [f64; M]) {
         let n = self.system.active.len();
-        let Vectors { residual, preconditioned, direction, spare, column, .. } = vectors;
+        let Vectors {
+            residual,
+            preconditioned,
+            direction,
+            spare,
+            column,
+            ..
+        } = vectors;
         preconditioned.resize(M * n, 0.0);
-        self.iterative.preconditioner.apply::<M>(residual, preconditioned, n, spare);
+        self.iterative
+            .preconditioner
+            .apply::<M>(residual, preconditioned, n, spare);
         self.complement(preconditioned, column);
         let new = inner::<M>(residual, preconditioned);
         for m in 0..M {
             let (beta, part) = (ratio(new[m], size[m]), m * n..(m + 1) * n);
-            let terms = direction[part.clone()].iter_mut().zip(&preconditioned[part]);
+            let terms = direction[part.clone()]
+                .iter_mut()
+                .zip(&preconditioned[part]);
             terms.for_each(|(p, z)| *p = z + beta * *p);
         }
         *size = new;
@@ -107,7 +138,14 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
     /// The step along the direction that makes the energy least.
     fn advance<const M: usize>(&self, vectors: &mut Vectors, size: &[f64; M]) {
         let n = self.system.active.len();
-        let Vectors { residual, direction, product, solution, column, .. } = vectors;
+        let Vectors {
+            residual,
+            direction,
+            product,
+            solution,
+            column,
+            ..
+        } = vectors;
         product.clear();
         product.resize(direction.len(), 0.0);
         self.subtract::<M>(direction, product);
@@ -127,11 +165,22 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
     fn subtract<const M: usize>(&self, w: &[f64], r: &mut [f64]) {
         let (n, places) = (self.system.active.len(), self.iterative.axes());
         let weights = core::array::from_fn(|m| &w[m * n..(m + 1) * n]);
-        let sum = Sum::<_, _, D, M> { kernel: self.kernel, centres: places, weights };
-        dispatch(Subtract { sum, places, residuals: r });
+        let sum = Sum::<_, _, D, M> {
+            kernel: self.kernel,
+            centres: places,
+            weights,
+        };
+        dispatch(Subtract {
+            sum,
+            places,
+            residuals: r,
+        });
         if !self.iterative.diagonal.is_empty() {
             for (r, w) in r.chunks_exact_mut(n).zip(w.chunks_exact(n)) {
-                r.iter_mut().zip(w).zip(&self.iterative.diagonal).for_each(|((r, w), d)| *r -= d * w);
+                r.iter_mut()
+                    .zip(w)
+                    .zip(&self.iterative.diagonal)
+                    .for_each(|((r, w), d)| *r -= d * w);
             }
         }
     }
@@ -139,7 +188,13 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
     /// Forms the residual anew: y − (K + λW⁻¹)w − P a with the a that makes it least, and its largest entry relative to the
     /// largest target.
     fn residual<const M: usize>(&self, vectors: &mut Vectors) -> ([[f64; MAX]; M], f64) {
-        let Vectors { residual, solution, target, column, .. } = vectors;
+        let Vectors {
+            residual,
+            solution,
+            target,
+            column,
+            ..
+        } = vectors;
         self.complement(solution, column);
         residual.clone_from(target);
         self.subtract::<M>(solution, residual);

@@ -55,7 +55,11 @@ impl<const D: usize> Iterative<D> {
         system.choose(setting.sites.len(), weights, false);
         let spacing = self.arrange(setting.sites, system);
         system.outline(setting);
-        let weights: Vec<f64> = system.active.iter().filter_map(|&i| weights.get(i).copied()).collect();
+        let weights: Vec<f64> = system
+            .active
+            .iter()
+            .filter_map(|&i| weights.get(i).copied())
+            .collect();
         self.diagonal.clear();
         if lambda > 0.0 {
             let inverse = |i: usize| lambda / weights.get(i).copied().unwrap_or(1.0);
@@ -71,14 +75,25 @@ impl<const D: usize> Iterative<D> {
             lambda,
         };
         let total = system.active.len();
-        let mut tell = |done| watch(&Progress { stage: Stage::Preparation, done, total, residual: None });
+        let mut tell = |done| {
+            watch(&Progress {
+                stage: Stage::Preparation,
+                done,
+                total,
+                residual: None,
+            })
+        };
         self.preconditioner.build(&ordered, &mut tell)
     }
 
     /// Orders the active points from coarse to fine; returns the squared distance of each to the nearest before it.
     fn arrange(&mut self, sites: &Sites<D>, system: &mut System<D>) -> Vec<f64> {
         let gathered = |order: &[usize]| -> Vec<Vec<f64>> {
-            sites.axes.iter().map(|axis| order.iter().map(|&i| axis[i]).collect()).collect()
+            sites
+                .axes
+                .iter()
+                .map(|axis| order.iter().map(|&i| axis[i]).collect())
+                .collect()
         };
         self.axes = gathered(&system.active);
         let (mut near, mut order, mut spacing) = (Vec::new(), Vec::new(), Vec::new());

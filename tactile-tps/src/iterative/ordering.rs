@@ -24,10 +24,17 @@ pub(crate) fn coarse_to_fine<const D: usize>(
     while let Some(i) = next.filter(|_| order.len() < n) {
         order.push(i);
         distances.push(near[i]);
-        let farthest = dispatch(Approach { axes, from: axes.map(|axis| axis[i]), near });
+        let farthest = dispatch(Approach {
+            axes,
+            from: axes.map(|axis| axis[i]),
+            near,
+        });
         // A point taken is nowhere near the farthest any more.
         near[i] = -1.0;
-        next = near.iter().position(|&d| d == farthest).or_else(|| near.iter().position(|&d| d >= 0.0));
+        next = near
+            .iter()
+            .position(|&d| d == farthest)
+            .or_else(|| near.iter().position(|&d| d >= 0.0));
     }
 }
 
@@ -53,9 +60,17 @@ impl<const D: usize> Job<f64> for Approach<'_, D> {
         let chunks = self.near.chunks_exact(8);
         let rest = chunks.remainder();
         for chunk in chunks {
-            (0..8).for_each(|l| largest[l] = if chunk[l] > largest[l] { chunk[l] } else { largest[l] });
+            (0..8).for_each(|l| {
+                largest[l] = if chunk[l] > largest[l] {
+                    chunk[l]
+                } else {
+                    largest[l]
+                }
+            });
         }
-        rest.iter().chain(&largest).fold(-1.0, |m, &d| f64::max(m, d))
+        rest.iter()
+            .chain(&largest)
+            .fold(-1.0, |m, &d| f64::max(m, d))
     }
 }
 
@@ -106,10 +121,15 @@ impl Nearest {
         found: &mut Vec<usize>,
     ) {
         self.distances.resize(i, 0.0);
-        dispatch(Distances { axes, from: axes.map(|axis| axis[i]), distances: &mut self.distances });
+        dispatch(Distances {
+            axes,
+            from: axes.map(|axis| axis[i]),
+            distances: &mut self.distances,
+        });
         self.gather(spacing, count.min(i));
         if self.candidates.len() > count {
-            self.candidates.select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            self.candidates
+                .select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             self.candidates.truncate(count);
         }
         found.clear();
@@ -121,7 +141,12 @@ impl Nearest {
     fn gather(&mut self, spacing: f64, count: usize) {
         let mut reach = f64::max(self.reach, 1.0);
         loop {
-            let within = self.distances.iter().copied().enumerate().filter(|&(_, d)| d <= reach * spacing);
+            let within = self
+                .distances
+                .iter()
+                .copied()
+                .enumerate()
+                .filter(|&(_, d)| d <= reach * spacing);
             self.candidates.clear();
             self.candidates.extend(within.map(|(j, d)| (d, j)));
             if self.candidates.len() >= count || reach > 1e300 {

@@ -56,12 +56,17 @@ impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
         weights: &mut Vec<f64>,
         system: &mut System<D>,
     ) -> bool {
-        self.sites.select(places.iter().map(|&i| self.order[i]), local);
+        self.sites
+            .select(places.iter().map(|&i| self.order[i]), local);
         weights.clear();
         if !self.weights.is_empty() {
             weights.extend(places.iter().map(|&i| self.weights[i]));
         }
-        let setting = Setting { kernel: self.kernel, sites: local, rank_tolerance: 0.0 };
+        let setting = Setting {
+            kernel: self.kernel,
+            sites: local,
+            rank_tolerance: 0.0,
+        };
         system.factor(&setting, weights, self.lambda).is_ok() && !system.indefinite
     }
 }
@@ -79,12 +84,26 @@ struct Cardinal<'a, K, const D: usize> {
 impl<'a, K: Kernel, const D: usize> Cardinal<'a, K, D> {
     fn new(points: &'a Ordered<'a, K, D>) -> Self {
         let (local, system) = (points.sites.clone(), System::default());
-        Self { points, local, local_weights: Vec::new(), system, unit: Vec::new(), work: Vec::new() }
+        Self {
+            points,
+            local,
+            local_weights: Vec::new(),
+            system,
+            unit: Vec::new(),
+            work: Vec::new(),
+        }
     }
 
     /// The weights of the spline of the points at these places; the unit vector itself where there is none.
     fn weights(&mut self, places: &[usize]) -> &[f64] {
-        let Self { points, local, local_weights, system, unit, work } = self;
+        let Self {
+            points,
+            local,
+            local_weights,
+            system,
+            unit,
+            work,
+        } = self;
         unit.clear();
         unit.resize(places.len(), 0.0);
         unit[places.len() - 1] = 1.0;
@@ -105,13 +124,19 @@ impl<const D: usize> Preconditioner<D> {
         let n = points.order.len();
         self.coarse_points = n.min(COARSE);
         let first: Vec<usize> = (0..self.coarse_points).collect();
-        if !points.factor(&first, &mut points.sites.clone(), &mut Vec::new(), &mut self.coarse) {
+        if !points.factor(
+            &first,
+            &mut points.sites.clone(),
+            &mut Vec::new(),
+            &mut self.coarse,
+        ) {
             self.coarse_points = 0;
         }
         self.row = NEIGHBOURS + 1;
         self.places.clear();
         self.weights.clear();
-        let (mut cardinal, mut nearest, mut places) = (Cardinal::new(points), Nearest::default(), Vec::new());
+        let (mut cardinal, mut nearest, mut places) =
+            (Cardinal::new(points), Nearest::default(), Vec::new());
         for i in self.coarse_points.max(D + 2)..n {
             if i % 64 == 0 {
                 watch(i)?;
@@ -126,11 +151,16 @@ impl<const D: usize> Preconditioner<D> {
     /// Takes over the weights of a cardinal spline, scaled to unit energy.
     fn push(&mut self, places: &[usize], unit: &[f64]) {
         let own = unit[unit.len() - 1];
-        let scale = if own > 0.0 && own.is_finite() { 1.0 / own.sqrt() } else { 0.0 };
+        let scale = if own > 0.0 && own.is_finite() {
+            1.0 / own.sqrt()
+        } else {
+            0.0
+        };
         self.places.extend(places.iter().map(|&i| i as u32));
         self.weights.extend(unit.iter().map(|w| w * scale));
         let padding = self.row - places.len();
-        self.places.extend(core::iter::repeat_n(places[0] as u32, padding));
+        self.places
+            .extend(core::iter::repeat_n(places[0] as u32, padding));
         self.weights.extend(core::iter::repeat_n(0.0, padding));
     }
 
@@ -143,21 +173,36 @@ impl<const D: usize> Preconditioner<D> {
         spare: &mut [Vec<f64>; 2],
     ) {
         z.fill(0.0);
-        for (places, weights) in self.places.chunks_exact(self.row).zip(self.weights.chunks_exact(self.row)) {
+        for (places, weights) in self
+            .places
+            .chunks_exact(self.row)
+            .zip(self.weights.chunks_exact(self.row))
+        {
             for m in 0..M {
                 let (r, z) = (&r[m * n..(m + 1) * n], &mut z[m * n..(m + 1) * n]);
-                let product: f64 = places.iter().zip(weights).map(|(&i, w)| w * r[i as usize]).sum();
-                places.iter().zip(weights).for_each(|(&i, w)| z[i as usize] += product * w);
+                let product: f64 = places
+                    .iter()
+                    .zip(weights)
+                    .map(|(&i, w)| w * r[i as usize])
+                    .sum();
+                places
+                    .iter()
+                    .zip(weights)
+                    .for_each(|(&i, w)| z[i as usize] += product * w);
             }
         }
         let (count, [values, work]) = (self.coarse_points, spare);
         values.clear();
         (0..M).for_each(|m| values.extend_from_slice(&r[m * n..m * n + count]));
         if count > 0 {
-            self.coarse.solve::<M>(values, count, 0.0, work, &mut Vec::new());
+            self.coarse
+                .solve::<M>(values, count, 0.0, work, &mut Vec::new());
         }
         for (m, values) in values.chunks_exact(count.max(1)).enumerate() {
-            z[m * n..m * n + count].iter_mut().zip(values).for_each(|(z, v)| *z += v);
+            z[m * n..m * n + count]
+                .iter_mut()
+                .zip(values)
+                .for_each(|(z, v)| *z += v);
         }
     }
 }

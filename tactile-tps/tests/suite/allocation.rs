@@ -18,7 +18,9 @@ fn refits_and_evaluation_allocate_nothing() {
     let mut hessians = vec![[Matrix3::zeros(); 3]; 333];
     let (mut influence, mut slopes) = (vec![0.0; 7 * 105], vec![SVector::zeros(); 7 * 105]);
     let mut round = |lambda: f64| {
-        factorization.fit_with(&mut workspace, &targets, &mut spline).expect("a fit");
+        factorization
+            .fit_with(&mut workspace, &targets, &mut spline)
+            .expect("a fit");
         for weights in [None, Some(&weights[..]), Some(&near)] {
             for smoothing in [Smoothing::None, Smoothing::Lambda(lambda)] {
                 factorization
@@ -30,11 +32,19 @@ fn refits_and_evaluation_allocate_nothing() {
         factorization
             .refit_with(&mut workspace, &targets, None, Smoothing::Gcv, &mut spline)
             .expect("a refit");
-        spline.apply_into(&queries, &mut values).expect("equal lengths");
-        spline.apply_and_jacobian_into(&queries, &mut values, &mut jacobians).expect("equal lengths");
-        spline.hessian_into(&queries, &mut hessians).expect("equal lengths");
+        spline
+            .apply_into(&queries, &mut values)
+            .expect("equal lengths");
+        spline
+            .apply_and_jacobian_into(&queries, &mut values, &mut jacobians)
+            .expect("equal lengths");
+        spline
+            .hessian_into(&queries, &mut hessians)
+            .expect("equal lengths");
         values[0] = spline.apply(&queries[0]);
-        factorization.influence_into(&mut workspace, &queries[..7], &mut influence).expect("a linear map");
+        factorization
+            .influence_into(&mut workspace, &queries[..7], &mut influence)
+            .expect("a linear map");
         factorization
             .jacobian_influence_into(&mut workspace, &queries[..7], &mut slopes)
             .expect("a linear map");

@@ -76,7 +76,9 @@ fn along<const D: usize, K: Kernel>(
     let place: [Dual; D] = core::array::from_fn(|i| Dual(x[i], f64::from(i == k)));
     let (linear, constant) = spline.affine();
     let mut sums: [Dual; D] = core::array::from_fn(|m| {
-        (0..D).fold(Dual(constant[m], 0.0), |sum, i| sum + Dual(linear[(m, i)], 0.0) * place[i])
+        (0..D).fold(Dual(constant[m], 0.0), |sum, i| {
+            sum + Dual(linear[(m, i)], 0.0) * place[i]
+        })
     });
     for (centre, weight) in spline.centres().zip(spline.weights()) {
         let distance = (0..D).map(|i| place[i] - Dual(centre[i], 0.0));
@@ -92,8 +94,8 @@ fn agrees<const D: usize, K: Kernel>(kernel: K) {
     let place = |p: &Point<f64, D>| Point::from(p.coords * 3.0 + SVector::repeat(0.7));
     let sources: Vec<_> = random.points::<D>(40).iter().map(place).collect();
     let targets: Vec<_> = sources.iter().map(bend).collect();
-    let spline =
-        ThinPlateSpline::fit(&sources, &targets, &FitOptions::new(kernel.clone())).expect("a spline");
+    let spline = ThinPlateSpline::fit(&sources, &targets, &FitOptions::new(kernel.clone()))
+        .expect("a spline");
     let weight = spline.weights().map(|w| w.norm()).sum::<f64>();
     for _ in 0..50 {
         let query = place(&random.point());
@@ -102,8 +104,16 @@ fn agrees<const D: usize, K: Kernel>(kernel: K) {
             for (m, dual) in along(&spline, &kernel, &query, k).iter().enumerate() {
                 // Rounding, 1e-16, of terms of at most a weight times U and U' at a distance of 10, below 1e3.
                 let rounding = 1e-13 * (weight + 1.0) * 10.0;
-                assert!((dual.0 - value[m]).abs() < rounding, "{dual:?} {}", value[m]);
-                assert!((dual.1 - jacobian[(m, k)]).abs() < rounding, "{dual:?} {}", jacobian[(m, k)]);
+                assert!(
+                    (dual.0 - value[m]).abs() < rounding,
+                    "{dual:?} {}",
+                    value[m]
+                );
+                assert!(
+                    (dual.1 - jacobian[(m, k)]).abs() < rounding,
+                    "{dual:?} {}",
+                    jacobian[(m, k)]
+                );
             }
         }
     }

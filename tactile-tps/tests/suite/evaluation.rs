@@ -11,7 +11,9 @@ fn has_the_derivatives_it_says<const D: usize, K: Kernel>(kernel: K, seed: u64) 
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let spline = fit(&sources, &targets, &FitOptions::new(kernel));
     // Off the centres, so that −r is smooth within the step.
-    let query = (0..).map(|_| random.point::<D>()).find(|q| sources.iter().all(|x| (x - q).norm() > 0.05));
+    let query = (0..)
+        .map(|_| random.point::<D>())
+        .find(|q| sources.iter().all(|x| (x - q).norm() > 0.05));
     let query = query.expect("a gap");
     let (jacobian, hessian) = (spline.jacobian(&query), spline.hessian(&query));
     const STEP: f64 = 1e-4;
@@ -19,7 +21,8 @@ fn has_the_derivatives_it_says<const D: usize, K: Kernel>(kernel: K, seed: u64) 
         let mut step = SVector::<f64, D>::zeros();
         step[k] = STEP;
         let slope = (spline.apply(&(query + step)) - spline.apply(&(query - step))) / (2.0 * STEP);
-        let bend = (spline.jacobian(&(query + step)) - spline.jacobian(&(query - step))) / (2.0 * STEP);
+        let bend =
+            (spline.jacobian(&(query + step)) - spline.jacobian(&(query - step))) / (2.0 * STEP);
         for m in 0..D {
             // Central differences: h² times third derivatives, at most w/0.05² with weights below 10.
             assert!((slope[m] - jacobian[(m, k)]).abs() < 1e-4);
@@ -38,12 +41,19 @@ fn gives_the_same_bits_in_batches<const D: usize, K: Kernel>(kernel: K, seed: u6
     let spline = fit(&sources, &targets, &FitOptions::new(kernel));
     let queries = random.points::<D>(77);
     let (mut values, mut jacobians) = (vec![Point::origin(); 77], vec![SMatrix::zeros(); 77]);
-    spline.apply_and_jacobian_into(&queries, &mut values, &mut jacobians).expect("equal lengths");
+    spline
+        .apply_and_jacobian_into(&queries, &mut values, &mut jacobians)
+        .expect("equal lengths");
     let mut alone = values.clone();
-    spline.apply_into(&queries, &mut alone).expect("equal lengths");
+    spline
+        .apply_into(&queries, &mut alone)
+        .expect("equal lengths");
     assert_eq!(values, alone);
     for (i, query) in queries.iter().enumerate() {
-        assert_eq!((spline.apply(query), spline.jacobian(query)), (values[i], jacobians[i]));
+        assert_eq!(
+            (spline.apply(query), spline.jacobian(query)),
+            (values[i], jacobians[i])
+        );
     }
 }
 
@@ -51,14 +61,23 @@ fn gives_the_same_bits_in_batches<const D: usize, K: Kernel>(kernel: K, seed: u6
 fn works_in_single_precision<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let sources = Uniform(seed).points::<D>(30);
     let targets: Vec<_> = sources.iter().map(bend).collect();
-    let narrow = |points: &[Point<f64, D>]| points.iter().map(|p| p.map(|x| x as f32)).collect::<Vec<_>>();
+    let narrow = |points: &[Point<f64, D>]| {
+        points
+            .iter()
+            .map(|p| p.map(|x| x as f32))
+            .collect::<Vec<_>>()
+    };
     let options = FitOptions::new(kernel.clone());
-    let single: ThinPlateSpline<f32, D, K> =
-        ThinPlateSpline::fit(&narrow(&sources), &narrow(&targets), &FitOptions::new(kernel))
-            .expect("a spline");
+    let single: ThinPlateSpline<f32, D, K> = ThinPlateSpline::fit(
+        &narrow(&sources),
+        &narrow(&targets),
+        &FitOptions::new(kernel),
+    )
+    .expect("a spline");
     let double = fit(&sources, &targets, &options);
     let query: Point<f64, D> = Point::from(SVector::repeat(0.2));
-    let difference = single.apply(&query.map(|x: f64| x as f32)).map(f64::from) - double.apply(&query);
+    let difference =
+        single.apply(&query.map(|x: f64| x as f32)).map(f64::from) - double.apply(&query);
     // 1e-7 times weights that sum to at most some hundreds.
     assert!(difference.norm() < 2e-4, "{difference}");
 }
@@ -95,7 +114,11 @@ fn far_values_keep_their_digits() {
     let limit = at(1e9);
     let excess = |distance: f64| (at(distance) - limit).norm() * distance;
     for distance in [1e4, 1e5, 1e6] {
-        assert!((excess(distance) / excess(1e3) - 1.0).abs() < 0.01, "{} {limit}", at(distance));
+        assert!(
+            (excess(distance) / excess(1e3) - 1.0).abs() < 0.01,
+            "{} {limit}",
+            at(distance)
+        );
     }
 }
 
@@ -109,10 +132,16 @@ fn threads_do_not_change_a_bit() {
     let queries = random.points::<3>(2000);
     let (mut serial, mut parallel) = (vec![Point::origin(); 2000], vec![Point::origin(); 2000]);
     let (mut jacobians, mut others) = (vec![SMatrix::zeros(); 2000], vec![SMatrix::zeros(); 2000]);
-    spline.apply_and_jacobian_into(&queries, &mut serial, &mut jacobians).expect("equal lengths");
-    spline.par_apply_and_jacobian_into(&queries, &mut parallel, &mut others).expect("equal lengths");
+    spline
+        .apply_and_jacobian_into(&queries, &mut serial, &mut jacobians)
+        .expect("equal lengths");
+    spline
+        .par_apply_and_jacobian_into(&queries, &mut parallel, &mut others)
+        .expect("equal lengths");
     assert_eq!((&serial, jacobians), (&parallel, others));
     parallel.fill(Point::origin());
-    spline.par_apply_into(&queries, &mut parallel).expect("equal lengths");
+    spline
+        .par_apply_into(&queries, &mut parallel)
+        .expect("equal lengths");
     assert_eq!(serial, parallel);
 }

@@ -3,7 +3,8 @@
 use crate::common::{Uniform, bend, largest};
 use nalgebra::{Matrix3, Point, Point1, SMatrix, SVector};
 use tactile_tps::{
-    Factorization, FitOptions, Input, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError, Workspace,
+    Factorization, FitOptions, Input, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError,
+    Workspace,
 };
 
 /// Largest difference between influences and the values and Jacobians of refits with unit targets.
@@ -15,12 +16,20 @@ fn against_unit_targets<const D: usize, K: Kernel>(options: FitOptions<f64, K>, 
     let (mut workspace, mut unit) = (Workspace::new(), Spline::empty(options.kernel().clone()));
     let mut values = vec![0.0; 7 * n];
     let mut slopes = vec![SVector::zeros(); 7 * n];
-    factorization.influence_into(&mut workspace, &queries, &mut values).expect("a linear map");
-    factorization.jacobian_influence_into(&mut workspace, &queries, &mut slopes).expect("a linear map");
+    factorization
+        .influence_into(&mut workspace, &queries, &mut values)
+        .expect("a linear map");
+    factorization
+        .jacobian_influence_into(&mut workspace, &queries, &mut slopes)
+        .expect("a linear map");
     let mut worst: f64 = 0.0;
     for j in 0..n {
-        let targets: Vec<_> = (0..n).map(|i| Point1::new(if i == j { 1.0 } else { 0.0 })).collect();
-        factorization.fit_with(&mut workspace, &targets, &mut unit).expect("a fit");
+        let targets: Vec<_> = (0..n)
+            .map(|i| Point1::new(if i == j { 1.0 } else { 0.0 }))
+            .collect();
+        factorization
+            .fit_with(&mut workspace, &targets, &mut unit)
+            .expect("a fit");
         for (q, query) in queries.iter().enumerate() {
             let value = (values[q * n + j] - unit.apply(query).x).abs();
             let slope = (slopes[q * n + j].transpose() - unit.jacobian(query)).norm();
@@ -42,12 +51,19 @@ fn influences_are_fits_to_unit_targets() {
                 against_unit_targets::<3, _>(with(NegR, smoothing, &options), 40),
                 against_unit_targets::<3, _>(with(R3, smoothing, &options), 40),
             ];
-            assert!(found.iter().all(|&worst| worst < 1e-11), "{smoothing:?}: {found:?}");
+            assert!(
+                found.iter().all(|&worst| worst < 1e-11),
+                "{smoothing:?}: {found:?}"
+            );
         }
     }
 }
 
-fn with<K: Kernel>(kernel: K, smoothing: Smoothing<f64>, weights: &Option<Vec<f64>>) -> FitOptions<f64, K> {
+fn with<K: Kernel>(
+    kernel: K,
+    smoothing: Smoothing<f64>,
+    weights: &Option<Vec<f64>>,
+) -> FitOptions<f64, K> {
     let options = FitOptions::new(kernel).smoothing(smoothing);
     match weights {
         Some(weights) => options.weights(weights.clone()),
@@ -65,14 +81,20 @@ fn influences_sum_to_the_spline() {
     let weights: Vec<f64> = (0..33).map(|i| 0.2 + f64::from(i % 4)).collect();
     for unit in [1.0, 1e-6] {
         let sources: Vec<_> = sources.iter().map(|p| p * unit).collect();
-        let options = FitOptions::new(NegR).smoothing(Smoothing::Lambda(0.1 * unit)).weights(weights.clone());
+        let options = FitOptions::new(NegR)
+            .smoothing(Smoothing::Lambda(0.1 * unit))
+            .weights(weights.clone());
         let factorization = Factorization::new(&sources, &options).expect("a factor");
         let spline = factorization.fit(&targets).expect("a fit");
         let x = Point::from(random.point::<3>().coords * unit);
         let a = factorization.influence(&x).expect("a linear map");
         let b = factorization.jacobian_influence(&x).expect("a linear map");
         let value: SVector<f64, 3> = a.iter().zip(&targets).map(|(a, y)| y.coords * *a).sum();
-        let slope: Matrix3<f64> = b.iter().zip(&targets).map(|(b, y)| y.coords * b.transpose()).sum();
+        let slope: Matrix3<f64> = b
+            .iter()
+            .zip(&targets)
+            .map(|(b, y)| y.coords * b.transpose())
+            .sum();
         assert!((value - spline.apply(&x).coords).norm() < 1e-13);
         assert!((slope - spline.jacobian(&x)).norm() * unit < 1e-13);
     }
@@ -83,14 +105,21 @@ fn influences_sum_to_the_spline() {
 fn influences_have_the_moments_of_the_point() {
     let mut random = Uniform(3);
     for flat in [1.0, 0.0] {
-        let sources: Vec<_> =
-            random.points::<3>(25).iter().map(|p| Point::from([p.x, p.y, p.z * flat])).collect();
+        let sources: Vec<_> = random
+            .points::<3>(25)
+            .iter()
+            .map(|p| Point::from([p.x, p.y, p.z * flat]))
+            .collect();
         let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
         let x = random.point::<3>();
         let a = factorization.influence(&x).expect("a linear map");
         let b = factorization.jacobian_influence(&x).expect("a linear map");
         let first: SVector<f64, 3> = a.iter().zip(&sources).map(|(a, p)| p.coords * *a).sum();
-        let slope: Matrix3<f64> = b.iter().zip(&sources).map(|(b, p)| p.coords * b.transpose()).sum();
+        let slope: Matrix3<f64> = b
+            .iter()
+            .zip(&sources)
+            .map(|(b, p)| p.coords * b.transpose())
+            .sum();
         let shadow = SMatrix::from_diagonal(&SVector::from([1.0, 1.0, flat]));
         assert!((a.iter().sum::<f64>() - 1.0).abs() < 1e-13);
         assert!(largest(b.iter().sum::<SVector<f64, 3>>().iter().copied()) < 1e-13);
@@ -116,10 +145,22 @@ fn single_precision_keeps_its_digits() {
 fn what_is_no_linear_map_is_refused() {
     let sources = Uniform(6).points::<2>(12);
     let x = Point::from([0.1, 0.2]);
-    let chosen = Factorization::<f64, 2>::new(&sources, &FitOptions::default().smoothing(Smoothing::Gcv));
-    assert_eq!(chosen.expect("a factor").influence(&x), Err(TpsError::DependsOnTargets));
-    let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default()).expect("a factor");
+    let chosen =
+        Factorization::<f64, 2>::new(&sources, &FitOptions::default().smoothing(Smoothing::Gcv));
+    assert_eq!(
+        chosen.expect("a factor").influence(&x),
+        Err(TpsError::DependsOnTargets)
+    );
+    let factorization =
+        Factorization::<f64, 2>::new(&sources, &FitOptions::default()).expect("a factor");
     let (mut workspace, mut short) = (Workspace::new(), vec![0.0; 11]);
     let found = factorization.influence_into(&mut workspace, &[x], &mut short);
-    assert_eq!(found, Err(TpsError::Length { input: Input::Output, expected: 12, found: 11 }));
+    assert_eq!(
+        found,
+        Err(TpsError::Length {
+            input: Input::Output,
+            expected: 12,
+            found: 11
+        })
+    );
 }

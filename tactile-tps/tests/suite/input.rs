@@ -15,10 +15,19 @@ fn coinciding_points_are_merged() {
     targets.push(targets[3]);
     let merged = fit(&sources, &targets, &FitOptions::default());
     let query = random.point();
-    assert_eq!((merged.report().merged, merged.apply(&query)), (1, apart.apply(&query)));
+    assert_eq!(
+        (merged.report().merged, merged.apply(&query)),
+        (1, apart.apply(&query))
+    );
     targets[12].x += 0.2;
     let conflict = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default());
-    assert_eq!(conflict.err(), Some(TpsError::Conflict { first: 3, second: 12 }));
+    assert_eq!(
+        conflict.err(),
+        Some(TpsError::Conflict {
+            first: 3,
+            second: 12
+        })
+    );
     let options = FitOptions::default().smoothing(Smoothing::Lambda(0.1));
     let smoothed = fit(&sources, &targets, &options);
     // One point of weight two at the mean is the same problem.
@@ -46,7 +55,10 @@ fn directions_that_are_not_spanned_are_dropped() {
     let normal = SVector::<f64, 3>::new(0.5, -0.25, -1.0).normalize();
     assert!((spline.jacobian(&(exact[0] + normal * 0.0)) * normal).norm() < 1e-10);
     let thin = flat(1e-4, &mut random);
-    assert_eq!(fit(&thin, &targets, &FitOptions::new(NegR)).report().rank, 4);
+    assert_eq!(
+        fit(&thin, &targets, &FitOptions::new(NegR)).report().rank,
+        4
+    );
     let dropped = fit(&thin, &targets, &FitOptions::new(NegR).rank_tolerance(1e-2));
     assert_eq!(dropped.report().rank, 3);
     assert!(dropped.report().extents[2] < 1e-3);
@@ -56,27 +68,56 @@ fn directions_that_are_not_spanned_are_dropped() {
 fn bad_input_is_named() {
     let points = Uniform(3).points::<2>(6);
     let fit = |sources: &[Point2<f64>], targets: &[Point2<f64>], options| {
-        ThinPlateSpline::fit(sources, targets, &options).expect_err("an error").to_string()
+        ThinPlateSpline::fit(sources, targets, &options)
+            .expect_err("an error")
+            .to_string()
     };
     let plain = FitOptions::<f64>::default;
     assert_eq!(fit(&[], &[], plain()), "no source points to fit");
     let mut bad = points.clone();
     bad[4].y = f64::NAN;
-    assert_eq!(fit(&bad, &points, plain()), "source points: number 4 (from zero) is not finite");
-    assert_eq!(fit(&points, &bad, plain()), "target points: number 4 (from zero) is not finite");
-    assert_eq!(fit(&points, &points[1..], plain()), "target points: expected 6 of them, found 5");
+    assert_eq!(
+        fit(&bad, &points, plain()),
+        "source points: number 4 (from zero) is not finite"
+    );
+    assert_eq!(
+        fit(&points, &bad, plain()),
+        "target points: number 4 (from zero) is not finite"
+    );
+    assert_eq!(
+        fit(&points, &points[1..], plain()),
+        "target points: expected 6 of them, found 5"
+    );
     for lambda in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(fit(&points, &points, plain().smoothing(Smoothing::Lambda(lambda))).starts_with("smoothing"));
+        assert!(
+            fit(
+                &points,
+                &points,
+                plain().smoothing(Smoothing::Lambda(lambda))
+            )
+            .starts_with("smoothing")
+        );
     }
     for tolerance in [-0.1, 1.0, f64::NAN] {
-        assert!(fit(&points, &points, plain().rank_tolerance(tolerance)).starts_with("rank tolerance"));
+        assert!(
+            fit(&points, &points, plain().rank_tolerance(tolerance)).starts_with("rank tolerance")
+        );
     }
     let weights = |bad| vec![1.0, 1.0, bad, 1.0, 1.0, 1.0];
     for weight in [-1.0, f64::NAN, f64::INFINITY] {
         assert!(fit(&points, &points, plain().weights(weights(weight))).starts_with("weight 2 "));
     }
-    assert_eq!(fit(&points, &points, plain().weights(vec![0.0; 6])), "no weights to fit");
-    assert!(fit(&points, &points, plain().weights(vec![1.0; 5])).starts_with("weights: expected 6"));
-    let few = fit(&points[..3], &points[..3], plain().smoothing(Smoothing::Gcv));
+    assert_eq!(
+        fit(&points, &points, plain().weights(vec![0.0; 6])),
+        "no weights to fit"
+    );
+    assert!(
+        fit(&points, &points, plain().weights(vec![1.0; 5])).starts_with("weights: expected 6")
+    );
+    let few = fit(
+        &points[..3],
+        &points[..3],
+        plain().smoothing(Smoothing::Gcv),
+    );
     assert!(few.starts_with("cross-validation needs more than 3"));
 }

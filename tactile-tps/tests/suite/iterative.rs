@@ -5,8 +5,8 @@ use core::ops::ControlFlow;
 use crate::common::{Uniform, bend, largest};
 use nalgebra::{Point, Point3};
 use tactile_tps::{
-    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Solver, Spline, Stage, ThinPlateSpline,
-    TpsError, Workspace,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Solver, Spline, Stage,
+    ThinPlateSpline, TpsError, Workspace,
 };
 
 const POINTS: usize = 900;
@@ -17,33 +17,77 @@ fn compare<const D: usize, K: Kernel>(
     options: &FitOptions<f64, K>,
 ) -> (f64, usize) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
-    let fit =
-        |solver| ThinPlateSpline::fit(sources, &targets, &options.clone().solver(solver)).expect("a fit");
+    let fit = |solver| {
+        ThinPlateSpline::fit(sources, &targets, &options.clone().solver(solver)).expect("a fit")
+    };
     let (direct, iterative) = (fit(Solver::Direct), fit(Solver::Iterative));
     let report = iterative.report();
-    assert!(report.converged && report.residual <= Some(1e-10), "{report:?}");
+    assert!(
+        report.converged && report.residual <= Some(1e-10),
+        "{report:?}"
+    );
     assert_eq!(report.rank, direct.report().rank);
     let mut random = Uniform(31);
     let queries: [Point<f64, D>; 60] = core::array::from_fn(|_| random.point());
-    (largest(queries.iter().map(|q| (direct.apply(q) - iterative.apply(q)).norm())), report.iterations)
+    (
+        largest(
+            queries
+                .iter()
+                .map(|q| (direct.apply(q) - iterative.apply(q)).norm()),
+        ),
+        report.iterations,
+    )
 }
 
 /// The residual is at most 1e-10 of targets of size one; between the points a spline is off by little more than at them.
 /// Steps grow slowly with the number of points; a preconditioner without effect takes hundreds.
 #[test]
 fn iteration_finds_the_direct_solution() {
-    let (plane, space) = (Uniform(7).points::<2>(POINTS), Uniform(8).points::<3>(POINTS));
+    let (plane, space) = (
+        Uniform(7).points::<2>(POINTS),
+        Uniform(8).points::<3>(POINTS),
+    );
     let weights: Vec<f64> = (0..POINTS).map(|i| f64::from(i as u32 % 5) * 0.7).collect();
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.01)] {
         for weights in [vec![1.0; POINTS], weights.clone()] {
             let found = [
-                compare(&plane, &FitOptions::new(R2LogR).smoothing(smoothing).weights(weights.clone())),
-                compare(&space, &FitOptions::new(R2LogR).smoothing(smoothing).weights(weights.clone())),
-                compare(&plane, &FitOptions::new(NegR).smoothing(smoothing).weights(weights.clone())),
-                compare(&space, &FitOptions::new(NegR).smoothing(smoothing).weights(weights.clone())),
-                compare(&space, &FitOptions::new(R3).smoothing(smoothing).weights(weights.clone())),
+                compare(
+                    &plane,
+                    &FitOptions::new(R2LogR)
+                        .smoothing(smoothing)
+                        .weights(weights.clone()),
+                ),
+                compare(
+                    &space,
+                    &FitOptions::new(R2LogR)
+                        .smoothing(smoothing)
+                        .weights(weights.clone()),
+                ),
+                compare(
+                    &plane,
+                    &FitOptions::new(NegR)
+                        .smoothing(smoothing)
+                        .weights(weights.clone()),
+                ),
+                compare(
+                    &space,
+                    &FitOptions::new(NegR)
+                        .smoothing(smoothing)
+                        .weights(weights.clone()),
+                ),
+                compare(
+                    &space,
+                    &FitOptions::new(R3)
+                        .smoothing(smoothing)
+                        .weights(weights.clone()),
+                ),
             ];
-            assert!(found.iter().all(|&(difference, steps)| difference < 1e-9 && steps < 20), "{found:?}");
+            assert!(
+                found
+                    .iter()
+                    .all(|&(difference, steps)| difference < 1e-9 && steps < 20),
+                "{found:?}"
+            );
         }
     }
 }
@@ -51,17 +95,29 @@ fn iteration_finds_the_direct_solution() {
 /// Points in a plane of space, on a lattice with all its ties, in dense clumps.
 #[test]
 fn awkward_points_are_no_obstacle() {
-    let flat: Vec<_> = Uniform(9).points::<2>(POINTS).iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
+    let flat: Vec<_> = Uniform(9)
+        .points::<2>(POINTS)
+        .iter()
+        .map(|p| Point3::new(p.x, p.y, 0.0))
+        .collect();
     let lattice: Vec<_> = (0..POINTS as u32)
         .map(|i| Point3::from([i % 10, i / 10 % 10, i / 100].map(|x| f64::from(x) / 5.0 - 1.0)))
         .collect();
     let clump = |(i, p): (usize, &Point3<f64>)| {
         p * 0.02 + nalgebra::Vector3::from([i % 3, i % 7, i % 2].map(|x| x as f64 / 4.0))
     };
-    let clumps: Vec<_> = Uniform(10).points::<3>(POINTS).iter().enumerate().map(clump).collect();
+    let clumps: Vec<_> = Uniform(10)
+        .points::<3>(POINTS)
+        .iter()
+        .enumerate()
+        .map(clump)
+        .collect();
     for sources in [flat, lattice, clumps] {
         let (difference, steps) = compare(&sources, &FitOptions::new(NegR));
-        assert!(difference < 1e-9 && steps < 20, "{difference:e} after {steps} steps");
+        assert!(
+            difference < 1e-9 && steps < 20,
+            "{difference:e} after {steps} steps"
+        );
     }
 }
 
@@ -82,14 +138,18 @@ fn refits_are_fits() {
         (Some(&weights), Smoothing::Lambda(0.1)),
     ] {
         let refit = weights.map(|w| &w[..]);
-        factorization.refit_with(&mut workspace, &targets, refit, smoothing, &mut spline).expect("a refit");
+        factorization
+            .refit_with(&mut workspace, &targets, refit, smoothing, &mut spline)
+            .expect("a refit");
         let options = options.clone().smoothing(smoothing).solver(Solver::Direct);
         let options = weights.map_or(options.clone(), |w| options.clone().weights(w.clone()));
         let fitted = ThinPlateSpline::fit(&sources, &targets, &options).expect("a fit");
         assert!((spline.apply(&query) - fitted.apply(&query)).norm() < 1e-9);
     }
     let again = allocation_counter::measure(|| {
-        factorization.fit_with(&mut workspace, &targets, &mut spline).expect("a refit");
+        factorization
+            .fit_with(&mut workspace, &targets, &mut spline)
+            .expect("a refit");
     });
     assert_eq!(again.count_total, 0);
     assert_eq!(factorization.influence(&query), Err(TpsError::NoFactor));
@@ -112,13 +172,20 @@ fn a_watch_stops_the_fit() {
     let mut residuals = Vec::new();
     let early = factorization.fit_watched(&targets, |progress| {
         residuals.push(progress.residual.expect("an iteration has one"));
-        if progress.done == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if progress.done == 3 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     });
     let early = early.expect("the best so far");
     assert!(early.report().iterations == 3 && !early.report().converged);
     // What was told is what is reported: the residual carried along and the one formed anew differ by rounding.
     let (told, reported) = (residuals[3], early.report().residual.expect("measured"));
-    assert!((told / reported - 1.0).abs() < 1e-6 && reported < 0.01 * residuals[0], "{told:e} {reported:e}");
+    assert!(
+        (told / reported - 1.0).abs() < 1e-6 && reported < 0.01 * residuals[0],
+        "{told:e} {reported:e}"
+    );
 }
 
 #[test]
@@ -129,8 +196,13 @@ fn tolerances_are_checked_and_kept() {
         let found = Factorization::<f64, 2>::new(&sources, &FitOptions::default().tolerance(value));
         assert!(matches!(found, Err(TpsError::Tolerance { .. })), "{value}");
     }
-    let rough = FitOptions::default().solver(Solver::Iterative).tolerance(1e-4);
+    let rough = FitOptions::default()
+        .solver(Solver::Iterative)
+        .tolerance(1e-4);
     let rough = ThinPlateSpline::fit(&sources, &targets, &rough).expect("a fit");
     let report = rough.report();
-    assert!(report.converged && report.residual <= Some(1e-4) && report.iterations < 8, "{report:?}");
+    assert!(
+        report.converged && report.residual <= Some(1e-4) && report.iterations < 8,
+        "{report:?}"
+    );
 }

@@ -18,7 +18,10 @@ fn rigid_motions_are_found_and_never_reflect() {
         (found.rotation - truth.rotation).norm() < 1e-13
             && (found.translation - truth.translation).norm() < 1e-13
     );
-    let mirrored: Vec<_> = sources.iter().map(|x| Point3::new(-x.x, x.y, x.z)).collect();
+    let mirrored: Vec<_> = sources
+        .iter()
+        .map(|x| Point3::new(-x.x, x.y, x.z))
+        .collect();
     let found = RigidModel.fit(&sources, &mirrored, None).expect("a motion");
     assert!((found.rotation.determinant() - 1.0).abs() < 1e-13);
 }

@@ -4,8 +4,8 @@ use crate::common::{Uniform, bend, fit, for_all, largest};
 use nalgebra::{Point, Point2, Point3, Rotation2, Rotation3, SMatrix, SVector};
 use proptest::prelude::*;
 use tactile_tps::{
-    Affine, AffineModel, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, Warp,
-    WarpModel, Workspace,
+    Affine, AffineModel, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline,
+    Warp, WarpModel, Workspace,
 };
 
 fn interpolates<const D: usize, K: Kernel>(kernel: K, seed: u64) {
@@ -26,12 +26,26 @@ fn reproduces_affine_maps<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let linear = SMatrix::<f64, D, D>::from_fn(|_, _| random.next());
     let map = Affine::new(linear, SVector::from_fn(|_, _| 10.0 * random.next()));
     let targets: Vec<_> = sources.iter().map(|x| map.apply(x)).collect();
-    for smoothing in [Smoothing::None, Smoothing::Lambda(0.1), Smoothing::Lambda(1e6)] {
-        let spline = fit(&sources, &targets, &FitOptions::new(kernel.clone()).smoothing(smoothing));
+    for smoothing in [
+        Smoothing::None,
+        Smoothing::Lambda(0.1),
+        Smoothing::Lambda(1e6),
+    ] {
+        let spline = fit(
+            &sources,
+            &targets,
+            &FitOptions::new(kernel.clone()).smoothing(smoothing),
+        );
         // The targets' own rounding, up to 1e-15 of their size 10 over 30 points, times the condition number: close
         // points under r³ bring it to 1e8.
         let rounding = 5e-15 * spline.report().condition;
-        assert!(largest(spline.weights().flat_map(|w| w.iter().copied().collect::<Vec<_>>())) < rounding);
+        assert!(
+            largest(
+                spline
+                    .weights()
+                    .flat_map(|w| w.iter().copied().collect::<Vec<_>>())
+            ) < rounding
+        );
         let far = random.point::<D>() * 50.0;
         assert!((spline.apply(&far) - map.apply(&far)).norm() < 100.0 * rounding);
         assert!((spline.jacobian(&far) - linear).norm() < rounding);
@@ -53,7 +67,8 @@ fn is_the_same_in_any_frame<const D: usize, K: Kernel>(
     let offset = SVector::<f64, D>::from_fn(|_, _| 3.0 * random.next());
     let moved = |x: &Point<f64, D>| Point::from((turn(x).coords + offset) * scale);
     let elsewhere: Vec<_> = sources.iter().map(moved).collect();
-    let options = |lambda: f64| FitOptions::new(kernel.clone()).smoothing(Smoothing::Lambda(lambda));
+    let options =
+        |lambda: f64| FitOptions::new(kernel.clone()).smoothing(Smoothing::Lambda(lambda));
     let here = fit(&sources, &targets, &options(0.01));
     let there = fit(&elsewhere, &targets, &options(0.01 * scale.powi(degree)));
     for _ in 0..20 {
@@ -68,7 +83,10 @@ fn ignores_the_order<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let reversed = |points: &[Point<f64, D>]| points.iter().rev().copied().collect::<Vec<_>>();
     let options = FitOptions::new(kernel);
-    let (a, b) = (fit(&sources, &targets, &options), fit(&reversed(&sources), &reversed(&targets), &options));
+    let (a, b) = (
+        fit(&sources, &targets, &options),
+        fit(&reversed(&sources), &reversed(&targets), &options),
+    );
     let query = Point::from(SVector::repeat(0.3));
     assert!((a.apply(&query) - b.apply(&query)).norm() < 1e-11);
 }
@@ -79,12 +97,17 @@ fn smooths_towards_the_affine_fit<const D: usize, K: Kernel>(kernel: K, seed: u6
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let weights: Vec<f64> = (0..30).map(|_| 1.1 + random.next()).collect();
     let options = |lambda| {
-        FitOptions::new(kernel.clone()).smoothing(Smoothing::Lambda(lambda)).weights(weights.clone())
+        FitOptions::new(kernel.clone())
+            .smoothing(Smoothing::Lambda(lambda))
+            .weights(weights.clone())
     };
-    let energies: Vec<f64> =
-        (-6..6).map(|k| fit(&sources, &targets, &options(10f64.powi(k))).bending_energy()).collect();
+    let energies: Vec<f64> = (-6..6)
+        .map(|k| fit(&sources, &targets, &options(10f64.powi(k))).bending_energy())
+        .collect();
     assert!(energies.windows(2).all(|e| e[1] < e[0]), "{energies:?}");
-    let limit = AffineModel.fit(&sources, &targets, Some(&weights)).expect("an affine map");
+    let limit = AffineModel
+        .fit(&sources, &targets, Some(&weights))
+        .expect("an affine map");
     let spline = fit(&sources, &targets, &options(1e12));
     let query = random.point::<D>();
     // What is left of the bending goes as 1/λ.
@@ -96,8 +119,11 @@ fn refits_to_the_same<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let mut random = Uniform(seed);
     let sources = random.points::<D>(35);
     let targets: Vec<_> = sources.iter().map(bend).collect();
-    let weights: Vec<f64> = (0..35).map(|i| if i % 7 == 0 { 0.0 } else { 1.1 + random.next() }).collect();
-    let factorization = Factorization::new(&sources, &FitOptions::new(kernel.clone())).expect("a factor");
+    let weights: Vec<f64> = (0..35)
+        .map(|i| if i % 7 == 0 { 0.0 } else { 1.1 + random.next() })
+        .collect();
+    let factorization =
+        Factorization::new(&sources, &FitOptions::new(kernel.clone())).expect("a factor");
     let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel.clone()));
     let query = random.point::<D>();
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.3), Smoothing::Gcv] {
@@ -162,10 +188,16 @@ proptest! {
 fn cross_validation_finds_the_noise() {
     let mut random = Uniform(7);
     let sources = random.points::<2>(150);
-    let targets: Vec<_> =
-        sources.iter().map(|x| bend(x) + SVector::<f64, 2>::from_fn(|_, _| 0.05 * random.next())).collect();
+    let targets: Vec<_> = sources
+        .iter()
+        .map(|x| bend(x) + SVector::<f64, 2>::from_fn(|_, _| 0.05 * random.next()))
+        .collect();
     let error = |smoothing| {
-        let spline = fit(&sources, &targets, &FitOptions::new(R2LogR).smoothing(smoothing));
+        let spline = fit(
+            &sources,
+            &targets,
+            &FitOptions::new(R2LogR).smoothing(smoothing),
+        );
         let queries = Uniform(8).points::<2>(200);
         queries
             .iter()

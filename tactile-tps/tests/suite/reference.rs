@@ -21,7 +21,10 @@ struct Table {
 impl Table {
     fn enter(&mut self, case: &Value, quantity: &'static str, error: f64, tolerance: f64) {
         let ratio = error / tolerance;
-        let row = self.rows.entry((text(case, "category"), quantity)).or_insert((-1.0, String::new()));
+        let row = self
+            .rows
+            .entry((text(case, "category"), quantity))
+            .or_insert((-1.0, String::new()));
         if ratio > row.0 || ratio.is_nan() {
             *row = (ratio, text(case, "id"));
         }
@@ -37,28 +40,46 @@ fn number(value: &Value) -> f64 {
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().expect("an array").iter().map(number).collect()
+    value
+        .as_array()
+        .expect("an array")
+        .iter()
+        .map(number)
+        .collect()
 }
 
 /// Rows of numbers as points, short rows padded with zero.
 fn points<const D: usize>(value: &Value) -> Vec<Point<f64, D>> {
     let point = |row: &Value| {
         let row = numbers(row);
-        Point::from(nalgebra::SVector::from_fn(|k, _| row.get(k).copied().unwrap_or(0.0)))
+        Point::from(nalgebra::SVector::from_fn(|k, _| {
+            row.get(k).copied().unwrap_or(0.0)
+        }))
     };
     value.as_array().expect("rows").iter().map(point).collect()
 }
 
 fn options<K: Kernel>(case: &Value, kernel: K) -> FitOptions<f64, K> {
     let lambda = number(&case["lambda"]);
-    let smoothing = if lambda > 0.0 { Smoothing::Lambda(lambda) } else { Smoothing::None };
+    let smoothing = if lambda > 0.0 {
+        Smoothing::Lambda(lambda)
+    } else {
+        Smoothing::None
+    };
     let options = FitOptions::new(kernel).smoothing(smoothing);
-    if case["weights"].is_null() { options } else { options.weights(numbers(&case["weights"])) }
+    if case["weights"].is_null() {
+        options
+    } else {
+        options.weights(numbers(&case["weights"]))
+    }
 }
 
 /// The tolerance the reference states: never below 1e-13, growing with conditioning and cancellation.
 fn tolerance(n: usize, sensitivity: f64, summation: f64) -> f64 {
-    f64::max(1e-13, 0.5f64.powi(53) * 50.0 * n as f64 * (1.0 + sensitivity) * (1.0 + summation))
+    f64::max(
+        1e-13,
+        0.5f64.powi(53) * 50.0 * n as f64 * (1.0 + sensitivity) * (1.0 + summation),
+    )
 }
 
 fn optional(case: &Value, group: &str, quantity: &str, query: usize) -> f64 {
@@ -91,7 +112,9 @@ fn singular<const D: usize, K: Kernel>(
     fitted: Fitted<D, K>,
 ) {
     let mut pairs = (0..sources.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
-    let (i, j) = pairs.find(|&(i, j)| sources[i] == sources[j]).expect("a pair");
+    let (i, j) = pairs
+        .find(|&(i, j)| sources[i] == sources[j])
+        .expect("a pair");
     match fitted {
         Err(TpsError::Conflict { first, second }) => {
             assert_eq!((first, second, true), (i, j, targets[i] != targets[j]))
@@ -114,7 +137,10 @@ fn queries<const D: usize, K: Kernel>(
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
 ) {
-    let (n, outputs) = (sources.len(), case["outputs"].as_u64().expect("outputs") as usize);
+    let (n, outputs) = (
+        sources.len(),
+        case["outputs"].as_u64().expect("outputs") as usize,
+    );
     let scale = largest(targets.iter().flat_map(|p| p.iter().copied()));
     let side = |k: usize| {
         let axis = || sources.iter().map(|p| p[k]);
@@ -127,20 +153,43 @@ fn queries<const D: usize, K: Kernel>(
         let size = f64::max(largest(expected.iter().copied()), scale);
         let value = spline.apply(query);
         let error = largest((0..outputs).map(|k| value[k] - expected[k]));
-        let bound = size * tolerance(n, group("sensitivity", "values"), group("summation", "values"));
-        table.enter(case, if i < 8 { "value near" } else { "value far" }, error, bound);
+        let bound = size
+            * tolerance(
+                n,
+                group("sensitivity", "values"),
+                group("summation", "values"),
+            );
+        table.enter(
+            case,
+            if i < 8 { "value near" } else { "value far" },
+            error,
+            bound,
+        );
 
         let rows = case["expected"]["jacobian"][i].as_array().expect("rows");
         let rows: Vec<Vec<f64>> = rows.iter().map(numbers).collect();
-        let slope = if diameter > 0.0 { scale / diameter } else { 0.0 };
+        let slope = if diameter > 0.0 {
+            scale / diameter
+        } else {
+            0.0
+        };
         let size = f64::max(largest(rows.iter().flatten().copied()), slope);
         let jacobian = spline.jacobian(query);
         let entries = (0..outputs).flat_map(|k| (0..D).map(move |l| (k, l)));
         let error = largest(entries.map(|(k, l)| jacobian[(k, l)] - rows[k][l]));
-        let bound = size * tolerance(n, group("sensitivity", "jacobian"), group("summation", "jacobian"));
+        let bound = size
+            * tolerance(
+                n,
+                group("sensitivity", "jacobian"),
+                group("summation", "jacobian"),
+            );
         table.enter(
             case,
-            if i < 8 { "jacobian near" } else { "jacobian far" },
+            if i < 8 {
+                "jacobian near"
+            } else {
+                "jacobian far"
+            },
             error,
             f64::max(bound, 1e-300),
         );
@@ -157,11 +206,24 @@ fn coefficients<const D: usize, K: Kernel>(
     if sensitivity.is_null() || spline.report().merged > 0 {
         return;
     }
-    let rows: Vec<Vec<f64>> = case["expected"]["w"].as_array().expect("rows").iter().map(numbers).collect();
-    let errors = spline.weights().zip(&rows).flat_map(|(w, row)| (0..row.len()).map(move |k| w[k] - row[k]));
+    let rows: Vec<Vec<f64>> = case["expected"]["w"]
+        .as_array()
+        .expect("rows")
+        .iter()
+        .map(numbers)
+        .collect();
+    let errors = spline
+        .weights()
+        .zip(&rows)
+        .flat_map(|(w, row)| (0..row.len()).map(move |k| w[k] - row[k]));
     let (error, size) = (largest(errors), largest(rows.iter().flatten().copied()));
     if size > 0.0 {
-        table.enter(case, "weights", error, size * tolerance(targets.len(), number(sensitivity), 0.0));
+        table.enter(
+            case,
+            "weights",
+            error,
+            size * tolerance(targets.len(), number(sensitivity), 0.0),
+        );
     }
 }
 
@@ -170,8 +232,14 @@ fn run<const D: usize>(table: &mut Table, folder: &str) {
     let file = std::fs::read_to_string(&path).expect("readable");
     let file: Value = serde_json::from_str(&file).expect("JSON");
     for check in file["header"]["parse_check"].as_array().expect("rows") {
-        let bits = check["bits"].as_str().expect("bits").trim_start_matches("0x");
-        assert_eq!(number(&check["value"]).to_bits(), u64::from_str_radix(bits, 16).expect("hexadecimal"));
+        let bits = check["bits"]
+            .as_str()
+            .expect("bits")
+            .trim_start_matches("0x");
+        assert_eq!(
+            number(&check["value"]).to_bits(),
+            u64::from_str_radix(bits, 16).expect("hexadecimal")
+        );
     }
     for case in file["cases"].as_array().expect("cases") {
         match text(case, "kernel").as_str() {
@@ -187,7 +255,10 @@ fn run<const D: usize>(table: &mut Table, folder: &str) {
 fn every_case_is_within_its_stated_tolerance() {
     let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
     let folder = std::env::var("TACTILE_DATA").unwrap_or_else(|_| default.to_owned());
-    if !std::path::Path::new(&folder).join("reference/tps2.json").exists() {
+    if !std::path::Path::new(&folder)
+        .join("reference/tps2.json")
+        .exists()
+    {
         println!("skipped: no reference numbers in {folder}");
         return;
     }

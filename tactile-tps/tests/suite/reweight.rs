@@ -3,14 +3,18 @@
 use crate::common::{Uniform, bend, largest};
 use nalgebra::{Point, Point3};
 use tactile_tps::{
-    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline, TpsError,
-    Workspace,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, ThinPlateSpline,
+    TpsError, Workspace,
 };
 
 const POINTS: usize = 150;
 
 /// Largest difference at queries between refit and fit, and the steps the refit took.
-fn compare<const D: usize, K: Kernel>(kernel: K, weights: &[f64], smoothing: Smoothing<f64>) -> (f64, usize) {
+fn compare<const D: usize, K: Kernel>(
+    kernel: K,
+    weights: &[f64],
+    smoothing: Smoothing<f64>,
+) -> (f64, usize) {
     let mut random = Uniform(17);
     let sources = random.points::<D>(weights.len());
     let targets: Vec<_> = sources.iter().map(bend).collect();
@@ -18,14 +22,31 @@ fn compare<const D: usize, K: Kernel>(kernel: K, weights: &[f64], smoothing: Smo
     let factorization = Factorization::new(&sources, &options).expect("a factor");
     let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel));
     factorization
-        .refit_with(&mut workspace, &targets, Some(weights), smoothing, &mut refitted)
+        .refit_with(
+            &mut workspace,
+            &targets,
+            Some(weights),
+            smoothing,
+            &mut refitted,
+        )
         .expect("a refit");
-    let fitted =
-        ThinPlateSpline::fit(&sources, &targets, &options.smoothing(smoothing).weights(weights.to_vec()))
-            .expect("a fit");
+    let fitted = ThinPlateSpline::fit(
+        &sources,
+        &targets,
+        &options.smoothing(smoothing).weights(weights.to_vec()),
+    )
+    .expect("a fit");
     let queries: [Point<f64, D>; 50] = core::array::from_fn(|_| random.point());
-    let values = largest(queries.iter().map(|q| (fitted.apply(q) - refitted.apply(q)).norm()));
-    let slopes = largest(queries.iter().map(|q| (fitted.jacobian(q) - refitted.jacobian(q)).norm()));
+    let values = largest(
+        queries
+            .iter()
+            .map(|q| (fitted.apply(q) - refitted.apply(q)).norm()),
+    );
+    let slopes = largest(
+        queries
+            .iter()
+            .map(|q| (fitted.jacobian(q) - refitted.jacobian(q)).norm()),
+    );
     (values.max(1e-2 * slopes), refitted.report().iterations)
 }
 
@@ -38,11 +59,21 @@ fn weights(weight: impl FnMut(usize) -> f64) -> Vec<f64> {
 #[test]
 fn weights_that_differ_little_are_no_new_factorisation() {
     let near = weights(|i| 1.0 + 0.003 * (i as f64).sin());
-    let few = weights(|i| if i % 12 == 7 { [0.01, 1e-6, 30.0][i / 12 % 3] } else { 1.0 });
+    let few = weights(|i| {
+        if i % 12 == 7 {
+            [0.01, 1e-6, 30.0][i / 12 % 3]
+        } else {
+            1.0
+        }
+    });
     for lambda in [1e-3, 0.1, 10.0] {
         for weights in [&near, &few] {
             let smoothing = Smoothing::Lambda(lambda);
-            let range = if std::ptr::eq(weights, &few) { 0..=0 } else { 1..=POINTS / 18 };
+            let range = if std::ptr::eq(weights, &few) {
+                0..=0
+            } else {
+                1..=POINTS / 18
+            };
             for (difference, steps) in [
                 compare::<2, _>(R2LogR, weights, smoothing),
                 compare::<3, _>(R2LogR, weights, smoothing),
@@ -64,7 +95,10 @@ fn weights_that_differ_much_are_factored() {
     let gaps = weights(|i| f64::from(i % 5 != 0));
     for weights in [&wild, &gaps] {
         let (difference, steps) = compare::<3, _>(NegR, weights, Smoothing::Lambda(0.1));
-        assert!(difference < 1e-12 && steps == 0, "{difference:e} after {steps} steps");
+        assert!(
+            difference < 1e-12 && steps == 0,
+            "{difference:e} after {steps} steps"
+        );
     }
 }
 
@@ -85,9 +119,23 @@ fn conflicts_are_found_whatever_the_weights() {
     let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
     let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(NegR));
     let mut refit = |weight: f64| {
-        let weights: Vec<f64> = (0..21).map(|i| if i == 20 { weight } else { 2.0 }).collect();
-        factorization.refit_with(&mut workspace, &targets, Some(&weights), Smoothing::None, &mut spline)
+        let weights: Vec<f64> = (0..21)
+            .map(|i| if i == 20 { weight } else { 2.0 })
+            .collect();
+        factorization.refit_with(
+            &mut workspace,
+            &targets,
+            Some(&weights),
+            Smoothing::None,
+            &mut spline,
+        )
     };
-    assert_eq!(refit(0.5), Err(TpsError::Conflict { first: 4, second: 20 }));
+    assert_eq!(
+        refit(0.5),
+        Err(TpsError::Conflict {
+            first: 4,
+            second: 20
+        })
+    );
     assert_eq!(refit(0.0), Ok(()));
 }

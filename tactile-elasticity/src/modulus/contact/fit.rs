@@ -14,7 +14,11 @@ use crate::scalar::{narrow, widen};
 use nalgebra::{DMatrix, RealField};
 
 impl<L: ContactLaw> ContactEstimator<L> {
-    fn observe(&self, loads: &[LoadState<f64>], share: f64) -> Result<Vec<Observation>, ElasticityError> {
+    fn observe(
+        &self,
+        loads: &[LoadState<f64>],
+        share: f64,
+    ) -> Result<Vec<Observation>, ElasticityError> {
         let mut all = Vec::new();
         for (load, state) in loads.iter().enumerate() {
             let force = state.force_n.validated(Quantity::Force)?;
@@ -22,32 +26,58 @@ impl<L: ContactLaw> ContactEstimator<L> {
                             wanted: bool,
                             quantity,
                             law: &dyn Fn(f64) -> Option<LogForce>| {
-                let Some(length) = length.filter(|_| wanted) else { return Ok(()) };
+                let Some(length) = length.filter(|_| wanted) else {
+                    return Ok(());
+                };
                 let length = length.validated(quantity)?;
                 positive(length.value, quantity)?;
                 positive(force.value, Quantity::Force)?;
                 if let Some(log_force) = law(length.value) {
                     let log_modulus = force.value.ln() - log_force.value;
-                    all.push(Observation { load, force, length, log_force, log_modulus });
+                    all.push(Observation {
+                        load,
+                        force,
+                        length,
+                        log_force,
+                        log_modulus,
+                    });
                 }
                 Ok(())
             };
-            let (radius, depth) =
-                (self.evidence != Evidence::Indentation, self.evidence != Evidence::ContactRadius);
-            push(state.contact_radius_m, radius, Quantity::ContactRadius, &|a| {
-                self.law.of_contact_radius(a, share)
+            let (radius, depth) = (
+                self.evidence != Evidence::Indentation,
+                self.evidence != Evidence::ContactRadius,
+            );
+            push(
+                state.contact_radius_m,
+                radius,
+                Quantity::ContactRadius,
+                &|a| self.law.of_contact_radius(a, share),
+            )?;
+            push(state.indentation_m, depth, Quantity::Indentation, &|d| {
+                self.law.of_indentation(d, share)
             })?;
-            push(state.indentation_m, depth, Quantity::Indentation, &|d| self.law.of_indentation(d, share))?;
         }
         if all.is_empty() {
-            return Err(ElasticityError::TooFewLoads { expected: 1, found: 0 });
+            return Err(ElasticityError::TooFewLoads {
+                expected: 1,
+                found: 0,
+            });
         }
         Ok(all)
     }
 
     /// Covariances of the ln E*, with their degrees of freedom: of forces, of lengths, of what all have in common.
-    fn sources(&self, all: &[Observation], loads: usize) -> Result<[LogErrors; 3], ElasticityError> {
-        let given = self.force_covariance.as_ref().map(|c| checked(c, loads, Quantity::Force)).transpose()?;
+    fn sources(
+        &self,
+        all: &[Observation],
+        loads: usize,
+    ) -> Result<[LogErrors; 3], ElasticityError> {
+        let given = self
+            .force_covariance
+            .as_ref()
+            .map(|c| checked(c, loads, Quantity::Force))
+            .transpose()?;
         let over = |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(all.len(), all.len(), f);
         let forces = over(&|i, j| match given {
             Some(c) => c[(all[i].load, all[j].load)] / (all[i].force.value * all[j].force.value),
@@ -63,8 +93,14 @@ impl<L: ContactLaw> ContactEstimator<L> {
                 + p.size_slope * q.size_slope * self.size_error.powi(2)
         });
         Ok([
-            (forces, fewest(all.iter().map(|o| o.force.degrees_of_freedom))),
-            (lengths, fewest(all.iter().map(|o| o.length.degrees_of_freedom))),
+            (
+                forces,
+                fewest(all.iter().map(|o| o.force.degrees_of_freedom)),
+            ),
+            (
+                lengths,
+                fewest(all.iter().map(|o| o.length.degrees_of_freedom)),
+            ),
             (shared, None),
         ])
     }
@@ -93,23 +129,39 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// The mean at the share that belongs to the modulus it gives, `reach` standard errors away.
     ///
     /// The share moves ln E* by less than it is moved itself, so that the plain iteration converges.
-    fn consistent(&self, loads: &[LoadState<f64>], reach: f64) -> Result<Consistent, ElasticityError> {
-        let share_at = |log_reduced: f64| (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0);
+    fn consistent(
+        &self,
+        loads: &[LoadState<f64>],
+        reach: f64,
+    ) -> Result<Consistent, ElasticityError> {
+        let share_at =
+            |log_reduced: f64| (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0);
         let mut share = 0.0;
         for _ in 0..60 {
             let (observations, mean) = self.mean(loads, share)?;
-            let steps =
-                if reach == 0.0 { 0.0 } else { reach * quantile_95(mean.degrees) * mean.standard_error };
+            let steps = if reach == 0.0 {
+                0.0
+            } else {
+                reach * quantile_95(mean.degrees) * mean.standard_error
+            };
             let log_reduced = mean.mean + steps;
             let next = share_at(log_reduced);
             if !self.law.depends_on_share() || (next - share).abs() < 1e-10 {
-                return Ok(Consistent { observations, mean, log_reduced });
+                return Ok(Consistent {
+                    observations,
+                    mean,
+                    log_reduced,
+                });
             }
             share = next;
         }
         let (observations, mean) = self.mean(loads, share)?;
         let log_reduced = mean.mean;
-        Ok(Consistent { observations, mean, log_reduced })
+        Ok(Consistent {
+            observations,
+            mean,
+            log_reduced,
+        })
     }
 
     fn answer<T: RealField + Copy>(
@@ -121,7 +173,11 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let limit = |reach: f64| -> Option<f64> {
             self.sample_modulus(self.consistent(loads, reach).ok()?.log_reduced)
         };
-        let lower = if known { limit(-1.0).unwrap_or(f64::INFINITY) } else { 0.0 };
+        let lower = if known {
+            limit(-1.0).unwrap_or(f64::INFINITY)
+        } else {
+            0.0
+        };
         let Some(modulus) = self.sample_modulus(centre.log_reduced) else {
             let lower_bound_pa = if lower.is_finite() { lower } else { 0.0 };
             return Err(ElasticityError::StifferThanResolvable { lower_bound_pa });
@@ -129,7 +185,14 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let upper = if known { limit(1.0) } else { None };
         let left = 1.0 - self.other_compliance_per_pa * centre.log_reduced.exp();
         let error = modulus / left * centre.mean.standard_error;
-        Ok((modulus, error, Interval { lower: narrow(lower), upper: upper.map(narrow) }))
+        Ok((
+            modulus,
+            error,
+            Interval {
+                lower: narrow(lower),
+                upper: upper.map(narrow),
+            },
+        ))
     }
 
     fn diagnose<T: RealField + Copy>(
@@ -142,10 +205,13 @@ impl<L: ContactLaw> ContactEstimator<L> {
         (0..loads.len())
             .map(|i| {
                 let value = |e: Option<Estimate<f64>>| e.map(|e| e.value);
-                let ratio =
-                    self.law.contact_ratio(value(loads[i].contact_radius_m), value(loads[i].indentation_m));
+                let ratio = self.law.contact_ratio(
+                    value(loads[i].contact_radius_m),
+                    value(loads[i].indentation_m),
+                );
                 let count = own(i).count();
-                let log_mean = own(i).map(|(_, o)| o.log_modulus).sum::<f64>() / count.max(1) as f64;
+                let log_mean =
+                    own(i).map(|(_, o)| o.log_modulus).sum::<f64>() / count.max(1) as f64;
                 let worst = own(i)
                     .map(|(k, _)| mean.standardized_residuals[k])
                     .max_by(|a, b| a.abs().total_cmp(&b.abs()));
@@ -167,7 +233,11 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let value = |e: Option<Estimate<f64>>| e.map(|e| e.value);
         (loads.iter().enumerate())
             .filter_map(|(i, l)| {
-                Some((i, self.law.layer_ratio(value(l.contact_radius_m), value(l.indentation_m))?))
+                Some((
+                    i,
+                    self.law
+                        .layer_ratio(value(l.contact_radius_m), value(l.indentation_m))?,
+                ))
             })
             .filter(|(_, (ratio, limit))| ratio > limit)
             .map(|(load, (ratio, limit))| Warning::ThinLayer {
@@ -188,9 +258,15 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let mut warnings: Vec<Warning<T>> = (loads.iter().enumerate())
             .filter_map(|(load, d)| d.contact_ratio.map(|ratio| (load, ratio)))
             .filter(|&(_, ratio)| widen(ratio) > limit)
-            .map(|(load, ratio)| Warning::LargeContact { load, ratio, limit: narrow(limit) })
+            .map(|(load, ratio)| Warning::LargeContact {
+                load,
+                ratio,
+                limit: narrow(limit),
+            })
             .collect();
-        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
+        warnings.extend(mean.excess.map(|x| Warning::ExcessScatter {
+            reduced_chi_squared: narrow(x),
+        }));
         if mean.standard_error.is_infinite() {
             warnings.push(Warning::NoErrorEstimate);
         } else if !bounded {
@@ -220,7 +296,11 @@ impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimato
         let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
         let centre = self.consistent(&loads, 0.0)?;
         let (modulus, error, interval_95) = self.answer(&loads, &centre)?;
-        let Consistent { observations: all, mean, .. } = &centre;
+        let Consistent {
+            observations: all,
+            mean,
+            ..
+        } = &centre;
         let diagnostics = self.diagnose(&loads, all, mean);
         let mut warnings = self.warn(&diagnostics, mean, interval_95.upper.is_some());
         warnings.extend(self.layer_warnings(&loads));
@@ -230,7 +310,12 @@ impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimato
             interval_95,
             estimator: self.law.kind(),
             loads: diagnostics,
-            fit: FitStatistics::new(all.len(), 1, mean.chi_squared, mean.minus_two_log_likelihood),
+            fit: FitStatistics::new(
+                all.len(),
+                1,
+                mean.chi_squared,
+                mean.minus_two_log_likelihood,
+            ),
             warnings,
         })
     }

@@ -111,7 +111,10 @@ impl ContactEstimator<Sphere> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub fn new<T: RealField + Copy>(
+        radius_m: T,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
         Self::from_law(Sphere::new(radius_m)?, poisson_ratio)
     }
 }
@@ -121,7 +124,10 @@ impl ContactEstimator<Punch> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub fn new<T: RealField + Copy>(
+        radius_m: T,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
         Self::from_law(Punch::new(radius_m)?, poisson_ratio)
     }
 }
@@ -131,11 +137,18 @@ impl ContactEstimator<ConeLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::OutOfRange`] for an angle outside (0, π/2), [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(half_angle_rad: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub fn new<T: RealField + Copy>(
+        half_angle_rad: T,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
         let (angle, limit) = (widen(half_angle_rad), std::f64::consts::FRAC_PI_2);
         positive(angle, Quantity::HalfAngle)?;
         if angle >= limit {
-            return Err(ElasticityError::OutOfRange { quantity: Quantity::HalfAngle, found: angle, limit });
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::HalfAngle,
+                found: angle,
+                limit,
+            });
         }
         Self::from_law(ConeLaw::new(angle.tan())?, poisson_ratio)
     }
@@ -153,7 +166,10 @@ impl ContactEstimator<LayerLaw> {
         bond: Bond,
         theory: LayerTheory,
     ) -> Result<Self, ElasticityError> {
-        Self::from_law(LayerLaw::new(radius_m, thickness_m, poisson_ratio, bond, theory)?, poisson_ratio)
+        Self::from_law(
+            LayerLaw::new(radius_m, thickness_m, poisson_ratio, bond, theory)?,
+            poisson_ratio,
+        )
     }
 }
 
@@ -162,7 +178,10 @@ impl ContactEstimator<TataraLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub fn new<T: RealField + Copy>(
+        radius_m: T,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
         Self::from_law(TataraLaw::new(radius_m, poisson_ratio)?, poisson_ratio)
     }
 }
@@ -172,7 +191,10 @@ impl ContactEstimator<TwoContactsLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub fn new<T: RealField + Copy>(
+        radius_m: T,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
         Self::from_law(TwoContactsLaw::new(radius_m)?, poisson_ratio)
     }
 }

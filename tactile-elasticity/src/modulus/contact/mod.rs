@@ -90,7 +90,10 @@ pub struct ContactEstimator<L> {
 }
 
 impl<L: ContactLaw> ContactEstimator<L> {
-    pub(crate) fn from_law<T: RealField + Copy>(law: L, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub(crate) fn from_law<T: RealField + Copy>(
+        law: L,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
         Ok(Self {
             law,
             poisson_ratio: poisson(widen(poisson_ratio))?,
@@ -174,7 +177,10 @@ impl<L: ContactLaw> ContactEstimator<L> {
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
-    pub fn with_size_error<T: RealField + Copy>(mut self, relative: T) -> Result<Self, ElasticityError> {
+    pub fn with_size_error<T: RealField + Copy>(
+        mut self,
+        relative: T,
+    ) -> Result<Self, ElasticityError> {
         self.size_error = not_negative(widen(relative), Quantity::StandardError)?;
         Ok(self)
     }

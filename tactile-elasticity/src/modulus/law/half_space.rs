@@ -27,7 +27,9 @@ impl Sphere {
 
     /// From the relative radius in m.
     pub(crate) fn new<T: RealField + Copy>(radius_m: T) -> Result<Self, ElasticityError> {
-        Ok(Self { radius_m: positive(widen(radius_m), Quantity::Radius)? })
+        Ok(Self {
+            radius_m: positive(widen(radius_m), Quantity::Radius)?,
+        })
     }
 }
 
@@ -38,16 +40,26 @@ impl ContactLaw for Sphere {
 
     fn of_contact_radius(&self, a: f64, _: f64) -> Option<LogForce> {
         let value = (4.0 / 3.0f64).ln() - self.radius_m.ln() + 3.0 * a.ln();
-        Some(LogForce { value, slope: 3.0, size_slope: -1.0 })
+        Some(LogForce {
+            value,
+            slope: 3.0,
+            size_slope: -1.0,
+        })
     }
 
     fn of_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         let value = (4.0 / 3.0f64).ln() + 0.5 * self.radius_m.ln() + 1.5 * d.ln();
-        Some(LogForce { value, slope: 1.5, size_slope: 0.5 })
+        Some(LogForce {
+            value,
+            slope: 1.5,
+            size_slope: 0.5,
+        })
     }
 
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
-        contact_radius.or_else(|| indentation.map(|d| (self.radius_m * d).sqrt())).map(|a| a / self.radius_m)
+        contact_radius
+            .or_else(|| indentation.map(|d| (self.radius_m * d).sqrt()))
+            .map(|a| a / self.radius_m)
     }
 
     fn contact_ratio_limit(&self) -> f64 {
@@ -71,7 +83,9 @@ pub struct Punch {
 
 impl Punch {
     pub(crate) fn new<T: RealField + Copy>(radius_m: T) -> Result<Self, ElasticityError> {
-        Ok(Self { radius_m: positive(widen(radius_m), Quantity::Radius)? })
+        Ok(Self {
+            radius_m: positive(widen(radius_m), Quantity::Radius)?,
+        })
     }
 }
 
@@ -85,7 +99,11 @@ impl ContactLaw for Punch {
     }
 
     fn of_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
-        Some(LogForce { value: (2.0 * self.radius_m).ln() + d.ln(), slope: 1.0, size_slope: 1.0 })
+        Some(LogForce {
+            value: (2.0 * self.radius_m).ln() + d.ln(),
+            slope: 1.0,
+            size_slope: 1.0,
+        })
     }
 
     fn contact_ratio(&self, _: Option<f64>, _: Option<f64>) -> Option<f64> {
@@ -109,7 +127,9 @@ pub struct ConeLaw {
 
 impl ConeLaw {
     pub(crate) fn new(tangent: f64) -> Result<Self, ElasticityError> {
-        Ok(Self { tangent: positive(tangent, Quantity::HalfAngle)? })
+        Ok(Self {
+            tangent: positive(tangent, Quantity::HalfAngle)?,
+        })
     }
 }
 
@@ -120,12 +140,20 @@ impl ContactLaw for ConeLaw {
 
     fn of_contact_radius(&self, a: f64, _: f64) -> Option<LogForce> {
         let value = (std::f64::consts::FRAC_PI_2 / self.tangent).ln() + 2.0 * a.ln();
-        Some(LogForce { value, slope: 2.0, size_slope: -1.0 })
+        Some(LogForce {
+            value,
+            slope: 2.0,
+            size_slope: -1.0,
+        })
     }
 
     fn of_indentation(&self, d: f64, _: f64) -> Option<LogForce> {
         let value = (std::f64::consts::FRAC_2_PI * self.tangent).ln() + 2.0 * d.ln();
-        Some(LogForce { value, slope: 2.0, size_slope: 1.0 })
+        Some(LogForce {
+            value,
+            slope: 2.0,
+            size_slope: 1.0,
+        })
     }
 
     fn contact_ratio(&self, _: Option<f64>, _: Option<f64>) -> Option<f64> {

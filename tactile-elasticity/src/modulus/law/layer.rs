@@ -1,7 +1,9 @@
 //! A sphere on a layer with a rigid base.
 
 use super::{ContactLaw, LogForce, Sphere};
-use crate::contact::{Bond, LayerContact, LayerEquation, LayerKernel, LayerSeries, LayerTable, Waveguide};
+use crate::contact::{
+    Bond, LayerContact, LayerEquation, LayerKernel, LayerSeries, LayerTable, Waveguide,
+};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::EstimatorKind;
 use crate::scalar::widen;
@@ -101,14 +103,18 @@ impl LayerLaw {
     fn correction(&self, chi: f64, share: f64) -> Option<(f64, f64)> {
         match (self.theory, &self.table) {
             (LayerTheory::IntegralEquation, Some(table)) if share == 0.0 => table.of_chi(chi),
-            (LayerTheory::IntegralEquation, _) => {
-                at_chi(&LayerEquation::new(&self.kernel).with_share(1.0 - share), chi)
-            }
+            (LayerTheory::IntegralEquation, _) => at_chi(
+                &LayerEquation::new(&self.kernel).with_share(1.0 - share),
+                chi,
+            ),
             (LayerTheory::CorrectedSeries, _) if share > 0.0 => {
                 let series = LayerSeries::corrected(&self.kernel, 1.0 - share);
                 Some((series.force_ratio(chi).ln(), series.log_slope(chi)))
             }
-            _ => Some((self.series.force_ratio(chi).ln(), self.series.log_slope(chi))),
+            _ => Some((
+                self.series.force_ratio(chi).ln(),
+                self.series.log_slope(chi),
+            )),
         }
         .filter(|c| c.0.is_finite())
     }
@@ -148,15 +154,20 @@ impl ContactLaw for LayerLaw {
         self.sphere.contact_ratio_limit()
     }
 
-    fn layer_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<(f64, f64)> {
+    fn layer_ratio(
+        &self,
+        contact_radius: Option<f64>,
+        indentation: Option<f64>,
+    ) -> Option<(f64, f64)> {
         // Where each theory has erred by about 1 % in the force.
         let limit = match self.theory {
             LayerTheory::PublishedSeries => 0.2,
             LayerTheory::CorrectedSeries => 0.5,
             LayerTheory::IntegralEquation => return None,
         };
-        let ratio =
-            indentation.map(|d| self.chi(d)).or_else(|| contact_radius.map(|a| a / self.thickness_m))?;
+        let ratio = indentation
+            .map(|d| self.chi(d))
+            .or_else(|| contact_radius.map(|a| a / self.thickness_m))?;
         Some((ratio, limit))
     }
 
@@ -240,12 +251,27 @@ fn corrected(hertz: LogForce, value: f64, slope: f64, size_slope: f64) -> LogFor
     }
 }
 
-fn of_radius(sphere: &Sphere, equation: &LayerEquation, a: f64, thickness: f64) -> Option<LogForce> {
+fn of_radius(
+    sphere: &Sphere,
+    equation: &LayerEquation,
+    a: f64,
+    thickness: f64,
+) -> Option<LogForce> {
     const STEP: f64 = 1e-4;
-    let at = |x: f64| equation.solve(x).ok().map(|c| c.force_ratio_same_radius.ln());
+    let at = |x: f64| {
+        equation
+            .solve(x)
+            .ok()
+            .map(|c| c.force_ratio_same_radius.ln())
+    };
     let ratio = a / thickness;
     let slope = (at(ratio * STEP.exp())? - at(ratio * (-STEP).exp())?) / (2.0 * STEP);
-    Some(corrected(sphere.of_contact_radius(a, 0.0)?, at(ratio)?, slope, 0.0))
+    Some(corrected(
+        sphere.of_contact_radius(a, 0.0)?,
+        at(ratio)?,
+        slope,
+        0.0,
+    ))
 }
 
 /// ln(F/F_Hertz) at χ and its slope in ln χ, by the secant method on ln(a/h).

@@ -54,7 +54,11 @@ pub trait ContactLaw {
 
     /// Contact over layer thickness and its limit, for laws with a layer.
     #[doc(hidden)]
-    fn layer_ratio(&self, _contact_radius: Option<f64>, _indentation: Option<f64>) -> Option<(f64, f64)> {
+    fn layer_ratio(
+        &self,
+        _contact_radius: Option<f64>,
+        _indentation: Option<f64>,
+    ) -> Option<(f64, f64)> {
         None
     }
 
@@ -86,7 +90,11 @@ impl<L: ContactLaw + ?Sized> ContactLaw for Box<L> {
         (**self).contact_ratio_limit()
     }
 
-    fn layer_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<(f64, f64)> {
+    fn layer_ratio(
+        &self,
+        contact_radius: Option<f64>,
+        indentation: Option<f64>,
+    ) -> Option<(f64, f64)> {
         (**self).layer_ratio(contact_radius, indentation)
     }
 

@@ -24,10 +24,19 @@ pub struct TataraLaw {
 }
 
 impl TataraLaw {
-    pub(crate) fn new<T: RealField + Copy>(radius_m: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        let (radius_m, poisson_ratio) =
-            (positive(widen(radius_m), Quantity::Radius)?, poisson(widen(poisson_ratio))?);
-        Ok(Self { sphere: Sphere::new(radius_m)?, radius_m, poisson_ratio })
+    pub(crate) fn new<T: RealField + Copy>(
+        radius_m: T,
+        poisson_ratio: T,
+    ) -> Result<Self, ElasticityError> {
+        let (radius_m, poisson_ratio) = (
+            positive(widen(radius_m), Quantity::Radius)?,
+            poisson(widen(poisson_ratio))?,
+        );
+        Ok(Self {
+            sphere: Sphere::new(radius_m)?,
+            radius_m,
+            poisson_ratio,
+        })
     }
 
     fn squeeze(&self, share: f64) -> Squeeze {
@@ -50,11 +59,16 @@ impl ContactLaw for TataraLaw {
         let hertz = self.sphere.of_contact_radius(a, share)?;
         let slope = hertz.slope * d / (a * squeeze.slope(a));
         // f has the dimension of an area: its slopes in δ and R add up to 2.
-        Some(LogForce { value: hertz.value, slope, size_slope: 2.0 - slope })
+        Some(LogForce {
+            value: hertz.value,
+            slope,
+            size_slope: 2.0 - slope,
+        })
     }
 
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
-        let a = contact_radius.or_else(|| indentation.and_then(|d| self.squeeze(0.0).contact_radius(d)));
+        let a = contact_radius
+            .or_else(|| indentation.and_then(|d| self.squeeze(0.0).contact_radius(d)));
         a.map(|a| a / self.radius_m)
     }
 

@@ -25,7 +25,9 @@ pub struct TwoContactsLaw {
 
 impl TwoContactsLaw {
     pub(crate) fn new<T: RealField + Copy>(radius_m: T) -> Result<Self, ElasticityError> {
-        Ok(Self { sphere: Sphere::new(radius_m)? })
+        Ok(Self {
+            sphere: Sphere::new(radius_m)?,
+        })
     }
 
     /// δ over the near contact's own.
@@ -48,7 +50,8 @@ impl ContactLaw for TwoContactsLaw {
     }
 
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
-        self.sphere.contact_ratio(contact_radius, indentation.map(|d| 0.5 * d))
+        self.sphere
+            .contact_ratio(contact_radius, indentation.map(|d| 0.5 * d))
     }
 
     fn contact_ratio_limit(&self) -> f64 {

@@ -32,8 +32,9 @@ impl Line {
         }
         for _ in 0..50 {
             let slope = line.slope;
-            let variance =
-                |p: &Point| p.stress.standard_error.powi(2) + (slope * p.strain.standard_error).powi(2);
+            let variance = |p: &Point| {
+                p.stress.standard_error.powi(2) + (slope * p.strain.standard_error).powi(2)
+            };
             let floor = points.iter().map(variance).fold(0.0, f64::max) * 1e-12;
             line = Self::weighted(points, |p| 1.0 / variance(p).max(floor), free, true);
             if (line.slope - slope).abs() <= 1e-12 * slope.abs() {
@@ -48,7 +49,10 @@ impl Line {
         let sum = |f: &dyn Fn(&Point) -> f64| points.iter().map(|p| weight(p) * f(p)).sum::<f64>();
         let total = sum(&|_| 1.0);
         let (cx, cy) = if free {
-            (sum(&|p| p.strain.value) / total, sum(&|p| p.stress.value) / total)
+            (
+                sum(&|p| p.strain.value) / total,
+                sum(&|p| p.stress.value) / total,
+            )
         } else {
             (0.0, 0.0)
         };
@@ -58,11 +62,15 @@ impl Line {
         let chi_squared = sum(&|p| (p.stress.value - intercept - slope * p.strain.value).powi(2));
         let degrees = points.len() - if free { 2 } else { 1 };
         let reduced = chi_squared / degrees.max(1) as f64;
-        let excess =
-            (known && degrees > 0 && chi_squared_tail(chi_squared, degrees) < 1e-3).then_some(reduced);
+        let excess = (known && degrees > 0 && chi_squared_tail(chi_squared, degrees) < 1e-3)
+            .then_some(reduced);
         let learnt = !known || excess.is_some();
         let unit = if learnt { reduced } else { 1.0 };
-        let intercept_variance = if free { unit * (1.0 / total + cx * cx / sxx) } else { 0.0 };
+        let intercept_variance = if free {
+            unit * (1.0 / total + cx * cx / sxx)
+        } else {
+            0.0
+        };
         Self {
             slope,
             intercept,

@@ -143,7 +143,10 @@ impl StressStrainRegression {
             _ => 2,
         };
         if points.len() < expected {
-            return Err(ElasticityError::TooFewLoads { expected, found: points.len() });
+            return Err(ElasticityError::TooFewLoads {
+                expected,
+                found: points.len(),
+            });
         }
         let same = |f: fn(&Point) -> f64| points.windows(2).all(|w| f(&w[0]) == f(&w[1]));
         if through_origin && points.iter().all(|p| p.strain.value == 0.0) {
@@ -163,23 +166,48 @@ impl StressStrainRegression {
         if line.learnt {
             return Some(line.degrees as f64);
         }
-        let stress = points.iter().map(|p| p.stress.standard_error.powi(2)).sum::<f64>();
-        let strain = points.iter().map(|p| (line.slope * p.strain.standard_error).powi(2)).sum::<f64>();
+        let stress = points
+            .iter()
+            .map(|p| p.stress.standard_error.powi(2))
+            .sum::<f64>();
+        let strain = points
+            .iter()
+            .map(|p| (line.slope * p.strain.standard_error).powi(2))
+            .sum::<f64>();
         // What the slope's error has of either, in proportion.
         let unit = line.slope_error.powi(2) / (stress + strain);
         effective_degrees(&[
-            (unit * stress, fewest(points.iter().map(|p| p.stress.degrees_of_freedom))),
-            (unit * strain, fewest(points.iter().map(|p| p.strain.degrees_of_freedom))),
+            (
+                unit * stress,
+                fewest(points.iter().map(|p| p.stress.degrees_of_freedom)),
+            ),
+            (
+                unit * strain,
+                fewest(points.iter().map(|p| p.strain.degrees_of_freedom)),
+            ),
             ((line.slope * self.stress_scale_error).powi(2), None),
         ])
     }
 
-    fn warnings<T: RealField + Copy>(&self, loads: &[LoadState<f64>], line: &Line) -> Vec<Warning<T>> {
+    fn warnings<T: RealField + Copy>(
+        &self,
+        loads: &[LoadState<f64>],
+        line: &Line,
+    ) -> Vec<Warning<T>> {
         let mut warnings = strain_warnings(loads);
-        warnings.extend(line.excess.map(|x| Warning::ExcessScatter { reduced_chi_squared: narrow(x) }));
+        warnings.extend(line.excess.map(|x| Warning::ExcessScatter {
+            reduced_chi_squared: narrow(x),
+        }));
         if line.intercept_error > 0.0 {
             let t = line.intercept / line.intercept_error;
-            let p_value = t_tail(t, if line.learnt { line.degrees } else { usize::MAX >> 12 });
+            let p_value = t_tail(
+                t,
+                if line.learnt {
+                    line.degrees
+                } else {
+                    usize::MAX >> 12
+                },
+            );
             if p_value < 0.05 {
                 warnings.push(Warning::Intercept {
                     intercept_pa: narrow(line.intercept),
@@ -202,32 +230,55 @@ fn diagnostics<T: RealField + Copy>(
     for p in points {
         let residual = p.stress.value - line.intercept - line.slope * p.strain.value;
         let spread = if known {
-            p.stress.standard_error.hypot(line.slope * p.strain.standard_error)
+            p.stress
+                .standard_error
+                .hypot(line.slope * p.strain.standard_error)
         } else {
             (line.chi_squared / line.degrees.max(1) as f64).sqrt()
         };
         diagnostics[p.load].used = true;
-        diagnostics[p.load].standardized_residual = (spread > 0.0).then(|| narrow(residual / spread));
+        diagnostics[p.load].standardized_residual =
+            (spread > 0.0).then(|| narrow(residual / spread));
     }
     diagnostics
 }
 
-fn fit_statistics<T: RealField + Copy>(points: &[Point], line: &Line, known: bool) -> FitStatistics<T> {
+fn fit_statistics<T: RealField + Copy>(
+    points: &[Point],
+    line: &Line,
+    known: bool,
+) -> FitStatistics<T> {
     let n = points.len() as f64;
-    let minus_two_log = if known { line.chi_squared } else { n * (line.chi_squared / n).ln() };
-    FitStatistics::new(points.len(), points.len() - line.degrees, line.chi_squared, minus_two_log)
+    let minus_two_log = if known {
+        line.chi_squared
+    } else {
+        n * (line.chi_squared / n).ln()
+    };
+    FitStatistics::new(
+        points.len(),
+        points.len() - line.degrees,
+        line.chi_squared,
+        minus_two_log,
+    )
 }
 
 impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
     fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
         let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
         let points = Self::points(&loads)?;
-        let known = points.iter().any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0);
+        let known = points
+            .iter()
+            .any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0);
         self.check(&points, known)?;
         let line = Line::fit(&points, self.intercept == Intercept::Tested, known);
         if line.slope <= 0.0 || !line.slope.is_finite() {
-            let p = points.last().map_or((0.0, 0.0), |p| (p.stress.value, p.strain.value));
-            return Err(ElasticityError::OppositeSigns { stress_pa: p.0, strain: p.1 });
+            let p = points
+                .last()
+                .map_or((0.0, 0.0), |p| (p.stress.value, p.strain.value));
+            return Err(ElasticityError::OppositeSigns {
+                stress_pa: p.0,
+                strain: p.1,
+            });
         }
         let error = line.slope_error.hypot(line.slope * self.stress_scale_error);
         let reach = error * quantile_95(self.degrees(&points, &line));

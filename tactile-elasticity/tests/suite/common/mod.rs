@@ -16,8 +16,14 @@ pub(crate) fn reference(name: &str) -> Option<Vec<Value>> {
         return None;
     };
     let file: Value = serde_json::from_str(&text).expect("the reference is JSON");
-    for check in file["header"]["parse_check"].as_array().expect("parse checks") {
-        let bits = check["bits"].as_str().expect("bits").trim_start_matches("0x");
+    for check in file["header"]["parse_check"]
+        .as_array()
+        .expect("parse checks")
+    {
+        let bits = check["bits"]
+            .as_str()
+            .expect("bits")
+            .trim_start_matches("0x");
         let bits = u64::from_str_radix(bits, 16).expect("hexadecimal");
         assert_eq!(number(&check["value"]).to_bits(), bits, "the parser rounds");
     }

@@ -19,11 +19,20 @@ fn intervals_cover_what_they_promise() {
         let loads: Vec<_> = (clean.iter())
             .map(|l| {
                 let (f, a) = (l.force_n.value, l.contact_radius_m.unwrap().value);
-                LoadState::new(Estimate::new(f * scale * (1.0 + 0.005 * normal()), 0.005 * f))
-                    .with_contact_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
+                LoadState::new(Estimate::new(
+                    f * scale * (1.0 + 0.005 * normal()),
+                    0.005 * f,
+                ))
+                .with_contact_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
             })
             .collect();
-        covered += usize::from(estimator.estimate(&loads).unwrap().interval_95.contains(SAMPLE));
+        covered += usize::from(
+            estimator
+                .estimate(&loads)
+                .unwrap()
+                .interval_95
+                .contains(SAMPLE),
+        );
     }
     assert!((1860..=1940).contains(&covered), "{covered} of 2000");
 }
@@ -33,9 +42,20 @@ fn a_force_covariance_says_the_same_as_a_shared_scale() {
     let loads = hertz_loads(Body::rigid(), &[1e-3, 3e-3]);
     let f = [1e-3, 3e-3];
     let covariance = DMatrix::from_fn(2, 2, |i, j| 1e-4 * f[i] * f[j]);
-    let plain = HertzSphere::new(4e-3, NU).unwrap().with_evidence(Evidence::ContactRadius);
-    let one = plain.clone().with_force_covariance(&covariance).unwrap().estimate(&loads).unwrap();
-    let other = plain.with_force_scale_error(0.01).unwrap().estimate(&loads).unwrap();
+    let plain = HertzSphere::new(4e-3, NU)
+        .unwrap()
+        .with_evidence(Evidence::ContactRadius);
+    let one = plain
+        .clone()
+        .with_force_covariance(&covariance)
+        .unwrap()
+        .estimate(&loads)
+        .unwrap();
+    let other = plain
+        .with_force_scale_error(0.01)
+        .unwrap()
+        .estimate(&loads)
+        .unwrap();
     assert!((one.standard_error_pa / other.standard_error_pa - 1.0).abs() < 1e-6);
     assert!((one.standard_error_pa / SAMPLE - 0.01).abs() < 1e-6);
 }
@@ -43,8 +63,11 @@ fn a_force_covariance_says_the_same_as_a_shared_scale() {
 #[test]
 fn one_load_without_errors_has_no_interval() {
     let loads = hertz_loads(Body::rigid(), &[1e-3]);
-    let only =
-        HertzSphere::new(4e-3, NU).unwrap().with_evidence(Evidence::ContactRadius).estimate(&loads).unwrap();
+    let only = HertzSphere::new(4e-3, NU)
+        .unwrap()
+        .with_evidence(Evidence::ContactRadius)
+        .estimate(&loads)
+        .unwrap();
     assert!(only.warnings.contains(&Warning::NoErrorEstimate) && only.interval_95.upper.is_none());
 }
 
@@ -57,19 +80,32 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
     };
     let loads = [load(0.02, 0.0), load(0.08, 0.01)];
     let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
-    let shared = DMatrix::from_fn(2, 2, |i, j| (0.01f64).powi(2) * [0.02, 0.08][i] * [0.02, 0.08][j]);
-    let common = ratio.clone().with_force_covariance(&shared).unwrap().estimate(&loads).unwrap();
+    let shared = DMatrix::from_fn(2, 2, |i, j| {
+        (0.01f64).powi(2) * [0.02, 0.08][i] * [0.02, 0.08][j]
+    });
+    let common = ratio
+        .clone()
+        .with_force_covariance(&shared)
+        .unwrap()
+        .estimate(&loads)
+        .unwrap();
     // One factor on both forces is one factor on their difference: 1 %.
     assert!((common.standard_error_pa / common.youngs_modulus_pa - 0.01).abs() < 1e-12);
     // Independent errors of 1 % of 20 and 80 mN on a difference of 60 mN.
     let apart = ratio.estimate(&loads).unwrap();
     let expected = 0.01 * 0.02f64.hypot(0.08) / 0.06;
     assert!((apart.standard_error_pa / apart.youngs_modulus_pa - expected).abs() < 1e-12);
-    let wrong = PaperRatio::new().with_force_covariance(&DMatrix::<f64>::zeros(3, 3)).unwrap();
+    let wrong = PaperRatio::new()
+        .with_force_covariance(&DMatrix::<f64>::zeros(3, 3))
+        .unwrap();
     let mismatch = wrong.estimate(&[load(0.08, 0.01)]).unwrap_err();
     assert_eq!(
         mismatch,
-        ElasticityError::LengthMismatch { quantity: Quantity::Force, expected: 1, found: 3 }
+        ElasticityError::LengthMismatch {
+            quantity: Quantity::Force,
+            expected: 1,
+            found: 3
+        }
     );
 }
 
@@ -77,11 +113,14 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
 #[test]
 fn errors_learnt_from_few_repetitions_widen_the_interval() {
     let load = |force: Estimate<f64>, strain: Estimate<f64>| {
-        [LoadState::new(force).with_contact_area(exact(1e-4)).with_mean_strain(strain)]
+        [LoadState::new(force)
+            .with_contact_area(exact(1e-4))
+            .with_mean_strain(strain)]
     };
     let half_width = |loads: &[LoadState<f64>]| {
         let found = PaperRatio::new().estimate(loads).unwrap();
-        (found.interval_95.upper.unwrap() / found.interval_95.lower).ln() / 2.0 * found.youngs_modulus_pa
+        (found.interval_95.upper.unwrap() / found.interval_95.lower).ln() / 2.0
+            * found.youngs_modulus_pa
             / found.standard_error_pa
     };
     let force = Estimate::new(0.1, 0.002);
@@ -91,6 +130,7 @@ fn errors_learnt_from_few_repetitions_widen_the_interval() {
     assert!((half_width(&load(learnt, exact(0.02))) - 2.570_582).abs() < 1e-5);
     // Half of the variance with five degrees of freedom, half known: 5/0.5² = 20.
     assert!((half_width(&load(learnt, strain)) - 2.085_963).abs() < 1e-5);
-    let refused = PaperRatio::new().estimate(&load(force.with_degrees_of_freedom(f64::NAN), strain));
+    let refused =
+        PaperRatio::new().estimate(&load(force.with_degrees_of_freedom(f64::NAN), strain));
     assert!(refused.is_err());
 }

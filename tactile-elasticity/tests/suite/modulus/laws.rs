@@ -5,13 +5,22 @@ use super::*;
 #[test]
 fn every_law_inverts_itself() {
     let forces = [1e-3, 2e-3, 5e-3];
-    finds(&HertzSphere::new(4e-3, NU).unwrap(), &hertz_loads(Body::rigid(), &forces));
-    let on_waveguide = HertzSphere::new(4e-3, NU).unwrap().with_waveguide(&waveguide());
+    finds(
+        &HertzSphere::new(4e-3, NU).unwrap(),
+        &hertz_loads(Body::rigid(), &forces),
+    );
+    let on_waveguide = HertzSphere::new(4e-3, NU)
+        .unwrap()
+        .with_waveguide(&waveguide());
     finds(&on_waveguide, &hertz_loads(waveguide().as_body(), &forces));
     let punch = |d: f64| {
-        LoadState::new(exact(flat_punch(reduced(), 2e-3, d).unwrap().force_n)).with_indentation(exact(d))
+        LoadState::new(exact(flat_punch(reduced(), 2e-3, d).unwrap().force_n))
+            .with_indentation(exact(d))
     };
-    finds(&FlatPunch::new(2e-3, NU).unwrap(), &[punch(1e-5), punch(3e-5)]);
+    finds(
+        &FlatPunch::new(2e-3, NU).unwrap(),
+        &[punch(1e-5), punch(3e-5)],
+    );
     let angle = 1.2f64;
     let cone = |d: f64| {
         let c = cone(reduced(), angle.tan(), d).unwrap();
@@ -24,9 +33,14 @@ fn every_law_inverts_itself() {
         let d = tatara_indentation_m(a, 3e-3, NU).unwrap();
         LoadState::new(exact(4.0 / 3.0 * reduced() * a.powi(3) / 3e-3)).with_indentation(exact(d))
     };
-    finds(&TataraSphere::new(3e-3, NU).unwrap(), &[squeezed(3e-4), squeezed(1.6e-3)]);
     finds(
-        &SphereBetweenPlates::new(4e-3, NU).unwrap().with_waveguide(&waveguide()),
+        &TataraSphere::new(3e-3, NU).unwrap(),
+        &[squeezed(3e-4), squeezed(1.6e-3)],
+    );
+    finds(
+        &SphereBetweenPlates::new(4e-3, NU)
+            .unwrap()
+            .with_waveguide(&waveguide()),
         &between_plates(&forces, 0.0),
     );
 }
@@ -39,20 +53,31 @@ fn layers_invert_themselves_thick_or_thin() {
         let c = layer.solve(a_over_h).unwrap();
         let (a, d) = (a_over_h * h, (c.chi * h).powi(2) / r);
         let force = 4.0 / 3.0 * reduced() * r.sqrt() * d.powf(1.5) * c.force_ratio;
-        LoadState::new(exact(force)).with_contact_radius(exact(a)).with_indentation(exact(d))
+        LoadState::new(exact(force))
+            .with_contact_radius(exact(a))
+            .with_indentation(exact(d))
     };
     let loads = [load(0.05), load(0.4), load(1.3)];
     let theory = |t| BondedLayer::new(r, h, NU, Bond::Bonded, t).unwrap();
     finds(&theory(LayerTheory::IntegralEquation), &loads);
     // The published series errs as its authors' readers found; the corrected one only where χ is large.
     let off = |t, i: usize| {
-        ModulusEstimator::<f64>::estimate(&theory(t), &loads[i..=i]).unwrap().youngs_modulus_pa / SAMPLE - 1.0
+        ModulusEstimator::<f64>::estimate(&theory(t), &loads[i..=i])
+            .unwrap()
+            .youngs_modulus_pa
+            / SAMPLE
+            - 1.0
     };
     assert!(off(LayerTheory::CorrectedSeries, 0).abs() < 1e-5);
     assert!(off(LayerTheory::CorrectedSeries, 1).abs() < 5e-3);
     assert!(off(LayerTheory::PublishedSeries, 1) > 0.03);
-    let thin = ModulusEstimator::<f64>::estimate(&theory(LayerTheory::PublishedSeries), &loads).unwrap();
-    assert!(thin.warnings.iter().any(|w| matches!(w, Warning::ThinLayer { load: 2, .. })));
+    let thin =
+        ModulusEstimator::<f64>::estimate(&theory(LayerTheory::PublishedSeries), &loads).unwrap();
+    assert!(
+        thin.warnings
+            .iter()
+            .any(|w| matches!(w, Warning::ThinLayer { load: 2, .. }))
+    );
 }
 
 #[test]
@@ -63,16 +88,25 @@ fn a_sphere_on_a_shallow_waveguide_inverts_itself() {
     let kernel = LayerKernel::new(Bond::Bonded, 0.5).unwrap();
     let layer = LayerEquation::new(&kernel).with_share(share);
     let loads = [0.02, 0.1, 0.25].map(|a_over_h| {
-        let (c, a) = (layer.solve(a_over_h).unwrap(), a_over_h * guide.thickness_m());
+        let (c, a) = (
+            layer.solve(a_over_h).unwrap(),
+            a_over_h * guide.thickness_m(),
+        );
         let force = 4.0 / 3.0 / total * a.powi(3) / r * c.force_ratio_same_radius;
         LoadState::new(exact(force))
             .with_contact_radius(exact(a))
             .with_indentation(exact(a * a / r * c.indentation_ratio))
     });
-    finds(&SphereOnWaveguide::new(r, NU, &guide, Bond::Bonded).unwrap(), &loads);
+    finds(
+        &SphereOnWaveguide::new(r, NU, &guide, Bond::Bonded).unwrap(),
+        &loads,
+    );
     // Taken as deep, the waveguide spoils the indentation far more than the contact radius.
     let deep = |evidence| {
-        let estimator = HertzSphere::new(r, NU).unwrap().with_waveguide(&guide).with_evidence(evidence);
+        let estimator = HertzSphere::new(r, NU)
+            .unwrap()
+            .with_waveguide(&guide)
+            .with_evidence(evidence);
         estimator.estimate(&loads[1..2]).unwrap().youngs_modulus_pa / SAMPLE - 1.0
     };
     assert!(deep(Evidence::ContactRadius).abs() < 0.01 && deep(Evidence::Indentation) > 0.1);
@@ -84,7 +118,10 @@ fn far_stiffer_samples_are_bounded_from_below_only() {
     let guide = waveguide();
     let e = reduced_modulus_pa(guide.as_body(), Body::elastic(5e6, NU).unwrap()).unwrap();
     let load = |f: f64, error: f64| {
-        let a = HertzContact::from_force(f, 4e-3, e).unwrap().contact_radius_m * (1.0 + error);
+        let a = HertzContact::from_force(f, 4e-3, e)
+            .unwrap()
+            .contact_radius_m
+            * (1.0 + error);
         LoadState::new(exact(f)).with_contact_radius(Estimate::new(a, 0.01 * a))
     };
     let estimator = HertzSphere::new(4e-3, NU).unwrap().with_waveguide(&guide);
@@ -100,9 +137,14 @@ fn far_stiffer_samples_are_bounded_from_below_only() {
 #[test]
 fn large_contacts_are_flagged_with_their_ratio() {
     let loads = hertz_loads(Body::rigid(), &[1e-3, 0.5]);
-    let found = HertzSphere::new(4e-3, NU).unwrap().estimate(&loads).unwrap();
+    let found = HertzSphere::new(4e-3, NU)
+        .unwrap()
+        .estimate(&loads)
+        .unwrap();
     assert_eq!(found.warnings.len(), 1);
-    assert!(matches!(found.warnings[0], Warning::LargeContact { load: 1, ratio, .. } if ratio > 0.5));
+    assert!(
+        matches!(found.warnings[0], Warning::LargeContact { load: 1, ratio, .. } if ratio > 0.5)
+    );
 }
 
 #[test]
@@ -111,9 +153,15 @@ fn f32_agrees_with_f64() {
     let narrow = |e: Estimate<f64>| Estimate::new(e.value as f32, e.standard_error as f32);
     let single: Vec<LoadState<f32>> = loads
         .iter()
-        .map(|l| LoadState::new(narrow(l.force_n)).with_contact_radius(narrow(l.contact_radius_m.unwrap())))
+        .map(|l| {
+            LoadState::new(narrow(l.force_n))
+                .with_contact_radius(narrow(l.contact_radius_m.unwrap()))
+        })
         .collect();
-    let found = HertzSphere::new(4e-3f32, NU as f32).unwrap().estimate(&single).unwrap();
+    let found = HertzSphere::new(4e-3f32, NU as f32)
+        .unwrap()
+        .estimate(&single)
+        .unwrap();
     // Three roundings of a at 6·10⁻⁸ each, cubed.
     assert!((f64::from(found.youngs_modulus_pa) / SAMPLE - 1.0).abs() < 1e-6);
 }
@@ -123,12 +171,18 @@ fn loads_choose_their_law() {
     let forces = [1e-3, 4e-3, 1.6e-2];
     let candidates = sphere_as_sample(4e-3, NU, &waveguide()).unwrap();
     let choice = select_estimator(&candidates, &between_plates(&forces, 0.003)).unwrap();
-    assert_eq!(choice.chosen().estimator, EstimatorKind::SphereBetweenPlates);
+    assert_eq!(
+        choice.chosen().estimator,
+        EstimatorKind::SphereBetweenPlates
+    );
     assert!((choice.chosen().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-9);
     // Hertz with one contact takes the plate's approach for twice what it is: many standard errors off.
     assert!(matches!(choice.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
     assert!((choice.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 && choice.weights[0] > 0.99);
-    assert_eq!(choice.estimates.len() + choice.left_out.len(), candidates.len());
+    assert_eq!(
+        choice.estimates.len() + choice.left_out.len(),
+        candidates.len()
+    );
 
     // A sliding layer tells itself from a glued and from a deep one.
     let equation = LayerEquation::new(&LayerKernel::new(Bond::Free, NU).unwrap());
@@ -139,10 +193,15 @@ fn loads_choose_their_law() {
         LoadState::new(exact(hertz * contact.force_ratio_same_radius))
             .with_indentation(Estimate::new(depth, 0.003 * depth))
     };
-    let layer =
-        select_estimator(&sphere_on_sample(4e-3, NU, Some(2e-3)).unwrap(), &[0.2, 0.5, 0.9, 1.3].map(load))
-            .unwrap();
-    assert_eq!(layer.chosen().estimator, EstimatorKind::FreeLayerIntegralEquation);
+    let layer = select_estimator(
+        &sphere_on_sample(4e-3, NU, Some(2e-3)).unwrap(),
+        &[0.2, 0.5, 0.9, 1.3].map(load),
+    )
+    .unwrap();
+    assert_eq!(
+        layer.chosen().estimator,
+        EstimatorKind::FreeLayerIntegralEquation
+    );
     assert!((layer.chosen().youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-6);
 }
 
@@ -150,8 +209,11 @@ fn loads_choose_their_law() {
 fn one_load_is_answered_by_the_most_general_law() {
     let mut loads = between_plates(&[1e-3], 0.01);
     loads[0].indentation_m = None;
-    let choice = select_estimator(&sphere_as_sample(4e-3, NU, &waveguide()).unwrap(), &loads).unwrap();
+    let choice =
+        select_estimator(&sphere_as_sample(4e-3, NU, &waveguide()).unwrap(), &loads).unwrap();
     assert_eq!(choice.chosen().estimator, EstimatorKind::SphereOnWaveguide);
-    assert!(matches!(choice.reason, SelectionReason::MostGeneral { behind } if behind.abs() < 1e-9));
+    assert!(
+        matches!(choice.reason, SelectionReason::MostGeneral { behind } if behind.abs() < 1e-9)
+    );
     assert!(select_estimator::<f64>(&[], &loads).is_err());
 }

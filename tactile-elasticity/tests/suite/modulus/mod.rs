@@ -22,8 +22,17 @@ fn exact(x: f64) -> Estimate<f64> {
 }
 
 fn waveguide() -> Waveguide<f64> {
-    let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.5 };
-    Waveguide::new(vec![layer(2e-3, 1.36e5), layer(3e-3, 8.0e4), layer(5e-3, 3.4e4)]).unwrap()
+    let layer = |thickness_m, youngs_modulus_pa| Layer {
+        thickness_m,
+        youngs_modulus_pa,
+        poisson_ratio: 0.5,
+    };
+    Waveguide::new(vec![
+        layer(2e-3, 1.36e5),
+        layer(3e-3, 8.0e4),
+        layer(5e-3, 3.4e4),
+    ])
+    .unwrap()
 }
 
 fn reduced() -> f64 {
@@ -46,15 +55,20 @@ fn hertz_loads(other: Body<f64>, forces: &[f64]) -> Vec<LoadState<f64>> {
 /// The same, with the indentation that of both contacts: the waveguide's and a rigid plate's. Relative error as stated.
 fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState<f64>> {
     let far = hertz_loads(Body::rigid(), forces);
-    (hertz_loads(waveguide().as_body(), forces).into_iter().zip(far))
-        .map(|(near, far)| {
-            let indentation = near.indentation_m.unwrap().value + far.indentation_m.unwrap().value;
-            let a = near.contact_radius_m.unwrap().value;
-            LoadState::new(Estimate::new(near.force_n.value, relative * near.force_n.value))
-                .with_contact_radius(Estimate::new(a, relative * a))
-                .with_indentation(Estimate::new(indentation, relative * indentation))
-        })
-        .collect()
+    (hertz_loads(waveguide().as_body(), forces)
+        .into_iter()
+        .zip(far))
+    .map(|(near, far)| {
+        let indentation = near.indentation_m.unwrap().value + far.indentation_m.unwrap().value;
+        let a = near.contact_radius_m.unwrap().value;
+        LoadState::new(Estimate::new(
+            near.force_n.value,
+            relative * near.force_n.value,
+        ))
+        .with_contact_radius(Estimate::new(a, relative * a))
+        .with_indentation(Estimate::new(indentation, relative * indentation))
+    })
+    .collect()
 }
 
 fn finds(estimator: &dyn ModulusEstimator<f64>, loads: &[LoadState<f64>]) {

@@ -3,7 +3,9 @@
 use super::*;
 
 fn strained(stress: f64, strain: f64) -> LoadState<f64> {
-    LoadState::new(exact(stress * 1e-4)).with_contact_area(exact(1e-4)).with_mean_strain(exact(strain))
+    LoadState::new(exact(stress * 1e-4))
+        .with_contact_area(exact(1e-4))
+        .with_mean_strain(exact(strain))
 }
 
 #[test]
@@ -11,7 +13,10 @@ fn stress_over_strain() {
     let line = [0.01, 0.03, 0.05].map(|e| strained(SAMPLE * e, e));
     finds(&PaperRatio::new(), &line);
     finds(&StressStrainRegression::new(), &line);
-    finds(&StressStrainRegression::new().with_intercept(Intercept::Zero), &line);
+    finds(
+        &StressStrainRegression::new().with_intercept(Intercept::Zero),
+        &line,
+    );
     // An offset biases the ratio, not the slope, and is found.
     let wobble = [3.0, -3.0, -3.0, 3.0];
     let offset: Vec<_> = [0.01, 0.02, 0.03, 0.04]
@@ -21,20 +26,40 @@ fn stress_over_strain() {
         .collect();
     let slope = StressStrainRegression::new().estimate(&offset).unwrap();
     assert!((slope.youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-9);
-    assert!(slope.warnings.iter().any(|w| matches!(w, Warning::Intercept { .. })));
-    assert!(PaperRatio::new().estimate(&offset).unwrap().youngs_modulus_pa > 1.2 * SAMPLE);
+    assert!(
+        slope
+            .warnings
+            .iter()
+            .any(|w| matches!(w, Warning::Intercept { .. }))
+    );
+    assert!(
+        PaperRatio::new()
+            .estimate(&offset)
+            .unwrap()
+            .youngs_modulus_pa
+            > 1.2 * SAMPLE
+    );
 }
 
 #[test]
 fn strain_counted_from_the_first_load() {
-    let (first, second) = (strained(1000.0, 0.0), strained(1000.0 + SAMPLE * 0.02, 0.02));
+    let (first, second) = (
+        strained(1000.0, 0.0),
+        strained(1000.0 + SAMPLE * 0.02, 0.02),
+    );
     let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
     finds(&ratio, &[first, second]);
     assert_eq!(
         ratio.estimate(&[second]).unwrap_err(),
-        ElasticityError::TooFewLoads { expected: 2, found: 1 }
+        ElasticityError::TooFewLoads {
+            expected: 2,
+            found: 1
+        }
     );
-    assert_eq!(ratio.estimate(&[second, second]).unwrap_err(), ElasticityError::EqualLoads);
+    assert_eq!(
+        ratio.estimate(&[second, second]).unwrap_err(),
+        ElasticityError::EqualLoads
+    );
 }
 
 #[test]
@@ -43,38 +68,108 @@ fn bad_input_is_named() {
     let ratio = PaperRatio::new();
     let fail = |load: LoadState<f64>| ratio.estimate(&[load]).unwrap_err();
     assert_eq!(fail(strained(100.0, 0.0)), E::ZeroStrain);
-    assert_eq!(fail(strained(100.0, -0.1)), E::OppositeSigns { stress_pa: 100.0, strain: -0.1 });
+    assert_eq!(
+        fail(strained(100.0, -0.1)),
+        E::OppositeSigns {
+            stress_pa: 100.0,
+            strain: -0.1
+        }
+    );
     for area in [0.0, -1e-6] {
         let load = strained(100.0, 0.1).with_contact_area(exact(area));
-        assert_eq!(fail(load), E::NotPositive { quantity: Quantity::ContactArea, found: area });
+        assert_eq!(
+            fail(load),
+            E::NotPositive {
+                quantity: Quantity::ContactArea,
+                found: area
+            }
+        );
     }
-    assert_eq!(fail(strained(f64::NAN, 0.1)), E::NotFinite { quantity: Quantity::Force });
-    assert_eq!(fail(strained(100.0, f64::NAN)), E::NotFinite { quantity: Quantity::Strain });
-    assert_eq!(fail(LoadState::new(exact(1.0))), E::TooFewLoads { expected: 1, found: 0 });
+    assert_eq!(
+        fail(strained(f64::NAN, 0.1)),
+        E::NotFinite {
+            quantity: Quantity::Force
+        }
+    );
+    assert_eq!(
+        fail(strained(100.0, f64::NAN)),
+        E::NotFinite {
+            quantity: Quantity::Strain
+        }
+    );
+    assert_eq!(
+        fail(LoadState::new(exact(1.0))),
+        E::TooFewLoads {
+            expected: 1,
+            found: 0
+        }
+    );
     let bare = LoadState::new(exact(1.0)).with_mean_strain(exact(0.1));
-    assert_eq!(fail(bare), E::Missing { load: 0, quantity: Quantity::ContactArea });
+    assert_eq!(
+        fail(bare),
+        E::Missing {
+            load: 0,
+            quantity: Quantity::ContactArea
+        }
+    );
     let line = StressStrainRegression::new();
-    assert_eq!(line.estimate(&[strained(10.0, 0.1); 3]).unwrap_err(), E::EqualLoads);
-    assert_eq!(line.estimate(&[strained(10.0, 0.1)]).unwrap_err(), E::TooFewLoads { expected: 3, found: 1 });
+    assert_eq!(
+        line.estimate(&[strained(10.0, 0.1); 3]).unwrap_err(),
+        E::EqualLoads
+    );
+    assert_eq!(
+        line.estimate(&[strained(10.0, 0.1)]).unwrap_err(),
+        E::TooFewLoads {
+            expected: 3,
+            found: 1
+        }
+    );
     for nu in [-1.0, 0.500001, f64::NAN, 7.0] {
-        assert!(matches!(HertzSphere::new(1e-3, nu), Err(E::PoissonRatio { .. })), "{nu}");
+        assert!(
+            matches!(HertzSphere::new(1e-3, nu), Err(E::PoissonRatio { .. })),
+            "{nu}"
+        );
     }
     for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             HertzSphere::new(radius, 0.3),
-            Err(E::NotPositive { quantity: Quantity::Radius, .. })
+            Err(E::NotPositive {
+                quantity: Quantity::Radius,
+                ..
+            })
         ));
     }
     let sphere = HertzSphere::new(4e-3, NU).unwrap();
     let empty: [LoadState<f64>; 0] = [];
-    assert_eq!(sphere.estimate(&empty).unwrap_err(), E::TooFewLoads { expected: 1, found: 0 });
+    assert_eq!(
+        sphere.estimate(&empty).unwrap_err(),
+        E::TooFewLoads {
+            expected: 1,
+            found: 0
+        }
+    );
     let pulled = LoadState::new(exact(-1.0)).with_contact_radius(exact(1e-3));
-    assert!(matches!(sphere.estimate(&[pulled]), Err(E::NotPositive { quantity: Quantity::Force, .. })));
+    assert!(matches!(
+        sphere.estimate(&[pulled]),
+        Err(E::NotPositive {
+            quantity: Quantity::Force,
+            ..
+        })
+    ));
     let flat = LoadState::new(exact(1.0)).with_contact_radius(exact(0.0));
     assert!(matches!(
         sphere.estimate(&[flat]),
-        Err(E::NotPositive { quantity: Quantity::ContactRadius, .. })
+        Err(E::NotPositive {
+            quantity: Quantity::ContactRadius,
+            ..
+        })
     ));
-    assert!(matches!(sphere.clone().with_size_error(-0.1), Err(E::Negative { .. })));
-    assert!(matches!(sphere.with_force_scale_error(f64::NAN), Err(E::Negative { .. })));
+    assert!(matches!(
+        sphere.clone().with_size_error(-0.1),
+        Err(E::Negative { .. })
+    ));
+    assert!(matches!(
+        sphere.with_force_scale_error(f64::NAN),
+        Err(E::Negative { .. })
+    ));
 }

@@ -22,7 +22,13 @@ pub(super) fn strip(
     threshold: u8,
     tile_sums: &mut [i32],
 ) -> Strip {
-    simd.vectorize(Work { simd, frame, reference, threshold, tile_sums })
+    simd.vectorize(Work {
+        simd,
+        frame,
+        reference,
+        threshold,
+        tile_sums,
+    })
 }
 
 struct Work<'a, 'b> {
@@ -38,7 +44,13 @@ impl pulp::NullaryFnOnce for Work<'_, '_> {
 
     #[inline(always)]
     fn call(self) -> Strip {
-        sum(self.simd, self.frame, self.reference, self.threshold, self.tile_sums)
+        sum(
+            self.simd,
+            self.frame,
+            self.reference,
+            self.threshold,
+            self.tile_sums,
+        )
     }
 }
 
@@ -59,18 +71,30 @@ fn columns(
 ) -> Columns {
     let (avx, v) = (simd.avx, simd.avx2);
     let zero = avx._mm256_setzero_si256();
-    let mut c = Columns { plain: [zero; 2], by_k: [zero; 2], by_kk: [zero; 2], above: zero, below: zero };
+    let mut c = Columns {
+        plain: [zero; 2],
+        by_k: [zero; 2],
+        by_kk: [zero; 2],
+        above: zero,
+        below: zero,
+    };
     let ones = v_set8(simd, 1, 1);
     for pair in 0..TILE_ROWS / 2 {
         let k = 2 * pair as i8 - 4;
-        let (wk, wkk) = (v_set8(simd, k, k + 1), v_set8(simd, k * k, (k + 1) * (k + 1)));
+        let (wk, wkk) = (
+            v_set8(simd, k, k + 1),
+            v_set8(simd, k * k, (k + 1) * (k + 1)),
+        );
         let rows: [__m256i; 2] = std::array::from_fn(|i| cast(*frame[2 * pair + i]));
         for (i, f) in rows.iter().enumerate() {
             let r: __m256i = cast(*reference[2 * pair + i]);
             c.above = v._mm256_max_epu8(c.above, v._mm256_subs_epu8(*f, r));
             c.below = v._mm256_max_epu8(c.below, v._mm256_subs_epu8(r, *f));
         }
-        let mixed = [v._mm256_unpacklo_epi8(rows[0], rows[1]), v._mm256_unpackhi_epi8(rows[0], rows[1])];
+        let mixed = [
+            v._mm256_unpacklo_epi8(rows[0], rows[1]),
+            v._mm256_unpackhi_epi8(rows[0], rows[1]),
+        ];
         for (half, bytes) in mixed.into_iter().enumerate() {
             c.plain[half] = v._mm256_add_epi16(c.plain[half], v._mm256_maddubs_epi16(bytes, ones));
             c.by_k[half] = v._mm256_add_epi16(c.by_k[half], v._mm256_maddubs_epi16(bytes, wk));
@@ -82,21 +106,33 @@ fn columns(
 
 #[inline(always)]
 fn v_set8(simd: V3, even: i8, odd: i8) -> __m256i {
-    simd.avx._mm256_set1_epi16(i16::from_le_bytes([even as u8, odd as u8]))
+    simd.avx
+        ._mm256_set1_epi16(i16::from_le_bytes([even as u8, odd as u8]))
 }
 
 #[inline(always)]
-fn sum(simd: V3, frame: &Rows<'_>, reference: &Rows<'_>, threshold: u8, tile_sums: &mut [i32]) -> Strip {
+fn sum(
+    simd: V3,
+    frame: &Rows<'_>,
+    reference: &Rows<'_>,
+    threshold: u8,
+    tile_sums: &mut [i32],
+) -> Strip {
     let (avx, v) = (simd.avx, simd.avx2);
     let tiles = tile_sums.len();
-    let f: [&[[u8; TILE_COLUMNS]]; TILE_ROWS] = std::array::from_fn(|k| &frame[k].as_chunks().0[..tiles]);
-    let r: [&[[u8; TILE_COLUMNS]]; TILE_ROWS] = std::array::from_fn(|k| &reference[k].as_chunks().0[..tiles]);
+    let f: [&[[u8; TILE_COLUMNS]]; TILE_ROWS] =
+        std::array::from_fn(|k| &frame[k].as_chunks().0[..tiles]);
+    let r: [&[[u8; TILE_COLUMNS]]; TILE_ROWS] =
+        std::array::from_fn(|k| &reference[k].as_chunks().0[..tiles]);
     let (zero, one) = (avx._mm256_setzero_si256(), avx._mm256_set1_epi16(1));
     let limit = avx._mm256_set1_epi8(threshold as i8);
     let j: [__m256i; 2] = [cast(LOW), cast(HIGH)];
     let jj: [__m256i; 2] = [cast(LOW.map(|j| j * j)), cast(HIGH.map(|j| j * j))];
     let along = |c: [__m256i; 2], w: [__m256i; 2]| {
-        v._mm256_add_epi32(v._mm256_madd_epi16(c[0], w[0]), v._mm256_madd_epi16(c[1], w[1]))
+        v._mm256_add_epi32(
+            v._mm256_madd_epi16(c[0], w[0]),
+            v._mm256_madd_epi16(c[1], w[1]),
+        )
     };
     let total = |c: [__m256i; 2]| v._mm256_madd_epi16(v._mm256_add_epi16(c[0], c[1]), one);
     let (mut above, mut below) = (zero, zero);
@@ -105,10 +141,18 @@ fn sum(simd: V3, frame: &Rows<'_>, reference: &Rows<'_>, threshold: u8, tile_sum
     let (mut ja, mut ja_t, mut jja) = (zero, zero, zero);
     let (mut b, mut b_t, mut jb, mut c) = (zero, zero, zero, zero);
     for (t, tile_sum) in tile_sums.iter_mut().enumerate() {
-        let tile = columns(simd, std::array::from_fn(|k| &f[k][t]), std::array::from_fn(|k| &r[k][t]));
+        let tile = columns(
+            simd,
+            std::array::from_fn(|k| &f[k][t]),
+            std::array::from_fn(|k| &r[k][t]),
+        );
         *tile_sum = horizontal(simd, total(tile.plain));
         let (number, wide) = (t as i64, i64::from(*tile_sum));
-        (s.sum, t1, t2) = (s.sum + wide, t1 + number * wide, t2 + number * number * wide);
+        (s.sum, t1, t2) = (
+            s.sum + wide,
+            t1 + number * wide,
+            t2 + number * number * wide,
+        );
         ja = v._mm256_add_epi32(ja, along(tile.plain, j));
         ja_t = v._mm256_add_epi32(ja_t, ja);
         jja = v._mm256_add_epi32(jja, along(tile.plain, jj));
@@ -139,17 +183,25 @@ fn sum(simd: V3, frame: &Rows<'_>, reference: &Rows<'_>, threshold: u8, tile_sum
 #[inline(always)]
 fn horizontal(simd: V3, lanes: __m256i) -> i32 {
     let (sse2, v) = (simd.sse2, simd.avx2);
-    let four =
-        sse2._mm_add_epi32(simd.avx._mm256_castsi256_si128(lanes), v._mm256_extracti128_si256::<1>(lanes));
+    let four = sse2._mm_add_epi32(
+        simd.avx._mm256_castsi256_si128(lanes),
+        v._mm256_extracti128_si256::<1>(lanes),
+    );
     let two = sse2._mm_add_epi32(four, sse2._mm_shuffle_epi32::<0b00_00_11_10>(four));
     let one = sse2._mm_add_epi32(two, sse2._mm_shuffle_epi32::<0b00_00_00_01>(two));
     sse2._mm_cvtsi128_si32(one)
 }
 
 fn wide(lanes: __m256i) -> i64 {
-    cast::<__m256i, [i32; 8]>(lanes).iter().map(|&v| i64::from(v)).sum()
+    cast::<__m256i, [i32; 8]>(lanes)
+        .iter()
+        .map(|&v| i64::from(v))
+        .sum()
 }
 
 fn greatest(lanes: __m256i) -> u8 {
-    cast::<__m256i, [u8; 32]>(lanes).into_iter().max().unwrap_or(0)
+    cast::<__m256i, [u8; 32]>(lanes)
+        .into_iter()
+        .max()
+        .unwrap_or(0)
 }

@@ -2,7 +2,12 @@
 
 use super::{Rows, Strip, TILE_COLUMNS, TILE_ROWS};
 
-pub(super) fn strip(frame: &Rows<'_>, reference: &Rows<'_>, threshold: u8, tile_sums: &mut [i32]) -> Strip {
+pub(super) fn strip(
+    frame: &Rows<'_>,
+    reference: &Rows<'_>,
+    threshold: u8,
+    tile_sums: &mut [i32],
+) -> Strip {
     let mut s = Strip::default();
     for (t, sum) in tile_sums.iter_mut().enumerate() {
         let tile = columns(frame, reference, t * TILE_COLUMNS);
@@ -37,10 +42,19 @@ struct Columns {
 #[inline]
 fn columns(frame: &Rows<'_>, reference: &Rows<'_>, first: usize) -> Columns {
     let zero = [0; TILE_COLUMNS];
-    let mut c = Columns { plain: zero, by_k: zero, by_kk: zero, above: 0, below: 0 };
+    let mut c = Columns {
+        plain: zero,
+        by_k: zero,
+        by_kk: zero,
+        above: 0,
+        below: 0,
+    };
     for row in 0..TILE_ROWS {
         let k = row as i32 - 4;
-        let (f, r) = (&frame[row][first..first + TILE_COLUMNS], &reference[row][first..first + TILE_COLUMNS]);
+        let (f, r) = (
+            &frame[row][first..first + TILE_COLUMNS],
+            &reference[row][first..first + TILE_COLUMNS],
+        );
         for (j, (&f, &r)) in f.iter().zip(r).enumerate() {
             let wide = i32::from(f);
             c.plain[j] += wide;

@@ -5,13 +5,25 @@ use super::*;
 #[test]
 fn exact_data_are_recovered_to_rounding() {
     let pairs = cycle(10, 0.0, 1, line);
-    for (k, c) in all(&pairs, &CalibrationOptions::default()).iter().enumerate() {
+    for (k, c) in all(&pairs, &CalibrationOptions::default())
+        .iter()
+        .enumerate()
+    {
         for v in [0.0, 1.3e5, 2.7e6, 4e6] {
-            assert!((c.force_n(v) - line(v)).abs() < 1e-14, "calibration {k} at {v}");
-            assert!((c.sensitivity_n(v) - 5e-7).abs() < 1e-19, "calibration {k} at {v}");
+            assert!(
+                (c.force_n(v) - line(v)).abs() < 1e-14,
+                "calibration {k} at {v}"
+            );
+            assert!(
+                (c.sensitivity_n(v) - 5e-7).abs() < 1e-19,
+                "calibration {k} at {v}"
+            );
         }
         let r = c.report();
-        assert!(r.residual_sd_n < 1e-14 && r.linearity_error < 1e-13 && r.monotone, "{r:?}");
+        assert!(
+            r.residual_sd_n < 1e-14 && r.linearity_error < 1e-13 && r.monotone,
+            "{r:?}"
+        );
         assert!((r.r_squared - 1.0).abs() < 1e-14);
         assert!(r.hysteresis.unwrap().greatest_n.abs() < 1e-14);
         assert_eq!(c.range(), [0.0, 4e6]);
@@ -50,12 +62,18 @@ fn a_bent_curve_is_seen_as_such() {
 #[test]
 fn hysteresis_is_measured_with_its_sign() {
     let mut pairs = cycle(40, 1e-4, 3, line);
-    for p in pairs.iter_mut().filter(|p| p.branch == tactile_force::Branch::Unloading) {
+    for p in pairs
+        .iter_mut()
+        .filter(|p| p.branch == tactile_force::Branch::Unloading)
+    {
         let x = p.integrated_pixel_value / 4e6;
         p.force_n -= 0.08 * x * (1.0 - x);
     }
-    let h =
-        LinearCalibration::fit(&pairs, &CalibrationOptions::default()).unwrap().report().hysteresis.unwrap();
+    let h = LinearCalibration::fit(&pairs, &CalibrationOptions::default())
+        .unwrap()
+        .report()
+        .hysteresis
+        .unwrap();
     // Greatest difference 0.02 N at half range, up to three times the noise of a difference; mean 0.08/6.
     assert!((h.greatest_n - 0.02).abs() < 5e-4, "{h:?}");
     assert!((h.mean_n.value - 0.08 / 6.0).abs() < 5e-4, "{h:?}");
@@ -68,13 +86,26 @@ fn outliers_lose_their_pull_on_request() {
     pairs[7].force_n += 1.0;
     pairs[30].force_n -= 0.8;
     let error = |r: Robustness| -> Vec<f64> {
-        all(&pairs, &options(false, r)).iter().map(|c| (c.force_n(1.4e6) - line(1.4e6)).abs()).collect()
+        all(&pairs, &options(false, r))
+            .iter()
+            .map(|c| (c.force_n(1.4e6) - line(1.4e6)).abs())
+            .collect()
     };
-    let (plain, huber, tukey) = (error(Robustness::None), error(Robustness::Huber), error(Robustness::Tukey));
+    let (plain, huber, tukey) = (
+        error(Robustness::None),
+        error(Robustness::Huber),
+        error(Robustness::Tukey),
+    );
     // Tukey: as if the two were not there, within three standard errors of the clean fit (2 mN/√10 for a cubic or a step).
-    assert!(plain[0] > 5e-3 && tukey.iter().all(|e| *e < 4e-3), "{plain:?} {tukey:?}");
+    assert!(
+        plain[0] > 5e-3 && tukey.iter().all(|e| *e < 4e-3),
+        "{plain:?} {tukey:?}"
+    );
     assert!(huber[0] < 0.5 * plain[0], "{huber:?}");
-    let report = LinearCalibration::fit(&pairs, &options(false, Robustness::Tukey)).unwrap().report().clone();
+    let report = LinearCalibration::fit(&pairs, &options(false, Robustness::Tukey))
+        .unwrap()
+        .report()
+        .clone();
     assert_eq!((report.weights[7], report.weights[30]), (0.0, 0.0));
     assert_eq!(report.stop, StopReason::Converged);
     assert!((report.residual_sd_n / 2e-3 - 1.0).abs() < 0.5);
@@ -94,7 +125,10 @@ fn stress_over_the_contact_is_the_force() {
         let differences = [3.0, 100.0, 20.0, 0.0, 77.0];
         let (v, area) = (differences.iter().sum::<f64>() * 1e4, 4e-10);
         let table = c.stress_table_pa(v, area);
-        let force: f64 = differences.iter().map(|d| table[*d as usize] * area * 1e4).sum();
+        let force: f64 = differences
+            .iter()
+            .map(|d| table[*d as usize] * area * 1e4)
+            .sum();
         assert!((force / c.force_n(v) - 1.0).abs() < 1e-14);
         let limit = c.stress_per_grey_level_pa(0.0, area);
         assert!((limit * area / c.sensitivity_n(0.0) - 1.0).abs() < 1e-14);
@@ -127,21 +161,42 @@ fn bad_pairs_are_refused() {
     let good = cycle(5, 0.0, 1, line);
     let mut nan = good.clone();
     nan[3].force_n = f64::NAN;
-    assert_eq!(LinearCalibration::fit(&nan, &o), Err(ForceError::NonFinitePair { index: 3 }));
+    assert_eq!(
+        LinearCalibration::fit(&nan, &o),
+        Err(ForceError::NonFinitePair { index: 3 })
+    );
     nan[2].integrated_pixel_value = f64::INFINITY;
-    assert_eq!(MonotoneCalibration::fit(&nan, &o), Err(ForceError::NonFinitePair { index: 2 }));
+    assert_eq!(
+        MonotoneCalibration::fit(&nan, &o),
+        Err(ForceError::NonFinitePair { index: 2 })
+    );
     assert_eq!(
         LinearCalibration::fit(&good[..2], &o),
-        Err(ForceError::TooFewPairs { required: 3, found: 2 })
+        Err(ForceError::TooFewPairs {
+            required: 3,
+            found: 2
+        })
     );
     assert_eq!(
         PolynomialCalibration::fit(&good[..4], 3, &o),
-        Err(ForceError::TooFewPairs { required: 5, found: 4 })
+        Err(ForceError::TooFewPairs {
+            required: 5,
+            found: 4
+        })
     );
     let still = vec![good[2]; 6];
-    assert!(matches!(LinearCalibration::fit(&still, &o), Err(ForceError::DegeneratePairs { .. })));
-    assert!(matches!(MonotoneCalibration::fit(&still, &o), Err(ForceError::DegeneratePairs { .. })));
-    assert!(matches!(PolynomialCalibration::fit(&still, 1, &o), Err(ForceError::DegeneratePairs { .. })));
+    assert!(matches!(
+        LinearCalibration::fit(&still, &o),
+        Err(ForceError::DegeneratePairs { .. })
+    ));
+    assert!(matches!(
+        MonotoneCalibration::fit(&still, &o),
+        Err(ForceError::DegeneratePairs { .. })
+    ));
+    assert!(matches!(
+        PolynomialCalibration::fit(&still, 1, &o),
+        Err(ForceError::DegeneratePairs { .. })
+    ));
     // Two pixel values cannot carry a parabola.
     let two: Pairs = [0, 10, 0, 10, 0].map(|k| good[k]).to_vec();
     let two: Pairs = two
@@ -149,10 +204,19 @@ fn bad_pairs_are_refused() {
         .enumerate()
         .map(|(k, p)| CalibrationPair::loading((k % 2) as f64 * 1e6, p.force_n))
         .collect();
-    assert!(matches!(PolynomialCalibration::fit(&two, 2, &o), Err(ForceError::DegeneratePairs { .. })));
-    assert!(matches!(PolynomialCalibration::fit(&good, 0, &o), Err(ForceError::InvalidOption { .. })));
+    assert!(matches!(
+        PolynomialCalibration::fit(&two, 2, &o),
+        Err(ForceError::DegeneratePairs { .. })
+    ));
+    assert!(matches!(
+        PolynomialCalibration::fit(&good, 0, &o),
+        Err(ForceError::InvalidOption { .. })
+    ));
     let falling = cycle(5, 0.0, 1, |v| 2.0 - line(v));
-    assert!(matches!(MonotoneCalibration::fit(&falling, &o), Err(ForceError::NotMonotone { .. })));
+    assert!(matches!(
+        MonotoneCalibration::fit(&falling, &o),
+        Err(ForceError::NotMonotone { .. })
+    ));
 }
 
 proptest! {

@@ -3,7 +3,11 @@
 use super::*;
 
 /// Share of seeds for which the truth lies within one standard error, at a pixel value.
-fn coverage(fit: impl Fn(&Pairs) -> Box<dyn StressCalibration<f64>>, curve: fn(f64) -> f64, at: f64) -> f64 {
+fn coverage(
+    fit: impl Fn(&Pairs) -> Box<dyn StressCalibration<f64>>,
+    curve: fn(f64) -> f64,
+    at: f64,
+) -> f64 {
     let seeds = 1000;
     let inside = (0..seeds)
         .filter(|seed| {
@@ -20,11 +24,23 @@ fn stated_errors_are_right() {
     let huber = options(false, Robustness::Huber);
     // 68.3 % ± 1.5 % (binomial, 1000 seeds); Student's t with 38 degrees takes 0.5 % off.
     for at in [0.0, 1.7e6, 3.9e6] {
-        let linear = coverage(|p| Box::new(LinearCalibration::fit(p, &plain).unwrap()), line, at);
+        let linear = coverage(
+            |p| Box::new(LinearCalibration::fit(p, &plain).unwrap()),
+            line,
+            at,
+        );
         assert!((0.64..0.72).contains(&linear), "line at {at}: {linear}");
-        let cubic = coverage(|p| Box::new(PolynomialCalibration::fit(p, 3, &plain).unwrap()), bent, at);
+        let cubic = coverage(
+            |p| Box::new(PolynomialCalibration::fit(p, 3, &plain).unwrap()),
+            bent,
+            at,
+        );
         assert!((0.63..0.72).contains(&cubic), "cubic at {at}: {cubic}");
-        let robust = coverage(|p| Box::new(LinearCalibration::fit(p, &huber).unwrap()), line, at);
+        let robust = coverage(
+            |p| Box::new(LinearCalibration::fit(p, &huber).unwrap()),
+            line,
+            at,
+        );
         assert!((0.62..0.73).contains(&robust), "robust at {at}: {robust}");
     }
 }
@@ -33,8 +49,11 @@ fn stated_errors_are_right() {
 fn confidence_intervals_cover_nineteen_in_twenty() {
     let inside = (0..1000)
         .filter(|seed| {
-            let c =
-                LinearCalibration::fit(&cycle(4, 5e-3, *seed, line), &CalibrationOptions::default()).unwrap();
+            let c = LinearCalibration::fit(
+                &cycle(4, 5e-3, *seed, line),
+                &CalibrationOptions::default(),
+            )
+            .unwrap();
             let [low, high] = c.report().intervals_95[1];
             low < 5e-7 && 5e-7 < high
         })
@@ -60,14 +79,21 @@ fn errors_of_two_forces_go_together_as_stated() {
             size += c.standard_error_n(at[0]) * c.standard_error_n(at[1]);
         }
         // The mean of a thousand products of two errors is uncertain by √2/√1000 of their size at most; three of that.
-        assert!((seen - stated).abs() < 0.13 * size, "{seen} {stated} {size}");
+        assert!(
+            (seen - stated).abs() < 0.13 * size,
+            "{seen} {stated} {size}"
+        );
     }
 }
 
 #[test]
 fn forces_of_one_calibration_share_its_error() {
-    let c = LinearCalibration::fit(&cycle(20, 5e-3, 2, line), &CalibrationOptions::default()).unwrap();
-    let values = [2e5, 2e6, 3.9e6].map(|value| Estimate { value, standard_error: 4e3 });
+    let c =
+        LinearCalibration::fit(&cycle(20, 5e-3, 2, line), &CalibrationOptions::default()).unwrap();
+    let values = [2e5, 2e6, 3.9e6].map(|value| Estimate {
+        value,
+        standard_error: 4e3,
+    });
     let covariance = c.force_covariance_n2(&values);
     for (i, v) in values.iter().enumerate() {
         let reading = c.read(*v);
@@ -82,12 +108,26 @@ fn forces_of_one_calibration_share_its_error() {
 
 #[test]
 fn reading_adds_both_errors_and_flags_extrapolation() {
-    let c = LinearCalibration::fit(&cycle(20, 5e-3, 2, line), &CalibrationOptions::default()).unwrap();
-    let inside = c.read(Estimate { value: 2e6, standard_error: 1e4 });
+    let c =
+        LinearCalibration::fit(&cycle(20, 5e-3, 2, line), &CalibrationOptions::default()).unwrap();
+    let inside = c.read(Estimate {
+        value: 2e6,
+        standard_error: 1e4,
+    });
     assert!((inside.noise_n / 5e-3 - 1.0).abs() < 0.01 && inside.calibration_n > 0.0);
-    assert_eq!(inside.force_n.standard_error, inside.noise_n.hypot(inside.calibration_n));
+    assert_eq!(
+        inside.force_n.standard_error,
+        inside.noise_n.hypot(inside.calibration_n)
+    );
     assert!(!inside.out_of_range);
     for value in [-1.0, 4.1e6, f64::NAN] {
-        assert!(c.read(Estimate { value, standard_error: 0.0 }).out_of_range, "{value}");
+        assert!(
+            c.read(Estimate {
+                value,
+                standard_error: 0.0
+            })
+            .out_of_range,
+            "{value}"
+        );
     }
 }

@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, Normal};
 use tactile_force::{
-    CalibrationOptions, CalibrationPair, Estimate, ForceError, LinearCalibration, MonotoneCalibration,
-    PolynomialCalibration, Robustness, StopReason, StressCalibration,
+    CalibrationOptions, CalibrationPair, Estimate, ForceError, LinearCalibration,
+    MonotoneCalibration, PolynomialCalibration, Robustness, StopReason, StressCalibration,
 };
 
 type Pairs = Vec<CalibrationPair<f64>>;
@@ -36,7 +36,10 @@ fn bent(v: f64) -> f64 {
 }
 
 fn options(through_origin: bool, robustness: Robustness) -> CalibrationOptions {
-    CalibrationOptions { through_origin, robustness }
+    CalibrationOptions {
+        through_origin,
+        robustness,
+    }
 }
 
 fn all(pairs: &Pairs, o: &CalibrationOptions) -> Vec<Box<dyn StressCalibration<f64>>> {

@@ -38,11 +38,19 @@ impl RelaxationMatcher {
                 break;
             }
             let sets = (&*ws.model, &*ws.target);
-            ws.consensus.fit(&mut ws.annealer, SCALES, sets, &ws.constellations.pairs, &mut ws.state);
+            ws.consensus.fit(
+                &mut ws.annealer,
+                SCALES,
+                sets,
+                &ws.constellations.pairs,
+                &mut ws.state,
+            );
             let sigma = PATTERN_SIGMA * ws.constellations.spacing;
             self.refine(ws, Pace { sigma, ..REHEAT }, observe)?;
             let (matched, sigma) = (ws.best.matched, ws.best.sigma);
-            if matched >= COMPLETE * points || (matched < 1.01 * before.0 && sigma > 0.99 * before.1) {
+            if matched >= COMPLETE * points
+                || (matched < 1.01 * before.0 && sigma > 0.99 * before.1)
+            {
                 break;
             }
         }

@@ -12,7 +12,11 @@ use super::{RelaxationMatcher, RelaxationWorkspace, Rotation, Search, finish, st
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
-const SCALES: PriorScales = PriorScales { length: 1.2, bending: 0.35, affine: 0.5 };
+const SCALES: PriorScales = PriorScales {
+    length: 1.2,
+    bending: 0.35,
+    affine: 0.5,
+};
 /// Where a run starts and how fast it cools.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
@@ -24,15 +28,39 @@ struct Pace {
 }
 
 /// The first try: most scenes are easy.
-const FAST: Pace = Pace { sigma: 0.3, rate: 0.75, least: 0.9, patience: usize::MAX, sweeps: 3 };
+const FAST: Pace = Pace {
+    sigma: 0.3,
+    rate: 0.75,
+    least: 0.9,
+    patience: usize::MAX,
+    sweeps: 3,
+};
 /// From the best answer so far.
-const REHEAT: Pace = Pace { sigma: 0.1, rate: 0.9, least: 1.0, patience: usize::MAX, sweeps: 5 };
+const REHEAT: Pace = Pace {
+    sigma: 0.1,
+    rate: 0.9,
+    least: 1.0,
+    patience: usize::MAX,
+    sweeps: 5,
+};
 /// The only try between sets that lie near each other. Residuals that stay above the temperature, whatever else moves, end it.
-const NEAR: Pace = Pace { sigma: 0.2, rate: 0.8, least: 1.0, patience: 12, sweeps: 3 };
+const NEAR: Pace = Pace {
+    sigma: 0.2,
+    rate: 0.8,
+    least: 1.0,
+    patience: 12,
+    sweeps: 3,
+};
 /// Least first temperature of a run from the last answer of a series.
 const COOLEST: f64 = 0.03;
 /// Further tries.
-const SLOW: Pace = Pace { sigma: 0.3, rate: 0.93, least: 1.0, patience: usize::MAX, sweeps: 5 };
+const SLOW: Pace = Pace {
+    sigma: 0.3,
+    rate: 0.93,
+    least: 1.0,
+    patience: usize::MAX,
+    sweeps: 5,
+};
 /// Residuals are judged no finer than this.
 const RESOLUTION: f64 = 0.01;
 
@@ -68,7 +96,10 @@ impl RelaxationMatcher {
         begin(ws);
         ws.state.warped.clear();
         ws.state.warped.extend_from_slice(start);
-        let pace = Pace { sigma: sigma.clamp(COOLEST, NEAR.sigma), ..NEAR };
+        let pace = Pace {
+            sigma: sigma.clamp(COOLEST, NEAR.sigma),
+            ..NEAR
+        };
         // Nobody listens, so nobody breaks off.
         let _ = self.refine(ws, pace, &mut |_, _| ControlFlow::Continue(()));
         self.conclude(ws);
@@ -78,10 +109,14 @@ impl RelaxationMatcher {
     fn conclude<const D: usize>(&self, ws: &mut RelaxationWorkspace<D>) {
         if ws.starts > 1 || !self.is_exact(ws) {
             // Later runs have left their own fit behind.
-            let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
+            let schedule = self.schedule(Pace {
+                sigma: ws.best.sigma,
+                ..SLOW
+            });
             ws.annealer.look(&ws.best, &mut ws.state, &schedule);
         }
-        ws.answer.read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
+        ws.answer
+            .read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
     }
 
     /// What follows the first run where its answer is not exact and complete.
@@ -103,8 +138,21 @@ impl RelaxationMatcher {
             ws.state.warped.clone_from(&ws.state.base);
             ws.correspondence.find(&ws.state.base, &ws.target);
             let sets = (&*ws.model, &*ws.target);
-            ws.consensus.fit(&mut ws.annealer, SCALES, sets, &ws.correspondence.pairs, &mut ws.state);
-            flow = self.refine(ws, Pace { sigma: 0.15, ..SLOW }, observe);
+            ws.consensus.fit(
+                &mut ws.annealer,
+                SCALES,
+                sets,
+                &ws.correspondence.pairs,
+                &mut ws.state,
+            );
+            flow = self.refine(
+                ws,
+                Pace {
+                    sigma: 0.15,
+                    ..SLOW
+                },
+                observe,
+            );
         }
         let rotations = match self.options.rotation {
             Rotation::Any => starts::ANY,
@@ -128,7 +176,10 @@ impl RelaxationMatcher {
 
     /// The last stage on noisy data: the prior's scales by their evidence, each with the noise level that fits it.
     fn fit_scales<const D: usize>(&self, ws: &mut RelaxationWorkspace<D>) {
-        let schedule = self.schedule(Pace { sigma: ws.best.sigma, ..SLOW });
+        let schedule = self.schedule(Pace {
+            sigma: ws.best.sigma,
+            ..SLOW
+        });
         if ws.annealer.look(&ws.best, &mut ws.state, &schedule) > UNDECIDED {
             return;
         }
@@ -140,12 +191,21 @@ impl RelaxationMatcher {
         let mut total = 0.0;
         for length in [1.2, 1.7, 2.4, 3.4] {
             for bending in [0.35, 0.2, 0.1, 0.05, 0.025] {
-                let scales = PriorScales { length, bending: bending * length / 1.2, ..SCALES };
+                let scales = PriorScales {
+                    length,
+                    bending: bending * length / 1.2,
+                    ..SCALES
+                };
                 ws.annealer.prior.build(&ws.model, scales);
                 ws.state.copy_from(&ws.start);
                 ws.annealer.settle(&mut ws.state, &schedule, 4);
-                ws.annealer.judge(&mut ws.state, self.options.share, RESOLUTION);
-                let old = if total > 0.0 { ws.best.energy } else { ws.state.energy };
+                ws.annealer
+                    .judge(&mut ws.state, self.options.share, RESOLUTION);
+                let old = if total > 0.0 {
+                    ws.best.energy
+                } else {
+                    ws.state.energy
+                };
                 if ws.state.energy < ws.best.energy {
                     let f = (ws.state.energy - old).exp();
                     total *= f;
@@ -161,7 +221,11 @@ impl RelaxationMatcher {
             }
         }
         ws.annealer.prior.build(&ws.model, winner);
-        ws.best.warped.iter_mut().zip(&ws.mean).for_each(|(p, s)| *p = s.map(|v| v / total));
+        ws.best
+            .warped
+            .iter_mut()
+            .zip(&ws.mean)
+            .for_each(|(p, s)| *p = s.map(|v| v / total));
     }
 
     fn schedule(&self, pace: Pace) -> Schedule {
@@ -206,7 +270,8 @@ impl RelaxationMatcher {
                 return flow; // there will be nothing to compare it with
             }
         }
-        ws.annealer.judge(&mut ws.state, self.options.share, RESOLUTION);
+        ws.annealer
+            .judge(&mut ws.state, self.options.share, RESOLUTION);
         if ws.state.energy < ws.best.energy || ws.starts == 1 {
             ws.best.copy_from(&ws.state);
         }
@@ -228,7 +293,9 @@ fn begin<const D: usize>(ws: &mut RelaxationWorkspace<D>) {
 /// Volume of the bounding box; thin sides count as a tenth of the model's radius.
 fn bounding_volume<const D: usize>(points: &[[f64; D]]) -> f64 {
     let side = |k: usize| {
-        let (low, high) = points.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        let (low, high) = points
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
         (high - low).max(0.1)
     };
     (0..D).map(side).product()

@@ -25,7 +25,11 @@ impl RelaxationMatcher {
     /// Whether the best run so far explains nearly every point of the smaller set to rounding.
     pub(super) fn is_exact<const D: usize>(&self, ws: &RelaxationWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
-        let wanted = if ws.starts == 1 || points < MANY { COMPLETE } else { 0.8 };
+        let wanted = if ws.starts == 1 || points < MANY {
+            COMPLETE
+        } else {
+            0.8
+        };
         ws.best.sigma <= finish::CLEAN && ws.best.matched >= wanted * points as f64
     }
 }

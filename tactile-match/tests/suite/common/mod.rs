@@ -4,8 +4,8 @@ use nalgebra::{Point, RealField, SMatrix, SVector};
 use proptest::prelude::*;
 use tactile_match::dense::Neighbourhood;
 use tactile_match::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Matching, Motion,
-    NearestNeighbour, PointMatcher, RelaxationMatcher, SparseRelaxation,
+    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Matching,
+    Motion, NearestNeighbour, PointMatcher, RelaxationMatcher, SparseRelaxation,
 };
 use tactile_tps::Scalar;
 
@@ -14,10 +14,17 @@ pub(crate) type Matchers<T, const D: usize> = Vec<(&'static str, Box<dyn PointMa
 /// The matchers that every test file runs; a new one is added here and nowhere else.
 pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
     let drift = |motion| {
-        CoherentPointDrift::new(DriftOptions { motion, ..Default::default() }).expect("valid options")
+        CoherentPointDrift::new(DriftOptions {
+            motion,
+            ..Default::default()
+        })
+        .expect("valid options")
     };
     // Eight neighbours instead of half of all points: what is checked here does not need the time of the latter.
-    let options = DenseOptions { neighbourhood: Neighbourhood::Nearest(8), ..Default::default() };
+    let options = DenseOptions {
+        neighbourhood: Neighbourhood::Nearest(8),
+        ..Default::default()
+    };
     let dense = DenseRelaxation::new(options).expect("valid options");
     vec![
         ("relaxation", Box::new(RelaxationMatcher::default())),
@@ -25,16 +32,31 @@ pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
         ("sparse relaxation", Box::new(SparseRelaxation::default())),
         ("nearest neighbour", Box::new(NearestNeighbour::new())),
         ("linear assignment", Box::new(LinearAssignment::new())),
-        ("coherent point drift", Box::new(CoherentPointDrift::default())),
-        ("coherent point drift, rigid", Box::new(drift(Motion::Rigid))),
-        ("coherent point drift, similarity", Box::new(drift(Motion::Similarity))),
-        ("coherent point drift, affine", Box::new(drift(Motion::Affine))),
+        (
+            "coherent point drift",
+            Box::new(CoherentPointDrift::default()),
+        ),
+        (
+            "coherent point drift, rigid",
+            Box::new(drift(Motion::Rigid)),
+        ),
+        (
+            "coherent point drift, similarity",
+            Box::new(drift(Motion::Similarity)),
+        ),
+        (
+            "coherent point drift, affine",
+            Box::new(drift(Motion::Affine)),
+        ),
     ]
 }
 
 /// Largest distance of two points of the same row.
 pub(crate) fn largest_step<T: Scalar, const D: usize>(a: &[Point<T, D>], b: &[Point<T, D>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| nalgebra::convert_unchecked::<T, f64>((a - b).norm())).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| nalgebra::convert_unchecked::<T, f64>((a - b).norm()))
+        .fold(0.0, f64::max)
 }
 
 /// A repeatable stream of numbers in [0, 1), the same for every scalar type.
@@ -65,7 +87,10 @@ impl Stream {
 }
 
 /// `n` points, no two closer than about half the spacing of a regular arrangement: a jittered lattice of the unit cube.
-pub(crate) fn scattered<T: RealField + Copy, const D: usize>(n: usize, seed: u64) -> Vec<Point<T, D>> {
+pub(crate) fn scattered<T: RealField + Copy, const D: usize>(
+    n: usize,
+    seed: u64,
+) -> Vec<Point<T, D>> {
     let side = (n as f64).powf(1.0 / D as f64).ceil() as usize;
     let mut stream = Stream::new(seed);
     let cells = stream.permutation(side.pow(D as u32));
@@ -84,7 +109,9 @@ pub(crate) fn scattered<T: RealField + Copy, const D: usize>(n: usize, seed: u64
 pub(crate) fn grid<T: RealField + Copy, const D: usize>(side: usize) -> Vec<Point<T, D>> {
     (0..side.pow(D as u32))
         .map(|cell| {
-            Point::from(SVector::from_fn(|d, _| nalgebra::convert((cell / side.pow(d as u32) % side) as f64)))
+            Point::from(SVector::from_fn(|d, _| {
+                nalgebra::convert((cell / side.pow(d as u32) % side) as f64)
+            }))
         })
         .collect()
 }
@@ -113,7 +140,10 @@ pub(crate) fn reordered<P: Copy>(points: &[P], order: &[usize]) -> Vec<P> {
 
 /// A rotation by `angle` in the plane of the first two axes.
 pub(crate) fn rotation<T: RealField + Copy, const D: usize>(angle: f64) -> SMatrix<T, D, D> {
-    let (sin, cos): (T, T) = (nalgebra::convert(angle.sin()), nalgebra::convert(angle.cos()));
+    let (sin, cos): (T, T) = (
+        nalgebra::convert(angle.sin()),
+        nalgebra::convert(angle.cos()),
+    );
     let mut r = SMatrix::identity();
     (r[(0, 0)], r[(0, 1)], r[(1, 0)], r[(1, 1)]) = (cos, -sin, sin, cos);
     r
@@ -127,10 +157,18 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
     matching: &Matching<T, D>,
 ) {
     let (rows, columns) = (model.len(), target.len());
-    let lengths =
-        [matching.warped.len(), matching.assignment.len(), matching.confidence.len(), matching.soft.rows()];
+    let lengths = [
+        matching.warped.len(),
+        matching.assignment.len(),
+        matching.confidence.len(),
+        matching.soft.rows(),
+    ];
     assert_eq!(lengths, [rows; 4], "{name}: one entry per model point");
-    assert_eq!(matching.displacement_covariance.len(), rows, "{name}: one covariance per model point");
+    assert_eq!(
+        matching.displacement_covariance.len(),
+        rows,
+        "{name}: one covariance per model point"
+    );
     assert_partition(name, columns, matching);
     let probability = |p: T| p >= T::zero() && p <= T::one() + nalgebra::convert(1e-5);
     assert!(
@@ -140,13 +178,20 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
     );
     for i in 0..rows {
         let sum = matching.soft.row(i).fold(T::zero(), |sum, (j, p)| {
-            assert!(j < columns && probability(p), "{name}: soft match ({i}, {j}) = {p}");
+            assert!(
+                j < columns && probability(p),
+                "{name}: soft match ({i}, {j}) = {p}"
+            );
             sum + p
         });
         assert!(probability(sum), "{name}: soft row {i} sums to {sum}");
     }
     let finite = |p: &Point<T, D>| p.iter().all(|c| c.is_finite());
-    assert!(matching.warped.iter().all(finite), "{name}: warped points {:?}", matching.warped);
+    assert!(
+        matching.warped.iter().all(finite),
+        "{name}: warped points {:?}",
+        matching.warped
+    );
     for (i, (point, warped)) in model.iter().zip(&matching.warped).enumerate() {
         // Rounding of a spline's sum, whose terms may exceed the set's size by some orders of magnitude.
         let size = target
@@ -162,24 +207,56 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
         );
     }
     for covariance in &matching.displacement_covariance {
-        assert!(covariance.iter().all(|c| c.is_finite()), "{name}: covariance {covariance}");
-        assert!((0..D).all(|d| covariance[(d, d)] >= T::zero()), "{name}: covariance {covariance}");
+        assert!(
+            covariance.iter().all(|c| c.is_finite()),
+            "{name}: covariance {covariance}"
+        );
+        assert!(
+            (0..D).all(|d| covariance[(d, d)] >= T::zero()),
+            "{name}: covariance {covariance}"
+        );
     }
-    assert!(matching.energy.iter().all(|e| e.is_finite()), "{name}: energy {:?}", matching.energy);
+    assert!(
+        matching.energy.iter().all(|e| e.is_finite()),
+        "{name}: energy {:?}",
+        matching.energy
+    );
     let report = &matching.report;
-    assert!(report.residual.is_finite() && report.sigma.is_finite(), "{name}: {report:?}");
+    assert!(
+        report.residual.is_finite() && report.sigma.is_finite(),
+        "{name}: {report:?}"
+    );
 }
 
 /// No target twice; matched and unmatched rows together are all rows.
-fn assert_partition<T: Scalar, const D: usize>(name: &str, columns: usize, matching: &Matching<T, D>) {
+fn assert_partition<T: Scalar, const D: usize>(
+    name: &str,
+    columns: usize,
+    matching: &Matching<T, D>,
+) {
     let mut seen = vec![false; columns];
-    for &j in matching.assignment.iter().flatten().chain(&matching.unmatched_target) {
-        assert!(!std::mem::replace(&mut seen[j], true), "{name}: target {j} twice");
+    for &j in matching
+        .assignment
+        .iter()
+        .flatten()
+        .chain(&matching.unmatched_target)
+    {
+        assert!(
+            !std::mem::replace(&mut seen[j], true),
+            "{name}: target {j} twice"
+        );
     }
-    assert!(seen.iter().all(|s| *s), "{name}: a target is neither matched nor unmatched");
-    let unmatched: Vec<usize> =
-        (0..matching.assignment.len()).filter(|&i| matching.assignment[i].is_none()).collect();
-    assert_eq!(unmatched, matching.unmatched_model, "{name}: unmatched model rows");
+    assert!(
+        seen.iter().all(|s| *s),
+        "{name}: a target is neither matched nor unmatched"
+    );
+    let unmatched: Vec<usize> = (0..matching.assignment.len())
+        .filter(|&i| matching.assignment[i].is_none())
+        .collect();
+    assert_eq!(
+        unmatched, matching.unmatched_model,
+        "{name}: unmatched model rows"
+    );
 }
 
 /// Coordinates a caller may come with by mistake.
@@ -195,11 +272,25 @@ pub(crate) fn hostile_coordinate() -> impl Strategy<Value = f64> {
 }
 
 /// Up to `most` points with such coordinates, many of them equal.
-pub(crate) fn hostile_points<const D: usize>(most: usize) -> impl Strategy<Value = Vec<Point<f64, D>>> {
-    prop::collection::vec(prop::collection::vec(hostile_coordinate(), D), 1..=most).prop_flat_map(|points| {
-        let points: Vec<Point<f64, D>> = points.iter().map(|p| Point::from_slice(p)).collect();
-        let len = points.len();
-        (Just(points), prop::collection::vec(0..len, len), any::<bool>())
-            .prop_map(|(points, pick, repeat)| if repeat { reordered(&points, &pick) } else { points })
-    })
+pub(crate) fn hostile_points<const D: usize>(
+    most: usize,
+) -> impl Strategy<Value = Vec<Point<f64, D>>> {
+    prop::collection::vec(prop::collection::vec(hostile_coordinate(), D), 1..=most).prop_flat_map(
+        |points| {
+            let points: Vec<Point<f64, D>> = points.iter().map(|p| Point::from_slice(p)).collect();
+            let len = points.len();
+            (
+                Just(points),
+                prop::collection::vec(0..len, len),
+                any::<bool>(),
+            )
+                .prop_map(|(points, pick, repeat)| {
+                    if repeat {
+                        reordered(&points, &pick)
+                    } else {
+                        points
+                    }
+                })
+        },
+    )
 }

@@ -18,7 +18,8 @@ impl Components {
     pub(super) fn label<T: Scalar>(&mut self, system: &System<T>) {
         let length = system.inside.len();
         self.parent.clear();
-        self.parent.extend((0..length as u32).map(|i| if system.inside[i as usize] { i } else { NONE }));
+        self.parent
+            .extend((0..length as u32).map(|i| if system.inside[i as usize] { i } else { NONE }));
         for i in 0..length {
             if system.inside[i] {
                 for j in [i - 1, i - system.width] {

@@ -30,7 +30,18 @@ impl Level {
     pub(super) fn reset(&mut self, rows: usize, columns: usize) {
         (self.width, self.rows) = (columns + 2, rows);
         let length = self.width * (rows + 2);
-        let Self { right, below, anchor, inverse, lean_x, lean_y, rhs, x, line, .. } = self;
+        let Self {
+            right,
+            below,
+            anchor,
+            inverse,
+            lean_x,
+            lean_y,
+            rhs,
+            x,
+            line,
+            ..
+        } = self;
         for vector in [right, below, anchor, inverse, lean_x, lean_y, rhs, x] {
             vector.clear();
             vector.resize(length, 0.0);
@@ -45,7 +56,11 @@ impl Level {
         for i in w..self.right.len() - w {
             let edges = self.right[i] + self.right[i - 1] + self.below[i] + self.below[i - w];
             let diagonal = edges + self.anchor[i];
-            self.inverse[i] = if diagonal > 0.0 { diagonal.recip() } else { 0.0 };
+            self.inverse[i] = if diagonal > 0.0 {
+                diagonal.recip()
+            } else {
+                0.0
+            };
             self.lean_x[i] = lean(self.right[i - 1], self.right[i], i % w % 2 == 1);
             self.lean_y[i] = lean(self.below[i - w], self.below[i], i / w % 2 == 1);
         }
@@ -101,5 +116,9 @@ impl Level {
 /// all weights are equal, none without an edge. `first` tells on which side of its block the node lies.
 fn lean(before: f32, after: f32, first: bool) -> f32 {
     let across = if first { before } else { after };
-    if across > 0.0 { 0.5 * across / (before + after) } else { 0.0 }
+    if across > 0.0 {
+        0.5 * across / (before + after)
+    } else {
+        0.0
+    }
 }

@@ -53,7 +53,11 @@ pub struct MaskedLeastSquares<'a, T> {
 impl<T: Scalar> Default for MaskedLeastSquares<'_, T> {
     fn default() -> Self {
         let tolerance = T::of(1e-9).max(T::epsilon() * T::of(10.0));
-        Self { tolerance, max_iterations: 500, weights: None }
+        Self {
+            tolerance,
+            max_iterations: 500,
+            weights: None,
+        }
     }
 }
 
@@ -78,11 +82,17 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
     /// [`SfsError::InvalidOption`] for 0.
     pub fn with_max_iterations(self, max_iterations: usize) -> Result<Self, SfsError> {
         positive("most iterations", max_iterations as f64)?;
-        Ok(Self { max_iterations, ..self })
+        Ok(Self {
+            max_iterations,
+            ..self
+        })
     }
 
     fn limits(&self) -> Limits {
-        Limits { tolerance: self.tolerance.as_f64(), iterations: self.max_iterations }
+        Limits {
+            tolerance: self.tolerance.as_f64(),
+            iterations: self.max_iterations,
+        }
     }
 
     /// Whether the fit is Poisson's equation on a rectangle: equal weights, no height known, no hole in the mask.
@@ -105,7 +115,10 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     pub fn with_weights(self, weights: ArrayView2<'a, T>) -> Self {
-        Self { weights: Some(weights), ..self }
+        Self {
+            weights: Some(weights),
+            ..self
+        }
     }
 }
 
@@ -156,7 +169,11 @@ impl<T: Scalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
             return Ok(());
         }
         surface.enter_slopes(p, q, domain)?;
-        let slopes = system::Slopes { p, q, weights: self.weights };
+        let slopes = system::Slopes {
+            p,
+            q,
+            weights: self.weights,
+        };
         let mut buffers = core::mem::take(&mut workspace.masked);
         system::assemble(&mut buffers, &slopes, domain, surface);
         solve::conjugate_gradients(&mut buffers, workspace, &self.limits(), &mut surface.report);
@@ -179,7 +196,11 @@ fn solve_directly<T: Scalar>(
         Ok(()) => {
             let BoundingBox { top, left, .. } = surface.bounding_box;
             let pixels = surface.bounding_box.area();
-            surface.report.components.push(Component { pixels, first: [top, left], mean_height: T::zero() });
+            surface.report.components.push(Component {
+                pixels,
+                first: [top, left],
+                mean_height: T::zero(),
+            });
             Ok(true)
         }
         Err(SfsError::NonFiniteSlope { .. }) => Ok(false),
@@ -194,10 +215,18 @@ impl<T: Scalar> MaskedBuffers<T> {
         self.sum_up(surface);
         for (part, component) in self.parts.iter().zip(&mut surface.report.components) {
             component.pixels = part.pixels;
-            component.mean_height = if part.anchored { T::of(part.mean()) } else { T::zero() };
+            component.mean_height = if part.anchored {
+                T::of(part.mean())
+            } else {
+                T::zero()
+            };
         }
         for i in 0..self.z.len() {
-            if let Some(label) = self.components.of(i).filter(|&label| !self.parts[label].anchored) {
+            if let Some(label) = self
+                .components
+                .of(i)
+                .filter(|&label| !self.parts[label].anchored)
+            {
                 self.z[i] -= self.parts[label].mean();
             }
         }
@@ -210,11 +239,20 @@ impl<T: Scalar> MaskedBuffers<T> {
         self.parts.resize(self.components.count(), Part::default());
         surface.report.components.clear();
         for (i, z) in self.z.iter().enumerate() {
-            let Some(label) = self.components.of(i) else { continue };
+            let Some(label) = self.components.of(i) else {
+                continue;
+            };
             let part = &mut self.parts[label];
             if part.pixels == 0 {
-                let first = [area.top + i / system.width - 1, area.left + i % system.width - 1];
-                surface.report.components.push(Component { pixels: 0, first, mean_height: T::zero() });
+                let first = [
+                    area.top + i / system.width - 1,
+                    area.left + i % system.width - 1,
+                ];
+                surface.report.components.push(Component {
+                    pixels: 0,
+                    first,
+                    mean_height: T::zero(),
+                });
             }
             part.sum += z;
             part.pixels += 1;
@@ -227,7 +265,11 @@ impl<T: Scalar> MaskedBuffers<T> {
         for (row, column) in area.pixels() {
             let i = (row - area.top + 1) * self.system.width + column - area.left + 1;
             if self.system.inside[i] {
-                surface.set(row, column, domain.known(row, column).unwrap_or(T::of(self.z[i])));
+                surface.set(
+                    row,
+                    column,
+                    domain.known(row, column).unwrap_or(T::of(self.z[i])),
+                );
             }
         }
     }

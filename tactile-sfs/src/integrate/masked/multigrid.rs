@@ -141,7 +141,11 @@ fn prolong(fine: &mut Level, coarse: &Level, [own, near, sides]: &mut [Vec<f32>;
         let (block, beyond) = blocks(r);
         let from = &coarse.x[block * cw..][..m + 2];
         let (own, near, sides) = (&mut own[..2 * m], &mut near[..2 * m], &mut sides[..2 * m]);
-        for (j, (own, sides)) in own.chunks_exact_mut(2).zip(sides.chunks_exact_mut(2)).enumerate() {
+        for (j, (own, sides)) in own
+            .chunks_exact_mut(2)
+            .zip(sides.chunks_exact_mut(2))
+            .enumerate()
+        {
             own.fill(from[j + 1]);
             (sides[0], sides[1]) = (from[j], from[j + 2]);
         }

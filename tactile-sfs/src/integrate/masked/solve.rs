@@ -37,7 +37,13 @@ struct Steps {
 impl Steps {
     /// `None` if there is nothing to do.
     fn start<T: Scalar>(buffers: &mut MaskedBuffers<T>) -> Option<Self> {
-        let MaskedBuffers { hierarchy, residual, direction, image, .. } = buffers;
+        let MaskedBuffers {
+            hierarchy,
+            residual,
+            direction,
+            image,
+            ..
+        } = buffers;
         for vector in [&mut *direction, &mut *image] {
             vector.clear();
             vector.resize(residual.len(), 0.0);
@@ -46,7 +52,10 @@ impl Steps {
         for (to, from) in hierarchy.levels[0].rhs.iter_mut().zip(residual.iter()) {
             *to = (from / unit) as f32;
         }
-        (unit > 0.0).then_some(Self { unit, last: f64::INFINITY })
+        (unit > 0.0).then_some(Self {
+            unit,
+            last: f64::INFINITY,
+        })
     }
 
     /// Steps until one of the limits is met.
@@ -59,7 +68,9 @@ impl Steps {
     ) -> StopReason {
         let (mut best, mut waited) = (f64::INFINITY, 0);
         for iteration in 1..=limits.iterations {
-            let Some(relative) = self.next(buffers) else { return StopReason::Stagnated };
+            let Some(relative) = self.next(buffers) else {
+                return StopReason::Stagnated;
+            };
             report.iterations = iteration;
             report.residual = T::of(relative);
             if relative <= limits.tolerance {
@@ -79,7 +90,15 @@ impl Steps {
 
     /// One step; the relative residual after it, `None` where rounding allows no further one.
     fn next<T: Scalar>(&mut self, buffers: &mut MaskedBuffers<T>) -> Option<f64> {
-        let MaskedBuffers { hierarchy, system, z, residual, direction, image, .. } = buffers;
+        let MaskedBuffers {
+            hierarchy,
+            system,
+            z,
+            residual,
+            direction,
+            image,
+            ..
+        } = buffers;
         hierarchy.cycle();
         let level = &mut hierarchy.levels[0];
         let new = dot(residual, &level.x);
@@ -91,9 +110,12 @@ impl Steps {
         let step = new / curvature;
         let mut sum = 0.0;
         let (w, per_unit) = (level.width, self.unit.recip());
-        let lines =
-            z.chunks_exact_mut(w).zip(residual.chunks_exact_mut(w)).zip(level.rhs.chunks_exact_mut(w));
-        for (((z, residual), rhs), (d, a)) in lines.zip(direction.chunks_exact(w).zip(image.chunks_exact(w)))
+        let lines = z
+            .chunks_exact_mut(w)
+            .zip(residual.chunks_exact_mut(w))
+            .zip(level.rhs.chunks_exact_mut(w));
+        for (((z, residual), rhs), (d, a)) in
+            lines.zip(direction.chunks_exact(w).zip(image.chunks_exact(w)))
         {
             for i in 0..w {
                 z[i] += step * d[i];
@@ -110,7 +132,12 @@ impl Steps {
 pub(super) fn dot<A: Copy + Into<f64>>(a: &[f64], b: &[A]) -> f64 {
     let mut sums = [0.0; 4];
     let (a, b) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest = a.remainder().iter().zip(b.remainder()).map(|(&a, &b)| a * b.into()).sum::<f64>();
+    let rest = a
+        .remainder()
+        .iter()
+        .zip(b.remainder())
+        .map(|(&a, &b)| a * b.into())
+        .sum::<f64>();
     for (a, b) in a.zip(b) {
         for k in 0..4 {
             sums[k] += a[k] * b[k].into();

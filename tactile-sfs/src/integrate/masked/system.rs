@@ -34,13 +34,20 @@ impl<T: Scalar> Slopes<'_, T> {
     fn edge(&self, slopes: ArrayView2<'_, T>, [a, b, c, d]: [Option<[usize; 2]>; 4]) -> (T, T) {
         let usable = |at: Option<[usize; 2]>| {
             let at = at?;
-            let (slope, weight) = (slopes[at], self.weights.map_or(T::one(), |weights| weights[at]));
-            (slope.is_finite() && weight > T::zero() && weight.is_finite()).then_some((slope, weight))
+            let (slope, weight) = (
+                slopes[at],
+                self.weights.map_or(T::one(), |weights| weights[at]),
+            );
+            (slope.is_finite() && weight > T::zero() && weight.is_finite())
+                .then_some((slope, weight))
         };
         match (usable(b), usable(c)) {
             (Some((s, v)), Some((t, w))) => {
                 let beside = |at| usable(at).map(|(slope, _)| slope);
-                (mean_slope([beside(a), Some(s), Some(t), beside(d)]), T::of(2.0) * v * w / (v + w))
+                (
+                    mean_slope([beside(a), Some(s), Some(t), beside(d)]),
+                    T::of(2.0) * v * w / (v + w),
+                )
             }
             (Some((s, v)), None) => (s, v),
             (None, Some((t, w))) => (t, w),
@@ -85,7 +92,13 @@ pub(super) fn assemble<T: Scalar>(
     surface: &mut Surface<T>,
 ) {
     let area = surface.bounding_box;
-    let MaskedBuffers { hierarchy, system, z, residual, .. } = buffers;
+    let MaskedBuffers {
+        hierarchy,
+        system,
+        z,
+        residual,
+        ..
+    } = buffers;
     system.reset(area);
     for vector in [&mut *z, &mut *residual] {
         vector.clear();
@@ -149,13 +162,26 @@ impl<T: Scalar> System<T> {
         area: BoundingBox,
     ) {
         let (width, weight) = (self.width, (hy / hx) * (hy / hx));
-        let x = Axis { slopes: slopes.p, step: [0, 1], stride: 1, weight, length: hx };
-        let y = Axis { slopes: slopes.q, step: [1, 0], stride: width, weight: T::one(), length: hy };
+        let x = Axis {
+            slopes: slopes.p,
+            step: [0, 1],
+            stride: 1,
+            weight,
+            length: hx,
+        };
+        let y = Axis {
+            slopes: slopes.q,
+            step: [1, 0],
+            stride: width,
+            weight: T::one(),
+            length: hy,
+        };
         for (row, column) in area.pixels() {
             let i = (row - area.top + 1) * width + column - area.left + 1;
             for axis in [&x, &y] {
                 if self.inside[i] && self.inside[i + axis.stride] {
-                    let (slope, weight) = slopes.edge(axis.slopes, self.line(axis, i, [row, column]));
+                    let (slope, weight) =
+                        slopes.edge(axis.slopes, self.line(axis, i, [row, column]));
                     self.add(z, rhs, axis, i, weight * axis.weight, slope * axis.length);
                 }
             }
@@ -175,12 +201,24 @@ impl<T: Scalar> System<T> {
     }
 
     /// Adds w (z_j − z_i − rise)², j the node after i, to the fit; an end of known height moves to the right-hand side.
-    fn add(&mut self, z: &[f64], rhs: &mut [f64], axis: &Axis<'_, T>, i: usize, weight: T, rise: T) {
+    fn add(
+        &mut self,
+        z: &[f64],
+        rhs: &mut [f64],
+        axis: &Axis<'_, T>,
+        i: usize,
+        weight: T,
+        rise: T,
+    ) {
         let j = i + axis.stride;
         let (w, rise) = (weight.as_f64(), rise.as_f64());
         match (self.fixed[i], self.fixed[j]) {
             (false, false) => {
-                let edges = if axis.stride == 1 { &mut self.right } else { &mut self.below };
+                let edges = if axis.stride == 1 {
+                    &mut self.right
+                } else {
+                    &mut self.below
+                };
                 edges[i] = weight;
                 rhs[i] -= w * rise;
                 rhs[j] += w * rise;
@@ -200,7 +238,10 @@ impl<T: Scalar> System<T> {
     /// Copies the weights, the largest as 1.
     fn copy_to(&self, level: &mut Level) {
         let all = || [&self.right, &self.below, &self.anchor].into_iter();
-        let largest = all().flatten().fold(T::zero(), |largest, &weight| largest.max(weight)).as_f64();
+        let largest = all()
+            .flatten()
+            .fold(T::zero(), |largest, &weight| largest.max(weight))
+            .as_f64();
         let scale = if largest > 0.0 { largest.recip() } else { 1.0 };
         for (from, to) in all().zip([&mut level.right, &mut level.below, &mut level.anchor]) {
             for (to, from) in to.iter_mut().zip(from) {
@@ -210,7 +251,13 @@ impl<T: Scalar> System<T> {
     }
 
     /// Turns the direction, d ← x + β d, and multiplies it, image ← A d; returns d · A d.
-    pub(super) fn turn(&self, beta: f64, x: &[f32], direction: &mut [f64], image: &mut [f64]) -> f64 {
+    pub(super) fn turn(
+        &self,
+        beta: f64,
+        x: &[f32],
+        direction: &mut [f64],
+        image: &mut [f64],
+    ) -> f64 {
         let w = self.width;
         let advance = |direction: &mut [f64], row: usize| {
             for (d, &x) in direction[row * w..][..w].iter_mut().zip(&x[row * w..][..w]) {

@@ -21,7 +21,8 @@ impl<T: Scalar> EikonalBuffers<T> {
         let mut sum = T::zero();
         for i in width..value.len() - width {
             let near = [i - 1, i + 1, i - width, i + width];
-            if self.node[i] == Node::Outside || near.iter().any(|&j| self.node[j] == Node::Outside) {
+            if self.node[i] == Node::Outside || near.iter().any(|&j| self.node[j] == Node::Outside)
+            {
                 continue;
             }
             if near.iter().any(|&j| !value[j].is_finite()) {
@@ -32,7 +33,11 @@ impl<T: Scalar> EikonalBuffers<T> {
             let q = half * (value[i + width] - value[i - width]) / self.aspect;
             let shade = (z - x * p - y * q) / (T::one() + p * p + q * q).sqrt();
             let difference = shade.max(T::zero()) - self.cosine[i];
-            sum += if difference.is_finite() { difference * difference } else { T::one() };
+            sum += if difference.is_finite() {
+                difference * difference
+            } else {
+                T::one()
+            };
         }
         sum
     }

@@ -20,7 +20,8 @@ pub(super) fn sweep<T: Scalar>(grid: &mut EikonalBuffers<T>, order: usize, toler
         if order == 0 || order == 3 {
             line.for_each(|i| change = change.max(visit(grid, i, width, tolerance)));
         } else {
-            line.rev().for_each(|i| change = change.max(visit(grid, i, width, tolerance)));
+            line.rev()
+                .for_each(|i| change = change.max(visit(grid, i, width, tolerance)));
         }
     }
     change
@@ -39,8 +40,11 @@ pub(super) fn measure_directions<T: Scalar>(grid: &mut EikonalBuffers<T>) {
         let p = value[i + 1] - value[i - 1];
         let q = (value[i + width] - value[i - width]) / grid.aspect;
         let along_x = p * p / (p * p + q * q);
-        grid.along_x[i] =
-            if along_x.is_nan() && !grid.rise[i].is_nan() { rim::along_x(grid, i) } else { along_x };
+        grid.along_x[i] = if along_x.is_nan() && !grid.rise[i].is_nan() {
+            rim::along_x(grid, i)
+        } else {
+            along_x
+        };
     }
 }
 
@@ -59,11 +63,27 @@ fn visit<T: Scalar>(grid: &mut EikonalBuffers<T>, i: usize, width: usize, tolera
         return T::zero();
     }
     grid.active[i] = false;
-    let EikonalBuffers { value, edges, along_x, .. } = grid;
-    let edge = |j: usize, metric: T| Edge { value: value[j], metric, along_x: along_x[j] };
+    let EikonalBuffers {
+        value,
+        edges,
+        along_x,
+        ..
+    } = grid;
+    let edge = |j: usize, metric: T| Edge {
+        value: value[j],
+        metric,
+        along_x: along_x[j],
+    };
     let x = upwind(edge(i - 1, edges[i - 1][0]), edge(i + 1, edges[i][0]));
-    let y = upwind(edge(i - width, edges[i - width][1]), edge(i + width, edges[i][1]));
-    let k = if grid.corrected { correction(x, y) } else { T::one() };
+    let y = upwind(
+        edge(i - width, edges[i - width][1]),
+        edge(i + width, edges[i][1]),
+    );
+    let k = if grid.corrected {
+        correction(x, y)
+    } else {
+        T::one()
+    };
     let (old, new) = (value[i], update(x, y, k));
     if new >= old {
         return T::zero();
@@ -84,12 +104,20 @@ fn visit<T: Scalar>(grid: &mut EikonalBuffers<T>, i: usize, width: usize, tolera
 #[inline(always)]
 fn correction<T: Scalar>(x: Edge<T>, y: Edge<T>) -> T {
     let turn = T::of(0.5) * (x.along_x - y.along_x);
-    if turn.abs() < T::of(0.1) { T::one() + turn } else { T::one() }
+    if turn.abs() < T::of(0.1) {
+        T::one() + turn
+    } else {
+        T::one()
+    }
 }
 
 #[inline(always)]
 fn upwind<T: Scalar>(before: Edge<T>, after: Edge<T>) -> Edge<T> {
-    if before.value < after.value { before } else { after }
+    if before.value < after.value {
+        before
+    } else {
+        after
+    }
 }
 
 /// Solves A (u − a)² + B (u − b)² = k for the larger root, or along one edge where it is not upwind of both.
@@ -100,7 +128,9 @@ fn update<T: Scalar>(x: Edge<T>, y: Edge<T>, k: T) -> T {
     // Upwind of both if u > max(a, b): the larger of the two seen from the smaller is less than one edge away.
     let lower = if d > T::zero() { y } else { x };
     if lower.metric * d * d < k {
-        let root = (k * sum - x.metric * y.metric * d * d).max(T::zero()).sqrt();
+        let root = (k * sum - x.metric * y.metric * d * d)
+            .max(T::zero())
+            .sqrt();
         return (x.metric * x.value + y.metric * y.value + root) / sum;
     }
     lower.value + (k / lower.metric).sqrt()

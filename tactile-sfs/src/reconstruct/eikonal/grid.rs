@@ -73,7 +73,10 @@ impl<T: Scalar> EikonalBuffers<T> {
         };
         for i in self.width..self.node.len() - self.width {
             if self.node[i] != Node::Outside {
-                self.edges[i] = [metric(i, i + 1, T::one()), metric(i, i + self.width, self.aspect)];
+                self.edges[i] = [
+                    metric(i, i + 1, T::one()),
+                    metric(i, i + self.width, self.aspect),
+                ];
             }
             if self.node[i - 1] == Node::Outside {
                 self.edges[i - 1] = [T::one(); 2];
@@ -88,7 +91,9 @@ impl<T: Scalar> EikonalBuffers<T> {
             self.active[i] = self.node[i] == Node::Unknown;
             self.value[i] = match self.node[i] {
                 Node::Known => sign * self.given[i],
-                Node::Unknown if !self.rise[i].is_nan() => rim::lowest(self, i, sign) + self.rise[i],
+                Node::Unknown if !self.rise[i].is_nan() => {
+                    rim::lowest(self, i, sign) + self.rise[i]
+                }
                 _ => T::infinity(),
             };
         }
@@ -112,8 +117,14 @@ impl<T: Scalar> EikonalBuffers<T> {
             let i = (row - area.top + 1) * self.width + column - area.left + 1;
             match self.node[i] {
                 Node::Outside => {}
-                Node::Known => surface.set(row, column, domain.known(row, column).unwrap_or_else(T::nan)),
-                Node::Unknown if self.value[i].is_finite() => surface.set(row, column, scale * self.value[i]),
+                Node::Known => surface.set(
+                    row,
+                    column,
+                    domain.known(row, column).unwrap_or_else(T::nan),
+                ),
+                Node::Unknown if self.value[i].is_finite() => {
+                    surface.set(row, column, scale * self.value[i])
+                }
                 Node::Unknown => surface.flags[[row, column]] |= PixelFlags::UNREACHED,
             }
         }

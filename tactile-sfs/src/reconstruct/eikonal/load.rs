@@ -36,7 +36,9 @@ impl<T: Scalar> EikonalBuffers<T> {
         let count = self.load_nodes(input, surface);
         self.fill_holes(area.area())?;
         for (sine, &cosine) in self.sine.iter_mut().zip(&self.cosine) {
-            *sine = ((T::one() - cosine) * (T::one() + cosine)).max(T::zero()).sqrt();
+            *sine = ((T::one() - cosine) * (T::one() + cosine))
+                .max(T::zero())
+                .sqrt();
         }
         rim::measure(self);
         if count.inside == 0 && (count.border == 0 || self.rise.iter().all(|rise| rise.is_nan())) {
@@ -53,7 +55,9 @@ impl<T: Scalar> EikonalBuffers<T> {
         let mut count = KnownCount::default();
         for r in 0..area.rows + 2 {
             for c in 0..self.width {
-                let Some(at @ (row, column)) = pixel(area, [r, c], input.frame.dim()) else { continue };
+                let Some(at @ (row, column)) = pixel(area, [r, c], input.frame.dim()) else {
+                    continue;
+                };
                 let i = r * self.width + c;
                 let in_box = r > 0 && c > 0 && r <= area.rows && c <= area.columns;
                 if in_box && input.domain.contains(row, column) {
@@ -76,7 +80,11 @@ impl<T: Scalar> EikonalBuffers<T> {
         (row, column): (usize, usize),
     ) -> PixelFlags {
         let known = input.domain.known(row, column);
-        self.node[i] = if known.is_some() { Node::Known } else { Node::Unknown };
+        self.node[i] = if known.is_some() {
+            Node::Known
+        } else {
+            Node::Unknown
+        };
         self.given[i] = known.map_or(T::nan(), |height| height / input.domain.pixel_size_m[0]);
         let reflectance = input.lighting.reflectance(input.frame.at(row, column));
         let flags = PixelFlags::of_reflectance(reflectance, input.least);
@@ -108,7 +116,13 @@ impl<T: Scalar> EikonalBuffers<T> {
             let cosine = &self.cosine;
             self.holes.retain(|&i| cosine[i].is_nan());
             if self.holes.len() == before {
-                if before == self.node.iter().filter(|&&node| node != Node::Outside).count() {
+                if before
+                    == self
+                        .node
+                        .iter()
+                        .filter(|&&node| node != Node::Outside)
+                        .count()
+                {
                     return Err(SfsError::EmptyMask);
                 }
                 self.holes.drain(..).for_each(|i| self.cosine[i] = T::one());
@@ -128,13 +142,23 @@ impl<T: Scalar> EikonalBuffers<T> {
                 }
             }
         }
-        if count > 0 { sum / T::of(count as f64) } else { T::nan() }
+        if count > 0 {
+            sum / T::of(count as f64)
+        } else {
+            T::nan()
+        }
     }
 }
 
 /// The pixel of the frame under a node of the grid, whose border may lie outside the frame.
-fn pixel(area: BoundingBox, [r, c]: [usize; 2], (rows, columns): (usize, usize)) -> Option<(usize, usize)> {
+fn pixel(
+    area: BoundingBox,
+    [r, c]: [usize; 2],
+    (rows, columns): (usize, usize),
+) -> Option<(usize, usize)> {
     let row = (area.top + r).checked_sub(1).filter(|&row| row < rows)?;
-    let column = (area.left + c).checked_sub(1).filter(|&column| column < columns)?;
+    let column = (area.left + c)
+        .checked_sub(1)
+        .filter(|&column| column < columns)?;
     Some((row, column))
 }

@@ -225,7 +225,11 @@ impl<T: Scalar> Eikonal<T> {
     fn sweep(&self, workspace: &mut Workspace<T>, rising: bool, done: usize) -> Outcome<T> {
         workspace.eikonal.start(rising);
         let light = self.lighting.direction();
-        let mut outcome = Outcome { stop: StopReason::IterationLimit, sweeps: done, change: T::infinity() };
+        let mut outcome = Outcome {
+            stop: StopReason::IterationLimit,
+            sweeps: done,
+            change: T::infinity(),
+        };
         while outcome.sweeps < done + self.max_sweeps {
             let buffers = &mut workspace.eikonal;
             outcome.change = T::zero();
@@ -242,7 +246,9 @@ impl<T: Scalar> Eikonal<T> {
                 outcome.stop = StopReason::Converged;
                 break;
             }
-            if let Some(stop) = workspace.report(outcome.sweeps, done + self.max_sweeps, outcome.change) {
+            if let Some(stop) =
+                workspace.report(outcome.sweeps, done + self.max_sweeps, outcome.change)
+            {
                 outcome.stop = stop;
                 break;
             }
@@ -274,7 +280,11 @@ impl<T: Scalar> SurfaceReconstruction<T> for Eikonal<T> {
             domain,
             lighting: &self.lighting,
             least: (T::one() + slope2).sqrt().recip(),
-            rim: if let Rim::Height(height) = self.rim { Some(height) } else { None },
+            rim: if let Rim::Height(height) = self.rim {
+                Some(height)
+            } else {
+                None
+            },
         };
         let known = workspace.eikonal.load(&input, surface)?;
         let (outcome, rising) = self.choose(workspace, known.inside > 0);
@@ -282,7 +292,9 @@ impl<T: Scalar> SurfaceReconstruction<T> for Eikonal<T> {
         surface.report.stop = outcome.stop;
         surface.report.iterations = outcome.sweeps;
         surface.report.residual = outcome.change * width;
-        workspace.eikonal.store(if rising { width } else { -width }, domain, surface);
+        workspace
+            .eikonal
+            .store(if rising { width } else { -width }, domain, surface);
         surface.finish(domain);
         Ok(())
     }

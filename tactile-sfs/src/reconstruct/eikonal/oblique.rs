@@ -19,7 +19,11 @@ pub(super) fn sweep<T: Scalar>(
     for r in 1..rows - 1 {
         let r = if order & 1 == 1 { rows - 1 - r } else { r };
         for c in 1..width - 1 {
-            let c = if order == 0 || order == 3 { c } else { width - 1 - c };
+            let c = if order == 0 || order == 3 {
+                c
+            } else {
+                width - 1 - c
+            };
             let i = r * width + c;
             if grid.active[i] {
                 change = change.max(visit(grid, i, light, tolerance));
@@ -51,11 +55,20 @@ fn update<T: Scalar>(grid: &EikonalBuffers<T>, i: usize, light: [T; 3]) -> T {
     let width = grid.width;
     let mut least = grid.value[i];
     for (jx, sx) in [(i - 1, T::one()), (i + 1, -T::one())] {
-        let ex = Edge { value: grid.value[jx], step: sx, reflectance: middle(grid, i, jx) };
+        let ex = Edge {
+            value: grid.value[jx],
+            step: sx,
+            reflectance: middle(grid, i, jx),
+        };
         least = least.min(ex.value + straight(ex.reflectance, light, [sx, T::zero()]));
         for (jy, sy) in [(i - width, T::one()), (i + width, -T::one())] {
-            let ey = Edge { value: grid.value[jy], step: sy * grid.aspect, reflectance: middle(grid, i, jy) };
-            least = least.min(ey.value + straight(ey.reflectance, light, [T::zero(), sy]) * grid.aspect);
+            let ey = Edge {
+                value: grid.value[jy],
+                step: sy * grid.aspect,
+                reflectance: middle(grid, i, jy),
+            };
+            least = least
+                .min(ey.value + straight(ey.reflectance, light, [T::zero(), sy]) * grid.aspect);
             if ex.value.is_finite() && ey.value.is_finite() {
                 least = least.min(triangle(light, ex, ey));
             }
@@ -97,10 +110,18 @@ fn straight<T: Scalar>(reflectance: T, [x, y, z]: [T; 3], d: [T; 2]) -> T {
     let root = (sine2 * discriminant).sqrt();
     if along >= T::zero() {
         let denominator = along * z + root;
-        return if denominator > T::zero() { (sine2 - along * along) / denominator } else { T::zero() };
+        return if denominator > T::zero() {
+            (sine2 - along * along) / denominator
+        } else {
+            T::zero()
+        };
     }
     let denominator = z * z - sine2;
-    if denominator > T::zero() { (root - along * z) / denominator } else { T::infinity() }
+    if denominator > T::zero() {
+        (root - along * z) / denominator
+    } else {
+        T::infinity()
+    }
 }
 
 /// Solves the equation on the triangle of two neighbours; +∞ if the characteristic does not come from within it.
@@ -139,5 +160,12 @@ fn roots<T: Scalar>(a: T, b: T, c: T) -> [T; 2] {
     }
     let root = discriminant.sqrt();
     let far = if b >= T::zero() { b + root } else { b - root };
-    [far / a, if far == T::zero() { T::infinity() } else { c / far }]
+    [
+        far / a,
+        if far == T::zero() {
+            T::infinity()
+        } else {
+            c / far
+        },
+    ]
 }

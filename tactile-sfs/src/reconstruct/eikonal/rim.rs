@@ -36,7 +36,10 @@ pub(super) fn lowest<T: Scalar>(grid: &EikonalBuffers<T>, i: usize, sign: T) -> 
         Node::Outside if !grid.given[j].is_nan() => sign * grid.given[j],
         _ => T::infinity(),
     };
-    given(i - 1).min(given(i + 1)).min(given(i - width)).min(given(i + width))
+    given(i - 1)
+        .min(given(i + 1))
+        .min(given(i - width))
+        .min(given(i + width))
 }
 
 /// |∇ sin θ| at a pixel, and how far the rim can be from it along that gradient.
@@ -66,8 +69,9 @@ fn rise<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> T {
 /// Mean bend of the rim pixels around one, and whether most of them lie at an occluding contour.
 fn around<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> (T, bool) {
     let (width, rows) = (grid.width, grid.node.len() / grid.width);
-    let span =
-        |middle: usize, length: usize| middle.saturating_sub(WINDOW)..(middle + WINDOW + 1).min(length);
+    let span = |middle: usize, length: usize| {
+        middle.saturating_sub(WINDOW)..(middle + WINDOW + 1).min(length)
+    };
     let (mut sum, mut count, mut votes) = (T::zero(), 0usize, 0usize);
     for row in span(i / width, rows) {
         for j in span(i % width, width).map(|column| row * width + column) {
@@ -91,8 +95,9 @@ pub(super) fn along_x<T: Scalar>(grid: &EikonalBuffers<T>, i: usize) -> T {
 
 /// Derivative of sin θ along one axis, from the neighbours inside the mask; second order where there are enough.
 fn bend<T: Scalar>(grid: &EikonalBuffers<T>, i: usize, stride: usize) -> T {
-    let inside =
-        |j: Option<usize>| j.filter(|&j| grid.node.get(j).is_some_and(|&node| node != Node::Outside));
+    let inside = |j: Option<usize>| {
+        j.filter(|&j| grid.node.get(j).is_some_and(|&node| node != Node::Outside))
+    };
     let (before, after) = (inside(Some(i - stride)), inside(Some(i + stride)));
     let here = grid.sine[i];
     let one_sided = |near: usize, far: Option<usize>| match inside(far) {

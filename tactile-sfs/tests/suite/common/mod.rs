@@ -20,13 +20,26 @@ pub struct Sampled {
 impl Sampled {
     pub fn new(n: usize, shape: Shape) -> Self {
         let pixel = 2.0 / n as f64;
-        let at = |r: usize, c: usize| shape((c as f64 + 0.5) * pixel - 1.0, (r as f64 + 0.5) * pixel - 1.0);
-        let field = |k: usize| Array2::from_shape_fn((n, n), |(r, c)| at(r, c).map_or(0.0, |v| v[k]));
+        let at = |r: usize, c: usize| {
+            shape(
+                (c as f64 + 0.5) * pixel - 1.0,
+                (r as f64 + 0.5) * pixel - 1.0,
+            )
+        };
+        let field =
+            |k: usize| Array2::from_shape_fn((n, n), |(r, c)| at(r, c).map_or(0.0, |v| v[k]));
         let image = Array2::from_shape_fn((n, n), |(r, c)| {
             at(r, c).map_or(0.0, |[_, p, q]| 1.0 / (1.0 + p * p + q * q).sqrt())
         });
         let mask = Array2::from_shape_fn((n, n), |(r, c)| at(r, c).is_some());
-        Self { pixel, z: field(0), mask, p: field(1), q: field(2), image }
+        Self {
+            pixel,
+            z: field(0),
+            mask,
+            p: field(1),
+            q: field(2),
+            image,
+        }
     }
 }
 
@@ -39,7 +52,13 @@ pub fn sphere(x: f64, y: f64) -> Option<[f64; 3]> {
 /// Half an ellipsoid with axes 0.9, 0.6 and 0.5.
 pub fn ellipsoid(x: f64, y: f64) -> Option<[f64; 3]> {
     let z2 = 0.25 * (1.0 - x * x / 0.81 - y * y / 0.36);
-    (z2 > 0.0).then(|| [z2.sqrt(), -0.25 / 0.81 * x / z2.sqrt(), -0.25 / 0.36 * y / z2.sqrt()])
+    (z2 > 0.0).then(|| {
+        [
+            z2.sqrt(),
+            -0.25 / 0.81 * x / z2.sqrt(),
+            -0.25 / 0.36 * y / z2.sqrt(),
+        ]
+    })
 }
 
 /// A paraboloid of height 0.4 that meets the plane at an angle, on a disc of radius 0.8.
@@ -58,5 +77,9 @@ pub fn gaussian(x: f64, y: f64) -> Option<[f64; 3]> {
 /// Waves that do not vanish at the border.
 pub fn waves(x: f64, y: f64) -> Option<[f64; 3]> {
     let (a, b) = (2.1 * x + 0.3, 1.7 * y - 0.4);
-    Some([a.sin() * b.cos(), 2.1 * a.cos() * b.cos(), -1.7 * a.sin() * b.sin()])
+    Some([
+        a.sin() * b.cos(),
+        2.1 * a.cos() * b.cos(),
+        -1.7 * a.sin() * b.sin(),
+    ])
 }

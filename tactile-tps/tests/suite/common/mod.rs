@@ -25,7 +25,9 @@ impl Uniform {
 
 /// A smooth map that no affine map comes near.
 pub(crate) fn bend<const D: usize>(p: &Point<f64, D>) -> Point<f64, D> {
-    Point::from(SVector::from_fn(|k, _| p[k] + 0.2 * (2.0 * p[(k + 1) % D] + k as f64).sin()))
+    Point::from(SVector::from_fn(|k, _| {
+        p[k] + 0.2 * (2.0 * p[(k + 1) % D] + k as f64).sin()
+    }))
 }
 
 pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
