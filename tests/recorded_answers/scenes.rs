@@ -1,0 +1,419 @@
+//! The scenes whose numbers are recorded.
+use super::{Answer, Answers};
+use nalgebra::Matrix3;
+use ndarray::Array2;
+use std::sync::Arc;
+use tactile_imaging::elasticity::modulus::ModulusEstimate;
+use tactile_imaging::force::CalibrationPair;
+use tactile_imaging::pipeline::{
+    BoxedPipeline, ContactReading, DarkContact, EstimatorChoice, LightContact, MatcherChoice,
+    Object, Pipeline, Press, ReconstructionChoice, SamplerChoice, Session, StagesConfig,
+    StrainChoice, SurfaceInput, Trial, WarpChoice,
+};
+use tactile_imaging::scene::Scene;
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, Sphere,
+    UniaxialOptions, UniaxialScene, write_folder,
+};
+
+pub(super) fn all() -> Vec<Answer> {
+    let mut answers = ball();
+    answers.extend(block());
+    answers.extend(dark());
+    answers.extend(stages_by_name());
+    answers.extend(stream());
+    answers.extend(scene_file());
+    answers
+}
+
+/// A camera of 174 × 130 pixels on 30 mm × 22 mm.
+fn coarse() -> Camera {
+    Camera {
+        shape: [130, 174],
+        pixel_size_m: [172.4e-6; 2],
+        ..Camera::default()
+    }
+}
+
+fn trial(forces: &[f64], seed: u64) -> Trial {
+    let options = PressOptions {
+        camera: coarse(),
+        loads: forces.iter().map(|&force| Load::normal(force)).collect(),
+        seed,
+        ..PressOptions::default()
+    };
+    Trial::new(options, &CalibrationOptions::default()).expect("a trial")
+}
+
+fn contact(answers: &mut Answers, name: &str, reading: &ContactReading) {
+    let force = reading
+        .force_n
+        .map_or([0.0; 2], |f| [f.value, f.standard_error]);
+    let radius = reading.contact_radius_m;
+    answers.add(format!("{name}/force"), force);
+    answers.add(
+        format!("{name}/force errors"),
+        [reading.force_noise_n, reading.force_calibration_n],
+    );
+    answers.add(
+        format!("{name}/radius"),
+        [radius.value, radius.standard_error],
+    );
+    answers.add(
+        format!("{name}/centroid"),
+        reading
+            .centroid_px
+            .iter()
+            .flat_map(|c| [c.value, c.standard_error]),
+    );
+    answers.add(format!("{name}/area"), [reading.area_m2]);
+    answers.add(format!("{name}/peak"), [reading.peak_grey]);
+    if let Some(depth) = reading.indentation_m {
+        answers.add(
+            format!("{name}/indentation"),
+            [depth.value, depth.standard_error],
+        );
+    }
+}
+
+fn modulus(answers: &mut Answers, name: &str, found: &ModulusEstimate<f64>) {
+    let interval = [Some(found.interval_95.lower), found.interval_95.upper];
+    answers.add(name, [found.youngs_modulus_pa, found.standard_error_pa]);
+    answers.add(format!("{name}/interval"), interval.into_iter().flatten());
+    answers.add(format!("{name}/chi squared"), [found.fit.chi_squared]);
+    answers.add(format!("{name}/warnings"), [found.warnings.len() as f64]);
+}
+
+fn tensor(m: &Matrix3<f64>) -> impl Iterator<Item = f64> + '_ {
+    (0..3).flat_map(move |row| (row..3).map(move |column| m[(row, column)]))
+}
+
+/// Contacts, surfaces, control points, matches, strains of all frames.
+fn press(answers: &mut Answers, name: &str, press: &mut Press<'_>) {
+    for frame in 0..press.frames() {
+        let name = format!("{name}frame {frame}");
+        let reading = *press
+            .contact(frame)
+            .expect("a measurement")
+            .expect("a contact");
+        contact(answers, &name, &reading);
+        let heights = &press.surface(frame).expect("a surface").surface.heights;
+        let finite = || heights.iter().copied().filter(|h| h.is_finite());
+        answers.add(
+            format!("{name}/height sums"),
+            [finite().sum::<f64>(), finite().map(f64::abs).sum()],
+        );
+        answers.add(format!("{name}/heights"), finite().step_by(151));
+        let points = press.control_points(frame).expect("control points");
+        answers.add(format!("{name}/control points"), [points.len() as f64]);
+        answers.add(
+            format!("{name}/some control points"),
+            points.iter().step_by(13).flat_map(|p| [p.x, p.y, p.z]),
+        );
+        if frame == 0 {
+            continue;
+        }
+        let matching = press.matching(frame).expect("a match");
+        answers.add(
+            format!("{name}/partners"),
+            matching
+                .assignment
+                .iter()
+                .map(|a| a.map_or(-1.0, |j| j as f64)),
+        );
+        answers.add(
+            format!("{name}/confidence"),
+            matching.confidence.iter().copied().step_by(7),
+        );
+        answers.add(
+            format!("{name}/warped"),
+            matching
+                .warped
+                .iter()
+                .step_by(13)
+                .flat_map(|p| [p.x, p.y, p.z]),
+        );
+        answers.add(format!("{name}/residual"), [matching.report.residual]);
+        answers.add(
+            format!("{name}/iterations"),
+            [matching.report.iterations as f64],
+        );
+        let summary = &press.strain(frame).expect("a strain").summary;
+        answers.add(format!("{name}/strain"), tensor(&summary.mean));
+        answers.add(
+            format!("{name}/strain error"),
+            tensor(&summary.standard_error),
+        );
+        answers.add(format!("{name}/strain spread"), tensor(&summary.spread));
+    }
+}
+
+fn estimates(answers: &mut Answers, press: &mut Press<'_>) {
+    let best = press.modulus().expect("a modulus");
+    modulus(answers, "modulus", &best);
+    for estimate in press.estimates().expect("estimates") {
+        let name = format!("modulus ({})", estimate.estimator);
+        modulus(answers, &name, &estimate);
+    }
+}
+
+fn ball() -> Vec<Answer> {
+    let mut answers = Answers::of("ball");
+    let trial = trial(&[0.7, 1.2], 1);
+    let pipeline = trial
+        .pipeline()
+        .expect("a pipeline")
+        .with_control_points(100);
+    let mut measured = trial.press(&pipeline).expect("a press");
+    press(&mut answers, "", &mut measured);
+    estimates(&mut answers, &mut measured);
+    let everything = measured.measure().expect("a measurement");
+    answers.add("flags", [everything.flags.len() as f64]);
+    answers.all
+}
+
+/// A patterned block between plates: nothing is known of its shape, the modulus is stress over strain.
+fn block() -> Vec<Answer> {
+    let mut answers = Answers::of("block");
+    let scene = UniaxialScene::new(UniaxialOptions {
+        camera: Camera {
+            shape: [120, 120],
+            pixel_size_m: [14e-3 / 120.0; 2],
+            ..Camera::default()
+        },
+        gain: Gain::PeakGrey(180.0),
+        ..UniaxialOptions::default()
+    })
+    .expect("a scene");
+    let per_grey = scene.options().camera.pixel_area_m2() / scene.grey_per_pascal();
+    let pairs = [0.0, 1e5, 2e5, 3e5].map(|value| CalibrationPair::loading(value, per_grey * value));
+    let object = Object::Unknown { poisson_ratio: 0.5 };
+    let pixel_size_m = scene.options().camera.pixel_size_m;
+    let pipeline = Pipeline::from_pairs(&pairs, pixel_size_m, object)
+        .expect("a pipeline")
+        .with_control_points(60);
+    let reference = scene.reference(0);
+    let frames = [0, 1, 2].map(|load| scene.frame(load, 0));
+    let mut measured = pipeline.press(reference.view()).expect("a press");
+    for frame in &frames {
+        measured.add_frame(frame.view());
+    }
+    press(&mut answers, "", &mut measured);
+    estimates(&mut answers, &mut measured);
+    answers.all
+}
+
+/// A sensor that darkens with depth, forces from a gauge.
+fn dark() -> Vec<Answer> {
+    let mut answers = Answers::of("dark");
+    let table = [(0.0, 0.0), (50.0, 0.2e-3), (200.0, 1e-3)];
+    let pixel_m = 0.1e-3;
+    // A ball of 4 mm; the grey is rounded, and noise that repeats keeps its levels from being flat.
+    let frame = |depth_m: f64| {
+        Array2::from_shape_fn((90, 100), |(row, column)| {
+            let (x, y) = (
+                pixel_m * (column as f64 - 51.3),
+                pixel_m * (row as f64 - 44.8),
+            );
+            let depth = (depth_m - (4e-3 - (16e-6_f64 - x * x - y * y).max(0.0).sqrt())).max(0.0);
+            let level = if depth < 0.2e-3 {
+                depth / 0.2e-3 * 50.0
+            } else {
+                50.0 + (depth - 0.2e-3) / 0.8e-3 * 150.0
+            };
+            220 - (level + ((7 * row + 3 * column) % 5) as f64 * 0.2).floor() as u8
+        })
+    };
+    let contact = DarkContact::new(&table, [pixel_m; 2]).expect("a table");
+    let depths = DarkContact::depth_table(&table).expect("a table");
+    let objects = [
+        Object::sphere(4e-3),
+        Object::FlatPunch {
+            radius_m: 2e-3,
+            poisson_ratio: 0.45,
+        },
+    ];
+    for (name, object) in ["ball/", "punch/"].into_iter().zip(objects) {
+        let mut pipeline = Pipeline::new(contact.clone(), object)
+            .with_surface(depths.clone(), SurfaceInput::Signal)
+            .with_scale_errors(0.01, 0.002)
+            .with_control_points(80);
+        if name == "punch/" {
+            pipeline = pipeline.with_estimator(EstimatorChoice::FlatPunch);
+        }
+        let (reference, frames) = (frame(0.0), [frame(0.4e-3), frame(0.6e-3)]);
+        let mut measured = pipeline.press(reference.view()).expect("a press");
+        measured.add_gauged_frame(frames[0].view(), Some(0.4));
+        measured.add_gauged_frame(frames[1].view(), Some(0.8));
+        press(&mut answers, name, &mut measured);
+        let name = format!("{name}modulus");
+        modulus(&mut answers, &name, &measured.modulus().expect("a modulus"));
+    }
+    answers.all
+}
+
+/// Every stage that a configuration can name, one at a time.
+fn stages_by_name() -> Vec<Answer> {
+    let mut answers = Answers::of("by name");
+    let trial = trial(&[0.7, 1.2], 2);
+    let default = StagesConfig::default();
+    let mut configs = Vec::new();
+    for reconstruction in [
+        ReconstructionChoice::TsaiShah,
+        ReconstructionChoice::BrooksHorn,
+    ] {
+        configs.push((
+            reconstruction.name(),
+            StagesConfig {
+                reconstruction,
+                ..default
+            },
+        ));
+    }
+    for sampler in [SamplerChoice::Curvature, SamplerChoice::Random] {
+        configs.push((sampler.name(), StagesConfig { sampler, ..default }));
+    }
+    for matcher in [
+        MatcherChoice::DenseRelaxation,
+        MatcherChoice::CoherentPointDrift,
+        MatcherChoice::LinearAssignment,
+        MatcherChoice::NearestNeighbour,
+    ] {
+        configs.push((matcher.name(), StagesConfig { matcher, ..default }));
+    }
+    for warp in [
+        WarpChoice::CubicSpline,
+        WarpChoice::Affine,
+        WarpChoice::Rigid,
+    ] {
+        configs.push((warp.name(), StagesConfig { warp, ..default }));
+    }
+    for strain in [
+        StrainChoice::EulerAlmansi,
+        StrainChoice::Hencky,
+        StrainChoice::Biot,
+        StrainChoice::Infinitesimal,
+    ] {
+        configs.push((strain.name(), StagesConfig { strain, ..default }));
+    }
+    let estimator = EstimatorChoice::PaperRatio;
+    configs.push((
+        estimator.name(),
+        StagesConfig {
+            estimator,
+            ..default
+        },
+    ));
+    for (name, config) in configs {
+        let typed = trial
+            .pipeline()
+            .expect("a pipeline")
+            .with_control_points(40)
+            .with_estimator(config.estimator);
+        let contact = LightContact::from_pairs(&trial.pairs, trial.simulation.pixel_size_m)
+            .expect("a calibration");
+        let pipeline =
+            BoxedPipeline::from_config(Box::new(contact), typed.settings().object, &config)
+                .expect("stages")
+                .with_settings(typed.settings().clone());
+        let mut measured =
+            Press::new(&pipeline, trial.simulation.reference.view()).expect("a press");
+        for frame in &trial.simulation.frames {
+            measured.add_frame(frame.view());
+        }
+        let heights = &measured.surface(1).expect("a surface").surface.heights;
+        let heights: Vec<f64> = heights.iter().copied().filter(|h| h.is_finite()).collect();
+        answers.add(
+            format!("{name}/height sum"),
+            [heights.iter().map(|h| h.abs()).sum::<f64>()],
+        );
+        let points = measured.control_points(1).expect("points");
+        answers.add(
+            format!("{name}/points"),
+            points.iter().step_by(9).flat_map(|p| [p.x, p.y, p.z]),
+        );
+        let partners = &measured.matching(1).expect("a match").assignment;
+        answers.add(
+            format!("{name}/partners"),
+            partners.iter().map(|a| a.map_or(-1.0, |j| j as f64)),
+        );
+        let strain = measured.strain(1).map(|strain| strain.summary.mean);
+        answers.add(format!("{name}/strain"), strain.iter().flat_map(tensor));
+        let found = measured.modulus().expect("a modulus");
+        modulus(&mut answers, &format!("{name}/modulus"), &found);
+    }
+    answers.all
+}
+
+/// A stream whose strain is followed.
+fn stream() -> Vec<Answer> {
+    let mut answers = Answers::of("stream");
+    let trial = trial(&[0.7, 0.9, 1.2, 1.0], 3);
+    let pipeline = trial
+        .pipeline()
+        .expect("a pipeline")
+        .with_control_points(60);
+    let ratio = pipeline.clone().with_estimator(EstimatorChoice::PaperRatio);
+    let reference = || trial.simulation.reference.view();
+    let mut session = Session::new(Arc::new(pipeline), reference()).expect("a session");
+    let mut by_strain = Session::new(Arc::new(ratio), reference()).expect("a session");
+    session
+        .push(trial.scene.reference(9).view())
+        .expect("an update");
+    answers.add("drift", [session.drift().last_grey]);
+    for (number, frame) in trial.simulation.frames.iter().enumerate() {
+        let name = format!("frame {number}");
+        by_strain.push(frame.view()).expect("an update");
+        by_strain.strain().expect("a strain");
+        let reading = session
+            .push(frame.view())
+            .expect("an update")
+            .contact
+            .expect("a contact");
+        contact(&mut answers, &name, &reading);
+        if let Some(found) = session.strain().expect("a strain") {
+            answers.add(format!("{name}/matched"), [found.matched as f64]);
+            answers.add(format!("{name}/residual"), [found.report.residual]);
+            answers.add(format!("{name}/strain"), tensor(&found.strain.summary.mean));
+            answers.add(
+                format!("{name}/strain error"),
+                tensor(&found.strain.summary.standard_error),
+            );
+        }
+    }
+    modulus(
+        &mut answers,
+        "modulus",
+        &session.modulus().expect("a modulus"),
+    );
+    modulus(
+        &mut answers,
+        "modulus by strain",
+        &by_strain.modulus().expect("a modulus"),
+    );
+    answers.all
+}
+
+/// A scene file with its images, measured as a user does.
+fn scene_file() -> Vec<Answer> {
+    let mut answers = Answers::of("scene file");
+    let options = PressOptions {
+        camera: coarse(),
+        object: Sphere {
+            radius_m: 20e-3,
+            material: Elastic::CL2003X,
+        },
+        seed: 4,
+        ..PressOptions::default()
+    };
+    let made = PressScene::new(options).expect("a scene");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = write_folder(&made, &CalibrationOptions::default(), folder.path()).expect("files");
+    let scene = Scene::read(&path).expect("a scene");
+    let data = scene.load().expect("its files");
+    let stages = scene.stages_with(&data, 60).expect("its stages");
+    let mut measured = scene.press(stages.as_ref(), &data).expect("a press");
+    press(&mut answers, "", &mut measured);
+    estimates(&mut answers, &mut measured);
+    answers.all
+}
