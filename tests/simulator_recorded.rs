@@ -1,0 +1,140 @@
+//! The simulator's frames to the bit: a change of its code that is meant to change no frame is held to the frames recorded here.
+//!
+//! The frames are integers, so a last digit of a system's `exp` or `sin` almost never shows. A change that is meant to
+//! change frames records the new checksums (each failing line prints them) and says so in its commit.
+use ndarray::Array2;
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, ContactLaw, Gain, Hostile, Illumination, Load, LoadCycle,
+    PressOptions, PressScene, Response, UniaxialOptions, UniaxialScene,
+};
+
+const CAMERA: [usize; 2] = [130, 174];
+
+fn camera() -> Camera {
+    Camera {
+        shape: CAMERA,
+        pixel_size_m: [30e-3 / 174.0; 2],
+        ..Camera::default()
+    }
+}
+
+fn press() -> PressOptions {
+    PressOptions {
+        camera: camera(),
+        ..PressOptions::default()
+    }
+}
+
+/// FNV-1a of 64 bits over the bytes of all frames.
+fn checksum<'a>(frames: impl IntoIterator<Item = &'a Array2<u8>>) -> u64 {
+    let bytes = frames.into_iter().flatten();
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+fn press_checksum(options: PressOptions) -> u64 {
+    let made = PressScene::new(options).unwrap().simulate();
+    checksum(made.frames.iter().chain([&made.reference]))
+}
+
+#[test]
+fn presses_keep_their_frames() {
+    let sheared = Load {
+        shear_n: [0.3, -0.2],
+        illumination: Illumination {
+            level: 1.03,
+            tilt: [0.04, -0.02],
+        },
+        ..Load::normal(0.7)
+    };
+    let scenes = [
+        ("default", press(), 0xa136_0fa6_f6de_78fd),
+        (
+            "quadratic response, Tatara, another seed",
+            PressOptions {
+                response: Response::Quadratic { droop: 0.2 },
+                law: ContactLaw::Tatara,
+                seed: 99,
+                ..press()
+            },
+            0xb501_90d7_4f15_4445,
+        ),
+        (
+            "sheared, other lamps, over the edge",
+            PressOptions {
+                loads: vec![sheared, Load::normal(0.0)],
+                centre_px: Some([4.3, 60.9]),
+                gain: Gain::GreyPerPascal(0.004),
+                ..press()
+            },
+            0x30da_a0f7_5979_0abe,
+        ),
+        (
+            "no blur, no noise, oblong pixels",
+            PressOptions {
+                camera: Camera {
+                    pixel_size_m: [180e-6, 150e-6],
+                    ..camera().ideal()
+                },
+                ..press()
+            },
+            0x957b_e415_7c0a_be91,
+        ),
+    ];
+    let found = scenes.map(|(name, options, expected)| (name, press_checksum(options), expected));
+    let changed: Vec<_> = (found.into_iter())
+        .filter(|(_, found, expected)| found != expected)
+        .map(|(name, found, _)| format!("{name}: {found:#018x}"))
+        .collect();
+    assert!(changed.is_empty(), "{changed:#?}");
+}
+
+#[test]
+fn hostile_scenes_keep_their_frames() {
+    let frames = Hostile::ALL.map(|kind| kind.simulate(&press()).unwrap());
+    let found = checksum(
+        frames
+            .iter()
+            .flat_map(|made| made.frames.iter().chain([&made.reference])),
+    );
+    assert_eq!(found, 0x36aa_4270_a5bf_91db, "{found:#018x}");
+}
+
+#[test]
+fn blocks_keep_their_frames() {
+    let scene = UniaxialScene::new(UniaxialOptions {
+        camera: camera(),
+        ..UniaxialOptions::default()
+    })
+    .unwrap();
+    let frames = [scene.reference(0), scene.frame(0, 0), scene.frame(2, 1)];
+    let found = checksum(&frames);
+    assert_eq!(found, 0xdcaa_2df2_5c1e_2b89, "{found:#018x}");
+}
+
+#[test]
+fn calibrations_and_streams_keep_their_frames() {
+    let scene = PressScene::new(press()).unwrap();
+    let options = CalibrationOptions {
+        steps: 5,
+        hysteresis: 0.02,
+        ..CalibrationOptions::default()
+    };
+    let points = scene.calibrate(&options).unwrap().points;
+    let light: Vec<f64> = points.iter().map(|p| p.integrated_pixel_value).collect();
+    let recorded = [
+        -78.0, 72238.0, 143850.0, 215607.0, 287714.0, 359440.0, 292283.0, 222584.0, 150727.0,
+        76458.0, 55.0,
+    ];
+    assert_eq!(light, recorded, "{light:?}");
+    let cycle = LoadCycle {
+        frame_rate_hz: 10.0,
+        light_drift_per_s: 0.01,
+        largest_shear_n: [0.1, 0.0],
+        ..LoadCycle::default()
+    };
+    let frames: Vec<_> = scene.stream(cycle).unwrap().map(|f| f.frame).collect();
+    let found = checksum(&frames);
+    assert_eq!(found, 0x45c7_c5b5_d519_c266, "{found:#018x}");
+}
