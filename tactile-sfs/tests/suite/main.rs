@@ -6,6 +6,7 @@ mod invariants;
 mod large;
 mod measured;
 mod order;
+mod recorded;
 mod rims;
 mod samplers;
 mod stability_scale;

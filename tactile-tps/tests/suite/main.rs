@@ -9,6 +9,7 @@ mod input;
 mod iterative;
 mod models;
 mod properties;
+mod recorded;
 mod reference;
 mod reweight;
 mod stability_scale;
