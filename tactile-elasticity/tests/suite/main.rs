@@ -4,6 +4,7 @@ mod common;
 mod curve;
 mod hertz_reference;
 mod modulus;
+mod recorded;
 mod stability;
 mod stability_scale;
 mod strain_reference;

@@ -1,0 +1,286 @@
+//! Recorded answers: what the crate computed when `tests/recorded.txt` was written, so that a change of its insides changes no number.
+//!
+//! `RECORD_ANSWERS=1 cargo test -p tactile-elasticity --test suite recorded` writes the file anew; the reason belongs in the commit.
+
+use nalgebra::{DMatrix, Matrix3};
+use std::fmt::Write as _;
+use tactile_elasticity::contact::*;
+use tactile_elasticity::curve::*;
+use tactile_elasticity::field::{Averaging, StrainField};
+use tactile_elasticity::modulus::*;
+use tactile_elasticity::strain::*;
+use tactile_elasticity::stress::{Cauchy, SecondPiolaKirchhoff, Strain, Stress};
+
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded.txt");
+
+/// A reordered sum may move the last digits; nothing else may.
+const TOLERANCE: f64 = 1e-12;
+
+/// Names with their numbers.
+#[derive(Default)]
+struct Answers(Vec<(String, f64)>);
+
+impl Answers {
+    fn add(&mut self, name: &str, value: f64) {
+        self.0.push((name.to_owned(), value));
+    }
+
+    fn tensor(&mut self, name: &str, tensor: &Matrix3<f64>) {
+        for (i, x) in tensor.iter().enumerate() {
+            self.add(&format!("{name} {i}"), *x);
+        }
+    }
+
+    fn estimate(
+        &mut self,
+        name: &str,
+        estimator: &dyn ModulusEstimator<f64>,
+        loads: &[LoadState<f64>],
+    ) {
+        let e = estimator.estimate(loads).expect(name);
+        self.add(&format!("{name} E"), e.youngs_modulus_pa);
+        self.add(&format!("{name} error"), e.standard_error_pa);
+        self.add(&format!("{name} lower"), e.interval_95.lower);
+        self.add(
+            &format!("{name} upper"),
+            e.interval_95.upper.unwrap_or(-1.0),
+        );
+        self.add(&format!("{name} aicc"), e.fit.aicc);
+        self.add(&format!("{name} warnings"), e.warnings.len() as f64);
+        for (i, load) in e.loads.iter().enumerate() {
+            self.add(
+                &format!("{name} load {i} E"),
+                load.youngs_modulus_pa.unwrap_or(-1.0),
+            );
+            self.add(
+                &format!("{name} load {i} residual"),
+                load.standardized_residual.unwrap_or(-1.0),
+            );
+        }
+    }
+}
+
+fn strain_and_stress(answers: &mut Answers) {
+    let h = Matrix3::new(0.02, -0.13, 0.01, 0.11, -0.05, 0.03, 0.004, 0.02, -0.21);
+    let deformation = Deformation::from_displacement_gradient(h);
+    let measures: [&dyn StrainMeasure<f64>; 5] = [
+        &GreenLagrange,
+        &EulerAlmansi,
+        &Hencky,
+        &Biot,
+        &Infinitesimal,
+    ];
+    for measure in measures {
+        answers.tensor(measure.name(), &measure.of(&deformation).unwrap());
+    }
+    answers.add("volume change", deformation.volume_change());
+    let cauchy = Stress::<Cauchy, f64>::new(Matrix3::new(
+        10.0, 3.0, -2.0, 3.0, 40.0, 5.0, -2.0, 5.0, 900.0,
+    ));
+    let second: Stress<SecondPiolaKirchhoff, f64> = cauchy.to_second(&deformation).unwrap();
+    answers.tensor("second Piola-Kirchhoff", second.tensor_pa());
+    answers.add("von Mises", cauchy.von_mises_pa());
+    let green = Strain::<GreenLagrange, f64>::of(&deformation).unwrap();
+    let law = tactile_elasticity::stress::saint_venant_kirchhoff(&green, 60e3, 0.45).unwrap();
+    answers.tensor("Saint Venant-Kirchhoff", law.tensor_pa());
+    let gradients: Vec<_> = (1..9).map(|k| h * f64::from(k * k) * 0.01).collect();
+    let field = StrainField::from_gradients(&gradients, None, &GreenLagrange).unwrap();
+    for averaging in [Averaging::Mean, Averaging::Median, Averaging::Huber] {
+        answers.tensor(
+            &format!("mean {averaging:?}"),
+            &field.summary_with(averaging).mean,
+        );
+    }
+}
+
+fn contacts(answers: &mut Answers) {
+    let hertz = HertzContact::from_force(0.05, 3e-3, 45e3).unwrap();
+    for r in [0.0, 1e-3, 2.5e-3, 7e-3] {
+        answers.add(&format!("Hertz pressure {r}"), hertz.pressure_pa(r));
+        answers.add(
+            &format!("Hertz displacement {r}"),
+            hertz.surface_displacement_m(r),
+        );
+    }
+    answers.add("Tatara", tatara_indentation_m(1.4e-3, 3e-3, 0.47).unwrap());
+    for (name, bond, nu) in [
+        ("bonded", Bond::Bonded, 0.5),
+        ("bonded 0.3", Bond::Bonded, 0.3),
+        ("free", Bond::Free, 0.4),
+    ] {
+        let kernel = LayerKernel::new(bond, nu).unwrap();
+        let series = LayerSeries::corrected(&kernel, 0.7);
+        for ratio in [0.01, 0.4, 1.5, 7.0] {
+            let contact = LayerEquation::new(&kernel)
+                .with_share(0.8)
+                .solve(ratio)
+                .unwrap();
+            answers.add(
+                &format!("layer {name} {ratio} force"),
+                contact.force_ratio_same_radius,
+            );
+            answers.add(
+                &format!("layer {name} {ratio} indentation"),
+                contact.indentation_ratio,
+            );
+            answers.add(
+                &format!("layer {name} {ratio} series"),
+                series.force_ratio(ratio),
+            );
+        }
+    }
+}
+
+fn gel() -> Waveguide<f64> {
+    let layer = |thickness_m, youngs_modulus_pa, poisson_ratio| Layer {
+        thickness_m,
+        youngs_modulus_pa,
+        poisson_ratio,
+    };
+    Waveguide::new(vec![
+        layer(2e-3, 1.36e5, 0.48),
+        layer(3e-3, 8.0e4, 0.49),
+        layer(5e-3, 3.4e4, 0.5),
+    ])
+    .unwrap()
+}
+
+/// Loads near Hertz's with errors that no law fits exactly.
+fn loads() -> Vec<LoadState<f64>> {
+    [(0.01, 1.003), (0.02, 0.996), (0.05, 1.001)]
+        .map(|(force, factor)| {
+            let contact = HertzContact::from_force(force, 4e-3, 25e3).unwrap();
+            let (a, d) = (
+                contact.contact_radius_m * factor,
+                contact.indentation_m / factor,
+            );
+            LoadState::new(Estimate::new(force, 0.004 * force).with_degrees_of_freedom(9.0))
+                .with_contact_radius(Estimate::new(a, 0.003 * a))
+                .with_indentation(Estimate::new(d, 0.005 * d))
+                .with_mean_strain(Estimate::new(0.6 * force * factor, 1e-4))
+        })
+        .to_vec()
+}
+
+fn estimators(answers: &mut Answers) {
+    let (radius, nu, gel, loads) = (4e-3, 0.48, gel(), loads());
+    let covariance = DMatrix::from_fn(3, 3, |i, j| 1e-10 * (1.0 + 4.0 * f64::from(i == j)));
+    let hertz = HertzSphere::new(radius, nu)
+        .and_then(|e| e.with_waveguide(&gel).with_force_scale_error(0.01))
+        .and_then(|e| e.with_length_scale_error(0.004)?.with_size_error(0.002));
+    answers.estimate("Hertz on the guide", &hertz.unwrap(), &loads);
+    let hertz = HertzSphere::new(radius, nu).and_then(|e| e.with_force_covariance(&covariance));
+    answers.estimate("Hertz with a covariance", &hertz.unwrap(), &loads);
+    let indentation = HertzSphere::new(radius, nu)
+        .unwrap()
+        .with_evidence(Evidence::Indentation);
+    answers.estimate("Hertz from indentation", &indentation, &loads);
+    let tatara = TataraSphere::new(radius, nu).unwrap().with_waveguide(&gel);
+    answers.estimate("Tatara", &tatara, &loads);
+    let plates = SphereBetweenPlates::new(radius, nu)
+        .unwrap()
+        .with_waveguide(&gel);
+    answers.estimate("between plates", &plates, &loads);
+    let layered = SphereOnWaveguide::new(radius, nu, &gel, Bond::Bonded).unwrap();
+    answers.estimate("on the guide", &layered, &loads);
+    for theory in [
+        LayerTheory::PublishedSeries,
+        LayerTheory::CorrectedSeries,
+        LayerTheory::IntegralEquation,
+    ] {
+        let layer = BondedLayer::new(radius, 9e-3, nu, Bond::Bonded, theory).unwrap();
+        answers.estimate(&format!("layer {theory:?}"), &layer, &loads);
+    }
+    answers.estimate("punch", &FlatPunch::new(1e-3, nu).unwrap(), &loads);
+    answers.estimate("cone", &Cone::new(1.1, nu).unwrap(), &loads);
+    let ratio = PaperRatio::new().with_sphere_radius(radius).and_then(|e| {
+        e.with_stress_scale_error(0.01)?
+            .with_strain_covariance(&(&covariance * 10.0))
+    });
+    answers.estimate("stress over strain", &ratio.unwrap(), &loads);
+    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    answers.estimate("stress over strain from the first load", &ratio, &loads);
+    for intercept in [Intercept::Tested, Intercept::Zero] {
+        let line = StressStrainRegression::new()
+            .with_intercept(intercept)
+            .with_stress_scale_error(0.01);
+        answers.estimate(&format!("regression {intercept:?}"), &line.unwrap(), &loads);
+    }
+    let selection = select_estimator(&sphere_as_sample(radius, nu, &gel).unwrap(), &loads).unwrap();
+    for (k, weight) in selection.weights.iter().enumerate() {
+        answers.add(&format!("selection weight {k}"), *weight);
+        answers.add(
+            &format!("selection E {k}"),
+            selection.estimates[k].youngs_modulus_pa,
+        );
+    }
+    let bootstrap = Bootstrap {
+        replicates: 200,
+        seed: 3,
+    };
+    let spread = bootstrap
+        .modulus(&HertzSphere::new(radius, nu).unwrap(), &loads, 0.01)
+        .unwrap();
+    answers.add("bootstrap mean", spread.mean);
+    answers.add("bootstrap error", spread.standard_error);
+}
+
+fn curves(answers: &mut Answers) {
+    let z: Vec<f64> = (0..60).map(|i| f64::from(i) * 1e-5).collect();
+    let f: Vec<f64> = (z.iter().zip(0..))
+        .map(|(z, i)| {
+            1.2e4 * 5e-3_f64.sqrt() * (z - 1.3e-4).max(0.0).powf(1.6)
+                + 1e-7 * f64::from((i * 7) % 5)
+        })
+        .collect();
+    let curve = IndentationCurve::new(&z, &f).unwrap();
+    let sphere = Indenter::Sphere {
+        radius_m: 5e-3,
+        thickness_m: Some(3e-3),
+        bond: Bond::Bonded,
+    };
+    let selection =
+        select_model(&curve, &sphere, 0.48, Model::Auto, &CurveOptions::default()).unwrap();
+    for (k, fit) in selection.fits.iter().enumerate() {
+        answers.add(&format!("curve {k} E"), fit.youngs_modulus_pa);
+        answers.add(&format!("curve {k} error"), fit.standard_error_pa);
+        answers.add(&format!("curve {k} contact"), fit.contact_point_m);
+        answers.add(&format!("curve {k} offset"), fit.offset_n);
+        answers.add(&format!("curve {k} aicc"), fit.statistics.aicc);
+    }
+}
+
+fn answers() -> Vec<(String, f64)> {
+    let mut answers = Answers::default();
+    strain_and_stress(&mut answers);
+    contacts(&mut answers);
+    estimators(&mut answers);
+    curves(&mut answers);
+    answers.0
+}
+
+#[test]
+fn answers_are_those_recorded() {
+    let found = answers();
+    if std::env::var_os("RECORD_ANSWERS").is_some() {
+        let text = found.iter().fold(String::new(), |mut text, (name, value)| {
+            writeln!(text, "{value:e}\t{name}").expect("a string takes all");
+            text
+        });
+        std::fs::write(FILE, text).expect("the record can be written");
+    }
+    let recorded = std::fs::read_to_string(FILE).expect("the record is committed");
+    assert_eq!(recorded.lines().count(), found.len());
+    for (line, (name, value)) in recorded.lines().zip(&found) {
+        let (number, recorded_name) = line.split_once('\t').expect("a number, a tab, a name");
+        assert_eq!(recorded_name, name);
+        let expected: f64 = number.parse().expect("a number");
+        let gap = (value - expected).abs();
+        // Numbers that are zero but for rounding have no relative error.
+        let close = gap <= TOLERANCE * expected.abs().max(1e-6);
+        assert!(
+            close || value.to_bits() == expected.to_bits(),
+            "{name}: {value:e} for {expected:e}"
+        );
+    }
+}
