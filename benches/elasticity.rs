@@ -9,7 +9,9 @@ use tactile_imaging::elasticity::contact::{Bond, LayerEquation, LayerKernel};
 use tactile_imaging::elasticity::curve::{
     CurveOptions, IndentationCurve, Indenter, Model, select_model,
 };
-use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+use tactile_imaging::elasticity::modulus::{
+    Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
+};
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, StrainMeasure, green_lagrange_into,
 };
@@ -89,10 +91,12 @@ fn moduli(c: &mut Criterion) {
                 .with_contact_radius(Estimate::new(a, 1e-3 * a))
         })
         .collect();
-    let estimator = HertzSphere::new(4e-3, 0.5)
-        .unwrap()
-        .with_force_scale_error(0.01)
-        .unwrap();
+    let shared = SharedErrors {
+        force_scale: 0.01,
+        ..SharedErrors::default()
+    };
+    let loads = LoadSeries::new(loads).with_shared_errors(shared).unwrap();
+    let estimator = HertzSphere::new(4e-3, 0.5).unwrap();
     let error = estimator.estimate(&loads).unwrap().youngs_modulus_pa / 60e3 - 1.0;
     assert!(error.abs() < 1e-12);
     println!("modulus from twelve loads: off by {error:.1e}");

@@ -7,11 +7,11 @@ use crate::force::Estimate;
 /// A modulus with its error.
 ///
 /// ```
-/// use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+/// use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 /// use tactile_imaging::pipeline::ModulusResult;
 /// // A ball of 3 mm radius under 10 mN, in contact up to 0.5 mm: E = (1 − ν²) 3FR/(4a³) = 135 kPa.
 /// let load = LoadState::new(Estimate::new(10e-3, 0.1e-3)).with_contact_radius(Estimate::new(0.5e-3, 1e-6));
-/// let modulus = ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&[load])?);
+/// let modulus = ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?);
 /// assert!((modulus.value - 135e3).abs() < 1.0);
 /// assert!(modulus.interval_95.0 < modulus.value && modulus.warnings.is_empty());
 /// assert!(modulus.to_string().starts_with("135.0 ± 1.6 kPa"));

@@ -5,8 +5,8 @@ use super::settings::Settings;
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::Waveguide;
 use crate::elasticity::modulus::{
-    Estimate, Evidence, FlatPunch, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator,
-    PaperRatio, StrainReference, StressStrainRegression,
+    Estimate, Evidence, FlatPunch, HertzSphere, LoadSeries, LoadState, ModulusEstimate,
+    ModulusEstimator, PaperRatio, SharedErrors, StrainReference, StressStrainRegression,
 };
 
 /// The pressed object, as far as it is known.
@@ -76,15 +76,6 @@ impl Object {
     }
 }
 
-/// Relative errors that all loads share.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct SharedErrors {
-    /// Of the forces: the calibration's own.
-    pub force: f64,
-    /// Of the lengths: the pixel size's.
-    pub length: f64,
-}
-
 /// What one load says, before errors are split into its own and those that all loads share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LoadReading {
@@ -101,7 +92,7 @@ pub(crate) struct LoadReading {
 pub(crate) fn split_errors(
     readings: impl Iterator<Item = LoadReading> + Clone,
     settings: &Settings,
-) -> (Vec<LoadState<f64>>, SharedErrors) {
+) -> (Vec<LoadState<f64>>, SharedErrors<f64>) {
     let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
     let common = readings
         .clone()
@@ -116,8 +107,9 @@ pub(crate) fn split_errors(
             .with_contact_radius(r.radius_m)
     };
     let shared = SharedErrors {
-        force: common.hypot(settings.force_scale_error),
-        length: settings.length_scale_error,
+        force_scale: common.hypot(settings.force_scale_error),
+        length_scale: settings.length_scale_error,
+        ..SharedErrors::default()
     };
     (readings.map(load).collect(), shared)
 }
@@ -133,13 +125,22 @@ pub(crate) fn radius_with_floor(
     Estimate::new(value, standard_error.hypot(floor))
 }
 
+/// Loads with the errors that they share.
+pub(crate) fn series(
+    loads: Vec<LoadState<f64>>,
+    shared: SharedErrors<f64>,
+) -> Result<LoadSeries<f64>, PipelineError> {
+    LoadSeries::new(loads)
+        .with_shared_errors(shared)
+        .map_err(PipelineError::Modulus)
+}
+
 type Attempt = Result<ModulusEstimate<f64>, ElasticityError>;
 
 /// The estimate that the settings ask for.
 pub(crate) fn chosen_estimate(
     settings: &Settings,
-    loads: &[LoadState<f64>],
-    shared: SharedErrors,
+    loads: &LoadSeries<f64>,
 ) -> Result<ModulusEstimate<f64>, PipelineError> {
     let (object, waveguide, choice) = (
         settings.object,
@@ -153,19 +154,20 @@ pub(crate) fn chosen_estimate(
                 radius_m,
                 poisson_ratio,
             },
-        ) => hertz(radius_m, poisson_ratio, waveguide, shared, Evidence::All)
-            .and_then(|e| e.estimate(loads)),
+        ) => {
+            hertz(radius_m, poisson_ratio, waveguide, Evidence::All).and_then(|e| e.estimate(loads))
+        }
         (
             EstimatorChoice::FlatPunch,
             Object::FlatPunch {
                 radius_m,
                 poisson_ratio,
             },
-        ) => flat_punch(radius_m, poisson_ratio, waveguide, shared).and_then(|e| e.estimate(loads)),
+        ) => flat_punch(radius_m, poisson_ratio, waveguide).and_then(|e| e.estimate(loads)),
         (EstimatorChoice::Best | EstimatorChoice::PaperRatio, _) => {
-            paper_ratio(&object, shared).and_then(|e| e.estimate(loads))
+            paper_ratio(&object).and_then(|e| e.estimate(loads))
         }
-        (EstimatorChoice::Regression, _) => regression(shared).and_then(|e| e.estimate(loads)),
+        (EstimatorChoice::Regression, _) => StressStrainRegression::new().estimate(loads),
         (EstimatorChoice::Sphere, _) => {
             return Err(PipelineError::WrongEstimator {
                 estimator: choice,
@@ -187,29 +189,27 @@ pub(crate) fn chosen_estimate(
 pub(crate) fn all_estimates(
     object: &Object,
     waveguide: Option<&Waveguide<f64>>,
-    loads: &[LoadState<f64>],
-    shared: SharedErrors,
+    loads: &LoadSeries<f64>,
 ) -> Vec<ModulusEstimate<f64>> {
-    let mut attempts: Vec<Attempt> =
-        vec![paper_ratio(object, shared).and_then(|e| e.estimate(loads))];
+    let mut attempts: Vec<Attempt> = vec![paper_ratio(object).and_then(|e| e.estimate(loads))];
     match *object {
         Object::Sphere {
             radius_m,
             poisson_ratio,
         } => {
-            let both = hertz(radius_m, poisson_ratio, waveguide, shared, Evidence::All);
+            let both = hertz(radius_m, poisson_ratio, waveguide, Evidence::All);
             attempts.push(both.and_then(|e| e.estimate(loads)));
         }
         Object::FlatPunch {
             radius_m,
             poisson_ratio,
         } => {
-            let punch = flat_punch(radius_m, poisson_ratio, waveguide, shared);
+            let punch = flat_punch(radius_m, poisson_ratio, waveguide);
             attempts.push(punch.and_then(|e| e.estimate(loads)));
         }
         Object::Unknown { .. } => {}
     }
-    attempts.push(regression(shared).and_then(|e| e.estimate(loads)));
+    attempts.push(StressStrainRegression::new().estimate(loads));
     attempts.into_iter().filter_map(Result::ok).collect()
 }
 
@@ -217,13 +217,9 @@ fn hertz(
     radius_m: f64,
     poisson_ratio: f64,
     waveguide: Option<&Waveguide<f64>>,
-    shared: SharedErrors,
     evidence: Evidence,
 ) -> Result<HertzSphere, ElasticityError> {
-    let estimator = HertzSphere::new(radius_m, poisson_ratio)?
-        .with_evidence(evidence)
-        .with_force_scale_error(shared.force)?
-        .with_length_scale_error(shared.length)?;
+    let estimator = HertzSphere::new(radius_m, poisson_ratio)?.with_evidence(evidence);
     Ok(match waveguide {
         Some(waveguide) => estimator.with_waveguide(waveguide),
         None => estimator,
@@ -234,23 +230,17 @@ fn flat_punch(
     radius_m: f64,
     poisson_ratio: f64,
     waveguide: Option<&Waveguide<f64>>,
-    shared: SharedErrors,
 ) -> Result<FlatPunch, ElasticityError> {
-    let punch = FlatPunch::new(radius_m, poisson_ratio)?.with_force_scale_error(shared.force)?;
+    let punch = FlatPunch::new(radius_m, poisson_ratio)?;
     Ok(match waveguide {
         Some(waveguide) => punch.with_waveguide(waveguide),
         None => punch,
     })
 }
 
-fn regression(shared: SharedErrors) -> Result<StressStrainRegression, ElasticityError> {
-    StressStrainRegression::new().with_stress_scale_error(shared.force)
-}
-
 /// Stress over strain, counted from the first load, as the paper matches two pressed frames.
-fn paper_ratio(object: &Object, shared: SharedErrors) -> Result<PaperRatio, ElasticityError> {
+fn paper_ratio(object: &Object) -> Result<PaperRatio, ElasticityError> {
     let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
-    let ratio = ratio.with_stress_scale_error(shared.force)?;
     match object.sphere_radius_m() {
         Some(radius_m) => ratio.with_sphere_radius(radius_m),
         None => Ok(ratio),

@@ -57,6 +57,12 @@ pub(crate) fn rank(criteria: &[f64]) -> (Vec<usize>, SelectionReason) {
     (others, reason)
 }
 
+/// The items in an order that names each once.
+pub(crate) fn in_order<A>(items: Vec<A>, order: &[usize]) -> Vec<A> {
+    let mut taken: Vec<_> = items.into_iter().map(Some).collect();
+    order.iter().filter_map(|&k| taken[k].take()).collect()
+}
+
 /// exp(−Δ/2), divided by their sum (Akaike weights).
 pub(crate) fn akaike_weights(criteria: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     let lowest = criteria.clone().fold(f64::INFINITY, f64::min);

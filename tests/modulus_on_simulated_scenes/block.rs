@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use ndarray::Array2;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use tactile_imaging::elasticity::modulus::{
-    Estimate, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio, StrainReference,
+    Estimate, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, PaperRatio, StrainReference,
 };
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{ForceMeter, ForceOptions, ForceWorkspace};
@@ -106,14 +106,16 @@ fn ratio(
     covariance: &DMatrix<f64>,
     lateral: Estimate<f64>,
 ) -> ModulusEstimate<f64> {
-    let ratio = PaperRatio::new()
-        .with_reference(StrainReference::FirstLoad)
-        .with_force_covariance(covariance)
-        .unwrap();
-    let mut answer = ratio.estimate(&loads(0.0, forces, lateral)).unwrap();
+    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let from_first_strain = |strain: f64| {
+        let series = LoadSeries::new(loads(strain, forces, lateral));
+        let series = series.with_force_covariance(covariance).unwrap();
+        ratio.estimate(&series).unwrap()
+    };
+    let mut answer = from_first_strain(0.0);
     for _ in 0..5 {
         let first = forces[0].value / (FACE_M * FACE_M) / answer.youngs_modulus_pa;
-        answer = ratio.estimate(&loads(first, forces, lateral)).unwrap();
+        answer = from_first_strain(first);
     }
     answer
 }

@@ -4,7 +4,7 @@ use super::{NU, calibrate, estimate, force, force_covariance, log_uniform, refer
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::{
-    Evidence, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator,
+    Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator,
 };
 use tactile_imaging::force::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace};
 use tactile_imaging::simulate::{Camera, Elastic, Gain, Load, PressOptions, PressScene, Sphere};
@@ -144,10 +144,11 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
     let estimator = HertzSphere::new(presses.radius, NU)
         .unwrap()
         .with_waveguide(&waveguide())
-        .with_evidence(Evidence::ContactRadius)
+        .with_evidence(Evidence::ContactRadius);
+    let series = LoadSeries::new(loads.as_slice())
         .with_force_covariance(&force_covariance(&calibration, &measured))
         .unwrap();
-    let found = estimator.estimate(&loads).unwrap();
+    let found = estimator.estimate(&series).unwrap();
     if verbose() {
         presses.report(
             &measured[measured.len() - 1],

@@ -6,8 +6,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::field::{StrainField, mean_strain_covariance};
 use tactile_imaging::elasticity::modulus::{
-    Bootstrap, BootstrapSummary, Estimate, LoadState, ModulusEstimate, ModulusEstimator,
-    PaperRatio, StrainReference,
+    Bootstrap, BootstrapSummary, Estimate, LoadSeries, LoadState, ModulusEstimate,
+    ModulusEstimator, PaperRatio, StrainReference,
 };
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{self, CalibrationPair, LinearCalibration, StressCalibration};
@@ -119,9 +119,7 @@ impl Experiment {
             mean_strain_covariance(&gradients, &weights, |i, j| influence[i][j], &displacement)?;
         let squeeze = Estimate::new(Self::squeeze(&gradients), strain[(2, 2)].sqrt());
         let forces = LIGHT.map(|(v, _)| calibration.force_n(v));
-        ratio()
-            .with_force_covariance(&covariance)?
-            .estimate(&loads(forces, squeeze))
+        ratio().estimate(&loads(forces, squeeze).with_force_covariance(&covariance)?)
     }
 
     /// Everything drawn anew: pairs and their fit, light, displacements and their spline.
@@ -162,9 +160,9 @@ fn ratio() -> PaperRatio {
     PaperRatio::new().with_reference(StrainReference::FirstLoad)
 }
 
-fn loads(forces: [f64; 2], squeeze: Estimate<f64>) -> [LoadState<f64>; 2] {
+fn loads(forces: [f64; 2], squeeze: Estimate<f64>) -> LoadSeries<f64> {
     let load = |f| LoadState::new(Estimate::exact(f)).with_contact_area(Estimate::exact(AREA_M2));
-    [load(forces[0]), load(forces[1]).with_mean_strain(squeeze)]
+    LoadSeries::new([load(forces[0]), load(forces[1]).with_mean_strain(squeeze)])
 }
 
 /// The standard deviation of 4000 redrawn moduli is itself known to 1.1 %; 5 % is four and a half of its standard deviations.

@@ -1,9 +1,9 @@
 //! The modulus of a press, and the loads it is estimated from.
 use super::Press;
-use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate};
+use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate, SharedErrors};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::object::{
-    LoadReading, SharedErrors, all_estimates, chosen_estimate, radius_with_floor, split_errors,
+    LoadReading, all_estimates, chosen_estimate, radius_with_floor, series, split_errors,
 };
 use crate::pipeline::report::Stage;
 use std::time::Instant;
@@ -18,7 +18,8 @@ impl Press<'_> {
         let with_strain = self.stages.settings().needs_strain();
         let (loads, shared) = self.loads(with_strain)?;
         let start = Instant::now();
-        let estimate = chosen_estimate(self.stages.settings(), &loads, shared);
+        let loads = series(loads, shared)?;
+        let estimate = chosen_estimate(self.stages.settings(), &loads);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate
     }
@@ -69,12 +70,8 @@ impl Press<'_> {
         };
         let start = Instant::now();
         let settings = self.stages.settings();
-        let estimates = all_estimates(
-            &settings.object,
-            settings.waveguide.as_ref(),
-            &loads,
-            shared,
-        );
+        let loads = series(loads, shared)?;
+        let estimates = all_estimates(&settings.object, settings.waveguide.as_ref(), &loads);
         self.report.ran(Stage::Modulus, start.elapsed());
         Ok(estimates)
     }
@@ -83,7 +80,7 @@ impl Press<'_> {
     fn loads(
         &mut self,
         with_strain: bool,
-    ) -> Result<(Vec<LoadState<f64>>, SharedErrors), PipelineError> {
+    ) -> Result<(Vec<LoadState<f64>>, SharedErrors<f64>), PipelineError> {
         let mut readings = Vec::with_capacity(self.frames.len());
         let mut depths = Vec::with_capacity(self.frames.len());
         let size = self.stages.contact().pixel_size_m();

@@ -3,7 +3,7 @@ use super::Session;
 use super::strain::{FollowedStrain, Frame, SessionStrain};
 use crate::elasticity::modulus::ModulusEstimate;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::object::{chosen_estimate, split_errors};
+use crate::pipeline::object::{chosen_estimate, series, split_errors};
 use crate::pipeline::report::Stage;
 use std::time::Instant;
 
@@ -85,7 +85,7 @@ impl Session {
         } else {
             split_errors(self.loads.readings(size), settings)
         };
-        let estimate = chosen_estimate(settings, &loads, shared);
+        let estimate = chosen_estimate(settings, &series(loads, shared)?);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate
     }

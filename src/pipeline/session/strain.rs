@@ -1,11 +1,12 @@
 //! Strain along a stream, counted from one load.
 use super::loads::SeenLoads;
+use crate::elasticity::modulus::SharedErrors;
 use crate::elasticity::modulus::{Estimate, LoadState};
 use crate::force::ReferenceFrame;
 use crate::matching::{MatchReport, MatchSeries};
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::object::{LoadReading, SharedErrors, radius_with_floor, split_errors};
+use crate::pipeline::object::{LoadReading, radius_with_floor, split_errors};
 use crate::pipeline::pair::{self, PairStrain};
 use crate::pipeline::report::{Report, SkipReason, Stage};
 use crate::pipeline::settings::Settings;
@@ -206,7 +207,7 @@ impl FollowedStrain {
         &self,
         pixel_size_m: [f64; 2],
         settings: &Settings,
-    ) -> (Vec<LoadState<f64>>, SharedErrors) {
+    ) -> (Vec<LoadState<f64>>, SharedErrors<f64>) {
         let anchor = self.anchor.as_ref().map(|anchor| &anchor.reading);
         let first = anchor.and_then(|reading| {
             let a = reading.contact_radius_m;

@@ -4,7 +4,7 @@ use super::{CurveFit, CurveOptions, IndentationCurve, Indenter, Model, fit_curve
 use crate::error::ElasticityError;
 use crate::modulus::EstimatorKind;
 pub use crate::selection::SelectionReason;
-use crate::selection::{akaike_weights, rank};
+use crate::selection::{akaike_weights, in_order, rank};
 
 /// All laws tried, the best first.
 ///
@@ -77,10 +77,8 @@ pub fn select_model(
         reason
     };
     let weights = akaike_weights(order.iter().map(|&k| criteria[k]));
-    let mut taken: Vec<_> = fits.into_iter().map(Some).collect();
-    let fits = order.iter().filter_map(|&k| taken[k].take()).collect();
     Ok(CurveSelection {
-        fits,
+        fits: in_order(fits, &order),
         weights,
         reason,
     })

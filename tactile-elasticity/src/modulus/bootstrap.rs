@@ -1,7 +1,7 @@
 //! The spread of an answer over repetitions of the experiment, drawn with a seed.
 
-use super::{Estimate, LoadState, ModulusEstimator};
-use crate::error::{ElasticityError, Quantity};
+use super::{Estimate, LoadSeries, LoadState, ModulusEstimator};
+use crate::error::ElasticityError;
 use crate::scalar::{narrow, widen};
 use nalgebra::RealField;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -92,23 +92,22 @@ impl Bootstrap {
     }
 
     /// Repeats an estimate with every measured quantity redrawn from its standard error, and all forces scaled by one common
-    /// factor with the given relative error.
+    /// factor with the error that the loads share. Covariances are not redrawn.
     ///
     /// # Errors
-    /// As [`run`](Self::run); [`ElasticityError::Negative`] scale error.
+    /// As [`run`](Self::run).
     pub fn modulus<T: RealField + Copy>(
         &self,
         estimator: &dyn ModulusEstimator<T>,
-        loads: &[LoadState<T>],
-        force_scale_error: T,
+        series: &LoadSeries<T>,
     ) -> Result<BootstrapSummary, ElasticityError> {
-        let scale_error =
-            crate::error::not_negative(widen(force_scale_error), Quantity::StandardError)?;
+        let scale_error = widen(series.shared_errors().force_scale);
         self.run(|normal| {
             let scale: T = narrow(1.0 + scale_error * normal());
-            let redrawn: Vec<_> = loads.iter().map(|l| redraw(l, scale, normal)).collect();
+            let redrawn = series.loads().iter();
+            let redrawn: Vec<_> = redrawn.map(|l| redraw(l, scale, normal)).collect();
             estimator
-                .estimate(&redrawn)
+                .estimate(&series.with_loads(redrawn))
                 .ok()
                 .map(|m| widen(m.youngs_modulus_pa))
         })

@@ -2,16 +2,18 @@
 
 use super::warning::Warning;
 use crate::error::ElasticityError;
-use crate::modulus::LoadState;
+use crate::modulus::LoadSeries;
 use crate::scalar::narrow;
 use nalgebra::RealField;
+use std::sync::Arc;
 
-/// A way from loads to Young's modulus.
+/// Estimates Young's modulus from a series of loads.
 ///
-/// Object safe, so that a program can choose at run time.
+/// An estimator holds what is known of the object; what was measured, with its errors, comes with the
+/// [`LoadSeries`]. One estimator therefore serves any number of series, and a boxed or shared one is an estimator as well.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 /// // A rigid ball of 5 mm on a sample of 30 kPa.
 /// let loads: Vec<_> = [0.01, 0.02, 0.04]
 ///     .map(|f| {
@@ -20,7 +22,7 @@ use nalgebra::RealField;
 ///     })
 ///     .to_vec();
 /// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(HertzSphere::new(0.005, 0.5)?);
-/// let modulus = estimator.estimate(&loads)?;
+/// let modulus = estimator.estimate(&LoadSeries::new(loads))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// assert!(modulus.interval_95.contains(30e3));
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -30,7 +32,7 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     ///
     /// # Errors
     /// [`ElasticityError`] where the loads do not determine it.
-    fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError>;
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError>;
 
     /// Which estimator this is.
     ///
@@ -41,6 +43,26 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     /// assert_eq!(estimator.kind(), EstimatorKind::PaperRatio);
     /// ```
     fn kind(&self) -> EstimatorKind;
+}
+
+impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> for Box<E> {
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+        (**self).estimate(series)
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        (**self).kind()
+    }
+}
+
+impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> for Arc<E> {
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+        (**self).estimate(series)
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        (**self).kind()
+    }
 }
 
 /// The estimators, by name.
@@ -67,6 +89,10 @@ pub enum EstimatorKind {
     LayerIntegralEquation,
     FreeLayerIntegralEquation,
     TataraSphere,
+    /// The best of several by Akaike's criterion.
+    BestOf,
+    /// An estimator from outside this crate, by its name.
+    Other(&'static str),
 }
 
 impl core::fmt::Display for EstimatorKind {
@@ -84,6 +110,8 @@ impl core::fmt::Display for EstimatorKind {
             Self::LayerIntegralEquation => "sphere on a layer, integral equation",
             Self::FreeLayerIntegralEquation => "sphere on a sliding layer, integral equation",
             Self::TataraSphere => "Tatara's sphere",
+            Self::BestOf => "best of several",
+            Self::Other(name) => name,
         })
     }
 }
@@ -116,11 +144,11 @@ impl<T: RealField + Copy> Interval<T> {
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimate, ModulusEstimator, Warning};
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning};
 ///
 /// let contact = HertzContact::from_force(0.05_f64, 3e-3, 40e3)?;
 /// let load = LoadState::new(Estimate::new(0.05, 1e-4)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
-/// let modulus: ModulusEstimate<f64> = HertzSphere::new(3e-3, 0.5)?.estimate(&[load])?;
+/// let modulus: ModulusEstimate<f64> = HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!(modulus.interval_95.contains(30e3));
 /// // The number stands, with the warning that a/R = 0.47 is much.
 /// assert!(matches!(modulus.warnings[0], Warning::LargeContact { load: 0, ratio, .. } if ratio > 0.4));
@@ -149,13 +177,13 @@ pub struct ModulusEstimate<T> {
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 ///
 /// // The second load carries nothing but its force.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let force = LoadState::new(Estimate::new(1e-3, 1e-5));
 /// let loads = [force.with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6)), force];
-/// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&loads)?;
+/// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new(loads))?;
 /// assert!(modulus.loads[0].used && !modulus.loads[1].used);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -187,7 +215,7 @@ impl<T: RealField + Copy> LoadDiagnostics<T> {
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
-/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 ///
 /// let loads: Vec<LoadState<f64>> = [1e-3, 2e-3, 4e-3]
 ///     .into_iter()
@@ -197,7 +225,7 @@ impl<T: RealField + Copy> LoadDiagnostics<T> {
 ///         Ok(LoadState::new(Estimate::new(force, 1e-5)).with_contact_radius(radius))
 ///     })
 ///     .collect::<Result<_, tactile_elasticity::ElasticityError>>()?;
-/// let fit = HertzSphere::new(5e-3, 0.5)?.estimate(&loads)?.fit;
+/// let fit = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new(loads))?.fit;
 /// assert_eq!((fit.observations, fit.parameters), (3, 1));
 /// assert!(fit.chi_squared < 1e-12);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())

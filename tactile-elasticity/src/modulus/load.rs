@@ -30,13 +30,13 @@ impl<T: RealField + Copy> Estimate<T> {
     /// With a standard error that was learnt from so few repetitions that it is itself uncertain.
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, PaperRatio};
+    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio};
     /// let load = |force| {
     ///     LoadState::new(force).with_contact_area(Estimate::exact(1e-4)).with_mean_strain(Estimate::exact(0.02))
     /// };
     /// let force = Estimate::new(0.12, 0.001);
-    /// let known = PaperRatio::new().estimate(&[load(force)])?;
-    /// let learnt = PaperRatio::new().estimate(&[load(force.with_degrees_of_freedom(5.0))])?;
+    /// let known = PaperRatio::new().estimate(&LoadSeries::new([load(force)]))?;
+    /// let learnt = PaperRatio::new().estimate(&LoadSeries::new([load(force.with_degrees_of_freedom(5.0))]))?;
     /// assert_eq!(known.standard_error_pa, learnt.standard_error_pa);
     /// assert!(learnt.interval_95.lower < known.interval_95.lower); // Student's t instead of the normal distribution
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -82,7 +82,7 @@ impl Estimate<f64> {
 /// load, positive where the object is squeezed.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, LoadState};
+/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
 /// let load = LoadState::new(Estimate::new(0.7, 0.002))
 ///     .with_contact_radius(Estimate::new(1.2e-3, 4e-6))
 ///     .with_mean_strain(Estimate::exact(0.021));
@@ -124,7 +124,7 @@ impl<T: RealField + Copy> LoadState<T> {
     /// With the contact's area (m²), where it is not a disc.
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, LoadState};
+    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
     ///
     /// // A block of 1 cm²: its stress, and an approach of 0.2 mm.
     /// let load = LoadState::new(Estimate::exact(0.12))
@@ -140,7 +140,7 @@ impl<T: RealField + Copy> LoadState<T> {
     /// With the indentation (m).
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, LoadState};
+    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
     ///
     /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_indentation(Estimate::new(4e-5, 1e-7));
     /// assert_eq!(load.indentation_m.map(|d| d.value), Some(4e-5));

@@ -8,6 +8,7 @@ mod load;
 mod ratio;
 mod regression;
 mod select;
+mod series;
 mod source;
 mod statistics;
 mod warning;
@@ -28,8 +29,7 @@ pub use law::{
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::{Intercept, StressStrainRegression};
-pub use select::{
-    Candidates, ModulusSelection, select_estimator, sphere_as_sample, sphere_on_sample,
-};
+pub use select::{BestOf, ModulusSelection};
+pub use series::{LoadSeries, SharedErrors};
 pub(crate) use statistics::quantile_95;
 pub use warning::Warning;

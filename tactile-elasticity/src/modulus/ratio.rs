@@ -4,10 +4,11 @@ use super::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 use super::load::{Estimate, LoadState};
-use super::source::{LogErrors, Source, finite};
+use super::series::LoadSeries;
+use super::source::{LogErrors, Source};
 use super::statistics::{CommonMean, common_mean, effective_degrees, quantile_95};
 use super::warning::Warning;
-use crate::error::{ElasticityError, Quantity, not_negative, positive};
+use crate::error::{ElasticityError, Quantity, positive};
 use crate::scalar::{narrow, widen};
 use nalgebra::{DMatrix, RealField};
 
@@ -17,7 +18,7 @@ pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 /// What the strain of a load is counted from.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, PaperRatio, StrainReference};
+/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, StrainReference};
 ///
 /// // Two pressed frames: the strain between them belongs to the difference of their stresses.
 /// let load = |force, strain| {
@@ -25,7 +26,7 @@ pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 ///         .with_contact_area(Estimate::exact(1e-4))
 ///         .with_mean_strain(Estimate::exact(strain))
 /// };
-/// let loads = [load(0.7, 0.0), load(1.2, 0.05)];
+/// let loads = LoadSeries::new([load(0.7, 0.0), load(1.2, 0.05)]);
 /// let modulus = PaperRatio::new().with_reference(StrainReference::FirstLoad).estimate(&loads)?;
 /// assert!((modulus.youngs_modulus_pa - (1.2 - 0.7) / 1e-4 / 0.05_f64).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -50,34 +51,29 @@ pub enum StrainReference {
 /// Several loads are averaged with the weights of their relative errors.
 ///
 /// ```
-/// use nalgebra::DMatrix;
-/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, PaperRatio, StrainReference, Warning};
+/// use tactile_elasticity::modulus::{
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, SharedErrors, StrainReference, Warning,
+/// };
 ///
 /// let load = LoadState::new(Estimate::new(0.12, 0.001))
 ///     .with_contact_area(Estimate::exact(1e-4))
 ///     .with_contact_radius(Estimate::exact(5.64e-3))
 ///     .with_mean_strain(Estimate::new(0.02, 1e-4));
-/// let plain = PaperRatio::new().with_reference(StrainReference::Unloaded).estimate(&[load])?;
+/// let series = LoadSeries::new([load]);
+/// let plain = PaperRatio::new().with_reference(StrainReference::Unloaded).estimate(&series)?;
 /// assert!((plain.youngs_modulus_pa - 60e3_f64).abs() < 1e-6);
 ///
-/// // Errors that loads share come as covariances; on a sphere the ratio is biased, and says so.
-/// let careful = PaperRatio::new()
-///     .with_sphere_radius(3e-3)?
-///     .with_stress_scale_error(0.01)?
-///     .with_force_covariance(&DMatrix::from_element(1, 1, 1e-6))?
-///     .with_strain_covariance(&DMatrix::from_element(1, 1, 1e-8))?
-///     .estimate(&[load])?;
+/// // Errors that loads share come with the series; on a sphere the ratio is biased, and says so.
+/// let series = series.with_shared_errors(SharedErrors { force_scale: 0.01, ..SharedErrors::default() })?;
+/// let careful = PaperRatio::new().with_sphere_radius(3e-3)?.estimate(&series)?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
 /// assert!(careful.warnings.iter().any(|w| matches!(w, Warning::RatioOnSphere { .. })));
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PaperRatio {
     reference: StrainReference,
     sphere_radius_m: Option<f64>,
-    stress_scale_error: f64,
-    force_covariance: Option<DMatrix<f64>>,
-    strain_covariance: Option<DMatrix<f64>>,
 }
 
 impl PaperRatio {
@@ -101,43 +97,6 @@ impl PaperRatio {
         radius_m: T,
     ) -> Result<Self, ElasticityError> {
         self.sphere_radius_m = Some(positive(widen(radius_m), Quantity::Radius)?);
-        Ok(self)
-    }
-
-    /// Relative error that all stresses share (the slope of one calibration).
-    ///
-    /// # Errors
-    /// [`ElasticityError::Negative`].
-    pub fn with_stress_scale_error<T: RealField + Copy>(
-        mut self,
-        relative: T,
-    ) -> Result<Self, ElasticityError> {
-        self.stress_scale_error = not_negative(widen(relative), Quantity::StandardError)?;
-        Ok(self)
-    }
-
-    /// Covariance of the forces (N²), one row per load; replaces their standard errors.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotFinite`]; the size is checked against the loads.
-    pub fn with_force_covariance<T: RealField + Copy>(
-        mut self,
-        covariance: &DMatrix<T>,
-    ) -> Result<Self, ElasticityError> {
-        self.force_covariance = Some(finite(covariance, Quantity::Force)?);
-        Ok(self)
-    }
-
-    /// Covariance of the mean strains, one row per load (loads without a strain: zeros); replaces their standard errors. Strains
-    /// counted from one frame share its errors.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotFinite`]; the size is checked against the loads.
-    pub fn with_strain_covariance<T: RealField + Copy>(
-        mut self,
-        covariance: &DMatrix<T>,
-    ) -> Result<Self, ElasticityError> {
-        self.strain_covariance = Some(finite(covariance, Quantity::Strain)?);
         Ok(self)
     }
 
@@ -183,11 +142,8 @@ impl PaperRatio {
     /// Covariances of the ln E, from forces, areas and strains, each with its degrees of freedom.
     ///
     /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A.
-    fn sources(
-        &self,
-        loads: &[LoadState<f64>],
-        ratios: &[Ratio],
-    ) -> Result<[LogErrors; 3], ElasticityError> {
+    fn sources(&self, series: &LoadSeries<f64>, ratios: &[Ratio]) -> [LogErrors; 3] {
+        let loads = series.loads();
         let areas: Vec<_> = loads.iter().map(LoadState::area).collect();
         let area_of = |k: usize| areas[k].map_or(1.0, |a| a.value);
         let stress_slope = |i: usize, k: usize| {
@@ -202,13 +158,11 @@ impl PaperRatio {
         let by_strain = slopes(&|i, k| -f64::from(ratios[i].load == k) / ratios[i].strain);
         let forces: Vec<_> = loads.iter().map(|l| Some(l.force_n)).collect();
         let strains: Vec<_> = loads.iter().map(|l| l.mean_strain).collect();
-        Ok([
-            Source::new(&forces, self.force_covariance.as_ref(), Quantity::Force)?
-                .through(&by_force),
-            Source::new(&areas, None, Quantity::ContactArea)?.through(&by_area),
-            Source::new(&strains, self.strain_covariance.as_ref(), Quantity::Strain)?
-                .through(&by_strain),
-        ])
+        [
+            Source::new(&forces, series.force_covariance()).through(&by_force),
+            Source::new(&areas, None).through(&by_area),
+            Source::new(&strains, series.strain_covariance()).through(&by_strain),
+        ]
     }
 
     fn warnings<T: RealField + Copy>(
@@ -303,18 +257,20 @@ pub(crate) fn stress(
 }
 
 impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
-    fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
-        let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
-        let ratios = self.ratios(&loads)?;
-        let sources = self.sources(&loads, &ratios)?;
-        let shared = DMatrix::repeat(ratios.len(), ratios.len(), self.stress_scale_error.powi(2));
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+        let series = series.widened();
+        let loads = series.loads();
+        let ratios = self.ratios(loads)?;
+        let sources = self.sources(&series, &ratios);
+        let scale_variance = series.stress_scale_error().powi(2);
+        let shared = DMatrix::repeat(ratios.len(), ratios.len(), scale_variance);
         let covariance = sources.iter().fold(shared.clone(), |sum, s| sum + &s.0);
         let logs: Vec<f64> = ratios.iter().map(Ratio::log).collect();
         let mean = common_mean(&logs, &covariance)?;
         let errors = sources.iter().map(|s| (&s.0, s.1)).chain([(&shared, None)]);
         let reach = quantile_95(mean.degrees_from(errors)) * mean.standard_error;
         let modulus = mean.mean.exp();
-        let diagnostics = self.diagnose(&loads, &ratios, &mean);
+        let diagnostics = self.diagnose(loads, &ratios, &mean);
         Ok(ModulusEstimate {
             youngs_modulus_pa: narrow(modulus),
             standard_error_pa: narrow(modulus * mean.standard_error),
@@ -323,7 +279,7 @@ impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
                 upper: reach.is_finite().then(|| narrow((mean.mean + reach).exp())),
             },
             estimator: EstimatorKind::PaperRatio,
-            warnings: self.warnings(&loads, &diagnostics, &mean),
+            warnings: self.warnings(loads, &diagnostics, &mean),
             loads: diagnostics,
             fit: FitStatistics::new(
                 ratios.len(),

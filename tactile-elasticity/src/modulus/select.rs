@@ -1,26 +1,15 @@
-//! Which estimator the loads speak for.
+//! The choice among estimators by how they fit the loads.
 
 use super::{
-    BondedLayer, EstimatorKind, HertzSphere, LayerTheory, LoadState, ModulusEstimate,
+    BondedLayer, EstimatorKind, HertzSphere, LayerTheory, LoadSeries, ModulusEstimate,
     ModulusEstimator, SphereBetweenPlates, SphereOnWaveguide, TataraSphere,
 };
 use crate::contact::{Bond, Waveguide};
 use crate::error::ElasticityError;
 use crate::scalar::widen;
-use crate::selection::{SelectionReason, akaike_weights, rank};
+use crate::selection::{SelectionReason, akaike_weights, in_order, rank};
 use nalgebra::RealField;
-
-/// Estimators by name, boxed for a choice at run time.
-///
-/// ```
-/// use tactile_elasticity::modulus::{Candidates, HertzSphere, TataraSphere};
-///
-/// let candidates: Candidates<f64> =
-///     vec![Box::new(TataraSphere::new(3e-3, 0.5)?), Box::new(HertzSphere::new(3e-3, 0.5)?)];
-/// assert_eq!(candidates[0].kind().to_string(), "Tatara's sphere");
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub type Candidates<T> = Vec<Box<dyn ModulusEstimator<T>>>;
+use std::sync::Arc;
 
 /// All estimators tried on the same loads, the best first.
 ///
@@ -31,9 +20,8 @@ pub type Candidates<T> = Vec<Box<dyn ModulusEstimator<T>>>;
 /// // One load cannot tell laws apart: the most general candidate is the answer.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
-/// let candidates: Candidates<f64> =
-///     vec![Box::new(TataraSphere::new(5e-3, 0.5)?), Box::new(HertzSphere::new(5e-3, 0.5)?)];
-/// let selection: ModulusSelection<f64> = select_estimator(&candidates, &[load])?;
+/// let candidates = BestOf::new(TataraSphere::new(5e-3, 0.5)?).or(HertzSphere::new(5e-3, 0.5)?);
+/// let selection: ModulusSelection<f64> = candidates.select(&LoadSeries::new([load]))?;
 /// assert_eq!(selection.chosen().estimator, EstimatorKind::TataraSphere);
 /// assert!(selection.left_out.is_empty());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -58,65 +46,158 @@ impl<T> ModulusSelection<T> {
     }
 }
 
-/// Estimates with every candidate and chooses by Akaike's criterion: among those within 2 of the best, the first in the list,
-/// so give the most general theory first.
+/// Estimates with every candidate and chooses by Akaike's criterion: among those within 2 of the best, the first given, so give the
+/// most general theory first. An estimator itself: [`estimate`](ModulusEstimator::estimate) gives the chosen estimate.
 ///
 /// The criterion is that of [`FitStatistics`](super::FitStatistics): AICc, or AIC where the loads are too few for the correction.
 /// Loads of one size cannot tell laws apart: the first candidate is then the answer, with the reason
 /// [`SelectionReason::MostGeneral`].
 ///
-/// # Errors
-/// The first candidate's, where none has an answer; [`ElasticityError::TooFewLoads`] without candidates.
-///
 /// ```
-/// use tactile_elasticity::contact::Bond;
-/// use tactile_elasticity::modulus::{Estimate, EstimatorKind, LoadState, select_estimator, sphere_on_sample};
+/// use tactile_elasticity::modulus::{BestOf, Estimate, EstimatorKind, LoadSeries, LoadState, ModulusEstimator};
 /// // A ball of 5 mm on a deep sample of 30 kPa: δ³ᐟ² = 3F/(4E*√R).
 /// let loads = [0.002, 0.01, 0.05].map(|f: f64| {
 ///     let d = (0.75 * f / (40e3 * 0.005f64.sqrt())).powf(2.0 / 3.0);
 ///     LoadState::new(Estimate::exact(f)).with_indentation(Estimate::new(d, 0.003 * d))
 /// });
+/// let series = LoadSeries::new(loads);
 /// // Against a layer of 1 mm, glued or sliding:
-/// let selection = select_estimator(&sphere_on_sample(0.005, 0.5, Some(1e-3))?, &loads)?;
+/// let estimator = BestOf::sphere_on_sample(0.005, 0.5, Some(1e-3))?;
+/// let selection = estimator.select(&series)?;
 /// assert_eq!(selection.chosen().estimator, EstimatorKind::HertzSphere);
 /// assert!((selection.chosen().youngs_modulus_pa - 30e3).abs() < 1.0 && selection.weights[0] > 0.99);
+/// assert_eq!(estimator.estimate(&series)?, *selection.chosen());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn select_estimator<T: RealField + Copy>(
-    candidates: &[Box<dyn ModulusEstimator<T>>],
-    loads: &[LoadState<T>],
-) -> Result<ModulusSelection<T>, ElasticityError> {
-    let (mut estimates, mut left_out, mut first_error) = (Vec::new(), Vec::new(), None);
-    for candidate in candidates {
-        match candidate.estimate(loads) {
-            Ok(estimate) => estimates.push(estimate),
-            Err(error) => {
-                left_out.push(candidate.kind());
-                first_error.get_or_insert(error);
-            }
+#[derive(Clone)]
+pub struct BestOf<T: RealField + Copy> {
+    candidates: Vec<Candidate<T>>,
+}
+
+type Candidate<T> = Arc<dyn ModulusEstimator<T> + Send + Sync>;
+
+impl<T: RealField + Copy> core::fmt::Debug for BestOf<T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let kinds = self.candidates.iter().map(|c| c.kind());
+        f.debug_list().entries(kinds).finish()
+    }
+}
+
+impl<T: RealField + Copy> BestOf<T> {
+    /// One candidate, the most general.
+    pub fn new(candidate: impl ModulusEstimator<T> + Send + Sync + 'static) -> Self {
+        Self {
+            candidates: vec![Arc::new(candidate)],
         }
     }
-    let Some(observations) = estimates.first().map(|e| e.fit.observations) else {
-        return Err(first_error.unwrap_or(ElasticityError::TooFewLoads {
-            expected: 1,
-            found: 0,
-        }));
-    };
-    let (mut estimates, others): (Vec<_>, Vec<_>) = estimates
-        .into_iter()
-        .partition(|e| e.fit.observations == observations);
-    left_out.extend(others.iter().map(|e| e.estimator));
-    let criteria: Vec<f64> = estimates.iter().map(criterion).collect();
-    let (order, reason) = rank(&criteria);
-    let weights = akaike_weights(order.iter().map(|&k| criteria[k]));
-    let mut taken: Vec<_> = estimates.drain(..).map(Some).collect();
-    let estimates = order.iter().filter_map(|&k| taken[k].take()).collect();
-    Ok(ModulusSelection {
-        estimates,
-        weights,
-        reason,
-        left_out,
-    })
+
+    /// Another candidate, less general than those before.
+    pub fn or(mut self, candidate: impl ModulusEstimator<T> + Send + Sync + 'static) -> Self {
+        self.candidates.push(Arc::new(candidate));
+        self
+    }
+
+    /// A rigid sphere of radius R (m) on a sample with Poisson ratio ν: Hertz, and with a thickness h (m) the layer's integral
+    /// equation, bonded to its rigid base or sliding on it.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    pub fn sphere_on_sample(
+        radius_m: T,
+        poisson_ratio: T,
+        thickness_m: Option<T>,
+    ) -> Result<Self, ElasticityError> {
+        let half_space = HertzSphere::new(radius_m, poisson_ratio)?;
+        let Some(thickness_m) = thickness_m else {
+            return Ok(Self::new(half_space));
+        };
+        let layer = |bond| {
+            let theory = LayerTheory::IntegralEquation;
+            BondedLayer::new(radius_m, thickness_m, poisson_ratio, bond, theory)
+        };
+        Ok(Self::new(layer(Bond::Bonded)?)
+            .or(layer(Bond::Free)?)
+            .or(half_space))
+    }
+
+    /// A soft sphere of radius R (m) and Poisson ratio ν, the sample, pressed by a rigid plate onto a waveguide: the waveguide as
+    /// a layer of finite depth, Tatara's large deformation, and Hertz with one and with two contacts.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::{HertzContact, Layer, Waveguide};
+    /// use tactile_elasticity::modulus::{BestOf, Estimate, EstimatorKind, LoadSeries, LoadState, ModulusEstimator};
+    ///
+    /// let gel = Waveguide::new(vec![Layer { thickness_m: 10e-3, youngs_modulus_pa: 50e3_f64, poisson_ratio: 0.5 }])?;
+    /// let contact = HertzContact::from_force(1e-3, 3e-3, 30e3)?;
+    /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
+    /// let modulus = BestOf::sphere_as_sample(3e-3, 0.5, &gel)?.estimate(&LoadSeries::new([load]))?;
+    /// assert_eq!(modulus.estimator, EstimatorKind::SphereOnWaveguide);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn sphere_as_sample(
+        radius_m: T,
+        poisson_ratio: T,
+        waveguide: &Waveguide<T>,
+    ) -> Result<Self, ElasticityError> {
+        let layered = SphereOnWaveguide::new(radius_m, poisson_ratio, waveguide, Bond::Bonded)?;
+        let tatara = TataraSphere::new(radius_m, poisson_ratio)?;
+        let two_contacts = SphereBetweenPlates::new(radius_m, poisson_ratio)?;
+        let hertz = HertzSphere::new(radius_m, poisson_ratio)?;
+        Ok(Self::new(layered)
+            .or(tatara.with_waveguide(waveguide))
+            .or(two_contacts.with_waveguide(waveguide))
+            .or(hertz.with_waveguide(waveguide)))
+    }
+
+    /// All estimates, the chosen one first.
+    ///
+    /// # Errors
+    /// The first candidate's, where none has an answer.
+    pub fn select(&self, series: &LoadSeries<T>) -> Result<ModulusSelection<T>, ElasticityError> {
+        let (mut estimates, mut left_out, mut first_error) = (Vec::new(), Vec::new(), None);
+        for candidate in &self.candidates {
+            match candidate.estimate(series) {
+                Ok(estimate) => estimates.push(estimate),
+                Err(error) => {
+                    left_out.push(candidate.kind());
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+        let Some(observations) = estimates.first().map(|e| e.fit.observations) else {
+            return Err(first_error.unwrap_or(ElasticityError::TooFewLoads {
+                expected: 1,
+                found: 0,
+            }));
+        };
+        let (estimates, others): (Vec<_>, Vec<_>) = estimates
+            .into_iter()
+            .partition(|e| e.fit.observations == observations);
+        left_out.extend(others.iter().map(|e| e.estimator));
+        let criteria: Vec<f64> = estimates.iter().map(criterion).collect();
+        let (order, reason) = rank(&criteria);
+        let weights = akaike_weights(order.iter().map(|&k| criteria[k]));
+        Ok(ModulusSelection {
+            estimates: in_order(estimates, &order),
+            weights,
+            reason,
+            left_out,
+        })
+    }
+}
+
+impl<T: RealField + Copy> ModulusEstimator<T> for BestOf<T> {
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+        // The chosen estimate is the first.
+        Ok(self.select(series)?.estimates.swap_remove(0))
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        EstimatorKind::BestOf
+    }
 }
 
 /// AICc; where the loads are too few for it, AIC from χ², which differs by a constant between laws of the same loads.
@@ -128,77 +209,4 @@ fn criterion<T: RealField + Copy>(estimate: &ModulusEstimate<T>) -> f64 {
     } else {
         widen(fit.chi_squared) + 2.0 * fit.parameters as f64
     }
-}
-
-/// A rigid sphere of radius R (m) on a sample with Poisson ratio ν: Hertz, and with a thickness h (m) the layer's integral equation,
-/// glued to its rigid base or sliding on it.
-///
-/// # Errors
-/// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-///
-/// ```
-/// use tactile_elasticity::modulus::sphere_on_sample;
-///
-/// // Bonded layer, sliding layer, half-space; without a thickness the last alone.
-/// assert_eq!(sphere_on_sample(5e-3_f64, 0.5, Some(2e-3))?.len(), 3);
-/// assert_eq!(sphere_on_sample(5e-3_f64, 0.5, None)?.len(), 1);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn sphere_on_sample<T: RealField + Copy>(
-    radius_m: T,
-    poisson_ratio: T,
-    thickness_m: Option<T>,
-) -> Result<Candidates<T>, ElasticityError> {
-    let mut candidates: Candidates<T> = Vec::new();
-    for bond in [Bond::Bonded, Bond::Free]
-        .into_iter()
-        .filter(|_| thickness_m.is_some())
-    {
-        let (h, theory) = (
-            thickness_m.unwrap_or(radius_m),
-            LayerTheory::IntegralEquation,
-        );
-        candidates.push(Box::new(BondedLayer::new(
-            radius_m,
-            h,
-            poisson_ratio,
-            bond,
-            theory,
-        )?));
-    }
-    candidates.push(Box::new(HertzSphere::new(radius_m, poisson_ratio)?));
-    Ok(candidates)
-}
-
-/// A soft sphere of radius R (m) and Poisson ratio ν, the sample, pressed by a rigid plate onto a waveguide: the waveguide as a
-/// layer of finite depth, Tatara's large deformation, and Hertz with one and with two contacts.
-///
-/// # Errors
-/// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-///
-/// ```
-/// use tactile_elasticity::contact::{Layer, Waveguide};
-/// use tactile_elasticity::modulus::{EstimatorKind, sphere_as_sample};
-///
-/// let gel = Waveguide::new(vec![Layer { thickness_m: 10e-3, youngs_modulus_pa: 50e3_f64, poisson_ratio: 0.5 }])?;
-/// let kinds: Vec<_> = sphere_as_sample(3e-3, 0.5, &gel)?.iter().map(|c| c.kind()).collect();
-/// assert_eq!((kinds[0], kinds.len()), (EstimatorKind::SphereOnWaveguide, 4));
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-pub fn sphere_as_sample<T: RealField + Copy>(
-    radius_m: T,
-    poisson_ratio: T,
-    waveguide: &Waveguide<T>,
-) -> Result<Candidates<T>, ElasticityError> {
-    Ok(vec![
-        Box::new(SphereOnWaveguide::new(
-            radius_m,
-            poisson_ratio,
-            waveguide,
-            Bond::Bonded,
-        )?),
-        Box::new(TataraSphere::new(radius_m, poisson_ratio)?.with_waveguide(waveguide)),
-        Box::new(SphereBetweenPlates::new(radius_m, poisson_ratio)?.with_waveguide(waveguide)),
-        Box::new(HertzSphere::new(radius_m, poisson_ratio)?.with_waveguide(waveguide)),
-    ])
 }

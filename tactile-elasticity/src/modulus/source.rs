@@ -3,7 +3,6 @@
 use super::load::Estimate;
 use super::statistics::fewest;
 use crate::error::{ElasticityError, Quantity};
-use crate::scalar::widen;
 use nalgebra::{DMatrix, DVector, RealField};
 
 /// A covariance of logarithms of moduli from one source, and the degrees of freedom it was learnt with.
@@ -21,20 +20,19 @@ impl Source {
     pub(super) fn new(
         estimates: &[Option<Estimate<f64>>],
         covariance: Option<&DMatrix<f64>>,
-        quantity: Quantity,
-    ) -> Result<Self, ElasticityError> {
+    ) -> Self {
         let degrees = fewest(estimates.iter().flatten().map(|e| e.degrees_of_freedom));
         let own = estimates
             .iter()
             .map(|e| e.map_or(0.0, |e| e.standard_error.powi(2)));
         let covariance = match covariance {
-            Some(given) => checked(given, estimates.len(), quantity)?.clone(),
+            Some(given) => given.clone(),
             None => DMatrix::from_diagonal(&DVector::from_iterator(estimates.len(), own)),
         };
-        Ok(Self {
+        Self {
             covariance,
             degrees,
-        })
+        }
     }
 
     /// Covariance, with its degrees of freedom, of what follows the quantity with these slopes: a row a result, a column a load.
@@ -43,24 +41,24 @@ impl Source {
     }
 }
 
-/// A covariance as the caller gave it, in f64.
+/// Refuses a covariance with an entry that is not a number.
 pub(super) fn finite<T: RealField + Copy>(
     covariance: &DMatrix<T>,
     quantity: Quantity,
-) -> Result<DMatrix<f64>, ElasticityError> {
-    let covariance = covariance.map(widen);
-    if !covariance.iter().all(|x| x.is_finite()) {
-        return Err(ElasticityError::NotFinite { quantity });
+) -> Result<(), ElasticityError> {
+    if covariance.iter().all(|x| x.is_finite()) {
+        Ok(())
+    } else {
+        Err(ElasticityError::NotFinite { quantity })
     }
-    Ok(covariance)
 }
 
 /// The covariance, if it has a row and a column for every load.
-pub(super) fn checked(
-    covariance: &DMatrix<f64>,
+pub(super) fn checked<T: RealField + Copy>(
+    covariance: &DMatrix<T>,
     loads: usize,
     quantity: Quantity,
-) -> Result<&DMatrix<f64>, ElasticityError> {
+) -> Result<&DMatrix<T>, ElasticityError> {
     match [covariance.nrows(), covariance.ncols()]
         .into_iter()
         .find(|&n| n != loads)

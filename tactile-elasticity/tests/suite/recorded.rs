@@ -35,9 +35,9 @@ impl Answers {
         &mut self,
         name: &str,
         estimator: &dyn ModulusEstimator<f64>,
-        loads: &[LoadState<f64>],
+        series: &LoadSeries<f64>,
     ) {
-        let e = estimator.estimate(loads).expect(name);
+        let e = estimator.estimate(series).expect(name);
         self.add(&format!("{name} E"), e.youngs_modulus_pa);
         self.add(&format!("{name} error"), e.standard_error_pa);
         self.add(&format!("{name} lower"), e.interval_95.lower);
@@ -163,50 +163,61 @@ fn loads() -> Vec<LoadState<f64>> {
 }
 
 fn estimators(answers: &mut Answers) {
-    let (radius, nu, gel, loads) = (4e-3, 0.48, gel(), loads());
+    let (radius, nu, gel) = (4e-3, 0.48, gel());
+    let series = LoadSeries::new(loads());
+    let shared = SharedErrors {
+        force_scale: 0.01,
+        ..SharedErrors::default()
+    };
+    let scaled = series.clone().with_shared_errors(shared).unwrap();
     let covariance = DMatrix::from_fn(3, 3, |i, j| 1e-10 * (1.0 + 4.0 * f64::from(i == j)));
-    let hertz = HertzSphere::new(radius, nu)
-        .and_then(|e| e.with_waveguide(&gel).with_force_scale_error(0.01))
-        .and_then(|e| e.with_length_scale_error(0.004)?.with_size_error(0.002));
-    answers.estimate("Hertz on the guide", &hertz.unwrap(), &loads);
-    let hertz = HertzSphere::new(radius, nu).and_then(|e| e.with_force_covariance(&covariance));
-    answers.estimate("Hertz with a covariance", &hertz.unwrap(), &loads);
+    let hertz = HertzSphere::new(radius, nu).unwrap();
+    let uncertain = SharedErrors {
+        length_scale: 0.004,
+        size: 0.002,
+        ..shared
+    };
+    let uncertain = series.clone().with_shared_errors(uncertain).unwrap();
+    let on_guide = hertz.clone().with_waveguide(&gel);
+    answers.estimate("Hertz on the guide", &on_guide, &uncertain);
+    let correlated = series.clone().with_force_covariance(&covariance).unwrap();
+    answers.estimate("Hertz with a covariance", &hertz, &correlated);
     let indentation = HertzSphere::new(radius, nu)
         .unwrap()
         .with_evidence(Evidence::Indentation);
-    answers.estimate("Hertz from indentation", &indentation, &loads);
+    answers.estimate("Hertz from indentation", &indentation, &series);
     let tatara = TataraSphere::new(radius, nu).unwrap().with_waveguide(&gel);
-    answers.estimate("Tatara", &tatara, &loads);
+    answers.estimate("Tatara", &tatara, &series);
     let plates = SphereBetweenPlates::new(radius, nu)
         .unwrap()
         .with_waveguide(&gel);
-    answers.estimate("between plates", &plates, &loads);
+    answers.estimate("between plates", &plates, &series);
     let layered = SphereOnWaveguide::new(radius, nu, &gel, Bond::Bonded).unwrap();
-    answers.estimate("on the guide", &layered, &loads);
+    answers.estimate("on the guide", &layered, &series);
     for theory in [
         LayerTheory::PublishedSeries,
         LayerTheory::CorrectedSeries,
         LayerTheory::IntegralEquation,
     ] {
         let layer = BondedLayer::new(radius, 9e-3, nu, Bond::Bonded, theory).unwrap();
-        answers.estimate(&format!("layer {theory:?}"), &layer, &loads);
+        answers.estimate(&format!("layer {theory:?}"), &layer, &series);
     }
-    answers.estimate("punch", &FlatPunch::new(1e-3, nu).unwrap(), &loads);
-    answers.estimate("cone", &Cone::new(1.1, nu).unwrap(), &loads);
-    let ratio = PaperRatio::new().with_sphere_radius(radius).and_then(|e| {
-        e.with_stress_scale_error(0.01)?
-            .with_strain_covariance(&(&covariance * 10.0))
-    });
-    answers.estimate("stress over strain", &ratio.unwrap(), &loads);
+    answers.estimate("punch", &FlatPunch::new(1e-3, nu).unwrap(), &series);
+    answers.estimate("cone", &Cone::new(1.1, nu).unwrap(), &series);
+    let strain_covariance = &covariance * 10.0;
+    let strained = scaled.clone().with_strain_covariance(&strain_covariance);
+    let ratio = PaperRatio::new().with_sphere_radius(radius).unwrap();
+    answers.estimate("stress over strain", &ratio, &strained.unwrap());
     let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
-    answers.estimate("stress over strain from the first load", &ratio, &loads);
+    answers.estimate("stress over strain from the first load", &ratio, &series);
     for intercept in [Intercept::Tested, Intercept::Zero] {
-        let line = StressStrainRegression::new()
-            .with_intercept(intercept)
-            .with_stress_scale_error(0.01);
-        answers.estimate(&format!("regression {intercept:?}"), &line.unwrap(), &loads);
+        let line = StressStrainRegression::new().with_intercept(intercept);
+        answers.estimate(&format!("regression {intercept:?}"), &line, &scaled);
     }
-    let selection = select_estimator(&sphere_as_sample(radius, nu, &gel).unwrap(), &loads).unwrap();
+    let selection = BestOf::sphere_as_sample(radius, nu, &gel)
+        .unwrap()
+        .select(&series)
+        .unwrap();
     for (k, weight) in selection.weights.iter().enumerate() {
         answers.add(&format!("selection weight {k}"), *weight);
         answers.add(
@@ -218,9 +229,7 @@ fn estimators(answers: &mut Answers) {
         replicates: 200,
         seed: 3,
     };
-    let spread = bootstrap
-        .modulus(&HertzSphere::new(radius, nu).unwrap(), &loads, 0.01)
-        .unwrap();
+    let spread = bootstrap.modulus(&hertz, &scaled).unwrap();
     answers.add("bootstrap mean", spread.mean);
     answers.add("bootstrap error", spread.standard_error);
 }

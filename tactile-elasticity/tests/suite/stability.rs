@@ -6,7 +6,7 @@ use tactile_elasticity::contact::{
     Body, HertzContact, hertz_surface_displacement_m, reduced_modulus_pa,
 };
 use tactile_elasticity::field::{Averaging, StrainField};
-use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadState, ModulusEstimator};
+use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 use tactile_elasticity::strain::{
     Biot, Deformation, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, Invariants,
     PrincipalStretches, StrainMeasure, green_lagrange_into,
@@ -101,7 +101,7 @@ proptest! {
         let load = LoadState::new(Estimate::new(1e-3 * f, 1e-5 * f))
             .with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-3 * contact.contact_radius_m))
             .with_indentation(Estimate::new(contact.indentation_m, 1e-3 * contact.indentation_m));
-        let found = HertzSphere::new(4e-3 * l, 0.4).unwrap().estimate(&[load]).unwrap();
+        let found = HertzSphere::new(4e-3 * l, 0.4).unwrap().estimate(&LoadSeries::new([load])).unwrap();
         prop_assert!((found.youngs_modulus_pa / modulus - 1.0).abs() < 1e-12);
         let outside = hertz_surface_displacement_m(3.0 * contact.contact_radius_m, contact.contact_radius_m, 1.0, 1.0);
         prop_assert!(outside > 0.0);

@@ -5,7 +5,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tactile_elasticity::contact::{Body, HertzContact, reduced_modulus_pa};
 use tactile_elasticity::field::{StrainField, mean_strain_covariance};
 use tactile_elasticity::modulus::{
-    Bootstrap, Estimate, HertzSphere, LoadState, ModulusEstimator, PaperRatio,
+    Bootstrap, Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, PaperRatio,
+    SharedErrors,
 };
 use tactile_elasticity::strain::GreenLagrange;
 
@@ -35,7 +36,7 @@ fn displacements_through_strain_to_the_modulus() {
         let load = LoadState::new(force)
             .with_contact_area(Estimate::exact(area))
             .with_mean_strain(strain);
-        PaperRatio::new().estimate(&[load])
+        PaperRatio::new().estimate(&LoadSeries::new([load]))
     };
     let gradient = |u: &dyn Fn(usize) -> Vector3<f64>| {
         (0..60).fold(Matrix3::zeros(), |h, j| h + u(j) * influence[j].transpose())
@@ -96,16 +97,18 @@ fn a_calibrations_error_does_not_average_out() {
                 .with_contact_radius(Estimate::new(a, 0.002 * a))
         })
         .collect();
-    let estimator = HertzSphere::new(4e-3, 0.5)
-        .unwrap()
-        .with_force_scale_error(0.01)
-        .unwrap();
-    let propagated = estimator.estimate(&loads).unwrap();
+    let estimator = HertzSphere::new(4e-3, 0.5).unwrap();
+    let shared = SharedErrors {
+        force_scale: 0.01,
+        ..SharedErrors::default()
+    };
+    let series = LoadSeries::new(loads).with_shared_errors(shared).unwrap();
+    let propagated = estimator.estimate(&series).unwrap();
     let redrawn = Bootstrap {
         replicates: 4000,
         seed: 2,
     }
-    .modulus(&estimator, &loads, 0.01)
+    .modulus(&estimator, &series)
     .unwrap();
     let ratio = propagated.standard_error_pa / redrawn.standard_error;
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
@@ -117,7 +120,7 @@ fn a_calibrations_error_does_not_average_out() {
             replicates: 4000,
             seed: 2
         }
-        .modulus(&estimator, &loads, 0.01)
+        .modulus(&estimator, &series)
         .unwrap()
     );
 }

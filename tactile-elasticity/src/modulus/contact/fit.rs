@@ -7,7 +7,8 @@ use crate::modulus::estimate::{
 };
 use crate::modulus::law::{ContactLaw, LogForce};
 use crate::modulus::load::{Estimate, LoadState};
-use crate::modulus::source::{LogErrors, checked};
+use crate::modulus::series::LoadSeries;
+use crate::modulus::source::LogErrors;
 use crate::modulus::statistics::{CommonMean, common_mean, fewest, quantile_95};
 use crate::modulus::warning::Warning;
 use crate::scalar::{narrow, widen};
@@ -68,16 +69,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
     }
 
     /// Covariances of the ln E*, with their degrees of freedom: of forces, of lengths, of what all have in common.
-    fn sources(
-        &self,
-        all: &[Observation],
-        loads: usize,
-    ) -> Result<[LogErrors; 3], ElasticityError> {
-        let given = self
-            .force_covariance
-            .as_ref()
-            .map(|c| checked(c, loads, Quantity::Force))
-            .transpose()?;
+    fn sources(&self, all: &[Observation], series: &LoadSeries<f64>) -> [LogErrors; 3] {
+        let (given, shared) = (series.force_covariance(), series.shared_errors());
         let over = |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(all.len(), all.len(), f);
         let forces = over(&|i, j| match given {
             Some(c) => c[(all[i].load, all[j].load)] / (all[i].force.value * all[j].force.value),
@@ -86,13 +79,13 @@ impl<L: ContactLaw> ContactEstimator<L> {
         });
         let own = |o: &Observation| (o.log_force.slope * o.length.relative_error()).powi(2);
         let lengths = over(&|i, j| if i == j { own(&all[i]) } else { 0.0 });
-        let shared = over(&|i, j| {
+        let common = over(&|i, j| {
             let (p, q) = (all[i].log_force, all[j].log_force);
-            self.force_scale_error.powi(2)
-                + p.slope * q.slope * self.length_scale_error.powi(2)
-                + p.size_slope * q.size_slope * self.size_error.powi(2)
+            shared.force_scale.powi(2)
+                + p.slope * q.slope * shared.length_scale.powi(2)
+                + p.size_slope * q.size_slope * shared.size.powi(2)
         });
-        Ok([
+        [
             (
                 forces,
                 fewest(all.iter().map(|o| o.force.degrees_of_freedom)),
@@ -101,8 +94,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
                 lengths,
                 fewest(all.iter().map(|o| o.length.degrees_of_freedom)),
             ),
-            (shared, None),
-        ])
+            (common, None),
+        ]
     }
 
     /// E of the sample at a given ln E*; None where the other body leaves no compliance.
@@ -112,15 +105,29 @@ impl<L: ContactLaw> ContactEstimator<L> {
         (left > 0.0).then(|| (1.0 - self.poisson_ratio.powi(2)) * reduced / left)
     }
 
+    /// Standard error of ln E*: that of the mean, and what the errors of the other body's compliance C and of ν add to it.
+    ///
+    /// ln E = ln(1 − ν²) + ln E* − ln(1 − C E*), so that an error of ln C counts C E* times, one of ν
+    /// (1 − C E*)·2ν/(1 − ν²) times as one of ln E* does.
+    fn standard_error(&self, series: &LoadSeries<f64>, mean: &CommonMean) -> f64 {
+        let shared = series.shared_errors();
+        let share = (self.other_compliance_per_pa * mean.mean.exp()).min(1.0);
+        let nu_slope = 2.0 * self.poisson_ratio / (1.0 - self.poisson_ratio.powi(2));
+        let of_other_body = share * shared.other_body;
+        let of_poisson_ratio = (1.0 - share) * nu_slope * shared.poisson_ratio;
+        mean.standard_error
+            .hypot(of_other_body.hypot(of_poisson_ratio))
+    }
+
     /// The mean at a given share of the other body.
     fn mean(
         &self,
-        loads: &[LoadState<f64>],
+        series: &LoadSeries<f64>,
         share: f64,
     ) -> Result<(Vec<Observation>, CommonMean), ElasticityError> {
-        let all = self.observe(loads, share)?;
+        let all = self.observe(series.loads(), share)?;
         let logs: Vec<f64> = all.iter().map(|o| o.log_modulus).collect();
-        let sources = self.sources(&all, loads.len())?;
+        let sources = self.sources(&all, series);
         let mut mean = common_mean(&logs, &(&sources[0].0 + &sources[1].0 + &sources[2].0))?;
         mean.degrees = mean.degrees_from(sources.iter().map(|s| (&s.0, s.1)));
         Ok((all, mean))
@@ -131,18 +138,18 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// The share moves ln E* by less than it is moved itself, so that the plain iteration converges.
     fn consistent(
         &self,
-        loads: &[LoadState<f64>],
+        series: &LoadSeries<f64>,
         reach: f64,
     ) -> Result<Consistent, ElasticityError> {
         let share_at =
             |log_reduced: f64| (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0);
         let mut share = 0.0;
         for _ in 0..60 {
-            let (observations, mean) = self.mean(loads, share)?;
+            let (observations, mean) = self.mean(series, share)?;
             let steps = if reach == 0.0 {
                 0.0
             } else {
-                reach * quantile_95(mean.degrees) * mean.standard_error
+                reach * quantile_95(mean.degrees) * self.standard_error(series, &mean)
             };
             let log_reduced = mean.mean + steps;
             let next = share_at(log_reduced);
@@ -155,7 +162,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
             }
             share = next;
         }
-        let (observations, mean) = self.mean(loads, share)?;
+        let (observations, mean) = self.mean(series, share)?;
         let log_reduced = mean.mean;
         Ok(Consistent {
             observations,
@@ -166,12 +173,12 @@ impl<L: ContactLaw> ContactEstimator<L> {
 
     fn answer<T: RealField + Copy>(
         &self,
-        loads: &[LoadState<f64>],
+        series: &LoadSeries<f64>,
         centre: &Consistent,
     ) -> Result<(f64, f64, Interval<T>), ElasticityError> {
         let known = centre.mean.standard_error.is_finite();
         let limit = |reach: f64| -> Option<f64> {
-            self.sample_modulus(self.consistent(loads, reach).ok()?.log_reduced)
+            self.sample_modulus(self.consistent(series, reach).ok()?.log_reduced)
         };
         let lower = if known {
             limit(-1.0).unwrap_or(f64::INFINITY)
@@ -184,7 +191,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
         };
         let upper = if known { limit(1.0) } else { None };
         let left = 1.0 - self.other_compliance_per_pa * centre.log_reduced.exp();
-        let error = modulus / left * centre.mean.standard_error;
+        let error = modulus / left * self.standard_error(series, &centre.mean);
         Ok((
             modulus,
             error,
@@ -292,18 +299,19 @@ struct Observation {
 }
 
 impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimator<L> {
-    fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
-        let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
-        let centre = self.consistent(&loads, 0.0)?;
-        let (modulus, error, interval_95) = self.answer(&loads, &centre)?;
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+        let series = series.widened();
+        let loads = series.loads();
+        let centre = self.consistent(&series, 0.0)?;
+        let (modulus, error, interval_95) = self.answer(&series, &centre)?;
         let Consistent {
             observations: all,
             mean,
             ..
         } = &centre;
-        let diagnostics = self.diagnose(&loads, all, mean);
+        let diagnostics = self.diagnose(loads, all, mean);
         let mut warnings = self.warn(&diagnostics, mean, interval_95.upper.is_some());
-        warnings.extend(self.layer_warnings(&loads));
+        warnings.extend(self.layer_warnings(loads));
         Ok(ModulusEstimate {
             youngs_modulus_pa: narrow(modulus),
             standard_error_pa: narrow(error),

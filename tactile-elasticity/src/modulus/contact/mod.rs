@@ -14,11 +14,10 @@ pub use indenters::{
 };
 
 use super::law::ContactLaw;
-use super::source::finite;
 use crate::contact::{Body, Waveguide};
-use crate::error::{ElasticityError, Quantity, not_negative, poisson};
+use crate::error::{ElasticityError, poisson};
 use crate::scalar::widen;
-use nalgebra::{DMatrix, RealField};
+use nalgebra::RealField;
 
 /// Which of the observations a contact estimator uses.
 ///
@@ -31,7 +30,7 @@ use nalgebra::{DMatrix, RealField};
 /// let load = LoadState::new(Estimate::new(1e-3, 1e-5))
 ///     .with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6))
 ///     .with_indentation(Estimate::new(contact.indentation_m + 2e-5, 1e-6));
-/// let modulus = HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::ContactRadius).estimate(&[load])?;
+/// let modulus = HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::ContactRadius).estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -50,12 +49,12 @@ pub enum Evidence {
 /// Young's modulus by a law F = E* f(x); see [`HertzSphere`], [`FlatPunch`], [`Cone`].
 ///
 /// ```
-/// use nalgebra::DMatrix;
 /// use tactile_elasticity::contact::{Body, HertzContact, Layer, Waveguide};
 /// use tactile_elasticity::modulus::*;
 ///
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let loads = [LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6))];
+/// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
+/// let loads = LoadSeries::new([load]);
 /// let rigid = HertzSphere::new(5e-3, 0.5)?;
 /// assert_eq!(rigid.law().kind(), EstimatorKind::HertzSphere);
 /// let plain = rigid.estimate(&loads)?;
@@ -68,12 +67,8 @@ pub enum Evidence {
 /// assert!(on_gel.youngs_modulus_pa > 1.3 * plain.youngs_modulus_pa);
 ///
 /// // What all loads share is not averaged away.
-/// let careful = rigid
-///     .with_force_covariance(&DMatrix::from_element(1, 1, 1e-10))?
-///     .with_force_scale_error(0.01)?
-///     .with_length_scale_error(0.005)?
-///     .with_size_error(0.002)?
-///     .estimate(&loads)?;
+/// let shared = SharedErrors { force_scale: 0.01, length_scale: 0.005, size: 0.002, ..SharedErrors::default() };
+/// let careful = rigid.estimate(&loads.with_shared_errors(shared)?)?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -83,10 +78,6 @@ pub struct ContactEstimator<L> {
     poisson_ratio: f64,
     other_compliance_per_pa: f64,
     evidence: Evidence,
-    force_covariance: Option<DMatrix<f64>>,
-    force_scale_error: f64,
-    length_scale_error: f64,
-    size_error: f64,
 }
 
 impl<L: ContactLaw> ContactEstimator<L> {
@@ -99,10 +90,6 @@ impl<L: ContactLaw> ContactEstimator<L> {
             poisson_ratio: poisson(widen(poisson_ratio))?,
             other_compliance_per_pa: 0.0,
             evidence: Evidence::All,
-            force_covariance: None,
-            force_scale_error: 0.0,
-            length_scale_error: 0.0,
-            size_error: 0.0,
         })
     }
 
@@ -125,63 +112,15 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// Which observations to use.
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, Evidence, HertzSphere, LoadState, ModulusEstimator};
+    /// use tactile_elasticity::modulus::{Estimate, Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
     ///
     /// // Only the radius was measured, and only the indentation is to be used.
     /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(0.45e-3_f64, 1e-6));
-    /// assert!(HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::Indentation).estimate(&[load]).is_err());
+    /// assert!(HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::Indentation).estimate(&LoadSeries::new([load])).is_err());
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn with_evidence(mut self, evidence: Evidence) -> Self {
         self.evidence = evidence;
         self
-    }
-
-    /// Covariance of the forces (N²), one row per load; replaces their standard errors.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotFinite`]; the size is checked against the loads.
-    pub fn with_force_covariance<T: RealField + Copy>(
-        mut self,
-        covariance: &DMatrix<T>,
-    ) -> Result<Self, ElasticityError> {
-        self.force_covariance = Some(finite(covariance, Quantity::Force)?);
-        Ok(self)
-    }
-
-    /// Relative error that all forces share (the slope of one calibration).
-    ///
-    /// # Errors
-    /// [`ElasticityError::Negative`].
-    pub fn with_force_scale_error<T: RealField + Copy>(
-        mut self,
-        relative: T,
-    ) -> Result<Self, ElasticityError> {
-        self.force_scale_error = not_negative(widen(relative), Quantity::StandardError)?;
-        Ok(self)
-    }
-
-    /// Relative error that all lengths share (the size of a pixel).
-    ///
-    /// # Errors
-    /// [`ElasticityError::Negative`].
-    pub fn with_length_scale_error<T: RealField + Copy>(
-        mut self,
-        relative: T,
-    ) -> Result<Self, ElasticityError> {
-        self.length_scale_error = not_negative(widen(relative), Quantity::StandardError)?;
-        Ok(self)
-    }
-
-    /// Relative error of the indenter's size (radius, or tangent of the half angle).
-    ///
-    /// # Errors
-    /// [`ElasticityError::Negative`].
-    pub fn with_size_error<T: RealField + Copy>(
-        mut self,
-        relative: T,
-    ) -> Result<Self, ElasticityError> {
-        self.size_error = not_negative(widen(relative), Quantity::StandardError)?;
-        Ok(self)
     }
 }

@@ -2,31 +2,34 @@
 
 mod line;
 
-use crate::error::{ElasticityError, Quantity, not_negative};
+use crate::error::{ElasticityError, Quantity};
 use crate::modulus::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 use crate::modulus::load::LoadState;
 use crate::modulus::ratio::{strain_warnings, stress};
+use crate::modulus::series::LoadSeries;
 use crate::modulus::statistics::{effective_degrees, fewest, quantile_95, t_tail};
 use crate::modulus::warning::Warning;
-use crate::scalar::{narrow, widen};
+use crate::scalar::narrow;
 use line::{Line, Point};
 use nalgebra::RealField;
 
 /// Whether the line may miss the origin.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, Intercept, LoadState, ModulusEstimator, StressStrainRegression, Warning};
+/// use tactile_elasticity::modulus::{
+///     Estimate, Intercept, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, Warning,
+/// };
 ///
 /// // Stress that starts at 300 Pa: a gauge that was not tared.
-/// let loads: Vec<_> = [0.01, 0.02, 0.03, 0.04]
+/// let loads = [0.01, 0.02, 0.03, 0.04]
 ///     .map(|strain: f64| {
 ///         LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
 ///             .with_contact_area(Estimate::exact(1e-4))
 ///             .with_mean_strain(Estimate::exact(strain))
-///     })
-///     .to_vec();
+///     });
+/// let loads = LoadSeries::new(loads);
 /// let tested = StressStrainRegression::new().estimate(&loads)?;
 /// assert!(tested.warnings.iter().any(|w| matches!(w, Warning::Intercept { .. })));
 /// let forced = StressStrainRegression::new().with_intercept(Intercept::Zero).estimate(&loads)?;
@@ -50,13 +53,13 @@ pub enum Intercept {
 /// zero intercept are given.
 ///
 /// ```
-/// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, StressStrainRegression};
+/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression};
 /// let load = |stress: f64, strain: f64| {
 ///     LoadState::new(Estimate::new(stress * 1e-6, 1e-5)) // on one square millimetre
 ///         .with_contact_area(Estimate::exact(1e-6))
 ///         .with_mean_strain(Estimate::new(strain, 1e-4))
 /// };
-/// let loads = [load(600.0, 0.01), load(1200.0, 0.02), load(2400.0, 0.04)];
+/// let loads = LoadSeries::new([load(600.0, 0.01), load(1200.0, 0.02), load(2400.0, 0.04)]);
 /// let modulus = StressStrainRegression::new().estimate(&loads)?;
 /// assert!((modulus.youngs_modulus_pa - 60e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -64,7 +67,6 @@ pub enum Intercept {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StressStrainRegression {
     intercept: Intercept,
-    stress_scale_error: f64,
 }
 
 impl StressStrainRegression {
@@ -76,7 +78,7 @@ impl StressStrainRegression {
     /// How the intercept is treated.
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, Intercept, LoadState, ModulusEstimator, StressStrainRegression};
+    /// use tactile_elasticity::modulus::{Estimate, Intercept, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression};
     ///
     /// let load = |strain: f64| {
     ///     LoadState::new(Estimate::new(60e3 * strain * 1e-4, 1e-4))
@@ -84,41 +86,12 @@ impl StressStrainRegression {
     ///         .with_mean_strain(Estimate::exact(strain))
     /// };
     /// let line = StressStrainRegression::new().with_intercept(Intercept::Zero);
-    /// assert!((line.estimate(&[load(0.01), load(0.02)])?.youngs_modulus_pa - 60e3).abs() < 1e-6);
+    /// assert!((line.estimate(&LoadSeries::new([load(0.01), load(0.02)]))?.youngs_modulus_pa - 60e3).abs() < 1e-6);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn with_intercept(mut self, intercept: Intercept) -> Self {
         self.intercept = intercept;
         self
-    }
-
-    /// Relative error that all stresses share (the slope of one calibration).
-    ///
-    /// # Errors
-    /// [`ElasticityError::Negative`].
-    ///
-    /// ```
-    /// use tactile_elasticity::modulus::{Estimate, LoadState, ModulusEstimator, StressStrainRegression};
-    ///
-    /// // However many loads, one calibration known to 2 % gives a modulus known to 2 %.
-    /// let loads: Vec<_> = (1..100)
-    ///     .map(|k| 1e-3 * f64::from(k))
-    ///     .map(|strain| {
-    ///         LoadState::new(Estimate::new(6.0 * strain, 1e-4))
-    ///             .with_contact_area(Estimate::exact(1e-4))
-    ///             .with_mean_strain(Estimate::exact(strain))
-    ///     })
-    ///     .collect();
-    /// let modulus = StressStrainRegression::new().with_stress_scale_error(0.02)?.estimate(&loads)?;
-    /// assert!(modulus.standard_error_pa >= 0.02 * modulus.youngs_modulus_pa);
-    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
-    /// ```
-    pub fn with_stress_scale_error<T: RealField + Copy>(
-        mut self,
-        relative: T,
-    ) -> Result<Self, ElasticityError> {
-        self.stress_scale_error = not_negative(widen(relative), Quantity::StandardError)?;
-        Ok(self)
     }
 
     fn points(loads: &[LoadState<f64>]) -> Result<Vec<Point>, ElasticityError> {
@@ -162,7 +135,7 @@ impl StressStrainRegression {
     }
 
     /// Degrees of freedom of the slope's error: those of the scatter, or of the sources, the stresses counted as one.
-    fn degrees(&self, points: &[Point], line: &Line) -> Option<f64> {
+    fn degrees(points: &[Point], line: &Line, scale_error: f64) -> Option<f64> {
         if line.learnt {
             return Some(line.degrees as f64);
         }
@@ -185,7 +158,7 @@ impl StressStrainRegression {
                 unit * strain,
                 fewest(points.iter().map(|p| p.strain.degrees_of_freedom)),
             ),
-            ((line.slope * self.stress_scale_error).powi(2), None),
+            ((line.slope * scale_error).powi(2), None),
         ])
     }
 
@@ -263,9 +236,10 @@ fn fit_statistics<T: RealField + Copy>(
 }
 
 impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
-    fn estimate(&self, loads: &[LoadState<T>]) -> Result<ModulusEstimate<T>, ElasticityError> {
-        let loads: Vec<_> = loads.iter().map(LoadState::widened).collect();
-        let points = Self::points(&loads)?;
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+        let series = series.widened();
+        let loads = series.loads();
+        let points = Self::points(loads)?;
         let known = points
             .iter()
             .any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0);
@@ -280,8 +254,9 @@ impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
                 strain: p.1,
             });
         }
-        let error = line.slope_error.hypot(line.slope * self.stress_scale_error);
-        let reach = error * quantile_95(self.degrees(&points, &line));
+        let scale_error = series.stress_scale_error();
+        let error = line.slope_error.hypot(line.slope * scale_error);
+        let reach = error * quantile_95(Self::degrees(&points, &line, scale_error));
         Ok(ModulusEstimate {
             youngs_modulus_pa: narrow(line.slope),
             standard_error_pa: narrow(error),
@@ -292,7 +267,7 @@ impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
             estimator: EstimatorKind::StressStrainRegression,
             loads: diagnostics(&points, &line, known, loads.len()),
             fit: fit_statistics(&points, &line, known),
-            warnings: self.warnings(&loads, &line),
+            warnings: self.warnings(loads, &line),
         })
     }
 

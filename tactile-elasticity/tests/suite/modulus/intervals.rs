@@ -7,9 +7,7 @@ use super::*;
 fn intervals_cover_what_they_promise() {
     let estimator = HertzSphere::new(4e-3, NU)
         .unwrap()
-        .with_waveguide(&waveguide())
-        .with_force_scale_error(0.01)
-        .unwrap();
+        .with_waveguide(&waveguide());
     let clean = hertz_loads(waveguide().as_body(), &[2e-3, 4e-3, 6e-3, 8e-3]);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut covered = 0;
@@ -26,9 +24,10 @@ fn intervals_cover_what_they_promise() {
                 .with_contact_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
             })
             .collect();
+        let series = LoadSeries::new(loads).with_shared_errors(force_scale(0.01));
         covered += usize::from(
             estimator
-                .estimate(&loads)
+                .estimate(&series.unwrap())
                 .unwrap()
                 .interval_95
                 .contains(SAMPLE),
@@ -45,17 +44,11 @@ fn a_force_covariance_says_the_same_as_a_shared_scale() {
     let plain = HertzSphere::new(4e-3, NU)
         .unwrap()
         .with_evidence(Evidence::ContactRadius);
-    let one = plain
-        .clone()
-        .with_force_covariance(&covariance)
-        .unwrap()
-        .estimate(&loads)
-        .unwrap();
-    let other = plain
-        .with_force_scale_error(0.01)
-        .unwrap()
-        .estimate(&loads)
-        .unwrap();
+    let series = LoadSeries::new(loads);
+    let correlated = series.clone().with_force_covariance(&covariance).unwrap();
+    let one = plain.estimate(&correlated).unwrap();
+    let scaled = series.with_shared_errors(force_scale(0.01)).unwrap();
+    let other = plain.estimate(&scaled).unwrap();
     assert!((one.standard_error_pa / other.standard_error_pa - 1.0).abs() < 1e-6);
     assert!((one.standard_error_pa / SAMPLE - 0.01).abs() < 1e-6);
 }
@@ -66,7 +59,7 @@ fn one_load_without_errors_has_no_interval() {
     let only = HertzSphere::new(4e-3, NU)
         .unwrap()
         .with_evidence(Evidence::ContactRadius)
-        .estimate(&loads)
+        .estimate(&LoadSeries::new(loads))
         .unwrap();
     assert!(only.warnings.contains(&Warning::NoErrorEstimate) && only.interval_95.upper.is_none());
 }
@@ -78,27 +71,23 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
             .with_contact_area(exact(1e-4))
             .with_mean_strain(exact(strain))
     };
-    let loads = [load(0.02, 0.0), load(0.08, 0.01)];
+    let loads = LoadSeries::new([load(0.02, 0.0), load(0.08, 0.01)]);
     let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
     let shared = DMatrix::from_fn(2, 2, |i, j| {
         (0.01f64).powi(2) * [0.02, 0.08][i] * [0.02, 0.08][j]
     });
-    let common = ratio
-        .clone()
-        .with_force_covariance(&shared)
-        .unwrap()
-        .estimate(&loads)
-        .unwrap();
+    let correlated = loads.clone().with_force_covariance(&shared).unwrap();
+    let common = ratio.estimate(&correlated).unwrap();
     // One factor on both forces is one factor on their difference: 1 %.
     assert!((common.standard_error_pa / common.youngs_modulus_pa - 0.01).abs() < 1e-12);
     // Independent errors of 1 % of 20 and 80 mN on a difference of 60 mN.
     let apart = ratio.estimate(&loads).unwrap();
     let expected = 0.01 * 0.02f64.hypot(0.08) / 0.06;
     assert!((apart.standard_error_pa / apart.youngs_modulus_pa - expected).abs() < 1e-12);
-    let wrong = PaperRatio::new()
-        .with_force_covariance(&DMatrix::<f64>::zeros(3, 3))
-        .unwrap();
-    let mismatch = wrong.estimate(&[load(0.08, 0.01)]).unwrap_err();
+    let wrong = LoadSeries::new([load(0.08, 0.01)]);
+    let mismatch = wrong
+        .with_force_covariance(&DMatrix::zeros(3, 3))
+        .unwrap_err();
     assert_eq!(
         mismatch,
         ElasticityError::LengthMismatch {
@@ -113,11 +102,11 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
 #[test]
 fn errors_learnt_from_few_repetitions_widen_the_interval() {
     let load = |force: Estimate<f64>, strain: Estimate<f64>| {
-        [LoadState::new(force)
+        LoadSeries::new([LoadState::new(force)
             .with_contact_area(exact(1e-4))
-            .with_mean_strain(strain)]
+            .with_mean_strain(strain)])
     };
-    let half_width = |loads: &[LoadState<f64>]| {
+    let half_width = |loads: &LoadSeries<f64>| {
         let found = PaperRatio::new().estimate(loads).unwrap();
         (found.interval_95.upper.unwrap() / found.interval_95.lower).ln() / 2.0
             * found.youngs_modulus_pa

@@ -62,7 +62,7 @@ fn layers_invert_themselves_thick_or_thin() {
     finds(&theory(LayerTheory::IntegralEquation), &loads);
     // The published series errs as its authors' readers found; the corrected one only where χ is large.
     let off = |t, i: usize| {
-        ModulusEstimator::<f64>::estimate(&theory(t), &loads[i..=i])
+        ModulusEstimator::<f64>::estimate(&theory(t), &LoadSeries::new(&loads[i..=i]))
             .unwrap()
             .youngs_modulus_pa
             / SAMPLE
@@ -71,8 +71,11 @@ fn layers_invert_themselves_thick_or_thin() {
     assert!(off(LayerTheory::CorrectedSeries, 0).abs() < 1e-5);
     assert!(off(LayerTheory::CorrectedSeries, 1).abs() < 5e-3);
     assert!(off(LayerTheory::PublishedSeries, 1) > 0.03);
-    let thin =
-        ModulusEstimator::<f64>::estimate(&theory(LayerTheory::PublishedSeries), &loads).unwrap();
+    let thin = ModulusEstimator::<f64>::estimate(
+        &theory(LayerTheory::PublishedSeries),
+        &LoadSeries::new(loads),
+    )
+    .unwrap();
     assert!(
         thin.warnings
             .iter()
@@ -107,7 +110,12 @@ fn a_sphere_on_a_shallow_waveguide_inverts_itself() {
             .unwrap()
             .with_waveguide(&guide)
             .with_evidence(evidence);
-        estimator.estimate(&loads[1..2]).unwrap().youngs_modulus_pa / SAMPLE - 1.0
+        estimator
+            .estimate(&LoadSeries::new(&loads[1..2]))
+            .unwrap()
+            .youngs_modulus_pa
+            / SAMPLE
+            - 1.0
     };
     assert!(deep(Evidence::ContactRadius).abs() < 0.01 && deep(Evidence::Indentation) > 0.1);
 }
@@ -125,10 +133,12 @@ fn far_stiffer_samples_are_bounded_from_below_only() {
         LoadState::new(exact(f)).with_contact_radius(Estimate::new(a, 0.01 * a))
     };
     let estimator = HertzSphere::new(4e-3, NU).unwrap().with_waveguide(&guide);
-    let found = estimator.estimate(&[load(0.01, 0.0)]).unwrap();
+    let found = estimator
+        .estimate(&LoadSeries::new([load(0.01, 0.0)]))
+        .unwrap();
     assert!(found.interval_95.upper.is_none() && found.interval_95.lower > 200e3);
     assert!(found.warnings.contains(&Warning::UnboundedAbove));
-    let refused = estimator.estimate(&[load(0.01, -0.01)]);
+    let refused = estimator.estimate(&LoadSeries::new([load(0.01, -0.01)]));
     assert!(
         matches!(refused, Err(ElasticityError::StifferThanResolvable { lower_bound_pa }) if lower_bound_pa > 200e3)
     );
@@ -139,7 +149,7 @@ fn large_contacts_are_flagged_with_their_ratio() {
     let loads = hertz_loads(Body::rigid(), &[1e-3, 0.5]);
     let found = HertzSphere::new(4e-3, NU)
         .unwrap()
-        .estimate(&loads)
+        .estimate(&LoadSeries::new(loads))
         .unwrap();
     assert_eq!(found.warnings.len(), 1);
     assert!(
@@ -160,7 +170,7 @@ fn f32_agrees_with_f64() {
         .collect();
     let found = HertzSphere::new(4e-3f32, NU as f32)
         .unwrap()
-        .estimate(&single)
+        .estimate(&LoadSeries::new(single))
         .unwrap();
     // Three roundings of a at 6·10⁻⁸ each, cubed.
     assert!((f64::from(found.youngs_modulus_pa) / SAMPLE - 1.0).abs() < 1e-6);
@@ -169,8 +179,9 @@ fn f32_agrees_with_f64() {
 #[test]
 fn loads_choose_their_law() {
     let forces = [1e-3, 4e-3, 1.6e-2];
-    let candidates = sphere_as_sample(4e-3, NU, &waveguide()).unwrap();
-    let choice = select_estimator(&candidates, &between_plates(&forces, 0.003)).unwrap();
+    let candidates = BestOf::sphere_as_sample(4e-3, NU, &waveguide()).unwrap();
+    let series = LoadSeries::new(between_plates(&forces, 0.003));
+    let choice = candidates.select(&series).unwrap();
     assert_eq!(
         choice.chosen().estimator,
         EstimatorKind::SphereBetweenPlates
@@ -179,10 +190,7 @@ fn loads_choose_their_law() {
     // Hertz with one contact takes the plate's approach for twice what it is: many standard errors off.
     assert!(matches!(choice.reason, SelectionReason::BetterFit { margin } if margin > 10.0));
     assert!((choice.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 && choice.weights[0] > 0.99);
-    assert_eq!(
-        choice.estimates.len() + choice.left_out.len(),
-        candidates.len()
-    );
+    assert_eq!(choice.estimates.len() + choice.left_out.len(), 4);
 
     // A sliding layer tells itself from a glued and from a deep one.
     let equation = LayerEquation::new(&LayerKernel::new(Bond::Free, NU).unwrap());
@@ -193,11 +201,9 @@ fn loads_choose_their_law() {
         LoadState::new(exact(hertz * contact.force_ratio_same_radius))
             .with_indentation(Estimate::new(depth, 0.003 * depth))
     };
-    let layer = select_estimator(
-        &sphere_on_sample(4e-3, NU, Some(2e-3)).unwrap(),
-        &[0.2, 0.5, 0.9, 1.3].map(load),
-    )
-    .unwrap();
+    let candidates = BestOf::sphere_on_sample(4e-3, NU, Some(2e-3)).unwrap();
+    let series = LoadSeries::new([0.2, 0.5, 0.9, 1.3].map(load));
+    let layer = candidates.select(&series).unwrap();
     assert_eq!(
         layer.chosen().estimator,
         EstimatorKind::FreeLayerIntegralEquation
@@ -209,11 +215,10 @@ fn loads_choose_their_law() {
 fn one_load_is_answered_by_the_most_general_law() {
     let mut loads = between_plates(&[1e-3], 0.01);
     loads[0].indentation_m = None;
-    let choice =
-        select_estimator(&sphere_as_sample(4e-3, NU, &waveguide()).unwrap(), &loads).unwrap();
+    let candidates = BestOf::sphere_as_sample(4e-3, NU, &waveguide()).unwrap();
+    let choice = candidates.select(&LoadSeries::new(loads)).unwrap();
     assert_eq!(choice.chosen().estimator, EstimatorKind::SphereOnWaveguide);
     assert!(
         matches!(choice.reason, SelectionReason::MostGeneral { behind } if behind.abs() < 1e-9)
     );
-    assert!(select_estimator::<f64>(&[], &loads).is_err());
 }

@@ -71,8 +71,16 @@ fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState<f64>> {
     .collect()
 }
 
+/// Only the forces' common scale is in doubt.
+fn force_scale(relative: f64) -> SharedErrors<f64> {
+    SharedErrors {
+        force_scale: relative,
+        ..SharedErrors::default()
+    }
+}
+
 fn finds(estimator: &dyn ModulusEstimator<f64>, loads: &[LoadState<f64>]) {
-    let found = estimator.estimate(loads).unwrap();
+    let found = estimator.estimate(&LoadSeries::new(loads)).unwrap();
     let gap = (found.youngs_modulus_pa / SAMPLE - 1.0).abs();
     assert!(gap < 1e-9, "{}: off by {gap:e}", found.estimator);
 }

@@ -24,7 +24,9 @@ fn stress_over_strain() {
         .zip(wobble)
         .map(|(&e, w)| strained(300.0 + SAMPLE * e + w, e))
         .collect();
-    let slope = StressStrainRegression::new().estimate(&offset).unwrap();
+    let slope = StressStrainRegression::new()
+        .estimate(&LoadSeries::new(offset.as_slice()))
+        .unwrap();
     assert!((slope.youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-9);
     assert!(
         slope
@@ -34,7 +36,7 @@ fn stress_over_strain() {
     );
     assert!(
         PaperRatio::new()
-            .estimate(&offset)
+            .estimate(&LoadSeries::new(offset.as_slice()))
             .unwrap()
             .youngs_modulus_pa
             > 1.2 * SAMPLE
@@ -50,14 +52,16 @@ fn strain_counted_from_the_first_load() {
     let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
     finds(&ratio, &[first, second]);
     assert_eq!(
-        ratio.estimate(&[second]).unwrap_err(),
+        ratio.estimate(&LoadSeries::new([second])).unwrap_err(),
         ElasticityError::TooFewLoads {
             expected: 2,
             found: 1
         }
     );
     assert_eq!(
-        ratio.estimate(&[second, second]).unwrap_err(),
+        ratio
+            .estimate(&LoadSeries::new([second, second]))
+            .unwrap_err(),
         ElasticityError::EqualLoads
     );
 }
@@ -66,7 +70,7 @@ fn strain_counted_from_the_first_load() {
 fn bad_input_is_named() {
     use ElasticityError as E;
     let ratio = PaperRatio::new();
-    let fail = |load: LoadState<f64>| ratio.estimate(&[load]).unwrap_err();
+    let fail = |load: LoadState<f64>| ratio.estimate(&LoadSeries::new([load])).unwrap_err();
     assert_eq!(fail(strained(100.0, 0.0)), E::ZeroStrain);
     assert_eq!(
         fail(strained(100.0, -0.1)),
@@ -114,11 +118,13 @@ fn bad_input_is_named() {
     );
     let line = StressStrainRegression::new();
     assert_eq!(
-        line.estimate(&[strained(10.0, 0.1); 3]).unwrap_err(),
+        line.estimate(&LoadSeries::new([strained(10.0, 0.1); 3]))
+            .unwrap_err(),
         E::EqualLoads
     );
     assert_eq!(
-        line.estimate(&[strained(10.0, 0.1)]).unwrap_err(),
+        line.estimate(&LoadSeries::new([strained(10.0, 0.1)]))
+            .unwrap_err(),
         E::TooFewLoads {
             expected: 3,
             found: 1
@@ -142,7 +148,7 @@ fn bad_input_is_named() {
     let sphere = HertzSphere::new(4e-3, NU).unwrap();
     let empty: [LoadState<f64>; 0] = [];
     assert_eq!(
-        sphere.estimate(&empty).unwrap_err(),
+        sphere.estimate(&LoadSeries::new(empty)).unwrap_err(),
         E::TooFewLoads {
             expected: 1,
             found: 0
@@ -150,7 +156,7 @@ fn bad_input_is_named() {
     );
     let pulled = LoadState::new(exact(-1.0)).with_contact_radius(exact(1e-3));
     assert!(matches!(
-        sphere.estimate(&[pulled]),
+        sphere.estimate(&LoadSeries::new([pulled])),
         Err(E::NotPositive {
             quantity: Quantity::Force,
             ..
@@ -158,18 +164,39 @@ fn bad_input_is_named() {
     ));
     let flat = LoadState::new(exact(1.0)).with_contact_radius(exact(0.0));
     assert!(matches!(
-        sphere.estimate(&[flat]),
+        sphere.estimate(&LoadSeries::new([flat])),
         Err(E::NotPositive {
             quantity: Quantity::ContactRadius,
             ..
         })
     ));
-    assert!(matches!(
-        sphere.clone().with_size_error(-0.1),
-        Err(E::Negative { .. })
-    ));
-    assert!(matches!(
-        sphere.with_force_scale_error(f64::NAN),
-        Err(E::Negative { .. })
-    ));
+    for wrong in [-0.1, f64::NAN, f64::INFINITY] {
+        let none = SharedErrors::default();
+        let one_wrong = [
+            SharedErrors {
+                force_scale: wrong,
+                ..none
+            },
+            SharedErrors {
+                length_scale: wrong,
+                ..none
+            },
+            SharedErrors {
+                size: wrong,
+                ..none
+            },
+            SharedErrors {
+                poisson_ratio: wrong,
+                ..none
+            },
+            SharedErrors {
+                other_body: wrong,
+                ..none
+            },
+        ];
+        for shared in one_wrong {
+            let refused = LoadSeries::new([flat]).with_shared_errors(shared);
+            assert!(matches!(refused, Err(E::Negative { .. })));
+        }
+    }
 }

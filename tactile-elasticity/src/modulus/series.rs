@@ -1,0 +1,208 @@
+//! Loads, and the errors that they share.
+
+use super::load::LoadState;
+use super::source::{checked, finite};
+use crate::error::{ElasticityError, Quantity, not_negative};
+use crate::scalar::widen;
+use nalgebra::{DMatrix, RealField};
+
+/// Standard errors that all loads of a series share: no number of loads averages them away. Zero where negligible or unknown.
+///
+/// ```
+/// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors};
+///
+/// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(0.4543e-3_f64, 1e-6));
+/// let series = LoadSeries::new([load; 50]);
+/// let shared = SharedErrors { force_scale: 0.02, ..SharedErrors::default() };
+/// let hertz = HertzSphere::new(5e-3, 0.5)?;
+/// let averaged = hertz.estimate(&series)?;
+/// let honest = hertz.estimate(&series.with_shared_errors(shared)?)?;
+/// assert!(averaged.standard_error_pa < 0.005 * averaged.youngs_modulus_pa);
+/// assert!(honest.standard_error_pa > 0.02 * honest.youngs_modulus_pa);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SharedErrors<T> {
+    /// Relative error of all forces: the slope of one calibration.
+    pub force_scale: T,
+    /// Relative error of all lengths: the size of a pixel.
+    pub length_scale: T,
+    /// Relative error of the indenter's size: radius, or tangent of the half angle.
+    pub size: T,
+    /// Error of the sample's Poisson ratio.
+    pub poisson_ratio: T,
+    /// Relative error of the other body's compliance: the moduli of a waveguide's layers, all by one factor.
+    pub other_body: T,
+}
+
+impl<T: RealField + Copy> SharedErrors<T> {
+    fn map<U>(self, f: impl Fn(T) -> U) -> SharedErrors<U> {
+        SharedErrors {
+            force_scale: f(self.force_scale),
+            length_scale: f(self.length_scale),
+            size: f(self.size),
+            poisson_ratio: f(self.poisson_ratio),
+            other_body: f(self.other_body),
+        }
+    }
+
+    fn validated(self) -> Result<Self, ElasticityError> {
+        let errors = self.map(widen);
+        for error in [
+            errors.force_scale,
+            errors.length_scale,
+            errors.size,
+            errors.poisson_ratio,
+            errors.other_body,
+        ] {
+            not_negative(error, Quantity::StandardError)?;
+        }
+        Ok(self)
+    }
+}
+
+/// What an estimator works on: one or more loads with the errors that they share.
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
+///
+/// let load = |force, radius| {
+///     LoadState::new(Estimate::new(force, 1e-3)).with_contact_radius(Estimate::new(radius, 4e-6))
+/// };
+/// let series = LoadSeries::new([load(0.7, 1.2e-3), load(1.2, 1.4e-3)])
+///     // The offset of one calibration is in both forces.
+///     .with_force_covariance(&DMatrix::from_row_slice(2, 2, &[2e-6, 1e-6, 1e-6, 2e-6]))?
+///     .with_shared_errors(SharedErrors { length_scale: 0.002, ..SharedErrors::default() })?;
+/// assert_eq!((series.loads().len(), series.shared_errors().length_scale), (2, 0.002));
+/// assert!(series.force_covariance().is_some() && series.strain_covariance().is_none());
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadSeries<T: RealField> {
+    loads: Vec<LoadState<T>>,
+    shared: SharedErrors<T>,
+    force_covariance: Option<DMatrix<T>>,
+    strain_covariance: Option<DMatrix<T>>,
+}
+
+impl<T: RealField + Copy> LoadSeries<T> {
+    /// Loads whose errors are independent: a vector, an array or a slice of them.
+    pub fn new(loads: impl Into<Vec<LoadState<T>>>) -> Self {
+        Self {
+            loads: loads.into(),
+            shared: SharedErrors {
+                force_scale: T::zero(),
+                length_scale: T::zero(),
+                size: T::zero(),
+                poisson_ratio: T::zero(),
+                other_body: T::zero(),
+            },
+            force_covariance: None,
+            strain_covariance: None,
+        }
+    }
+
+    /// With the errors that all loads share.
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn with_shared_errors(mut self, shared: SharedErrors<T>) -> Result<Self, ElasticityError> {
+        self.shared = shared.validated()?;
+        Ok(self)
+    }
+
+    /// With the covariance of the forces (N²), a row and a column for each load; it replaces their standard errors.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`], [`ElasticityError::LengthMismatch`].
+    pub fn with_force_covariance(
+        mut self,
+        covariance: &DMatrix<T>,
+    ) -> Result<Self, ElasticityError> {
+        self.force_covariance = Some(self.accepted(covariance, Quantity::Force)?);
+        Ok(self)
+    }
+
+    /// With the covariance of the mean strains, a row and a column for each load (zeros for a load without a strain); it replaces
+    /// their standard errors. Strains counted from one frame share its errors.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`], [`ElasticityError::LengthMismatch`].
+    ///
+    /// ```
+    /// use nalgebra::DMatrix;
+    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
+    ///
+    /// let load = LoadState::new(Estimate::new(0.12_f64, 1e-3)).with_mean_strain(Estimate::exact(0.02));
+    /// let series = LoadSeries::new([load; 2]);
+    /// assert!(series.clone().with_strain_covariance(&DMatrix::from_element(3, 3, 1e-8)).is_err());
+    /// assert!(series.with_strain_covariance(&DMatrix::from_element(2, 2, 1e-8)).is_ok());
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn with_strain_covariance(
+        mut self,
+        covariance: &DMatrix<T>,
+    ) -> Result<Self, ElasticityError> {
+        self.strain_covariance = Some(self.accepted(covariance, Quantity::Strain)?);
+        Ok(self)
+    }
+
+    fn accepted(
+        &self,
+        covariance: &DMatrix<T>,
+        quantity: Quantity,
+    ) -> Result<DMatrix<T>, ElasticityError> {
+        finite(covariance, quantity)?;
+        Ok(checked(covariance, self.loads.len(), quantity)?.clone())
+    }
+
+    /// The loads, in the order given.
+    pub fn loads(&self) -> &[LoadState<T>] {
+        &self.loads
+    }
+
+    /// The errors that all loads share.
+    pub fn shared_errors(&self) -> &SharedErrors<T> {
+        &self.shared
+    }
+
+    /// The covariance of the forces, where one was given.
+    pub fn force_covariance(&self) -> Option<&DMatrix<T>> {
+        self.force_covariance.as_ref()
+    }
+
+    /// The covariance of the mean strains, where one was given.
+    pub fn strain_covariance(&self) -> Option<&DMatrix<T>> {
+        self.strain_covariance.as_ref()
+    }
+
+    /// The same series in f64, in which estimators work.
+    pub(crate) fn widened(&self) -> LoadSeries<f64> {
+        let matrix = |m: &DMatrix<T>| m.map(widen);
+        LoadSeries {
+            loads: self.loads.iter().map(LoadState::widened).collect(),
+            shared: self.shared.map(widen),
+            force_covariance: self.force_covariance.as_ref().map(matrix),
+            strain_covariance: self.strain_covariance.as_ref().map(matrix),
+        }
+    }
+
+    /// The series with other loads.
+    pub(crate) fn with_loads(&self, loads: Vec<LoadState<T>>) -> Self {
+        Self {
+            loads,
+            ..self.clone()
+        }
+    }
+}
+
+impl LoadSeries<f64> {
+    /// Relative error that all stresses F/A share; areas go as the square of lengths.
+    pub(crate) fn stress_scale_error(&self) -> f64 {
+        self.shared
+            .force_scale
+            .hypot(2.0 * self.shared.length_scale)
+    }
+}
