@@ -9,6 +9,7 @@ mod dense_sets;
 mod drift;
 mod hostile;
 mod labelling_against_dense;
+mod recorded;
 mod reference;
 mod relaxation;
 #[cfg(feature = "serde")]

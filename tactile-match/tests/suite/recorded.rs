@@ -1,0 +1,204 @@
+//! Recorded answers: what every matcher returned on small scenes when the numbers were last meant to change.
+//!
+//! A change that is to leave the numbers alone passes; one that is to change them writes the record anew with
+//! `RECORD_ANSWERS=1 cargo test -p tactile-match --test suite recorded` and shows the difference in review.
+
+use crate::common::{Stream, bend, reordered, rotation, scattered};
+use nalgebra::{Point, Point2, SVector};
+use std::fmt::Write;
+use std::path::Path;
+use tactile_match::dense::Neighbourhood;
+use tactile_match::{
+    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, MatchSeries,
+    Matching, Motion, NearestNeighbour, Outliers, PointMatcher, RelaxationMatcher,
+    RelaxationOptions, Rotation, Search, SparseRelaxation,
+};
+
+/// A model and its target.
+struct Scene<const D: usize> {
+    name: &'static str,
+    model: Vec<Point<f64, D>>,
+    target: Vec<Point<f64, D>>,
+}
+
+/// A normal deviate, nearly: the sum of twelve uniform ones.
+fn deviate(stream: &mut Stream) -> f64 {
+    (0..12).map(|_| stream.next()).sum::<f64>() - 6.0
+}
+
+/// The scenes that every matcher is recorded on.
+fn scenes<const D: usize>() -> Vec<Scene<D>> {
+    let mut stream = Stream::new(11);
+    let model = scattered::<f64, D>(50, 12);
+    let bent = bend(&model, 0.06);
+    let order = stream.permutation(50);
+    let clean = reordered(&bent, &order);
+    let noise: Vec<_> = clean
+        .iter()
+        .map(|p| p + SVector::from_fn(|_, _| 0.015 * deviate(&mut stream)))
+        .collect();
+    let mut outliers = clean.clone();
+    outliers
+        .extend((0..8).map(|_| Point::from(SVector::from_fn(|_, _| 1.2 * stream.next() - 0.1))));
+    let occluded = clean[..40].to_vec();
+    let turn = rotation::<f64, D>(2.0);
+    let turned = clean.iter().map(|p| turn * p).collect();
+    [
+        ("clean", clean),
+        ("noise", noise),
+        ("outliers", outliers),
+        ("occlusion", occluded),
+        ("rotation", turned),
+    ]
+    .map(|(name, target)| Scene {
+        name,
+        model: model.clone(),
+        target,
+    })
+    .into()
+}
+
+/// A jittered sunflower's disc, turned a little: parts of it settle one point aside at first.
+fn dense_scene() -> Scene<2> {
+    let mut stream = Stream::new(13);
+    let model: Vec<Point2<f64>> = (0..600)
+        .map(|i| {
+            let (r, angle) = (((i as f64 + 0.5) / 600.0).sqrt(), 2.399_963 * f64::from(i));
+            let mut jitter = || 0.009 * (2.0 * stream.next() - 1.0);
+            Point2::new(r * angle.cos() + jitter(), r * angle.sin() + jitter())
+        })
+        .collect();
+    let turn = rotation::<f64, 2>(0.12);
+    let target = bend(&model, 0.03).iter().map(|p| turn * p).collect();
+    Scene {
+        name: "dense set",
+        model,
+        target,
+    }
+}
+
+/// Numbers that change when anything in an answer does: the counts and the report as they are, of the arrays their sums with weights
+/// that tell the rows apart.
+fn digest<const D: usize>(name: &str, found: &Matching<f64, D>) -> String {
+    let weight = |i: usize| (1.0 + i as f64).sin();
+    let sum = |values: &mut dyn Iterator<Item = f64>| -> f64 {
+        values.enumerate().map(|(i, v)| weight(i) * v).sum()
+    };
+    let partner = |j: &Option<usize>| j.map_or(-1.0, |j| j as f64);
+    let report = &found.report;
+    let numbers = [
+        report.iterations as f64,
+        report.starts as f64,
+        found.assignment.iter().flatten().count() as f64,
+        sum(&mut found.assignment.iter().map(partner)),
+        sum(&mut found.warped.iter().flat_map(|p| p.iter().copied())),
+        sum(&mut found.confidence.iter().copied()),
+        sum(&mut (0..found.soft.rows())
+            .map(|i| found.soft.row(i).map(|(j, p)| weight(j) * p).sum())),
+        sum(&mut found.displacement_covariance.iter().map(|c| c.trace())),
+        sum(&mut found.energy.iter().copied()),
+        report.residual,
+        report.sigma,
+        found
+            .warp
+            .apply(&Point::from(SVector::repeat(0.4)))
+            .coords
+            .sum(),
+    ];
+    let mut line = format!("{name}: {:?}", report.stop);
+    for number in numbers {
+        write!(line, " {number:.15e}").expect("a string takes everything");
+    }
+    line
+}
+
+/// All answers, a line each.
+fn answers() -> String {
+    let mut lines = Vec::new();
+    of_dimension::<2>(&mut lines);
+    of_dimension::<3>(&mut lines);
+    let scene = dense_scene();
+    let found = RelaxationMatcher::default().match_points(&scene.model, &scene.target);
+    lines.push(digest("default, dense set", &found.expect("finite points")));
+    lines.join("\n") + "\n"
+}
+
+fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
+    let options = RelaxationOptions::default();
+    let fast = |options| Box::new(RelaxationMatcher::new(options));
+    let drift = |motion| {
+        let options = DriftOptions {
+            motion,
+            ..Default::default()
+        };
+        Box::new(CoherentPointDrift::new(options).expect("valid options"))
+    };
+    let few = DenseOptions {
+        neighbourhood: Neighbourhood::Nearest(6),
+        ..Default::default()
+    };
+    let dense = DenseRelaxation::new(few).expect("valid options");
+    let sparse = SparseRelaxation::new(few, 10).expect("valid options");
+    let share = options.stray_share(0.2).expect("valid share");
+    let matchers: [(&str, Box<dyn PointMatcher<f64, D>>); 12] = [
+        ("default", fast(options)),
+        ("near", fast(options.search(Search::Near))),
+        ("any rotation", fast(options.rotation(Rotation::Any))),
+        ("outlier ratio 0.2", fast(share)),
+        ("model outliers", fast(options.outliers(Outliers::Model))),
+        ("dense relaxation", Box::new(dense)),
+        ("sparse relaxation", Box::new(sparse)),
+        ("drift", drift(Motion::NON_RIGID)),
+        ("rigid drift", drift(Motion::Rigid)),
+        ("affine drift", drift(Motion::Affine)),
+        ("assignment", Box::new(LinearAssignment::new())),
+        ("nearest", Box::new(NearestNeighbour::new())),
+    ];
+    for scene in scenes::<D>() {
+        for (name, matcher) in &matchers {
+            let found = matcher.match_points(&scene.model, &scene.target);
+            let name = format!("{name}, {}, {D}-D", scene.name);
+            lines.push(digest(&name, &found.expect("finite points")));
+        }
+    }
+    let scenes = scenes::<D>();
+    let (model, matcher) = (&scenes[0].model, fast(options.search(Search::Near)));
+    let mut series = MatchSeries::new();
+    for step in 1..4 {
+        let target = bend(model, 0.02 * f64::from(step));
+        let found = matcher.match_next(&mut series, model, &target);
+        lines.push(digest(
+            &format!("series, step {step}, {D}-D"),
+            &found.expect("finite points"),
+        ));
+    }
+}
+
+/// Points have coordinates of size one: sums of a few hundred of them in another order differ by less.
+const TOLERANCE: f64 = 1e-12;
+
+#[test]
+fn answers_are_those_recorded() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/recorded_answers.txt");
+    let found = answers();
+    if std::env::var_os("RECORD_ANSWERS").is_some() {
+        std::fs::write(&path, &found).expect("the folder can be written");
+    }
+    let recorded = std::fs::read_to_string(&path).expect("the record is committed");
+    assert_eq!(found.lines().count(), recorded.lines().count());
+    for (found, recorded) in found.lines().zip(recorded.lines()) {
+        let (name, numbers) = found.split_once(": ").expect("a name");
+        let (recorded_name, recorded) = recorded.split_once(": ").expect("a name");
+        assert_eq!(name, recorded_name);
+        for (a, b) in numbers.split(' ').zip(recorded.split(' ')) {
+            let same = match (a.parse::<f64>(), b.parse::<f64>()) {
+                (Ok(a), Ok(b)) => (a - b).abs() <= TOLERANCE * b.abs().max(1.0),
+                _ => a == b,
+            };
+            assert!(
+                same,
+                "{name}: {a}, recorded {b}\nfound    {numbers}\nrecorded {recorded}"
+            );
+        }
+    }
+}
