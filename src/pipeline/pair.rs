@@ -3,7 +3,7 @@ use super::error::PipelineError;
 use super::stages::Stages;
 use super::strain_error::mean_strain_error;
 use crate::elasticity::field::{StrainField, StrainSummary};
-use crate::matching::{MatchSeries, Matching};
+use crate::matching::{Matching, WarmStart};
 use crate::tps::Warp;
 use nalgebra::{Matrix3, Point3};
 
@@ -60,16 +60,16 @@ pub(super) fn match_points(
         .map_err(|source| PipelineError::Match { from, to, source })
 }
 
-/// As [`match_points`], from where the last match of a series ended.
+/// As [`match_points`], from where the matcher's last match ended.
 pub(super) fn match_next(
     stages: &dyn Stages,
     frames: [usize; 2],
-    series: &mut MatchSeries<f64, 3>,
+    warm: &mut WarmStart,
     model: &[Point3<f64>],
     target: &[Point3<f64>],
 ) -> Result<Matching<f64, 3>, PipelineError> {
     let [from, to] = frames;
-    let found = stages.matcher().match_next(series, model, target);
+    let found = stages.matcher().match_next(warm, model, target);
     found.map_err(|source| PipelineError::Match { from, to, source })
 }
 

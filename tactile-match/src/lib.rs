@@ -25,10 +25,10 @@ mod hard;
 mod matching;
 mod nearest;
 mod relaxation;
-mod series;
 mod shape_context;
 mod soft;
 mod validate;
+mod warm_start;
 
 pub use assignment::{AssignmentWorkspace, linear_assignment};
 pub use assignment_matcher::LinearAssignment;
@@ -41,6 +41,6 @@ pub use relaxation::{
     Labelling, Outliers, PointSets, RelaxationMatch, RelaxationMatcher, RelaxationOptions,
     RelaxationWorkspace, Rotation, Search,
 };
-pub use series::MatchSeries;
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;
+pub use warm_start::WarmStart;

@@ -1,7 +1,8 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
-use crate::{MatchError, MatchSeries, SoftMatches};
+use crate::{MatchError, SoftMatches, WarmStart};
 use nalgebra::{Point, SMatrix};
+use std::sync::Arc;
 use tactile_tps::{Scalar, Warp};
 
 /// Finds which model point is which target point, and the warp that takes the model onto the target.
@@ -36,19 +37,18 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError>;
 
-    /// As [`match_points`](Self::match_points), for the next target of a series: a matcher may begin where the last match of
-    /// the same model ended ([`MatchSeries`]). The others match anew.
+    /// As [`match_points`](Self::match_points), for the next target of a series: a matcher may begin where its last match of the same
+    /// model ended, with what it keeps in `warm` ([`WarmStart`]). By default the match is made anew.
     ///
     /// ```
     /// use nalgebra::Point2;
-    /// use tactile_match::{LinearAssignment, MatchSeries, PointMatcher};
+    /// use tactile_match::{LinearAssignment, PointMatcher, WarmStart};
     /// let model = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]].map(Point2::from);
-    /// let (matcher, mut series) = (LinearAssignment::new(), MatchSeries::new());
+    /// let (matcher, mut warm) = (LinearAssignment::new(), WarmStart::new());
     /// for step in [0.1, 0.2] {
     ///     let target = model.map(|p| Point2::new(p.x + step, p.y));
-    ///     assert_eq!(matcher.match_next(&mut series, &model, &target)?.assignment[2], Some(2));
+    ///     assert_eq!(matcher.match_next(&mut warm, &model, &target)?.assignment[2], Some(2));
     /// }
-    /// assert!((series.last_for(&model).unwrap()[0] - Point2::new(0.2, 0.0)).norm() < 1e-12);
     /// # Ok::<(), tactile_match::MatchError>(())
     /// ```
     ///
@@ -56,15 +56,43 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
     /// As [`match_points`](Self::match_points).
     fn match_next(
         &self,
-        series: &mut MatchSeries<T, D>,
+        warm: &mut WarmStart,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        let found = self.match_points(model, target)?;
-        series.remember(model, &found);
-        Ok(found)
+        let _ = warm;
+        self.match_points(model, target)
     }
 }
+
+/// Passes the calls on to what a pointer points to, so that a boxed or shared matcher is a matcher.
+macro_rules! matcher_behind {
+    ($pointer:ident) => {
+        impl<T: Scalar, const D: usize, M: PointMatcher<T, D> + ?Sized> PointMatcher<T, D>
+            for $pointer<M>
+        {
+            fn match_points(
+                &self,
+                model: &[Point<T, D>],
+                target: &[Point<T, D>],
+            ) -> Result<Matching<T, D>, MatchError> {
+                (**self).match_points(model, target)
+            }
+
+            fn match_next(
+                &self,
+                warm: &mut WarmStart,
+                model: &[Point<T, D>],
+                target: &[Point<T, D>],
+            ) -> Result<Matching<T, D>, MatchError> {
+                (**self).match_next(warm, model, target)
+            }
+        }
+    };
+}
+
+matcher_behind!(Box);
+matcher_behind!(Arc);
 
 /// Why a matcher stopped.
 ///

@@ -3,7 +3,7 @@ use super::loads::SeenLoads;
 use crate::elasticity::modulus::SharedErrors;
 use crate::elasticity::modulus::{Estimate, LoadState};
 use crate::force::ReferenceFrame;
-use crate::matching::{MatchReport, MatchSeries};
+use crate::matching::{MatchReport, WarmStart};
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::object::{LoadReading, radius_with_floor, split_errors};
@@ -72,7 +72,7 @@ struct Anchor {
 #[derive(Default)]
 pub(super) struct FollowedStrain {
     anchor: Option<Anchor>,
-    series: MatchSeries<f64, 3>,
+    warm: WarmStart,
     surface: SurfaceWorkspace,
     last: Option<SessionStrain>,
     loads: Option<SeenLoads>,
@@ -161,7 +161,7 @@ impl FollowedStrain {
         let frames = [anchor.frame as usize, frame.number as usize];
         let start = Instant::now();
         let found = if stages.settings().skips.last_answer {
-            pair::match_next(stages, frames, &mut self.series, &anchor.points, &target)?
+            pair::match_next(stages, frames, &mut self.warm, &anchor.points, &target)?
         } else {
             pair::match_points(stages, frames, &anchor.points, &target)?
         };

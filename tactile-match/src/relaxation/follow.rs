@@ -1,8 +1,9 @@
 //! The next match of a series: from where the last one put the model.
 
 use super::frame::mean;
+use super::series::Series;
 use super::{RelaxationMatch, RelaxationMatcher, finish};
-use crate::{MatchError, MatchSeries, Matching, validate};
+use crate::{MatchError, Matching, validate};
 use nalgebra::Point;
 use std::ops::ControlFlow;
 use tactile_tps::Scalar;
@@ -19,7 +20,7 @@ impl RelaxationMatcher {
     /// there is no last match, or the run loses partners.
     pub(super) fn follow<T: Scalar, const D: usize>(
         &self,
-        series: &mut MatchSeries<T, D>,
+        series: &mut Series<T, D>,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
@@ -34,13 +35,13 @@ impl RelaxationMatcher {
                     .interpolated(model, interpolation)
             }
         };
-        series.remember(model, &found);
+        series.keep(model, &found);
         Ok(found)
     }
 
     fn go_on<T: Scalar, const D: usize>(
         &self,
-        series: &mut MatchSeries<T, D>,
+        series: &mut Series<T, D>,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Option<Matching<T, D>>, MatchError> {

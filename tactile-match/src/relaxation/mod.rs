@@ -38,6 +38,7 @@ mod options;
 mod prior;
 mod regression;
 mod search;
+mod series;
 mod soft_assign;
 mod starts;
 
@@ -46,7 +47,7 @@ pub use found::RelaxationMatch;
 pub use labelling::Labelling;
 pub use options::{Outliers, RelaxationOptions, Rotation, Search};
 
-use crate::{MatchError, MatchSeries, Matching, PointMatcher, validate};
+use crate::{MatchError, Matching, PointMatcher, WarmStart, validate};
 use anneal::{Annealer, State};
 use consensus::Consensus;
 use constellation::Constellations;
@@ -208,10 +209,10 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for RelaxationMatcher {
 
     fn match_next(
         &self,
-        series: &mut MatchSeries<T, D>,
+        warm: &mut WarmStart,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        self.follow(series, model, target)
+        self.follow(warm.state(), model, target)
     }
 }

@@ -9,9 +9,9 @@ use std::fmt::Write;
 use std::path::Path;
 use tactile_match::dense::Neighbourhood;
 use tactile_match::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, MatchSeries,
-    Matching, Motion, NearestNeighbour, Outliers, PointMatcher, RelaxationMatcher,
-    RelaxationOptions, Rotation, Search, SparseRelaxation,
+    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Matching,
+    Motion, NearestNeighbour, Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions,
+    Rotation, Search, SparseRelaxation, WarmStart,
 };
 
 /// A model and its target.
@@ -163,10 +163,10 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
     }
     let scenes = scenes::<D>();
     let (model, matcher) = (&scenes[0].model, fast(options.search(Search::Near)));
-    let mut series = MatchSeries::new();
+    let mut warm = WarmStart::new();
     for step in 1..4 {
         let target = bend(model, 0.02 * f64::from(step));
-        let found = matcher.match_next(&mut series, model, &target);
+        let found = matcher.match_next(&mut warm, model, &target);
         lines.push(digest(
             &format!("series, step {step}, {D}-D"),
             &found.expect("finite points"),

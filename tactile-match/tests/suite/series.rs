@@ -1,8 +1,10 @@
 //! Matches that begin where the last one ended find what a match made anew finds.
+use std::sync::Arc;
+
 use nalgebra::{Point2, Point3, Vector3};
 use tactile_match::{
-    CoherentPointDrift, LinearAssignment, MatchSeries, Matching, PointMatcher, RelaxationMatcher,
-    RelaxationOptions, Search,
+    CoherentPointDrift, LinearAssignment, MatchError, Matching, PointMatcher, RelaxationMatcher,
+    RelaxationOptions, Search, WarmStart,
 };
 
 /// A number of (−1, 1), without pattern and the same on every machine.
@@ -47,10 +49,10 @@ fn agree(one: &Matching<f64, 3>, other: &Matching<f64, 3>, tolerance: f64) {
 fn a_series_agrees_with_matches_made_anew() {
     let model = dome(150);
     for noise in [0.0, 0.01] {
-        let (mut series, mut saved) = (MatchSeries::new(), 0);
+        let (mut warm, mut saved) = (WarmStart::new(), 0);
         for k in 1..8 {
             let target = frame(&model, k, noise);
-            let next = near().match_next(&mut series, &model, &target).unwrap();
+            let next = near().match_next(&mut warm, &model, &target).unwrap();
             let anew = near().match_points(&model, &target).unwrap();
             // Both stop when the temperature moves by a ten-thousandth; what is left is a small part of the noise.
             agree(&next, &anew, 1e-12 + 0.03 * noise);
@@ -67,12 +69,12 @@ fn a_series_agrees_with_matches_made_anew() {
 
 #[test]
 fn a_target_far_from_the_last_is_matched_all_the_same() {
-    let (model, mut series) = (dome(120), MatchSeries::new());
+    let (model, mut warm) = (dome(120), WarmStart::new());
     for (k, grown) in [(1, 1.0), (2, 1.25), (1, 0.85)] {
         let squeezed = |p: Point3<f64>| Point3::new(grown * p.x, p.y / grown, p.z);
         let target: Vec<_> = frame(&model, k, 0.0).into_iter().map(squeezed).collect();
         let next = RelaxationMatcher::default()
-            .match_next(&mut series, &model, &target)
+            .match_next(&mut warm, &model, &target)
             .unwrap();
         agree(
             &next,
@@ -87,39 +89,31 @@ fn a_target_far_from_the_last_is_matched_all_the_same() {
 
 #[test]
 fn another_model_has_no_past() {
-    let (one, other, mut series) = (dome(60), dome(70), MatchSeries::new());
-    near()
-        .match_next(&mut series, &one, &frame(&one, 3, 0.0))
-        .unwrap();
-    assert!(series.last_for(&one).is_some() && series.last_for(&other).is_none());
+    let (one, other, mut warm) = (dome(60), dome(70), WarmStart::new());
+    let target = frame(&one, 3, 0.0);
+    let first = near().match_next(&mut warm, &one, &target).unwrap();
     let target = frame(&other, 2, 0.0);
-    let next = near().match_next(&mut series, &other, &target).unwrap();
-    agree(
-        &next,
-        &near().match_points(&other, &target).unwrap(),
-        0.0 + f64::MIN_POSITIVE,
-    );
-    assert!(series.last_for(&one).is_none());
+    let next = near().match_next(&mut warm, &other, &target).unwrap();
+    let anew = near().match_points(&other, &target).unwrap();
+    agree(&next, &anew, f64::MIN_POSITIVE);
+    // The first model in turn is forgotten: its match takes what a cold one does.
+    let target = frame(&one, 3, 0.0);
+    let again = near().match_next(&mut warm, &one, &target).unwrap();
+    assert_eq!(again.report, first.report);
 }
 
 #[test]
-fn an_error_leaves_the_series_as_it_was() {
-    let (model, mut series) = (dome(60), MatchSeries::new());
-    near()
-        .match_next(&mut series, &model, &frame(&model, 1, 0.0))
-        .unwrap();
-    let before = series.last_for(&model).unwrap().to_vec();
-    assert!(near().match_next(&mut series, &model, &[]).is_err());
-    assert!(
-        near()
-            .match_next(&mut series, &model, &[Point3::new(f64::NAN, 0.0, 0.0)])
-            .is_err()
-    );
-    // Nor does another model that cannot be matched leave anything of its own.
-    assert!(near().match_next(&mut series, &dome(70), &[]).is_err());
-    assert_eq!(series.last_for(&model), Some(&*before));
+fn an_error_leaves_the_state_as_it_was() {
+    let (model, mut warm) = (dome(60), WarmStart::new());
     let target = frame(&model, 1, 0.0);
-    let next = near().match_next(&mut series, &model, &target).unwrap();
+    let first = near().match_next(&mut warm, &model, &target).unwrap();
+    assert!(near().match_next(&mut warm, &model, &[]).is_err());
+    let nan = [Point3::new(f64::NAN, 0.0, 0.0)];
+    assert!(near().match_next(&mut warm, &model, &nan).is_err());
+    // Nor does another model that cannot be matched leave anything of its own.
+    assert!(near().match_next(&mut warm, &dome(70), &[]).is_err());
+    let next = near().match_next(&mut warm, &model, &target).unwrap();
+    assert!(next.report.iterations < first.report.iterations);
     agree(&next, &near().match_points(&model, &target).unwrap(), 1e-12);
     assert!(
         (next.warp.apply(&model[5]) - target[5]).norm() < 1e-9,
@@ -127,21 +121,50 @@ fn an_error_leaves_the_series_as_it_was() {
     );
 }
 
+/// Counts the matches of a series.
+struct Counting;
+
+impl PointMatcher<f64, 2> for Counting {
+    fn match_points(
+        &self,
+        model: &[Point2<f64>],
+        target: &[Point2<f64>],
+    ) -> Result<Matching<f64, 2>, MatchError> {
+        LinearAssignment::new().match_points(model, target)
+    }
+
+    fn match_next(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point2<f64>],
+        target: &[Point2<f64>],
+    ) -> Result<Matching<f64, 2>, MatchError> {
+        *warm.state::<usize>() += 1;
+        self.match_points(model, target)
+    }
+}
+
 #[test]
-fn matchers_without_a_memory_match_anew() {
+fn every_matcher_keeps_its_own_state() {
     let model: Vec<Point2<f64>> = dome(40).iter().map(|p| Point2::new(p.x, p.y)).collect();
     let target: Vec<_> = model.iter().map(|p| Point2::new(1.02 * p.x, p.y)).collect();
+    let boxed: Box<dyn PointMatcher<f64, 2> + Send + Sync> = Box::new(Counting);
+    let shared: Arc<dyn PointMatcher<f64, 2> + Send + Sync> = Arc::new(boxed);
+    let mut warm = WarmStart::new();
+    for _ in 0..3 {
+        shared.match_next(&mut warm, &model, &target).unwrap();
+    }
+    assert_eq!(*warm.state::<usize>(), 3);
+    // Matchers without a state match anew and leave the other's alone.
     let matchers: [&dyn PointMatcher<f64, 2>; 2] =
         [&LinearAssignment::new(), &CoherentPointDrift::default()];
     for matcher in matchers {
-        let mut series = MatchSeries::new();
-        for _ in 0..2 {
-            let next = matcher.match_next(&mut series, &model, &target).unwrap();
-            assert_eq!(
-                next.warped,
-                matcher.match_points(&model, &target).unwrap().warped
-            );
-            assert_eq!(series.last_for(&model), Some(&*next.warped));
-        }
+        let next = matcher.match_next(&mut warm, &model, &target).unwrap();
+        let anew = matcher.match_points(&model, &target).unwrap();
+        assert_eq!(next.warped, anew.warped);
     }
+    assert_eq!(*warm.state::<usize>(), 3);
+    // Another matcher with one starts cold.
+    let found = RelaxationMatcher::default().match_next(&mut warm, &model, &target);
+    assert!(found.is_ok() && *warm.state::<usize>() == 0);
 }
