@@ -111,7 +111,7 @@ fn warp<const D: usize, K: Kernel>(
 ) -> Result<(), Box<dyn Error>> {
     let targets = read_points::<D>(&arguments.targets)?;
     let queries = read_points::<D>(&arguments.queries)?;
-    let options = FitOptions::new(kernel.clone()).smoothing(arguments.lambda);
+    let options = FitOptions::new(kernel.clone()).with_smoothing(arguments.lambda)?;
     let name = |error| in_files(arguments, error);
     let (fit_ms, spline) = median_ms(|| fit(sources, &targets, &options));
     let spline = spline.map_err(name)?;

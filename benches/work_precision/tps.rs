@@ -188,7 +188,9 @@ pub(crate) fn noisy(study: &mut Study) {
         vec![1e-3, 1e-2, 1e-1, 1.0, 10.0],
         vec![1e-4, 1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0, 10.0, 1e3],
     ) {
-        let options = FitOptions::new(NegR).smoothing(Smoothing::Lambda(lambda));
+        let options = FitOptions::new(NegR)
+            .with_smoothing(Smoothing::Lambda(lambda))
+            .expect("a λ");
         fit(study, "λ", &format!("λ = {lambda}"), false, &p, options);
     }
     fit(
@@ -197,6 +199,8 @@ pub(crate) fn noisy(study: &mut Study) {
         "cross-validation",
         false,
         &p,
-        FitOptions::new(NegR).smoothing(Smoothing::Gcv),
+        FitOptions::new(NegR)
+            .with_smoothing(Smoothing::Gcv)
+            .expect("a rule"),
     );
 }

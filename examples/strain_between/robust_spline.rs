@@ -185,8 +185,8 @@ fn weighted<const D: usize>(
     let kept: Vec<usize> = (0..sources.len()).filter(|&i| weights[i] > 1e-3).collect();
     let pick = |p: Points<'_, D>| kept.iter().map(|&i| p[i]).collect::<Vec<_>>();
     let options = FitOptions::default()
-        .smoothing(Smoothing::Lambda(lambda))
-        .weights(kept.iter().map(|&i| weights[i]).collect());
+        .with_smoothing(Smoothing::Lambda(lambda))?
+        .with_weights(kept.iter().map(|&i| weights[i]).collect())?;
     ThinPlateSpline::fit(&pick(sources), &pick(targets), &options)
 }
 

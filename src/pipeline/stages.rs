@@ -18,8 +18,8 @@ use ndarray::ArrayView2;
 /// // Corners of a cube that is drawn out to double its height.
 /// let corners: Vec<_> = (0..8).map(|k| Point3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64)).collect();
 /// let drawn: Vec<_> = corners.iter().map(|p| Point3::new(p.x, p.y, 2.0 * p.z)).collect();
-/// let affine: BoxedWarp = Box::new(AffineModel.fit(&corners, &drawn, None)?);
-/// let rigid: BoxedWarp = Box::new(RigidModel.fit(&corners, &drawn, None)?);
+/// let affine: BoxedWarp = AffineModel.fit(&corners, &drawn, None)?;
+/// let rigid: BoxedWarp = RigidModel.fit(&corners, &drawn, None)?;
 /// let stretch = [affine, rigid].map(|warp| warp.jacobian(&corners[0])[(2, 2)]);
 /// assert!((stretch[0] - 2.0).abs() < 1e-9 && (stretch[1] - 1.0).abs() < 1e-9);
 /// # Ok::<(), tactile_imaging::tps::TpsError>(())

@@ -49,22 +49,31 @@ type Spline = ThinPlateSpline<f64, 3, NegR>;
 pub struct StrainSpline;
 
 impl WarpModel<f64, 3> for StrainSpline {
-    type Warp = Spline;
-
     fn fit(
         &self,
         sources: &[Point3<f64>],
         targets: &[Point3<f64>],
         weights: Option<&[f64]>,
-    ) -> Result<Spline, TpsError> {
+    ) -> Result<Box<dyn Warp<f64, 3> + Send + Sync>, TpsError> {
         let smoothing = match stiffest_as_good(sources, targets, weights) {
             Some(lambda) => Smoothing::Lambda(lambda),
             None => Smoothing::Gcv,
         };
-        FitOptions::new(NegR)
-            .smoothing(smoothing)
-            .fit(sources, targets, weights)
+        Ok(Box::new(fit_spline(smoothing, sources, targets, weights)?))
     }
+}
+
+fn fit_spline(
+    smoothing: Smoothing<f64>,
+    sources: &[Point3<f64>],
+    targets: &[Point3<f64>],
+    weights: Option<&[f64]>,
+) -> Result<Spline, TpsError> {
+    let mut options = FitOptions::new(NegR).with_smoothing(smoothing)?;
+    if let Some(weights) = weights {
+        options = options.with_weights(weights.to_vec())?;
+    }
+    Spline::fit(sources, targets, &options)
 }
 
 /// Pairs of points with their weights.
@@ -77,10 +86,8 @@ struct Pairs {
 
 impl Pairs {
     fn fit(&self, lambda: f64) -> Option<Spline> {
-        let model = FitOptions::new(NegR).smoothing(Smoothing::Lambda(lambda));
-        model
-            .fit(&self.sources, &self.targets, Some(&self.weights))
-            .ok()
+        let smoothing = Smoothing::Lambda(lambda);
+        fit_spline(smoothing, &self.sources, &self.targets, Some(&self.weights)).ok()
     }
 
     /// Squared distances from where `spline` puts the sources to the targets, times the weights.
@@ -192,13 +199,8 @@ mod tests {
         (sources, targets)
     }
 
-    fn mean_across(warp: &Spline, points: &[Point3<f64>]) -> f64 {
-        points
-            .iter()
-            .map(|p| Warp::jacobian(warp, p)[(2, 2)])
-            .sum::<f64>()
-            / points.len() as f64
-            - 1.0
+    fn mean_across(warp: &dyn Warp<f64, 3>, points: &[Point3<f64>]) -> f64 {
+        points.iter().map(|p| warp.jacobian(p)[(2, 2)]).sum::<f64>() / points.len() as f64 - 1.0
     }
 
     #[test]
@@ -208,11 +210,11 @@ mod tests {
             .fit(&sources, &targets, None)
             .expect("a spline");
         let loose = FitOptions::new(NegR).fit(&sources, &targets, None);
-        let error = |warp: &Spline| {
-            let square = |p| (Warp::jacobian(warp, p)[(2, 2)] - 1.2).powi(2);
+        let error = |warp: &dyn Warp<f64, 3>| {
+            let square = |p| (warp.jacobian(p)[(2, 2)] - 1.2).powi(2);
             (sources.iter().map(square).sum::<f64>() / sources.len() as f64).sqrt()
         };
-        let [stiff, loose] = [stiff, loose.expect("a spline")].map(|warp| error(&warp));
+        let [stiff, loose] = [stiff, loose.expect("a spline")].map(|warp| error(&*warp));
         // An affine fit knows it to the error of 0.03 × 1.2/√3 of 50 groups over the spread 1/√12 of z: 0.010; to two and a half standard
         // deviations.
         assert!(stiff < 0.025, "{stiff}, interpolated {loose}");
@@ -224,22 +226,15 @@ mod tests {
         let (sources, _) = dome(0.0);
         let bend = |p: &Point3<f64>| Point3::new(p.x + 0.3 * p.x * p.x, p.y, p.z);
         let targets: Vec<_> = sources.iter().map(bend).collect();
-        let error = |warp: &Spline| {
+        let error = |warp: &dyn Warp<f64, 3>| {
             let inner = sources.iter().filter(|p| p.z > 0.5);
             inner
-                .map(|p| (Warp::jacobian(warp, p)[(0, 0)] - 1.0 - 0.6 * p.x).abs())
+                .map(|p| (warp.jacobian(p)[(0, 0)] - 1.0 - 0.6 * p.x).abs())
                 .sum::<f64>()
         };
-        let chosen = error(
-            &StrainSpline
-                .fit(&sources, &targets, None)
-                .expect("a spline"),
-        );
-        let fit = |smoothing| {
-            FitOptions::new(NegR)
-                .smoothing(smoothing)
-                .fit(&sources, &targets, None)
-        };
+        let chosen = StrainSpline.fit(&sources, &targets, None);
+        let chosen = error(&*chosen.expect("a spline"));
+        let fit = |smoothing| fit_spline(smoothing, &sources, &targets, None);
         let [affine, interpolated] = [Smoothing::Lambda(1e9), Smoothing::None]
             .map(|smoothing| error(&fit(smoothing).expect("a spline")));
         // What the gradient of a spline through points of a surface can tell of the bending is told, to a third of the whole.
@@ -260,8 +255,8 @@ mod tests {
             .fit(&millimetres(&sources), &millimetres(&targets), None)
             .expect("a spline");
         let (a, b) = (
-            mean_across(&one, &sources),
-            mean_across(&other, &millimetres(&sources)),
+            mean_across(&*one, &sources),
+            mean_across(&*other, &millimetres(&sources)),
         );
         // λ scales as the kernel: the same equations, to the rounding of a system of 200.
         assert!((a - b).abs() < 1e-8, "{a} {b}");
@@ -277,9 +272,7 @@ mod tests {
         );
         assert!(StrainSpline.fit(&sources, &targets[1..], None).is_err());
         let flat: Vec<_> = sources.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
-        let own = FitOptions::new(NegR)
-            .smoothing(Smoothing::Gcv)
-            .fit(&flat, &flat, None);
+        let own = fit_spline(Smoothing::Gcv, &flat, &flat, None);
         assert_eq!(StrainSpline.fit(&flat, &flat, None).is_ok(), own.is_ok());
     }
 }

@@ -4,8 +4,7 @@ use crate::frame::Frame;
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
 use tactile_tps::{
-    Affine, AffineModel, Factorization, FitOptions, NegR, R2LogR, Scalar, Smoothing, Warp,
-    WarpModel,
+    Affine, Factorization, FitOptions, NegR, R2LogR, Scalar, Smoothing, TpsError, Warp,
 };
 
 /// Soft matches below this weight are left out.
@@ -147,9 +146,7 @@ fn through<T: Scalar, const D: usize>(
     if let Some(warped) = finite(&spline) {
         return (spline, warped);
     }
-    let affine = AffineModel
-        .fit(sources, images, None)
-        .unwrap_or_else(|_| Affine::identity());
+    let affine = Affine::fit(sources, images, None).unwrap_or_else(|_| Affine::identity());
     if let Some(warped) = finite(&affine) {
         return (Box::new(affine), warped);
     }
@@ -182,17 +179,20 @@ impl<T: Scalar, const D: usize> Interpolation<T, D> {
             kernel: K,
             smoothing: Smoothing<T>,
             weights: &Option<Vec<T>>,
-        ) -> FitOptions<T, K> {
-            let options = FitOptions::new(kernel).smoothing(smoothing);
-            weights
-                .iter()
-                .fold(options, |options, weights| options.weights(weights.clone()))
+        ) -> Result<FitOptions<T, K>, TpsError> {
+            let options = FitOptions::new(kernel).with_smoothing(smoothing)?;
+            match weights {
+                Some(weights) => options.with_weights(weights.clone()),
+                None => Ok(options),
+            }
         }
         let system = if D == 2 {
-            let plane = Factorization::new(sources, &options(R2LogR, smoothing, &weights));
+            let plane = options(R2LogR, smoothing, &weights)
+                .and_then(|options| Factorization::new(sources, &options));
             plane.ok().map(|plane| System::Plane(Box::new(plane)))
         } else {
-            let space = Factorization::new(sources, &options(NegR, smoothing, &weights));
+            let space = options(NegR, smoothing, &weights)
+                .and_then(|options| Factorization::new(sources, &options));
             space.ok().map(|space| System::Space(Box::new(space)))
         };
         Self {
@@ -221,7 +221,7 @@ impl<T: Scalar, const D: usize> Interpolation<T, D> {
         spline
             .filter(|spline| follows(&**spline, sources, images, exact))
             .unwrap_or_else(|| {
-                let affine = AffineModel.fit(sources, images, self.weights.as_deref());
+                let affine = Affine::fit(sources, images, self.weights.as_deref());
                 Box::new(affine.unwrap_or_else(|_| Affine::identity()))
             })
     }

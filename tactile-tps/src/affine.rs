@@ -52,6 +52,43 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
     pub fn identity() -> Self {
         Self::new(SMatrix::identity(), SVector::zeros())
     }
+
+    /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
+    ///
+    /// Along directions that the points do not span the map moves points with their mean (the pseudo-inverse S⁺). O(n).
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Affine, Warp};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(2.0 * p.x - p.y, p.y + 3.0));
+    /// let map = Affine::fit(&sources, &targets, None)?;
+    /// assert!((map.apply(&Point2::new(5.0, 1.0)) - Point2::new(9.0, 4.0)).norm() < 1e-14);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
+    pub fn fit(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self, TpsError> {
+        let moments = Moments::new(sources, targets, weights)?;
+        let (values, vectors) = symmetric_eigen(&moments.scatter);
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let mut linear = SMatrix::<f64, D, D>::zeros();
+        for (k, &value) in values.iter().enumerate() {
+            // Below this the extent is the rounding of the moments.
+            if value > largest * 1e-13 {
+                let axis = SVector::<f64, D>::from_fn(|i, _| vectors[(i, k)]);
+                linear += moments.cross * axis * axis.transpose() / value;
+            }
+        }
+        Ok(Self::new(linear.map(T::narrow), moments.offset(&linear)))
+    }
 }
 
 impl<T: Scalar, const D: usize> Warp<T, D> for Affine<T, D> {
@@ -86,19 +123,33 @@ pub struct Rigid<T: Scalar, const D: usize> {
 }
 
 impl<T: Scalar, const D: usize> Rigid<T, D> {
-    /// The motion that leaves every point where it is.
+    /// The motion of least Σ wᵢ |R xᵢ + b − yᵢ|²: R the rotation nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
     ///
     /// ```
-    /// # use nalgebra::Point3;
-    /// # use tactile_tps::{Rigid, Warp};
-    /// let point = Point3::new(1.0, 2.0, 3.0);
-    /// assert_eq!(Rigid::identity().apply(&point), point);
+    /// # use nalgebra::{Point2, Rotation2};
+    /// # use tactile_tps::Rigid;
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let turn = Rotation2::new(0.3);
+    /// let motion = Rigid::fit(&sources, &sources.map(|p| turn * p), None)?;
+    /// assert!((motion.rotation - turn.matrix()).norm() < 1e-15);
+    /// # Ok(())
+    /// # }
     /// ```
-    pub fn identity() -> Self {
-        Self {
-            rotation: SMatrix::identity(),
-            translation: SVector::zeros(),
-        }
+    ///
+    /// # Errors
+    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
+    pub fn fit(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self, TpsError> {
+        let moments = Moments::new(sources, targets, weights)?;
+        let rotation = nearest_rotation(&moments.cross);
+        Ok(Self {
+            rotation: rotation.map(T::narrow),
+            translation: moments.offset(&rotation),
+        })
     }
 }
 
@@ -111,18 +162,16 @@ impl<T: Scalar, const D: usize> Warp<T, D> for Rigid<T, D> {
     }
 }
 
-/// Fits an [`Affine`] map: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
-///
-/// Along directions the points do not span the map moves points with their mean (the pseudo-inverse S⁺).
+/// The [`WarpModel`] of [`Affine::fit`].
 ///
 /// ```
 /// # use nalgebra::Point2;
 /// # use tactile_tps::{AffineModel, Warp, WarpModel};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-/// let targets = sources.map(|p| Point2::new(2.0 * p.x - p.y, p.y + 3.0));
-/// let warp = AffineModel.fit(&sources, &targets, None)?;
-/// assert!((warp.apply(&Point2::new(5.0, 1.0)) - Point2::new(9.0, 4.0)).norm() < 1e-14);
+/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let doubled = sources.map(|p| p * 2.0);
+/// let warp: Box<dyn Warp<f64, 2> + Send + Sync> = AffineModel.fit(&sources, &doubled, None)?;
+/// assert!((warp.apply(&Point2::new(5.0, 1.0)) - Point2::new(10.0, 2.0)).norm() < 1e-14);
 /// # Ok(())
 /// # }
 /// ```
@@ -130,16 +179,16 @@ impl<T: Scalar, const D: usize> Warp<T, D> for Rigid<T, D> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AffineModel;
 
-/// Fits a [`Rigid`] motion: the rotation nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991).
+/// The [`WarpModel`] of [`Rigid::fit`].
 ///
 /// ```
-/// # use nalgebra::{Point2, Rotation2};
+/// # use nalgebra::{Point2, Vector2};
 /// # use tactile_tps::{RigidModel, WarpModel};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-/// let turn = Rotation2::new(0.3);
-/// let warp = RigidModel.fit(&sources, &sources.map(|p| turn * p), None)?;
-/// assert!((warp.rotation - turn.matrix()).norm() < 1e-15);
+/// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+/// let shifted = sources.map(|p| p + Vector2::new(1.0, 2.0));
+/// let warp = RigidModel.fit(&sources, &shifted, None)?;
+/// assert!((warp.apply(&Point2::origin()) - Point2::new(1.0, 2.0)).norm() < 1e-14);
 /// # Ok(())
 /// # }
 /// ```
@@ -223,46 +272,23 @@ fn symmetric_eigen<const D: usize>(
     )
 }
 
-impl<T: Scalar, const D: usize> WarpModel<T, D> for AffineModel {
-    type Warp = Affine<T, D>;
-
-    fn fit(
-        &self,
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
-    ) -> Result<Affine<T, D>, TpsError> {
-        let moments = Moments::new(sources, targets, weights)?;
-        let (values, vectors) = symmetric_eigen(&moments.scatter);
-        let largest = values.iter().copied().fold(0.0, f64::max);
-        let mut linear = SMatrix::<f64, D, D>::zeros();
-        for (k, &value) in values.iter().enumerate() {
-            if value > largest * 1e-13 {
-                let axis = SVector::<f64, D>::from_fn(|i, _| vectors[(i, k)]);
-                linear += moments.cross * axis * axis.transpose() / value;
+/// A model whose one rule is the fit of its type of warp.
+macro_rules! model {
+    ($model:ident fits $warp:ident) => {
+        impl<T: Scalar, const D: usize> WarpModel<T, D> for $model {
+            fn fit(
+                &self,
+                sources: &[Point<T, D>],
+                targets: &[Point<T, D>],
+                weights: Option<&[T]>,
+            ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
+                Ok(Box::new($warp::fit(sources, targets, weights)?))
             }
         }
-        Ok(Affine::new(linear.map(T::narrow), moments.offset(&linear)))
-    }
+    };
 }
-
-impl<T: Scalar, const D: usize> WarpModel<T, D> for RigidModel {
-    type Warp = Rigid<T, D>;
-
-    fn fit(
-        &self,
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
-    ) -> Result<Rigid<T, D>, TpsError> {
-        let moments = Moments::new(sources, targets, weights)?;
-        let rotation = nearest_rotation(&moments.cross);
-        Ok(Rigid {
-            rotation: rotation.map(T::narrow),
-            translation: moments.offset(&rotation),
-        })
-    }
-}
+model!(AffineModel fits Affine);
+model!(RigidModel fits Rigid);
 
 /// The rotation R that maximises tr(Rᵀ C): U diag(1, …, det(U Vᵀ)) Vᵀ of the singular value decomposition.
 fn nearest_rotation<const D: usize>(cross: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {

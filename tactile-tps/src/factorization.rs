@@ -8,6 +8,7 @@ use nalgebra::Point;
 use crate::{
     FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, TpsError,
     iterative::Iterative,
+    options::validate_weight_count,
     refine::Buffers,
     sites::Sites,
     system::{Setting, System},
@@ -92,13 +93,14 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ///
     /// ```
     /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, NegR, TpsError};
+    /// # use tactile_tps::{Factorization, FitOptions, Input, NegR, TpsError};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::new(NegR))?;
     /// assert_eq!(factorization.len(), 5);
-    /// let bad = FitOptions::new(NegR).weights(vec![1.0, 1.0, -1.0, 1.0, 1.0]);
-    /// assert_eq!(Factorization::new(&sources, &bad).unwrap_err(), TpsError::Weight { index: 2, value: -1.0 });
+    /// let five_weights = FitOptions::new(NegR).with_weights(vec![1.0; 5])?;
+    /// let error = Factorization::new(&sources[..4], &five_weights).unwrap_err();
+    /// assert_eq!(error, TpsError::Length { input: Input::Weights, expected: 4, found: 5 });
     /// # Ok(())
     /// # }
     /// ```
@@ -117,7 +119,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # use tactile_tps::{Factorization, FitOptions, Solver, TpsError};
     /// let sources: Vec<Point2<f64>> =
     ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
-    /// let options = FitOptions::default().solver(Solver::Iterative);
+    /// let options = FitOptions::default().with_solver(Solver::Iterative);
     /// let stopped = Factorization::new_watched(&sources, &options, |progress| {
     ///     if 2 * progress.done > progress.total { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     /// });
@@ -131,7 +133,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         options: &FitOptions<T, K>,
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TpsError> {
-        options.validate(sources.len())?;
+        if let Some(weights) = &options.weights {
+            validate_weight_count(weights, sources.len())?;
+        }
         let mut this = Self::unfactored(sources, options)?;
         let lambda = this.inner_lambda(this.smoothing);
         let mut system = System::default();

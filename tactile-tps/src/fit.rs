@@ -49,7 +49,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// let sources: Vec<Point2<f64>> =
     ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
     /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
-    /// let options = FitOptions::default().solver(Solver::Iterative);
+    /// let options = FitOptions::default().with_solver(Solver::Iterative);
     /// let spline = Factorization::new(&sources, &options)?.fit_watched(&targets, |progress| {
     ///     // Good enough for a first look.
     ///     if progress.residual < Some(1e-3) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

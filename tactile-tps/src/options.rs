@@ -11,9 +11,9 @@ use crate::{R2LogR, Scalar, TpsError, error::Input};
 /// let sources: Vec<Point2<f64>> = (0..25).map(|i| Point2::new(f64::from(i % 5), f64::from(i / 5))).collect();
 /// let noise = |i: usize| 0.01 * ((i * 7919 % 101) as f64 / 50.0 - 1.0);
 /// let targets: Vec<_> = sources.iter().enumerate().map(|(i, p)| Point2::new(p.x + noise(i), p.y)).collect();
-/// let options = FitOptions::default().smoothing(Smoothing::Gcv);
+/// let options = FitOptions::default().with_smoothing(Smoothing::Gcv)?;
 /// let smooth = ThinPlateSpline::fit(&sources, &targets, &options)?;
-/// let through = ThinPlateSpline::fit(&sources, &targets, &options.smoothing(Smoothing::None))?;
+/// let through = ThinPlateSpline::fit(&sources, &targets, &options.with_smoothing(Smoothing::None)?)?;
 /// assert!(smooth.report().lambda > 0.0 && smooth.bending_energy() < through.bending_energy());
 /// # Ok(())
 /// # }
@@ -40,7 +40,7 @@ pub enum Smoothing<T> {
 /// let sources: Vec<Point2<f64>> =
 ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
 /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
-/// let fit = |solver| ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().solver(solver));
+/// let fit = |solver| ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().with_solver(solver));
 /// let (direct, iterative) = (fit(Solver::Direct)?, fit(Solver::Iterative)?);
 /// let query = Point2::new(7.3, 11.9);
 /// assert!((direct.apply(&query) - iterative.apply(&query)).norm() < 1e-8);
@@ -68,11 +68,19 @@ const DIRECT_POINTS: usize = 3000;
 ///
 /// ```
 /// use tactile_tps::{FitOptions, NegR, Smoothing};
-/// let options = FitOptions::new(NegR).smoothing(Smoothing::Lambda(1e-3)).weights(vec![1.0, 1.0, 0.2, 1.0]);
-/// # let _ = options;
+/// let options = FitOptions::new(NegR).with_smoothing(Smoothing::Lambda(1e-3))?.with_weights(vec![1.0, 1.0, 0.2, 1.0])?;
+/// assert!(options.with_smoothing(Smoothing::Lambda(f64::NAN)).is_err());
+/// # Ok::<(), tactile_tps::TpsError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(
+        try_from = "Unchecked<T, K>",
+        bound(deserialize = "T: Scalar + serde::Deserialize<'de>, K: serde::Deserialize<'de>")
+    )
+)]
 pub struct FitOptions<T, K = R2LogR> {
     pub(crate) kernel: K,
     pub(crate) smoothing: Smoothing<T>,
@@ -80,6 +88,35 @@ pub struct FitOptions<T, K = R2LogR> {
     pub(crate) rank_tolerance: T,
     pub(crate) solver: Solver,
     pub(crate) tolerance: T,
+}
+
+/// Options as they are read, before the setters have checked them.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked<T, K> {
+    kernel: K,
+    smoothing: Smoothing<T>,
+    weights: Option<Vec<T>>,
+    rank_tolerance: T,
+    solver: Solver,
+    tolerance: T,
+}
+
+#[cfg(feature = "serde")]
+impl<T: Scalar, K> TryFrom<Unchecked<T, K>> for FitOptions<T, K> {
+    type Error = TpsError;
+
+    fn try_from(read: Unchecked<T, K>) -> Result<Self, TpsError> {
+        let options = Self::new(read.kernel)
+            .with_smoothing(read.smoothing)?
+            .with_rank_tolerance(read.rank_tolerance)?
+            .with_solver(read.solver)
+            .with_tolerance(read.tolerance)?;
+        match read.weights {
+            Some(weights) => options.with_weights(weights),
+            None => Ok(options),
+        }
+    }
 }
 
 impl<T: Scalar> Default for FitOptions<T, R2LogR> {
@@ -94,7 +131,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// ```
     /// # use tactile_tps::{FitOptions, R3};
     /// let options = FitOptions::<f64, _>::new(R3);
-    /// assert_eq!(options.kernel(), &R3);
+    /// # let _ = options;
     /// ```
     pub fn new(kernel: K) -> Self {
         Self {
@@ -115,16 +152,19 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let options = FitOptions::default().smoothing(Smoothing::Lambda(0.5));
+    /// let options = FitOptions::default().with_smoothing(Smoothing::Lambda(0.5))?;
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &options)?;
     /// assert!((warp.report().lambda - 0.5).abs() < 1e-15 && warp.bending_energy() < 1e-3);
     /// # Ok(())
     /// # }
     /// ```
-    #[must_use]
-    pub fn smoothing(mut self, smoothing: Smoothing<T>) -> Self {
+    ///
+    /// # Errors
+    /// [`TpsError::Lambda`] for a λ that is negative, NaN or infinite.
+    pub fn with_smoothing(mut self, smoothing: Smoothing<T>) -> Result<Self, TpsError> {
+        validate_smoothing(&smoothing)?;
         self.smoothing = smoothing;
-        self
+        Ok(self)
     }
 
     /// Gives every point a weight of at least zero; zero leaves the point out.
@@ -137,15 +177,19 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().weights(vec![1.0, 1.0, 1.0, 1.0, 0.0]))?;
+    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default().with_weights(vec![1.0, 1.0, 1.0, 1.0, 0.0])?)?;
     /// assert_eq!(warp.report().ignored, 1);
     /// # Ok(())
     /// # }
     /// ```
-    #[must_use]
-    pub fn weights(mut self, weights: Vec<T>) -> Self {
+    ///
+    /// # Errors
+    /// [`TpsError::Weight`] for a weight that is negative, NaN or infinite, [`TpsError::Empty`] if none is positive. Whether
+    /// there are as many weights as points is checked by the fit.
+    pub fn with_weights(mut self, weights: Vec<T>) -> Result<Self, TpsError> {
+        validate_weights(&weights, weights.len())?;
         self.weights = Some(weights);
-        self
+        Ok(self)
     }
 
     /// Directions in which the points extend less than this share of their largest extent are dropped.
@@ -159,27 +203,34 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources = [[0.0, 0.0, 0.0], [1.0, 0.0, 1e-5], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.4, 0.6, 1e-5]].map(Point3::from);
     /// let rank = |tolerance| {
-    ///     ThinPlateSpline::fit(&sources, &sources, &FitOptions::new(NegR).rank_tolerance(tolerance)).map(|s| s.report().rank)
+    ///     let options = FitOptions::new(NegR).with_rank_tolerance(tolerance)?;
+    ///     ThinPlateSpline::fit(&sources, &sources, &options).map(|spline| spline.report().rank)
     /// };
     /// assert_eq!((rank(0.0)?, rank(1e-3)?), (4, 3));
     /// # Ok(())
     /// # }
     /// ```
-    #[must_use]
-    pub fn rank_tolerance(mut self, tolerance: T) -> Self {
+    ///
+    /// # Errors
+    /// [`TpsError::RankTolerance`] unless in [0, 1).
+    pub fn with_rank_tolerance(mut self, tolerance: T) -> Result<Self, TpsError> {
+        let value = tolerance.widen();
+        if !(0.0..1.0).contains(&value) {
+            return Err(TpsError::RankTolerance { value });
+        }
         self.rank_tolerance = tolerance;
-        self
+        Ok(self)
     }
 
     /// Sets how the equations are solved.
     ///
     /// ```
     /// # use tactile_tps::{FitOptions, Solver};
-    /// let to_rounding = FitOptions::<f64>::default().solver(Solver::Direct);
+    /// let to_rounding = FitOptions::<f64>::default().with_solver(Solver::Direct);
     /// assert_ne!(to_rounding, FitOptions::default());
     /// ```
     #[must_use]
-    pub fn solver(mut self, solver: Solver) -> Self {
+    pub fn with_solver(mut self, solver: Solver) -> Self {
         self.solver = solver;
         self
     }
@@ -195,16 +246,22 @@ impl<T: Scalar, K> FitOptions<T, K> {
     /// let sources: Vec<Point2<f64>> =
     ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
     /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
-    /// let options = FitOptions::default().solver(Solver::Iterative).tolerance(1e-4);
+    /// let options = FitOptions::default().with_solver(Solver::Iterative).with_tolerance(1e-4)?;
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &options)?;
     /// assert!(warp.report().converged && warp.report().residual <= Some(1e-4));
     /// # Ok(())
     /// # }
     /// ```
-    #[must_use]
-    pub fn tolerance(mut self, tolerance: T) -> Self {
+    ///
+    /// # Errors
+    /// [`TpsError::Tolerance`] unless in (0, 1).
+    pub fn with_tolerance(mut self, tolerance: T) -> Result<Self, TpsError> {
+        let value = tolerance.widen();
+        if !(value > 0.0 && value < 1.0) {
+            return Err(TpsError::Tolerance { value });
+        }
         self.tolerance = tolerance;
-        self
+        Ok(self)
     }
 
     /// Whether so many points are to be solved for by iteration.
@@ -215,31 +272,6 @@ impl<T: Scalar, K> FitOptions<T, K> {
             Solver::Direct => false,
             Solver::Iterative => true,
         }
-    }
-
-    /// The kernel.
-    ///
-    /// ```
-    /// # use tactile_tps::{FitOptions, R2LogR};
-    /// assert_eq!(FitOptions::<f64>::default().kernel(), &R2LogR);
-    /// ```
-    pub fn kernel(&self) -> &K {
-        &self.kernel
-    }
-
-    pub(crate) fn validate(&self, points: usize) -> Result<(), TpsError> {
-        let tolerance = self.rank_tolerance.widen();
-        if !(0.0..1.0).contains(&tolerance) {
-            return Err(TpsError::RankTolerance { value: tolerance });
-        }
-        let tolerance = self.tolerance.widen();
-        if !(tolerance > 0.0 && tolerance < 1.0) {
-            return Err(TpsError::Tolerance { value: tolerance });
-        }
-        validate_smoothing(&self.smoothing)?;
-        self.weights
-            .as_deref()
-            .map_or(Ok(()), |weights| validate_weights(weights, points))
     }
 }
 
@@ -255,13 +287,7 @@ pub(crate) fn validate_smoothing<T: Scalar>(smoothing: &Smoothing<T>) -> Result<
 }
 
 pub(crate) fn validate_weights<T: Scalar>(weights: &[T], points: usize) -> Result<(), TpsError> {
-    if weights.len() != points {
-        return Err(TpsError::Length {
-            input: Input::Weights,
-            expected: points,
-            found: weights.len(),
-        });
-    }
+    validate_weight_count(weights, points)?;
     let bad = weights
         .iter()
         .position(|w| !(w.widen() >= 0.0 && w.widen().is_finite()));
@@ -273,4 +299,16 @@ pub(crate) fn validate_weights<T: Scalar>(weights: &[T], points: usize) -> Resul
         None if weights.iter().all(|w| w.widen() == 0.0) => Err(TpsError::Empty(Input::Weights)),
         None => Ok(()),
     }
+}
+
+/// One weight a point.
+pub(crate) fn validate_weight_count<T>(weights: &[T], points: usize) -> Result<(), TpsError> {
+    if weights.len() == points {
+        return Ok(());
+    }
+    Err(TpsError::Length {
+        input: Input::Weights,
+        expected: points,
+        found: weights.len(),
+    })
 }

@@ -11,7 +11,7 @@
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources: Vec<Point2<f64>> =
 ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
-/// let options = FitOptions::<f64>::default().solver(Solver::Iterative);
+/// let options = FitOptions::<f64>::default().with_solver(Solver::Iterative);
 /// let (mut steps, mut residuals) = (0, Vec::new());
 /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
 /// Factorization::new(&sources, &options)?.fit_watched(&targets, |progress| {
@@ -46,7 +46,7 @@ pub struct Progress {
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// let sources: Vec<Point2<f64>> =
 ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
-/// let options = FitOptions::<f64>::default().solver(Solver::Iterative);
+/// let options = FitOptions::<f64>::default().with_solver(Solver::Iterative);
 /// let mut stages = Vec::new();
 /// Factorization::new_watched(&sources, &options, |progress| {
 ///     stages.push(progress.stage);

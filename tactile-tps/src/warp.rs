@@ -1,5 +1,7 @@
 //! Maps of space onto itself, and models that find one from pairs of points.
 
+use std::sync::Arc;
+
 use nalgebra::{Point, SMatrix};
 
 use crate::{FitOptions, Kernel, Scalar, Spline, ThinPlateSpline, TpsError, error::Input};
@@ -68,53 +70,74 @@ pub trait Warp<T: Scalar, const D: usize> {
     }
 }
 
-impl<T: Scalar, const D: usize, W: Warp<T, D> + ?Sized> Warp<T, D> for Box<W> {
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
-        (**self).apply(point)
-    }
-    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
-        (**self).jacobian(point)
-    }
-    fn apply_into(
-        &self,
-        points: &[Point<T, D>],
-        images: &mut [Point<T, D>],
-    ) -> Result<(), TpsError> {
-        (**self).apply_into(points, images)
-    }
-    fn jacobian_into(
-        &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, D, D>],
-    ) -> Result<(), TpsError> {
-        (**self).jacobian_into(points, jacobians)
-    }
-}
+/// A warp or a model behind a pointer is one: what a pipeline holds and shares.
+macro_rules! forward {
+    ($pointer:ident) => {
+        impl<T: Scalar, const D: usize, W: Warp<T, D> + ?Sized> Warp<T, D> for $pointer<W> {
+            fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+                (**self).apply(point)
+            }
+            fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
+                (**self).jacobian(point)
+            }
+            fn apply_into(
+                &self,
+                points: &[Point<T, D>],
+                images: &mut [Point<T, D>],
+            ) -> Result<(), TpsError> {
+                (**self).apply_into(points, images)
+            }
+            fn jacobian_into(
+                &self,
+                points: &[Point<T, D>],
+                jacobians: &mut [SMatrix<T, D, D>],
+            ) -> Result<(), TpsError> {
+                (**self).jacobian_into(points, jacobians)
+            }
+        }
 
-/// A family of warps with a rule to choose one from weighted pairs of points.
+        impl<T: Scalar, const D: usize, M: WarpModel<T, D> + ?Sized> WarpModel<T, D>
+            for $pointer<M>
+        {
+            fn fit(
+                &self,
+                sources: &[Point<T, D>],
+                targets: &[Point<T, D>],
+                weights: Option<&[T]>,
+            ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
+                (**self).fit(sources, targets, weights)
+            }
+        }
+    };
+}
+forward!(Box);
+forward!(Arc);
+
+/// A family of warps with a rule to choose one from weighted pairs of points. Object safe: a pipeline holds an
+/// `Arc<dyn WarpModel<f64, 3> + Send + Sync>`.
+///
+/// Where the kind of warp is known, fit it by its own type: [`Spline::fit`], [`Affine::fit`](crate::Affine::fit),
+/// [`Rigid::fit`](crate::Rigid::fit).
 ///
 /// ```
 /// # use nalgebra::Point2;
-/// # use tactile_tps::{AffineModel, FitOptions, TpsError, Warp, WarpModel};
+/// use std::sync::Arc;
+/// use tactile_tps::{AffineModel, FitOptions, Warp, WarpModel};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// /// Root mean square distance that a model leaves between images and targets.
-/// fn misfit<W: WarpModel<f64, 2>>(model: &W, from: &[Point2<f64>], to: &[Point2<f64>]) -> Result<f64, TpsError> {
-///     let warp = model.fit(from, to, None)?;
-///     let sum: f64 = from.iter().zip(to).map(|(x, y)| (warp.apply(x) - y).norm_squared()).sum();
-///     Ok((sum / from.len() as f64).sqrt())
-/// }
 /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-/// let (affine, spline) = (misfit(&AffineModel, &sources, &targets)?, misfit(&FitOptions::default(), &sources, &targets)?);
-/// assert!(spline < 1e-14 && affine > 1e-3);
+/// let models: [Arc<dyn WarpModel<f64, 2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()), Arc::new(AffineModel)];
+/// let mut misfits = Vec::new();
+/// for model in models {
+///     let warp = model.fit(&sources, &targets, None)?;
+///     misfits.push((warp.apply(&sources[4]) - targets[4]).norm());
+/// }
+/// assert!(misfits[0] < 1e-14 && misfits[1] > 1e-3); // a spline interpolates, an affine map cannot
 /// # Ok(())
 /// # }
 /// ```
 pub trait WarpModel<T: Scalar, const D: usize> {
-    /// The warp it fits.
-    type Warp: Warp<T, D>;
-
-    /// The warp that takes each source to its target as nearly as the model's rule says; no weights means all one.
+    /// The warp that takes each source to its target as nearly as the model allows; without weights all count alike.
     ///
     /// # Errors
     /// See [`TpsError`].
@@ -123,7 +146,7 @@ pub trait WarpModel<T: Scalar, const D: usize> {
         sources: &[Point<T, D>],
         targets: &[Point<T, D>],
         weights: Option<&[T]>,
-    ) -> Result<Self::Warp, TpsError>;
+    ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError>;
 }
 
 impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
@@ -149,20 +172,22 @@ impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
     }
 }
 
-impl<T: Scalar, const D: usize, K: Kernel> WarpModel<T, D> for FitOptions<T, K> {
-    type Warp = ThinPlateSpline<T, D, K>;
-
-    /// The options' own weights are replaced by `weights` where these are given.
+impl<T: Scalar, const D: usize, K: Kernel + 'static> WarpModel<T, D> for FitOptions<T, K> {
+    /// `weights`, where given, replace those of the options.
     fn fit(
         &self,
         sources: &[Point<T, D>],
         targets: &[Point<T, D>],
         weights: Option<&[T]>,
-    ) -> Result<Self::Warp, TpsError> {
-        match weights {
+    ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
+        let spline: ThinPlateSpline<T, D, K> = match weights {
             None => Spline::fit(sources, targets, self),
-            Some(weights) => Spline::fit(sources, targets, &self.clone().weights(weights.to_vec())),
-        }
+            Some(weights) => {
+                let weighted = self.clone().with_weights(weights.to_vec())?;
+                Spline::fit(sources, targets, &weighted)
+            }
+        }?;
+        Ok(Box::new(spline))
     }
 }
 

@@ -57,8 +57,8 @@ impl Experiment {
             CalibrationPair::loading(1e5 * f64::from(k), 0.05 * f64::from(k) + 2e-3 * e)
         });
         // λ is held: the spline is then linear in its targets.
-        let options = FitOptions::default().smoothing(Smoothing::Lambda(1e-4));
-        let spline = Factorization::new(&before, &options).unwrap();
+        let options = FitOptions::default().with_smoothing(Smoothing::Lambda(1e-4));
+        let spline = Factorization::new(&before, &options.unwrap()).unwrap();
         Self {
             pairs: pairs.collect(),
             before,

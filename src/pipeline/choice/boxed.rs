@@ -99,7 +99,6 @@ pub trait FitWarp: Send + Sync {
 impl<W> FitWarp for W
 where
     W: WarpModel<f64, 3> + Send + Sync,
-    W::Warp: Send + Sync + 'static,
 {
     fn fit_warp(
         &self,
@@ -107,7 +106,7 @@ where
         targets: &[Point3<f64>],
         weights: &[f64],
     ) -> Result<BoxedWarp, TpsError> {
-        Ok(Box::new(self.fit(sources, targets, Some(weights))?))
+        self.fit(sources, targets, Some(weights))
     }
 }
 
@@ -150,7 +149,12 @@ impl WarpChoice {
     pub(in crate::pipeline) fn boxed(self) -> BoxedWarpModel {
         match self {
             Self::ThinPlateSpline => Box::new(StrainSpline),
-            Self::CubicSpline => Box::new(FitOptions::new(R3).smoothing(Smoothing::Gcv)),
+            // Cross-validation takes no number that could be refused.
+            Self::CubicSpline => Box::new(
+                FitOptions::new(R3)
+                    .with_smoothing(Smoothing::Gcv)
+                    .unwrap_or_else(|_| FitOptions::new(R3)),
+            ),
             Self::Affine => Box::new(AffineModel),
             Self::Rigid => Box::new(RigidModel),
         }

@@ -168,7 +168,6 @@ where
     P: ControlPointSampler<f64> + Send + Sync,
     M: PointMatcher<f64, 3> + Send + Sync,
     W: WarpModel<f64, 3> + Send + Sync,
-    W::Warp: Send + Sync + 'static,
     S: StrainMeasure<f64> + Send + Sync,
 {
     fn contact(&self) -> &dyn ContactStage {
@@ -193,7 +192,7 @@ where
         targets: &[Point3<f64>],
         weights: &[f64],
     ) -> Result<BoxedWarp, TpsError> {
-        Ok(Box::new(self.warp.fit(sources, targets, Some(weights))?))
+        self.warp.fit(sources, targets, Some(weights))
     }
 
     fn strain(&self) -> &dyn StrainMeasure<f64> {

@@ -6,7 +6,7 @@
 use super::Motion;
 use super::expectation::{Columns, Posterior};
 use nalgebra::{Point, SMatrix, SVector};
-use tactile_tps::{AffineModel, RigidModel, WarpModel};
+use tactile_tps::{Affine, Rigid};
 
 /// `y ↦ A y + b`, and the memory to find it.
 #[derive(Clone, Debug)]
@@ -50,7 +50,7 @@ impl<const D: usize> GlobalStep<D> {
             Motion::Rigid => self.fit_rigid(false),
             Motion::Similarity => self.fit_rigid(true),
             _ => {
-                if let Ok(fit) = AffineModel.fit(&self.sources, &self.means, Some(&self.weights)) {
+                if let Ok(fit) = Affine::fit(&self.sources, &self.means, Some(&self.weights)) {
                     (self.linear, self.offset) = (fit.linear, fit.offset);
                 }
             }
@@ -81,7 +81,7 @@ impl<const D: usize> GlobalStep<D> {
     }
 
     fn fit_rigid(&mut self, scaled: bool) {
-        let Ok(fit) = RigidModel.fit(&self.sources, &self.means, Some(&self.weights)) else {
+        let Ok(fit) = Rigid::fit(&self.sources, &self.means, Some(&self.weights)) else {
             return;
         };
         let scale = if scaled {

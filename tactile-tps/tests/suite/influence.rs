@@ -1,6 +1,6 @@
 //! The influence of targets on a spline against refits, against what splines reproduce, and against merged points.
 
-use crate::common::{Uniform, bend, largest};
+use crate::common::{Uniform, bend, largest, options};
 use nalgebra::{Matrix3, Point, Point1, SMatrix, SVector};
 use tactile_tps::{
     Factorization, FitOptions, Input, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError,
@@ -8,12 +8,18 @@ use tactile_tps::{
 };
 
 /// Largest difference between influences and the values and Jacobians of refits with unit targets.
-fn against_unit_targets<const D: usize, K: Kernel>(options: FitOptions<f64, K>, n: usize) -> f64 {
+fn against_unit_targets<const D: usize, K: Kernel>(
+    kernel: K,
+    smoothing: Smoothing<f64>,
+    weights: Option<&[f64]>,
+) -> f64 {
+    let n = 40;
+    let options = options(kernel.clone(), smoothing, weights);
     let mut random = Uniform(5);
     let sources = random.points::<D>(n);
     let queries: [Point<f64, D>; 7] = core::array::from_fn(|_| random.point::<D>() * 1.3);
     let factorization = Factorization::new(&sources, &options).expect("a factor");
-    let (mut workspace, mut unit) = (Workspace::new(), Spline::empty(options.kernel().clone()));
+    let (mut workspace, mut unit) = (Workspace::new(), Spline::empty(kernel));
     let mut values = vec![0.0; 7 * n];
     let mut slopes = vec![SVector::zeros(); 7 * n];
     factorization
@@ -44,30 +50,18 @@ fn against_unit_targets<const D: usize, K: Kernel>(options: FitOptions<f64, K>, 
 fn influences_are_fits_to_unit_targets() {
     let weights: Vec<f64> = (0..40).map(|i| f64::from(i % 5) * 0.3).collect();
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.05)] {
-        for options in [None, Some(weights.clone())] {
+        for weights in [None, Some(&weights[..])] {
             let found = [
-                against_unit_targets::<2, _>(with(R2LogR, smoothing, &options), 40),
-                against_unit_targets::<3, _>(with(R2LogR, smoothing, &options), 40),
-                against_unit_targets::<3, _>(with(NegR, smoothing, &options), 40),
-                against_unit_targets::<3, _>(with(R3, smoothing, &options), 40),
+                against_unit_targets::<2, _>(R2LogR, smoothing, weights),
+                against_unit_targets::<3, _>(R2LogR, smoothing, weights),
+                against_unit_targets::<3, _>(NegR, smoothing, weights),
+                against_unit_targets::<3, _>(R3, smoothing, weights),
             ];
             assert!(
                 found.iter().all(|&worst| worst < 1e-11),
                 "{smoothing:?}: {found:?}"
             );
         }
-    }
-}
-
-fn with<K: Kernel>(
-    kernel: K,
-    smoothing: Smoothing<f64>,
-    weights: &Option<Vec<f64>>,
-) -> FitOptions<f64, K> {
-    let options = FitOptions::new(kernel).smoothing(smoothing);
-    match weights {
-        Some(weights) => options.weights(weights.clone()),
-        None => options,
     }
 }
 
@@ -81,9 +75,7 @@ fn influences_sum_to_the_spline() {
     let weights: Vec<f64> = (0..33).map(|i| 0.2 + f64::from(i % 4)).collect();
     for unit in [1.0, 1e-6] {
         let sources: Vec<_> = sources.iter().map(|p| p * unit).collect();
-        let options = FitOptions::new(NegR)
-            .smoothing(Smoothing::Lambda(0.1 * unit))
-            .weights(weights.clone());
+        let options = options(NegR, Smoothing::Lambda(0.1 * unit), Some(&weights));
         let factorization = Factorization::new(&sources, &options).expect("a factor");
         let spline = factorization.fit(&targets).expect("a fit");
         let x = Point::from(random.point::<3>().coords * unit);
@@ -145,8 +137,7 @@ fn single_precision_keeps_its_digits() {
 fn what_is_no_linear_map_is_refused() {
     let sources = Uniform(6).points::<2>(12);
     let x = Point::from([0.1, 0.2]);
-    let chosen =
-        Factorization::<f64, 2>::new(&sources, &FitOptions::default().smoothing(Smoothing::Gcv));
+    let chosen = Factorization::<f64, 2>::new(&sources, &options(R2LogR, Smoothing::Gcv, None));
     assert_eq!(
         chosen.expect("a factor").influence(&x),
         Err(TpsError::DependsOnTargets)

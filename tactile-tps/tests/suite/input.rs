@@ -1,8 +1,8 @@
 //! Points as they come: coinciding, flat, broken.
 
-use crate::common::{Uniform, bend, fit};
+use crate::common::{Uniform, bend, fit, options};
 use nalgebra::{Point2, Point3, SVector};
-use tactile_tps::{FitOptions, NegR, Smoothing, ThinPlateSpline, TpsError};
+use tactile_tps::{FitOptions, Input, NegR, R2LogR, Smoothing, ThinPlateSpline, TpsError};
 
 /// Twice the same place with one value is one point; with two values it is their weighted mean, smoothed.
 #[test]
@@ -28,12 +28,16 @@ fn coinciding_points_are_merged() {
             second: 12
         })
     );
-    let options = FitOptions::default().smoothing(Smoothing::Lambda(0.1));
+    let options = options(R2LogR, Smoothing::Lambda(0.1), None);
     let smoothed = fit(&sources, &targets, &options);
     // One point of weight two at the mean is the same problem.
     targets[3].x += 0.1;
     let weights = (0..12).map(|i| if i == 3 { 2.0 } else { 1.0 }).collect();
-    let single = fit(&sources[..12], &targets[..12], &options.weights(weights));
+    let single = fit(
+        &sources[..12],
+        &targets[..12],
+        &options.with_weights(weights).expect("weights"),
+    );
     assert!((smoothed.apply(&query) - single.apply(&query)).norm() < 1e-12);
 }
 
@@ -59,7 +63,13 @@ fn directions_that_are_not_spanned_are_dropped() {
         fit(&thin, &targets, &FitOptions::new(NegR)).report().rank,
         4
     );
-    let dropped = fit(&thin, &targets, &FitOptions::new(NegR).rank_tolerance(1e-2));
+    let dropped = fit(
+        &thin,
+        &targets,
+        &FitOptions::new(NegR)
+            .with_rank_tolerance(1e-2)
+            .expect("a tolerance"),
+    );
     assert_eq!(dropped.report().rank, 3);
     assert!(dropped.report().extents[2] < 1e-3);
 }
@@ -89,35 +99,34 @@ fn bad_input_is_named() {
         "target points: expected 6 of them, found 5"
     );
     for lambda in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(
-            fit(
-                &points,
-                &points,
-                plain().smoothing(Smoothing::Lambda(lambda))
-            )
-            .starts_with("smoothing")
-        );
+        let refused = plain().with_smoothing(Smoothing::Lambda(lambda));
+        assert!(matches!(refused, Err(TpsError::Lambda { .. })), "{lambda}");
     }
     for tolerance in [-0.1, 1.0, f64::NAN] {
+        let refused = plain().with_rank_tolerance(tolerance);
         assert!(
-            fit(&points, &points, plain().rank_tolerance(tolerance)).starts_with("rank tolerance")
+            matches!(refused, Err(TpsError::RankTolerance { .. })),
+            "{tolerance}"
         );
     }
     let weights = |bad| vec![1.0, 1.0, bad, 1.0, 1.0, 1.0];
     for weight in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(fit(&points, &points, plain().weights(weights(weight))).starts_with("weight 2 "));
+        let refused = plain().with_weights(weights(weight));
+        assert!(
+            matches!(refused, Err(TpsError::Weight { index: 2, .. })),
+            "{weight}"
+        );
     }
     assert_eq!(
-        fit(&points, &points, plain().weights(vec![0.0; 6])),
-        "no weights to fit"
+        plain().with_weights(vec![0.0; 6]),
+        Err(TpsError::Empty(Input::Weights))
     );
-    assert!(
-        fit(&points, &points, plain().weights(vec![1.0; 5])).starts_with("weights: expected 6")
-    );
+    let five = plain().with_weights(vec![1.0; 5]).expect("weights");
+    assert!(fit(&points, &points, five).starts_with("weights: expected 6"));
     let few = fit(
         &points[..3],
         &points[..3],
-        plain().smoothing(Smoothing::Gcv),
+        options(R2LogR, Smoothing::Gcv, None),
     );
     assert!(few.starts_with("cross-validation needs more than 3"));
 }

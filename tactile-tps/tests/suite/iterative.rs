@@ -2,7 +2,7 @@
 
 use core::ops::ControlFlow;
 
-use crate::common::{Uniform, bend, largest};
+use crate::common::{Uniform, bend, largest, options};
 use nalgebra::{Point, Point3};
 use tactile_tps::{
     Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Solver, Spline, Stage,
@@ -18,7 +18,8 @@ fn compare<const D: usize, K: Kernel>(
 ) -> (f64, usize) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let fit = |solver| {
-        ThinPlateSpline::fit(sources, &targets, &options.clone().solver(solver)).expect("a fit")
+        ThinPlateSpline::fit(sources, &targets, &options.clone().with_solver(solver))
+            .expect("a fit")
     };
     let (direct, iterative) = (fit(Solver::Direct), fit(Solver::Iterative));
     let report = iterative.report();
@@ -51,36 +52,11 @@ fn iteration_finds_the_direct_solution() {
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.01)] {
         for weights in [vec![1.0; POINTS], weights.clone()] {
             let found = [
-                compare(
-                    &plane,
-                    &FitOptions::new(R2LogR)
-                        .smoothing(smoothing)
-                        .weights(weights.clone()),
-                ),
-                compare(
-                    &space,
-                    &FitOptions::new(R2LogR)
-                        .smoothing(smoothing)
-                        .weights(weights.clone()),
-                ),
-                compare(
-                    &plane,
-                    &FitOptions::new(NegR)
-                        .smoothing(smoothing)
-                        .weights(weights.clone()),
-                ),
-                compare(
-                    &space,
-                    &FitOptions::new(NegR)
-                        .smoothing(smoothing)
-                        .weights(weights.clone()),
-                ),
-                compare(
-                    &space,
-                    &FitOptions::new(R3)
-                        .smoothing(smoothing)
-                        .weights(weights.clone()),
-                ),
+                compare(&plane, &options(R2LogR, smoothing, Some(&weights))),
+                compare(&space, &options(R2LogR, smoothing, Some(&weights))),
+                compare(&plane, &options(NegR, smoothing, Some(&weights))),
+                compare(&space, &options(NegR, smoothing, Some(&weights))),
+                compare(&space, &options(R3, smoothing, Some(&weights))),
             ];
             assert!(
                 found
@@ -127,8 +103,8 @@ fn refits_are_fits() {
     let sources = Uniform(11).points::<3>(POINTS);
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let weights: Vec<f64> = (0..POINTS).map(|i| 0.5 + f64::from(i as u32 % 3)).collect();
-    let options = FitOptions::new(NegR).solver(Solver::Iterative);
-    let factorization = Factorization::new(&sources, &options).expect("a preconditioner");
+    let iterative = FitOptions::new(NegR).with_solver(Solver::Iterative);
+    let factorization = Factorization::new(&sources, &iterative).expect("a preconditioner");
     let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(NegR));
     let query = Point3::new(0.1, 0.2, 0.3);
     for (weights, smoothing) in [
@@ -141,9 +117,8 @@ fn refits_are_fits() {
         factorization
             .refit_with(&mut workspace, &targets, refit, smoothing, &mut spline)
             .expect("a refit");
-        let options = options.clone().smoothing(smoothing).solver(Solver::Direct);
-        let options = weights.map_or(options.clone(), |w| options.clone().weights(w.clone()));
-        let fitted = ThinPlateSpline::fit(&sources, &targets, &options).expect("a fit");
+        let direct = options(NegR, smoothing, refit).with_solver(Solver::Direct);
+        let fitted = ThinPlateSpline::fit(&sources, &targets, &direct).expect("a fit");
         assert!((spline.apply(&query) - fitted.apply(&query)).norm() < 1e-9);
     }
     let again = allocation_counter::measure(|| {
@@ -160,7 +135,7 @@ fn refits_are_fits() {
 fn a_watch_stops_the_fit() {
     let sources = Uniform(12).points::<2>(POINTS);
     let targets: Vec<_> = sources.iter().map(bend).collect();
-    let options = FitOptions::default().solver(Solver::Iterative);
+    let options = FitOptions::default().with_solver(Solver::Iterative);
     let mut heard = 0;
     let stopped = Factorization::<f64, 2>::new_watched(&sources, &options, |progress| {
         heard += 1;
@@ -193,12 +168,13 @@ fn tolerances_are_checked_and_kept() {
     let sources = Uniform(13).points::<2>(POINTS);
     let targets: Vec<_> = sources.iter().map(bend).collect();
     for value in [0.0, 1.0, -1.0, f64::NAN] {
-        let found = Factorization::<f64, 2>::new(&sources, &FitOptions::default().tolerance(value));
+        let found = FitOptions::<f64>::default().with_tolerance(value);
         assert!(matches!(found, Err(TpsError::Tolerance { .. })), "{value}");
     }
     let rough = FitOptions::default()
-        .solver(Solver::Iterative)
-        .tolerance(1e-4);
+        .with_solver(Solver::Iterative)
+        .with_tolerance(1e-4)
+        .expect("a tolerance");
     let rough = ThinPlateSpline::fit(&sources, &targets, &rough).expect("a fit");
     let report = rough.report();
     assert!(

@@ -2,7 +2,7 @@
 
 use crate::common::Uniform;
 use nalgebra::{Point3, Rotation3, SVector};
-use tactile_tps::{Rigid, RigidModel, Warp, WarpModel};
+use tactile_tps::{Rigid, Warp};
 
 #[test]
 fn rigid_motions_are_found_and_never_reflect() {
@@ -13,7 +13,7 @@ fn rigid_motions_are_found_and_never_reflect() {
         translation: SVector::from([1.0, 2.0, 3.0]),
     };
     let targets: Vec<_> = sources.iter().map(|x| truth.apply(x)).collect();
-    let found = RigidModel.fit(&sources, &targets, None).expect("a motion");
+    let found = Rigid::fit(&sources, &targets, None).expect("a motion");
     assert!(
         (found.rotation - truth.rotation).norm() < 1e-13
             && (found.translation - truth.translation).norm() < 1e-13
@@ -22,6 +22,6 @@ fn rigid_motions_are_found_and_never_reflect() {
         .iter()
         .map(|x| Point3::new(-x.x, x.y, x.z))
         .collect();
-    let found = RigidModel.fit(&sources, &mirrored, None).expect("a motion");
+    let found = Rigid::fit(&sources, &mirrored, None).expect("a motion");
     assert!((found.rotation.determinant() - 1.0).abs() < 1e-13);
 }

@@ -1,11 +1,10 @@
 //! What every spline must be: interpolating, affine where its targets are, the same in any frame, unit and order.
 
-use crate::common::{Uniform, bend, fit, for_all, largest};
+use crate::common::{Uniform, bend, fit, for_all, largest, options};
 use nalgebra::{Point, Point2, Point3, Rotation2, Rotation3, SMatrix, SVector};
 use proptest::prelude::*;
 use tactile_tps::{
-    Affine, AffineModel, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline,
-    Warp, WarpModel, Workspace,
+    Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, Warp, Workspace,
 };
 
 fn interpolates<const D: usize, K: Kernel>(kernel: K, seed: u64) {
@@ -34,7 +33,7 @@ fn reproduces_affine_maps<const D: usize, K: Kernel>(kernel: K, seed: u64) {
         let spline = fit(
             &sources,
             &targets,
-            &FitOptions::new(kernel.clone()).smoothing(smoothing),
+            &options(kernel.clone(), smoothing, None),
         );
         // The targets' own rounding, up to 1e-15 of their size 10 over 30 points, times the condition number: close
         // points under r³ bring it to 1e8.
@@ -67,8 +66,7 @@ fn is_the_same_in_any_frame<const D: usize, K: Kernel>(
     let offset = SVector::<f64, D>::from_fn(|_, _| 3.0 * random.next());
     let moved = |x: &Point<f64, D>| Point::from((turn(x).coords + offset) * scale);
     let elsewhere: Vec<_> = sources.iter().map(moved).collect();
-    let options =
-        |lambda: f64| FitOptions::new(kernel.clone()).smoothing(Smoothing::Lambda(lambda));
+    let options = |lambda: f64| options(kernel.clone(), Smoothing::Lambda(lambda), None);
     let here = fit(&sources, &targets, &options(0.01));
     let there = fit(&elsewhere, &targets, &options(0.01 * scale.powi(degree)));
     for _ in 0..20 {
@@ -96,18 +94,12 @@ fn smooths_towards_the_affine_fit<const D: usize, K: Kernel>(kernel: K, seed: u6
     let sources = random.points::<D>(30);
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let weights: Vec<f64> = (0..30).map(|_| 1.1 + random.next()).collect();
-    let options = |lambda| {
-        FitOptions::new(kernel.clone())
-            .smoothing(Smoothing::Lambda(lambda))
-            .weights(weights.clone())
-    };
+    let options = |lambda| options(kernel.clone(), Smoothing::Lambda(lambda), Some(&weights));
     let energies: Vec<f64> = (-6..6)
         .map(|k| fit(&sources, &targets, &options(10f64.powi(k))).bending_energy())
         .collect();
     assert!(energies.windows(2).all(|e| e[1] < e[0]), "{energies:?}");
-    let limit = AffineModel
-        .fit(&sources, &targets, Some(&weights))
-        .expect("an affine map");
+    let limit = Affine::fit(&sources, &targets, Some(&weights)).expect("an affine map");
     let spline = fit(&sources, &targets, &options(1e12));
     let query = random.point::<D>();
     // What is left of the bending goes as 1/λ.
@@ -128,8 +120,7 @@ fn refits_to_the_same<const D: usize, K: Kernel>(kernel: K, seed: u64) {
     let query = random.point::<D>();
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.3), Smoothing::Gcv] {
         for weights in [None, Some(&weights[..])] {
-            let plain = FitOptions::new(kernel.clone()).smoothing(smoothing);
-            let options = weights.map_or(plain.clone(), |w| plain.weights(w.to_vec()));
+            let options = options(kernel.clone(), smoothing, weights);
             let once = fit(&sources, &targets, &options);
             factorization
                 .refit_with(&mut workspace, &targets, weights, smoothing, &mut refitted)
@@ -193,11 +184,7 @@ fn cross_validation_finds_the_noise() {
         .map(|x| bend(x) + SVector::<f64, 2>::from_fn(|_, _| 0.05 * random.next()))
         .collect();
     let error = |smoothing| {
-        let spline = fit(
-            &sources,
-            &targets,
-            &FitOptions::new(R2LogR).smoothing(smoothing),
-        );
+        let spline = fit(&sources, &targets, &options(R2LogR, smoothing, None));
         let queries = Uniform(8).points::<2>(200);
         queries
             .iter()

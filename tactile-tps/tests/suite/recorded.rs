@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 
 use nalgebra::{Point, Point1};
 use tactile_tps::{
-    AffineModel, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, RigidModel, Smoothing,
-    Spline, ThinPlateSpline, Warp, WarpModel, Workspace,
+    Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Rigid, Smoothing, Spline,
+    ThinPlateSpline, Warp, Workspace,
 };
 
-use super::common::{Uniform, bend};
+use super::common::{Uniform, bend, options};
 
 /// Relative to the largest number of a line: sums of 40 terms in another order differ by 1e-15, times condition numbers
 /// of at most 1e3.
@@ -80,12 +80,15 @@ fn fits<const D: usize, K: Kernel>(answers: &mut Answers, kernel: K, name: &str)
         .collect();
     let weights: Vec<f64> = (0..40).map(|i| f64::from(i % 5) * 0.5).collect();
     let plain = FitOptions::new(kernel.clone());
-    let smooth = plain.clone().smoothing(Smoothing::Lambda(0.02));
+    let smooth = options(kernel.clone(), Smoothing::Lambda(0.02), None);
     let cases = [
         ("exact", plain.clone()),
         ("lambda", smooth.clone()),
-        ("gcv", plain.clone().smoothing(Smoothing::Gcv)),
-        ("weighted", smooth.clone().weights(weights.clone())),
+        ("gcv", options(kernel.clone(), Smoothing::Gcv, None)),
+        (
+            "weighted",
+            options(kernel.clone(), Smoothing::Lambda(0.02), Some(&weights)),
+        ),
     ];
     for (case, options) in cases {
         let fitted = ThinPlateSpline::fit(&sources, &targets, &options).expect("a spline");
@@ -124,8 +127,8 @@ fn models<const D: usize>(answers: &mut Answers) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let weights: Vec<f64> = (1..13).map(f64::from).collect();
     let query = uniform.point();
-    let affine = AffineModel.fit(&sources, &targets, Some(&weights));
-    let rigid = RigidModel.fit(&sources, &targets, Some(&weights));
+    let affine = Affine::fit(&sources, &targets, Some(&weights));
+    let rigid = Rigid::fit(&sources, &targets, Some(&weights));
     let (affine, rigid) = (affine.expect("a map"), rigid.expect("a motion"));
     answers.add(format!("affine{D}"), affine.apply(&query).iter().copied());
     answers.add(

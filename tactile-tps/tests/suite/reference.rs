@@ -66,12 +66,8 @@ fn options<K: Kernel>(case: &Value, kernel: K) -> FitOptions<f64, K> {
     } else {
         Smoothing::None
     };
-    let options = FitOptions::new(kernel).smoothing(smoothing);
-    if case["weights"].is_null() {
-        options
-    } else {
-        options.weights(numbers(&case["weights"]))
-    }
+    let weights = (!case["weights"].is_null()).then(|| numbers(&case["weights"]));
+    crate::common::options(kernel, smoothing, weights.as_deref())
 }
 
 /// The tolerance the reference states: never below 1e-13, growing with conditioning and cancellation.

@@ -20,7 +20,7 @@ fn compare<const D: usize, K: Kernel>(
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let options = FitOptions::new(kernel.clone());
     let factorization = Factorization::new(&sources, &options).expect("a factor");
-    let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel));
+    let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel.clone()));
     factorization
         .refit_with(
             &mut workspace,
@@ -33,7 +33,7 @@ fn compare<const D: usize, K: Kernel>(
     let fitted = ThinPlateSpline::fit(
         &sources,
         &targets,
-        &options.smoothing(smoothing).weights(weights.to_vec()),
+        &crate::common::options(kernel, smoothing, Some(weights)),
     )
     .expect("a fit");
     let queries: [Point<f64, D>; 50] = core::array::from_fn(|_| random.point());

@@ -5,7 +5,7 @@
 #[path = "../../../evidence/worst.rs"]
 mod worst;
 
-use crate::common::{Uniform, bend};
+use crate::common::{Uniform, bend, options};
 use nalgebra::{Point, SVector};
 use serde_json::Value;
 use tactile_tps::{
@@ -34,12 +34,8 @@ fn check<const D: usize, K: Kernel>(table: &mut Worst, case: &Value, kernel: K) 
     let sources = points::<D>(&case["points"]);
     let values = numbers(&case["values"]);
     let targets: Vec<Point<f64, 1>> = values.iter().map(|&v| Point::from([v])).collect();
-    let spline: Spline<f64, D, 1, K> = Spline::fit(
-        &sources,
-        &targets,
-        &FitOptions::new(kernel).smoothing(smoothing),
-    )
-    .expect("a spline");
+    let spline: Spline<f64, D, 1, K> =
+        Spline::fit(&sources, &targets, &options(kernel, smoothing, None)).expect("a spline");
     let scale = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let condition = case["condition"].as_f64().unwrap();
     for (query, expected) in points::<D>(&case["queries"])
@@ -105,7 +101,7 @@ fn lambda_reaches_both_ends() {
     let sources = Uniform(3).points::<2>(30);
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let residual = |lambda: f64| {
-        let options = FitOptions::new(R2LogR).smoothing(Smoothing::Lambda(lambda));
+        let options = options(R2LogR, Smoothing::Lambda(lambda), None);
         let spline = ThinPlateSpline::fit(&sources, &targets, &options).unwrap();
         sources
             .iter()

@@ -1,7 +1,7 @@
 //! Points and maps that the tests share.
 
 use nalgebra::{Point, SVector};
-use tactile_tps::{FitOptions, Kernel, ThinPlateSpline};
+use tactile_tps::{FitOptions, Kernel, Smoothing, ThinPlateSpline};
 
 /// Uniform numbers in [-1, 1) from a fixed seed (xorshift, Marsaglia 2003).
 pub(crate) struct Uniform(pub(crate) u64);
@@ -40,6 +40,20 @@ pub(crate) fn fit<const D: usize, K: Kernel>(
     options: &FitOptions<f64, K>,
 ) -> ThinPlateSpline<f64, D, K> {
     ThinPlateSpline::fit(sources, targets, options).expect("a spline")
+}
+
+/// Options with this smoothing and, where given, these weights.
+pub(crate) fn options<K>(
+    kernel: K,
+    smoothing: Smoothing<f64>,
+    weights: Option<&[f64]>,
+) -> FitOptions<f64, K> {
+    let smooth = FitOptions::new(kernel).with_smoothing(smoothing);
+    let smooth = smooth.expect("a smoothing");
+    match weights {
+        Some(weights) => smooth.with_weights(weights.to_vec()).expect("weights"),
+        None => smooth,
+    }
 }
 
 /// Runs a check with every kernel in both dimensions.
