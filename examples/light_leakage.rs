@@ -32,6 +32,8 @@ struct Arguments {
 
 /// Length of the slab: the paper's 30 mm side.
 const LENGTH_M: f64 = 30e-3;
+/// Thickness of the slab: three layers and the glass.
+const THICKNESS_M: f64 = 12e-3;
 /// Centre of the press.
 const CENTRE_M: [f64; 2] = [15e-3, 0.0];
 /// Half width of the dimple.
@@ -42,9 +44,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let glass = Dispersion::BOROFLOAT_33.index(530e-9)?;
     let layer = |index, thickness_m| SlabLayer { index, thickness_m };
     let layers = [
-        layer(1.41, 2e-3),
-        layer(1.40, 3e-3),
-        layer(1.39, 5e-3),
+        // From the object's side to the glass, §3.3.
+        layer(1.38, 2e-3),
+        layer(1.39, 3e-3),
+        layer(1.40, 5e-3),
         layer(glass, 2e-3),
     ];
     let slab = Slab::new(&layers, 1.0, LENGTH_M)?;
@@ -71,7 +74,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn print_angles() -> Result<(), OpticsError> {
-    let indices = [1.41, 1.40, 1.39, 1.38];
+    let indices = [1.38, 1.39, 1.40, 1.41];
     let stack = LayerStack::new(&indices, 1.0)?;
     println!("layer index   trapped within (of its plane)   share of a Lambertian LED trapped");
     for (n, answer) in indices.iter().zip(stack.acceptance_angles()) {
@@ -118,18 +121,16 @@ impl Scenes<'_> {
         surface: &dyn TopSurface<f64>,
         geometry: Geometry,
     ) -> Result<LightBudget<f64>, OpticsError> {
-        let options = self.options(geometry, self.rays, 1);
+        let options = Self::options(geometry, self.rays, 1)?;
         trace(&self.slab, &self.led, surface, &options, &mut [])
     }
 
-    fn options(&self, geometry: Geometry, rays: u32, seed: u64) -> TraceOptions<f64> {
-        TraceOptions {
-            geometry,
-            rays,
-            seed,
-            emitter_half_width_m: 5e-3,
-            ..TraceOptions::default()
-        }
+    fn options(geometry: Geometry, rays: u32, seed: u64) -> Result<TraceOptions<f64>, OpticsError> {
+        TraceOptions::default()
+            .with_geometry(geometry)
+            .with_seed(seed)
+            .with_rays(rays)?
+            .with_emitter_half_width_m(5e-3)
     }
 
     fn print_budgets(&self) -> Result<(), OpticsError> {
@@ -176,7 +177,7 @@ impl Scenes<'_> {
             // Aimed at the flank that faces the LED, from five angles within its cone.
             let angle = 0.3 + 0.2 * k as f64;
             let inside = (angle.sin() / 1.40).asin();
-            let depth_share = (12.5e-3 * inside.tan() / self.slab.thickness_m()).min(1.0);
+            let depth_share = (12.5e-3 * inside.tan() / THICKNESS_M).min(1.0);
             let written = path(&self.slab, surface, depth_share, angle, &mut vertices)?;
             let line: Vec<[f64; 2]> = vertices[..written]
                 .iter()
@@ -260,7 +261,7 @@ impl Scenes<'_> {
         ];
         for (name, surface, colour) in scenes {
             let mut profile = [0.0; 30];
-            let options = self.options(Geometry::Volume, 4 * self.rays, 1);
+            let options = Self::options(Geometry::Volume, 4 * self.rays, 1)?;
             trace(&self.slab, &self.led, surface, &options, &mut profile)?;
             panel = panel.line(
                 profile
@@ -278,7 +279,7 @@ impl Scenes<'_> {
         eprintln!("tracing for convergence …");
         let surface = dimple(1.5e-3)?;
         let camera = |rays: u32, seed: u64| -> Result<f64, OpticsError> {
-            let options = self.options(Geometry::Section, rays, seed);
+            let options = Self::options(Geometry::Section, rays, seed)?;
             Ok(trace(&self.slab, &self.led, &surface, &options, &mut [])?.camera)
         };
         let best = camera(1 << 19, 99)?;

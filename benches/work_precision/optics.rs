@@ -19,24 +19,24 @@ pub(crate) fn rays(study: &mut Study) {
             .guided
     };
     for geometry in [Geometry::Section, Geometry::Volume] {
-        let default = TraceOptions {
-            geometry,
-            ..TraceOptions::default()
-        };
-        let finest = TraceOptions {
-            rays: study.choose(1 << 18, 1 << 21),
-            cutoff: 1e-12,
-            seed: 99,
-            ..default
-        };
+        let default = TraceOptions::default().with_geometry(geometry);
+        let finest = default
+            .with_seed(99)
+            .with_rays(study.choose(1 << 18, 1 << 21))
+            .and_then(|o| o.with_cutoff(1e-12))
+            .expect("valid");
         let expected = guided(&finest);
-        let mut run = |knob, options: TraceOptions<f64>, is_default| {
+        let mut run = |knob, (rays, cutoff), is_default| {
+            let options = default
+                .with_rays(rays)
+                .and_then(|o| o.with_cutoff(cutoff))
+                .expect("valid");
             let job = || {
                 (0..SEEDS)
-                    .map(|seed| guided(&TraceOptions { seed, ..options }))
+                    .map(|seed| guided(&options.with_seed(seed)))
                     .collect::<Vec<f64>>()
             };
-            let setting = format!("{} rays, cutoff {:e}", options.rays, options.cutoff);
+            let setting = format!("{rays} rays, cutoff {cutoff:e}");
             study.run(knob, setting, is_default, job, |found| {
                 (found
                     .iter()
@@ -53,14 +53,10 @@ pub(crate) fn rays(study: &mut Study) {
         };
         for rays in [64, 256, 1024, 4096, 16_384] {
             // Sections and volumes are different problems; the default is a volume.
-            run(
-                name,
-                TraceOptions { rays, ..default },
-                rays == default.rays && name == "volume",
-            );
+            run(name, (rays, 1e-6), rays == 4096 && name == "volume");
         }
         for cutoff in [1e-2, 1e-4] {
-            run(cutoffs, TraceOptions { cutoff, ..default }, false);
+            run(cutoffs, (4096, cutoff), false);
         }
     }
 }

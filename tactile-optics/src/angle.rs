@@ -6,7 +6,7 @@
 //!
 //! θᵢ = asin(√(nᵢ² − n₀²)/n₀),
 //!
-//! the paper's asin √(nᵢ² − 1) for air. At nᵢ² ≥ 2n₀² every ray is trapped, at nᵢ ≤ n₀ none: both are answers.
+//! the paper's asin √(nᵢ² − 1) for air. At nᵢ² ≥ 2n₀² every ray is trapped, at nᵢ ≤ n₀ none: both are answers, not errors.
 //!
 //! The formulas used are θ_c = atan2(n₀, √((nᵢ − n₀)(nᵢ + n₀))) and θᵢ = atan2(√((nᵢ − n₀)(nᵢ + n₀)), √(2n₀² − nᵢ²)), which keep all
 //! digits where the textbook ones lose half of them: nᵢ near n₀ and near √2 n₀. Whether nᵢ² ≥ 2n₀² is decided exactly.
@@ -17,13 +17,12 @@ use crate::real::{Real, index, real, twice_square_minus_square};
 /// An angle between 0 and π/2 together with its complement, both to full precision.
 ///
 /// ```
-/// use tactile_optics::{Angle, CriticalAngle, critical_angle};
+/// use tactile_optics::{CriticalAngle, critical_angle};
 ///
-/// // An index a hair above the ambient's: the complement keeps the digits that π/2 minus the angle has lost.
+/// // An index 10⁻¹⁴ above the ambient's: the complement keeps the digits that π/2 minus the angle has lost.
 /// let CriticalAngle::Beyond(angle) = critical_angle(1.0 + 1e-14_f64, 1.0)? else { unreachable!() };
 /// assert!((angle.complement() / 1.4136e-7 - 1.0).abs() < 1e-2);
 /// assert!((angle.degrees() - angle.radians().to_degrees()).abs() < 1e-12);
-/// assert_eq!(Angle::<f64>::right().complement(), 0.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,20 +40,12 @@ impl<T: Real> Angle<T> {
         }
     }
 
-    /// π/2.
-    pub fn right() -> Self {
-        Self {
-            radians: T::FRAC_PI_2(),
-            complement: T::zero(),
-        }
-    }
-
-    /// In radians.
+    /// The angle in radians.
     pub fn radians(&self) -> T {
         self.radians
     }
 
-    /// In degrees.
+    /// The angle in degrees.
     pub fn degrees(&self) -> T {
         self.radians.to_degrees()
     }
@@ -65,28 +56,28 @@ impl<T: Real> Angle<T> {
     }
 }
 
-/// From which angle of incidence on light is totally reflected.
+/// The angle of incidence beyond which light is totally reflected.
 ///
 /// ```
 /// use tactile_optics::{CriticalAngle, critical_angle};
 ///
-/// let says = |n: f64| match critical_angle(n, 1.0)? {
+/// let describe = |n: f64| match critical_angle(n, 1.0)? {
 ///     CriticalAngle::Beyond(angle) => Ok::<_, tactile_optics::OpticsError>(format!("beyond {:.1}°", angle.degrees())),
 ///     CriticalAngle::Never => Ok("never".to_string()),
 /// };
-/// assert_eq!(says(1.41)?, "beyond 45.2°");
-/// assert_eq!(says(0.9)?, "never");
+/// assert_eq!(describe(1.41)?, "beyond 45.2°");
+/// assert_eq!(describe(0.9)?, "never");
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CriticalAngle<T> {
-    /// Beyond this angle.
+    /// Light is totally reflected beyond this angle.
     Beyond(Angle<T>),
-    /// Never: the layer is no denser than its ambient.
+    /// No angle: the layer's index does not exceed its ambient's.
     Never,
 }
 
-/// Which rays entering through the layer's edge are trapped.
+/// The set of rays entering through a layer's edge that total reflection traps.
 ///
 /// ```
 /// use tactile_optics::{AcceptanceAngle, acceptance_angle};
@@ -99,16 +90,16 @@ pub enum CriticalAngle<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AcceptanceAngle<T> {
-    /// None: the layer is no denser than its ambient.
+    /// No ray: the layer's index does not exceed its ambient's.
     NoneTrapped,
-    /// Those whose angle to the layer's plane, in the ambient, is below this one.
+    /// The rays whose angle to the layer's plane, measured in the ambient, is below this one.
     Below(Angle<T>),
-    /// Every one: nᵢ² ≥ 2n₀².
+    /// Every ray: nᵢ² ≥ 2n₀².
     AllTrapped,
 }
 
 impl<T: Real> AcceptanceAngle<T> {
-    /// As a number: 0 for none, π/2 for all.
+    /// The acceptance angle in radians: 0 where no ray is trapped, π/2 where all are.
     pub fn radians(&self) -> T {
         match self {
             Self::NoneTrapped => T::zero(),
@@ -167,9 +158,12 @@ pub fn acceptance_angle<T: Real>(n: T, ambient: T) -> Result<AcceptanceAngle<T>,
     // Squares of very small or large indices would leave the scalar's range.
     let scale = power_of_two_near(n0).recip();
     let (n, n0) = (n * scale, n0 * scale);
-    let room = twice_square_minus_square(n0, n);
-    Ok(if room > T::zero() {
-        AcceptanceAngle::Below(Angle::from_legs(((n - n0) * (n + n0)).sqrt(), room.sqrt()))
+    let cosine_leg_squared = twice_square_minus_square(n0, n);
+    Ok(if cosine_leg_squared > T::zero() {
+        AcceptanceAngle::Below(Angle::from_legs(
+            ((n - n0) * (n + n0)).sqrt(),
+            cosine_leg_squared.sqrt(),
+        ))
     } else {
         AcceptanceAngle::AllTrapped
     })

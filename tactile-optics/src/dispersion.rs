@@ -1,9 +1,18 @@
-//! Refractive index against wavelength.
+//! Refractive index as a function of wavelength, for PDMS and glass.
 
 use crate::error::OpticsError;
 use crate::real::{Real, real, within};
 
-/// A dispersion formula with the range of wavelengths it was fitted on. λ is in micrometres inside the formulas.
+/// A dispersion formula and the range of wavelengths it was fitted on; λ is in micrometres inside the formulas.
+///
+/// ```
+/// use tactile_optics::Dispersion;
+///
+/// // A user's own material: Cauchy's formula through two measured indices.
+/// let gel = Dispersion::Cauchy { coefficients: [1.40, 3.5e-3, 0.0], range_m: [0.45e-6, 0.65e-6] };
+/// assert!((gel.index(0.5e-6_f64)? - 1.414).abs() < 1e-12);
+/// # Ok::<(), tactile_optics::OpticsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Dispersion {
@@ -82,6 +91,8 @@ impl Dispersion {
     /// ```
     /// use tactile_optics::Dispersion;
     /// assert!((Dispersion::N_BK7.index(587.6e-9_f64)? - 1.5168).abs() < 1e-5);
+    /// // The fit of PDMS ends at 750 nm.
+    /// assert!(Dispersion::PDMS_10_1.index(850e-9_f64).is_err());
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
     pub fn index<T: Real>(&self, wavelength_m: T) -> Result<T, OpticsError> {
@@ -102,9 +113,12 @@ impl Dispersion {
             Self::Sellmeier {
                 constant, terms, ..
             } => {
-                let term =
-                    |sum: T, [b, c]: &[f64; 2]| sum + real::<T>(*b) * square / (square - real(*c));
-                terms.iter().fold(T::one() + real(*constant), term).sqrt()
+                let mut n_squared = T::one() + real(*constant);
+                for &[strength, resonance] in terms {
+                    n_squared =
+                        n_squared + real::<T>(strength) * square / (square - real(resonance));
+                }
+                n_squared.sqrt()
             }
         })
     }
@@ -127,15 +141,7 @@ impl Dispersion {
     }
 
     /// Shortest and longest wavelength of the fit in metres.
-    ///
-    /// ```
-    /// use tactile_optics::Dispersion;
-    ///
-    /// let [shortest, longest] = Dispersion::PDMS_10_1.range_m();
-    /// assert_eq!([shortest, longest], [0.40e-6, 0.75e-6]);
-    /// assert!(Dispersion::PDMS_10_1.index(0.85e-6_f64).is_err());
-    /// ```
-    pub fn range_m(&self) -> [f64; 2] {
+    fn range_m(&self) -> [f64; 2] {
         match self {
             Self::Cauchy { range_m, .. } | Self::Sellmeier { range_m, .. } => *range_m,
         }

@@ -1,6 +1,6 @@
-//! What can be wrong with the input.
+//! The errors of this crate.
 
-/// An input was rejected. Values are reported as `f64` whatever the scalar in use.
+/// The reason why an input was rejected. Values are reported as `f64` whatever the scalar in use.
 ///
 /// ```
 /// use tactile_optics::{OpticsError, critical_angle};

@@ -13,7 +13,7 @@ use crate::angle::Angle;
 use crate::error::OpticsError;
 use crate::real::{Real, difference_of_products, index, real, within};
 
-/// What an interface does to incident light, by polarisation.
+/// Reflectance, transmittance and refraction of an interface, by polarisation.
 ///
 /// ```
 /// use tactile_optics::fresnel;
@@ -21,13 +21,13 @@ use crate::real::{Real, difference_of_products, index, real, within};
 /// // At Brewster's angle, atan(n₂/n₁), nothing polarised in the plane of incidence is reflected.
 /// let glass = fresnel(1.0_f64, 1.5, 1.5_f64.atan())?;
 /// assert!(glass.reflectance_p < 1e-30 && glass.reflectance_s > 0.14);
-/// assert!(!glass.is_total());
+/// assert!(glass.refraction.is_some());
 /// assert!((glass.reflectance() + glass.transmittance() - 1.0).abs() < 1e-15);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fresnel<T> {
-    /// Angle of refraction; none when reflection is total.
+    /// Angle of refraction; `None` when reflection is total.
     pub refraction: Option<Angle<T>>,
     /// Reflectance of light polarised perpendicular to the plane of incidence.
     pub reflectance_s: T,
@@ -50,11 +50,6 @@ impl<T: Real> Fresnel<T> {
         (self.transmittance_s + self.transmittance_p) * real(0.5)
     }
 
-    /// Whether reflection is total.
-    pub fn is_total(&self) -> bool {
-        self.refraction.is_none()
-    }
-
     fn total() -> Self {
         Self {
             refraction: None,
@@ -66,7 +61,7 @@ impl<T: Real> Fresnel<T> {
     }
 }
 
-/// Light in a medium of index `n1` meeting one of index `n2` at the angle of incidence `incidence` (radians, 0 to π/2).
+/// Fresnel's coefficients for light in a medium of index `n1` that meets one of index `n2` at `incidence` (radians, 0 to π/2).
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for an index that is not positive and finite, or an angle outside 0 to π/2.
@@ -76,7 +71,7 @@ impl<T: Real> Fresnel<T> {
 /// let glass = fresnel(1.0_f64, 1.5, 0.0)?;
 /// assert!((glass.reflectance() - 0.04).abs() < 1e-15);
 /// let trapped = fresnel(1.40, 1.0, 0.9)?;
-/// assert!(trapped.is_total() && trapped.reflectance() == 1.0);
+/// assert!(trapped.refraction.is_none() && trapped.reflectance() == 1.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 pub fn fresnel<T: Real>(n1: T, n2: T, incidence: T) -> Result<Fresnel<T>, OpticsError> {
@@ -119,24 +114,30 @@ pub(crate) fn from_sine_and_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) ->
     }
 }
 
-/// n₂ cos θ₂, or nothing when reflection is total.
+/// n₂ cos θ₂, or `None` when reflection is total.
 fn refracted_normal<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<T> {
-    let room = if sine > real(0.8) {
-        (n2 - n1) + n1 * (cosine / (T::one() + sine)) * cosine
+    // n₂ − n₁ sin θ₁; towards grazing incidence the sine has rounded to 1 and the cosine carries the digits.
+    let margin = if sine > real(0.8) {
+        margin_from_cosine(n1, n2, sine, cosine)
     } else {
         (-n1).mul_add(sine, n2)
     };
-    (room >= T::zero()).then(|| room.sqrt() * (n2 + n1 * sine).sqrt())
+    (margin >= T::zero()).then(|| margin.sqrt() * (n2 + n1 * sine).sqrt())
 }
 
-/// Transmittance of unpolarised light and n₂ cos θ₂, or nothing when reflection is total: what a ray tracer needs, without
-/// angles and without fused multiply–adds (which are slow where the processor is not known to have them).
+/// n₂ − n₁ sin θ₁ as (n₂ − n₁) + n₁ cos² θ₁/(1 + sin θ₁), which keeps its digits where sin θ₁ is near 1.
+fn margin_from_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> T {
+    (n2 - n1) + n1 * (cosine / (T::one() + sine)) * cosine
+}
+
+/// Transmittance of unpolarised light and n₂ cos θ₂, or `None` when reflection is total: the part of Fresnel's formulas that a
+/// ray tracer needs, without angles and without fused multiply–adds (slow where the processor is not known to have them).
 pub(crate) fn crossing<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<(T, T)> {
-    let room = (n2 - n1) + n1 * (cosine / (T::one() + sine)) * cosine;
-    if room <= T::zero() {
+    let margin = margin_from_cosine(n1, n2, sine, cosine);
+    if margin <= T::zero() {
         return None;
     }
-    let b = (room * (n2 + n1 * sine)).sqrt();
+    let b = (margin * (n2 + n1 * sine)).sqrt();
     let a = n1 * cosine;
     let (s, p) = (a + b, n2 * cosine + n1 * (b / n2));
     let two = T::one() + T::one();

@@ -1,10 +1,10 @@
-//! The lamp at the slab's edge: its radiation pattern, and the share of its light that a layer traps.
+//! The LED at the slab's edge: its radiation pattern, and the share of its light that a layer traps.
 
 use crate::angle::AcceptanceAngle;
 use crate::error::OpticsError;
 use crate::real::{Real, real, within};
 
-/// Whether light stays in one plane or fills space.
+/// The directions that light may take: one plane, or all of space.
 ///
 /// ```
 /// use tactile_optics::{Geometry, Led, acceptance_angle};
@@ -27,12 +27,15 @@ pub enum Geometry {
 /// An LED facing the slab's edge: intensity ∝ cosᵐ θ up to a half angle, θ from its axis.
 ///
 /// ```
-/// use tactile_optics::Led;
+/// use tactile_optics::{Geometry, Led, acceptance_angle};
 ///
-/// let narrow = Led::new(4.0_f64, 60.0_f64.to_radians())?;
-/// assert_eq!((narrow.exponent(), narrow.half_angle()), (4.0, 60.0_f64.to_radians()));
 /// // A data sheet's "half intensity at 60°" is Lambert's law.
-/// assert!((Led::from_half_intensity_angle(60.0_f64.to_radians())?.exponent() - 1.0).abs() < 1e-12);
+/// let sheet = Led::from_half_intensity_angle(60.0_f64.to_radians())?;
+/// let acceptance = acceptance_angle(1.38, 1.0)?;
+/// let [a, b] = [sheet, Led::lambertian()].map(|led| led.trapped_share(acceptance, Geometry::Volume));
+/// assert!((a - b).abs() < 1e-12);
+/// // A narrow one keeps more of its light inside.
+/// assert!(Led::new(4.0, 60.0_f64.to_radians())?.trapped_share(acceptance, Geometry::Volume) > a);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,17 +80,7 @@ impl<T: Real> Led<T> {
         Self::new(real::<T>(0.5).ln() / angle.cos().ln(), T::FRAC_PI_2())
     }
 
-    /// m of cosᵐ θ.
-    pub fn exponent(&self) -> T {
-        self.exponent
-    }
-
-    /// The largest angle at which there is light.
-    pub fn half_angle(&self) -> T {
-        self.half_angle
-    }
-
-    /// The share of the LED's light that a layer of this acceptance angle traps for good (before losses at the entry).
+    /// The share of the LED's light that a layer of this acceptance angle traps, before losses at the entry.
     ///
     /// In a section, ∫₀^θᵢ cosᵐ / ∫₀^h cosᵐ. In space a ray is trapped while its slope out of the layer's plane is below
     /// S = sin θᵢ: of the directions at θ from the axis that is the part (2/π) asin(min(1, S/sin θ)). Gauss–Legendre
@@ -108,7 +101,7 @@ impl<T: Real> Led<T> {
         }
         let flux = |t: T| t.cos().max(T::zero()).powf(self.exponent) * t.sin();
         let slope = acceptance.radians().sin();
-        // Beyond θᵢ the part falls with an infinite slope: θ = θᵢ + t² takes it away.
+        // Beyond θᵢ the trapped part falls with an infinite slope; substituting θ = θᵢ + t² removes it.
         let outer = |t: T| {
             let theta = limit + t * t;
             let part = (slope / theta.sin()).min(T::one()).asin() * T::FRAC_2_PI();
@@ -123,8 +116,8 @@ impl<T: Real> Led<T> {
         trapped / integral(T::zero(), self.half_angle, flux)
     }
 
-    /// A direction by two numbers in [0, 1): components along the axis, across it in the slab's plane, and along the
-    /// slab's normal; and the weight of the direction, 1 on average.
+    /// The direction that two numbers in [0, 1) stand for: components along the axis, across it in the slab's plane, and
+    /// along the slab's normal; and the weight of the direction, 1 on average.
     pub(crate) fn direction(&self, u: T, v: T, geometry: Geometry) -> ([T; 3], T) {
         let one = T::one();
         if geometry == Geometry::Section {

@@ -1,22 +1,23 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # Rooms
+//! # Modules
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`angle`] | critical and acceptance angles, (1)–(4) |
 //! | [`snell`] | propagation angles through a stack |
 //! | [`mod@fresnel`] | reflectance and transmittance, s, p and unpolarised |
-//! | [`stack`] | a stack of layers in its ambient: all of the above, normal incidence, the LED's cone |
-//! | [`dispersion`] | refractive index against wavelength; PDMS and borosilicate glass |
+//! | [`stack`] | a stack of layers in its ambient: acceptance angles, normal incidence, the LED's cone |
+//! | [`dispersion`] | refractive index as a function of wavelength; PDMS and borosilicate glass |
 //! | [`led`] | radiation pattern and the share of it that is trapped |
-//! | [`surface`] | the slab's deformed top and what touches it |
-//! | [`trace`] | rays through the slab: where the light goes |
-//! | [`sensor`] | grid elements, temporal and force resolution |
+//! | [`surface`] | the slab's deformed top and the object that touches it |
+//! | [`trace`] | ray tracing through the slab: the light budget of a press |
+//! | [`sensor`] | Table 1: grid elements, temporal and force resolution |
 //!
 //! # Conventions
 //! Angles in radians unless the name says degrees; angles of incidence are measured from the normal of the interface,
-//! the LED's from its axis. Lengths in metres. Every function is generic over [`Real`], that is `f32` and `f64`,
+//! the LED's from its axis. Lengths in metres. Layers count from the object's side towards the glass, and their indices
+//! grow that way as in §3.3: 1.38, 1.39, 1.40, glass 1.41. Every function is generic over [`Real`], that is `f32` and `f64`,
 //! allocates nothing, and needs no standard library.
 //!
 //! # Equations
@@ -54,6 +55,6 @@ pub use error::OpticsError;
 pub use fresnel::{Fresnel, fresnel};
 pub use led::{Geometry, Led};
 pub use real::Real;
-pub use sensor::SensorSpecification;
+pub use sensor::{SensorParameters, SensorSpecification};
 pub use snell::{Propagation, propagation};
 pub use stack::{LayerStack, LedCone, NormalIncidence};

@@ -1,4 +1,4 @@
-//! The scalar, and sums whose rounding matters.
+//! The scalar type, range checks, and differences computed without cancellation.
 
 use core::fmt::Debug;
 

@@ -4,27 +4,27 @@ use crate::angle::Angle;
 use crate::error::OpticsError;
 use crate::real::{Real, index, within};
 
-/// How light of a given invariant n sin θ travels in a medium.
+/// The direction in which light of a given invariant n sin θ travels in a medium.
 ///
 /// ```
 /// use tactile_optics::{Propagation, propagation};
 ///
-/// // Near grazing the cosine has digits that the angle has not.
+/// // Near grazing the cosine keeps digits that the angle has lost.
 /// let Propagation::At { angle, cosine } = propagation(1.0 + 1e-14_f64, 1.0)? else { unreachable!() };
 /// assert!((cosine - angle.complement().sin()).abs() < 1e-15 * cosine);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Propagation<T> {
-    /// At this angle to the interfaces' normal; `cosine` is kept apart because near grazing it has more digits
-    /// than the angle.
+    /// Light propagates at this angle to the interfaces' normal. `cosine` is given as well because near grazing it keeps
+    /// more digits than the angle.
     At {
         /// Angle to the normal.
         angle: Angle<T>,
         /// Its cosine.
         cosine: T,
     },
-    /// Not at all: the invariant exceeds the index and the field decays exponentially.
+    /// The invariant exceeds the index: the field decays exponentially and no light propagates.
     Evanescent,
 }
 

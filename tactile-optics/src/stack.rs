@@ -1,12 +1,14 @@
-//! A stack of layers in its ambient.
+//! A stack of plane layers in its ambient.
 
-use crate::angle::{AcceptanceAngle, CriticalAngle, acceptance_angle, critical_angle};
+use crate::angle::{AcceptanceAngle, acceptance_angle};
 use crate::error::OpticsError;
 use crate::real::{Real, index, real, within};
-use crate::snell::{Propagation, propagation};
 
-/// Refractive indices of any number of plane layers, with the same ambient on both sides. It borrows: making one costs
-/// the check of the indices and nothing else.
+/// A stack of plane layers with the same ambient on both sides, given by the refractive indices from the object's side to
+/// the glass. It borrows the indices: construction costs their check and nothing else.
+///
+/// Critical and propagation angles are per layer: call [`critical_angle`](crate::critical_angle) or
+/// [`propagation`](crate::propagation) on the index wanted.
 ///
 /// ```
 /// use tactile_optics::LayerStack;
@@ -22,7 +24,7 @@ pub struct LayerStack<'a, T> {
     ambient: T,
 }
 
-/// What a stack does to light that falls on it at right angles; lossless.
+/// Transmittance and reflectance of a lossless stack at normal incidence.
 ///
 /// ```
 /// use tactile_optics::LayerStack;
@@ -40,11 +42,11 @@ pub struct NormalIncidence<T> {
     pub single_pass: T,
     /// Transmittance with all reflections added by intensity, 1/(1 + Σ Rⱼ/(1 − Rⱼ)).
     pub transmittance: T,
-    /// The rest: reflectance with all reflections added by intensity.
+    /// Reflectance with all reflections added by intensity, 1 − transmittance.
     pub reflectance: T,
 }
 
-/// Whether an LED's cone of light is trapped by the whole stack.
+/// The comparison of an LED's cone of light with the acceptance angles of a stack.
 ///
 /// ```
 /// use tactile_optics::LayerStack;
@@ -59,7 +61,7 @@ pub struct NormalIncidence<T> {
 pub struct LedCone<T> {
     /// Full angle of the LED's cone in radians.
     pub full_angle: T,
-    /// The weakest layer's answer.
+    /// The smallest acceptance angle of the layers.
     pub weakest: AcceptanceAngle<T>,
     /// The largest full angle trapped, twice the weakest layer's acceptance angle, less the cone's. Negative: that much
     /// too wide. A cone of less than π inside a stack that traps every ray has at least π less its own angle.
@@ -97,42 +99,6 @@ impl<'a, T: Real> LayerStack<'a, T> {
         })
     }
 
-    /// The layers' indices.
-    ///
-    /// ```
-    /// use tactile_optics::LayerStack;
-    ///
-    /// let stack = LayerStack::new(&[1.38_f64, 1.41], 1.0)?;
-    /// assert_eq!((stack.indices(), stack.ambient()), (&[1.38, 1.41][..], 1.0));
-    /// # Ok::<(), tactile_optics::OpticsError>(())
-    /// ```
-    pub fn indices(&self) -> &'a [T] {
-        self.indices
-    }
-
-    /// The ambient's index.
-    pub fn ambient(&self) -> T {
-        self.ambient
-    }
-
-    /// The critical angle of each layer against the ambient.
-    ///
-    /// ```
-    /// use tactile_optics::{CriticalAngle, LayerStack};
-    ///
-    /// let stack = LayerStack::new(&[1.38_f64, 0.9], 1.0)?;
-    /// let answers: Vec<_> = stack.critical_angles().collect();
-    /// assert!(matches!(answers[0], CriticalAngle::Beyond(angle) if (angle.degrees() - 46.4387).abs() < 1e-4));
-    /// assert_eq!(answers[1], CriticalAngle::Never);
-    /// # Ok::<(), tactile_optics::OpticsError>(())
-    /// ```
-    pub fn critical_angles(&self) -> impl Iterator<Item = CriticalAngle<T>> + 'a {
-        let ambient = self.ambient;
-        self.indices
-            .iter()
-            .map(move |&n| critical_angle(n, ambient).unwrap_or(CriticalAngle::Never))
-    }
-
     /// The acceptance angle of each layer in the ambient, (1)–(4).
     ///
     /// ```
@@ -151,34 +117,7 @@ impl<'a, T: Real> LayerStack<'a, T> {
             .map(move |&n| acceptance_angle(n, ambient).unwrap_or(AcceptanceAngle::NoneTrapped))
     }
 
-    /// The angle in each layer of light with the invariant n sin θ (for light entering from the ambient at θ₀ through
-    /// the top or bottom face: n₀ sin θ₀).
-    ///
-    /// # Errors
-    /// [`OpticsError::OutOfRange`] for an invariant that is negative or not finite.
-    ///
-    /// ```
-    /// use tactile_optics::{LayerStack, Propagation};
-    ///
-    /// // Light that entered from air at 60° is steeper the denser the layer.
-    /// let stack = LayerStack::new(&[1.38_f64, 1.41], 1.0)?;
-    /// let cosines: Vec<_> = stack
-    ///     .propagation(60.0_f64.to_radians().sin())?
-    ///     .map(|p| if let Propagation::At { cosine, .. } = p { cosine } else { 0.0 })
-    ///     .collect();
-    /// assert!(0.5 < cosines[0] && cosines[0] < cosines[1]);
-    /// # Ok::<(), tactile_optics::OpticsError>(())
-    /// ```
-    pub fn propagation(
-        &self,
-        invariant: T,
-    ) -> Result<impl Iterator<Item = Propagation<T>> + 'a, OpticsError> {
-        within("invariant n sin θ", invariant, 0.0, f64::MAX)?;
-        let in_layer = move |&n| propagation(n, invariant).unwrap_or(Propagation::Evanescent);
-        Ok(self.indices.iter().map(in_layer))
-    }
-
-    /// Light through the whole stack at right angles, ambient to ambient, with no interference.
+    /// Transmittance and reflectance at normal incidence, ambient to ambient, without interference.
     ///
     /// Rⱼ/(1 − Rⱼ) = (a − b)²/(4ab) and 1 − Rⱼ = 4ab/(a + b)² at the interface of indices a and b. O(layers).
     ///
@@ -225,16 +164,12 @@ impl<'a, T: Real> LayerStack<'a, T> {
             0.0,
             core::f64::consts::PI * (1.0 + 1e-7),
         )?;
-        let weaker = |a: AcceptanceAngle<T>, b| {
-            if a.radians() <= AcceptanceAngle::radians(&b) {
-                a
-            } else {
-                b
+        let mut weakest = AcceptanceAngle::AllTrapped;
+        for answer in self.acceptance_angles() {
+            if answer.radians() < weakest.radians() {
+                weakest = answer;
             }
-        };
-        let weakest = self
-            .acceptance_angles()
-            .fold(AcceptanceAngle::AllTrapped, weaker);
+        }
         let limit = weakest.radians() + weakest.radians();
         Ok(LedCone {
             full_angle,

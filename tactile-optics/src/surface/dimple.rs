@@ -1,4 +1,4 @@
-//! A smooth round press.
+//! A smooth round indentation.
 
 use super::TopSurface;
 use crate::error::OpticsError;

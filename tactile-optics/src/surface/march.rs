@@ -1,9 +1,9 @@
-//! Where a ray meets the top.
+//! Intersection of a ray with the deformed top.
 
 use super::TopSurface;
 use crate::real::{Real, real};
 
-/// Where a ray meets the surface inside its support: the way along the ray from `from`, none before `to`.
+/// The first intersection of a ray with the surface inside its support, at a distance along the ray between `from` and `to`.
 ///
 /// g = height − z is the gap above the ray. It closes no faster than u_z + L·√(u_x² + u_y²) with L the steepest slope, so
 /// a step of gap over that rate never jumps a crossing; steps are taken until the gap is below `tolerance`.
@@ -38,7 +38,7 @@ pub(crate) fn march<T: Real, S: TopSurface<T> + ?Sized>(
     approach(gap, [t, g], to, closing, tolerance)
 }
 
-/// Steps from the way t, where the gap is g, until the gap is below `tolerance`; it closes no faster than `closing`.
+/// Steps from the distance t, where the gap is g, until the gap is below `tolerance`; it closes no faster than `closing`.
 #[inline]
 fn approach<T: Real>(
     gap: impl Fn(T) -> T,
@@ -68,9 +68,9 @@ const MAX_STEPS: usize = 20_000;
 pub(crate) enum Meeting<T> {
     /// The ray meets the surface here.
     At(T),
-    /// It does not.
+    /// The ray does not meet the surface.
     Missed,
-    /// Still creeping along it.
+    /// The steps ran out while the ray creeps along the surface.
     Undecided,
 }
 

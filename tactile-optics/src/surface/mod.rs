@@ -1,4 +1,4 @@
-//! The top of the slab: its shape under load and what touches it.
+//! The top of the slab: its shape under load and the object that touches it.
 
 mod dimple;
 mod march;
@@ -25,7 +25,7 @@ use crate::real::Real;
 pub struct TouchingObject<T> {
     /// Refractive index of the object.
     pub index: T,
-    /// Share of the light entering the object that it gives back, as a Lambertian emitter in the slab's top layer.
+    /// Share of the light entering the object that it scatters back, as a Lambertian emitter in the slab's top layer.
     pub albedo: T,
 }
 
@@ -70,13 +70,14 @@ pub trait TopSurface<T> {
     fn height(&self, x: T, y: T) -> T;
     /// Its slopes along x and y.
     fn gradient(&self, x: T, y: T) -> [T; 2];
-    /// A bound on the slope's size anywhere: rays step towards the surface no faster than it allows, so none is missed.
+    /// A bound on the slope's size anywhere: rays step towards the surface no faster than it allows, so that no intersection is
+    /// missed.
     fn steepest(&self) -> T;
     /// The deepest point below the undeformed top, in metres, as a positive number.
     fn deepest(&self) -> T;
     /// The range of x outside which the top is flat and untouched.
     fn support(&self) -> [T; 2];
-    /// What touches the slab at a point, if not the ambient.
+    /// The object that touches the slab at a point; `None` where the ambient does.
     fn touching(&self, _x: T, _y: T) -> Option<TouchingObject<T>> {
         None
     }

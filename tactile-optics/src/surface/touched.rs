@@ -1,4 +1,4 @@
-//! Contact with an object.
+//! A surface in optical contact with an object.
 
 use super::{TopSurface, TouchingObject};
 use crate::error::OpticsError;
@@ -17,7 +17,7 @@ use crate::real::{Real, within};
 /// let (led, options) = (Led::lambertian(), TraceOptions::default());
 /// let pressed_by_air = trace(&slab, &led, &dimple, &options, &mut [])?;
 /// let pressed_by_finger = trace(&slab, &led, &finger, &options, &mut [])?;
-/// // What touches scatters light down to the camera: that is what is seen.
+/// // The touching object scatters light down to the camera.
 /// assert!(pressed_by_finger.camera > 2.0 * pressed_by_air.camera);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```

@@ -1,4 +1,4 @@
-//! Where the light went.
+//! The light budget: shares of the LED's light by where it ended.
 
 use crate::real::Real;
 
@@ -20,7 +20,7 @@ use crate::real::Real;
 pub struct LightBudget<T> {
     /// Reflected at the lit edge, never entering.
     pub entry: T,
-    /// Reached the far edge: trapped on the way.
+    /// Guided to the far edge by total reflection.
     pub guided: T,
     /// Came back to the lit edge.
     pub returned: T,
@@ -52,21 +52,21 @@ impl<T: Real> LightBudget<T> {
         .fold(self.guided, |sum, &share| sum + share)
     }
 
-    /// Share that left through top or bottom.
+    /// Share of the light that left through top or bottom.
     pub fn leaked(&self) -> T {
         self.above + self.below + self.camera
     }
 
-    /// Share of the light that entered the slab which reached the far edge.
+    /// Share of the entered light that reached the far edge.
     pub fn guided_of_entered(&self) -> T {
         self.guided / (T::one() - self.entry)
     }
 }
 
-/// Destinations, in the order of [`LightBudget`]'s fields.
+/// The outcome of a ray, in the order of [`LightBudget`]'s fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
-pub(crate) enum Fate {
+pub(crate) enum RayOutcome {
     Entry,
     Guided,
     Returned,
@@ -77,7 +77,7 @@ pub(crate) enum Fate {
     Unresolved,
 }
 
-/// Compensated sums (Neumaier), one for each fate: a million rays add up without loss.
+/// Compensated sums (Neumaier), one for each outcome: a million rays add up without loss.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tally<T> {
     sums: [T; 8],
@@ -92,8 +92,8 @@ impl<T: Real> Tally<T> {
         }
     }
 
-    pub(crate) fn add(&mut self, fate: Fate, power: T) {
-        let k = fate as usize;
+    pub(crate) fn add(&mut self, outcome: RayOutcome, power: T) {
+        let k = outcome as usize;
         let (old, new) = (self.sums[k], self.sums[k] + power);
         let lost = if old.abs() >= power.abs() {
             (old - new) + power
@@ -106,16 +106,18 @@ impl<T: Real> Tally<T> {
 
     /// Shares of `total`.
     pub(crate) fn budget(&self, total: T) -> LightBudget<T> {
-        let share = |fate: Fate| (self.sums[fate as usize] + self.errors[fate as usize]) / total;
+        let share = |outcome: RayOutcome| {
+            (self.sums[outcome as usize] + self.errors[outcome as usize]) / total
+        };
         LightBudget {
-            entry: share(Fate::Entry),
-            guided: share(Fate::Guided),
-            returned: share(Fate::Returned),
-            above: share(Fate::Above),
-            below: share(Fate::Below),
-            camera: share(Fate::Camera),
-            absorbed: share(Fate::Absorbed),
-            unresolved: share(Fate::Unresolved),
+            entry: share(RayOutcome::Entry),
+            guided: share(RayOutcome::Guided),
+            returned: share(RayOutcome::Returned),
+            above: share(RayOutcome::Above),
+            below: share(RayOutcome::Below),
+            camera: share(RayOutcome::Camera),
+            absorbed: share(RayOutcome::Absorbed),
+            unresolved: share(RayOutcome::Unresolved),
         }
     }
 }

@@ -1,6 +1,6 @@
-//! One ray from interface to interface until its light has gone.
+//! Follows one ray from interface to interface until its light has left or is cut off.
 
-use super::budget::{Fate, Tally};
+use super::budget::{RayOutcome, Tally};
 use super::ray::{Branches, Ray, dot, normalised, sine_between};
 use super::sampling::{hash, unit};
 use super::{Slab, TraceOptions};
@@ -12,7 +12,7 @@ use crate::surface::{Meeting, TopSurface, march};
 /// Reflections after which a ray is given up: a guided ray in a long slab needs thousands at most.
 const MAX_EVENTS: u32 = 20_000;
 
-/// What a trace needs along the way.
+/// The state of a trace: the scene, the sums and the random numbers.
 pub(super) struct Tracer<'a, 's, T, S: ?Sized> {
     pub(super) slab: &'a Slab<'s, T>,
     pub(super) surface: &'a S,
@@ -26,7 +26,7 @@ pub(super) struct Tracer<'a, 's, T, S: ?Sized> {
     pub(super) stream: u64,
 }
 
-/// What a ray meets next.
+/// The next obstacle on a ray's path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Next {
     /// The slab's top.
@@ -37,7 +37,7 @@ pub(super) enum Next {
     Down,
     /// The edge it travels to.
     Edge,
-    /// It creeps along the surface.
+    /// None was found: the ray creeps along the surface.
     Nothing,
 }
 
@@ -49,7 +49,7 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         let mut current = Some(first);
         while let Some(ray) = current {
             current = if ray.power <= smallest || ray.events >= MAX_EVENTS {
-                self.tally.add(Fate::Unresolved, ray.power);
+                self.tally.add(RayOutcome::Unresolved, ray.power);
                 None
             } else {
                 self.advance(ray, &mut branches)
@@ -58,23 +58,23 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         }
     }
 
-    /// Moves the ray to what it meets next; returns what goes on.
+    /// Moves the ray to its next obstacle; returns the part that continues, if any.
     pub(super) fn advance(&mut self, ray: Ray<T>, branches: &mut Branches<T>) -> Option<Ray<T>> {
-        let (way, next) = self.next(&ray);
+        let (distance, next) = self.next(&ray);
         let mut ray = Ray {
-            position: ray.at(way),
+            position: ray.at(distance),
             events: ray.events + 1,
             ..ray
         };
         match next {
-            Next::Nothing => self.tally.add(Fate::Unresolved, ray.power),
+            Next::Nothing => self.tally.add(RayOutcome::Unresolved, ray.power),
             Next::Edge => {
-                let fate = if ray.direction[0] > T::zero() {
-                    Fate::Guided
+                let outcome = if ray.direction[0] > T::zero() {
+                    RayOutcome::Guided
                 } else {
-                    Fate::Returned
+                    RayOutcome::Returned
                 };
-                self.tally.add(fate, ray.power);
+                self.tally.add(outcome, ray.power);
             }
             Next::Top => return self.top(ray, branches),
             Next::Up => {
@@ -93,7 +93,7 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         None
     }
 
-    /// The nearest of edge, faces and top.
+    /// Distance to and kind of the nearest obstacle: edge, face of the layer, or top.
     pub(super) fn next(&self, ray: &Ray<T>) -> (T, Next) {
         let (zero, [ux, _, uz]) = (T::zero(), ray.direction);
         let edge = match ux {
@@ -102,9 +102,9 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
             _ => T::infinity(),
         };
         let mut nearest = (edge.max(zero), Next::Edge);
-        let mut offer = |way: T, next: Next| {
-            if way < nearest.0 {
-                nearest = (way.max(zero), next);
+        let mut offer = |distance: T, next: Next| {
+            if distance < nearest.0 {
+                nearest = (distance.max(zero), next);
             }
         };
         if uz < zero {
@@ -119,13 +119,13 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
             return nearest;
         }
         match self.meet_top(ray, nearest.0) {
-            Meeting::At(way) => (way, Next::Top),
+            Meeting::At(distance) => (distance, Next::Top),
             Meeting::Missed => nearest,
             Meeting::Undecided => (zero, Next::Nothing),
         }
     }
 
-    /// Where the ray meets the top before the way `limit`: the plane z = 0 outside the surface's support, the surface
+    /// Where the ray meets the top before the distance `limit`: the plane z = 0 outside the surface's support, the surface
     /// itself inside.
     fn meet_top(&self, ray: &Ray<T>, limit: T) -> Meeting<T> {
         let zero = T::zero();
@@ -136,7 +136,7 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         } else {
             T::infinity()
         };
-        // The part of the way inside the support.
+        // The part of the path inside the support.
         let (enter, leave) = if ux == zero {
             if x >= left && x <= right {
                 (zero, limit)
@@ -147,9 +147,9 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
             let (a, b) = ((left - x) / ux, (right - x) / ux);
             (a.min(b).max(zero), a.max(b))
         };
-        let meets_plane = |way: T| {
-            if way <= limit {
-                Meeting::At(way)
+        let meets_plane = |distance: T| {
+            if distance <= limit {
+                Meeting::At(distance)
             } else {
                 Meeting::Missed
             }
@@ -172,7 +172,7 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         }
     }
 
-    /// At the top: what is transmitted leaves, or enters the touching object and is scattered back or lost.
+    /// Splits a ray at the top: the transmitted part leaves, or enters the touching object and is scattered back or absorbed.
     fn top(&mut self, mut ray: Ray<T>, branches: &mut Branches<T>) -> Option<Ray<T>> {
         let [x, y, _] = ray.position;
         let [left, right] = self.surface.support();
@@ -196,10 +196,11 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         let outside = object.map_or(self.slab.ambient, |o| o.index);
         let transmitted = ray.power * self.transmittance(&ray, &normal, outside);
         match object {
-            None => self.tally.add(Fate::Above, transmitted),
+            None => self.tally.add(RayOutcome::Above, transmitted),
             Some(object) => {
                 let scattered = transmitted * object.albedo;
-                self.tally.add(Fate::Absorbed, transmitted - scattered);
+                self.tally
+                    .add(RayOutcome::Absorbed, transmitted - scattered);
                 let direction = self.scatter(&normal);
                 self.keep(
                     Ray {
@@ -214,14 +215,20 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         Some(ray.mirrored(&normal, ray.power - transmitted))
     }
 
-    /// At the bottom: what is transmitted leaves, towards the camera or past it.
+    /// Splits a ray at the bottom: the transmitted part leaves, towards the camera or past it.
     fn bottom(&mut self, ray: Ray<T>) -> Ray<T> {
         let normal = [T::zero(), T::zero(), T::one()];
         let transmitted = ray.power * self.transmittance(&ray, &normal, self.slab.ambient);
         let sine = ray.direction[0].hypot(ray.direction[1]);
         let seen = self.slab.layers[ray.layer].index * sine <= self.slab.ambient * self.camera_sine;
-        self.tally
-            .add(if seen { Fate::Camera } else { Fate::Below }, transmitted);
+        self.tally.add(
+            if seen {
+                RayOutcome::Camera
+            } else {
+                RayOutcome::Below
+            },
+            transmitted,
+        );
         if seen && !self.camera_profile.is_empty() {
             let bins = self.camera_profile.len();
             let share = ray.position[0] / self.slab.length * real(bins as f64);
@@ -231,7 +238,7 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         ray.mirrored(&normal, ray.power - transmitted)
     }
 
-    /// At an interface inside the slab: the refracted part goes on, the reflected part waits as a branch.
+    /// Splits a ray at an interface inside the slab: the refracted part continues, the reflected part waits as a branch.
     fn inside(&mut self, ray: Ray<T>, beyond: usize, branches: &mut Branches<T>) -> Option<Ray<T>> {
         let normal = [T::zero(), T::zero(), T::one()];
         let (n1, n2) = (
@@ -262,10 +269,10 @@ impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
         crossing(inside, outside, sine, cosine).map_or(T::zero(), |(share, _)| share.min(T::one()))
     }
 
-    /// Puts a branch aside, or counts it as unresolved when there is no room.
+    /// Stores a branch for later, or counts it as unresolved when the stack is full.
     fn keep(&mut self, ray: Ray<T>, branches: &mut Branches<T>) {
         if ray.power > T::zero() && !branches.push(ray) {
-            self.tally.add(Fate::Unresolved, ray.power);
+            self.tally.add(RayOutcome::Unresolved, ray.power);
         }
     }
 

@@ -1,9 +1,9 @@
-//! Rays through the slab: where an LED's light goes.
+//! Ray tracing through the slab: the budget of an LED's light.
 //!
 //! Light enters through the edge x = 0 and travels along x between the top (deformed, possibly touched by an object) and
 //! the bottom, beyond which the camera looks up. At every interface its power is split by Fresnel's coefficients for
 //! unpolarised light and both parts are followed; what leaves the slab is counted. In the undeformed slab light within
-//! the acceptance angle is totally reflected for ever. A press breaks this twice: the top's slope turns rays towards the
+//! the acceptance angle is totally reflected for good. A press breaks this twice: the top's slope turns rays towards the
 //! normal, by twice the slope at each reflection, until they leave; and a touching object lets light out of the top
 //! whatever its angle and scatters it back in all directions, some of them towards the camera.
 //!
@@ -15,19 +15,21 @@
 
 mod budget;
 mod follow;
+mod options;
 mod path;
 mod ray;
 pub(crate) mod sampling;
 
 pub use budget::LightBudget;
+pub use options::TraceOptions;
 pub use path::path;
 
 use crate::error::OpticsError;
 use crate::fresnel::from_sine_and_cosine;
 use crate::led::{Geometry, Led};
-use crate::real::{Real, as_f64, real, within};
+use crate::real::{Real, as_f64, within};
 use crate::surface::{TopSurface, contact_gap};
-use budget::{Fate, Tally};
+use budget::{RayOutcome, Tally};
 use follow::Tracer;
 use ray::Ray;
 use sampling::Points;
@@ -50,15 +52,15 @@ pub struct SlabLayer<T> {
     pub thickness_m: T,
 }
 
-/// The slab: layers from the top (the object's side) down.
+/// A slab of layers, listed from the top (the object's side) down to the glass.
 ///
 /// ```
 /// use tactile_optics::trace::{Slab, SlabLayer};
 ///
-/// // Epidermis, dermis and subcutanea on a plate of glass.
-/// let layers = [(1.405, 2e-3), (1.398, 3e-3), (1.410, 5e-3), (1.473, 3e-3)].map(|(index, thickness_m)| SlabLayer { index, thickness_m });
-/// let slab = Slab::new(&layers, 1.0_f64, 30e-3)?;
-/// assert!((slab.thickness_m() - 13e-3).abs() < 1e-15);
+/// // Epidermis, dermis and subcutanea on a plate of glass: the paper's indices (§3.3) and thicknesses.
+/// let layers = [(1.38, 2e-3), (1.39, 3e-3), (1.40, 5e-3), (1.41, 3e-3)].map(|(index, thickness_m)| SlabLayer { index, thickness_m });
+/// assert!(Slab::new(&layers, 1.0_f64, 30e-3).is_ok());
+/// assert!(Slab::new(&layers, 1.0_f64, 0.0).is_err());
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +94,7 @@ impl<'a, T: Real> Slab<'a, T> {
     }
 
     /// Thickness of the whole slab in metres.
-    pub fn thickness_m(&self) -> T {
+    pub(crate) fn thickness_m(&self) -> T {
         self.layers
             .iter()
             .fold(T::zero(), |sum, l| sum + l.thickness_m)
@@ -106,59 +108,20 @@ impl<'a, T: Real> Slab<'a, T> {
     }
 }
 
-/// How rays are shot and counted.
-///
-/// ```
-/// use tactile_optics::Geometry;
-/// use tactile_optics::trace::TraceOptions;
-///
-/// let quick = TraceOptions::<f32> { geometry: Geometry::Section, rays: 256, ..TraceOptions::default() };
-/// assert_eq!(quick.seed, 1);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TraceOptions<T> {
-    /// Section or space.
-    pub geometry: Geometry,
-    /// Number of rays from the LED.
-    pub rays: u32,
-    /// Shifts the starting points and draws the directions of scattered light.
-    pub seed: u64,
-    /// A branch is given up when it carries less than this share of a ray.
-    pub cutoff: T,
-    /// Rays leaving the bottom within this angle of its normal reach the camera; radians.
-    pub camera_half_angle: T,
-    /// Half the LED's width across the slab in metres; a point by default. No effect in a section.
-    pub emitter_half_width_m: T,
-}
-
-impl<T: Real> Default for TraceOptions<T> {
-    /// 4096 rays in space, cut off at 10⁻⁶, a camera that sees 30° around its axis.
-    fn default() -> Self {
-        Self {
-            geometry: Geometry::Volume,
-            rays: 4096,
-            seed: 1,
-            cutoff: real(1e-6),
-            camera_half_angle: T::FRAC_PI_6(),
-            emitter_half_width_m: T::zero(),
-        }
-    }
-}
-
-/// Shoots the LED's rays through the slab under `surface` and returns where the light went.
+/// Traces the LED's rays through the slab under `surface` and returns the light budget.
 ///
 /// `camera_profile`, if not empty, receives the light reaching the camera by where along the slab it left, in equal bins
 /// from x = 0 to the length; it is overwritten, and its sum is [`LightBudget::camera`].
 ///
 /// # Errors
-/// [`OpticsError::OutOfRange`] for an option without meaning, or a surface deeper than the top layer.
+/// [`OpticsError::OutOfRange`] for a surface deeper than the top layer.
 ///
 /// ```
 /// use tactile_optics::led::Led;
 /// use tactile_optics::surface::{Dimple, Flat};
 /// use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, trace};
 ///
-/// let layers = [SlabLayer { index: 1.41_f64, thickness_m: 2e-3 }, SlabLayer { index: 1.40, thickness_m: 8e-3 }];
+/// let layers = [SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }, SlabLayer { index: 1.41, thickness_m: 3e-3 }];
 /// let slab = Slab::new(&layers, 1.0, 30e-3)?;
 /// let (led, options) = (Led::lambertian(), TraceOptions::default());
 /// let at_rest = trace(&slab, &led, &Flat, &options, &mut [])?;
@@ -175,27 +138,21 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
     options: &TraceOptions<T>,
     camera_profile: &mut [T],
 ) -> Result<LightBudget<T>, OpticsError> {
-    within(
-        "number of rays",
-        real::<T>(f64::from(options.rays)),
-        1.0,
-        4.3e9,
-    )?;
     camera_profile.fill(T::zero());
-    let mut tracer = options_tracer(slab, surface, options, camera_profile)?;
+    let mut tracer = new_tracer(slab, surface, options, camera_profile)?;
     let points = Points::new(options.geometry == Geometry::Volume, options.seed);
     let mut total = Tally::new();
     for i in 0..u64::from(options.rays) {
         let [z, u, v, y] = points.point::<T>(i);
         let (outside, weight) = led.direction(u, v, options.geometry);
-        total.add(Fate::Entry, weight);
+        total.add(RayOutcome::Entry, weight);
         let across = match options.geometry {
             Geometry::Section => T::zero(),
             Geometry::Volume => (y + y - T::one()) * options.emitter_half_width_m,
         };
         let entry = launch(slab, z, across, outside);
         let transmitted = weight * entry.1;
-        tracer.tally.add(Fate::Entry, weight - transmitted);
+        tracer.tally.add(RayOutcome::Entry, weight - transmitted);
         tracer.stream = sampling::hash(options.seed ^ sampling::hash(i));
         tracer.follow(Ray {
             power: transmitted,
@@ -210,27 +167,13 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
     Ok(tracer.tally.budget(total))
 }
 
-/// Checks the options and makes what follows rays.
-fn options_tracer<'a, 's, T: Real, S: TopSurface<T> + ?Sized>(
+/// A tracer of an empty budget; refuses a surface that reaches below the top layer.
+fn new_tracer<'a, 's, T: Real, S: TopSurface<T> + ?Sized>(
     slab: &'a Slab<'s, T>,
     surface: &'a S,
     options: &'a TraceOptions<T>,
     camera_profile: &'a mut [T],
 ) -> Result<Tracer<'a, 's, T, S>, OpticsError> {
-    within("cut-off", options.cutoff, 0.0, 1.0)?;
-    let right = core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7);
-    within(
-        "half angle of the camera",
-        options.camera_half_angle,
-        0.0,
-        right,
-    )?;
-    within(
-        "half width of the emitter",
-        options.emitter_half_width_m,
-        0.0,
-        1e6,
-    )?;
     let top = as_f64(slab.layers[0].thickness_m);
     within(
         "depth of the surface",

@@ -1,8 +1,8 @@
-//! The way of a single ray, for drawings.
+//! The path of a single ray, for drawings.
 
 use super::follow::Tracer;
 use super::ray::{Branches, Ray};
-use super::{Slab, TraceOptions, launch, options_tracer};
+use super::{Slab, TraceOptions, launch, new_tracer};
 use crate::error::OpticsError;
 use crate::real::{Real, real, within};
 use crate::surface::TopSurface;
@@ -22,7 +22,7 @@ use crate::surface::TopSurface;
 /// let slab = Slab::new(&[SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }], 1.0, 30e-3)?;
 /// let mut vertices = [[0.0; 3]; 8];
 /// let count = path(&slab, &Flat, 0.5, 45.0_f64.to_radians(), &mut vertices)?;
-/// // In at the middle of the edge, from side to side, out of the far edge.
+/// // In at the middle of the edge, reflected from side to side, out of the far edge.
 /// assert_eq!(vertices[0], [0.0, 0.0, -5e-3]);
 /// assert!((vertices[count - 1][0] - 30e-3).abs() < 1e-12);
 /// # Ok::<(), tactile_optics::OpticsError>(())
@@ -38,7 +38,7 @@ pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
     let right = core::f64::consts::FRAC_PI_2;
     within("angle of the ray", angle, -right, right)?;
     let options = TraceOptions::default();
-    let mut tracer: Tracer<'_, '_, T, S> = options_tracer(slab, surface, &options, &mut [])?;
+    let mut tracer: Tracer<'_, '_, T, S> = new_tracer(slab, surface, &options, &mut [])?;
     let outside = [angle.cos(), T::zero(), angle.sin()];
     let (ray, _) = launch(slab, depth_share, T::zero(), outside);
     let mut current = Some(Ray {
@@ -51,15 +51,15 @@ pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
         written += 1;
         current = stronger_part(&mut tracer, ray);
         if current.is_none() && written < vertices.len() {
-            let (way, _) = tracer.next(&ray);
-            vertices[written] = ray.at(way);
+            let (distance, _) = tracer.next(&ray);
+            vertices[written] = ray.at(distance);
             written += 1;
         }
     }
     Ok(written)
 }
 
-/// The strongest of what goes on where the ray meets something; none if more than half has left there.
+/// The strongest of the parts into which the next obstacle splits a ray; `None` if more than half of its light leaves there.
 fn stronger_part<T: Real, S: TopSurface<T> + ?Sized>(
     tracer: &mut Tracer<'_, '_, T, S>,
     ray: Ray<T>,

@@ -13,7 +13,7 @@ pub(crate) struct Ray<T> {
 }
 
 impl<T: Real> Ray<T> {
-    /// The point a way `t` along the ray.
+    /// The point at the distance `t` along the ray.
     pub(crate) fn at(&self, t: T) -> [T; 3] {
         core::array::from_fn(|k| self.position[k] + t * self.direction[k])
     }
@@ -62,7 +62,7 @@ impl<T: Real> Branches<T> {
         }
     }
 
-    /// Whether there was room.
+    /// Stores a ray; false when the stack is full.
     pub(crate) fn push(&mut self, ray: Ray<T>) -> bool {
         let Some(slot) = self.rays.get_mut(self.count) else {
             return false;

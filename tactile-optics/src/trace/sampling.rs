@@ -1,4 +1,4 @@
-//! Where rays start: evenly spread points, the same for the same seed.
+//! Starting points of rays: evenly spread, the same for the same seed.
 //!
 //! Points follow the additive recurrence with the powers of 1/φ_d, φ_d^(d+1) = φ_d + 1 (M. Roberts, "The unreasonable
 //! effectiveness of quasirandom sequences", 2018), in 64-bit fixed point, so that no precision is lost however many

@@ -1,6 +1,7 @@
 //! The paper's numbers (§2.2, §3.4, Table 1), and published indices of the materials.
-use tactile_optics::sensor::{FINGERTIP_FORCE_SENSITIVITY_N, PAPER_FORCE_SENSITIVITY_N};
-use tactile_optics::{AcceptanceAngle, Dispersion, LayerStack, OpticsError, SensorSpecification};
+use tactile_optics::{
+    AcceptanceAngle, Dispersion, LayerStack, OpticsError, SensorParameters, SensorSpecification,
+};
 
 #[test]
 fn acceptance_angles_and_the_led_cone() {
@@ -41,7 +42,7 @@ fn cones_at_the_extremes() {
 
 #[test]
 fn the_specification() {
-    let sensor = SensorSpecification {
+    let camera = SensorParameters {
         side_m: 30e-3_f64,
         pixel_m: 4.65e-6,
         frame_rate_hz: 80.0,
@@ -49,44 +50,29 @@ fn the_specification() {
         newton_per_grey: 8.7e-8,
         pixel_noise_grey: 0.76,
         summed_pixels: 1392.0 * 1042.0,
-    }
-    .validated()
-    .unwrap();
-    assert_eq!(sensor.grid_elements().round(), 6452.0);
-    assert_eq!(sensor.temporal_resolution_s(), 12.5e-3);
+    };
+    let sensor = SensorSpecification::new(&camera, 3.0).unwrap();
+    assert_eq!(sensor.grid_elements.round(), 6452.0);
+    assert_eq!(sensor.temporal_resolution_s, 12.5e-3);
     // 0.76 grey levels over 1.45 million pixels and a reference as noisy: 1300 grey levels, 0.11 mN.
     let one_sigma = 0.76 * (2.0 * 1392.0 * 1042.0_f64).sqrt() * 8.7e-8;
-    assert!((sensor.force_resolution_n(3.0) - 3.0 * one_sigma).abs() < 1e-18);
-    assert!((sensor.force_levels(3.0) * 3.0 * one_sigma - 2.0).abs() < 1e-12);
-    assert_eq!(2.0 / PAPER_FORCE_SENSITIVITY_N, 800.0);
-    assert_eq!(
-        FINGERTIP_FORCE_SENSITIVITY_N / PAPER_FORCE_SENSITIVITY_N,
-        8.0
+    assert!((sensor.force_resolution_n - 3.0 * one_sigma).abs() < 1e-18);
+    assert!((sensor.force_levels * 3.0 * one_sigma - 2.0).abs() < 1e-12);
+    let (paper, fingertip) = (
+        SensorSpecification::PAPER_FORCE_SENSITIVITY_N,
+        SensorSpecification::FINGERTIP_FORCE_SENSITIVITY_N,
     );
-    assert!(
-        SensorSpecification {
-            side_m: 0.0,
-            ..sensor
-        }
-        .validated()
-        .is_err()
-    );
-    assert!(
-        SensorSpecification {
-            pixel_noise_grey: f64::NAN,
-            ..sensor
-        }
-        .validated()
-        .is_err()
-    );
-    assert!(
-        SensorSpecification {
-            pixel_noise_grey: 0.0,
-            ..sensor
-        }
-        .validated()
-        .is_ok()
-    );
+    assert_eq!((2.0 / paper, fingertip / paper), (800.0, 8.0));
+    let refused = |change: fn(&mut SensorParameters<f64>)| {
+        let mut changed = camera;
+        change(&mut changed);
+        SensorSpecification::new(&changed, 3.0).is_err()
+    };
+    assert!(refused(|p| p.side_m = 0.0) && refused(|p| p.frame_rate_hz = f64::INFINITY));
+    assert!(refused(|p| p.pixel_noise_grey = f64::NAN));
+    assert!(SensorSpecification::new(&camera, 0.0).is_err());
+    // A camera without noise is a limit worth asking for.
+    assert!(!refused(|p| p.pixel_noise_grey = 0.0));
 }
 
 #[test]

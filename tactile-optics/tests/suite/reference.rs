@@ -125,17 +125,12 @@ fn check_snell(case: &Value, score: &mut Score) {
         .unwrap()
         .iter()
         .chain(std::iter::once(&case["ambient"]));
-    let found: Vec<_> = LayerStack::new(&indices, n0)
-        .unwrap()
-        .propagation(invariant)
-        .unwrap()
-        .collect();
-    let ambient = propagation(n0, invariant).unwrap();
-    for (found, expected) in found.iter().chain(std::iter::once(&ambient)).zip(expected) {
+    for (&n, expected) in indices.iter().chain(std::iter::once(&n0)).zip(expected) {
+        let found = propagation(n, invariant).unwrap();
         match (found, expected["status"].as_str().unwrap()) {
             (Propagation::At { angle, cosine }, "ok") => {
                 score.check(angle.radians(), number(&expected["theta_rad"]), 1e-13, what);
-                score.check(*cosine, number(&expected["cos"]), 1e-13, what);
+                score.check(cosine, number(&expected["cos"]), 1e-13, what);
             }
             (Propagation::Evanescent, "evanescent") => {}
             other => panic!("{what}: {other:?}"),
@@ -153,12 +148,12 @@ fn check_fresnel(case: &Value, score: &mut Score) {
     );
     let found = fresnel(n1, n2, theta).unwrap();
     let total = case["expected"]["status"].as_str() == Some("total");
-    if found.is_total() != total {
+    if found.refraction.is_none() != total {
         // One ulp of the angle on either side of the critical one decides; the sine carries half an ulp of its own.
         assert!(
             (n1 * theta.sin() - n2).abs() < 2.0 * EPS * n2,
             "{what}: total {} against {total}",
-            found.is_total()
+            found.refraction.is_none()
         );
         assert!(found.transmittance() < 1e-6, "{what}");
         score.values += 1;

