@@ -75,7 +75,7 @@ fn pass(c: &mut Criterion) {
     group.bench_function("the pass alone", |b| {
         b.iter(|| s.reference.compare(black_box(s.quiet.view()), 10))
     });
-    let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
+    let detector = ContactDetector::new(ContactOptions::default());
     let mut workspace = DetectorWorkspace::default();
     let mut detect = |frame: &Array2<u8>| {
         detector
@@ -94,7 +94,7 @@ fn pass(c: &mut Criterion) {
 fn contact(c: &mut Criterion) {
     for (wider, name) in [(1.0, "5 % of the frame"), (1.73, "15 % of the frame")] {
         let s = scene_of(wider);
-        let detector = ContactDetector::new(ContactOptions::default()).expect("valid");
+        let detector = ContactDetector::new(ContactOptions::default());
         let mut workspace = DetectorWorkspace::default();
         let mut detect = || {
             detector.detect_with::<f64>(&mut workspace, black_box(s.pressed.view()), &s.reference)
@@ -159,9 +159,10 @@ fn hertz_fit(c: &mut Criterion) {
         ("whole frame without the profile", true),
         ("whole frame with the profile", false),
     ] {
-        let options = ForceOptions {
-            skip_profile,
-            ..ForceOptions::default()
+        let options = if skip_profile {
+            ForceOptions::default().without_profile()
+        } else {
+            ForceOptions::default()
         };
         let meter = ForceMeter::new(truth.pixel_size_m, &options).expect("valid");
         let mut workspace = ForceWorkspace::default();

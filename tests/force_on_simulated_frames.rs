@@ -167,23 +167,18 @@ fn blur_oblong_pixels_and_small_contacts() {
 }
 
 #[test]
-fn lamps_that_drift_are_corrected_on_request() {
+fn illumination_drift_is_corrected_on_request() {
     let mut options = press(camera());
     options.loads[0].illumination = Illumination {
         level: 1.05,
         tilt: [0.1, -0.06],
     };
     let scene = PressScene::new(options).unwrap();
-    let with = |drift| ForceOptions {
-        contact: ContactOptions {
-            drift,
-            ..Default::default()
-        },
-        ..Default::default()
-    };
+    let with =
+        |drift| ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift));
     let uncorrected = study(&scene, 20, &with(DriftCorrection::None));
     assert!(uncorrected.force.rms() > 0.03);
-    let corrected = study(&scene, 100, &with(DriftCorrection::TiltedLamp));
+    let corrected = study(&scene, 100, &with(DriftCorrection::TiltedIllumination));
     assert!(corrected.force.worst() < 2e-3 && corrected.radius.worst() < 3e-3);
     // 100 seeds: 68.3 ± 4.7 %.
     assert!((0.55..=0.82).contains(&corrected.force.inside_one_sigma()));
@@ -253,7 +248,7 @@ fn shear_follows_the_centroid() {
             &calibration,
         )
         .unwrap();
-        let shear = tracker.update(&m).expect("contact");
+        let shear = tracker.update(m.centroid_m).expect("contact");
         for axis in 0..2 {
             let truth = made.truth[k].load.shear_n[axis];
             let found = shear.force_n[axis];
@@ -271,7 +266,7 @@ fn shear_follows_the_centroid() {
         &calibration,
     )
     .unwrap();
-    assert!(tracker.update(&none).is_none());
+    assert!(tracker.update(none.centroid_m).is_none());
 }
 
 fn measure(

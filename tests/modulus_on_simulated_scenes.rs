@@ -141,10 +141,7 @@ fn calibrate(
         .map(|&(f, v)| CalibrationPair::loading(v, gauge(f)))
         .collect();
     // No light, no force: the error of the slope is then all that the forces share.
-    let options = CalibrationOptions {
-        through_origin: true,
-        ..CalibrationOptions::default()
-    };
+    let options = CalibrationOptions::default().with_zero_at_origin();
     LinearCalibration::fit(&pairs, &options).unwrap()
 }
 

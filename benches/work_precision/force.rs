@@ -43,75 +43,28 @@ pub(crate) fn frame(study: &mut Study) {
     let frames: Vec<_> = (0..SEEDS).map(|seed| scene.frame(0, seed)).collect();
     let truth = scene.truth(0);
     let fit = HertzFitOptions::default();
-    let with = |hertz| ForceOptions {
-        hertz,
-        ..ForceOptions::default()
-    };
+    let with = |hertz| ForceOptions::default().with_hertz(hertz);
+    let steps = |n| with(fit.with_max_iterations(n).expect("valid"));
+    let blur = |sd| with(fit.with_blur_px(sd).expect("valid"));
     for (knob, setting, is_default, options) in [
         ("profile", "default", true, ForceOptions::default()),
         (
             "profile",
             "skipped",
             false,
-            ForceOptions {
-                skip_profile: true,
-                ..ForceOptions::default()
-            },
+            ForceOptions::default().without_profile(),
         ),
-        (
-            "iterations",
-            "1",
-            false,
-            with(HertzFitOptions {
-                max_iterations: 1,
-                ..fit
-            }),
-        ),
-        (
-            "iterations",
-            "2",
-            false,
-            with(HertzFitOptions {
-                max_iterations: 2,
-                ..fit
-            }),
-        ),
-        (
-            "iterations",
-            "5",
-            false,
-            with(HertzFitOptions {
-                max_iterations: 5,
-                ..fit
-            }),
-        ),
+        ("iterations", "1", false, steps(1)),
+        ("iterations", "2", false, steps(2)),
+        ("iterations", "5", false, steps(5)),
         (
             "background",
             "fitted",
             false,
-            with(HertzFitOptions {
-                fit_background: true,
-                ..fit
-            }),
+            with(fit.with_fitted_background()),
         ),
-        (
-            "blur",
-            "none",
-            false,
-            with(HertzFitOptions {
-                blur_px: Some(0.0),
-                ..fit
-            }),
-        ),
-        (
-            "blur",
-            "1 px",
-            false,
-            with(HertzFitOptions {
-                blur_px: Some(1.0),
-                ..fit
-            }),
-        ),
+        ("blur", "none", false, blur(0.0)),
+        ("blur", "1 px", false, blur(1.0)),
     ] {
         let meter = ForceMeter::new(truth.pixel_size_m, &options).expect("valid");
         let mut workspace = ForceWorkspace::default();

@@ -221,7 +221,7 @@ pub trait ContactStage: Send + Sync {
 /// assert!((line.calibration().force_n(5e4) - 0.5).abs() < 1e-12);
 /// // The same, with the contact's radius read off its mask instead of fitted.
 /// let calibration = LinearCalibration::fit(&pairs, &CalibrationOptions::default())?;
-/// let options = ForceOptions { skip_profile: true, ..ForceOptions::default() };
+/// let options = ForceOptions::default().without_profile();
 /// let quick = LightContact::new(calibration, [50e-6; 2], &options)?;
 /// assert!((quick.calibration().sensitivity_n(5e4) - 1e-5).abs() < 1e-17, "newtons per grey level");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -264,7 +264,7 @@ impl<C: StressCalibration<f64>> LightContact<C> {
             meter,
             calibration,
             pixel_size_m,
-            polarity: options.contact.polarity,
+            polarity: options.polarity(),
         })
     }
 

@@ -1,9 +1,8 @@
-//! What the lamps and the background did since the reference was taken, read from the pixels outside the contact.
+//! IlluminationDrift of illumination and stray light since the reference was taken, estimated from the pixels outside the contact.
 
-use crate::frame::{TILE_COLUMNS, TILE_ROWS};
-use crate::{FrameStatistics, ReferenceFrame};
+use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
-/// Which change of the light is corrected. Nothing is unless it is asked for.
+/// The change of illumination or stray light that is corrected; none by default.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -12,9 +11,9 @@ use crate::{FrameStatistics, ReferenceFrame};
 /// // Three grey levels of stray light everywhere are no contact.
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 20_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 23_u8);
-/// let options = ContactOptions { drift: DriftCorrection::Offset, ..ContactOptions::default() };
+/// let options = ContactOptions::default().with_drift(DriftCorrection::Offset);
 /// let found: Detection<f64> =
-///     ContactDetector::new(options)?.detect_with(&mut Default::default(), brighter.view(), &reference)?;
+///     ContactDetector::new(options).detect_with(&mut Default::default(), brighter.view(), &reference)?;
 /// assert!(found.contact.is_none());
 /// assert!((found.drift.coefficients[0] - 3.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -30,35 +29,35 @@ pub enum DriftCorrection {
     Offset,
     /// Stray light with a gradient: d = f − r − (b + bₓ x + b_y y).
     Plane,
-    /// Lamps brighter or darker, background and signal alike: d = f/g − r.
-    Lamp,
-    /// Lamps that also moved: d = f/(g + gₓ x + g_y y) − r.
-    TiltedLamp,
+    /// Illumination brighter or darker, background and signal alike: d = f/g − r.
+    Illumination,
+    /// Illumination that also changed its distribution, as when an LED moves: d = f/(g + gₓ x + g_y y) − r.
+    TiltedIllumination,
 }
 
-/// The correction found for one frame. `coefficients` are [value, per column, per row] about the frame's middle: grey
-/// levels for stray light, shares for lamps.
+/// The drift found in one frame. `coefficients` are [value, per column, per row] about the frame's middle: grey
+/// levels for stray light, shares for illumination.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_force::{ContactDetector, ContactOptions, Detection, DriftCorrection, ReferenceFrame};
 ///
-/// // Lamps a tenth brighter.
+/// // Illumination a tenth brighter.
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 100_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 110_u8);
-/// let options = ContactOptions { drift: DriftCorrection::Lamp, ..ContactOptions::default() };
+/// let options = ContactOptions::default().with_drift(DriftCorrection::Illumination);
 /// let found: Detection<f64> =
-///     ContactDetector::new(options)?.detect_with(&mut Default::default(), brighter.view(), &reference)?;
+///     ContactDetector::new(options).detect_with(&mut Default::default(), brighter.view(), &reference)?;
 /// assert!((found.drift.coefficients[0] - 1.1).abs() < 1e-9);
 /// assert_eq!(found.drift.tiles, 20 * 5);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Drift {
-    /// What was corrected.
+pub struct IlluminationDrift {
+    /// The kind of correction.
     pub correction: DriftCorrection,
-    /// Offset (grey levels) or lamp level (1 for unchanged) in the frame's middle, and its change per column and per row.
+    /// Offset (grey levels) or relative illumination (1 for unchanged) in the frame's middle, and its change per column and per row.
     pub coefficients: [f64; 3],
     /// Standard error of the first coefficient.
     pub standard_error: f64,
@@ -74,7 +73,7 @@ pub struct Drift {
 /// The correction along one row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DriftLine {
-    lamp: bool,
+    multiplicative: bool,
     start: f32,
     step: f32,
 }
@@ -83,7 +82,7 @@ impl DriftLine {
     /// Corrected difference of the pixel `x` columns from the line's start.
     pub(crate) fn difference(&self, x: usize, frame: f32, reference: f32) -> f32 {
         let level = self.start + self.step * x as f32;
-        if self.lamp {
+        if self.multiplicative {
             frame / level - reference
         } else {
             frame - reference - level
@@ -92,20 +91,20 @@ impl DriftLine {
 }
 
 impl DriftCorrection {
-    fn is_lamp(self) -> bool {
-        matches!(self, Self::Lamp | Self::TiltedLamp)
+    fn is_multiplicative(self) -> bool {
+        matches!(self, Self::Illumination | Self::TiltedIllumination)
     }
 
     fn terms(self) -> usize {
         match self {
             Self::None => 0,
-            Self::Offset | Self::Lamp => 1,
-            Self::Plane | Self::TiltedLamp => 3,
+            Self::Offset | Self::Illumination => 1,
+            Self::Plane | Self::TiltedIllumination => 3,
         }
     }
 }
 
-impl Drift {
+impl IlluminationDrift {
     /// No correction of a frame of the given size.
     pub(crate) fn none() -> Self {
         Self::default()
@@ -121,13 +120,13 @@ impl Drift {
         let x = first_column as f64 - self.middle[0];
         let start = value + per_column * x + per_row * y;
         DriftLine {
-            lamp: self.correction.is_lamp(),
+            multiplicative: self.correction.is_multiplicative(),
             start: start as f32,
             step: per_column as f32,
         }
     }
 
-    /// Variances that the correction leaves at a place: of the background in squared grey levels, and of the signal's scale.
+    /// Variances due to the correction's own error at a place: of the background in squared grey levels, and of the signal's scale.
     pub(crate) fn variances(&self, x: f64, y: f64) -> [f64; 2] {
         let at = [1.0, x - self.middle[0], y - self.middle[1]];
         let mut variance = 0.0;
@@ -136,39 +135,31 @@ impl Drift {
                 variance += at[i] * self.covariance[i][j] * at[j];
             }
         }
-        if self.correction.is_lamp() {
+        if self.correction.is_multiplicative() {
             [variance * self.reference * self.reference, variance]
         } else {
             [variance, 0.0]
         }
     }
 
-    /// Background that the correction takes from a frame at a place where the reference is `reference`.
+    /// Background that the correction subtracts from a frame at a place where the reference is `reference`.
     fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
         let [value, per_column, per_row] = self.coefficients;
         let at = value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1]);
-        if self.correction.is_lamp() {
+        if self.correction.is_multiplicative() {
             reference * (at - 1.0)
         } else {
             at
         }
     }
 
-    /// The greatest background it takes anywhere in the frame, in grey levels, for a reference of even brightness.
-    pub(crate) fn greatest_grey(
-        &self,
-        statistics: &FrameStatistics,
-        reference: &ReferenceFrame,
-    ) -> f64 {
+    /// The greatest background that the correction removes anywhere in a frame of a given size, in grey levels, for a reference
+    /// of even brightness `mean`.
+    pub(crate) fn greatest_grey(&self, (rows, columns): (usize, usize), mean: f64) -> f64 {
         if self.is_zero() {
             return 0.0;
         }
-        let image = reference.image();
-        let mean = image.iter().map(|p| f64::from(*p)).sum::<f64>() / image.len() as f64;
-        let (right, bottom) = (
-            statistics.columns as f64 - 1.0,
-            statistics.rows as f64 - 1.0,
-        );
+        let (right, bottom) = (columns as f64 - 1.0, rows as f64 - 1.0);
         let corners = [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]];
         corners
             .iter()
@@ -176,20 +167,10 @@ impl Drift {
             .fold(0.0, f64::max)
     }
 
-    /// What is left of a tile's summed difference.
+    /// A tile's summed difference after the correction.
     pub(crate) fn residual(&self, tile: &TileSum) -> f64 {
         tile.difference - tile.pixels * self.level(tile.x, tile.y, tile.reference / tile.pixels)
     }
-}
-
-/// One tile: where it is, its number of pixels, the reference's sum and the summed difference.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TileSum {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
-    pub(crate) pixels: f64,
-    pub(crate) reference: f64,
-    pub(crate) difference: f64,
 }
 
 /// Fits the correction to all tiles but those that stand out (the contact), by least squares on what stays, again and
@@ -200,14 +181,14 @@ pub(crate) fn fit(
     tiles: impl Iterator<Item = TileSum> + Clone,
     sd: f64,
     scratch: &mut Vec<f64>,
-) -> Drift {
+) -> IlluminationDrift {
     let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
-    let mut drift = Drift {
+    let mut drift = IlluminationDrift {
         correction,
         middle,
-        ..Drift::none()
+        ..IlluminationDrift::none()
     };
-    if correction.is_lamp() {
+    if correction.is_multiplicative() {
         drift.coefficients[0] = 1.0;
     }
     let terms = correction.terms();
@@ -240,16 +221,16 @@ pub(crate) fn fit(
     drift
 }
 
-/// What one unit of the first coefficient does to a tile's sum.
-fn weight(drift: &Drift, tile: &TileSum) -> f64 {
-    if drift.correction.is_lamp() {
+/// Derivative of a tile's sum by the first coefficient.
+fn weight(drift: &IlluminationDrift, tile: &TileSum) -> f64 {
+    if drift.correction.is_multiplicative() {
         tile.reference.max(1.0)
     } else {
         tile.pixels
     }
 }
 
-impl Drift {
+impl IlluminationDrift {
     /// One least-squares step on the given tiles; returns their number.
     fn step(&mut self, tiles: impl Iterator<Item = TileSum>, terms: usize, sd: f64) -> usize {
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
@@ -270,7 +251,7 @@ impl Drift {
     }
 }
 
-/// Normal equations of what a correction leaves of the tiles, and the tiles' own sums.
+/// Normal equations of the tiles' residuals, and the tiles' own sums.
 struct Normal {
     matrix: nalgebra::Matrix3<f64>,
     right: nalgebra::Vector3<f64>,
@@ -282,7 +263,7 @@ struct Normal {
 impl Normal {
     /// Places count from the frame's middle, in units of `scale`.
     fn of(
-        drift: &Drift,
+        drift: &IlluminationDrift,
         tiles: impl Iterator<Item = TileSum>,
         terms: usize,
         scale: [f64; 3],

@@ -1,15 +1,17 @@
-//! What can go wrong, with the numbers that say why.
+//! The errors of this crate, with the numbers that explain them.
+
+use std::fmt;
 
 use thiserror::Error;
 
-/// What an option's value has to satisfy.
+/// The rule that an option's value has to satisfy.
 ///
 /// ```
-/// use tactile_force::{ForceError, HertzFitOptions, HertzFitter, Requirement};
+/// use tactile_force::{ForceError, HertzFitOptions, Requirement};
 ///
-/// let options = HertzFitOptions { blur_px: Some(f64::NAN), ..HertzFitOptions::default() };
-/// let error = HertzFitter::new(options).unwrap_err();
-/// assert!(matches!(error, ForceError::InvalidOption { name: "blur_px", requirement: Requirement::NonNegative, .. }));
+/// let error = HertzFitOptions::default().with_blur_px(f64::NAN).unwrap_err();
+/// assert!(matches!(error, ForceError::InvalidOption { name: "blur_px", expected: Requirement::NonNegative, .. }));
+/// assert_eq!(error.to_string(), "`blur_px` is NaN, expected a finite number that is not negative");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -30,7 +32,7 @@ pub enum Requirement {
     AtLeastOne,
 }
 
-/// Every way in which this crate rejects its input.
+/// The reason why an input was rejected.
 ///
 /// No contact is a value, a fit that does not converge is a report, and a calibration used outside its range is a
 /// flag: none of them is an error.
@@ -89,7 +91,7 @@ pub enum ForceError {
         /// The share stated in the options.
         limit: f64,
     },
-    /// Fewer observations than parameters.
+    /// Fewer observations than a fit with an error estimate needs.
     #[error("{found} observations cannot determine {required} parameters with an error estimate")]
     TooFewPairs {
         /// The least number that can.
@@ -118,14 +120,14 @@ pub enum ForceError {
         to: f64,
     },
     /// An option outside its domain.
-    #[error("option `{name}` is {value}, must be {requirement:?}")]
+    #[error("`{name}` is {found}, expected {expected}")]
     InvalidOption {
         /// The option's name.
         name: &'static str,
         /// The value given.
-        value: f64,
-        /// What it must satisfy.
-        requirement: Requirement,
+        found: f64,
+        /// The rule it breaks.
+        expected: Requirement,
     },
     /// A pixel of a floating-point image is NaN or infinite.
     #[error("pixel (row {row}, column {column}) is not finite")]
@@ -137,8 +139,23 @@ pub enum ForceError {
     },
 }
 
+impl fmt::Display for Requirement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Positive => "a finite number above zero",
+            Self::NonNegative => "a finite number that is not negative",
+            Self::OpenUnitInterval => "a number above zero and below one",
+            Self::UnitInterval => "a number from zero to one",
+            Self::Finite => "a finite number",
+            Self::Odd => "an odd whole number",
+            Self::AtLeastOne => "a whole number of at least one",
+        })
+    }
+}
+
 impl Requirement {
-    pub(crate) fn check(self, name: &'static str, value: f64) -> Result<(), ForceError> {
+    /// The value, if it satisfies the rule.
+    pub(crate) fn check(self, name: &'static str, value: f64) -> Result<f64, ForceError> {
         let holds = match self {
             Self::Positive => value > 0.0 && value.is_finite(),
             Self::NonNegative => value >= 0.0 && value.is_finite(),
@@ -149,12 +166,12 @@ impl Requirement {
             Self::AtLeastOne => value >= 1.0 && value.is_finite(),
         };
         if holds {
-            Ok(())
+            Ok(value)
         } else {
             Err(ForceError::InvalidOption {
                 name,
-                value,
-                requirement: self,
+                found: value,
+                expected: self,
             })
         }
     }

@@ -5,15 +5,15 @@
 //! SI and say so in their names; names that end in `_px` are in pixels. Equation numbers are those of the paper on waveguide tactile
 //! imaging that the workspace follows.
 //!
-//! # Rooms
-//! | module | what it holds |
+//! # Modules
+//! | module | contents |
 //! |---|---|
 //! | `frame` | the pass over a frame, the reference, the noise of both, vignetting |
-//! | `drift` | what the lamps did since the reference was taken |
-//! | `contact` | detection, mask, aperture, what is summed over it |
-//! | `hertz` | the contact radius |
+//! | `drift` | drift of illumination and stray light since the reference was taken |
+//! | `contact` | detection, mask, aperture, sums over the aperture |
+//! | `hertz` | the contact radius from the pressure profile |
 //! | `calibration` | pixel value to force and stress, (5) and (6) |
-//! | `measure`, `batch` | one frame in, force out; many frames |
+//! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
 //! | `image` | moments of float images, blobs averaged over pixels |
 //!
@@ -47,13 +47,13 @@ pub use calibration::{
 pub use contact::{
     Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
 };
-pub use drift::{Drift, DriftCorrection};
+pub use drift::{DriftCorrection, IlluminationDrift};
 pub use error::{ForceError, Requirement};
 pub use estimate::{Estimate, Real};
 pub use frame::{
     BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame,
 };
-pub use hertz::{HertzFit, HertzFitOptions, HertzFitter};
+pub use hertz::{HertzFit, HertzFitOptions};
 pub use image::{
     GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,
 };

@@ -1,36 +1,66 @@
-//! One frame in, force and contact out.
+//! Measurement of force and contact in one frame.
 
 use ndarray::ArrayView2;
 
-use crate::contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
-use crate::hertz::{HertzFit, HertzFitOptions, HertzFitter, Rings, Start};
-use crate::{
-    BoundingBox, DifferenceNoise, Drift, Estimate, ForceError, ForceReading, FrameStatistics, Real,
-    ReferenceFrame, StressCalibration, error::Requirement,
+use crate::calibration::{ForceReading, StressCalibration};
+use crate::contact::{
+    Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
 };
+use crate::drift::IlluminationDrift;
+use crate::error::{ForceError, Requirement};
+use crate::estimate::{Estimate, Real};
+use crate::frame::{BoundingBox, DifferenceNoise, FrameStatistics, ReferenceFrame};
+use crate::hertz::{HertzFit, HertzFitOptions, HertzFitter, Rings, Start};
 
-/// How a force is measured.
+/// The options of a force measurement.
 ///
 /// ```
-/// use tactile_force::{ContactOptions, ForceOptions};
+/// use tactile_force::{ContactOptions, ForceMeter, ForceOptions, HertzFitOptions, Polarity};
 ///
 /// // Force and centroid only, at one false alarm in a million frames.
-/// let contact = ContactOptions { false_alarm_rate: 1e-6, ..ContactOptions::default() };
-/// let options = ForceOptions { contact, skip_profile: true, ..ForceOptions::default() };
-/// assert!(tactile_force::ForceMeter::<f64>::new([20e-6; 2], &options).is_ok());
+/// let contact = ContactOptions::default().with_false_alarm_rate(1e-6)?;
+/// let options = ForceOptions::default().with_contact(contact).without_profile();
+/// assert_eq!(options.polarity(), Polarity::Brighter);
+/// assert!(ForceMeter::<f64>::new([20e-6; 2], &options).is_ok());
+/// // The profile over a background that is fitted too.
+/// let hertz = HertzFitOptions::default().with_fitted_background();
+/// assert_ne!(ForceOptions::default().with_hertz(hertz), ForceOptions::default());
+/// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ForceOptions {
-    /// How the contact is found.
-    pub contact: ContactOptions,
-    /// How its profile is fitted.
-    pub hertz: HertzFitOptions,
-    /// Leave the profile out: radius and peak stress then come from the mask.
-    pub skip_profile: bool,
+    contact: ContactOptions,
+    hertz: HertzFitOptions,
+    skip_profile: bool,
 }
 
-/// What one frame says of the contact.
+impl ForceOptions {
+    /// Finds the contact with these options.
+    pub fn with_contact(mut self, contact: ContactOptions) -> Self {
+        self.contact = contact;
+        self
+    }
+
+    /// Fits the profile with these options.
+    pub fn with_hertz(mut self, hertz: HertzFitOptions) -> Self {
+        self.hertz = hertz;
+        self
+    }
+
+    /// Fits no profile: radius and peak stress then come from the mask.
+    pub fn without_profile(mut self) -> Self {
+        self.skip_profile = true;
+        self
+    }
+
+    /// Whether contact is brighter or darker than the reference.
+    pub fn polarity(&self) -> Polarity {
+        self.contact.polarity
+    }
+}
+
+/// Force, contact and stress measured in one frame.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -38,9 +68,9 @@ pub struct ForceOptions {
 ///
 /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
 /// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
-/// let quiet = Array2::from_elem((64, 64), 12_u8);
+/// let at_rest = Array2::from_elem((64, 64), 12_u8);
 /// let m: ForceMeasurement<f64> =
-///     measure_force(quiet.view(), quiet.view(), [20e-6; 2], &calibration, &Default::default())?;
+///     measure_force(at_rest.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
 /// // No contact is an answer, not an error.
 /// assert_eq!((m.force_n.value, m.contact, m.mean_stress_pa), (0.0, None, None));
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -68,13 +98,13 @@ pub struct ForceMeasurement<T> {
     pub peak_stress_pa: Option<Estimate<T>>,
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
-    /// The correction of lamps and background.
-    pub drift: Drift,
+    /// The correction of illumination and stray light.
+    pub drift: IlluminationDrift,
     /// The noise that the errors are computed from; `None` without contact.
     pub noise: Option<DifferenceNoise>,
 }
 
-/// Everything a measurement reuses from frame to frame. After the first frames nothing is allocated.
+/// Buffers that measurements reuse from frame to frame; after the first frames nothing is allocated.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -136,14 +166,14 @@ impl<T: Real> ForceMeter<T> {
     /// A meter for pixels of the given size [x, y].
     ///
     /// # Errors
-    /// A pixel size or an option outside its domain.
+    /// A pixel size that is not positive and finite.
     pub fn new(pixel_size_m: [T; 2], options: &ForceOptions) -> Result<Self, ForceError> {
         for size in pixel_size_m {
             Requirement::Positive.check("pixel_size_m", size.as_f64())?;
         }
         Ok(Self {
-            detector: ContactDetector::new(options.contact)?,
-            fitter: HertzFitter::new(options.hertz)?,
+            detector: ContactDetector::new(options.contact),
+            fitter: HertzFitter::new(options.hertz),
             skip_profile: options.skip_profile,
             pixel_size_m,
         })
@@ -210,13 +240,11 @@ impl<T: Real> ForceMeter<T> {
         let radius = contact_radius(&contact, profile, pixel_area.sqrt());
         let step =
             calibration.stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel_area);
-        let peak = profile.map_or(
-            Estimate {
-                value: contact.peak,
-                standard_error: T::one(),
-            },
-            |p| p.peak,
-        );
+        let brightest = Estimate {
+            value: contact.peak,
+            standard_error: T::one(),
+        };
+        let peak = profile.map_or(brightest, |p| p.peak);
         ForceMeasurement {
             force_n: reading.force_n,
             reading: Some(reading),
@@ -286,7 +314,7 @@ impl<T: Real> ForceMeasurement<T> {
 /// [`ReferenceFrame`] and a [`ForceWorkspace`].
 ///
 /// # Errors
-/// Images of different size or without pixels, options outside their domain, too much of the contact saturated.
+/// Images of different size or without pixels, a pixel size that is not positive, too much of the contact saturated.
 ///
 /// ```
 /// use ndarray::Array2;

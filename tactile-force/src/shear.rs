@@ -1,6 +1,7 @@
 //! Shear from the step of the centroid: F_x = K_x u_x, F_y = K_y u_y (equations (9)–(12)).
 
-use crate::{Estimate, ForceError, ForceMeasurement, Real};
+use crate::error::ForceError;
+use crate::estimate::{Estimate, Real};
 
 /// One measurement for the shear calibration: how far the centroid went under a known shear force.
 ///
@@ -65,11 +66,11 @@ impl<T: Real> ShearCalibration<T> {
         if let Some(index) = pairs.iter().position(|p| !finite(p)) {
             return Err(ForceError::NonFinitePair { index });
         }
-        let x = axis(pairs, 0)?;
-        let y = axis(pairs, 1)?;
+        let [x, y] = [Spring::fit(pairs, 0)?, Spring::fit(pairs, 1)?];
+        let stiffness = |s: &Spring| Estimate::nearest(s.stiffness, s.variance);
         Ok(Self {
-            stiffness_n_per_m: [Estimate::nearest(x.0, x.1), Estimate::nearest(y.0, y.1)],
-            residual_sd_n: [T::nearest(x.2), T::nearest(y.2)],
+            stiffness_n_per_m: [stiffness(&x), stiffness(&y)],
+            residual_sd_n: [T::nearest(x.residual_sd), T::nearest(y.residual_sd)],
         })
     }
 
@@ -86,26 +87,41 @@ impl<T: Real> ShearCalibration<T> {
     }
 }
 
-/// Stiffness, its variance, and the residual standard deviation along one axis.
-fn axis<T: Real>(pairs: &[ShearPair<T>], k: usize) -> Result<(f64, f64, f64), ForceError> {
-    let (mut uu, mut uf) = (0.0, 0.0);
-    for p in pairs {
-        let (u, f) = (p.centroid_step_m[k].as_f64(), p.force_n[k].as_f64());
-        uu += u * u;
-        uf += u * f;
-    }
-    if uu == 0.0 {
-        return Err(ForceError::DegeneratePairs { span: 0.0 });
-    }
-    let stiffness = uf / uu;
-    let residual =
-        |p: &ShearPair<T>| p.force_n[k].as_f64() - stiffness * p.centroid_step_m[k].as_f64();
-    let variance =
-        pairs.iter().map(|p| residual(p).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
-    Ok((stiffness, variance / uu, variance.sqrt()))
+/// Least squares along one axis.
+struct Spring {
+    stiffness: f64,
+    /// Variance of the stiffness.
+    variance: f64,
+    residual_sd: f64,
 }
 
-/// Shear of one frame.
+impl Spring {
+    fn fit<T: Real>(pairs: &[ShearPair<T>], axis: usize) -> Result<Self, ForceError> {
+        let step = |p: &ShearPair<T>| p.centroid_step_m[axis].as_f64();
+        let force = |p: &ShearPair<T>| p.force_n[axis].as_f64();
+        let (mut uu, mut uf) = (0.0, 0.0);
+        for p in pairs {
+            uu += step(p) * step(p);
+            uf += step(p) * force(p);
+        }
+        if uu == 0.0 {
+            return Err(ForceError::DegeneratePairs { span: 0.0 });
+        }
+        let stiffness = uf / uu;
+        let mut squares = 0.0;
+        for p in pairs {
+            squares += (force(p) - stiffness * step(p)).powi(2);
+        }
+        let residual_variance = squares / (pairs.len() - 1) as f64;
+        Ok(Self {
+            stiffness,
+            variance: residual_variance / uu,
+            residual_sd: residual_variance.sqrt(),
+        })
+    }
+}
+
+/// Shear force and centroid displacement of one frame.
 ///
 /// ```
 /// use tactile_force::{Estimate, ShearMeasurement};
@@ -114,8 +130,8 @@ fn axis<T: Real>(pairs: &[ShearPair<T>], k: usize) -> Result<(f64, f64, f64), Fo
 ///     let [x, y] = measured.force_n.map(|f| f.value);
 ///     x.hypot(y)
 /// };
-/// let still = [Estimate::default(); 2];
-/// let pulled = ShearMeasurement { displacement_m: still, step_m: still, force_n: [0.3, 0.4].map(|value| Estimate { value, standard_error: 0.01 }) };
+/// let at_rest = [Estimate::default(); 2];
+/// let pulled = ShearMeasurement { displacement_m: at_rest, step_m: at_rest, force_n: [0.3, 0.4].map(|value| Estimate { value, standard_error: 0.01 }) };
 /// assert_eq!(along(&pulled), 0.5);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,10 +164,10 @@ pub struct ShearMeasurement<T> {
 /// let measure = |frame: &Array2<u8>| measure_force(frame.view(), at_rest.view(), [20e-6; 2], &force, &Default::default());
 ///
 /// let mut tracker = ShearTracker::new(shear);
-/// assert!(tracker.update(&measure(&at_rest)?).is_none());
-/// assert_eq!(tracker.update(&measure(&press(60.0))?).map(|s| s.force_n[0].value), Some(0.0));
+/// assert!(tracker.update(measure(&at_rest)?.centroid_m).is_none());
+/// assert_eq!(tracker.update(measure(&press(60.0))?.centroid_m).map(|s| s.force_n[0].value), Some(0.0));
 /// // Two pixels to the right are 40 µm and 80 mN.
-/// let pulled = tracker.update(&measure(&press(62.0))?).expect("contact");
+/// let pulled = tracker.update(measure(&press(62.0))?.centroid_m).expect("contact");
 /// assert!((pulled.force_n[0].value - 0.08_f64).abs() < 1e-3);
 /// # Ok::<(), ForceError>(())
 /// ```
@@ -172,29 +188,9 @@ impl<T: Real> ShearTracker<T> {
         }
     }
 
-    /// Takes the next frame. The first frame of a contact has zero shear by definition; without contact there is none, and
-    /// the next contact starts anew.
-    pub fn update(&mut self, measurement: &ForceMeasurement<T>) -> Option<ShearMeasurement<T>> {
-        self.update_centroid(measurement.centroid_m)
-    }
-
-    /// As [`update`](Self::update), from the centroid [x, y] in metres alone, however it was measured; `None` without contact.
-    ///
-    /// ```
-    /// use tactile_force::{Estimate, ShearCalibration, ShearPair, ShearTracker};
-    /// let pairs = [1e-5, 2e-5].map(|u| ShearPair { centroid_step_m: [u, u], force_n: [2e3 * u; 2] });
-    /// let mut tracker = ShearTracker::new(ShearCalibration::fit(&pairs)?);
-    /// let at = |x: f64| Some([x, 1e-3].map(|value| Estimate { value, standard_error: 1e-8 }));
-    /// assert_eq!(tracker.update_centroid(at(0.0)).unwrap().force_n[0].value, 0.0);
-    /// let pulled = tracker.update_centroid(at(3e-5)).unwrap();
-    /// assert!((pulled.force_n[0].value - 0.06_f64).abs() < 1e-12);
-    /// assert!(tracker.update_centroid(None).is_none());
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn update_centroid(
-        &mut self,
-        centroid_m: Option<[Estimate<T>; 2]>,
-    ) -> Option<ShearMeasurement<T>> {
+    /// Takes the centroid [x, y] of the next frame in metres, however it was measured; `None` without contact. The first frame
+    /// of a contact has zero shear by definition; after a frame without contact the next contact starts anew.
+    pub fn update(&mut self, centroid_m: Option<[Estimate<T>; 2]>) -> Option<ShearMeasurement<T>> {
         let Some(now) = centroid_m else {
             (self.first, self.last) = (None, None);
             return None;

@@ -50,10 +50,7 @@ fn forces(
     pressed: &[Vec<Array2<u8>>; 2],
     rng: &mut ChaCha8Rng,
 ) -> ([Estimate<f64>; 2], DMatrix<f64>) {
-    let options = ForceOptions {
-        skip_profile: true,
-        ..ForceOptions::default()
-    };
+    let options = ForceOptions::default().without_profile();
     let meter = ForceMeter::new(scene.options().camera.pixel_size_m, &options).unwrap();
     let reference = reference(dark);
     let frames = (0..8)

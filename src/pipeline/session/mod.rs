@@ -165,7 +165,7 @@ impl Session {
         let shear = self
             .shear
             .as_mut()
-            .and_then(|tracker| tracker.update_centroid(centroid));
+            .and_then(|tracker| tracker.update(centroid));
         Ok(Update {
             frame: number,
             contact,

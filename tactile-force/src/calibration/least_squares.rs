@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Robustness, StopReason};
-use crate::ForceError;
+use super::options::Robustness;
+use super::stop::StopReason;
+use crate::error::ForceError;
 
 const HUBER: f64 = 1.345;
 const TUKEY: f64 = 4.685;

@@ -1,14 +1,15 @@
-//! F = b + s V.
+//! The straight line F = b + s V.
 
 use nalgebra::DMatrix;
 
+use super::StressCalibration;
 use super::curve::extremes;
-use super::report::{self, Parameters, Shape};
-use super::{
-    CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs,
-    least_squares, least_squares::Fit,
-};
-use crate::{Estimate, ForceError, Real};
+use super::least_squares::{self, Fit};
+use super::options::CalibrationOptions;
+use super::pair::{CalibrationPair, check_pairs};
+use super::report::{self, CalibrationReport, Parameters, Shape};
+use crate::error::ForceError;
+use crate::estimate::{Estimate, Real};
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the origin.
 ///
@@ -18,6 +19,9 @@ use crate::{Estimate, ForceError, Real};
 /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
 /// assert!((line.force_n(2.5e5) - 1.25).abs() < 1e-12);
 /// assert!((line.integrated_pixel_value(1.25).unwrap() - 2.5e5).abs() < 1e-6);
+/// // Offset and slope with their standard errors.
+/// let [offset, slope] = line.report().parameters[..] else { unreachable!() };
+/// assert!(offset.value.abs() < 1e-12 && (slope.value - 5e-6_f64).abs() < 1e-17);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -76,40 +80,6 @@ impl<T: Real> LinearCalibration<T> {
             range: extremes(&values).map(T::nearest),
             report: report::build(pairs, &fit, parameters, shape),
         })
-    }
-
-    /// Newtons per grey level, with its standard error.
-    ///
-    /// ```
-    /// use tactile_force::{CalibrationPair, LinearCalibration};
-    ///
-    /// let pairs = [(0.0, 0.0), (1e5, 0.5), (2e5, 1.1)].map(|(v, f)| CalibrationPair::loading(v, f));
-    /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
-    /// let slope = line.slope_n();
-    /// assert!((slope.value - 5.5e-6_f64).abs() < 1e-15 && slope.standard_error > 0.0);
-    /// assert!((line.offset_n().value + 1.0 / 60.0).abs() < 1e-12);
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn slope_n(&self) -> Estimate<T> {
-        self.slope_n
-    }
-
-    /// Force at zero pixel value, in newtons, with its standard error.
-    ///
-    /// ```
-    /// use tactile_force::{CalibrationPair, LinearCalibration};
-    ///
-    /// // The gauge was not tared.
-    /// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 0.02 + 5e-6 * v));
-    /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
-    /// assert!((line.offset_n().value - 0.02_f64).abs() < 1e-12);
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn offset_n(&self) -> Estimate<T> {
-        Estimate {
-            value: self.force_n(T::zero()),
-            standard_error: self.standard_error_n(T::zero()),
-        }
     }
 }
 

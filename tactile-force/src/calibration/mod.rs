@@ -12,130 +12,23 @@ mod curve;
 mod least_squares;
 mod linear;
 mod monotone;
+mod options;
+mod pair;
 mod polynomial;
 mod report;
+mod stop;
 
 pub use linear::LinearCalibration;
 pub use monotone::MonotoneCalibration;
+pub use options::{CalibrationOptions, Robustness};
+pub use pair::{Branch, CalibrationPair};
 pub use polynomial::PolynomialCalibration;
-pub use report::{CalibrationReport, Hysteresis, StopReason};
+pub use report::{CalibrationReport, Hysteresis};
+pub use stop::StopReason;
 
 use ndarray::Array2;
 
-use crate::{Estimate, ForceError, Real};
-
-/// Whether the force was rising or falling when a pair was taken.
-///
-/// ```
-/// use tactile_force::{Branch, CalibrationPair};
-///
-/// assert_eq!(CalibrationPair::loading(1e5, 0.5).branch, Branch::Loading);
-/// assert_eq!(CalibrationPair::unloading(1e5, 0.5).branch, Branch::Unloading);
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Branch {
-    /// The force was rising.
-    #[default]
-    Loading,
-    /// The force was falling.
-    Unloading,
-}
-
-/// One calibration measurement.
-///
-/// ```
-/// use tactile_force::CalibrationPair;
-///
-/// // A gauge's readings up and down again.
-/// let readings = [(0.0, 0.0), (1.02e5, 0.5), (2.01e5, 1.0), (0.99e5, 0.5)];
-/// let pairs: Vec<_> = readings
-///     .iter()
-///     .enumerate()
-///     .map(|(k, &(v, f))| if k < 3 { CalibrationPair::loading(v, f) } else { CalibrationPair::unloading(v, f) })
-///     .collect();
-/// assert_eq!(pairs[3].force_n, 0.5);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CalibrationPair<T> {
-    /// Sum of the grey-level differences over the contact.
-    pub integrated_pixel_value: T,
-    /// Force from a reference instrument, in newtons.
-    pub force_n: T,
-    /// Whether the force was rising or falling.
-    pub branch: Branch,
-}
-
-impl<T> CalibrationPair<T> {
-    /// A pair taken while the force was rising.
-    pub fn loading(integrated_pixel_value: T, force_n: T) -> Self {
-        Self {
-            integrated_pixel_value,
-            force_n,
-            branch: Branch::Loading,
-        }
-    }
-
-    /// A pair taken while the force was falling.
-    pub fn unloading(integrated_pixel_value: T, force_n: T) -> Self {
-        Self {
-            integrated_pixel_value,
-            force_n,
-            branch: Branch::Unloading,
-        }
-    }
-}
-
-/// How much a pair far from the curve may pull on it.
-///
-/// ```
-/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration, Robustness};
-///
-/// // One reading in ten is grossly wrong.
-/// let mut pairs: Vec<_> = (0..10).map(|k| CalibrationPair::loading(f64::from(k), 2.0 * f64::from(k))).collect();
-/// pairs[7].force_n = 40.0;
-/// let slope = |robustness| {
-///     let options = CalibrationOptions { robustness, ..CalibrationOptions::default() };
-///     LinearCalibration::fit(&pairs, &options).map(|line| line.slope_n().value)
-/// };
-/// assert!((slope(Robustness::None)? - 2.0).abs() > 0.5);
-/// assert!((slope(Robustness::Tukey)? - 2.0).abs() < 1e-6);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Robustness {
-    /// Least squares: every pair counts alike.
-    #[default]
-    None,
-    /// Huber's weights, min(1, k/|u|) with k = 1.345: 95 % efficient on normal errors.
-    Huber,
-    /// Tukey's biweight, (1 − u²/k²)² with k = 4.685, after Huber's: gross outliers count nothing.
-    Tukey,
-}
-
-/// What all calibration fits have in common.
-///
-/// ```
-/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration};
-///
-/// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
-/// let options = CalibrationOptions { through_origin: true, ..CalibrationOptions::default() };
-/// let line = LinearCalibration::fit(&pairs, &options)?;
-/// assert_eq!(line.offset_n().value, 0.0);
-/// assert!((line.slope_n().value - (2.0 + 0.1 * 6.0 / 14.0_f64)).abs() < 1e-12);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CalibrationOptions {
-    /// Force the curve through zero force at zero pixel value.
-    pub through_origin: bool,
-    /// What to do about outliers.
-    pub robustness: Robustness,
-}
+use crate::estimate::{Estimate, Real};
 
 /// A force read from a calibration.
 ///
@@ -160,8 +53,8 @@ pub struct ForceReading<T> {
     /// The part of the standard error that comes from the calibration's parameters, in newtons: it is the same for
     /// every frame read with one calibration.
     pub calibration_n: T,
-    /// Degrees of freedom of the standard error, for Student's t: the calibration's share was learnt from the scatter of a
-    /// few pairs, the frame's is known (Welch–Satterthwaite); `None` where the calibration adds nothing.
+    /// Degrees of freedom of the standard error, for Student's t: the calibration's share was estimated from the scatter of a
+    /// few pairs, the frame's is known (Welch–Satterthwaite); `None` where the calibration adds no error.
     pub degrees_of_freedom: Option<T>,
     /// The pixel value lies outside the range the calibration was fitted on.
     pub out_of_range: bool,
@@ -185,7 +78,6 @@ pub struct ForceReading<T> {
 /// // Stress of one grey level on pixels of (20 µm)².
 /// let step = line.stress_per_grey_level_pa(1e5, 4e-10);
 /// assert!((step - 12_500.0).abs() < 1e-6);
-/// assert_eq!(line.stress_table_pa(1e5, 4e-10)[2], 2.0 * step);
 /// // Beyond the range: read, and flagged.
 /// assert!(line.read(Estimate { value: 4e5, standard_error: 0.0 }).out_of_range);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -201,7 +93,7 @@ pub trait StressCalibration<T: Real>: Send + Sync {
     fn standard_error_n(&self, integrated_pixel_value: T) -> T;
 
     /// Covariance of the calibration's errors at two integrated pixel values, in N²; at one and the same it is the square of
-    /// [`standard_error_n`](Self::standard_error_n). Unless a calibration knows better, its errors go together.
+    /// [`standard_error_n`](Self::standard_error_n). By default errors at all pixel values are fully correlated.
     fn error_covariance_n2(&self, a: T, b: T) -> T {
         self.standard_error_n(a) * self.standard_error_n(b)
     }
@@ -279,26 +171,4 @@ pub trait StressCalibration<T: Real>: Send + Sync {
         };
         secant / pixel_area_m2
     }
-
-    /// The stress of every difference 0..=255 of an 8-bit frame, in pascals; entry k belongs to a difference of k.
-    fn stress_table_pa(&self, integrated_pixel_value: T, pixel_area_m2: T) -> [T; 256] {
-        let step = self.stress_per_grey_level_pa(integrated_pixel_value, pixel_area_m2);
-        std::array::from_fn(|k| step * T::nearest(k as f64))
-    }
-}
-
-/// Rejects what no fit can use.
-fn check_pairs<T: Real>(pairs: &[CalibrationPair<T>], parameters: usize) -> Result<(), ForceError> {
-    let finite =
-        |p: &CalibrationPair<T>| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
-    if let Some(index) = pairs.iter().position(|p| !finite(p)) {
-        return Err(ForceError::NonFinitePair { index });
-    }
-    if pairs.len() <= parameters {
-        return Err(ForceError::TooFewPairs {
-            required: parameters + 1,
-            found: pairs.len(),
-        });
-    }
-    Ok(())
 }

@@ -1,13 +1,14 @@
-//! A rising curve without a formula: isotonic regression, then monotone cubics.
+//! A rising curve without a formula: isotonic regression, joined by monotone cubics.
 
+use super::StressCalibration;
 use super::curve::{extremes, invert};
 use super::least_squares::{Fit, robust_weight};
-use super::report::{self, Parameters, Shape};
-use super::{
-    CalibrationOptions, CalibrationPair, CalibrationReport, Robustness, StopReason,
-    StressCalibration, check_pairs,
-};
-use crate::{ForceError, Real};
+use super::options::{CalibrationOptions, Robustness};
+use super::pair::{CalibrationPair, check_pairs};
+use super::report::{self, CalibrationReport, Parameters, Shape};
+use super::stop::StopReason;
+use crate::error::ForceError;
+use crate::estimate::Real;
 
 /// A rising curve through the pairs: least squares among all rising functions (isotonic regression, pool adjacent
 /// violators; Barlow et al. 1972), its levels joined by monotone cubics (Fritsch & Carlson 1980).
@@ -113,7 +114,7 @@ fn sorted<T: Real>(pairs: &[CalibrationPair<T>]) -> Vec<(f64, f64)> {
     points
 }
 
-/// What the report says of the joined cubics.
+/// Properties of the joined cubics for the report.
 fn shape(points: &[(f64, f64)], knots: &[Knot<f64>]) -> Result<Shape, ForceError> {
     let (values, forces): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
     let [low, high] = extremes(&values);

@@ -1,14 +1,14 @@
-//! F = Σ c_k T_k(t(V)).
+//! The polynomial F = Σ c_k T_k(t(V)) in Chebyshev form.
 
 use nalgebra::DMatrix;
 
 use super::curve::{Basis, extremes, invert};
-use super::report::{self, Parameters, Shape};
-use super::{
-    CalibrationOptions, CalibrationPair, CalibrationReport, StressCalibration, check_pairs,
-    least_squares,
-};
-use crate::{ForceError, Real, error::Requirement};
+use super::options::CalibrationOptions;
+use super::pair::{CalibrationPair, check_pairs};
+use super::report::{self, CalibrationReport, Parameters, Shape};
+use super::{StressCalibration, least_squares};
+use crate::error::{ForceError, Requirement};
+use crate::estimate::Real;
 
 /// A polynomial from integrated pixel value to force, fitted in Chebyshev polynomials over the calibrated range so that high
 /// degrees stay well conditioned.
@@ -75,20 +75,6 @@ impl<T: Real> PolynomialCalibration<T> {
             range: [T::nearest(low), T::nearest(high)],
             report: report::build(pairs, &fit, parameters, shape),
         })
-    }
-
-    /// Degree of the polynomial.
-    ///
-    /// ```
-    /// use tactile_force::{CalibrationOptions, CalibrationPair, PolynomialCalibration};
-    ///
-    /// let pairs: Vec<_> = (1..8).map(f64::from).map(|v| CalibrationPair::loading(v, v * v)).collect();
-    /// let options = CalibrationOptions { through_origin: true, ..CalibrationOptions::default() };
-    /// assert_eq!(PolynomialCalibration::fit(&pairs, 3, &options)?.degree(), 3);
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn degree(&self) -> usize {
-        self.coefficients.len() - usize::from(self.scale.is_none())
     }
 
     /// Runs over the basis at V: (k, φ_k, φ_k′), in T so that nothing is allocated.

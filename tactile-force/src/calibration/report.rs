@@ -1,36 +1,14 @@
-//! How well a calibration fits its pairs.
+//! The quality of a calibration's fit.
 
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::{Branch, CalibrationPair, Robustness, least_squares, least_squares::Fit};
-use crate::{Estimate, ForceError, Real};
-
-/// Why a fit stopped.
-///
-/// ```
-/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration, Robustness, StopReason, StressCalibration};
-///
-/// let pairs = [(0.0, 0.0), (1.0, 1.1), (2.0, 1.9), (3.0, 3.0)].map(|(v, f)| CalibrationPair::loading(v, f));
-/// let stop = |robustness| {
-///     let options = CalibrationOptions { robustness, ..CalibrationOptions::default() };
-///     LinearCalibration::<f64>::fit(&pairs, &options).map(|line| line.report().stop)
-/// };
-/// assert_eq!(stop(Robustness::None)?, StopReason::Direct);
-/// assert_eq!(stop(Robustness::Huber)?, StopReason::Converged);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum StopReason {
-    /// Solved without iterating.
-    Direct,
-    /// The last step was below the tolerance.
-    Converged,
-    /// The iterations ran out first.
-    IterationLimit,
-}
+use super::least_squares::{self, Fit};
+use super::options::Robustness;
+use super::pair::{Branch, CalibrationPair};
+use super::stop::StopReason;
+use crate::error::ForceError;
+use crate::estimate::{Estimate, Real};
 
 /// The difference between loading and unloading.
 ///
@@ -112,7 +90,7 @@ pub struct CalibrationReport<T> {
     pub stop: StopReason,
 }
 
-/// What a report needs to know of the curve itself.
+/// Properties of the fitted curve that a report states.
 pub(super) struct Shape {
     pub(super) linearity_error: f64,
     pub(super) sensitivity: f64,

@@ -1,4 +1,4 @@
-//! Frame in, contact out.
+//! Detection of the contact in a frame.
 
 use ndarray::{ArrayView2, Axis, Slice};
 
@@ -8,9 +8,10 @@ use super::runs::Run;
 use super::summary::Sums;
 use super::threshold::quantile;
 use super::{Contact, ContactOptions, Detection};
-use crate::drift::{self, Drift};
-use crate::frame::{DifferenceNoise, PassWorkspace, TILE_COLUMNS};
-use crate::{BoundingBox, DriftCorrection, Estimate, ForceError, Real, ReferenceFrame};
+use crate::drift::{self, DriftCorrection, IlluminationDrift};
+use crate::error::ForceError;
+use crate::estimate::{Estimate, Real};
+use crate::frame::{BoundingBox, DifferenceNoise, PassWorkspace, ReferenceFrame, TILE_COLUMNS};
 
 /// Finds the contact in frames of one sensor.
 ///
@@ -21,7 +22,7 @@ use crate::{BoundingBox, DriftCorrection, Estimate, ForceError, Real, ReferenceF
 /// let reference = ReferenceFrame::new(Array2::from_elem((64, 64), 10).view())?;
 /// let mut frame = Array2::from_elem((64, 64), 10);
 /// frame.slice_mut(ndarray::s![20..30, 30..44]).fill(90);
-/// let detector = ContactDetector::new(ContactOptions::default())?;
+/// let detector = ContactDetector::new(ContactOptions::default());
 /// let mut workspace = DetectorWorkspace::default();
 /// let found = detector.detect_with::<f64>(&mut workspace, frame.view(), &reference)?;
 /// let contact = found.contact.expect("a bright patch");
@@ -31,7 +32,7 @@ use crate::{BoundingBox, DriftCorrection, Estimate, ForceError, Real, ReferenceF
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactDetector {
-    options: ContactOptions,
+    pub(super) options: ContactOptions,
 }
 
 /// Buffers that detection reuses from frame to frame.
@@ -45,7 +46,7 @@ pub struct ContactDetector {
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
 /// frame.slice_mut(ndarray::s![28..32, 28..32]).fill(12); // a hole, which is filled
 /// let mut workspace = DetectorWorkspace::default();
-/// let _: Detection<f64> = ContactDetector::new(ContactOptions::default())?
+/// let _: Detection<f64> = ContactDetector::new(ContactOptions::default())
 ///     .detect_with(&mut workspace, frame.view(), &reference)?;
 /// let (_, mask) = workspace.mask().expect("contact");
 /// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 400);
@@ -71,25 +72,9 @@ impl DetectorWorkspace {
 }
 
 impl ContactDetector {
-    /// A detector with validated options.
-    ///
-    /// # Errors
-    /// An option outside its domain.
-    pub fn new(options: ContactOptions) -> Result<Self, ForceError> {
-        options.validate()?;
-        Ok(Self { options })
-    }
-
-    /// The options.
-    ///
-    /// ```
-    /// use tactile_force::{ContactDetector, ContactOptions};
-    ///
-    /// assert_eq!(*ContactDetector::new(ContactOptions::default())?.options(), ContactOptions::default());
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn options(&self) -> &ContactOptions {
-        &self.options
+    /// A detector with these options.
+    pub fn new(options: ContactOptions) -> Self {
+        Self { options }
     }
 
     /// The statistics of the frame and its contact, if there is one.
@@ -149,9 +134,9 @@ impl ContactDetector {
         reference: &ReferenceFrame,
         size: (usize, usize),
         sd: f64,
-    ) -> Drift {
+    ) -> IlluminationDrift {
         if self.options.drift == DriftCorrection::None {
-            return Drift::none();
+            return IlluminationDrift::none();
         }
         let tiles = reference.tile_sums(&workspace.pass.tiles);
         drift::fit(self.options.drift, size, tiles, sd, &mut workspace.scratch)
@@ -163,7 +148,7 @@ impl ContactDetector {
         region: &mut Region,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        drift: &Drift,
+        drift: &IlluminationDrift,
         suspect: BoundingBox,
         sd: f64,
     ) -> Option<Extent> {
@@ -197,7 +182,7 @@ impl ContactDetector {
         &self,
         workspace: &mut DetectorWorkspace,
         reference: &ReferenceFrame,
-        drift: &Drift,
+        drift: &IlluminationDrift,
         peak: f32,
     ) -> DifferenceNoise {
         let DetectorWorkspace {
@@ -262,7 +247,7 @@ impl ContactDetector {
         })
     }
 
-    /// Pixels of the mask at the end of the scale that contact drives them to; an error where they are too large a share of it.
+    /// Number of saturated pixels of the mask; an error where their share exceeds the limit.
     fn saturated(
         &self,
         region: &Region,

@@ -1,13 +1,14 @@
-//! Where the object touches: detection against the noise, the mask, and what is summed over it.
+//! Where the object touches: detection against the noise, the mask, and the sums over it.
 //!
-//! A frame is first judged by the one pass over it ([`FrameStatistics`]): contact is suspected where one pixel, or one tile of
+//! A frame is first tested by the one pass over it ([`FrameStatistics`]): contact is suspected where one pixel, or one tile of
 //! 8 × 32 pixels, differs from the reference by more than its noise allows at the stated false-alarm rate *per frame*.
-//! Only there the mask is made: smooth if the contact is faint, threshold, keep the largest component, fill its holes.
-//! Sums run over the mask grown by a margin (the *aperture*), with the sign of every difference kept, so that the rim,
-//! where the signal drowns in the noise, is not cut off.
+//! Only there a mask is made: smooth if the contact is faint, threshold, keep the largest component, fill its holes.
+//! Sums run over the mask grown by a margin (the *aperture*) with signed differences, so that the edge, where the signal is
+//! below the noise, is not cut off.
 
 mod detector;
 mod noise;
+mod options;
 mod region;
 mod runs;
 mod summary;
@@ -15,13 +16,13 @@ mod suspect;
 mod threshold;
 
 pub use detector::{ContactDetector, DetectorWorkspace};
+pub use options::ContactOptions;
 
 pub(crate) use region::Region;
 
-use crate::{
-    BoundingBox, DifferenceNoise, Drift, DriftCorrection, Estimate, ForceError, FrameStatistics,
-    Real, error::Requirement,
-};
+use crate::drift::IlluminationDrift;
+use crate::estimate::{Estimate, Real};
+use crate::frame::{BoundingBox, DifferenceNoise, FrameStatistics};
 
 /// Whether pressing makes the image brighter (light leaks out) or darker (light is blocked).
 ///
@@ -32,9 +33,9 @@ use crate::{
 /// let mut frame = Array2::from_elem((64, 64), 120_u8);
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(60);
-/// let options = ContactOptions { polarity: Polarity::Darker, ..ContactOptions::default() };
+/// let options = ContactOptions::default().with_polarity(Polarity::Darker);
 /// let found: Detection<f64> =
-///     ContactDetector::new(options)?.detect_with(&mut Default::default(), frame.view(), &reference)?;
+///     ContactDetector::new(options).detect_with(&mut Default::default(), frame.view(), &reference)?;
 /// assert_eq!(found.contact.map(|c| c.integrated_pixel_value.value), Some(400.0 * 60.0));
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
@@ -57,60 +58,6 @@ impl Polarity {
     }
 }
 
-/// How a contact is found.
-///
-/// ```
-/// use tactile_force::{ContactDetector, ContactOptions};
-///
-/// let options = ContactOptions { false_alarm_rate: 1e-6, margin_px: 6, ..ContactOptions::default() };
-/// assert_eq!(ContactDetector::new(options)?.options().margin_px, 6);
-/// assert!(ContactDetector::new(ContactOptions { false_alarm_rate: 0.0, ..options }).is_err());
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ContactOptions {
-    /// Sign of the signal.
-    pub polarity: Polarity,
-    /// Probability that a frame without contact is taken for one with contact; default 0.001.
-    pub false_alarm_rate: f64,
-    /// Width of the smoothing box in pixels, odd; `None` picks the narrowest that puts the threshold below a tenth of
-    /// the contact's signal (1, no smoothing, for all but faint contacts).
-    pub smoothing_px: Option<usize>,
-    /// By how many pixels the mask is grown to the aperture; default 4.
-    pub margin_px: usize,
-    /// Components smaller than this are noise; default 4.
-    pub minimum_area_px: usize,
-    /// Which change of the light is corrected; default none.
-    pub drift: DriftCorrection,
-    /// The share of saturated pixels of the contact beyond which its force is refused; default 0.01.
-    pub saturation_limit: f64,
-}
-
-impl Default for ContactOptions {
-    fn default() -> Self {
-        Self {
-            polarity: Polarity::Brighter,
-            false_alarm_rate: 1e-3,
-            smoothing_px: None,
-            margin_px: 4,
-            minimum_area_px: 4,
-            drift: DriftCorrection::None,
-            saturation_limit: 0.01,
-        }
-    }
-}
-
-impl ContactOptions {
-    pub(crate) fn validate(&self) -> Result<(), ForceError> {
-        Requirement::OpenUnitInterval.check("false_alarm_rate", self.false_alarm_rate)?;
-        Requirement::UnitInterval.check("saturation_limit", self.saturation_limit)?;
-        Requirement::AtLeastOne.check("minimum_area_px", self.minimum_area_px as f64)?;
-        self.smoothing_px
-            .map_or(Ok(()), |w| Requirement::Odd.check("smoothing_px", w as f64))
-    }
-}
-
 /// One contact. Its mask stays in the workspace.
 ///
 /// ```
@@ -121,7 +68,7 @@ impl ContactOptions {
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
 /// frame[[30, 30]] = 255;
-/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())?
+/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())
 ///     .detect_with(&mut Default::default(), frame.view(), &reference)?;
 /// let contact = found.contact.expect("contact");
 /// assert_eq!((contact.area_px, contact.peak, contact.touches_edge), (400, 243.0, false));
@@ -153,16 +100,16 @@ pub struct Contact<T> {
     pub touches_edge: bool,
 }
 
-/// What detection says of a frame.
+/// The result of detection in one frame.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_force::{ContactDetector, ContactOptions, Detection, ReferenceFrame};
 ///
-/// let quiet = Array2::from_elem((64, 64), 12_u8);
-/// let reference = ReferenceFrame::new(quiet.view())?;
-/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())?
-///     .detect_with(&mut Default::default(), quiet.view(), &reference)?;
+/// let at_rest = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(at_rest.view())?;
+/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())
+///     .detect_with(&mut Default::default(), at_rest.view(), &reference)?;
 /// assert!(found.contact.is_none() && found.noise.is_none());
 /// assert_eq!(found.statistics.sum, 0);
 /// # Ok::<(), tactile_force::ForceError>(())
@@ -172,8 +119,8 @@ pub struct Contact<T> {
 pub struct Detection<T> {
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
-    /// The correction of lamps and background.
-    pub drift: Drift,
+    /// The correction of illumination and stray light.
+    pub drift: IlluminationDrift,
     /// The noise that the errors are computed from; `None` without contact.
     pub noise: Option<DifferenceNoise>,
     /// The contact, if there is one.

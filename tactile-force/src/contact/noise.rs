@@ -1,4 +1,4 @@
-//! How the noise grows with the signal, from the contact itself.
+//! The growth of the noise with the signal, estimated from the contact itself.
 
 use super::region::Region;
 use super::runs::Run;
@@ -10,11 +10,11 @@ pub(super) const RESPONSES: usize = 4081;
 /// Pixels beyond which rows are left out.
 const ENOUGH: usize = 1 << 15;
 
-/// Fewest pixels that say something of the noise.
+/// Fewest pixels from which the noise is estimated.
 const FEWEST: u64 = 30;
 
 /// Variance per grey level: that of the pixels brighter than half the peak, by their second differences in both directions
-/// (see [`crate::NoiseModel::of_frame`]), less the background's, over their mean. The rim, where the signal itself bends, is darker.
+/// (as the reference's own noise, see [`crate::NoiseModel`]), less the background's, over their mean. The rim, where the signal itself bends, is darker.
 /// Of a large contact every so many rows are enough: 30 000 pixels know a variance to 1 %, a standard error to half of that.
 pub(super) fn gain(region: &Region, histogram: &mut Vec<u64>, background: f64, peak: f32) -> f64 {
     histogram.clear();
@@ -25,10 +25,10 @@ pub(super) fn gain(region: &Region, histogram: &mut Vec<u64>, background: f64, p
     let (mut count, mut signal) = (0_u64, 0.0);
     let area: usize = region.mask.iter().map(Run::len).sum();
     let stride = (area / ENOUGH).max(1);
-    let judged = |r: &&Run| {
+    let evaluated = |r: &&Run| {
         r.row > 0 && (r.row as usize) + 1 < rows && (r.row as usize).is_multiple_of(stride)
     };
-    for run in region.mask.iter().filter(judged) {
+    for run in region.mask.iter().filter(evaluated) {
         let span = run.span(columns);
         let first = span.start.max(run.row as usize * columns + 1);
         let last = span.end.min((run.row as usize + 1) * columns - 1);

@@ -1,10 +1,10 @@
-//! The part of a frame around a contact: its differences, the mask and the aperture.
+//! The region of a frame around a contact: its differences, the mask and the aperture.
 
 use ndarray::ArrayView2;
 
 use super::runs::{self, Components, Run, push_runs};
-use crate::drift::DriftLine;
-use crate::{BoundingBox, Drift, ReferenceFrame};
+use crate::drift::{DriftLine, IlluminationDrift};
+use crate::frame::{BoundingBox, ReferenceFrame};
 
 /// Differences over one box, row-major, and the contact in it as runs.
 #[derive(Clone, Debug, Default)]
@@ -14,7 +14,7 @@ pub(crate) struct Region {
     pub(crate) difference: Vec<f32>,
     /// The contact.
     pub(crate) mask: Vec<Run>,
-    /// The contact and a margin around it: what sums run over.
+    /// The contact and a margin around it, over which sums run.
     pub(crate) aperture: Vec<Run>,
     /// The mask pixel by pixel, 1 inside.
     pub(crate) pixels: Vec<u8>,
@@ -44,7 +44,7 @@ impl Region {
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
         place: BoundingBox,
-        drift: &Drift,
+        drift: &IlluminationDrift,
         sign: f32,
     ) {
         self.place = Some(place);

@@ -20,7 +20,7 @@ impl Run {
     }
 }
 
-/// Pixels that are judged together.
+/// Pixels that are tested together.
 const BLOCK: usize = 32;
 
 /// Appends the runs of a row where `inside` holds.
@@ -32,7 +32,7 @@ pub(super) fn push_runs<P>(
 ) {
     let mut start = None;
     for (block, pixels) in pixels.chunks(BLOCK).enumerate() {
-        // Most blocks lie wholly inside or outside; counting takes wide instructions, edges are looked at one by one.
+        // Most blocks lie wholly inside or outside; counting takes SIMD instructions, pixels of an edge are tested one by one.
         let count = pixels.iter().map(|p| u32::from(inside(p))).sum::<u32>() as usize;
         if count == if start.is_some() { pixels.len() } else { 0 } {
             continue;

@@ -1,4 +1,4 @@
-//! Sums over the aperture and the errors they carry.
+//! Sums over the aperture and their errors.
 
 use super::region::Region;
 use crate::frame::DifferenceNoise;

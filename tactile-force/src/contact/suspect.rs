@@ -1,10 +1,9 @@
-//! Where in the frame a contact may be.
+//! The part of the frame in which a contact is suspected.
 
 use super::ContactDetector;
 use super::threshold::quantile;
-use crate::drift::Drift;
-use crate::frame::{PassWorkspace, Tiles};
-use crate::{BoundingBox, FrameStatistics, ReferenceFrame};
+use crate::drift::IlluminationDrift;
+use crate::frame::{BoundingBox, FrameStatistics, PassWorkspace, ReferenceFrame, Tiles};
 
 impl ContactDetector {
     /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.
@@ -13,16 +12,16 @@ impl ContactDetector {
         pass: &PassWorkspace,
         reference: &ReferenceFrame,
         statistics: &FrameStatistics,
-        drift: &Drift,
+        drift: &IlluminationDrift,
         sd: f64,
         pixel_limit: f64,
     ) -> Option<BoundingBox> {
         let size = (statistics.rows, statistics.columns);
         let bright = self.bright_tiles(&pass.tiles, reference, size, drift, sd);
-        // Pixels were judged before the drift was known: their verdict stands while the drift is small beside it.
+        // Pixels were compared with their limit before the drift was known; that holds while the drift is well below the limit.
         let pixels = statistics
             .bounding_box
-            .filter(|_| drift.greatest_grey(statistics, reference) < 0.3 * pixel_limit);
+            .filter(|_| drift.greatest_grey(size, reference.mean_grey()) < 0.3 * pixel_limit);
         bright.into_iter().chain(pixels).reduce(BoundingBox::union)
     }
 
@@ -32,16 +31,16 @@ impl ContactDetector {
         tiles: &Tiles,
         reference: &ReferenceFrame,
         size: (usize, usize),
-        drift: &Drift,
+        drift: &IlluminationDrift,
         sd: f64,
     ) -> Option<BoundingBox> {
-        let z = quantile(0.5 * self.options().false_alarm_rate, tiles.sums.len()) * sd;
-        let sign = self.options().polarity.sign();
+        let z = quantile(0.5 * self.options.false_alarm_rate, tiles.sums.len()) * sd;
+        let sign = self.options.polarity.sign();
         let stands_out = |k: usize| {
             let tile = reference.tile_sum(tiles, k);
             f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
         };
-        // The last tile of a band is its smallest: a band that stays below its noise needs no closer look.
+        // The last tile of a band is its smallest: a band whose sums stay below that tile's noise has no bright tile.
         let quiet = |band: usize| {
             drift.is_zero() && {
                 let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);

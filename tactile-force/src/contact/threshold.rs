@@ -1,4 +1,4 @@
-//! From a false-alarm rate to thresholds.
+//! Thresholds from a false-alarm rate.
 
 use statrs::function::erf::erfc_inv;
 

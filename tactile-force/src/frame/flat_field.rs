@@ -1,8 +1,8 @@
-//! How evenly lens and lamps light the frame.
+//! Vignetting: how evenly lens and illumination light the frame.
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::drift::TileSum;
+use super::tiles::TileSum;
 
 /// Brightness relative to the frame's middle: a quadratic L(x, y) in x and y, least squares over the tiles of a reference frame.
 ///

@@ -6,6 +6,7 @@ mod pass;
 mod reference;
 mod statistics;
 mod strip;
+mod tiles;
 
 pub use flat_field::FlatField;
 pub use noise::{DifferenceNoise, NoiseModel};
@@ -13,6 +14,5 @@ pub use reference::ReferenceFrame;
 pub use statistics::{BoundingBox, FrameStatistics};
 
 pub(crate) use noise::trimmed_variance;
-pub(crate) use pass::Tiles;
 pub(crate) use reference::PassWorkspace;
-pub(crate) use strip::{TILE_COLUMNS, TILE_ROWS};
+pub(crate) use tiles::{TILE_COLUMNS, TILE_ROWS, TileSum, Tiles};

@@ -2,7 +2,7 @@
 
 use ndarray::ArrayView2;
 
-use crate::{ForceError, error::Requirement};
+use crate::error::{ForceError, Requirement};
 
 /// Variance of one pixel of one frame: read variance + gain × grey level, in squared grey levels.
 ///
@@ -11,13 +11,14 @@ use crate::{ForceError, error::Requirement};
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_force::NoiseModel;
+/// use tactile_force::{NoiseModel, ReferenceFrame};
 ///
 /// let camera = NoiseModel::new(1.5, 0.02)?;
 /// // 1.5² of reading, 1/12 of rounding, 0.02 × 100 of photons.
 /// assert!((camera.variance(100.0) - (2.25 + 1.0 / 12.0 + 2.0)).abs() < 1e-12);
 /// // An even image shows no noise but its rounding.
-/// assert_eq!(NoiseModel::of_frame(Array2::from_elem((32, 32), 9).view()).read_variance, 1.0 / 12.0);
+/// let even = ReferenceFrame::new(Array2::from_elem((32, 32), 9).view())?;
+/// assert_eq!(even.noise().read_variance, 1.0 / 12.0);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,28 +30,28 @@ pub struct NoiseModel {
     pub gain: f64,
 }
 
-/// Variance of one pixel's difference frame − reference: background + gain × difference, in squared grey levels, and what
-/// all pixels have in common.
+/// Variance of one pixel's difference frame − reference, background + gain × difference in squared grey levels, and the
+/// variances of errors that all pixels share.
 ///
 /// ```
 /// use tactile_force::DifferenceNoise;
 ///
 /// let noise = DifferenceNoise { background: 4.0, gain: 0.02, common: 0.0, scale: 0.0, flat_field: 0.0 };
-/// // The variance of a pixel that a press has made 100 grey levels brighter.
+/// // The variance of a pixel that contact has made 100 grey levels brighter.
 /// assert_eq!(noise.background + noise.gain * 100.0, 6.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DifferenceNoise {
-    /// Variance where nothing presses, of frame and reference together.
+    /// Variance outside the contact, of frame and reference together.
     pub background: f64,
     /// Growth of the variance per grey level of difference.
     pub gain: f64,
-    /// Variance of a background error common to all pixels, left by the drift's correction.
+    /// Variance of a background error common to all pixels, from the correction of drift.
     pub common: f64,
-    /// Variance of a relative error of the whole signal, left by the correction of the lamps.
+    /// Variance of a relative error of the whole signal, from the correction of illumination.
     pub scale: f64,
-    /// Variance of a relative error of the whole signal, left by the correction for vignetting.
+    /// Variance of a relative error of the whole signal, from the correction for vignetting.
     pub flat_field: f64,
 }
 
@@ -81,7 +82,7 @@ impl NoiseModel {
     /// The response of [1 −2 1; −2 4 −2; 1 −2 1] has 36 times the variance of a pixel and none of a quadratic background
     /// (Immerkær 1996). Responses beyond three standard deviations are left out, again and again, and the variance of
     /// what stays is corrected for the cut tails.
-    pub fn of_frame(frame: ArrayView2<'_, u8>) -> Self {
+    pub(super) fn of_frame(frame: ArrayView2<'_, u8>) -> Self {
         let mut histogram = [0_u64; 4081];
         let (rows, columns) = frame.dim();
         for y in 1..rows.saturating_sub(1) {
@@ -97,11 +98,9 @@ impl NoiseModel {
             gain: 0.0,
         }
     }
-}
 
-impl NoiseModel {
     /// White noise of repeated frames of one scene, from the changes of every pixel about its mean.
-    pub(crate) fn of_repeats(frames: &[ArrayView2<'_, u8>], mean: ArrayView2<'_, f32>) -> Self {
+    pub(super) fn of_repeats(frames: &[ArrayView2<'_, u8>], mean: ArrayView2<'_, f32>) -> Self {
         let mut squares = 0.0;
         for frame in frames {
             squares += frame

@@ -1,45 +1,12 @@
-//! The pass: every pixel of a frame once.
+//! The pass over a frame, which reads every pixel once.
 
 use std::ops::Range;
 
 use ndarray::{ArrayView2, Axis, Zip};
 
+use super::statistics::{BoundingBox, FrameStatistics};
 use super::strip::{Kernel, Rows, STRIP_TILES, Strip};
-use super::{BoundingBox, FrameStatistics, TILE_COLUMNS, TILE_ROWS};
-
-/// Sums over tiles of 8 rows by 32 columns, for what is fainter than the noise of one pixel.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Tiles {
-    pub(crate) rows: usize,
-    pub(crate) columns: usize,
-    pub(crate) sums: Vec<i32>,
-}
-
-impl Tiles {
-    fn reset(&mut self, (rows, columns): (usize, usize)) {
-        self.rows = rows.div_ceil(TILE_ROWS);
-        self.columns = columns.div_ceil(TILE_COLUMNS);
-        self.sums.clear();
-        self.sums.resize(self.rows * self.columns, 0);
-    }
-
-    /// Greatest sum of a band, each times `sign`.
-    pub(crate) fn greatest(&self, band: usize, sign: i32) -> i32 {
-        let sums = &self.sums[band * self.columns..(band + 1) * self.columns];
-        sums.iter().map(|s| sign * s).max().unwrap_or(0)
-    }
-
-    /// The pixels of a tile.
-    pub(crate) fn pixels(&self, tile: usize, (rows, columns): (usize, usize)) -> BoundingBox {
-        let (row, column) = (tile / self.columns, tile % self.columns);
-        BoundingBox {
-            row_start: row * TILE_ROWS,
-            row_end: ((row + 1) * TILE_ROWS).min(rows),
-            column_start: column * TILE_COLUMNS,
-            column_end: ((column + 1) * TILE_COLUMNS).min(columns),
-        }
-    }
-}
+use super::tiles::{TILE_COLUMNS, TILE_ROWS, Tiles};
 
 const ZEROS: [u8; STRIP_TILES * TILE_COLUMNS] = [0; STRIP_TILES * TILE_COLUMNS];
 
@@ -77,7 +44,7 @@ pub(super) fn scan(
     s
 }
 
-/// What stays the same over a pass.
+/// The inputs of a pass.
 struct Pass<'a> {
     kernel: Kernel,
     frame: &'a [u8],
@@ -219,7 +186,7 @@ impl FrameStatistics {
         self.sum_yy -= reference.sum_yy;
     }
 
-    /// The strips know extremes on their own side of zero only; where every difference is on one side, look again.
+    /// The strips give extremes on their own side of zero only; where every difference is on one side, computes them anew.
     pub(super) fn correct_extremes(
         &mut self,
         frame: ArrayView2<'_, u8>,

@@ -1,10 +1,13 @@
-//! The frame of the unpressed sensor, and the comparison of others with it.
+//! The frame of the unpressed sensor, and the comparison of other frames with it.
 
 use ndarray::{Array2, ArrayView2};
 
-use super::pass::{Tiles, pixels_of, scan, tighten};
-use super::{FlatField, FrameStatistics, NoiseModel, TILE_ROWS};
-use crate::{ForceError, drift::TileSum};
+use super::flat_field::FlatField;
+use super::noise::NoiseModel;
+use super::pass::{pixels_of, scan, tighten};
+use super::statistics::FrameStatistics;
+use super::tiles::{TILE_ROWS, TileSum, Tiles};
+use crate::error::ForceError;
 
 /// Longest side for which every integer sum of the pass fits its type: 16384⁴/3 · 255 < 2⁶³.
 const LONGEST_SIDE: usize = 16_384;
@@ -118,7 +121,7 @@ impl ReferenceFrame {
     /// Right where stray light and signal come through the same lens.
     ///
     /// # Errors
-    /// The reference is too dark to tell: its mean is below one grey level.
+    /// The reference is too dark to show vignetting: its mean is below one grey level.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -127,12 +130,12 @@ impl ReferenceFrame {
     /// let even = ReferenceFrame::new(Array2::from_elem((80, 120), 40_u8).view())?;
     /// assert!(even.flat_field().is_none());
     /// assert!((even.with_flat_field()?.flat_field().expect("asked for").at(3.0, 70.0) - 1.0).abs() < 1e-9);
-    /// // A dark reference cannot tell.
+    /// // A black reference shows no vignetting.
     /// assert!(ReferenceFrame::new(Array2::zeros((80, 120)).view())?.with_flat_field().is_err());
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
     pub fn with_flat_field(mut self) -> Result<Self, ForceError> {
-        let mean = self.sums.sum as f64 / self.image.len() as f64;
+        let mean = self.mean_grey();
         let too_dark = ForceError::ReferenceTooDark {
             mean,
             required: 1.0,
@@ -223,6 +226,11 @@ impl ReferenceFrame {
         self.mean.view()
     }
 
+    /// Mean grey level of the image.
+    pub(crate) fn mean_grey(&self) -> f64 {
+        self.sums.sum as f64 / self.image.len() as f64
+    }
+
     /// Variance of one pixel's difference frame − reference where nothing presses.
     pub(crate) fn difference_variance(&self) -> f64 {
         self.own_variance() * (self.frames as f64 + 1.0)
@@ -230,8 +238,7 @@ impl ReferenceFrame {
 
     /// Variance of one pixel of the reference.
     fn own_variance(&self) -> f64 {
-        let level = self.sums.sum as f64 / self.image.len() as f64;
-        self.noise.variance(level) / self.frames as f64
+        self.noise.variance(self.mean_grey()) / self.frames as f64
     }
 
     /// The gain, if it was given.

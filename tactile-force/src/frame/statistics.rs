@@ -1,8 +1,8 @@
-//! What one pass over a frame yields.
+//! The result of one pass over a frame.
 
 use ndarray::{ArrayView2, Axis, Slice};
 
-use crate::Real;
+use crate::estimate::Real;
 
 /// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
 ///

@@ -8,10 +8,8 @@
 mod avx2;
 mod plain;
 
-/// Rows of a tile.
-pub(crate) const TILE_ROWS: usize = 8;
-/// Columns of a tile.
-pub(crate) const TILE_COLUMNS: usize = 32;
+use super::tiles::TILE_ROWS;
+
 /// Most tiles of a strip, so that 32-bit sums have room: 64²/2 tiles × 2040 × (31 + 30) < 2³¹.
 pub(super) const STRIP_TILES: usize = 64;
 
@@ -82,6 +80,7 @@ impl Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::TILE_COLUMNS;
     use proptest::prelude::*;
 
     proptest! {

@@ -1,4 +1,4 @@
-//! Least squares on the rings.
+//! Least squares on the rings: the Gauss–Newton iteration for the profile's parameters.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -6,8 +6,10 @@ use super::edge::BlurredEdge;
 use super::profile::{Level, Shape, level};
 use super::rings::{RingSums, Rings};
 use super::{HertzFit, HertzFitOptions};
+use crate::calibration::StopReason;
 use crate::contact::Region;
-use crate::{DifferenceNoise, Estimate, ForceError, Real, StopReason};
+use crate::estimate::{Estimate, Real};
+use crate::frame::DifferenceNoise;
 
 type Normal = SMatrix<f64, 6, 6>;
 type Step = SVector<f64, 6>;
@@ -16,15 +18,8 @@ type Step = SVector<f64, 6>;
 const PIXEL: f64 = 1.0 / 12.0;
 
 /// Fits Hertz profiles; holds the table of the blurred edge.
-///
-/// ```
-/// use tactile_force::{HertzFitOptions, HertzFitter};
-///
-/// assert!(HertzFitter::new(HertzFitOptions::default()).is_ok());
-/// assert!(HertzFitter::new(HertzFitOptions { max_iterations: 0, ..HertzFitOptions::default() }).is_err());
-/// ```
 #[derive(Clone, Debug)]
-pub struct HertzFitter {
+pub(crate) struct HertzFitter {
     options: HertzFitOptions,
     edge: BlurredEdge,
 }
@@ -52,16 +47,11 @@ struct Equations {
 }
 
 impl HertzFitter {
-    /// A fitter with validated options.
-    ///
-    /// # Errors
-    /// An option outside its domain.
-    pub fn new(options: HertzFitOptions) -> Result<Self, ForceError> {
-        options.validate()?;
-        Ok(Self {
+    pub(crate) fn new(options: HertzFitOptions) -> Self {
+        Self {
             options,
             edge: BlurredEdge::new(),
-        })
+        }
     }
 
     /// Fits the aperture's pixels. `None` if they do not determine the parameters.

@@ -8,11 +8,12 @@
 mod edge;
 mod fit;
 mod options;
+mod outcome;
 mod profile;
 mod rings;
 
-pub use fit::HertzFitter;
-pub use options::{HertzFit, HertzFitOptions};
+pub use options::HertzFitOptions;
+pub use outcome::HertzFit;
 
-pub(crate) use fit::Start;
+pub(crate) use fit::{HertzFitter, Start};
 pub(crate) use rings::Rings;

@@ -1,4 +1,4 @@
-//! Twice the digits: a number as the unevaluated sum of two doubles (Dekker 1971, Knuth).
+//! Double-double arithmetic: a number as the unevaluated sum of two doubles (Dekker 1971, Knuth).
 
 use std::ops::{Add, Mul, Sub};
 

@@ -1,10 +1,11 @@
-//! A Gaussian blob.
+//! The Gaussian profile.
 
 use ndarray::Array2;
 
 use super::quadrature::Gauss;
 use super::{PixelGrid, ProfileMoments, Rectangle};
-use crate::{ForceError, Real, Requirement};
+use crate::error::{ForceError, Requirement};
+use crate::estimate::Real;
 
 /// A exp(−|x − c|²/(2σ²)), lengths in any unit.
 ///

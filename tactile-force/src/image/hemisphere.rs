@@ -1,10 +1,11 @@
-//! Hertz's pressure as a blob.
+//! Hertz's pressure profile.
 
 use ndarray::Array2;
 
 use super::quadrature::Gauss;
 use super::{PixelGrid, ProfileMoments, Rectangle};
-use crate::{ForceError, Real, Requirement};
+use crate::error::{ForceError, Requirement};
+use crate::estimate::Real;
 
 /// A √(1 − |x − c|²/a²) inside the radius a, zero outside; lengths in any unit.
 ///

@@ -1,4 +1,4 @@
-//! Images as numbers: moments that keep their digits, and blobs averaged over pixels exactly.
+//! Moments of float images, and profiles averaged over pixels exactly.
 
 mod double;
 mod gaussian;
@@ -10,7 +10,7 @@ pub use gaussian::GaussianProfile;
 pub use hemisphere::HertzProfile;
 pub use moments::{ImageMoments, MomentStatus};
 
-use crate::Real;
+use crate::estimate::Real;
 
 /// An axis-parallel rectangle of the image plane.
 ///

@@ -3,9 +3,10 @@
 use ndarray::ArrayView2;
 
 use super::double::Double;
-use crate::{ForceError, Real};
+use crate::error::{ForceError, Requirement};
+use crate::estimate::Real;
 
-/// Whether the moments mean something.
+/// Whether centroid and spread exist.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -109,7 +110,7 @@ fn checked<T: Real>(image: &ArrayView2<'_, T>, background: T) -> Result<f64, For
     if let Some(((row, column), _)) = image.indexed_iter().find(|(_, p)| !p.is_finite()) {
         return Err(ForceError::NonFinitePixel { row, column });
     }
-    crate::Requirement::Finite.check("background", background.as_f64())?;
+    Requirement::Finite.check("background", background.as_f64())?;
     Ok(first.as_f64())
 }
 

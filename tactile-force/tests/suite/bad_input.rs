@@ -3,9 +3,9 @@
 use ndarray::{Array2, array};
 use proptest::prelude::*;
 use tactile_force::{
-    CalibrationPair, ContactDetector, ContactOptions, ForceError, ForceMeter, ForceOptions,
-    GaussianProfile, HertzFitOptions, HertzFitter, HertzProfile, ImageMoments, LinearCalibration,
-    NoiseModel, ReferenceFrame, ShearCalibration, ShearPair, measure_force,
+    CalibrationPair, ContactOptions, ForceError, ForceMeter, ForceOptions, GaussianProfile,
+    HertzFitOptions, HertzProfile, ImageMoments, LinearCalibration, NoiseModel, ReferenceFrame,
+    ShearCalibration, ShearPair, measure_force,
 };
 
 fn calibration() -> LinearCalibration<f64> {
@@ -25,41 +25,22 @@ fn rejected<T>(result: Result<T, ForceError>, option: &str) {
 
 #[test]
 fn options_outside_their_domain() {
-    let detector = |change: fn(&mut ContactOptions)| {
-        let mut options = ContactOptions::default();
-        change(&mut options);
-        ContactDetector::new(options)
-    };
-    rejected(detector(|o| o.false_alarm_rate = 0.0), "false_alarm_rate");
-    rejected(detector(|o| o.false_alarm_rate = 1.0), "false_alarm_rate");
-    rejected(
-        detector(|o| o.false_alarm_rate = f64::NAN),
-        "false_alarm_rate",
-    );
-    rejected(detector(|o| o.saturation_limit = -0.1), "saturation_limit");
-    rejected(
-        detector(|o| o.saturation_limit = f64::NAN),
-        "saturation_limit",
-    );
-    rejected(detector(|o| o.minimum_area_px = 0), "minimum_area_px");
-    rejected(detector(|o| o.smoothing_px = Some(4)), "smoothing_px");
-    rejected(detector(|o| o.smoothing_px = Some(0)), "smoothing_px");
-    for blur in [-1.0, f64::NAN, f64::INFINITY] {
-        rejected(
-            HertzFitter::new(HertzFitOptions {
-                blur_px: Some(blur),
-                ..Default::default()
-            }),
-            "blur_px",
-        );
+    let contact = ContactOptions::default();
+    for rate in [0.0, 1.0, f64::NAN] {
+        rejected(contact.with_false_alarm_rate(rate), "false_alarm_rate");
     }
-    rejected(
-        HertzFitter::new(HertzFitOptions {
-            max_iterations: 0,
-            ..Default::default()
-        }),
-        "max_iterations",
-    );
+    for share in [-0.1, 1.1, f64::NAN] {
+        rejected(contact.with_saturation_limit(share), "saturation_limit");
+    }
+    rejected(contact.with_minimum_area_px(0), "minimum_area_px");
+    for width in [0, 4] {
+        rejected(contact.with_smoothing_px(width), "smoothing_px");
+    }
+    let hertz = HertzFitOptions::default();
+    for blur in [-1.0, f64::NAN, f64::INFINITY] {
+        rejected(hertz.with_blur_px(blur), "blur_px");
+    }
+    rejected(hertz.with_max_iterations(0), "max_iterations");
     for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         rejected(
             ForceMeter::new([1e-5, size], &ForceOptions::default()),
@@ -144,14 +125,10 @@ fn saturation_beyond_the_stated_share_is_an_error_and_below_it_a_count() {
         }
     }
     let with = |limit| {
-        let contact = ContactOptions {
-            saturation_limit: limit,
-            ..Default::default()
-        };
-        let options = ForceOptions {
-            contact,
-            ..Default::default()
-        };
+        let contact = ContactOptions::default()
+            .with_saturation_limit(limit)
+            .unwrap();
+        let options = ForceOptions::default().with_contact(contact);
         measure_force(
             frame.view(),
             reference.view(),
@@ -215,9 +192,9 @@ proptest! {
         });
         let (frame, reference) = (image(levels[0], levels[1]), image(levels[2], levels[3]));
         for polarity in [tactile_force::Polarity::Brighter, tactile_force::Polarity::Darker] {
-            for drift in [tactile_force::DriftCorrection::None, tactile_force::DriftCorrection::TiltedLamp] {
-                let contact = ContactOptions { polarity, drift, ..Default::default() };
-                let options = ForceOptions { contact, ..Default::default() };
+            for drift in [tactile_force::DriftCorrection::None, tactile_force::DriftCorrection::TiltedIllumination] {
+                let contact = ContactOptions::default().with_polarity(polarity).with_drift(drift);
+                let options = ForceOptions::default().with_contact(contact);
                 match measure_force(frame.view(), reference.view(), [1e-5; 2], &calibration(), &options) {
                     Ok(m) => prop_assert!(m.contact.is_none() || m.force_n.value.is_finite()),
                     Err(e) => prop_assert!(matches!(e, ForceError::SaturatedContact { .. }), "{e}"),

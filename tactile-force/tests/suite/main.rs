@@ -5,6 +5,7 @@ mod batch;
 mod calibration;
 mod frame_statistics;
 mod no_allocation;
+mod recorded;
 mod reference;
 mod stability;
 mod stability_scale;

@@ -62,15 +62,10 @@ fn measuring_with_a_workspace_allocates_nothing() {
     for drift in [
         DriftCorrection::None,
         DriftCorrection::Plane,
-        DriftCorrection::TiltedLamp,
+        DriftCorrection::TiltedIllumination,
     ] {
-        let options = ForceOptions {
-            contact: ContactOptions {
-                drift,
-                ..Default::default()
-            },
-            ..Default::default()
-        };
+        let contact = ContactOptions::default().with_drift(drift);
+        let options = ForceOptions::default().with_contact(contact);
         let meter = ForceMeter::new([1e-5; 2], &options).unwrap();
         let mut workspace = ForceWorkspace::default();
         for calibration in &calibrations {
@@ -78,7 +73,7 @@ fn measuring_with_a_workspace_allocates_nothing() {
                 let m = meter
                     .measure_with(&mut workspace, f, &reference, calibration.as_ref())
                     .unwrap();
-                tracker.update(&m);
+                tracker.update(m.centroid_m);
             });
             assert_eq!(allocations, 0, "{drift:?}");
         }

@@ -3,8 +3,8 @@
 use ndarray::{Array2, array};
 use proptest::prelude::*;
 use tactile_force::{
-    CalibrationPair, ForceMeasurement, ForceOptions, GaussianProfile, HertzProfile, ImageMoments,
-    LinearCalibration, MomentStatus, PixelGrid, Polarity, Rectangle, measure_force,
+    CalibrationPair, ContactOptions, ForceMeasurement, ForceOptions, GaussianProfile, HertzProfile,
+    ImageMoments, LinearCalibration, MomentStatus, PixelGrid, Polarity, Rectangle, measure_force,
 };
 
 #[test]
@@ -91,12 +91,13 @@ fn pressed<const DARK: bool>(flip: bool) -> ForceMeasurement<f64> {
         .map(|v| CalibrationPair::loading(v, 1e-6 * v))
         .collect();
     let calibration = LinearCalibration::fit(&pairs, &Default::default()).unwrap();
-    let mut options = ForceOptions::default();
-    options.contact.polarity = if DARK {
+    let polarity = if DARK {
         Polarity::Darker
     } else {
         Polarity::Brighter
     };
+    let contact = ContactOptions::default().with_polarity(polarity);
+    let options = ForceOptions::default().with_contact(contact);
     measure_force(
         image(1, 1.0).view(),
         image(0, 0.0).view(),

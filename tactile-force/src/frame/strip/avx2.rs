@@ -9,7 +9,8 @@ use core::arch::x86_64::__m256i;
 
 use pulp::{cast, x86::V3};
 
-use super::{Rows, Strip, TILE_COLUMNS, TILE_ROWS};
+use super::{Rows, Strip};
+use crate::frame::{TILE_COLUMNS, TILE_ROWS};
 
 /// Column numbers in the order in which interleaving leaves them.
 const LOW: [i16; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23];

@@ -1,6 +1,7 @@
 //! The strip in plain Rust, for every machine.
 
-use super::{Rows, Strip, TILE_COLUMNS, TILE_ROWS};
+use super::{Rows, Strip};
+use crate::frame::{TILE_COLUMNS, TILE_ROWS};
 
 pub(super) fn strip(
     frame: &Rows<'_>,

@@ -36,9 +36,11 @@ fn bent(v: f64) -> f64 {
 }
 
 fn options(through_origin: bool, robustness: Robustness) -> CalibrationOptions {
-    CalibrationOptions {
-        through_origin,
-        robustness,
+    let options = CalibrationOptions::default().with_robustness(robustness);
+    if through_origin {
+        options.with_zero_at_origin()
+    } else {
+        options
     }
 }
 

@@ -1,0 +1,51 @@
+//! The fitted profile.
+
+use crate::calibration::StopReason;
+use crate::estimate::Estimate;
+
+/// A fitted Hertz profile.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::*;
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let blob = HertzProfile::new([60.3_f64, 57.8], 30.0, 150.0)?;
+/// let frame = blob
+///     .image(&PixelGrid { rows: 120, columns: 120, size: [1.0; 2], first: [0.0; 2] })
+///     .mapv(|d| 12 + d.round() as u8);
+/// let at_rest = Array2::from_elem((120, 120), 12);
+/// let measured = measure_force(frame.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+/// let fit: HertzFit<f64> = measured.profile.expect("a profile");
+/// assert!((fit.radius_px.value - 30.0).abs() < 0.02);
+/// assert!((fit.centre_px[0].value - 60.3).abs() < 0.01 && (fit.peak.value - 150.0).abs() < 0.3);
+/// assert_eq!(fit.stop, StopReason::Converged);
+/// # Ok::<(), ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct HertzFit<T> {
+    /// Centre [x, y] in pixels.
+    pub centre_px: [Estimate<T>; 2],
+    /// Contact radius in units of the pixel's width.
+    pub radius_px: Estimate<T>,
+    /// Contact radius in metres.
+    pub radius_m: Estimate<T>,
+    /// Grey-level difference at the centre.
+    pub peak: Estimate<T>,
+    /// Grey-level difference far away; zero if it was not fitted.
+    pub background: Estimate<T>,
+    /// Standard deviation of the blur, in pixels.
+    pub blur_px: T,
+    /// Integral of the profile, 2π/3 A a² in grey levels × pixels.
+    pub integrated_pixel_value: Estimate<T>,
+    /// Covariance of [peak, background, radius, blur variance, x, y], in grey levels and pixels.
+    pub covariance: [[T; 6]; 6],
+    /// Residual variance over the noise model's: near 1 if the contact is Hertz's.
+    pub reduced_chi_squared: T,
+    /// Steps taken.
+    pub iterations: usize,
+    /// Why the fit stopped.
+    pub stop: StopReason,
+}

@@ -1,0 +1,408 @@
+//! Answers of an earlier state of this crate, so that a change of its form changes no number.
+//!
+//! `tests/recorded/answers.txt` holds a name and a number a line. After a change that is meant to alter answers, write it
+//! anew with `TACTILE_RECORD=1 cargo test -p tactile-force --test suite recorded` and read the difference before committing.
+
+use std::fmt::Write as _;
+
+use ndarray::{Array2, array};
+use tactile_force::{
+    CalibrationOptions, CalibrationPair, ContactOptions, DriftCorrection, Estimate,
+    ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, GaussianProfile, HertzFitOptions,
+    HertzProfile, ImageMoments, LinearCalibration, MonotoneCalibration, NoiseModel, PixelGrid,
+    Polarity, PolynomialCalibration, Real, Rectangle, ReferenceFrame, Robustness, ShearCalibration,
+    ShearPair, StressCalibration,
+};
+
+const RECORDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded/answers.txt");
+
+/// Named numbers, in the order in which they were computed.
+#[derive(Default)]
+struct Answers {
+    lines: String,
+}
+
+impl Answers {
+    fn add<T: Real>(&mut self, name: &str, value: T) {
+        // Two digits more than are compared.
+        writeln!(self.lines, "{name} {:.13e}", value.as_f64()).unwrap();
+    }
+
+    fn estimate<T: Real>(&mut self, name: &str, e: Estimate<T>) {
+        self.add(&format!("{name}.value"), e.value);
+        self.add(&format!("{name}.error"), e.standard_error);
+    }
+}
+
+/// A Hertz contact of `peak` grey levels on a slightly uneven background, with the noise of a seed.
+fn frame(centre: [f64; 2], radius: f64, peak: f64, illumination: f64, seed: u64) -> Array2<u8> {
+    let mut state = seed;
+    let mut noise = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        f64::from((state >> 60) as u8) / 4.0 - 2.0
+    };
+    let grid = PixelGrid {
+        rows: 150,
+        columns: 210,
+        size: [1.0; 2],
+        first: [0.0; 2],
+    };
+    let blob = HertzProfile::new(centre, radius, peak)
+        .unwrap()
+        .image(&grid);
+    Array2::from_shape_fn((150, 210), |(y, x)| {
+        let background = 60.0 - 0.02 * (x as f64 - 105.0) + 0.03 * (y as f64 - 75.0);
+        (illumination * (blob[[y, x]] + background) + noise())
+            .round()
+            .clamp(0.0, 255.0) as u8
+    })
+}
+
+fn pairs<T: Real>() -> Vec<CalibrationPair<T>> {
+    let forces = [
+        0.01, 0.19, 0.43, 0.58, 0.83, 0.97, 1.22, 1.38, 1.21, 0.79, 0.41, 0.02,
+    ];
+    let levels = [
+        0.0, 1e5, 2e5, 3e5, 4e5, 5e5, 6e5, 7e5, 6.05e5, 4.1e5, 2.05e5, 0.04e5,
+    ];
+    levels
+        .iter()
+        .zip(forces)
+        .enumerate()
+        .map(|(k, (&v, f))| {
+            let (v, f) = (T::nearest(v), T::nearest(f));
+            if k < 8 {
+                CalibrationPair::loading(v, f)
+            } else {
+                CalibrationPair::unloading(v, f)
+            }
+        })
+        .collect()
+}
+
+fn calibration<T: Real>(answers: &mut Answers, name: &str, c: &dyn StressCalibration<T>) {
+    for v in [0.0, 1.3e5, 5.2e5, 7.5e5].map(T::nearest) {
+        answers.add(&format!("{name}.force"), c.force_n(v));
+        answers.add(&format!("{name}.sensitivity"), c.sensitivity_n(v));
+        answers.add(&format!("{name}.error"), c.standard_error_n(v));
+        answers.add(
+            &format!("{name}.covariance"),
+            c.error_covariance_n2(v, T::nearest(3.1e5)),
+        );
+        answers.add(
+            &format!("{name}.stress"),
+            c.stress_per_grey_level_pa(v, T::nearest(4e-10)),
+        );
+    }
+    let inverse = c.integrated_pixel_value(T::nearest(0.7));
+    answers.add(
+        &format!("{name}.inverse"),
+        inverse.unwrap_or(T::nearest(-1.0)),
+    );
+    let report = c.report();
+    for p in &report.parameters {
+        answers.estimate(&format!("{name}.parameter"), *p);
+    }
+    let plain = name.contains("plain");
+    for [low, high] in report.intervals_95.iter().filter(|_| plain) {
+        answers.add(&format!("{name}.low"), *low);
+        answers.add(&format!("{name}.high"), *high);
+    }
+    let h = report.hysteresis.unwrap();
+    answers.add(&format!("{name}.hysteresis"), h.greatest_n);
+    answers.estimate(&format!("{name}.hysteresis.mean"), h.mean_n);
+    for (what, value) in [
+        ("r2", report.r_squared),
+        ("sd", report.residual_sd_n),
+        ("linearity", report.linearity_error),
+        ("mean sensitivity", report.sensitivity_n),
+        ("smallest", report.smallest_force_n),
+    ] {
+        answers.add(&format!("{name}.{what}").replace(' ', "_"), value);
+    }
+    for w in report.weights.iter().filter(|_| !plain) {
+        answers.add(&format!("{name}.weight"), *w);
+    }
+}
+
+fn calibrations<T: Real>(answers: &mut Answers, scalar: &str) {
+    for (robust, robustness) in [
+        ("plain", Robustness::None),
+        ("huber", Robustness::Huber),
+        ("tukey", Robustness::Tukey),
+    ] {
+        for through_origin in [false, true] {
+            // The other fits of singles are those of doubles, rounded.
+            if scalar == "f32" && (robust != "plain" || through_origin) {
+                continue;
+            }
+            let mut options = CalibrationOptions::default().with_robustness(robustness);
+            if through_origin {
+                options = options.with_zero_at_origin();
+            }
+            let name =
+                |kind: &str| format!("calibration.{scalar}.{kind}.{robust}.{through_origin}");
+            let p = pairs::<T>();
+            calibration(
+                answers,
+                &name("line"),
+                &LinearCalibration::fit(&p, &options).unwrap(),
+            );
+            calibration(
+                answers,
+                &name("cubic"),
+                &PolynomialCalibration::fit(&p, 3, &options).unwrap(),
+            );
+            calibration(
+                answers,
+                &name("monotone"),
+                &MonotoneCalibration::fit(&p, &options).unwrap(),
+            );
+        }
+    }
+}
+
+fn measurement<T: Real>(answers: &mut Answers, name: &str, m: &ForceMeasurement<T>) {
+    answers.estimate(&format!("{name}.force"), m.force_n);
+    for moment in [
+        m.statistics.sum,
+        m.statistics.sum_x,
+        m.statistics.sum_yy,
+        i64::from(m.statistics.greatest),
+    ] {
+        answers.add(&format!("{name}.sums"), moment as f64);
+    }
+    for c in m.drift.coefficients {
+        answers.add(&format!("{name}.drift"), c);
+    }
+    answers.add(&format!("{name}.drift.error"), m.drift.standard_error);
+    let (Some(contact), Some(noise), Some(reading)) = (m.contact, m.noise, m.reading) else {
+        return;
+    };
+    for n in [
+        noise.background,
+        noise.gain,
+        noise.common,
+        noise.scale,
+        noise.flat_field,
+    ] {
+        answers.add(&format!("{name}.noise"), n);
+    }
+    answers.add(&format!("{name}.area"), contact.area_px as f64);
+    answers.add(&format!("{name}.aperture"), contact.aperture_px as f64);
+    answers.add(&format!("{name}.peak"), contact.peak);
+    answers.estimate(&format!("{name}.integral"), contact.integrated_pixel_value);
+    contact
+        .centroid_px
+        .iter()
+        .for_each(|c| answers.estimate(&format!("{name}.centroid"), *c));
+    answers.add(&format!("{name}.reading.noise"), reading.noise_n);
+    answers.add(
+        &format!("{name}.reading.calibration"),
+        reading.calibration_n,
+    );
+    answers.add(
+        &format!("{name}.reading.freedom"),
+        reading.degrees_of_freedom.unwrap(),
+    );
+    answers.estimate(&format!("{name}.radius"), m.contact_radius_m.unwrap());
+    answers.estimate(&format!("{name}.mean"), m.mean_stress_pa.unwrap());
+    answers.estimate(&format!("{name}.peak_stress"), m.peak_stress_pa.unwrap());
+    if let Some(p) = m.profile {
+        for e in [
+            p.centre_px[0],
+            p.centre_px[1],
+            p.radius_px,
+            p.peak,
+            p.background,
+            p.integrated_pixel_value,
+        ] {
+            answers.estimate(&format!("{name}.profile"), e);
+        }
+        answers.add(&format!("{name}.blur"), p.blur_px);
+        answers.add(&format!("{name}.chi2"), p.reduced_chi_squared);
+        answers.add(&format!("{name}.profile.covariance"), p.covariance[2][3]);
+    }
+}
+
+fn frames<T: Real>(answers: &mut Answers, scalar: &str) {
+    let quiet = [1, 2, 3].map(|seed| frame([100.0, 70.0], 1.0, 0.0, 1.0, seed));
+    let plain = ReferenceFrame::new(quiet[0].view()).unwrap();
+    let mean = ReferenceFrame::from_frames(&quiet.each_ref().map(|f| f.view())).unwrap();
+    let flat = plain
+        .clone()
+        .with_flat_field()
+        .unwrap()
+        .with_noise(NoiseModel::new(1.0, 0.02).unwrap());
+    let firm = frame([98.3, 71.6], 36.0, 120.0, 1.0, 7);
+    let faint = frame([98.3, 71.6], 30.0, 4.0, 1.0, 8);
+    let brighter = frame([60.1, 80.2], 21.0, 90.0, 1.06, 9);
+    let darker = frame([98.3, 71.6], 30.0, -40.0, 1.0, 10);
+    let line = LinearCalibration::fit(&pairs::<T>(), &CalibrationOptions::default()).unwrap();
+    let options = ForceOptions::default;
+    let contact = ContactOptions::default();
+    let drift = |correction| options().with_contact(contact.with_drift(correction));
+    let hertz = HertzFitOptions::default();
+    let smoothed = contact
+        .with_margin_px(2)
+        .with_smoothing_px(5)
+        .and_then(|c| c.with_minimum_area_px(9))
+        .and_then(|c| c.with_false_alarm_rate(1e-5))
+        .unwrap();
+    let darker_contact = contact.with_polarity(Polarity::Darker);
+    let cases: [(&str, &ReferenceFrame, &Array2<u8>, ForceOptions); 14] = [
+        ("quiet", &plain, &quiet[1], options()),
+        ("firm", &plain, &firm, options()),
+        ("firm mean", &mean, &firm, options()),
+        ("firm flat", &flat, &firm, options()),
+        ("faint", &mean, &faint, options()),
+        ("no profile", &plain, &firm, options().without_profile()),
+        (
+            "blur",
+            &plain,
+            &firm,
+            options().with_hertz(hertz.with_blur_px(0.3).unwrap()),
+        ),
+        (
+            "background",
+            &plain,
+            &firm,
+            options().with_hertz(hertz.with_fitted_background()),
+        ),
+        ("offset", &plain, &brighter, drift(DriftCorrection::Offset)),
+        ("plane", &plain, &brighter, drift(DriftCorrection::Plane)),
+        (
+            "brighter",
+            &plain,
+            &brighter,
+            drift(DriftCorrection::Illumination),
+        ),
+        (
+            "tilted",
+            &flat,
+            &brighter,
+            drift(DriftCorrection::TiltedIllumination),
+        ),
+        (
+            "darker",
+            &plain,
+            &darker,
+            options().with_contact(darker_contact),
+        ),
+        ("smoothed", &plain, &firm, options().with_contact(smoothed)),
+    ];
+    for (name, reference, image, options) in cases {
+        if scalar == "f32" && !["firm", "tilted"].contains(&name) {
+            continue;
+        }
+        let meter = ForceMeter::new([20e-6, 22e-6].map(T::nearest), &options).unwrap();
+        let m = meter
+            .measure_with(
+                &mut ForceWorkspace::default(),
+                image.view(),
+                reference,
+                &line,
+            )
+            .unwrap();
+        measurement(
+            answers,
+            &format!("frame.{scalar}.{name}").replace(' ', "_"),
+            &m,
+        );
+    }
+}
+
+fn others(answers: &mut Answers) {
+    let shear_pairs = [(1e-5, 0.021), (2e-5, 0.038), (4e-5, 0.083)].map(|(u, f)| ShearPair {
+        centroid_step_m: [u, -u],
+        force_n: [f, -1.4 * f],
+    });
+    let shear = ShearCalibration::<f64>::fit(&shear_pairs).unwrap();
+    for k in 0..2 {
+        answers.estimate("shear.stiffness", shear.stiffness_n_per_m[k]);
+        answers.add("shear.sd", shear.residual_sd_n[k]);
+    }
+    let moments = ImageMoments::of(
+        array![[1e9, 1e9 + 1.0, 1e9], [1e9 - 0.25, 1e9 + 3.0, 1e9 + 0.5]].view(),
+        1e9,
+    )
+    .unwrap();
+    let [x, y] = moments.centroid_px.unwrap();
+    for value in [
+        moments.sum,
+        x,
+        y,
+        moments.radius_of_gyration_px.unwrap(),
+        moments.mean,
+        moments.variance,
+    ] {
+        answers.add("moments", value);
+    }
+    let grid = PixelGrid {
+        rows: 5,
+        columns: 4,
+        size: [1.5, 2.0],
+        first: [-2.0, -3.0],
+    };
+    let part = Rectangle {
+        x: [-1.2, 2.4],
+        y: [0.3, 3.1],
+    };
+    let hertz = HertzProfile::new([0.4, 0.7], 3.2, 11.0).unwrap();
+    let gaussian = GaussianProfile::new([0.4, 0.7], 1.3, 11.0).unwrap();
+    for (image, whole, within) in [
+        (
+            hertz.image(&grid),
+            hertz.whole(),
+            hertz.within(&part).unwrap(),
+        ),
+        (
+            gaussian.image(&grid),
+            gaussian.whole(),
+            gaussian.within(&part).unwrap(),
+        ),
+    ] {
+        image.iter().for_each(|v| answers.add("image", *v));
+        for m in [whole, within] {
+            for value in [
+                m.integral,
+                m.centroid[0],
+                m.centroid[1],
+                m.radius_of_gyration,
+            ] {
+                answers.add("profile", value);
+            }
+        }
+    }
+}
+
+#[test]
+fn answers_are_those_recorded() {
+    let mut answers = Answers::default();
+    calibrations::<f64>(&mut answers, "f64");
+    calibrations::<f32>(&mut answers, "f32");
+    frames::<f64>(&mut answers, "f64");
+    frames::<f32>(&mut answers, "f32");
+    others(&mut answers);
+    if std::env::var_os("TACTILE_RECORD").is_some() {
+        std::fs::write(RECORDED, &answers.lines).unwrap();
+    }
+    let recorded = std::fs::read_to_string(RECORDED).unwrap();
+    assert_eq!(recorded.lines().count(), answers.lines.lines().count());
+    for (expected, found) in recorded.lines().zip(answers.lines.lines()) {
+        let (name, expected) = expected.rsplit_once(' ').unwrap();
+        let (now, found) = found.rsplit_once(' ').unwrap();
+        assert_eq!(name, now);
+        let (expected, found): (f64, f64) = (expected.parse().unwrap(), found.parse().unwrap());
+        // A sum taken in another order moves the last digits of a double; a single must not move by more than one unit.
+        let tolerance = if name.contains("f32") { 1.2e-7 } else { 1e-12 };
+        let same = expected == found || (expected - found).abs() <= tolerance * expected.abs();
+        // Differences of nearly equal numbers: errors of a perfect fit, sums over a quiet frame.
+        assert!(
+            same || (expected - found).abs() < 1e-25,
+            "{name}: {found:e} where {expected:e} was recorded"
+        );
+    }
+}
