@@ -2,6 +2,7 @@
 
 use rand_distr::{Distribution, StandardNormal};
 
+use super::contact_law::ContactLaw;
 use super::error::{SimulateError, not_negative, positive, within};
 use super::light::Illumination;
 use super::material::{Elastic, Sphere};
@@ -169,11 +170,16 @@ impl PressScene {
             frame.iter().map(|&v| u64::from(v)).sum::<u64>() as f64
         };
         let reference = exposure(dark.view(), 0);
+        // A table belongs to the scene's own object.
+        let law = match &self.options().law {
+            ContactLaw::Tabulated(_) => ContactLaw::Hertz,
+            closed_form => closed_form.clone(),
+        };
         let mut gauge = row_stream(seed, Purpose::Gauge, 0, 0);
         let mut points = Vec::with_capacity(2 * options.steps + 1);
         for (k, (branch, true_force_n)) in options.forces().enumerate() {
             let lit = options.lit_force_n(branch, true_force_n);
-            let press = self.with_object(options.indenter, vec![Load::normal(lit)])?;
+            let press = self.with_press(options.indenter, law.clone(), Load::normal(lit))?;
             let sum = exposure(press.expected_frame(0).view(), k + 1);
             let normal: f64 = StandardNormal.sample(&mut gauge);
             let force_n = true_force_n + options.gauge_noise_n * normal;

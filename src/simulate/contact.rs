@@ -1,39 +1,11 @@
 //! A sphere pressed on the waveguide: pressure, contact radius, indentation and surface displacement.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::contact_law::{ContactLaw, far_side_m};
+use super::contact_state::ContactState;
+use super::error::{SimulateError, within};
 use super::material::{Sphere, Waveguide};
-
-/// How force, contact radius and indentation hang together.
-///
-/// ```
-/// use tactile_imaging::simulate::{ContactLaw, PressOptions, PressScene};
-/// let contact = |law| {
-///     let scene = PressScene::new(PressOptions { law, ..PressOptions::default() })?;
-///     Ok::<_, tactile_imaging::simulate::SimulateError>(scene.truth(0).contact)
-/// };
-/// let (hertz, tatara) = (contact(ContactLaw::Hertz)?, contact(ContactLaw::Tatara)?);
-/// assert_eq!(hertz.indentation_m, hertz.contact_radius_m.powi(2) / hertz.sphere_radius_m);
-/// assert_eq!(tatara.contact_radius_m, hertz.contact_radius_m);
-/// assert!(tatara.indentation_m < hertz.indentation_m);
-/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum ContactLaw {
-    /// Hertz (1882): a³ = 3FR/(4E*), δ = a²/R. Small contact, a ≪ R; the simulator obeys it at any load.
-    #[default]
-    Hertz,
-    /// Tatara (1991), first extension of Hertz to a sphere squeezed between two surfaces: Hertz's radius and
-    /// pressure, but the approach is lessened by the displacement that the opposite contact's force causes,
-    /// δ = a²/R − F/(πE₁)·[(1 − ν₁²)/√(a² + 4R²) + 2(1 + ν₁)R²/(a² + 4R²)^{3/2}].
-    /// Only the sphere's own material (E₁, ν₁) enters the correction: the waveguide is loaded on one side.
-    /// His stiffening of rubber and the lateral spread of the contact are not included.
-    ///
-    /// Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291.
-    Tatara,
-}
 
 /// The contact at one load.
 ///
@@ -48,11 +20,9 @@ pub enum ContactLaw {
 /// assert!(near(contact.mean_pressure_pa() * PI * a * a, 0.01));
 /// assert!(near(contact.pressure_pa(0.0), 1.5 * contact.mean_pressure_pa()) && contact.pressure_pa(a) == 0.0);
 /// assert!(near(contact.apparent_height_m(0.6 * a), 0.8 * a), "a hemisphere");
-/// let [_, _, sink] = contact.waveguide_displacement_m(0.0, 0.0);
-/// assert!(near(-sink, contact.waveguide_share * contact.indentation_m));
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Contact {
     /// Normal force in newton.
@@ -69,24 +39,44 @@ pub struct Contact {
     pub effective_modulus_pa: f64,
     /// The waveguide's share E*·(1 − ν₂²)/E₂ of the indentation, 0 to 1.
     pub waveguide_share: f64,
-    /// Radial displacement of the waveguide's surface at the rim, per p₀·a, in 1/Pa (0 when incompressible).
-    radial_compliance: f64,
+    /// The state at this force where the contact was computed elsewhere.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    given: Option<ContactState>,
 }
 
 impl Contact {
     /// The contact of `sphere` on `waveguide` at `force_n` ≥ 0.
+    ///
+    /// # Errors
+    /// [`SimulateError::OutOfRange`] for a force beyond the last state of a tabulated contact.
     pub(super) fn new(
         sphere: &Sphere,
         waveguide: &Waveguide,
-        law: ContactLaw,
+        law: &ContactLaw,
         force_n: f64,
-    ) -> Self {
+    ) -> Result<Self, SimulateError> {
+        within("force_n", force_n, 0.0, law.largest_force_n())?;
+        let hertz = Self::hertz(sphere, waveguide, force_n);
+        Ok(match law {
+            ContactLaw::Hertz => hertz,
+            ContactLaw::Tatara => Self {
+                indentation_m: hertz.indentation_m
+                    - far_side_m(sphere, force_n, hertz.contact_radius_m),
+                ..hertz
+            },
+            ContactLaw::Tabulated(_) if force_n == 0.0 => hertz,
+            ContactLaw::Tabulated(states) => match ContactState::at_force(states, force_n) {
+                Some(state) => hertz.with_state(state),
+                None => hertz,
+            },
+        })
+    }
+
+    fn hertz(sphere: &Sphere, waveguide: &Waveguide, force_n: f64) -> Self {
         let body = waveguide.series();
-        let (c1, c2) = (
-            sphere.material.plane_strain_compliance(),
-            body.plane_strain_compliance(),
-        );
-        let effective_modulus_pa = 1.0 / (c1 + c2);
+        let sphere_compliance = sphere.material.plane_strain_compliance();
+        let waveguide_compliance = body.plane_strain_compliance();
+        let effective_modulus_pa = 1.0 / (sphere_compliance + waveguide_compliance);
         let radius = sphere.radius_m;
         let a = (0.75 * force_n * radius / effective_modulus_pa).cbrt();
         let peak_pressure_pa = if a > 0.0 {
@@ -94,31 +84,52 @@ impl Contact {
         } else {
             0.0
         };
-        let nu = body.poisson_ratio;
         Self {
             force_n,
             sphere_radius_m: radius,
             contact_radius_m: a,
-            indentation_m: a * a / radius - far_side(sphere, law, force_n, a),
+            indentation_m: a * a / radius,
             peak_pressure_pa,
             effective_modulus_pa,
-            waveguide_share: c2 * effective_modulus_pa,
-            radial_compliance: (1.0 - 2.0 * nu) * (1.0 + nu) / (3.0 * body.youngs_modulus_pa),
+            waveguide_share: waveguide_compliance * effective_modulus_pa,
+            given: None,
         }
     }
 
-    /// Pressure p₀ √(1 − r²/a²) at distance `r_m` from the centre, in pascal.
+    fn with_state(self, state: ContactState) -> Self {
+        Self {
+            contact_radius_m: state.contact_radius_m,
+            indentation_m: state.indentation_m,
+            peak_pressure_pa: state.peak_pressure_pa(),
+            given: Some(state),
+            ..self
+        }
+    }
+
+    /// Whether the pressure is Hertz's, p₀ √(1 − r²/a²).
+    pub(super) fn is_hertzian(&self) -> bool {
+        self.given.is_none()
+    }
+
+    /// Pressure at distance `r_m` from the centre, in pascal: p₀ √(1 − r²/a²) for a closed form, else that of the given state.
     pub fn pressure_pa(&self, r_m: f64) -> f64 {
         let a = self.contact_radius_m;
         if r_m >= a {
             return 0.0;
         }
-        self.peak_pressure_pa * ((a - r_m) * (a + r_m)).sqrt() / a
+        match &self.given {
+            Some(state) => state.pressure_at_pa(r_m),
+            None => self.peak_pressure_pa * ((a - r_m) * (a + r_m)).sqrt() / a,
+        }
     }
 
     /// Mean pressure F/(πa²) in pascal; 0 without contact.
     pub fn mean_pressure_pa(&self) -> f64 {
-        self.peak_pressure_pa / 1.5
+        if self.contact_radius_m > 0.0 {
+            self.force_n / (PI * self.contact_radius_m.powi(2))
+        } else {
+            0.0
+        }
     }
 
     /// a/R: Hertz's law holds while this is small (warn beyond 0.3).
@@ -126,39 +137,37 @@ impl Contact {
         self.contact_radius_m / self.sphere_radius_m
     }
 
-    /// Height of the *apparent* surface: the pressure read as the shading of a frontally lit Lambertian surface is
-    /// exactly a hemisphere of radius a, z = √(a² − r²), whatever the sphere's radius and modulus. Zero outside.
+    /// Height of the *apparent* surface: the pressure read as the shading of a frontally lit Lambertian surface,
+    /// z(r) = ∫ᵣᵃ √((p₀/p)² − 1) dr with p₀ the largest pressure. Hertz's pressure gives exactly a hemisphere of radius a, z = √(a² − r²), whatever
+    /// the sphere's radius and modulus. Zero outside.
     pub fn apparent_height_m(&self, r_m: f64) -> f64 {
         let a = self.contact_radius_m;
         if r_m >= a {
-            0.0
-        } else {
-            ((a - r_m) * (a + r_m)).sqrt()
+            return 0.0;
         }
+        let Some(state) = &self.given else {
+            return ((a - r_m) * (a + r_m)).sqrt();
+        };
+        // With r = a sin φ the integrand stays finite at the rim, where p falls as √(a − r); midpoint rule.
+        const STEPS: usize = 64;
+        let first = (r_m / a).asin();
+        let step = (FRAC_PI_2 - first) / STEPS as f64;
+        let slope_at = |phi: f64| {
+            let ratio = self.peak_pressure_pa / state.pressure_at_pa(a * phi.sin());
+            (ratio * ratio - 1.0).max(0.0).sqrt() * a * phi.cos()
+        };
+        let angles = (0..STEPS).map(|k| first + (k as f64 + 0.5) * step);
+        angles.map(slope_at).sum::<f64>() * step
     }
 
-    /// Displacement (x, y, z) of the waveguide's material point that lay at (`x_m`, `y_m`) from the contact's
-    /// centre on the flat surface, in metres: down is negative z.
-    ///
-    /// With u the joint displacement of both surfaces under Hertz's pressure, the waveguide's share of it is normal;
-    /// the tangential part, towards the centre, vanishes at ν₂ = ½ (K. L. Johnson, *Contact Mechanics*, eq. 3.41).
-    pub fn waveguide_displacement_m(&self, x_m: f64, y_m: f64) -> [f64; 3] {
-        let a = self.contact_radius_m;
-        if a == 0.0 {
-            return [0.0; 3];
+    /// Vertical displacement in metres of the waveguide's surface at distance `r_m` from the centre, negative under the object:
+    /// of a closed form the waveguide's share of the joint displacement under Hertz's pressure, else that of the given state.
+    pub(super) fn waveguide_height_m(&self, r_m: f64) -> f64 {
+        match &self.given {
+            Some(state) => state.height_at_m(r_m),
+            None if self.contact_radius_m == 0.0 => 0.0,
+            None => -self.waveguide_share * self.joint_displacement_m(r_m),
         }
-        let r = x_m.hypot(y_m);
-        let normal = -self.waveguide_share * self.joint_displacement_m(r);
-        // 1 − (1 − t)^{3/2} over t, with t = r²/a², kept accurate for small t.
-        let t = (r / a).powi(2);
-        let shape = if t >= 1.0 {
-            1.0 / t
-        } else {
-            let s = (1.0 - t).sqrt();
-            (1.0 + s + s * s) / (1.0 + s)
-        };
-        let radial = -self.radial_compliance * self.peak_pressure_pa * shape;
-        [radial * x_m, radial * y_m, normal]
     }
 
     /// Sum of both surfaces' normal displacements at distance r (Johnson, eqs. 3.41a and 3.42a).
@@ -180,17 +189,6 @@ impl Contact {
     }
 }
 
-/// What the opposite contact takes off the approach.
-fn far_side(sphere: &Sphere, law: ContactLaw, force_n: f64, a: f64) -> f64 {
-    if law == ContactLaw::Hertz {
-        return 0.0;
-    }
-    let (nu, r) = (sphere.material.poisson_ratio, sphere.radius_m);
-    let d = (a * a + 4.0 * r * r).sqrt();
-    force_n / (PI * sphere.material.youngs_modulus_pa)
-        * ((1.0 - nu) * (1.0 + nu) / d + 2.0 * (1.0 + nu) * r * r / (d * d * d))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::material::Elastic;
@@ -201,7 +199,7 @@ mod tests {
             radius_m: 3e-3,
             material: Elastic::CL2000X,
         };
-        Contact::new(&sphere, &Waveguide::default(), law, force_n)
+        Contact::new(&sphere, &Waveguide::default(), &law, force_n).unwrap()
     }
 
     #[test]
@@ -222,7 +220,7 @@ mod tests {
         close(c.peak_pressure_pa, 2.0 * a * e / (PI * 3e-3));
         // Both surfaces' displacement at the centre is the approach.
         close(
-            -c.waveguide_displacement_m(0.0, 0.0)[2],
+            -c.waveguide_height_m(0.0),
             c.waveguide_share * c.indentation_m,
         );
     }
@@ -234,14 +232,14 @@ mod tests {
             (c.contact_radius_m, 1e-9),
             (50.0 * c.contact_radius_m, 1e-9),
         ] {
-            let at = |q: f64| c.waveguide_displacement_m(q, 0.0)[2];
+            let at = |q: f64| c.waveguide_height_m(q);
             // One-sided values differ by slope × step plus the closed form's cancellation, (r/a)³ ulps.
             assert!((at(r * (1.0 - step)) / at(r * (1.0 + step)) - 1.0).abs() < 1e-8);
         }
         // Far away: a point force on a half space, F/(π E* r) for both bodies.
         let r = 1e3 * c.contact_radius_m;
         let point = c.waveguide_share * c.force_n / (PI * c.effective_modulus_pa * r);
-        assert!((-c.waveguide_displacement_m(r, 0.0)[2] / point - 1.0).abs() < 1e-6);
+        assert!((-c.waveguide_height_m(r) / point - 1.0).abs() < 1e-6);
     }
 
     #[test]

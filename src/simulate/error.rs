@@ -35,6 +35,16 @@ pub enum SimulateError {
         /// Entries given.
         found: usize,
     },
+    /// A column has another length than the column it belongs to.
+    #[error("{field} has {found} entries, expected {expected}")]
+    LengthMismatch {
+        /// The field's name.
+        field: &'static str,
+        /// Entries of the other columns.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
     /// A load is too great for the law to have an equilibrium.
     #[error("the force {force_n} N exceeds {limit_n} N, the largest the material law can carry")]
     Overload {

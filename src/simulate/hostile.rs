@@ -5,8 +5,9 @@ use ndarray::Array2;
 use super::camera::Camera;
 use super::light::Illumination;
 use super::pixel_average::Patch;
-use super::press::{PressScene, PressSimulation};
+use super::press::PressScene;
 use super::press_options::{Gain, Load, PressOptions};
+use super::simulation::PressSimulation;
 
 /// What is wrong with the scene.
 ///

@@ -2,8 +2,9 @@
 
 use super::error::{SimulateError, finite, not_negative, within};
 
-/// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. Both are monotone up to the
-/// largest peak pressure p_max of the scene and exactly averaged over pixels.
+/// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All are monotone up to the
+/// largest peak pressure p_max of the scene. Hertz's pressure under the first two is averaged over pixels exactly, everything
+/// else by quadrature (1e-4 of the light).
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene, Response};
@@ -17,6 +18,9 @@ use super::error::{SimulateError, finite, not_negative, within};
 /// };
 /// assert!((ratio(Response::Linear)? - 1.2 / 0.7).abs() < 1e-9);
 /// assert!(ratio(Response::Quadratic { droop: 0.3 })? < 1.2 / 0.7);
+/// // Hertz: a² goes as F^⅔ and pⁿ as F^(n/3).
+/// let power = (1.2_f64 / 0.7).powf((2.0 + 0.9) / 3.0);
+/// assert!((ratio(Response::Power { exponent: 0.9 })? / power - 1.0).abs() < 1e-3);
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -31,18 +35,36 @@ pub enum Response {
         /// κ, the share of light lost at p_max.
         droop: f64,
     },
+    /// g·p_max·(p/p_max)ⁿ, n in 0.25 to 4: light that is no longer in proportion to the pressure, so that the frame's sum depends
+    /// on how the force is spread.
+    Power {
+        /// n, 1 for [`Linear`](Self::Linear).
+        exponent: f64,
+    },
 }
 
 impl Response {
     /// κ of g·p·(1 − κ p/p_max).
     pub(super) fn droop(&self) -> f64 {
         match *self {
-            Self::Linear => 0.0,
+            Self::Linear | Self::Power { .. } => 0.0,
             Self::Quadratic { droop } => droop,
         }
     }
 
+    /// Light over g·p_max at the pressure `share`·p_max.
+    pub(super) fn light(&self, share: f64) -> f64 {
+        match *self {
+            Self::Linear => share,
+            Self::Quadratic { droop } => share * (1.0 - droop * share),
+            Self::Power { exponent } => share.powf(exponent),
+        }
+    }
+
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
+        if let Self::Power { exponent } = *self {
+            return within("exponent", exponent, 0.25, 4.0);
+        }
         within("droop", self.droop(), 0.0, 0.5)
     }
 }

@@ -35,10 +35,13 @@
 mod calibration;
 mod camera;
 mod contact;
+mod contact_law;
+mod contact_state;
 mod error;
 #[cfg(feature = "scene")]
 mod folder;
 mod hostile;
+mod leak;
 mod light;
 mod material;
 mod pixel_average;
@@ -46,6 +49,7 @@ mod press;
 mod press_options;
 mod random;
 mod relief;
+mod simulation;
 mod stream;
 mod truth;
 mod uniaxial;
@@ -54,16 +58,19 @@ mod uniaxial_state;
 
 pub use calibration::{Branch, CalibrationOptions, CalibrationPoint, CalibrationSeries};
 pub use camera::Camera;
-pub use contact::{Contact, ContactLaw};
+pub use contact::Contact;
+pub use contact_law::ContactLaw;
+pub use contact_state::ContactState;
 pub use error::SimulateError;
 #[cfg(feature = "scene")]
 pub use folder::{FolderError, write_folder};
 pub use hostile::Hostile;
 pub use light::{Illumination, Response};
 pub use material::{Elastic, Sphere, Waveguide, WaveguideLayer};
-pub use press::{PressScene, PressSimulation};
+pub use press::PressScene;
 pub use press_options::{Gain, Load, PressOptions};
 pub use relief::SurfacePattern;
+pub use simulation::PressSimulation;
 pub use stream::{FrameStream, LoadCycle, StreamedFrame};
 pub use truth::{PressTruth, SurfaceScaling};
 pub use uniaxial::UniaxialScene;

@@ -9,9 +9,14 @@
 //!
 //! inside; outside the disc, G is the quarter disc's integral less the two caps beyond x and beyond y.
 
+mod radial;
+
 use std::f64::consts::PI;
 
 use ndarray::Array2;
+
+/// Rows and columns of the image plane: the first and one past the last of each.
+pub(super) type Window = [[isize; 2]; 2];
 
 /// A patch of the image plane, which may reach beyond the frame.
 #[derive(Debug, Clone)]
@@ -23,6 +28,14 @@ pub(super) struct Patch {
 }
 
 impl Patch {
+    /// Zeros over `window`.
+    pub(super) fn zeros([[row0, row1], [col0, col1]]: Window) -> Self {
+        Self {
+            origin: [row0, col0],
+            values: Array2::zeros(((row1 - row0) as usize, (col1 - col0) as usize)),
+        }
+    }
+
     /// Adds the part of the patch that lies in `frame`.
     pub(super) fn add_to(&self, frame: &mut Array2<f64>) {
         let [row0, col0] = self.origin;
@@ -64,7 +77,7 @@ pub(super) struct Disc {
 impl Disc {
     /// Rows and columns (first, one past the last) that the disc touches, widened by `margin` pixels and cut to what
     /// lies within `margin` of a frame of `shape`.
-    pub(super) fn window(&self, shape: [usize; 2], margin: usize) -> [[isize; 2]; 2] {
+    pub(super) fn window(&self, shape: [usize; 2], margin: usize) -> Window {
         let m = margin as isize;
         let span = |axis: usize, length: usize| {
             let (c, r) = (
@@ -80,7 +93,7 @@ impl Disc {
     }
 
     /// Pixel averages of `profile` over `window`.
-    pub(super) fn average(&self, profile: Profile, window: [[isize; 2]; 2]) -> Patch {
+    pub(super) fn average(&self, profile: Profile, window: Window) -> Patch {
         let [[row0, row1], [col0, col1]] = window;
         let (rows, cols) = ((row1 - row0) as usize, (col1 - col0) as usize);
         let mut values = Array2::zeros((rows, cols));

@@ -3,11 +3,12 @@
 use ndarray::Array2;
 
 use super::contact::Contact;
+use super::contact_law::ContactLaw;
 use super::error::SimulateError;
+use super::leak::LightLaw;
 use super::material::Sphere;
-use super::pixel_average::{Disc, Patch, Profile};
+use super::pixel_average::{Disc, Patch};
 use super::press_options::{Gain, Load, PressOptions};
-use super::truth::PressTruth;
 
 /// A checked scene that makes frames and knows the truth.
 ///
@@ -25,34 +26,7 @@ use super::truth::PressTruth;
 pub struct PressScene {
     options: PressOptions,
     contacts: Vec<Contact>,
-    grey_per_pascal: f64,
-    peak_pressure_pa: f64,
-}
-
-/// The frames of a scene and their truth.
-///
-/// ```
-/// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
-/// let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?.simulate();
-/// let sum = |frame: &ndarray::Array2<u8>| frame.iter().map(|&v| f64::from(v)).sum::<f64>();
-/// let light = made.frames.iter().map(|frame| sum(frame) - sum(&made.reference)).collect::<Vec<_>>();
-/// assert!((light[1] / light[0] / (1.2 / 0.7) - 1.0).abs() < 0.02, "light in proportion to force");
-/// assert_eq!(made.youngs_modulus_pa, 103e3);
-/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-/// ```
-#[derive(Debug, Clone)]
-pub struct PressSimulation {
-    /// The frame without contact.
-    pub reference: Array2<u8>,
-    /// One frame per load.
-    pub frames: Vec<Array2<u8>>,
-    /// The truth of each frame.
-    pub truth: Vec<PressTruth>,
-    /// Size of a pixel in metres, x and y.
-    pub pixel_size_m: [f64; 2],
-    /// Young's modulus of the object in pascal: what a measurement should find.
-    pub youngs_modulus_pa: f64,
+    light: LightLaw,
 }
 
 impl PressScene {
@@ -62,23 +36,35 @@ impl PressScene {
     /// [`SimulateError::OutOfRange`] or [`SimulateError::TooFew`] naming the first field that has no meaning.
     pub fn new(options: PressOptions) -> Result<Self, SimulateError> {
         options.validate()?;
-        let contact =
-            |l: &Load| Contact::new(&options.object, &options.waveguide, options.law, l.force_n);
-        let contacts: Vec<Contact> = options.loads.iter().map(contact).collect();
-        let peak_pressure_pa = contacts
+        let contacts = (options.loads.iter())
+            .map(|load| {
+                Contact::new(
+                    &options.object,
+                    &options.waveguide,
+                    &options.law,
+                    load.force_n,
+                )
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let largest_pressure_pa = contacts
             .iter()
             .map(|c| c.peak_pressure_pa)
             .fold(0.0, f64::max);
+        let response = options.response;
         let grey_per_pascal = match options.gain {
             Gain::GreyPerPascal(gain) => gain,
-            Gain::PeakGrey(_) if peak_pressure_pa == 0.0 => 0.0,
-            Gain::PeakGrey(grey) => grey / (peak_pressure_pa * (1.0 - options.response.droop())),
+            Gain::PeakGrey(_) if largest_pressure_pa == 0.0 => 0.0,
+            Gain::PeakGrey(grey) => grey / (largest_pressure_pa * response.light(1.0)),
+        };
+        let light = LightLaw {
+            response,
+            grey_per_pascal,
+            largest_pressure_pa,
         };
         Ok(Self {
             options,
             contacts,
-            grey_per_pascal,
-            peak_pressure_pa,
+            light,
         })
     }
 
@@ -89,43 +75,7 @@ impl PressScene {
 
     /// Grey levels per pascal.
     pub fn grey_per_pascal(&self) -> f64 {
-        self.grey_per_pascal
-    }
-
-    /// κ/p_max of the response g·p·(1 − κ p/p_max), in 1/Pa.
-    ///
-    /// ```
-    /// use std::f64::consts::PI;
-    /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene, Response};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
-    /// let response = Response::Quadratic { droop: 0.2 };
-    /// let scene = PressScene::new(PressOptions { camera, response, ..PressOptions::default() })?;
-    /// let contact = scene.truth(0).contact;
-    /// // ∫ p² dS = π a² p₀²/2: what the bend takes from the force's light.
-    /// let squared = 0.5 * PI * (contact.contact_radius_m * contact.peak_pressure_pa).powi(2);
-    /// let seen_n = contact.force_n - scene.droop_per_pascal() * squared;
-    /// let light = scene.grey_per_pascal() * seen_n / camera.pixel_area_m2();
-    /// assert!((scene.truth(0).integrated_pixel_value / light - 1.0).abs() < 1e-9);
-    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-    /// ```
-    pub fn droop_per_pascal(&self) -> f64 {
-        if self.peak_pressure_pa == 0.0 {
-            0.0
-        } else {
-            self.options.response.droop() / self.peak_pressure_pa
-        }
-    }
-
-    /// The frame without contact, and the frames and truth of every load.
-    pub fn simulate(&self) -> PressSimulation {
-        let loads = 0..self.contacts.len();
-        PressSimulation {
-            reference: self.reference(0),
-            frames: loads.clone().map(|k| self.frame(k, 0)).collect(),
-            truth: loads.map(|k| self.truth(k)).collect(),
-            pixel_size_m: self.options.camera.pixel_size_m,
-            youngs_modulus_pa: self.options.object.material.youngs_modulus_pa,
-        }
+        self.light.grey_per_pascal
     }
 
     /// An exposure without contact; each `repeat` has its own noise.
@@ -172,30 +122,28 @@ impl PressScene {
             .compose(leaked.as_slice(), &self.options.loads[load].illumination)
     }
 
-    /// The truth of load `load`.
-    ///
-    /// # Panics
-    /// If there is no such load.
-    pub fn truth(&self, load: usize) -> PressTruth {
-        PressTruth::new(self, load)
-    }
-
-    /// The same waveguide, camera, light and centre with another object and other loads.
-    pub(super) fn with_object(
+    /// The same waveguide, camera, light and centre with another object, contact law and load.
+    pub(super) fn with_press(
         &self,
         object: Sphere,
-        loads: Vec<Load>,
+        law: ContactLaw,
+        load: Load,
     ) -> Result<Self, SimulateError> {
         let changed = Self::new(PressOptions {
             object,
-            loads,
+            law,
+            loads: vec![load],
             ..self.options.clone()
         })?;
         Ok(Self {
-            grey_per_pascal: self.grey_per_pascal,
-            peak_pressure_pa: self.peak_pressure_pa,
+            light: self.light,
             ..changed
         })
+    }
+
+    /// From pressure to light.
+    pub(super) fn light(&self) -> &LightLaw {
+        &self.light
     }
 
     /// Contact of load `load`.
@@ -228,18 +176,7 @@ impl PressScene {
             return None;
         }
         let window = disc.window(camera.shape, camera.blur_reach());
-        let mut patch = disc.average(Profile::Hemisphere, window);
-        let peak = self.contacts[load].peak_pressure_pa;
-        patch
-            .values
-            .map_inplace(|v| *v *= self.grey_per_pascal * peak);
-        let droop = self.droop_per_pascal();
-        if droop > 0.0 {
-            let square = disc.average(Profile::Paraboloid, window);
-            patch
-                .values
-                .scaled_add(-self.grey_per_pascal * droop * peak * peak, &square.values);
-        }
+        let mut patch = self.light.patch(&self.contacts[load], &disc, window);
         camera.blur(&mut patch);
         Some(patch)
     }

@@ -1,7 +1,7 @@
 //! What describes a press: object, waveguide, loads, light and camera.
 
 use super::camera::Camera;
-use super::contact::ContactLaw;
+use super::contact_law::ContactLaw;
 use super::error::{SimulateError, at_least, finite, not_negative, positive, within};
 use super::light::{Illumination, Response};
 use super::material::{Elastic, Sphere, Waveguide};
@@ -96,7 +96,7 @@ pub struct PressOptions {
     pub object: Sphere,
     /// The waveguide.
     pub waveguide: Waveguide,
-    /// Force–radius–indentation law.
+    /// Where pressure, radius and indentation at each force come from.
     pub law: ContactLaw,
     /// Loads, a frame each.
     pub loads: Vec<Load>,
@@ -145,6 +145,7 @@ impl PressOptions {
         self.waveguide.validate()?;
         self.camera.validate()?;
         self.response.validate()?;
+        self.law.validate()?;
         at_least("loads", self.loads.len(), 1)?;
         within("loads", self.loads.len() as f64, 1.0, 65534.0)?;
         for load in &self.loads {

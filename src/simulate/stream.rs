@@ -121,7 +121,13 @@ impl PressScene {
     /// # Errors
     /// [`SimulateError::OutOfRange`] for a cycle without meaning.
     pub fn stream(&self, cycle: LoadCycle) -> Result<FrameStream, SimulateError> {
-        not_negative("largest_force_n", cycle.largest_force_n)?;
+        let law = &self.options().law;
+        within(
+            "largest_force_n",
+            cycle.largest_force_n,
+            0.0,
+            law.largest_force_n(),
+        )?;
         positive("period_s", cycle.period_s)?;
         not_negative("rest_s", cycle.rest_s)?;
         positive("frame_rate_hz", cycle.frame_rate_hz)?;
@@ -168,8 +174,11 @@ impl Iterator for FrameStream {
         self.next += 1;
         let time_s = k as f64 / self.cycle.frame_rate_hz;
         let load = self.load_at(time_s);
-        let object = self.scene.options().object;
-        let scene = self.scene.with_object(object, vec![load]).ok()?;
+        let (object, law) = (
+            self.scene.options().object,
+            self.scene.options().law.clone(),
+        );
+        let scene = self.scene.with_press(object, law, load).ok()?;
         let light = scene.expected_frame(0);
         let camera = scene.options().camera;
         // Above the frames a scene makes itself, whose numbers stay below 2⁴⁷.

@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Point3};
 use ndarray::Array2;
 
 use super::contact::Contact;
-use super::pixel_average::{Disc, Profile};
+use super::leak::{LightLaw, pressure_patch};
+use super::pixel_average::Disc;
 use super::press::PressScene;
 use super::press_options::Load;
 
@@ -52,9 +53,19 @@ pub struct PressTruth {
     shape: [usize; 2],
 }
 
+impl PressScene {
+    /// The truth of load `load`.
+    ///
+    /// # Panics
+    /// If there is no such load.
+    pub fn truth(&self, load: usize) -> PressTruth {
+        PressTruth::new(self, load)
+    }
+}
+
 impl PressTruth {
-    pub(super) fn new(scene: &PressScene, load: usize) -> Self {
-        let (contact, options) = (*scene.contact(load), scene.options());
+    fn new(scene: &PressScene, load: usize) -> Self {
+        let (contact, options) = (scene.contact(load).clone(), scene.options());
         let disc = scene.disc(load);
         let mut truth = Self {
             contact,
@@ -68,14 +79,17 @@ impl PressTruth {
             pixel_size_m: disc.pixel_size_m,
             shape: options.camera.shape,
         };
-        truth.add_moments(scene.droop_per_pascal());
+        truth.add_moments(scene.light());
         truth
     }
 
     /// Pressure in pascal, averaged over each pixel; its sum times the pixel's area is the visible force.
     pub fn pressure_pa(&self) -> Array2<f64> {
-        let mut field = self.averaged(Profile::Hemisphere);
-        field.map_inplace(|v| *v *= self.contact.peak_pressure_pa);
+        let mut field = Array2::zeros(self.shape);
+        if self.contact.contact_radius_m > 0.0 {
+            let disc = self.disc();
+            pressure_patch(&self.contact, &disc, disc.window(self.shape, 0)).add_to(&mut field);
+        }
         field
     }
 
@@ -91,7 +105,7 @@ impl PressTruth {
     pub fn waveguide_height_m(&self) -> Array2<f64> {
         Array2::from_shape_fn(self.shape, |(row, col)| {
             let [x, y] = self.offset_m(row, col);
-            self.contact.waveguide_displacement_m(x, y)[2]
+            self.contact.waveguide_height_m(x.hypot(y))
         })
     }
 
@@ -132,25 +146,14 @@ impl PressTruth {
         }
     }
 
-    fn averaged(&self, profile: Profile) -> Array2<f64> {
-        let mut field = Array2::zeros(self.shape);
-        if self.contact.contact_radius_m > 0.0 {
-            let disc = self.disc();
-            disc.average(profile, disc.window(self.shape, 0))
-                .add_to(&mut field);
-        }
-        field
-    }
-
     /// Force, centroid and integrated pixel value of what the frame shows.
-    fn add_moments(&mut self, droop_per_pascal: f64) {
+    fn add_moments(&mut self, light: &LightLaw) {
         if self.contact.contact_radius_m == 0.0 {
             return;
         }
         let disc = self.disc();
         let window = disc.window(self.shape, 0);
-        let pressure = disc.average(Profile::Hemisphere, window);
-        let peak = self.contact.peak_pressure_pa;
+        let pressure = pressure_patch(&self.contact, &disc, window);
         let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
         for ((r, c), &v) in pressure.values.indexed_iter() {
             sum += v;
@@ -161,14 +164,8 @@ impl PressTruth {
             let [row0, col0] = pressure.origin;
             self.centroid_px = [sum_x / sum + col0 as f64, sum_y / sum + row0 as f64];
         }
-        let squared = if droop_per_pascal > 0.0 {
-            disc.average(Profile::Paraboloid, window).values.sum()
-        } else {
-            0.0
-        };
-        self.visible_force_n = peak * sum * self.pixel_size_m[0] * self.pixel_size_m[1];
-        self.integrated_pixel_value =
-            self.grey_per_pascal * peak * (sum - droop_per_pascal * peak * squared);
+        self.visible_force_n = sum * self.pixel_size_m[0] * self.pixel_size_m[1];
+        self.integrated_pixel_value = light.patch(&self.contact, &disc, window).values.sum();
     }
 }
 
