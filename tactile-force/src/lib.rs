@@ -16,6 +16,7 @@
 //! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
 //! | `image` | moments of float images, blobs averaged over pixels |
+//! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |
 //!
 //! # Equations
 //! $d$ is the grey-level difference frame − reference, $V = \sum d$ the integrated pixel value; numbers are the paper's.
@@ -36,6 +37,7 @@ mod estimate;
 mod frame;
 mod hertz;
 mod image;
+mod lens;
 mod measure;
 mod shear;
 
@@ -57,5 +59,6 @@ pub use hertz::{HertzFit, HertzFitOptions};
 pub use image::{
     GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,
 };
+pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};

@@ -4,6 +4,7 @@ mod bad_input;
 mod batch;
 mod calibration;
 mod frame_statistics;
+mod lens;
 mod no_allocation;
 mod recorded;
 mod reference;
