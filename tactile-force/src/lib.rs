@@ -13,6 +13,7 @@
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `hertz` | the contact radius from the pressure profile |
 //! | `calibration` | pixel value to force and stress, (5) and (6) |
+//! | `pressure` | the local curve f of (5), fitted from frames |
 //! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
 //! | `image` | moments of float images, blobs averaged over pixels |
@@ -39,12 +40,13 @@ mod hertz;
 mod image;
 mod lens;
 mod measure;
+mod pressure;
 mod shear;
 
 pub use calibration::{
-    Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, Hysteresis,
-    LinearCalibration, MonotoneCalibration, PolynomialCalibration, Robustness, StopReason,
-    StressCalibration,
+    Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, GreyHistogram,
+    Hysteresis, LinearCalibration, LocalCalibration, MonotoneCalibration, PolynomialCalibration,
+    Robustness, StopReason, StressCalibration,
 };
 pub use contact::{
     Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
@@ -61,4 +63,7 @@ pub use image::{
 };
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
+pub use pressure::{
+    CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
+};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};

@@ -9,8 +9,10 @@
 //! ```
 
 mod curve;
+mod histogram;
 mod least_squares;
 mod linear;
+mod local;
 mod monotone;
 mod options;
 mod pair;
@@ -18,7 +20,9 @@ mod polynomial;
 mod report;
 mod stop;
 
+pub use histogram::GreyHistogram;
 pub use linear::LinearCalibration;
+pub use local::LocalCalibration;
 pub use monotone::MonotoneCalibration;
 pub use options::{CalibrationOptions, Robustness};
 pub use pair::{Branch, CalibrationPair};
@@ -138,6 +142,11 @@ pub trait StressCalibration<T: Real>: Send + Sync {
 
     /// How well the calibration fits its pairs.
     fn report(&self) -> &CalibrationReport<T>;
+
+    /// The curve that holds pixel by pixel, if the calibration has one; by default it has none.
+    fn local(&self) -> Option<&dyn LocalCalibration> {
+        None
+    }
 
     /// Force with its standard error: √((dF/dV)² σ_V² + σ_cal²).
     fn read(&self, integrated_pixel_value: Estimate<T>) -> ForceReading<T> {

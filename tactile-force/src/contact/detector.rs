@@ -8,6 +8,7 @@ use super::runs::Run;
 use super::summary::Sums;
 use super::threshold::quantile;
 use super::{Contact, ContactOptions, Detection};
+use crate::calibration::GreyHistogram;
 use crate::drift::{self, DriftCorrection, IlluminationDrift};
 use crate::error::ForceError;
 use crate::estimate::{Estimate, Real};
@@ -68,6 +69,35 @@ impl DetectorWorkspace {
         let view =
             ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
         Some((place, view))
+    }
+
+    /// The grey histogram of the last frame's contact over its aperture, each pixel covering `pixel_area_m2`: a row of the fit of a
+    /// [`PressureCurve`](crate::PressureCurve). `None` if there was no contact.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+    ///
+    /// let mut frame = Array2::from_elem((64, 64), 12_u8);
+    /// let reference = ReferenceFrame::new(frame.view())?;
+    /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
+    /// let mut workspace = DetectorWorkspace::default();
+    /// let found: Detection<f64> =
+    ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, frame.view(), &reference)?;
+    /// let histogram = workspace.grey_histogram(4e-10).expect("a contact");
+    /// let sum = found.contact.expect("a contact").integrated_pixel_value.value;
+    /// assert!((histogram.integral(|grey| grey) / (4e-10 * sum) - 1.0).abs() < 1e-12);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn grey_histogram(&self, pixel_area_m2: f64) -> Option<GreyHistogram> {
+        self.region.place?;
+        let columns = self.region.columns();
+        let runs = self.region.aperture.iter();
+        let differences = runs.flat_map(|run| &self.region.difference[run.span(columns)]);
+        Some(GreyHistogram::from_differences(
+            differences.copied(),
+            pixel_area_m2,
+        ))
     }
 }
 

@@ -5,11 +5,11 @@ use nalgebra::{SMatrix, SVector};
 use super::edge::BlurredEdge;
 use super::profile::{Level, Shape, level};
 use super::rings::{RingSums, Rings};
+use super::variance::PixelVariance;
 use super::{HertzFit, HertzFitOptions};
 use crate::calibration::StopReason;
 use crate::contact::Region;
 use crate::estimate::{Estimate, Real};
-use crate::frame::DifferenceNoise;
 
 type Normal = SMatrix<f64, 6, 6>;
 type Step = SVector<f64, 6>;
@@ -60,7 +60,7 @@ impl HertzFitter {
         rings: &mut Rings,
         region: &Region,
         start: Start,
-        noise: DifferenceNoise,
+        variance: PixelVariance<'_>,
         pixel_size_m: [f64; 2],
     ) -> Option<HertzFit<T>> {
         let place = region.place?;
@@ -81,12 +81,12 @@ impl HertzFitter {
         };
         for _ in 0..5 {
             rings.gather(region, state.centre, aspect, start.radius);
-            let moved = self.descend(rings, &mut state, noise, aspect)?;
+            let moved = self.descend(rings, &mut state, variance, aspect)?;
             if moved < 0.02 {
                 break;
             }
         }
-        let equations = self.assemble(rings, &state.shape, noise);
+        let equations = self.assemble(rings, &state.shape, variance);
         let origin = [place.column_start as f64, place.row_start as f64];
         self.report(&state, &equations, origin, pixel_size_m)
     }
@@ -98,10 +98,10 @@ impl HertzFitter {
         &self,
         rings: &Rings,
         state: &mut State,
-        noise: DifferenceNoise,
+        variance: PixelVariance<'_>,
         aspect: f64,
     ) -> Option<f64> {
-        let mut here = self.assemble(rings, &state.shape, noise);
+        let mut here = self.assemble(rings, &state.shape, variance);
         state.stop = StopReason::IterationLimit;
         let mut shift = [0.0; 2];
         while state.iterations < self.options.max_iterations {
@@ -110,13 +110,13 @@ impl HertzFitter {
             // The centre enters linearly on fixed rings: its best shift belongs to the final shape.
             shift = [step[4], step[5]];
             let mut trial = self.stepped(&state.shape, &step);
-            let mut there = self.assemble(rings, &trial, noise);
+            let mut there = self.assemble(rings, &trial, variance);
             for halving in 1..10 {
                 if there.chi2 <= here.chi2 * 1.01 {
                     break;
                 }
                 trial = self.stepped(&state.shape, &(step * 0.5_f64.powi(halving)));
-                there = self.assemble(rings, &trial, noise);
+                there = self.assemble(rings, &trial, variance);
             }
             let before = std::mem::replace(&mut state.shape, trial);
             here = there;
@@ -144,7 +144,7 @@ impl HertzFitter {
     }
 
     /// Normal equations over all pixels of the rings; rows of parameters that are not fitted are those of the identity.
-    fn assemble(&self, rings: &Rings, shape: &Shape, noise: DifferenceNoise) -> Equations {
+    fn assemble(&self, rings: &Rings, shape: &Shape, variance: PixelVariance<'_>) -> Equations {
         let mut e = Equations {
             normal: Normal::zeros(),
             gradient: Step::zeros(),
@@ -155,7 +155,7 @@ impl HertzFitter {
             let r2 = ring.r2 / ring.n;
             let spread = (ring.r4 / ring.n - r2 * r2).max(0.0);
             let level = level(&self.edge, shape, r2, spread);
-            let weight = 1.0 / (noise.background + noise.gain * level.value.max(0.0));
+            let weight = 1.0 / variance.at(level.value);
             e.add(&ring, &level, weight, r2, spread);
         }
         e.normal.fill_upper_triangle_with_lower_triangle();

@@ -11,9 +11,11 @@ mod options;
 mod outcome;
 mod profile;
 mod rings;
+mod variance;
 
 pub use options::HertzFitOptions;
 pub use outcome::HertzFit;
 
 pub(crate) use fit::{HertzFitter, Start};
 pub(crate) use rings::Rings;
+pub(crate) use variance::{LEVELS, PixelVariance};

@@ -1,7 +1,7 @@
 //! The fitted profile.
 
 use crate::calibration::StopReason;
-use crate::estimate::Estimate;
+use crate::estimate::{Estimate, Real};
 
 /// A fitted Hertz profile.
 ///
@@ -48,4 +48,20 @@ pub struct HertzFit<T> {
     pub iterations: usize,
     /// Why the fit stopped.
     pub stop: StopReason,
+}
+
+impl<T: Real> HertzFit<T> {
+    /// The fit of a profile in other units of its level, as pressures for grey levels.
+    pub(crate) fn with_levels_scaled(mut self, factor: T) -> Self {
+        self.peak = self.peak.scaled(factor);
+        self.background = self.background.scaled(factor);
+        self.integrated_pixel_value = self.integrated_pixel_value.scaled(factor);
+        for k in 0..2 {
+            self.covariance[k].iter_mut().for_each(|c| *c = *c * factor);
+            self.covariance
+                .iter_mut()
+                .for_each(|row| row[k] = row[k] * factor);
+        }
+        self
+    }
 }

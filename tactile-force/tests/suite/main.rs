@@ -6,6 +6,7 @@ mod calibration;
 mod frame_statistics;
 mod lens;
 mod no_allocation;
+mod pressure;
 mod recorded;
 mod reference;
 mod stability;

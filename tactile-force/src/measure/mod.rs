@@ -1,0 +1,328 @@
+//! Measurement of force and contact in one frame.
+
+mod local;
+mod options;
+mod outcome;
+
+pub use options::ForceOptions;
+pub use outcome::ForceMeasurement;
+
+use ndarray::{Array2, ArrayView2};
+
+use crate::calibration::StressCalibration;
+use crate::contact::{Contact, ContactDetector, Detection, DetectorWorkspace, Region};
+use crate::error::{ForceError, Requirement};
+use crate::estimate::{Estimate, Real};
+use crate::frame::{BoundingBox, ReferenceFrame};
+use crate::hertz::{HertzFit, HertzFitter, Rings, Start};
+use crate::lens::LensGeometry;
+use local::{Local, Stress};
+use outcome::{contact_radius, mean_stress};
+
+/// Buffers that measurements reuse from frame to frame; after the first frames nothing is allocated.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 24..48]).fill(90);
+/// let mut workspace = ForceWorkspace::default();
+/// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?;
+/// meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
+/// let (place, mask) = workspace.mask().expect("contact");
+/// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 20 * 24);
+/// assert!(place.row_start <= 20 && place.row_end >= 40);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct ForceWorkspace {
+    detector: DetectorWorkspace,
+    rings: Rings,
+    local: Local,
+}
+
+impl ForceWorkspace {
+    /// The last contact's mask (1 inside) over its region, and the region's place in the frame.
+    pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
+        self.detector.mask()
+    }
+
+    /// The pressure of the last contact in pascals over its region (zero outside the aperture), and the region's place in the
+    /// frame; `None` without contact, or if the calibration had no [local curve](StressCalibration::local). O(pixels of the region).
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::{
+    ///     Branch, CalibrationFrame, ForceMeter, ForceWorkspace, GreyHistogram, PressureCurve, ReferenceFrame,
+    /// };
+    ///
+    /// // 2 kPa a grey level.
+    /// let disc = |grey: f32| GreyHistogram::from_differences(std::iter::repeat_n(grey, 1000), 4e-10);
+    /// let frames: Vec<_> = [20.0_f32, 40.0, 60.0, 80.0, 100.0]
+    ///     .map(|grey| CalibrationFrame::new(disc(grey), f64::from(grey) * 2e3 * 4e-7, Branch::Loading))
+    ///     .into_iter()
+    ///     .collect::<Result<_, _>>()?;
+    /// let curve = PressureCurve::fit(&frames, &Default::default())?;
+    /// let mut frame = Array2::from_elem((64, 64), 12_u8);
+    /// let reference = ReferenceFrame::new(frame.view())?;
+    /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(62);
+    /// let mut workspace = ForceWorkspace::default();
+    /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
+    /// let measured = meter.measure_with(&mut workspace, frame.view(), &reference, &curve)?;
+    /// let (_, pressure) = workspace.pressure_pa().expect("a contact");
+    /// assert!((f64::from(pressure[[pressure.nrows() / 2, pressure.ncols() / 2]]) / 1e5 - 1.0).abs() < 1e-3);
+    /// let force = pressure.iter().map(|p| f64::from(*p) * 4e-10).sum::<f64>();
+    /// assert!((force / measured.force_n.value - 1.0).abs() < 1e-5);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn pressure_pa(&self) -> Option<(BoundingBox, Array2<f32>)> {
+        self.local.per_grey_pa()?;
+        let region = &self.detector.region;
+        let place = region.place?;
+        let columns = region.columns();
+        let mut image = vec![0.0; region.difference.len()];
+        for run in &region.aperture {
+            let span = run.span(columns);
+            image[span.clone()].copy_from_slice(&region.difference[span]);
+        }
+        let image = Array2::from_shape_vec((place.rows(), place.columns()), image).ok()?;
+        Some((place, image))
+    }
+}
+
+/// Measures forces with one sensor: options checked and tables built once.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, ForceMeter, ForceWorkspace, LinearCalibration, ReferenceFrame};
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let mut frame = Array2::from_elem((64, 64), 12_u8);
+/// let reference = ReferenceFrame::new(frame.view())?;
+/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(112);
+///
+/// let (meter, mut workspace) = (ForceMeter::new([20e-6; 2], &Default::default())?, ForceWorkspace::default());
+/// let measured = meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
+/// // 400 pixels of 100 grey levels at 10 µN each.
+/// assert!((measured.force_n.value - 0.4_f64).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct ForceMeter<T> {
+    detector: ContactDetector,
+    fitter: HertzFitter,
+    skip_profile: bool,
+    pixel_size_m: [T; 2],
+    lens: Option<LensGeometry>,
+}
+
+impl<T: Real> ForceMeter<T> {
+    /// A meter for pixels of the given size [x, y].
+    ///
+    /// # Errors
+    /// A pixel size that is not positive and finite.
+    pub fn new(pixel_size_m: [T; 2], options: &ForceOptions) -> Result<Self, ForceError> {
+        for size in pixel_size_m {
+            Requirement::Positive.check("pixel_size_m", size.as_f64())?;
+        }
+        Ok(Self {
+            detector: ContactDetector::new(options.contact),
+            fitter: HertzFitter::new(options.hertz),
+            skip_profile: options.skip_profile,
+            pixel_size_m,
+            lens: None,
+        })
+    }
+
+    /// The same meter behind a lens that distorts: places, areas and radii in metres are undistorted, with the size that a pixel
+    /// has at the contact's centroid.
+    ///
+    /// ```
+    /// use tactile_force::{ForceMeter, LensGeometry};
+    ///
+    /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+    /// let meter = ForceMeter::<f64>::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
+    /// # let _ = meter;
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn with_lens(mut self, lens: LensGeometry) -> Self {
+        self.lens = Some(lens);
+        self
+    }
+
+    /// Measures one frame. A calibration with a [local curve](StressCalibration::local) turns the contact's grey levels into
+    /// pressures: the force is their integral, and the profile is fitted to them.
+    ///
+    /// # Errors
+    /// The frame has not the reference's size, or too much of the contact is saturated.
+    pub fn measure_with(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        calibration: &(impl StressCalibration<T> + ?Sized),
+    ) -> Result<ForceMeasurement<T>, ForceError> {
+        let ForceWorkspace {
+            detector,
+            rings,
+            local,
+        } = workspace;
+        local.clear();
+        let found = self.detector.detect_with(detector, frame, reference)?;
+        let (Some(contact), Some(noise)) = (found.contact, found.noise) else {
+            return Ok(ForceMeasurement::without_contact(found));
+        };
+        let pixel = self.pixel_at(&contact);
+        let region = &mut detector.region;
+        let stress = match calibration.local() {
+            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area.as_f64()),
+            None => Stress {
+                reading: calibration.read(contact.integrated_pixel_value),
+                per_grey_pa: calibration
+                    .stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel.area),
+            },
+        };
+        let mut profile = None;
+        if !self.skip_profile {
+            let integral = contact.integrated_pixel_value.value.as_f64();
+            let levels = local.per_grey_pa().unwrap_or(1.0);
+            let start = self.start(region, &contact, pixel, integral * levels);
+            let variance = local.variance(&noise);
+            let sizes = pixel.step.map(T::as_f64);
+            profile = start
+                .and_then(|start| self.fitter.fit_with(rings, region, start, variance, sizes))
+                .map(|fit: HertzFit<T>| match local.per_grey_pa() {
+                    Some(per_grey) => fit.with_levels_scaled(T::nearest(per_grey).recip()),
+                    None => fit,
+                });
+        }
+        Ok(self.combine(found, contact, profile, stress, pixel))
+    }
+
+    /// The size of a pixel at a contact.
+    fn pixel_at(&self, contact: &Contact<T>) -> PixelSize<T> {
+        let Some(lens) = &self.lens else {
+            let [hx, hy] = self.pixel_size_m;
+            return PixelSize {
+                step: [hx, hy],
+                area: hx * hy,
+            };
+        };
+        let place = contact.centroid_px.map(|c| c.value.as_f64());
+        PixelSize {
+            step: lens.pixel_step_m(place).map(T::nearest),
+            area: T::nearest(lens.pixel_area_m2(place)),
+        }
+    }
+
+    /// Where the fit of the profile starts, in pixels of the region; `integral` is in the units of its levels.
+    fn start(
+        &self,
+        region: &Region,
+        contact: &Contact<T>,
+        pixel: PixelSize<T>,
+        integral: f64,
+    ) -> Option<Start> {
+        let place = region.place?;
+        let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
+        let [hx, hy] = pixel.step.map(T::as_f64);
+        Some(Start {
+            centre: [x - place.column_start as f64, y - place.row_start as f64],
+            radius: contact.equivalent_radius_px.as_f64() * (hy / hx).sqrt(),
+            integral,
+        })
+    }
+
+    fn combine(
+        &self,
+        found: Detection<T>,
+        contact: Contact<T>,
+        profile: Option<HertzFit<T>>,
+        stress: Stress<T>,
+        pixel: PixelSize<T>,
+    ) -> ForceMeasurement<T> {
+        let Stress {
+            reading,
+            per_grey_pa,
+        } = stress;
+        let [x, y] = contact.centroid_px;
+        let mut centroid_m = [x.scaled(pixel.step[0]), y.scaled(pixel.step[1])];
+        if let Some(lens) = &self.lens {
+            let place = lens.to_metres([x.value.as_f64(), y.value.as_f64()]);
+            centroid_m[0].value = T::nearest(place[0]);
+            centroid_m[1].value = T::nearest(place[1]);
+        }
+        let radius = contact_radius(&contact, profile, pixel.area.sqrt());
+        let brightest = Estimate {
+            value: contact.peak,
+            standard_error: T::one(),
+        };
+        let peak = profile.map_or(brightest, |p| p.peak);
+        ForceMeasurement {
+            force_n: reading.force_n,
+            reading: Some(reading),
+            centroid_m: Some(centroid_m),
+            contact_area_m2: Some(T::nearest(contact.area_px as f64) * pixel.area),
+            contact_radius_m: Some(radius),
+            mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
+            peak_stress_pa: Some(peak.scaled(per_grey_pa)),
+            contact: Some(contact),
+            profile,
+            statistics: found.statistics,
+            drift: found.drift,
+            noise: found.noise,
+        }
+    }
+}
+
+/// Steps [x, y] of a pixel in metres, and its area.
+#[derive(Clone, Copy, Debug)]
+struct PixelSize<T> {
+    step: [T; 2],
+    area: T,
+}
+
+/// Measures the force of one frame against one reference frame. For many frames keep a [`ForceMeter`], a
+/// [`ReferenceFrame`] and a [`ForceWorkspace`].
+///
+/// # Errors
+/// Images of different size or without pixels, a pixel size that is not positive, too much of the contact saturated.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{CalibrationPair, LinearCalibration, measure_force};
+///
+/// let pairs: Vec<_> = (0..5).map(|k| CalibrationPair::loading(1e5 * k as f64, 0.5 * k as f64)).collect();
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let reference = Array2::from_elem((200, 200), 12_u8);
+/// let frame = Array2::from_shape_fn((200, 200), |(y, x)| {
+///     let r2 = (x as f64 - 90.3).powi(2) + (y as f64 - 104.8).powi(2);
+///     12 + (150.0 * (1.0 - r2 / 1600.0).max(0.0).sqrt()).round() as u8
+/// });
+/// let measured = measure_force(frame.view(), reference.view(), [20e-6, 20e-6], &calibration, &Default::default())?;
+/// let radius = measured.contact_radius_m.expect("contact");
+/// assert!((radius.value / 800e-6 - 1.0).abs() < 1e-3);
+/// assert!((measured.force_n.value - 2.51).abs() < 0.01);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+pub fn measure_force<T: Real>(
+    frame: ArrayView2<'_, u8>,
+    reference: ArrayView2<'_, u8>,
+    pixel_size_m: [T; 2],
+    calibration: &(impl StressCalibration<T> + ?Sized),
+    options: &ForceOptions,
+) -> Result<ForceMeasurement<T>, ForceError> {
+    let meter = ForceMeter::new(pixel_size_m, options)?;
+    let reference = ReferenceFrame::new(reference)?;
+    meter.measure_with(
+        &mut ForceWorkspace::default(),
+        frame,
+        &reference,
+        calibration,
+    )
+}
