@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::force::ReferenceFrame;
-use tactile_imaging::matching::{PointMatcher, RelaxationMatcher};
+use tactile_imaging::matching::{AnnealedSoftassign, PointMatcher};
 use tactile_imaging::pipeline::Trial;
 use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
 use tactile_imaging::tps::{FitOptions, NegR, ThinPlateSpline};
@@ -64,7 +64,7 @@ fn match_105() {
     let mut target = moved.clone();
     target.reverse();
     let matching =
-        counted(|| RelaxationMatcher::default().match_points(&model, &target)).expect("a match");
+        counted(|| AnnealedSoftassign::default().match_points(&model, &target)).expect("a match");
     // A clean scene is solved to rounding.
     assert!(distance(&matching.warped, &moved) < 1e-9);
 }

@@ -1,6 +1,6 @@
 //! Point matching: time beside error, on generated scenes with known partners.
 //!
-//! `match/105x105` and `match/200x200` are jittered discs bent into a bell under a smooth warp (clean, with strays, with
+//! `match/105x105` and `match/200x200` are jittered discs bent into a bell under a smooth warp (clean, with outliers, with
 //! noise), `match/scaling` the plane's disc from 105 points up. Every answer is checked before it is timed.
 #![allow(clippy::print_stdout, missing_docs)]
 
@@ -11,7 +11,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point, SVector};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::matching::{
-    DenseRelaxation, PointMatcher, RelaxationMatcher, RelaxationWorkspace,
+    AnnealedSoftassign, PointMatcher, RelaxationLabelling, SoftassignWorkspace,
 };
 
 /// A model, a target, and where each model point truly goes.
@@ -23,8 +23,8 @@ struct Scene<const D: usize> {
 
 impl<const D: usize> Scene<D> {
     /// `n` points of a jittered sunflower disc of radius 1 (a bell in space), warped by six broad Gaussians.
-    fn new(n: usize, strays: usize, noise: f64) -> Self {
-        let mut random = SmallRng::seed_from_u64((n + 7 * strays) as u64);
+    fn new(n: usize, outliers: usize, noise: f64) -> Self {
+        let mut random = SmallRng::seed_from_u64((n + 7 * outliers) as u64);
         let mut uniform = |size: f64| random.random_range(-size..size);
         let model: Vec<Point<f64, D>> = (0..n)
             .map(|i| {
@@ -57,7 +57,7 @@ impl<const D: usize> Scene<D> {
             .map(|p| p + SVector::from_fn(|_, _| uniform(noise.max(1e-300))))
             .collect();
         target.reverse();
-        target.extend((0..strays).map(|_| Point::from(SVector::from_fn(|_, _| uniform(1.3)))));
+        target.extend((0..outliers).map(|_| Point::from(SVector::from_fn(|_, _| uniform(1.3)))));
         Self {
             model,
             target,
@@ -75,7 +75,7 @@ impl<const D: usize> Scene<D> {
     }
 }
 
-/// Checks and times the fast matcher on one scene; a match through a warm workspace, without the spline of the result.
+/// Checks and times the default matcher on one scene; a match through a warm workspace, without the spline of the result.
 fn fast<const D: usize>(
     criterion: &mut Criterion,
     group: &str,
@@ -83,7 +83,7 @@ fn fast<const D: usize>(
     scene: &Scene<D>,
     bound: f64,
 ) {
-    let matcher = RelaxationMatcher::default();
+    let matcher = AnnealedSoftassign::default();
     let error = scene.error(
         matcher
             .match_points(&scene.model, &scene.target)
@@ -95,15 +95,15 @@ fn fast<const D: usize>(
     println!("{group}/{name}: mean error {error:.2e}");
     let mut group = criterion.benchmark_group(group);
     group.sample_size(20);
-    group.bench_function(BenchmarkId::new("relaxation", name), |b| {
+    group.bench_function(BenchmarkId::new("softassign", name), |b| {
         b.iter(|| {
             matcher
                 .match_points(black_box(&scene.model), black_box(&scene.target))
                 .unwrap()
         });
     });
-    let mut workspace = RelaxationWorkspace::new();
-    group.bench_function(BenchmarkId::new("relaxation_with", name), |b| {
+    let mut workspace = SoftassignWorkspace::new();
+    group.bench_function(BenchmarkId::new("softassign_with", name), |b| {
         b.iter(|| {
             let go = |_, _| ControlFlow::Continue(());
             let found = matcher
@@ -129,7 +129,7 @@ fn sizes(criterion: &mut Criterion) {
         fast(
             criterion,
             &group,
-            "strays",
+            "outliers",
             &Scene::<3>::new(n, n / 5, 0.0),
             1e-9,
         );
@@ -143,13 +143,13 @@ fn sizes(criterion: &mut Criterion) {
     }
 }
 
-/// The paper's dense relaxation on the same 105 points.
-fn dense(criterion: &mut Criterion) {
+/// The paper's relaxation labelling on the same 105 points.
+fn labelling(criterion: &mut Criterion) {
     let scene = Scene::<3>::new(105, 0, 0.0);
-    let matcher = DenseRelaxation::default();
+    let matcher = RelaxationLabelling::default();
     let mut group = criterion.benchmark_group("match/105x105");
     group.sample_size(10);
-    group.bench_function(BenchmarkId::new("dense", "clean"), |b| {
+    group.bench_function(BenchmarkId::new("labelling", "clean"), |b| {
         let mut error = f64::NAN;
         b.iter(|| {
             error = scene.error(
@@ -160,9 +160,9 @@ fn dense(criterion: &mut Criterion) {
                     .into_iter(),
             )
         });
-        println!("match/105x105/dense: mean error {error:.2e}");
+        println!("match/105x105/labelling: mean error {error:.2e}");
         // It measured 1.6e-3 of the disc's radius on this scene; three times that would be another answer.
-        assert!(error < 5e-3, "dense: error {error}");
+        assert!(error < 5e-3, "labelling: error {error}");
     });
     group.finish();
 }
@@ -180,5 +180,5 @@ fn scaling(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, sizes, dense, scaling);
+criterion_group!(benches, sizes, labelling, scaling);
 criterion_main!(benches);

@@ -7,10 +7,10 @@
 use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::time::Duration;
-use tactile_imaging::matching::dense::Neighbourhood;
+use tactile_imaging::matching::labelling::Neighbourhood;
 use tactile_imaging::matching::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Motion,
-    NearestNeighbour, PointMatcher,
+    CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment, Motion, NearestNeighbour,
+    PointMatcher, RelaxationLabelling,
 };
 
 type Point3 = nalgebra::Point3<f64>;
@@ -104,11 +104,8 @@ fn standard_case(criterion: &mut Criterion) {
             lambda: 3.0,
             rank,
         };
-        CoherentPointDrift::new(DriftOptions {
-            motion,
-            ..Default::default()
-        })
-        .expect("valid options")
+        let options = DriftOptions::default().with_motion(motion);
+        CoherentPointDrift::new(options.expect("a valid motion"))
     };
     let mut group = criterion.benchmark_group("match/105x105");
     let quick: [Row<'_>; 4] = [
@@ -129,16 +126,15 @@ fn standard_case(criterion: &mut Criterion) {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(1));
     group.measurement_time(Duration::from_millis(1));
-    let eight = DenseOptions {
-        neighbourhood: Neighbourhood::Nearest(8),
-        ..Default::default()
-    };
-    let dense = [
-        ("dense_8_neighbours", eight),
-        ("dense", DenseOptions::default()),
+    let eight = LabellingOptions::default()
+        .with_neighbourhood(Neighbourhood::Nearest(8))
+        .expect("neighbours");
+    let labelling = [
+        ("labelling_8_neighbours", eight),
+        ("labelling", LabellingOptions::default()),
     ];
-    for (name, options) in dense {
-        let matcher = DenseRelaxation::new(options).expect("valid options");
+    for (name, options) in labelling {
+        let matcher = RelaxationLabelling::new(options);
         check(name, &matcher, &scene, 0.99, 0.5);
         group.bench_function(name, |b| {
             b.iter(|| matcher.match_points(black_box(&scene.model), &scene.target))

@@ -15,8 +15,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tactile_imaging::io::{CasePoints, read_cases, write_case_result};
 use tactile_imaging::matching::{
-    CoherentPointDrift, DenseRelaxation, LinearAssignment, MatchError, Matching, NearestNeighbour,
-    Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation, SparseRelaxation,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching,
+    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, SoftassignOptions,
+    SparseRelaxationLabelling,
 };
 
 /// Matches the point sets of case files and writes result files.
@@ -32,14 +33,11 @@ struct Arguments {
     #[arg(long, value_enum, default_value_t = Turn::Limited)]
     rotation: Turn,
     /// Where points without a partner are expected.
-    #[arg(long, value_enum, default_value_t = Stray::Both)]
-    outliers: Stray,
+    #[arg(long, value_enum, default_value_t = OutlierSide::Both)]
+    outliers: OutlierSide,
     /// The matcher.
-    #[arg(long, value_enum, default_value_t = Method::Relaxation)]
+    #[arg(long, value_enum, default_value_t = Method::Softassign)]
     method: Method,
-    /// The paper's dense relaxation, as `--method dense`.
-    #[arg(long, conflicts_with = "method")]
-    dense: bool,
     /// Calls a case; the median of their times is written.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     repeats: u32,
@@ -52,7 +50,7 @@ enum Turn {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Stray {
+enum OutlierSide {
     Both,
     Model,
     Target,
@@ -61,12 +59,12 @@ enum Stray {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Method {
-    /// The fast matcher.
-    Relaxation,
-    /// The paper's dense relaxation as printed: slow.
-    Dense,
+    /// Annealed softassign, the default matcher.
+    Softassign,
+    /// The paper's relaxation labelling as printed: slow.
+    Labelling,
     /// The same over ten candidates a point.
-    Sparse,
+    SparseLabelling,
     /// Coherent point drift.
     Drift,
     /// Each model point to the nearest target point.
@@ -76,31 +74,27 @@ enum Method {
 }
 
 impl Arguments {
-    fn options(&self) -> RelaxationOptions {
+    fn options(&self) -> SoftassignOptions {
         let rotation = match self.rotation {
             Turn::Limited => Rotation::Limited,
             Turn::Any => Rotation::Any,
         };
         let outliers = match self.outliers {
-            Stray::Both => Outliers::Both,
-            Stray::Model => Outliers::Model,
-            Stray::Target => Outliers::Target,
-            Stray::None => Outliers::None,
+            OutlierSide::Both => Outliers::Both,
+            OutlierSide::Model => Outliers::Model,
+            OutlierSide::Target => Outliers::Target,
+            OutlierSide::None => Outliers::None,
         };
-        RelaxationOptions::default()
-            .rotation(rotation)
-            .outliers(outliers)
+        SoftassignOptions::default()
+            .with_rotation(rotation)
+            .with_outliers(outliers)
     }
 
     fn matcher<const D: usize>(&self) -> Box<dyn PointMatcher<f64, D>> {
-        match if self.dense {
-            Method::Dense
-        } else {
-            self.method
-        } {
-            Method::Relaxation => Box::new(RelaxationMatcher::new(self.options())),
-            Method::Dense => Box::new(DenseRelaxation::default()),
-            Method::Sparse => Box::new(SparseRelaxation::default()),
+        match self.method {
+            Method::Softassign => Box::new(AnnealedSoftassign::new(self.options())),
+            Method::Labelling => Box::new(RelaxationLabelling::default()),
+            Method::SparseLabelling => Box::new(SparseRelaxationLabelling::default()),
             Method::Drift => Box::new(CoherentPointDrift::default()),
             Method::Nearest => Box::new(NearestNeighbour::default()),
             Method::Assignment => Box::new(LinearAssignment::default()),

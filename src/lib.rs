@@ -6,7 +6,7 @@
 //! - Light stays inside below $\theta_i = \arcsin\sqrt{n_i^2 - 1}$ (1)–(4) until a press lets it out: [`optics`].
 //! - Force $F_z = \int P dS$, centroid $\sum x I/\sum I$, shear $F_x = K_x u_x$ (5)–(12): [`force`].
 //! - Surface from shading, $|\nabla z| = \sqrt{1/R^2 - 1}$ under frontal light: [`sfs`].
-//! - Matches by relaxation labelling (13)–(20), [`matching`]; warp $f(x) = a_0 + A x + \sum_i w_i U(|x - x_i|)$ (21)–(24): [`tps`].
+//! - Matches: annealed softassign with a Gaussian-process prior by default, the paper's relaxation labelling (13)–(20) by name, [`matching`]; warp $f(x) = a_0 + A x + \sum_i w_i U(|x - x_i|)$ (21)–(24): [`tps`].
 //! - Strain $E = \frac{1}{2}(F^T F - I)$ (25)–(30) and modulus $E = S_{zz}/\bar e_{zz}$ (31), or Hertz's
 //!   $a^3 = 3FR/(4E^{\ast})$: [`elasticity`].
 #![forbid(unsafe_code)]

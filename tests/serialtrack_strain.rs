@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Point3};
 use std::path::PathBuf;
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::io::read_points;
-use tactile_imaging::matching::RelaxationMatcher;
+use tactile_imaging::matching::AnnealedSoftassign;
 
 fn frame(k: usize) -> Option<Vec<Point3<f64>>> {
     let folder = std::env::var_os("TACTILE_DATA").map_or_else(
@@ -35,7 +35,7 @@ fn stretch(k: usize) {
     let found = measure::strain_between(
         &before,
         &after,
-        &RelaxationMatcher::default(),
+        &AnnealedSoftassign::default(),
         &GreenLagrange,
     )
     .unwrap();

@@ -37,7 +37,7 @@ const STUDIES: [Filler; 10] = [
     ("splines", tps::clean),
     ("splines_noise", tps::noisy),
     ("matching", matching::noisy),
-    ("matching_strays", matching::strays),
+    ("matching_outliers", matching::outliers),
     ("surfaces", sfs::surfaces),
     ("slopes", sfs::slopes),
     ("force", force::frame),

@@ -3,10 +3,10 @@
 use crate::study::Study;
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
-use tactile_imaging::matching::dense::Neighbourhood;
+use tactile_imaging::matching::labelling::Neighbourhood;
 use tactile_imaging::matching::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment,
-    NearestNeighbour, Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions, Rotation,
+    AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
+    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, SoftassignOptions,
 };
 
 struct Scene {
@@ -17,7 +17,7 @@ struct Scene {
 
 impl Scene {
     /// A jittered disc of radius 1 bent into a bell, moved by six broad Gaussians.
-    fn new(seed: u64, strays: usize, noise: f64) -> Self {
+    fn new(seed: u64, outliers: usize, noise: f64) -> Self {
         const N: usize = 105;
         let mut random = SmallRng::seed_from_u64(seed);
         let mut uniform = |size: f64| random.random_range(-size..size);
@@ -50,7 +50,7 @@ impl Scene {
             .map(|p| p + Vector3::from_fn(|_, _| uniform(noise)))
             .collect();
         target.reverse();
-        target.extend((0..strays).map(|_| Point3::from(Vector3::from_fn(|_, _| uniform(1.3)))));
+        target.extend((0..outliers).map(|_| Point3::from(Vector3::from_fn(|_, _| uniform(1.3)))));
         Self {
             model,
             target,
@@ -100,8 +100,8 @@ pub(crate) fn noisy(study: &mut Study) {
     every(study, &scenes);
 }
 
-pub(crate) fn strays(study: &mut Study) {
-    study.error_label = "mean error, radius 1, 21 strays";
+pub(crate) fn outliers(study: &mut Study) {
+    study.error_label = "mean error, radius 1, 21 outliers";
     let scenes: Vec<_> = (0..study.choose(4, 16))
         .map(|seed| Scene::new(seed, 21, 0.01))
         .collect();
@@ -109,39 +109,39 @@ pub(crate) fn strays(study: &mut Study) {
 }
 
 fn every(study: &mut Study, scenes: &[Scene]) {
-    let options = RelaxationOptions::default();
+    let options = SoftassignOptions::default();
     run(
         study,
         scenes,
-        "relaxation",
+        "annealed softassign",
         "default",
         true,
-        &RelaxationMatcher::new(options),
+        &AnnealedSoftassign::new(options),
     );
     for limit in [1, 3, 10, 30] {
-        let options = options.max_iterations(limit).expect("valid");
+        let options = options.with_max_iterations(limit).expect("valid");
         run(
             study,
             scenes,
             "iterations",
             &format!("at most {limit}"),
             false,
-            &RelaxationMatcher::new(options),
+            &AnnealedSoftassign::new(options),
         );
     }
     for share in [0.01, 0.3] {
-        let options = options.stray_share(share).expect("valid");
+        let options = options.with_outlier_ratio(share).expect("valid");
         run(
             study,
             scenes,
-            "stray share",
+            "outlier ratio",
             &format!("{share}"),
             false,
-            &RelaxationMatcher::new(options),
+            &AnnealedSoftassign::new(options),
         );
     }
     for side in [Outliers::None, Outliers::Target] {
-        let matcher = RelaxationMatcher::new(options.outliers(side));
+        let matcher = AnnealedSoftassign::new(options.with_outliers(side));
         run(
             study,
             scenes,
@@ -157,7 +157,7 @@ fn every(study: &mut Study, scenes: &[Scene]) {
         "rotation",
         "any",
         false,
-        &RelaxationMatcher::new(options.rotation(Rotation::Any)),
+        &AnnealedSoftassign::new(options.with_rotation(Rotation::Any)),
     );
     others(study, scenes);
 }
@@ -180,11 +180,8 @@ fn others(study: &mut Study, scenes: &[Scene]) {
         &LinearAssignment::new(),
     );
     for tolerance in [1e-2, 1e-5, 1e-8] {
-        let drift = CoherentPointDrift::new(DriftOptions {
-            tolerance,
-            ..Default::default()
-        })
-        .expect("valid");
+        let options = DriftOptions::default().with_tolerance(tolerance);
+        let drift = CoherentPointDrift::new(options.expect("valid"));
         run(
             study,
             scenes,
@@ -195,18 +192,15 @@ fn others(study: &mut Study, scenes: &[Scene]) {
         );
     }
     for k in study.choose(vec![5], vec![5, 8, 12, 20]) {
-        let options = DenseOptions {
-            neighbourhood: Neighbourhood::Nearest(k),
-            ..Default::default()
-        };
-        let dense = DenseRelaxation::new(options).expect("valid");
+        let options = LabellingOptions::default().with_neighbourhood(Neighbourhood::Nearest(k));
+        let labelling = RelaxationLabelling::new(options.expect("valid"));
         run(
             study,
             scenes,
-            "dense relaxation",
+            "relaxation labelling",
             &format!("{k} neighbours"),
             false,
-            &dense,
+            &labelling,
         );
     }
 }

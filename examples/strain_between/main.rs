@@ -22,7 +22,7 @@ use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
 use tactile_imaging::io::{PointTable, read_point_table};
-use tactile_imaging::matching::RelaxationMatcher;
+use tactile_imaging::matching::AnnealedSoftassign;
 use tactile_imaging::plot::{Colour, Page, Panel};
 
 /// Matches the points of A and B, fits a smoothing spline and prints the strain from A to B.
@@ -97,7 +97,7 @@ fn report<const D: usize>(
     let found = strain_between(
         a,
         b,
-        &RelaxationMatcher::default(),
+        &AnnealedSoftassign::default(),
         arguments.measure.strain(),
     )?;
     if arguments.json {

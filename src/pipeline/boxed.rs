@@ -19,7 +19,7 @@ use nalgebra::Point3;
 /// ```
 /// use tactile_imaging::pipeline::{MatcherChoice, StagesConfig, StrainChoice};
 /// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
-/// assert_eq!(config.matcher, MatcherChoice::Relaxation);
+/// assert_eq!(config.matcher, MatcherChoice::AnnealedSoftassign);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(

@@ -35,7 +35,7 @@
 //! [stages]                               # each by name; these are the defaults
 //! reconstruction = "eikonal"             # or "tsai-shah", "brooks-horn"; not with a depth table
 //! sampler = "equally-spaced"             # or "curvature", "random"
-//! matcher = "relaxation"                 # or "dense-relaxation", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
+//! matcher = "annealed-softassign"        # or "relaxation-labelling", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
 //! warp = "thin-plate-spline"             # or "cubic-spline", "affine", "rigid"
 //! strain = "green-lagrange"              # or "euler-almansi", "hencky", "biot", "infinitesimal"
 //! estimator = "best"                     # or "paper-ratio", "regression", "sphere" (a ball's), "flat-punch"

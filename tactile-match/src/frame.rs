@@ -77,7 +77,7 @@ impl<const D: usize> Frame<D> {
     }
 }
 
-/// Centroid of a set and its root mean square radius, nought where all points coincide.
+/// Centroid of a set and its root mean square radius, zero where all points coincide.
 pub(crate) fn centre_and_radius<T: RealField + Copy, const D: usize>(
     points: &[Point<T, D>],
 ) -> (SVector<f64, D>, f64) {

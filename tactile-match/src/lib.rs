@@ -1,14 +1,20 @@
-//! Fuzzy graph matching of point sets by relaxation labelling, with a thin-plate-spline warp.
+//! Matching of point sets in the plane and in space: which point is which, and the smooth warp between them.
+//!
+//! # Methods
+//! The default, [`AnnealedSoftassign`], alternates a soft assignment and a smooth warp while a temperature falls. The warp has a
+//! Gaussian-process prior, and distances are taken from its leave-one-out predictions. Relaxation labelling is one of the starts it tries
+//! where the first does not settle the matter. The paper's own method, relaxation labelling (13)–(20) with a thin-plate spline
+//! (21)–(24), is [`RelaxationLabelling`]: `RelaxationLabelling::default().match_points(&model, &target)`.
 //!
 //! # Equations
 //! Match matrix $M$ of I model points $y_i$ and J target points $t_j$, with slack; numbers are the paper's.
 //!
-//! - Rows and columns sum to one with their slack (15): $\sum_j M_{ij} = 1$ and $\sum_i M_{ij} = 1$.
+//! - Rows and columns sum to one with their slack: $\sum_j M_{ij} = 1$ and $\sum_i M_{ij} = 1$.
 //! - Soft assignment at the temperature $\sigma$: $M_{ij} \propto \exp(-|y_i - t_j|^2/2\sigma^2)$, made doubly stochastic. At most O(IJ) a sweep.
-//! - Relaxation labelling (19), (20): $M_{ij} \leftarrow M_{ij} S_{ij}/\sum_k M_{ik} S_{ik}$ with the support
-//!   $S_{ij} = \sum_a \sum_b M_{ab} \alpha \beta \gamma$ of neighbours a of i and b of j. Densely O(IJAB), over few candidates one product a link.
 //! - Warp: the posterior mean of an affine field plus a smooth one, $\tau^2 \exp(-|x - x^{\prime}|^2/2\ell^2)$; $O(I r^2)$ with r near 30. The last one
 //!   is the thin-plate spline through the estimated positions.
+//! - Relaxation labelling (19), (20): $M_{ij} \leftarrow M_{ij} S_{ij}/\sum_k M_{ik} S_{ik}$ with the support
+//!   $S_{ij} = \sum_a \sum_b M_{ab} \alpha \beta \gamma$ of neighbours a of i and b of j. Densely O(IJAB), over few candidates one product a link.
 //!
 //! Lengths are in any unit; errors are [`MatchError`], not converging is a [`MatchReport`].
 #![forbid(unsafe_code)]
@@ -17,30 +23,38 @@
 
 mod assignment;
 mod assignment_matcher;
+#[cfg(test)]
+#[allow(dead_code)] // shared with the tests of the public interface
+#[path = "../tests/suite/common/mod.rs"]
+mod common;
 mod cpd;
-pub mod dense;
 mod error;
 mod frame;
 mod hard;
+pub mod labelling;
 mod matching;
 mod nearest;
-mod relaxation;
 mod shape_context;
 mod soft;
+mod softassign;
 mod validate;
 mod warm_start;
+
+// The shared tests name the crate from outside.
+#[cfg(test)]
+extern crate self as tactile_match;
 
 pub use assignment::{AssignmentWorkspace, linear_assignment};
 pub use assignment_matcher::LinearAssignment;
 pub use cpd::{CoherentPointDrift, DriftOptions, DriftWarp, DriftWorkspace, Motion, Normalization};
-pub use dense::{DenseOptions, DenseRelaxation, SparseRelaxation};
 pub use error::{MatchError, PointSet};
+pub use labelling::{LabellingOptions, RelaxationLabelling, SparseRelaxationLabelling};
 pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
 pub use nearest::NearestNeighbour;
-pub use relaxation::{
-    Labelling, Outliers, PointSets, RelaxationMatch, RelaxationMatcher, RelaxationOptions,
-    RelaxationWorkspace, Rotation, Search,
-};
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;
+pub use softassign::{
+    AnnealedSoftassign, Outliers, PointSets, Rotation, Search, SoftassignMatch, SoftassignOptions,
+    SoftassignWorkspace,
+};
 pub use warm_start::WarmStart;

@@ -12,13 +12,13 @@ use tactile_tps::{Scalar, Warp};
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, NearestNeighbour, PointMatcher, RelaxationMatcher};
+/// use tactile_match::{CoherentPointDrift, NearestNeighbour, PointMatcher, AnnealedSoftassign};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
 /// let target = model.map(|p| Point2::new(p.x + 0.05 * p.y, p.y));
 /// let matchers: [Box<dyn PointMatcher<f64, 2>>; 3] = [
 ///     Box::new(NearestNeighbour::new()),
 ///     Box::new(CoherentPointDrift::default()),
-///     Box::new(RelaxationMatcher::default()),
+///     Box::new(AnnealedSoftassign::default()),
 /// ];
 /// for matcher in matchers {
 ///     let matching = matcher.match_points(&model, &target)?;
@@ -99,10 +99,10 @@ matcher_behind!(Arc);
 /// ```
 /// use nalgebra::Point2;
 /// use std::ops::ControlFlow;
-/// use tactile_match::{RelaxationMatcher, RelaxationWorkspace, StopReason};
+/// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace, StopReason};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
 /// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
-/// let (matcher, mut workspace) = (RelaxationMatcher::default(), RelaxationWorkspace::new());
+/// let (matcher, mut workspace) = (AnnealedSoftassign::default(), SoftassignWorkspace::new());
 /// let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
 /// assert_eq!(found.report().stop, StopReason::Exact); // no noise: every pair fits to rounding
 /// let cut = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Break(()))?;
@@ -137,8 +137,8 @@ pub enum StopReason {
 /// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, PointMatcher};
 /// let model = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.0, 3.0]].map(Point2::from);
 /// let target = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [3.2, 3.2]].map(Point2::from); // one corner is drawn out
-/// let options = DriftOptions { motion: Motion::Rigid, ..Default::default() };
-/// let report = CoherentPointDrift::new(options)?.match_points(&model, &target)?.report;
+/// let options = DriftOptions::default().with_motion(Motion::Rigid)?;
+/// let report = CoherentPointDrift::new(options).match_points(&model, &target)?.report;
 /// assert!(report.iterations > 0 && report.starts == 1);
 /// assert!(report.residual > 0.05 && report.residual < 0.2); // what no rigid motion explains, in units of the points
 /// # Ok::<(), tactile_match::MatchError>(())

@@ -51,6 +51,11 @@ pub(crate) fn option_within(
     }
 }
 
+/// Rejects a count of zero.
+pub(crate) fn at_least_one(option: &'static str, value: usize) -> Result<(), MatchError> {
+    option_within(option, value as f64, 1.0, f64::MAX, "[1, ∞)")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

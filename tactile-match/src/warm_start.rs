@@ -9,13 +9,13 @@ use std::any::Any;
 ///
 /// ```
 /// use nalgebra::Point3;
-/// use tactile_match::{PointMatcher, RelaxationMatcher, RelaxationOptions, Search, WarmStart};
+/// use tactile_match::{PointMatcher, AnnealedSoftassign, SoftassignOptions, Search, WarmStart};
 /// # fn main() -> Result<(), tactile_match::MatchError> {
 /// let model: Vec<Point3<f64>> = (0..60)
 ///     .map(|i| (0.13 * f64::from(i).sqrt(), 2.4 * f64::from(i)))
 ///     .map(|(r, angle)| Point3::new(r * angle.cos(), r * angle.sin(), 1.0 - 0.5 * r * r))
 ///     .collect();
-/// let matcher = RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near));
+/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near));
 /// let mut warm = WarmStart::new();
 /// // The load rises: the surface grows by a hundredth from frame to frame.
 /// let mut iterations = Vec::new();
@@ -31,7 +31,7 @@ use std::any::Any;
 /// ```
 #[derive(Default)]
 pub struct WarmStart {
-    state: Option<Box<dyn Any + Send>>,
+    state: Option<Box<dyn Any + Send + Sync>>,
 }
 
 impl WarmStart {
@@ -69,7 +69,7 @@ impl WarmStart {
     /// }
     /// # Ok::<(), MatchError>(())
     /// ```
-    pub fn state<S: Default + Send + 'static>(&mut self) -> &mut S {
+    pub fn state<S: Default + Send + Sync + 'static>(&mut self) -> &mut S {
         let kept = self.state.take().and_then(|state| state.downcast().ok());
         let state: Box<S> = kept.unwrap_or_default();
         match self.state.insert(state).downcast_mut() {

@@ -11,7 +11,7 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{ForceMeter, ForceOptions, ForceWorkspace};
-use tactile_imaging::matching::RelaxationMatcher;
+use tactile_imaging::matching::AnnealedSoftassign;
 use tactile_imaging::simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
 
 /// Side of the undeformed face.
@@ -162,7 +162,7 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
     let found = measure::strain_between(
         &before,
         &after,
-        &RelaxationMatcher::default(),
+        &AnnealedSoftassign::default(),
         &GreenLagrange,
     )
     .expect("strain");

@@ -274,7 +274,7 @@ fn stages_by_name() -> Vec<Answer> {
         configs.push((sampler.name(), StagesConfig { sampler, ..default }));
     }
     for matcher in [
-        MatcherChoice::DenseRelaxation,
+        MatcherChoice::RelaxationLabelling,
         MatcherChoice::CoherentPointDrift,
         MatcherChoice::LinearAssignment,
         MatcherChoice::NearestNeighbour,

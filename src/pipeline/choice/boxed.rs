@@ -4,8 +4,8 @@ use crate::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
 use crate::matching::{
-    CoherentPointDrift, DenseRelaxation, LinearAssignment, NearestNeighbour, PointMatcher,
-    RelaxationMatcher, RelaxationOptions, Search,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, PointMatcher,
+    RelaxationLabelling, Search, SoftassignOptions,
 };
 use crate::pipeline::stages::BoxedWarp;
 use crate::pipeline::strain_spline::StrainSpline;
@@ -134,10 +134,10 @@ impl SamplerChoice {
 impl MatcherChoice {
     pub(in crate::pipeline) fn boxed(self) -> BoxedMatcher {
         match self {
-            Self::Relaxation => Box::new(RelaxationMatcher::new(
-                RelaxationOptions::default().search(Search::Near),
+            Self::AnnealedSoftassign => Box::new(AnnealedSoftassign::new(
+                SoftassignOptions::default().with_search(Search::Near),
             )),
-            Self::DenseRelaxation => Box::new(DenseRelaxation::default()),
+            Self::RelaxationLabelling => Box::new(RelaxationLabelling::default()),
             Self::CoherentPointDrift => Box::new(CoherentPointDrift::default()),
             Self::LinearAssignment => Box::new(LinearAssignment::default()),
             Self::NearestNeighbour => Box::new(NearestNeighbour::new()),

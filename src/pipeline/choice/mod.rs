@@ -121,10 +121,10 @@ choice! {
     /// assert!(MatcherChoice::ALL.iter().all(|m| m.name().parse() == Ok(*m)));
     /// ```
     MatcherChoice, "matcher":
-    /// [`RelaxationMatcher`](crate::matching::RelaxationMatcher), searching near by.
-    Relaxation = "relaxation",
-    /// [`DenseRelaxation`](crate::matching::DenseRelaxation): the paper's method as printed.
-    DenseRelaxation = "dense-relaxation",
+    /// [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by.
+    AnnealedSoftassign = "annealed-softassign",
+    /// [`RelaxationLabelling`](crate::matching::RelaxationLabelling): the paper's method as printed.
+    RelaxationLabelling = "relaxation-labelling",
     /// [`CoherentPointDrift`](crate::matching::CoherentPointDrift).
     CoherentPointDrift = "coherent-point-drift",
     /// [`LinearAssignment`](crate::matching::LinearAssignment).

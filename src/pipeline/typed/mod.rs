@@ -11,7 +11,7 @@ use super::stages::{BoxedWarp, Stages};
 use super::strain_spline::StrainSpline;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
-use crate::matching::{PointMatcher, RelaxationMatcher, RelaxationOptions, Search};
+use crate::matching::{AnnealedSoftassign, PointMatcher, Search, SoftassignOptions};
 use crate::sfs::{
     ControlPointSampler, Eikonal, EquallySpaced, Lighting, Rim, SurfaceReconstruction,
 };
@@ -27,7 +27,7 @@ use std::sync::Arc;
 /// | `C` | frame to contact and force | [`LightContact`] with a linear calibration |
 /// | `R` | image to surface | [`Eikonal`], frontal light, zero height at the rim |
 /// | `P` | surface to control points | [`EquallySpaced`] |
-/// | `M` | points to matches | [`RelaxationMatcher`] |
+/// | `M` | points to matches | [`AnnealedSoftassign`] |
 /// | `W` | weighted matches to the warp whose gradient is strained | [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation |
 /// | `S` | displacement gradient to strain | [`GreenLagrange`] |
 ///
@@ -55,7 +55,7 @@ pub struct Pipeline<
     C = LightContact,
     R = Eikonal<f64>,
     P = EquallySpaced,
-    M = RelaxationMatcher,
+    M = AnnealedSoftassign,
     W = StrainSpline,
     S = GreenLagrange,
 > {
@@ -102,7 +102,9 @@ impl<C> Pipeline<C> {
             surface: surface.unwrap_or_else(|_| Eikonal::new(Lighting::frontal())),
             sampler: EquallySpaced::new(),
             // Two loads of one contact lie near each other: one run from where they are.
-            matcher: RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near)),
+            matcher: AnnealedSoftassign::new(
+                SoftassignOptions::default().with_search(Search::Near),
+            ),
             warp: StrainSpline,
             strain: GreenLagrange,
             settings: Settings::new(object),

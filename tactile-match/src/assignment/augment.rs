@@ -166,7 +166,7 @@ impl<T: RealField + Copy> Search<T> {
         }
     }
 
-    /// `u_i` from complementary slackness; nought for a row left over.
+    /// `u_i` from complementary slackness; zero for a row left over.
     pub(super) fn row_price(&self, costs: &[T], row: usize) -> T {
         match self.column_of[row] {
             NONE => T::zero(),

@@ -5,7 +5,7 @@
 //! rectangular form: augmenting row reduction assigns most rows, shortest augmenting paths (Dijkstra's, on the
 //! reduced costs `c_ij − u_i − v_j ≥ 0`) the rest. `O(min(n, m)² max(n, m))` at worst, on point sets close to `O(n m)`.
 //!
-//! The prices `u`, `v` prove the answer: `u_i + v_j ≤ c_ij`, equal on the chosen pairs; they are nought for rows and columns
+//! The prices `u`, `v` prove the answer: `u_i + v_j ≤ c_ij`, equal on the chosen pairs; they are zero for rows and columns
 //! left over. To maximise, negate the costs; to forbid a pair, let it cost `+∞`.
 
 mod augment;

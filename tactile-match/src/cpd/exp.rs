@@ -1,6 +1,6 @@
 //! eˣ in loops that vectorise.
 
-/// `e^x` for `x <= 0`, to about one unit in the last place; exactly nought below −708, where a product with anything of size one
+/// `e^x` for `x <= 0`, to about one unit in the last place; exactly zero below −708, where a product with anything of size one
 /// would be lost anyway. No branch and no table, so that a loop over it vectorises; plain products and sums, so that every
 /// machine gives the same bits.
 #[inline(always)]

@@ -204,7 +204,7 @@ impl<const D: usize> DriftWorkspace<D> {
         )
     }
 
-    /// `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`; a tenth of the tolerance where rounding makes it nought or less.
+    /// `σ² = Σ P_mn |x_n − T(y_m)|² / (D Σ P_mn)`; a tenth of the tolerance where rounding makes it zero or less.
     fn update_variance(&mut self, tolerance: f64) {
         let mass: f64 = self.posterior.model_mass.iter().sum();
         if mass <= f64::MIN_POSITIVE {

@@ -16,8 +16,8 @@ use tactile_tps::{Scalar, Warp};
 /// let stretch = |p: &Point2<f64>| Point2::new(1.1 * p.x + 0.5, p.y);
 /// let target: Vec<_> = model.iter().map(stretch).collect();
 /// let mut workspace = DriftWorkspace::new();
-/// let options = DriftOptions { motion: Motion::Affine, ..Default::default() };
-/// CoherentPointDrift::new(options)?.register_with(&mut workspace, &model, &target)?;
+/// let options = DriftOptions::default().with_motion(Motion::Affine)?;
+/// CoherentPointDrift::new(options).register_with(&mut workspace, &model, &target)?;
 /// let (warp, elsewhere) = (workspace.warp(), Point2::new(7.0, -1.0)); // no point of the model
 /// assert!((warp.apply(&elsewhere) - stretch(&elsewhere)).norm() < 1e-3);
 /// assert!((warp.jacobian(&elsewhere).determinant() - 1.1_f64).abs() < 1e-3); // areas grow by a tenth

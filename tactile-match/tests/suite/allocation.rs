@@ -1,7 +1,7 @@
 //! A batch through one workspace allocates nothing after its first match.
 use nalgebra::Point2;
 use std::ops::ControlFlow;
-use tactile_match::{RelaxationMatcher, RelaxationWorkspace};
+use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
 
 #[test]
 fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
@@ -23,8 +23,8 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
             .collect()
     };
     let targets = [target(0.1, 0.0), target(0.1, 0.05)];
-    let matcher = RelaxationMatcher::default();
-    let mut workspace = RelaxationWorkspace::new();
+    let matcher = AnnealedSoftassign::default();
+    let mut workspace = SoftassignWorkspace::new();
     let mut run = |k: usize| {
         let go = |_, _| ControlFlow::Continue(());
         let found = matcher
@@ -52,8 +52,8 @@ fn a_dense_set_allocates_nothing_the_second_time() {
     };
     let model: Vec<_> = (0..700).map(|i| place(i, 0.0)).collect();
     let target: Vec<_> = (0..700).map(|i| place(i, 0.15)).collect();
-    let matcher = RelaxationMatcher::default();
-    let mut workspace = RelaxationWorkspace::new();
+    let matcher = AnnealedSoftassign::default();
+    let mut workspace = SoftassignWorkspace::new();
     let mut run = || {
         let go = |_, _| ControlFlow::Continue(());
         matcher

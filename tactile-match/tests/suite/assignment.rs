@@ -42,7 +42,7 @@ fn brute_force(
 /// test. Returns the least cost.
 fn slow_hungarian(costs: &[f64], rows: usize, columns: usize) -> f64 {
     let (mut u, mut v) = (vec![0.0; rows + 1], vec![0.0; columns + 1]);
-    let mut row_of = vec![0; columns + 1]; // counted from one; nought is none
+    let mut row_of = vec![0; columns + 1]; // counted from one; zero is none
     for row in 1..=rows {
         let (mut slack, mut used, mut way) = (
             vec![f64::INFINITY; columns + 1],

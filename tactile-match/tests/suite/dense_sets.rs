@@ -1,7 +1,7 @@
 //! Sets whose displacements are many times their spacing, evenly spread: annealing alone leaves parts one point aside.
 use nalgebra::{Point, Point2, Point3};
 use std::ops::ControlFlow;
-use tactile_match::{PointMatcher, RelaxationMatcher, RelaxationWorkspace};
+use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignWorkspace};
 
 /// A number of (−1, 1), without pattern and the same on every machine.
 fn scatter(i: usize, k: usize) -> f64 {
@@ -38,14 +38,14 @@ fn warp(p: &Point2<f64>, angle: f64) -> Point2<f64> {
 fn score<const D: usize>(
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
-    strays: usize,
+    outliers: usize,
 ) -> (usize, usize) {
     let n = model.len();
-    // Row i of the model is row (7 i + 3) mod n of the target, strays follow.
-    assert!(target.len() == n + strays && !n.is_multiple_of(7));
+    // Row i of the model is row (7 i + 3) mod n of the target, outliers follow.
+    assert!(target.len() == n + outliers && !n.is_multiple_of(7));
     let mut shuffled = target.to_vec();
     (0..n).for_each(|i| shuffled[(7 * i + 3) % n] = target[i]);
-    let found = RelaxationMatcher::default()
+    let found = AnnealedSoftassign::default()
         .match_points(model, &shuffled)
         .unwrap();
     let right = (0..n)
@@ -68,16 +68,16 @@ fn no_part_of_a_turned_disc_lies_one_point_aside() {
 }
 
 #[test]
-fn strays_and_a_little_noise_do_not_mislead_the_patterns() {
+fn outliers_and_a_little_noise_do_not_mislead_the_patterns() {
     let model = sunflower(1000);
-    // A fiftieth of the spacing, and one stray a twenty points.
+    // A fiftieth of the spacing, and one outlier a twenty points.
     let noisy = |(i, p): (usize, &Point2<f64>)| {
         warp(p, 0.1) + 0.001 * Point2::new(scatter(i + 7, 0), scatter(i + 7, 1)).coords
     };
     let mut target: Vec<_> = model.iter().enumerate().map(noisy).collect();
     target.extend((0..50).map(|i| Point2::new(1.1 * scatter(i + 3, 1), 1.1 * scatter(i + 3, 0))));
     let (right, wrong) = score(&model, &target, 50);
-    // A stray that lies closer than the noise to a place takes it rightly, as far as any matcher can tell.
+    // An outlier that lies closer than the noise to a place takes it rightly, as far as any matcher can tell.
     assert!(right >= 998 && wrong <= 2, "{right} right, {wrong} wrong");
 }
 
@@ -106,8 +106,8 @@ fn what_a_workspace_did_before_changes_no_answer() {
             .collect();
         (model, target)
     };
-    let matcher = RelaxationMatcher::default();
-    let run = |workspace: &mut RelaxationWorkspace<2>,
+    let matcher = AnnealedSoftassign::default();
+    let run = |workspace: &mut SoftassignWorkspace<2>,
                (model, target): &(Vec<Point2<f64>>, Vec<Point2<f64>>)| {
         let go = |_, _| ControlFlow::Continue(());
         let found = matcher
@@ -117,10 +117,10 @@ fn what_a_workspace_did_before_changes_no_answer() {
     };
     // In the first scene patterns are looked at, with a wider spacing than the second's, whose first run is nearly right.
     let (coarse, dense) = (scene(500, 0.01), scene(700, 0.006));
-    let mut used = RelaxationWorkspace::new();
+    let mut used = SoftassignWorkspace::new();
     run(&mut used, &coarse);
     assert_eq!(
         run(&mut used, &dense),
-        run(&mut RelaxationWorkspace::new(), &dense)
+        run(&mut SoftassignWorkspace::new(), &dense)
     );
 }

@@ -15,7 +15,6 @@ fn drift<const D: usize>(
     target: &[Point<f64, D>],
 ) -> Matching<f64, D> {
     CoherentPointDrift::new(options)
-        .expect("valid options")
         .match_points(model, target)
         .expect("valid points")
 }
@@ -95,26 +94,20 @@ fn check_against_slow<const D: usize>(
         &bend(&scattered::<f64, D>(columns, seed), 0.1),
         &Stream::new(seed).permutation(columns),
     );
-    let options = DriftOptions {
-        motion: Motion::NonRigid {
-            beta,
-            lambda,
-            rank: None,
-        },
-        outlier_weight: w,
-        tolerance: 0.0,
-        max_iterations: 1,
-        normalization: Normalization::Off,
+    let motion = Motion::NonRigid {
+        beta,
+        lambda,
+        rank: None,
     };
+    let options = DriftOptions::default()
+        .with_motion(motion)
+        .and_then(|options| options.with_outlier_weight(w))
+        .and_then(|options| options.with_tolerance(0.0))
+        .expect("valid options")
+        .with_normalization(Normalization::Off);
     let (expected, iterations) = slow_non_rigid(&model, &target, (beta, lambda, w), 8);
-    let found = drift(
-        DriftOptions {
-            max_iterations: iterations,
-            ..options
-        },
-        &model,
-        &target,
-    );
+    let options = options.with_max_iterations(iterations).expect("a limit");
+    let found = drift(options, &model, &target);
     assert!(
         largest_step(&found.warped, &expected) <= 1e-7,
         "{}",
@@ -140,7 +133,7 @@ proptest! {
     ) {
         let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
         let normalization = if each { Normalization::Each } else { Normalization::Model };
-        let options = DriftOptions { motion, normalization, ..Default::default() };
+        let options = DriftOptions::default().with_motion(motion).unwrap().with_normalization(normalization);
         let model = scattered::<f64, 3>(30, seed);
         let target = bend(&model, 0.05);
         let scale = 10_f64.powi(exponent);
@@ -156,7 +149,7 @@ proptest! {
     #[test]
     fn a_common_rotation_turns_the_answer(seed in 0..1000_u64, angle in -3.0..3.0_f64, motion in 0..4_usize) {
         let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
-        let options = DriftOptions { motion, ..Default::default() };
+        let options = DriftOptions::default().with_motion(motion).unwrap();
         let model = scattered::<f64, 2>(30, seed);
         let target = bend(&model, 0.05);
         let turn = rotation::<f64, 2>(angle);
@@ -173,7 +166,7 @@ proptest! {
         let shear = nalgebra::Matrix3::new(1.0, 0.2, 0.0, 0.0, 0.9, 0.1, 0.1, 0.0, 1.1);
         for (motion, map) in [(Motion::Rigid, turn), (Motion::Similarity, turn * size), (Motion::Affine, shear)] {
             let target: Vec<_> = model.iter().map(|p| map * p + Vector3::new(3.0, -1.0, 0.5)).collect();
-            let options = DriftOptions { motion, tolerance: 1e-12, ..Default::default() };
+            let options = DriftOptions::default().with_motion(motion).unwrap().with_tolerance(1e-12).unwrap();
             let order = Stream::new(seed).permutation(40);
             let found = drift(options, &model, &reordered(&target, &order));
             prop_assert!(largest_step(&found.warped, &target) <= 1e-5, "{:?}: {}", motion, largest_step(&found.warped, &target));
@@ -215,10 +208,7 @@ fn a_low_rank_kernel_is_close() {
     };
     let [whole, thirty] = [None, Some(30)].map(|rank| {
         drift(
-            DriftOptions {
-                motion: motion(rank),
-                ..Default::default()
-            },
+            DriftOptions::default().with_motion(motion(rank)).unwrap(),
             &model,
             &target,
         )
@@ -237,11 +227,10 @@ fn outliers_are_left_without_a_partner() {
     let mut target = bend(&model, 0.03);
     let mut stream = Stream::new(4);
     target.extend((0..15).map(|_| Point2::new(1.5 + stream.next(), 3.0 * stream.next())));
-    let options = DriftOptions {
-        outlier_weight: 0.2,
-        normalization: Normalization::Model,
-        ..Default::default()
-    };
+    let options = DriftOptions::default()
+        .with_outlier_weight(0.2)
+        .unwrap()
+        .with_normalization(Normalization::Model);
     let found = drift(options, &model, &target);
     assert!(
         (0..60).all(|i| found.assignment[i] == Some(i)),
@@ -292,11 +281,8 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
         Motion::Affine,
         Motion::NON_RIGID,
     ] {
-        let matcher = CoherentPointDrift::new(DriftOptions {
-            motion,
-            ..Default::default()
-        })
-        .unwrap();
+        let options = DriftOptions::default().with_motion(motion).unwrap();
+        let matcher = CoherentPointDrift::new(options);
         let found = matcher.match_with(&mut workspace, &model, &target).unwrap();
         let warp = workspace.warp();
         let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
@@ -322,73 +308,32 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
 #[test]
 fn options_out_of_range_are_typed_errors() {
     let good = DriftOptions::default();
-    let non_rigid = |beta, lambda| DriftOptions {
-        motion: Motion::NonRigid {
-            beta,
-            lambda,
-            rank: None,
-        },
-        ..good
+    let non_rigid = |beta, lambda, rank| good.with_motion(Motion::NonRigid { beta, lambda, rank });
+    let refused = |set: Result<DriftOptions, MatchError>, name| {
+        let error = set.unwrap_err();
+        assert!(
+            matches!(error, MatchError::InvalidOption { option, .. } if option == name),
+            "{error}"
+        );
     };
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
-        for (name, options) in [
-            (
-                "outlier_weight",
-                DriftOptions {
-                    outlier_weight: bad,
-                    ..good
-                },
-            ),
-            (
-                "tolerance",
-                DriftOptions {
-                    tolerance: bad,
-                    ..good
-                },
-            ),
-            ("beta", non_rigid(bad, 1.0)),
-            ("lambda", non_rigid(1.0, bad)),
-        ] {
-            let error = CoherentPointDrift::new(options).unwrap_err();
-            assert!(
-                matches!(error, MatchError::InvalidOption { option, .. } if option == name),
-                "{error}"
-            );
-        }
+        refused(good.with_outlier_weight(bad), "outlier_weight");
+        refused(good.with_tolerance(bad), "tolerance");
+        refused(non_rigid(bad, 1.0, None), "beta");
+        refused(non_rigid(1.0, bad, None), "lambda");
     }
-    let rank = Motion::NonRigid {
-        beta: 1.0,
-        lambda: 1.0,
-        rank: Some(0),
-    };
-    for options in [
-        DriftOptions {
-            outlier_weight: 1.0,
-            ..good
-        },
-        DriftOptions {
-            max_iterations: 0,
-            ..good
-        },
-        DriftOptions {
-            motion: rank,
-            ..good
-        },
-        non_rigid(0.0, 1.0),
-        non_rigid(1.0, 0.0),
-    ] {
-        assert!(CoherentPointDrift::new(options).is_err(), "{options:?}");
-    }
+    refused(good.with_outlier_weight(1.0), "outlier_weight");
+    refused(good.with_max_iterations(0), "max_iterations");
+    refused(non_rigid(1.0, 1.0, Some(0)), "rank");
+    refused(non_rigid(0.0, 1.0, None), "beta");
+    refused(non_rigid(1.0, 0.0, None), "lambda");
 }
 
 #[test]
 fn the_report_says_why_it_stopped() {
     let model = scattered::<f64, 2>(20, 8);
     let target = bend(&model, 0.05);
-    let few = DriftOptions {
-        max_iterations: 2,
-        ..Default::default()
-    };
+    let few = DriftOptions::default().with_max_iterations(2).unwrap();
     assert_eq!(
         drift(few, &model, &target).report.stop,
         StopReason::IterationLimit

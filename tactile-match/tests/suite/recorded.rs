@@ -7,11 +7,11 @@ use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{Point, Point2, SVector};
 use std::fmt::Write;
 use std::path::Path;
-use tactile_match::dense::Neighbourhood;
+use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Matching,
-    Motion, NearestNeighbour, Outliers, PointMatcher, RelaxationMatcher, RelaxationOptions,
-    Rotation, Search, SparseRelaxation, WarmStart,
+    AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
+    Matching, Motion, NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation,
+    Search, SoftassignOptions, SparseRelaxationLabelling, WarmStart,
 };
 
 /// A model and its target.
@@ -118,34 +118,33 @@ fn answers() -> String {
     of_dimension::<2>(&mut lines);
     of_dimension::<3>(&mut lines);
     let scene = dense_scene();
-    let found = RelaxationMatcher::default().match_points(&scene.model, &scene.target);
+    let found = AnnealedSoftassign::default().match_points(&scene.model, &scene.target);
     lines.push(digest("default, dense set", &found.expect("finite points")));
     lines.join("\n") + "\n"
 }
 
 fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
-    let options = RelaxationOptions::default();
-    let fast = |options| Box::new(RelaxationMatcher::new(options));
+    let options = SoftassignOptions::default();
+    let fast = |options| Box::new(AnnealedSoftassign::new(options));
     let drift = |motion| {
-        let options = DriftOptions {
-            motion,
-            ..Default::default()
-        };
-        Box::new(CoherentPointDrift::new(options).expect("valid options"))
+        let options = DriftOptions::default().with_motion(motion);
+        Box::new(CoherentPointDrift::new(options.expect("a valid motion")))
     };
-    let few = DenseOptions {
-        neighbourhood: Neighbourhood::Nearest(6),
-        ..Default::default()
-    };
-    let dense = DenseRelaxation::new(few).expect("valid options");
-    let sparse = SparseRelaxation::new(few, 10).expect("valid options");
-    let share = options.stray_share(0.2).expect("valid share");
+    let few = LabellingOptions::default()
+        .with_neighbourhood(Neighbourhood::Nearest(6))
+        .expect("neighbours");
+    let dense = RelaxationLabelling::new(few);
+    let sparse = SparseRelaxationLabelling::new(few, 10).expect("valid options");
+    let share = options.with_outlier_ratio(0.2).expect("valid share");
     let matchers: [(&str, Box<dyn PointMatcher<f64, D>>); 12] = [
         ("default", fast(options)),
-        ("near", fast(options.search(Search::Near))),
-        ("any rotation", fast(options.rotation(Rotation::Any))),
+        ("near", fast(options.with_search(Search::Near))),
+        ("any rotation", fast(options.with_rotation(Rotation::Any))),
         ("outlier ratio 0.2", fast(share)),
-        ("model outliers", fast(options.outliers(Outliers::Model))),
+        (
+            "model outliers",
+            fast(options.with_outliers(Outliers::Model)),
+        ),
         ("dense relaxation", Box::new(dense)),
         ("sparse relaxation", Box::new(sparse)),
         ("drift", drift(Motion::NON_RIGID)),
@@ -162,7 +161,7 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
         }
     }
     let scenes = scenes::<D>();
-    let (model, matcher) = (&scenes[0].model, fast(options.search(Search::Near)));
+    let (model, matcher) = (&scenes[0].model, fast(options.with_search(Search::Near)));
     let mut warm = WarmStart::new();
     for step in 1..4 {
         let target = bend(model, 0.02 * f64::from(step));

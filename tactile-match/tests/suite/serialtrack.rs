@@ -5,7 +5,7 @@
 use crate::common::{Stream, reordered};
 use nalgebra::Point;
 use std::path::PathBuf;
-use tactile_match::{PointMatcher, RelaxationMatcher};
+use tactile_match::{AnnealedSoftassign, PointMatcher};
 
 /// Rows of `C` numbers; none where the file is not there. The line of names is no row.
 fn read<const C: usize>(file: &str) -> Option<Vec<[f64; C]>> {
@@ -43,7 +43,7 @@ fn check<const D: usize>(kind: &str, k: usize) {
     };
     let (model, target) = (points(&model), points(&target));
     let order = Stream::new(1).permutation(target.len()); // the file keeps the order of frame 0
-    let matching = RelaxationMatcher::default()
+    let matching = AnnealedSoftassign::default()
         .match_points(&model, &reordered(&target, &order))
         .expect("good points");
     let partner = |i: usize| matching.assignment[i].map(|j| order[j] as f64);

@@ -3,8 +3,8 @@ use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
 use tactile_match::{
-    CoherentPointDrift, LinearAssignment, MatchError, Matching, PointMatcher, RelaxationMatcher,
-    RelaxationOptions, Search, WarmStart,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching, PointMatcher,
+    Search, SoftassignOptions, WarmStart,
 };
 
 /// A number of (−1, 1), without pattern and the same on every machine.
@@ -34,8 +34,8 @@ fn frame(model: &[Point3<f64>], k: usize, noise: f64) -> Vec<Point3<f64>> {
         .collect()
 }
 
-fn near() -> RelaxationMatcher {
-    RelaxationMatcher::new(RelaxationOptions::default().search(Search::Near))
+fn near() -> AnnealedSoftassign {
+    AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near))
 }
 
 fn agree(one: &Matching<f64, 3>, other: &Matching<f64, 3>, tolerance: f64) {
@@ -73,12 +73,12 @@ fn a_target_far_from_the_last_is_matched_all_the_same() {
     for (k, grown) in [(1, 1.0), (2, 1.25), (1, 0.85)] {
         let squeezed = |p: Point3<f64>| Point3::new(grown * p.x, p.y / grown, p.z);
         let target: Vec<_> = frame(&model, k, 0.0).into_iter().map(squeezed).collect();
-        let next = RelaxationMatcher::default()
+        let next = AnnealedSoftassign::default()
             .match_next(&mut warm, &model, &target)
             .unwrap();
         agree(
             &next,
-            &RelaxationMatcher::default()
+            &AnnealedSoftassign::default()
                 .match_points(&model, &target)
                 .unwrap(),
             1e-12,
@@ -165,6 +165,6 @@ fn every_matcher_keeps_its_own_state() {
     }
     assert_eq!(*warm.state::<usize>(), 3);
     // Another matcher with one starts cold.
-    let found = RelaxationMatcher::default().match_next(&mut warm, &model, &target);
+    let found = AnnealedSoftassign::default().match_next(&mut warm, &model, &target);
     assert!(found.is_ok() && *warm.state::<usize>() == 0);
 }

@@ -2,10 +2,11 @@
 
 use nalgebra::{Point, RealField, SMatrix, SVector};
 use proptest::prelude::*;
-use tactile_match::dense::Neighbourhood;
+use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
-    CoherentPointDrift, DenseOptions, DenseRelaxation, DriftOptions, LinearAssignment, Matching,
-    Motion, NearestNeighbour, PointMatcher, RelaxationMatcher, SparseRelaxation,
+    AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
+    Matching, Motion, NearestNeighbour, PointMatcher, RelaxationLabelling,
+    SparseRelaxationLabelling,
 };
 use tactile_tps::Scalar;
 
@@ -14,22 +15,19 @@ pub(crate) type Matchers<T, const D: usize> = Vec<(&'static str, Box<dyn PointMa
 /// The matchers that every test file runs; a new one is added here and nowhere else.
 pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
     let drift = |motion| {
-        CoherentPointDrift::new(DriftOptions {
-            motion,
-            ..Default::default()
-        })
-        .expect("valid options")
+        let options = DriftOptions::default().with_motion(motion);
+        CoherentPointDrift::new(options.expect("a valid motion"))
     };
     // Eight neighbours instead of half of all points: what is checked here does not need the time of the latter.
-    let options = DenseOptions {
-        neighbourhood: Neighbourhood::Nearest(8),
-        ..Default::default()
-    };
-    let dense = DenseRelaxation::new(options).expect("valid options");
+    let options = LabellingOptions::default().with_neighbourhood(Neighbourhood::Nearest(8));
+    let dense = RelaxationLabelling::new(options.expect("neighbours"));
     vec![
-        ("relaxation", Box::new(RelaxationMatcher::default())),
+        ("relaxation", Box::new(AnnealedSoftassign::default())),
         ("dense relaxation", Box::new(dense)),
-        ("sparse relaxation", Box::new(SparseRelaxation::default())),
+        (
+            "sparse relaxation",
+            Box::new(SparseRelaxationLabelling::default()),
+        ),
         ("nearest neighbour", Box::new(NearestNeighbour::new())),
         ("linear assignment", Box::new(LinearAssignment::new())),
         (

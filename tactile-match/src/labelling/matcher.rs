@@ -1,0 +1,162 @@
+//! The whole method: first probabilities, relaxation, spline, and again.
+
+use super::{
+    CompatibilityRule, LabellingOptions, MatchMatrix, NeighbourGraph, first_matches, sinkhorn,
+    support_by, update,
+};
+use crate::frame::Frame;
+use crate::validate::point_sets;
+use crate::{MatchError, Matching, PointMatcher, StopReason};
+use nalgebra::Point;
+use tactile_tps::{Scalar, Smoothing};
+
+/// Edge pairs whose compatibilities are kept between sweeps; more than these are computed anew every time.
+const TABLE_LIMIT: usize = 1 << 25;
+
+/// The paper's matching method (13)–(20) as printed: relaxation labelling, then a thin-plate spline, in turn.
+///
+/// Every outer iteration joins the warped model and the target to graphs, compares their shape contexts for the first M, relaxes M by
+/// (19), (20) and Sinkhorn's normalisation until it no longer changes, and fits a thin-plate spline to the mean partners. Each sweep costs
+/// `O(I J A B)`, seconds for 105 points with neighbourhoods of the median radius; use it to check, not to work.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{PointMatcher, RelaxationLabelling};
+/// let model: Vec<_> = (0..16).map(|k| f64::from(k)).map(|k| Point2::new(k % 4.0 + 0.1 * k.sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().rev().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
+/// let matching = RelaxationLabelling::default().match_points(&model, &target)?;
+/// assert!((0..16).all(|i| matching.assignment[i] == Some(15 - i)));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RelaxationLabelling {
+    options: LabellingOptions,
+}
+
+impl RelaxationLabelling {
+    /// With these options.
+    #[must_use]
+    pub fn new(options: LabellingOptions) -> Self {
+        Self { options }
+    }
+
+    /// One outer iteration's match matrix: first probabilities of `model` (as warped so far) and `target`, then relaxation.
+    ///
+    /// # Panics
+    /// Never for finite points.
+    #[must_use]
+    pub(crate) fn relax<T: Scalar, const D: usize>(
+        &self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> MatchMatrix<T> {
+        let options = &self.options;
+        let graphs =
+            [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
+        let compatibilities = Compatibilities::new(&graphs, options.rule(&graphs));
+        let first = first_matches(model, target, options.temperature, options.slack);
+        relax_with(options, first, |m| {
+            support_by(m, &graphs[0], &graphs[1], |x, y| compatibilities.of(x, y))
+        })
+    }
+}
+
+/// (19), (20) and normalisation in turn until M no longer changes.
+pub(super) fn relax_with<T: Scalar>(
+    options: &LabellingOptions,
+    mut m: MatchMatrix<T>,
+    support: impl Fn(&MatchMatrix<T>) -> Vec<T>,
+) -> MatchMatrix<T> {
+    for _ in 0..options.sweeps {
+        let before = m.clone();
+        let support = support(&m);
+        let gain = slack_gain(&support, m.columns(), options.slack);
+        update(&mut m, &support, gain);
+        sinkhorn(&mut m, options.sinkhorn_sweeps, T::zero());
+        if m.largest_change(&before) <= nalgebra::convert(options.tolerance) {
+            break;
+        }
+    }
+    m
+}
+
+/// The outer iterations: `relax` gives the match matrix of the warped model and the target, the spline warps the model, and again.
+pub(super) fn match_with<T: Scalar, const D: usize>(
+    options: &LabellingOptions,
+    model: &[Point<T, D>],
+    target: &[Point<T, D>],
+    relax: impl Fn(&[Point<T, D>], &[Point<T, D>]) -> MatchMatrix<T>,
+) -> Result<Matching<T, D>, MatchError> {
+    point_sets(model, target)?;
+    let frames = [Frame::of(model), Frame::of(target)];
+    let enter = |frame: &Frame<D>, points: &[Point<T, D>]| -> Vec<Point<T, D>> {
+        points
+            .iter()
+            .map(|p| Point::from(frame.inside(p).map(nalgebra::convert)))
+            .collect()
+    };
+    let (start, goal) = (enter(&frames[0], model), enter(&frames[1], target));
+    let mut run = super::outcome::Run::new(start, goal, frames[1]);
+    for k in 0..options.max_iterations {
+        run.matches = relax(&run.warped, &run.target);
+        run.record_energy(options.neighbourhood);
+        let lambda = options.smoothing * 0.5_f64.powi(i32::try_from(k).unwrap_or(i32::MAX));
+        let step = run.fit(Smoothing::Lambda(nalgebra::convert(lambda)));
+        if step <= nalgebra::convert(1e-3) {
+            run.stop = StopReason::Converged;
+            break;
+        }
+    }
+    Ok(run.finish(model, target))
+}
+
+/// Gain of the slack: a share of what the best partners get, so that it means the same for every neighbourhood.
+fn slack_gain<T: Scalar>(support: &[T], columns: usize, share: f64) -> T {
+    let rows = support.len() / columns;
+    let best = support
+        .chunks_exact(columns)
+        .map(|row| row.iter().fold(T::zero(), |m, &s| m.max(s)));
+    best.fold(T::zero(), |sum, s| sum + s) * nalgebra::convert(share / rows as f64)
+}
+
+/// `r` of all edge pairs: tabulated while that is possible, computed otherwise.
+struct Compatibilities<'a, T: Scalar, const D: usize> {
+    graphs: &'a [NeighbourGraph<T, D>; 2],
+    rule: CompatibilityRule<T>,
+    table: Vec<T>,
+}
+
+impl<'a, T: Scalar, const D: usize> Compatibilities<'a, T, D> {
+    fn new(graphs: &'a [NeighbourGraph<T, D>; 2], rule: CompatibilityRule<T>) -> Self {
+        let [x, y] = [0, 1].map(|g| graphs[g].edges());
+        let mut table = Vec::new();
+        if x.len().saturating_mul(y.len()) <= TABLE_LIMIT {
+            table.extend(x.iter().flat_map(|x| y.iter().map(move |y| rule.of(x, y))));
+        }
+        Self {
+            graphs,
+            rule,
+            table,
+        }
+    }
+
+    fn of(&self, x: usize, y: usize) -> T {
+        let [model, target] = [0, 1].map(|g| self.graphs[g].edges());
+        match self.table.get(x * target.len() + y) {
+            Some(&r) => r,
+            None => self.rule.of(&model[x], &target[y]),
+        }
+    }
+}
+
+impl<T: Scalar, const D: usize> PointMatcher<T, D> for RelaxationLabelling {
+    fn match_points(
+        &self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
+        match_with(&self.options, model, target, |model, target| {
+            self.relax(model, target)
+        })
+    }
+}

@@ -1,0 +1,180 @@
+//! Options of relaxation labelling.
+
+use super::{Compatibility, CompatibilityRule, LengthMaximum, NeighbourGraph, Neighbourhood};
+use crate::MatchError;
+use crate::validate::{at_least_one, option_within};
+use tactile_tps::Scalar;
+
+/// Options of [`RelaxationLabelling`](crate::RelaxationLabelling). Lengths refer to sets of root mean square radius one.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::labelling::{LabellingOptions, LengthMaximum, Neighbourhood};
+/// use tactile_match::{MatchError, PointMatcher, RelaxationLabelling};
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
+/// let options = LabellingOptions::default()
+///     .with_neighbourhood(Neighbourhood::Nearest(4))?
+///     .with_length_maximum(LengthMaximum::Global)
+///     .with_temperature(0.2)?
+///     .with_slack(0.1)?
+///     .with_sweeps(20)?
+///     .with_tolerance(1e-3)?
+///     .with_sinkhorn_sweeps(5)?
+///     .with_smoothing(0.5)?
+///     .with_max_iterations(3)?;
+/// let matching = RelaxationLabelling::new(options).match_points(&model, &target)?;
+/// assert!((0..12).all(|i| matching.assignment[i] == Some(i)) && matching.report.iterations <= 3);
+/// assert!(matches!(options.with_slack(2.0), Err(MatchError::InvalidOption { option: "slack", .. })));
+/// # Ok::<(), MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LabellingOptions {
+    pub(super) neighbourhood: Neighbourhood,
+    pub(super) compatibility: Compatibility,
+    pub(super) length_maximum: LengthMaximum,
+    pub(super) temperature: f64,
+    pub(super) slack: f64,
+    pub(super) sweeps: usize,
+    pub(super) tolerance: f64,
+    pub(super) sinkhorn_sweeps: usize,
+    pub(super) smoothing: f64,
+    pub(super) max_iterations: usize,
+}
+
+impl Default for LabellingOptions {
+    fn default() -> Self {
+        Self {
+            neighbourhood: Neighbourhood::MedianRadius,
+            compatibility: Compatibility::Full,
+            length_maximum: LengthMaximum::PerPair,
+            temperature: 0.1,
+            slack: 0.2,
+            sweeps: 10,
+            tolerance: 0.01,
+            sinkhorn_sweeps: 10,
+            smoothing: 1.0,
+            max_iterations: 10,
+        }
+    }
+}
+
+impl LabellingOptions {
+    /// Sets which points are neighbours (13).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for no neighbour at all.
+    pub fn with_neighbourhood(mut self, neighbourhood: Neighbourhood) -> Result<Self, MatchError> {
+        if let Neighbourhood::Nearest(k) = neighbourhood {
+            at_least_one("neighbourhood", k)?;
+        }
+        self.neighbourhood = neighbourhood;
+        Ok(self)
+    }
+
+    /// Sets which factors the compatibility r (18) has.
+    #[must_use]
+    pub fn with_compatibility(mut self, compatibility: Compatibility) -> Self {
+        self.compatibility = compatibility;
+        self
+    }
+
+    /// Sets what the maximum in α (15) is taken over.
+    #[must_use]
+    pub fn with_length_maximum(mut self, maximum: LengthMaximum) -> Self {
+        self.length_maximum = maximum;
+        self
+    }
+
+    /// Sets the temperature of the first probabilities, over shape-context distances between zero and one (default 0.1).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] unless it is positive and finite.
+    pub fn with_temperature(mut self, temperature: f64) -> Result<Self, MatchError> {
+        option_within(
+            "temperature",
+            temperature,
+            f64::MIN_POSITIVE,
+            f64::MAX,
+            "(0, ∞)",
+        )?;
+        self.temperature = temperature;
+        Ok(self)
+    }
+
+    /// Sets the slack (default 0.2): of the first probabilities relative to the likeliest partner, and of the support relative to the
+    /// mean over the model points of the largest.
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] outside `[0, 1]`.
+    pub fn with_slack(mut self, slack: f64) -> Result<Self, MatchError> {
+        option_within("slack", slack, 0.0, 1.0, "[0, 1]")?;
+        self.slack = slack;
+        Ok(self)
+    }
+
+    /// Sets the most sweeps of relaxation in one outer iteration (default 10).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn with_sweeps(mut self, sweeps: usize) -> Result<Self, MatchError> {
+        at_least_one("sweeps", sweeps)?;
+        self.sweeps = sweeps;
+        Ok(self)
+    }
+
+    /// Sets the change of an entry of M below which relaxation ends (default 0.01).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] outside `[0, 1]`.
+    pub fn with_tolerance(mut self, tolerance: f64) -> Result<Self, MatchError> {
+        option_within("tolerance", tolerance, 0.0, 1.0, "[0, 1]")?;
+        self.tolerance = tolerance;
+        Ok(self)
+    }
+
+    /// Sets the sweeps of normalisation after every update (default 10).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn with_sinkhorn_sweeps(mut self, sweeps: usize) -> Result<Self, MatchError> {
+        at_least_one("sinkhorn_sweeps", sweeps)?;
+        self.sinkhorn_sweeps = sweeps;
+        Ok(self)
+    }
+
+    /// Sets the smoothing λ of the first spline (default 1); it halves from one outer iteration to the next.
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] unless it is finite and not negative.
+    pub fn with_smoothing(mut self, lambda: f64) -> Result<Self, MatchError> {
+        option_within("smoothing", lambda, 0.0, f64::MAX, "[0, ∞)")?;
+        self.smoothing = lambda;
+        Ok(self)
+    }
+
+    /// Sets the most outer iterations (default 10).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn with_max_iterations(mut self, limit: usize) -> Result<Self, MatchError> {
+        at_least_one("max_iterations", limit)?;
+        self.max_iterations = limit;
+        Ok(self)
+    }
+
+    /// How edges of these two graphs are compared.
+    pub(super) fn rule<T: Scalar, const D: usize>(
+        &self,
+        graphs: &[NeighbourGraph<T, D>; 2],
+    ) -> CompatibilityRule<T> {
+        let longest = match self.length_maximum {
+            LengthMaximum::PerPair => None,
+            LengthMaximum::Global => Some(graphs[0].longest().max(graphs[1].longest())),
+        };
+        CompatibilityRule {
+            factors: self.compatibility,
+            longest,
+        }
+    }
+}

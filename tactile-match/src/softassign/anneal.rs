@@ -1,0 +1,287 @@
+//! The alternation: soft assignment at a falling temperature, then the warp that it asks for.
+
+use super::axes::Axes;
+use super::prior::Prior;
+use super::regression::Regression;
+use super::soft_assign::SoftAssignment;
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+
+/// A point whose own match decides its position is not left out altogether.
+const MAX_LEVERAGE: f64 = 0.95;
+/// Soft partners spread less than this, relative to the temperature, are as good as decided: no need to go slowly.
+const DECIDED: f64 = 0.01;
+/// Fall of σ an iteration once the matches are decided.
+const DECIDED_RATE: f64 = 0.3;
+/// Affinities so much fainter than the slack's are left out.
+const FAINTER: f64 = 1e-3;
+/// Least share of outliers an estimate may come to.
+const LEAST_SHARE: f64 = 0.02;
+/// Fixed-point rounds for the share of outliers.
+const SHARE_ROUNDS: usize = 8;
+
+/// Points without a partner: their expected share, and how far each side may have them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Slack {
+    pub(crate) share: f64,
+    pub(crate) model: f64,
+    pub(crate) target: f64,
+}
+
+/// One annealing run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Schedule {
+    /// First temperature, as a standard deviation in radii of the model.
+    pub(crate) sigma: f64,
+    /// Lowest temperature.
+    pub(crate) floor: f64,
+    /// Largest fall of σ an iteration, as a factor.
+    pub(crate) rate: f64,
+    /// Smallest fall of σ an iteration, as a factor; 1 lets the residuals decide.
+    pub(crate) least: f64,
+    /// Most iterations.
+    pub(crate) limit: usize,
+    /// Iterations after which a temperature that no longer falls is the last.
+    pub(crate) patience: usize,
+    /// Sinkhorn sweeps an iteration.
+    pub(crate) sweeps: usize,
+    /// What is expected of points without a partner.
+    pub(crate) slack: Slack,
+}
+
+/// Where a run stands.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct State<const D: usize> {
+    /// Where the run's prior puts the model points.
+    pub(crate) base: Vec<[f64; D]>,
+    /// Where the warp puts them.
+    pub(crate) warped: Vec<[f64; D]>,
+    /// Standard deviation of the residuals along one axis.
+    pub(crate) sigma: f64,
+    /// Model points matched, in all.
+    pub(crate) matched: f64,
+    /// Iterations made.
+    pub(crate) iterations: usize,
+    /// Energy per model point after every iteration.
+    pub(crate) trace: Vec<f64>,
+    /// What the run is judged by; less is better.
+    pub(crate) energy: f64,
+    /// Whether the temperature stopped falling before the limit.
+    pub(crate) settled: bool,
+}
+
+impl<const D: usize> State<D> {
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.base.clone_from(&other.base);
+        self.warped.clone_from(&other.warped);
+        self.trace.clone_from(&other.trace);
+        (self.sigma, self.iterations) = (other.sigma, other.iterations);
+        (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
+    }
+}
+
+/// Shared machinery of the runs: targets, prior, scratch.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Annealer<const D: usize> {
+    pub(crate) soft: SoftAssignment<D>,
+    pub(crate) prior: Prior,
+    pub(crate) regression: Regression<D>,
+    /// Volume of the targets' bounding box.
+    pub(crate) volume: f64,
+    weights: Vec<f64>,
+    residuals: Axes<D>,
+    predicted: Vec<[f64; D]>,
+    sums: Vec<f64>,
+    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0 decided.
+    ambiguity: f64,
+}
+
+impl<const D: usize> Annealer<D> {
+    /// Soft matches of `warped` at this temperature, with their moments.
+    ///
+    /// The slack weighs `(2πσ²)^{D/2}` times the density of outliers, beside Gaussian affinities.
+    pub(crate) fn assign(
+        &mut self,
+        warped: &[[f64; D]],
+        variance: f64,
+        slack: Slack,
+        sweeps: usize,
+    ) {
+        let density = slack.share / (1.0 - slack.share) * warped.len() as f64 / self.volume;
+        let weight = (TAU * variance).powf(0.5 * D as f64) * density;
+        let [rows, columns] =
+            [slack.model, slack.target].map(|side| (side * weight).max(1e-30) as f32);
+        self.soft
+            .affinities(warped, variance, FAINTER * f64::from(rows.min(columns)));
+        self.soft.normalise(sweeps, rows, columns);
+        self.soft.moments(warped);
+    }
+
+    /// Alternates until the temperature stands still; `observe` is told every iteration and may stop the run.
+    pub(crate) fn run(
+        &mut self,
+        state: &mut State<D>,
+        schedule: &Schedule,
+        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut variance = schedule.sigma * schedule.sigma;
+        let mut standing = 0;
+        state.settled = false;
+        self.predicted.clone_from(&state.warped);
+        for iteration in 0..schedule.limit {
+            let residual = self.step(state, schedule, variance);
+            state.iterations += 1;
+            state.trace.push(self.free_energy(state, variance));
+            observe(state.iterations, *state.trace.last().unwrap_or(&0.0))?;
+            let floor = schedule.floor * schedule.floor;
+            let decided = self.ambiguity < DECIDED;
+            let fall = |rate: f64| variance * rate * rate;
+            let lowest = fall(if decided { DECIDED_RATE } else { schedule.rate }).max(floor);
+            let next = residual.min(fall(schedule.least)).max(lowest).min(variance);
+            let still = if decided { 1e-3 } else { 1e-4 };
+            standing = if next < variance { 0 } else { standing + 1 };
+            state.settled = variance <= floor
+                || standing > schedule.patience
+                || (iteration > 5 && (residual - variance).abs() < still * variance);
+            if state.settled {
+                break;
+            }
+            variance = next;
+        }
+        state.sigma = variance.sqrt();
+        ControlFlow::Continue(())
+    }
+
+    /// One step from `state` in `scratch`: sets soft matches and regression to those of `state`; how undecided they are,
+    /// see [`ambiguity`](Self::ambiguity).
+    pub(crate) fn restore(
+        &mut self,
+        state: &State<D>,
+        scratch: &mut State<D>,
+        schedule: &Schedule,
+    ) -> f64 {
+        scratch.copy_from(state);
+        self.predicted.clone_from(&state.warped);
+        self.step(scratch, schedule, state.sigma * state.sigma);
+        self.ambiguity
+    }
+
+    /// Expectation and maximisation in turn with the noise level free: `rounds` of them, from where `state` stands.
+    pub(crate) fn settle(&mut self, state: &mut State<D>, schedule: &Schedule, rounds: usize) {
+        self.predicted.clone_from(&state.warped);
+        for _ in 0..rounds {
+            let residual = self.step(state, schedule, state.sigma * state.sigma);
+            let spread = self
+                .soft
+                .weight
+                .iter()
+                .zip(&self.regression.variance)
+                .map(|(w, v)| w * v)
+                .sum::<f64>();
+            let open = spread / self.soft.weight.iter().sum::<f64>().max(1e-9);
+            state.sigma = (residual + open).sqrt().max(schedule.floor);
+            self.predicted.clone_from(&state.warped);
+            state.iterations += 1;
+            state
+                .trace
+                .push(self.free_energy(state, state.sigma * state.sigma));
+        }
+    }
+
+    /// One soft assignment and one fit; the residual variance that is left.
+    ///
+    /// Distances are taken from where the *other* points' matches put a point: a wrong match does not confirm itself.
+    fn step(&mut self, state: &mut State<D>, schedule: &Schedule, variance: f64) -> f64 {
+        let predicted = std::mem::take(&mut self.predicted);
+        self.assign(&predicted, variance, schedule.slack, schedule.sweeps);
+        self.predicted = predicted;
+        self.fit(state, variance);
+        let (mut total, mut squares, mut within) = (0.0, 0.0, 0.0);
+        for i in 0..state.warped.len() {
+            let (w, shift) = (self.soft.weight[i], self.soft.shift[i]);
+            within += self.soft.spread[i] - w * shift.iter().map(|s| s * s).sum::<f64>();
+            let leverage = (w * self.regression.variance[i] / variance).min(MAX_LEVERAGE);
+            let mut square = self.soft.spread[i];
+            for k in 0..D {
+                let (u, z) = (self.regression.displacement.0[k][i], self.residuals.0[k][i]);
+                let moved = state.base[i][k] + u;
+                let step = moved - self.predicted[i][k];
+                square += w * step * (step - 2.0 * shift[k]);
+                state.warped[i][k] = moved;
+                self.predicted[i][k] = state.base[i][k] + (u - leverage * z) / (1.0 - leverage);
+            }
+            total += w;
+            squares += square.max(0.0);
+        }
+        state.matched = total;
+        self.ambiguity = within / (D as f64 * total.max(1e-9) * variance);
+        if total > 0.0 {
+            squares / (D as f64 * total)
+        } else {
+            variance
+        }
+    }
+
+    /// Fits the warp to the moments of the soft assignment about the predicted positions.
+    fn fit(&mut self, state: &State<D>, variance: f64) {
+        let stride = self.prior.stride;
+        let rows = self.predicted.iter().zip(&state.base).zip(&self.soft.shift);
+        let target = |((p, b), s): ((&[f64; D], &[f64; D]), &[f64; D])| {
+            std::array::from_fn(|k| p[k] + s[k] - b[k])
+        };
+        self.residuals.fill(stride, rows.map(target));
+        self.weights.clone_from(&self.soft.weight);
+        self.weights.resize(stride, 0.0);
+        self.regression
+            .fit(&self.prior, &self.weights, &self.residuals, variance);
+        self.regression.variances(&self.prior);
+    }
+
+    /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a model point.
+    fn free_energy(&self, state: &State<D>, variance: f64) -> f64 {
+        let data: f64 = self.soft.spread.iter().sum::<f64>() / (2.0 * variance);
+        (data + 0.5 * self.regression.penalty()) / state.warped.len() as f64
+    }
+
+    /// What runs are compared by: `−ln p(targets | warp) − ln p(warp)`, with the warp's posterior volume (Laplace).
+    ///
+    /// The targets are a mixture of Gaussians about the warped points and of uniform outliers, whose share is
+    /// estimated; residuals under `resolution` count as that, so that an exact fit does not win by an infinite margin.
+    pub(crate) fn evaluate(&mut self, state: &mut State<D>, share: f64, resolution: f64) {
+        let variance = state.sigma.max(resolution).powi(2);
+        let (n, m) = (state.warped.len(), self.soft.targets());
+        let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
+        self.soft.affinities(
+            &state.warped,
+            variance,
+            FAINTER * LEAST_SHARE * gaussian / self.volume,
+        );
+        self.soft.column_totals(&mut self.sums);
+        let sums = &self.sums[..m];
+        let density = 1.0 / gaussian;
+        let mut share = share;
+        for _ in 0..SHARE_ROUNDS {
+            let outlier = share / self.volume;
+            let outliers = sums
+                .iter()
+                .map(|s| outlier / ((1.0 - share) * density * s + outlier));
+            share = (outliers.sum::<f64>() / m as f64).clamp(LEAST_SHARE, 0.95);
+        }
+        let (gauss, outlier) = ((1.0 - share) * density, share / self.volume);
+        let data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
+        self.sums
+            .iter_mut()
+            .for_each(|s| *s = gauss / (gauss * *s + outlier));
+        self.soft.row_totals(&self.sums, &mut self.weights);
+        self.weights.resize(self.prior.stride, 0.0);
+        let rows = state.warped.iter().zip(&state.base);
+        self.residuals.fill(
+            self.prior.stride,
+            rows.map(|(w, b)| std::array::from_fn(|k| w[k] - b[k])),
+        );
+        self.regression
+            .fit(&self.prior, &self.weights, &self.residuals, variance);
+        state.energy =
+            data + 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
+    }
+}

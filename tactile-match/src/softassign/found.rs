@@ -1,0 +1,168 @@
+//! What a run of the matcher has found, read from its workspace.
+
+use super::{SoftassignWorkspace, finish};
+use crate::hard::{self, Interpolation};
+use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
+use nalgebra::{Point, SMatrix};
+use tactile_tps::{Scalar, Smoothing, Warp};
+
+/// The answer in a workspace.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use std::ops::ControlFlow;
+/// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
+/// let mut workspace = SoftassignWorkspace::new();
+/// let found = AnnealedSoftassign::default()
+///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+/// assert_eq!((found.assignment()[2], found.confidence()[2] > 0.9), (Some(2), true));
+/// assert!(found.warped::<f64>().zip(&target).all(|(w, t)| (w - t).norm() < 1e-9));
+/// assert!(found.report().residual < 1e-9); // units of the points
+/// let matching = found.to_matching(&model);
+/// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6); // areas grow by a tenth
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct SoftassignMatch<'w, const D: usize> {
+    pub(super) workspace: &'w SoftassignWorkspace<D>,
+}
+
+impl<'w, const D: usize> SoftassignMatch<'w, D> {
+    /// The warped model points.
+    pub fn warped<T: Scalar>(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + use<'w, T, D> {
+        let workspace = self.workspace;
+        workspace
+            .answer
+            .warped
+            .iter()
+            .map(|w| workspace.frame.outward(w))
+    }
+
+    /// Target row of every model point.
+    #[must_use]
+    pub fn assignment(&self) -> &'w [Option<usize>] {
+        &self.workspace.answer.assignment
+    }
+
+    /// Probability that each assignment is right.
+    #[must_use]
+    pub fn confidence(&self) -> &'w [f64] {
+        &self.workspace.answer.confidence
+    }
+
+    /// How it went.
+    #[must_use]
+    pub fn report(&self) -> MatchReport<f64> {
+        let (workspace, scale) = (self.workspace, self.workspace.frame.scale);
+        MatchReport {
+            stop: self.stop_reason(),
+            iterations: workspace.best.iterations,
+            starts: workspace.starts,
+            residual: workspace.answer.residual * scale,
+            sigma: workspace.best.sigma * scale,
+        }
+    }
+
+    /// The answer with its warp, soft matches and covariances; `model` are the points that were matched.
+    #[must_use]
+    pub fn to_matching<T: Scalar>(&self, model: &[Point<T, D>]) -> Matching<T, D> {
+        self.interpolated(model, &Interpolation::new(model, None, Smoothing::None))
+    }
+
+    /// As [`to_matching`](Self::to_matching), with the factorised system of the model's interpolating spline.
+    pub(super) fn interpolated<T: Scalar>(
+        &self,
+        model: &[Point<T, D>],
+        interpolation: &Interpolation<T, D>,
+    ) -> Matching<T, D> {
+        let workspace = self.workspace;
+        let (answer, frame) = (&workspace.answer, &workspace.frame);
+        let mut warped: Vec<Point<T, D>> = self.warped().collect();
+        let warp = warp_through(interpolation, model, &mut warped);
+        let (mut soft, mut row) = (SoftMatches::new(), Vec::new());
+        for i in 0..model.len() {
+            row.clear();
+            row.extend(
+                finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))),
+            );
+            row.sort_unstable_by_key(|entry| entry.0);
+            soft.push_row(row.iter().copied());
+        }
+        let square = frame.scale * frame.scale;
+        let covariance = |c: &[[f64; D]; D]| SMatrix::from_fn(|a, b| T::narrow(c[a][b] * square));
+        let (unmatched_model, unmatched_target) =
+            unmatched_rows(&answer.assignment, workspace.target.len());
+        Matching {
+            warp,
+            warped,
+            assignment: answer.assignment.clone(),
+            confidence: answer.confidence.iter().map(|&c| T::narrow(c)).collect(),
+            soft,
+            unmatched_model,
+            unmatched_target,
+            displacement_covariance: answer.covariance.iter().map(covariance).collect(),
+            energy: workspace.best.trace.iter().map(|&e| T::narrow(e)).collect(),
+            report: narrow(&self.report()),
+        }
+    }
+
+    fn stop_reason(&self) -> StopReason {
+        let workspace = self.workspace;
+        match () {
+            () if workspace.stopped => StopReason::Callback,
+            () if workspace.best.sigma <= finish::CLEAN => StopReason::Exact,
+            () if workspace.best.settled => StopReason::Converged,
+            () => StopReason::IterationLimit,
+        }
+    }
+}
+
+fn narrow<T: Scalar>(report: &MatchReport<f64>) -> MatchReport<T> {
+    MatchReport {
+        stop: report.stop,
+        iterations: report.iterations,
+        starts: report.starts,
+        residual: T::narrow(report.residual),
+        sigma: T::narrow(report.sigma),
+    }
+}
+
+/// Smoothing of the spline where none goes through all positions.
+const SMOOTHING: f64 = 1e-6;
+
+/// The interpolating spline through the estimated positions. Where there is none (model points that coincide and go different
+/// ways) a smoothed one, and `warped` becomes what that gives.
+fn warp_through<T: Scalar, const D: usize>(
+    interpolation: &Interpolation<T, D>,
+    model: &[Point<T, D>],
+    warped: &mut [Point<T, D>],
+) -> Box<dyn Warp<T, D> + Send + Sync> {
+    let exact = interpolation.through(model, warped);
+    if agrees(&*exact, model, warped) {
+        return exact;
+    }
+    let warp = hard::spline(model, warped, None, Smoothing::Lambda(T::narrow(SMOOTHING)));
+    model
+        .iter()
+        .zip(warped)
+        .for_each(|(p, w)| *w = warp.apply(p));
+    warp
+}
+
+/// Whether a warp takes the model to these positions, to half the digits.
+fn agrees<T: Scalar, const D: usize>(
+    warp: &(dyn Warp<T, D> + Send + Sync),
+    model: &[Point<T, D>],
+    warped: &[Point<T, D>],
+) -> bool {
+    let size = warped
+        .iter()
+        .fold(T::zero(), |size, p| size.max(p.coords.amax()));
+    let tolerance = size * T::narrow(T::UNIT_ROUNDOFF.sqrt());
+    model
+        .iter()
+        .zip(warped)
+        .all(|(p, w)| (warp.apply(p) - w).amax() <= tolerance)
+}

@@ -1,0 +1,215 @@
+//! The default matcher: annealed softassign with a Gaussian-process prior on the warp and leave-one-out prediction.
+//!
+//! Given where the warp puts the model points, the soft assignment `m_ij ∝ exp(−|yᵢ − tⱼ|²/2σ²)`, made doubly stochastic with slack, says
+//! how likely every pair is; given the pairs, the warp is the posterior mean of a smooth random field through the soft partners. The two
+//! steps alternate while the temperature σ falls [Gold, Rangarajan et al., *New algorithms for 2-D and 3-D point matching*, Pattern
+//! Recognition 31 (1998); Chui & Rangarajan, *A new point matching algorithm for non-rigid registration*, CVIU 89 (2003)].
+//!
+//! - Distances are taken from the *leave-one-out* prediction of the warp, so that a wrong match does not confirm itself.
+//! - The field's covariance has few modes: a fit costs `O(I r²)` with r near 30, and its leverages come with it.
+//! - Most scenes are easy and end with the first run (`search`). Others get further starts: local patterns of dense sets (`patterns`),
+//!   relaxation labelling (19), (20) over the candidates that shape contexts propose (`correspond`), and the moments.
+//!   The start of least energy wins: minus the logarithm of the targets' likelihood and of the warp's prior.
+//!
+//! Where the residuals are rounding the data are clean, and matched points go exactly onto their partners. Where they are
+//! noise the scales of the field are averaged over by their evidence, unless the matches themselves are undecided. The
+//! final warp is the thin-plate spline through the estimated positions.
+//!
+//! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, and memory of one `I × J` matrix in single
+//! precision. Everything else is computed in double precision, whatever the type of the points.
+
+mod anneal;
+mod axes;
+mod batch;
+mod blocks;
+mod candidate_labels;
+mod cells;
+mod consensus;
+mod correspond;
+mod finish;
+mod found;
+mod frame;
+mod lanes;
+mod next;
+mod options;
+mod patterns;
+mod prior;
+mod regression;
+mod search;
+mod series;
+mod soft_assign;
+mod starts;
+
+pub use batch::PointSets;
+pub use found::SoftassignMatch;
+pub use options::{Outliers, Rotation, Search, SoftassignOptions};
+
+use crate::{MatchError, Matching, PointMatcher, WarmStart, validate};
+use anneal::{Annealer, State};
+use consensus::Consensus;
+use correspond::Correspondence;
+use finish::Answer;
+use frame::Frame;
+use nalgebra::Point;
+use patterns::LocalPatterns;
+use std::ops::ControlFlow;
+use tactile_tps::Scalar;
+
+/// The default matcher: annealed softassign, with a Gaussian-process prior on the warp and leave-one-out prediction.
+///
+/// One default setting serves deformation, noise, outliers and missing points; say [`Rotation::Any`] where the target may be
+/// turned by more than half a right angle. Two and three dimensions.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{PointMatcher, AnnealedSoftassign};
+/// # fn main() -> Result<(), tactile_match::MatchError> {
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let mut target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y + 0.05 * p.x));
+/// target.reverse();
+/// let found = AnnealedSoftassign::default().match_points(&model, &target)?;
+/// assert_eq!(found.assignment[0], Some(5));
+/// assert!((found.warp.apply(&model[2]) - target[3]).norm() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AnnealedSoftassign {
+    options: SoftassignOptions,
+}
+
+/// Memory that matches use again and again.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use std::ops::ControlFlow;
+/// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let mut workspace = SoftassignWorkspace::new();
+/// for load in [0.02, 0.05, 0.1] { // a sequence of frames: memory is taken once
+///     let target = model.map(|p| Point2::new(p.x + load * p.y, p.y));
+///     let matcher = AnnealedSoftassign::default();
+///     let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+///     assert!((0..6).all(|i| found.assignment()[i] == Some(i)));
+/// }
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct SoftassignWorkspace<const D: usize> {
+    frame: Frame<D>,
+    model: Vec<[f64; D]>,
+    target: Vec<[f64; D]>,
+    annealer: Annealer<D>,
+    state: State<D>,
+    best: State<D>,
+    answer: Answer<D>,
+    correspondence: Correspondence,
+    patterns: LocalPatterns<D>,
+    consensus: Consensus<D>,
+    start: State<D>,
+    mean: Vec<[f64; D]>,
+    starts: usize,
+    stopped: bool,
+}
+
+impl<const D: usize> SoftassignWorkspace<D> {
+    /// An empty workspace; it grows at its first use.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Takes two sets, in the frame's units.
+    fn take<T: Scalar>(
+        &mut self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<(), MatchError> {
+        validate::point_sets(model, target)?;
+        let frame = Frame::new(model, target);
+        self.frame = frame;
+        self.model.clear();
+        self.model.extend(model.iter().map(|p| frame.model(p)));
+        self.target.clear();
+        self.target.extend(target.iter().map(|p| frame.target(p)));
+        Ok(())
+    }
+}
+
+impl AnnealedSoftassign {
+    /// A matcher with these options.
+    #[must_use]
+    pub fn new(options: SoftassignOptions) -> Self {
+        Self { options }
+    }
+
+    /// The options.
+    ///
+    /// ```
+    /// use tactile_match::{AnnealedSoftassign, SoftassignOptions, Search};
+    /// let options = SoftassignOptions::default().with_search(Search::Near);
+    /// assert_eq!(AnnealedSoftassign::new(options).options(), &options);
+    /// ```
+    #[must_use]
+    pub fn options(&self) -> &SoftassignOptions {
+        &self.options
+    }
+
+    /// As [`PointMatcher::match_points`] in the caller's workspace; nothing is allocated once that has grown.
+    ///
+    /// `observe` hears the iteration and the energy after every outer iteration and may stop the search: the best answer
+    /// so far is then returned.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use std::ops::ControlFlow;
+    /// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
+    /// # fn main() -> Result<(), tactile_match::MatchError> {
+    /// let model: Vec<Point2<f64>> =
+    ///     (0..30).map(|i| Point2::new(f64::from(i % 6) + 0.1 * f64::from(i * i % 7), f64::from(i / 6))).collect();
+    /// let target: Vec<Point2<f64>> = model.iter().rev().map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y)).collect();
+    /// let mut workspace = SoftassignWorkspace::new();
+    /// let found = AnnealedSoftassign::default()
+    ///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
+    /// assert_eq!(found.assignment()[3], Some(26));
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`PointMatcher::match_points`].
+    pub fn match_points_with<'w, T: Scalar, const D: usize>(
+        &self,
+        workspace: &'w mut SoftassignWorkspace<D>,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+        mut observe: impl FnMut(usize, f64) -> ControlFlow<()>,
+    ) -> Result<SoftassignMatch<'w, D>, MatchError> {
+        workspace.take(model, target)?;
+        self.solve(workspace, &mut observe);
+        Ok(SoftassignMatch { workspace })
+    }
+}
+
+impl<T: Scalar, const D: usize> PointMatcher<T, D> for AnnealedSoftassign {
+    fn match_points(
+        &self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
+        let mut workspace = SoftassignWorkspace::new();
+        let found = self.match_points_with(&mut workspace, model, target, |_, _| {
+            ControlFlow::Continue(())
+        })?;
+        Ok(found.to_matching(model))
+    }
+
+    fn match_next(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
+        self.follow(warm.state(), model, target)
+    }
+}

@@ -1,0 +1,189 @@
+//! What a caller may say about a scene.
+
+use super::anneal::Slack;
+use crate::{
+    MatchError,
+    validate::{at_least_one, option_within},
+};
+
+/// Weight of the slack on a side where no outliers are expected.
+const RARE: f64 = 0.01;
+
+/// How far the target may be turned against the model.
+///
+/// ```
+/// use nalgebra::{Point2, Rotation2};
+/// use tactile_match::{PointMatcher, AnnealedSoftassign, SoftassignOptions, Rotation};
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(|p| Rotation2::new(2.5) * p).collect(); // turned by 143°
+/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_rotation(Rotation::Any));
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
+pub enum Rotation {
+    /// By up to about half a right angle.
+    #[default]
+    Limited,
+    /// By any angle.
+    Any,
+}
+
+/// On which side points without a partner are expected.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{Outliers, PointMatcher, AnnealedSoftassign, SoftassignOptions};
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let mut target = model.map(|p| Point2::new(1.05 * p.x, p.y)).to_vec();
+/// target.push(Point2::new(6.0, 5.0)); // clutter
+/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_outliers(Outliers::Target));
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!(matching.unmatched_model.is_empty());
+/// assert_eq!(matching.unmatched_target, [6]);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
+pub enum Outliers {
+    /// Every point may lack its partner.
+    #[default]
+    Both,
+    /// Only model points: parts of the object are out of sight.
+    Model,
+    /// Only target points: clutter.
+    Target,
+    /// The sets are the same points.
+    None,
+}
+
+/// How far the search for the right start goes.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{PointMatcher, AnnealedSoftassign, SoftassignOptions, Search};
+/// let loaded = |p: &Point2<f64>| Point2::new(1.02 * p.x, p.y + 0.01 * p.x * p.x); // the same contact at a higher load
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(loaded).collect();
+/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near));
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
+/// assert_eq!(matching.report.starts, 1);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
+pub enum Search {
+    /// Until an answer is exact, or every start is tried and the scales of the prior are fitted to the data: any scene.
+    #[default]
+    Thorough,
+    /// One annealing run from the sets as they lie, centred: for sets known to be near each other, such as those of one
+    /// contact at two loads. A fixed, small number of iterations.
+    Near,
+}
+
+/// Options of [`AnnealedSoftassign`](crate::AnnealedSoftassign); all of them have defaults that suit every scene tried.
+///
+/// ```
+/// use tactile_match::{MatchError, Outliers, SoftassignOptions, Rotation, Search};
+/// let options = SoftassignOptions::default()
+///     .with_rotation(Rotation::Any)
+///     .with_outliers(Outliers::Model)
+///     .with_search(Search::Thorough)
+///     .with_outlier_ratio(0.3)? // three in ten points are out of sight
+///     .with_max_iterations(100)?;
+/// assert_ne!(options, SoftassignOptions::default());
+/// assert!(matches!(options.with_outlier_ratio(0.95), Err(MatchError::InvalidOption { option: "outlier_ratio", .. })));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SoftassignOptions {
+    pub(crate) rotation: Rotation,
+    pub(crate) outliers: Outliers,
+    pub(crate) search: Search,
+    pub(crate) share: f64,
+    pub(crate) max_iterations: usize,
+}
+
+impl Default for SoftassignOptions {
+    fn default() -> Self {
+        Self {
+            rotation: Rotation::Limited,
+            outliers: Outliers::Both,
+            search: Search::Thorough,
+            share: 0.1,
+            max_iterations: 200,
+        }
+    }
+}
+
+impl SoftassignOptions {
+    /// Says how far the target may be turned.
+    #[must_use]
+    pub fn with_rotation(mut self, rotation: Rotation) -> Self {
+        self.rotation = rotation;
+        self
+    }
+
+    /// Says where points without a partner are expected.
+    #[must_use]
+    pub fn with_outliers(mut self, outliers: Outliers) -> Self {
+        self.outliers = outliers;
+        self
+    }
+
+    /// Says how far to search.
+    #[must_use]
+    pub fn with_search(mut self, search: Search) -> Self {
+        self.search = search;
+        self
+    }
+
+    /// Sets the expected share of points without a partner, in [10⁻⁶, 0.9] (default 0.1).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] outside that range.
+    pub fn with_outlier_ratio(mut self, share: f64) -> Result<Self, MatchError> {
+        option_within("outlier_ratio", share, 1e-6, 0.9, "[1e-6, 0.9]")?;
+        self.share = share;
+        Ok(self)
+    }
+
+    /// Sets the most outer iterations of one start, at least 1 (default 200).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn with_max_iterations(mut self, limit: usize) -> Result<Self, MatchError> {
+        at_least_one("max_iterations", limit)?;
+        self.max_iterations = limit;
+        Ok(self)
+    }
+
+    pub(crate) fn slack(&self) -> Slack {
+        let (model, target) = match self.outliers {
+            Outliers::Both => (1.0, 1.0),
+            Outliers::Model => (1.0, RARE),
+            Outliers::Target => (RARE, 1.0),
+            Outliers::None => (RARE, RARE),
+        };
+        Slack {
+            share: self.share,
+            model,
+            target,
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! Whether a search is over.
+use super::super::{AnnealedSoftassign, SoftassignWorkspace, finish};
+
+/// So many points that an incomplete exact answer is not worth a second try.
+pub(super) const MANY: usize = 500;
+/// Residuals of so many points below this many spacings leave no doubt: one point aside, they would be larger.
+const PLAIN: f64 = 0.15;
+/// Share of the smaller set that an exact answer should match.
+pub(super) const COMPLETE: f64 = 0.98;
+
+impl AnnealedSoftassign {
+    /// Whether no further start can do better.
+    pub(super) fn is_done<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
+        self.is_exact(ws) || self.is_plain(ws)
+    }
+
+    /// Whether the residuals of a dense set are so far below its spacing, for nearly all points, that no part can lie aside.
+    fn is_plain<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
+        let points = ws.model.len().min(ws.target.len());
+        points >= MANY
+            && ws.best.sigma <= PLAIN * ws.patterns.spacing
+            && ws.best.matched >= 0.8 * points as f64
+    }
+
+    /// Whether the best run so far explains nearly every point of the smaller set to rounding.
+    pub(super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
+        let points = ws.model.len().min(ws.target.len());
+        let wanted = if ws.starts == 1 || points < MANY {
+            COMPLETE
+        } else {
+            0.8
+        };
+        ws.best.sigma <= finish::CLEAN && ws.best.matched >= wanted * points as f64
+    }
+}

@@ -1,0 +1,287 @@
+//! Soft assignment: the match matrix M from distances, made doubly stochastic with slack (Sinkhorn).
+//!
+//! `m_ij = aᵢ bⱼ exp(−|yᵢ − tⱼ|²/2σ²)` with `aᵢ`, `bⱼ` such that every row and every column sums to one together with its
+//! slack, whose weight is the density of outliers seen through the same Gaussian. Worked in single precision: the
+//! weights need no more, and the positions they lead to are refined in double precision.
+//!
+//! The targets are put into blocks of neighbours ([`blocks`](super::blocks)); of a row only the blocks within reach of its
+//! Gaussian are kept. At a low temperature that is a small part of `I J`.
+
+use super::blocks::{Blocks, LANES};
+use super::lanes::{Moments, gaussians};
+use pulp::Arch;
+
+/// The match matrix in factored form, with the moments of its rows. Columns stand in the order of the blocks.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SoftAssignment<const D: usize> {
+    blocks: Blocks<D>,
+    /// Where the blocks of every row begin in `active`, and one past the last.
+    starts: Vec<usize>,
+    active: Vec<u32>,
+    reach: Vec<f32>,
+    kernel: Vec<f32>,
+    pub(crate) row_scale: Vec<f32>,
+    pub(crate) column_scale: Vec<f32>,
+    column_sum: Vec<f32>,
+    /// Row sums without the slack.
+    pub(crate) weight: Vec<f64>,
+    /// Mean of `tⱼ − yᵢ` under row i.
+    pub(crate) shift: Vec<[f64; D]>,
+    /// Sum of `m_ij |tⱼ − yᵢ|²` over row i.
+    pub(crate) spread: Vec<f64>,
+}
+
+impl<const D: usize> SoftAssignment<D> {
+    /// Takes the target points.
+    pub(crate) fn set_targets(&mut self, targets: &[[f64; D]]) {
+        self.blocks.build(targets);
+    }
+
+    /// Number of target points.
+    pub(crate) fn targets(&self) -> usize {
+        self.blocks.order.len()
+    }
+
+    /// The Gaussian affinities of `warped` at variance `variance`; blocks in which all are below `least`, or
+    /// below a millionth, are left out.
+    pub(crate) fn affinities(&mut self, warped: &[[f64; D]], variance: f64, least: f64) {
+        let blocks = &self.blocks;
+        let (scale, cut) = (
+            (-0.5 / variance) as f32,
+            (-2.0 * variance * least.min(1e-6).ln()) as f32,
+        );
+        self.starts.clear();
+        self.starts.push(0);
+        self.active.clear();
+        // Taken whole and cut at the end: the largest there can be, once.
+        self.kernel.resize(warped.len() * blocks.width(), 0.0);
+        Arch::new().dispatch(|| {
+            for y in warped {
+                let (y, from) = (y.map(|v| v as f32), self.active.len());
+                blocks.squared_distances(&y, &mut self.reach);
+                self.active.extend(
+                    (0..)
+                        .zip(&self.reach)
+                        .filter(|(_, r)| **r <= cut)
+                        .map(|(b, _)| b),
+                );
+                let kernel = self.kernel[from * LANES..].as_chunks_mut::<LANES>().0;
+                for (row, &block) in kernel.iter_mut().zip(&self.active[from..]) {
+                    gaussians(row, blocks.at(block), &y, scale);
+                }
+                self.starts.push(self.active.len());
+            }
+        });
+    }
+
+    /// Number of model points.
+    fn rows(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// The blocks of row `i`, and its affinities there.
+    #[inline(always)]
+    fn row(&self, i: usize) -> impl Iterator<Item = (usize, &[f32; LANES])> {
+        row_of(&self.starts, &self.active, &self.kernel, i)
+    }
+
+    /// Alternates row and column normalisation `sweeps` times.
+    pub(crate) fn normalise(&mut self, sweeps: usize, row_slack: f32, column_slack: f32) {
+        let rows = self.rows();
+        refill(&mut self.row_scale, rows, 1.0);
+        refill(&mut self.column_scale, self.blocks.width(), 1.0);
+        let Self {
+            starts,
+            active,
+            kernel,
+            row_scale,
+            column_scale,
+            column_sum,
+            ..
+        } = self;
+        Arch::new().dispatch(|| {
+            for _ in 0..sweeps {
+                refill(column_sum, column_scale.len(), column_slack);
+                let (b, sums) = (
+                    column_scale.as_chunks::<LANES>().0,
+                    column_sum.as_chunks_mut::<LANES>().0,
+                );
+                for (i, a) in row_scale.iter_mut().enumerate() {
+                    let mut dots = [0.0_f32; LANES];
+                    for (block, k) in row_of(starts, active, kernel, i) {
+                        (0..LANES).for_each(|l| dots[l] += k[l] * b[block][l]);
+                    }
+                    *a = 1.0 / (dots.iter().sum::<f32>() + row_slack);
+                    for (block, k) in row_of(starts, active, kernel, i) {
+                        (0..LANES).for_each(|l| sums[block][l] += *a * k[l]);
+                    }
+                }
+                column_scale
+                    .iter_mut()
+                    .zip(&*column_sum)
+                    .for_each(|(b, s)| *b = 1.0 / s);
+            }
+        });
+    }
+
+    /// Row sums, mean shifts and spreads of M about `warped`.
+    pub(crate) fn moments(&mut self, warped: &[[f64; D]]) {
+        self.weight.clear();
+        self.shift.clear();
+        self.spread.clear();
+        let Self {
+            blocks,
+            starts,
+            active,
+            kernel,
+            row_scale,
+            column_scale,
+            weight,
+            shift,
+            spread,
+            ..
+        } = self;
+        let columns = column_scale.as_chunks::<LANES>().0;
+        Arch::new().dispatch(|| {
+            for ((i, y), &a) in warped.iter().enumerate().zip(&*row_scale) {
+                let y = y.map(|v| v as f32);
+                let mut sums = Moments::new();
+                for (block, k) in row_of(starts, active, kernel, i) {
+                    sums.add(k, &columns[block], blocks.at(block as u32), &y);
+                }
+                let total = f64::from(sums.weight.iter().sum::<f32>());
+                let mean = |s: [f32; LANES]| f64::from(s.iter().sum::<f32>()) / total;
+                weight.push(total * f64::from(a));
+                shift.push(sums.shift.map(|s| if total > 0.0 { mean(s) } else { 0.0 }));
+                spread.push(f64::from(sums.spread.iter().sum::<f32>()) * f64::from(a));
+            }
+        });
+    }
+
+    /// Makes rows that the last column normalisation left above one sum to one: where points coincide, a few sweeps do not
+    /// converge.
+    pub(crate) fn cap_rows(&mut self) {
+        for (weight, scale) in self.weight.iter_mut().zip(&mut self.row_scale) {
+            let excess = weight.max(1.0);
+            *scale /= excess as f32;
+            *weight /= excess;
+        }
+    }
+
+    /// Row `i` of M where it is not zero: target rows, in the order of the blocks, and entries.
+    pub(crate) fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (scale, columns) = (self.row_scale[i], self.column_scale.as_chunks::<LANES>().0);
+        self.row(i).flat_map(move |(block, k)| {
+            let real = self.blocks.order[block * LANES..].iter().take(LANES);
+            real.enumerate()
+                .map(move |(l, &j)| (j, f64::from(scale * k[l] * columns[block][l])))
+        })
+    }
+
+    /// Sums of the affinities over the rows, for every column; the first [`targets`](Self::targets) are targets.
+    pub(crate) fn column_totals(&self, totals: &mut Vec<f64>) {
+        refill(totals, self.blocks.width(), 0.0);
+        let totals = totals.as_chunks_mut::<LANES>().0;
+        Arch::new().dispatch(|| {
+            for i in 0..self.rows() {
+                self.row(i)
+                    .for_each(|(b, k)| (0..LANES).for_each(|l| totals[b][l] += f64::from(k[l])));
+            }
+        });
+    }
+
+    /// Sums of the affinities over the columns, each times its factor, for every row.
+    pub(crate) fn row_totals(&self, factors: &[f64], totals: &mut Vec<f64>) {
+        let factors = factors.as_chunks::<LANES>().0;
+        totals.clear();
+        Arch::new().dispatch(|| {
+            for i in 0..self.rows() {
+                let mut sums = [0.0; LANES];
+                self.row(i).for_each(|(b, k)| {
+                    (0..LANES).for_each(|l| sums[l] += f64::from(k[l]) * factors[b][l]);
+                });
+                totals.push(sums.iter().sum());
+            }
+        });
+    }
+}
+
+#[inline(always)]
+fn row_of<'a>(
+    starts: &[usize],
+    active: &'a [u32],
+    kernel: &'a [f32],
+    i: usize,
+) -> impl Iterator<Item = (usize, &'a [f32; LANES])> + use<'a> {
+    let range = starts[i]..starts[i + 1];
+    let rows = kernel.as_chunks::<LANES>().0;
+    active[range.clone()]
+        .iter()
+        .map(|&b| b as usize)
+        .zip(&rows[range])
+}
+
+fn refill<V: Clone>(values: &mut Vec<V>, len: usize, value: V) {
+    values.clear();
+    values.resize(len, value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> (Vec<[f64; 2]>, SoftAssignment<2>) {
+        let targets: Vec<[f64; 2]> = (0..41)
+            .map(|i| [f64::from(i) * 0.1, f64::from(i * i % 7) * 0.2])
+            .collect();
+        let mut soft = SoftAssignment::default();
+        soft.set_targets(&targets);
+        (
+            targets
+                .iter()
+                .take(37)
+                .map(|t| [t[0] + 0.02, t[1] - 0.01])
+                .collect(),
+            soft,
+        )
+    }
+
+    #[test]
+    fn rows_and_columns_sum_to_one_with_their_slack() {
+        let (warped, mut soft) = scene();
+        soft.affinities(&warped, 0.02, 1e-9);
+        soft.normalise(300, 0.05, 0.05);
+        soft.moments(&warped);
+        let mut columns = vec![0.0; 41];
+        for i in 0..37 {
+            let slack = f64::from(soft.row_scale[i]) * 0.05;
+            let sum: f64 = soft.entries(i).map(|(_, p)| p).sum();
+            // Single precision sums of 41 terms, at the fixed point of the sweeps.
+            assert!((sum + slack - 1.0).abs() < 1e-5 && (sum - soft.weight[i]).abs() < 1e-5);
+            soft.entries(i).for_each(|(j, p)| columns[j] += p);
+        }
+        for (c, &j) in soft.blocks.order.iter().enumerate() {
+            assert!((columns[j] + f64::from(soft.column_scale[c]) * 0.05 - 1.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn what_is_out_of_reach_makes_no_difference() {
+        let (warped, mut soft) = scene();
+        let (mut near, mut sparse) = (vec![vec![0.0_f64; 41]; 37], 0);
+        for least in [1e-30, 1e-7] {
+            soft.affinities(&warped, 0.01, least);
+            soft.normalise(5, 0.01, 0.01);
+            soft.moments(&warped);
+            sparse = sparse.max(37 * 3 - soft.active.len());
+            for i in 0..37 {
+                for (j, p) in soft.entries(i) {
+                    // Forty affinities of 1e-7 each, over a slack of 1e-2.
+                    assert!(least == 1e-30 || (p - near[i][j]).abs() < 4e-4);
+                    near[i][j] = p;
+                }
+            }
+        }
+        assert!(sparse > 20, "blocks were left out: {sparse}");
+    }
+}
