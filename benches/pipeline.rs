@@ -9,8 +9,9 @@ use ndarray::Array2;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
+use tactile_imaging::Pipeline;
 use tactile_imaging::force::ReferenceFrame;
-use tactile_imaging::pipeline::{Measurement, Press, Session, Stage, Stages, Trial};
+use tactile_imaging::pipeline::{Measurement, Press, Session, Stage, Trial};
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, PressSimulation,
     Sphere,
@@ -55,9 +56,8 @@ fn press(c: &mut Criterion) {
 fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {
     let (one, two) = (&trial.simulation.frames[0], &trial.simulation.frames[1]);
     let empty = trial.scene.reference(9);
-    let stages = Arc::new(trial.pipeline().expect("a calibrated sensor"));
-    let session =
-        || Session::new(stages.clone(), trial.simulation.reference.view()).expect("a session");
+    let pipeline = trial.pipeline().expect("a calibrated sensor");
+    let session = || Session::new(&pipeline, trial.simulation.reference.view()).expect("a session");
     let mut turn = session();
     let mut side = false;
     group.bench_function("force_of_a_frame", |b| {
@@ -190,13 +190,13 @@ struct Table {
 impl Table {
     fn add(
         &mut self,
-        stages: &dyn Stages,
+        pipeline: &Pipeline,
         made: &PressSimulation,
         reference: &Arc<ReferenceFrame>,
         empty: &Array2<u8>,
     ) {
         let press = || {
-            let mut press = Press::with_reference(stages, reference.clone());
+            let mut press = pipeline.press_on(reference.clone());
             for frame in &made.frames {
                 press.add_frame(frame.view());
             }
@@ -212,7 +212,7 @@ impl Table {
         self.add_skipped(
             press(),
             reference,
-            stages,
+            pipeline,
             [&made.frames[1], empty],
             everything,
         );
@@ -227,7 +227,7 @@ impl Table {
         &mut self,
         mut twins: Press<'a>,
         reference: &Arc<ReferenceFrame>,
-        stages: &dyn Stages,
+        pipeline: &Pipeline,
         [equal, empty]: [&'a Array2<u8>; 2],
         everything: f64,
     ) {
@@ -242,7 +242,7 @@ impl Table {
             2,
             "an equal frame takes no surface"
         );
-        let mut quiet = Press::with_reference(stages, reference.clone());
+        let mut quiet = pipeline.press_on(reference.clone());
         let start = Instant::now();
         quiet.add_frame(empty.view());
         assert!(quiet.contact(0).expect("a frame").is_none());

@@ -11,7 +11,6 @@
 use clap::Parser;
 use ndarray::Array2;
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::pipeline::{FrameSource, PipelineError, Session, Trial, Update, with_error};
@@ -56,7 +55,7 @@ fn main() -> Result<ExitCode, Failure> {
     let frames = record(&trial, &arguments)?;
     let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
-    let mut session = Session::from_frames(Arc::new(trial.pipeline()?), &views)?;
+    let mut session = Session::from_frames(&trial.pipeline()?, &views)?;
     let truth = trial.truth().youngs_modulus_pa;
     let late = play(&mut session, &frames, &arguments, truth)?;
     let share = 100.0 * late as f64 / frames.len() as f64;

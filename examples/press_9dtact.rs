@@ -58,7 +58,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let frame = read_grey_image(folder.join("rectify_crop_sample.png"))?.to_u8();
     let entries = depth_table(&folder)?;
     let contact = DarkContact::new(&entries, [PIXEL_M; 2])?;
-    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))
+    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))?
         .with_surface(DarkContact::depth_table(&entries)?, SurfaceInput::Signal);
     let mut press = pipeline.press(reference.view())?;
     press.add_frame(frame.view());

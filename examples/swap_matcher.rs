@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use tactile_imaging::matching::{
     MatchError, MatchReport, Matching, PointMatcher, PointSet, SoftMatches, unmatched_rows,
 };
-use tactile_imaging::pipeline::{Stages, Trial};
+use tactile_imaging::pipeline::{Pipeline, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, PressOptions};
 use tactile_imaging::tps::Affine;
 
@@ -100,9 +100,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn report(
     name: &str,
     trial: &Trial,
-    stages: &dyn Stages,
+    pipeline: &Pipeline,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let measurement = trial.press(stages)?.measure()?;
+    let measurement = trial.press(pipeline)?.measure()?;
     println!("{name}");
     if let Some(matching) = &measurement.matching {
         println!("  match    {matching}");

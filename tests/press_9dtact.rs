@@ -3,15 +3,13 @@
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{read_grey_image, read_table};
-use tactile_imaging::pipeline::{
-    ContactSurface, DarkContact, Object, Pipeline, Press, Stages, SurfaceInput,
-};
+use tactile_imaging::pipeline::{ContactSurface, DarkContact, Object, Pipeline, SurfaceInput};
 
 const PIXEL_M: f64 = 0.0510151e-3;
 const BALL_M: f64 = 4.0e-3;
 
 /// The sensor with its makers' table, and its images without and with the ball.
-fn sensor(folder: &Path) -> (impl Stages, [Array2<u8>; 2]) {
+fn sensor(folder: &Path) -> (Pipeline, [Array2<u8>; 2]) {
     let [reference, frame] = ["rectify_crop_ref.png", "rectify_crop_sample.png"]
         .map(|name| read_grey_image(folder.join(name)).unwrap().to_u8());
     let path = folder.join("grey_to_depth_mm.csv");
@@ -23,10 +21,12 @@ fn sensor(folder: &Path) -> (impl Stages, [Array2<u8>; 2]) {
         .zip(depth.into_iter().map(|z| z * 1e-3))
         .collect();
     let contact = DarkContact::new(&entries, [PIXEL_M; 2]).unwrap();
-    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M)).with_surface(
-        DarkContact::depth_table(&entries).unwrap(),
-        SurfaceInput::Signal,
-    );
+    let pipeline = Pipeline::new(contact, Object::sphere(BALL_M))
+        .unwrap()
+        .with_surface(
+            DarkContact::depth_table(&entries).unwrap(),
+            SurfaceInput::Signal,
+        );
     (pipeline, [reference, frame])
 }
 
@@ -40,7 +40,7 @@ fn the_ball_is_found_and_its_depth_is_right() {
         return;
     }
     let (pipeline, [reference, frame]) = sensor(&folder);
-    let mut press = Press::new(&pipeline, reference.view()).unwrap();
+    let mut press = pipeline.press(reference.view()).unwrap();
     press.add_frame(frame.view());
     let reading = *press.contact(0).unwrap().expect("a contact");
     let surface = press.surface(0).unwrap();

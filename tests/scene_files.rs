@@ -11,7 +11,7 @@ use std::path::Path;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::io::write_grey_image;
-use tactile_imaging::pipeline::{EstimatorChoice, Stages};
+use tactile_imaging::pipeline::EstimatorChoice;
 use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::simulate::{
@@ -196,16 +196,16 @@ fn a_missing_scene_file_is_named() {
 }
 
 /// Everything measured of a scene, as text, but for the times.
-fn measured(scene: &Scene, stages: &dyn Stages) -> String {
+fn measured(scene: &Scene, pipeline: &Pipeline) -> String {
     let data = scene.load().unwrap();
-    let mut press = scene.press(stages, &data).unwrap();
+    let mut press = scene.press(pipeline, &data).unwrap();
     let points: Vec<_> = press.control_points(1).unwrap().to_vec();
     let strain = press.strain(1).unwrap().summary.clone();
     format!("{points:?} {strain:?} {:?}", press.modulus().unwrap())
 }
 
 #[test]
-fn stages_by_name_are_those_of_the_typed_pipeline() {
+fn stages_by_name_are_those_given_as_values() {
     let folder = tempfile::tempdir().unwrap();
     let camera = Camera {
         shape: [130, 174],
@@ -221,22 +221,19 @@ fn stages_by_name_are_those_of_the_typed_pipeline() {
     let text = fs::read_to_string(&path).unwrap();
     let by_name = |table: &str| {
         let scene = Scene::parse(&format!("{text}\n[stages]\n{table}"), &path).unwrap();
-        measured(
-            &scene,
-            scene.stages(&scene.load().unwrap()).unwrap().as_ref(),
-        )
+        measured(&scene, &scene.pipeline(&scene.load().unwrap()).unwrap())
     };
     let scene = Scene::read(&path).unwrap();
     let LoadedCalibration::Pairs(pairs) = scene.load().unwrap().calibration else {
         panic!("pairs")
     };
-    let boxed = scene.stages(&scene.load().unwrap()).unwrap();
-    let typed = Pipeline::from_pairs(&pairs, scene.pixel_size_m, scene.object).unwrap();
-    let typed = typed.with_waveguide(boxed.settings().waveguide.clone().unwrap());
+    let of_scene = scene.pipeline(&scene.load().unwrap()).unwrap();
+    let pipeline = Pipeline::from_pairs(&pairs, scene.pixel_size_m, scene.object).unwrap();
+    let pipeline = pipeline.with_waveguide(of_scene.settings().waveguide.clone().unwrap());
     // `{:?}` prints every bit of a number.
-    assert_eq!(by_name(""), measured(&scene, &typed));
+    assert_eq!(by_name(""), measured(&scene, &pipeline));
     let named = by_name("sampler = \"curvature\"\nwarp = \"affine\"\nstrain = \"hencky\"");
-    let swapped = typed.with_sampler(CurvatureAdaptive::new(4.0).unwrap());
+    let swapped = pipeline.with_sampler(CurvatureAdaptive::new(4.0).unwrap());
     assert_eq!(
         named,
         measured(&scene, &swapped.with_warp(AffineModel).with_strain(Hencky))
@@ -248,7 +245,7 @@ fn stages_by_name_are_those_of_the_typed_pipeline() {
     .unwrap();
     assert_eq!(
         ratio
-            .stages(&ratio.load().unwrap())
+            .pipeline(&ratio.load().unwrap())
             .unwrap()
             .settings()
             .estimator,
@@ -261,8 +258,8 @@ fn stages_by_name_are_those_of_the_typed_pipeline() {
             &path,
         )
         .unwrap();
-        let stages = scene.stages(&data).unwrap();
-        let mut press = scene.press(stages.as_ref(), &data).unwrap();
+        let pipeline = scene.pipeline(&data).unwrap();
+        let mut press = scene.press(&pipeline, &data).unwrap();
         press.surface(1).unwrap().surface.heights.clone()
     };
     assert!(
@@ -282,7 +279,7 @@ fn a_flat_field_is_asked_for_by_its_key() {
         assert_eq!(scene.flat_field, wanted);
         assert_eq!(
             scene
-                .stages(&scene.load().unwrap())
+                .pipeline(&scene.load().unwrap())
                 .unwrap()
                 .settings()
                 .flat_field,

@@ -1,6 +1,5 @@
 //! A session allocates nothing per frame once its buffers have their size.
 #![allow(missing_docs)]
-use std::sync::Arc;
 use tactile_imaging::pipeline::{SESSION_LOADS, Session, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
@@ -19,8 +18,8 @@ fn pushing_frames_allocates_nothing_after_warm_up() {
     };
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let empty = trial.scene.reference(5);
-    let stages = Arc::new(trial.pipeline().unwrap());
-    let mut session = Session::new(stages, trial.simulation.reference.view()).unwrap();
+    let pipeline = trial.pipeline().unwrap();
+    let mut session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
     let mut frames: Vec<_> = trial.simulation.frames.iter().collect();
     frames.push(&empty);
     for frame in frames.iter().cycle().take(4 * SESSION_LOADS) {

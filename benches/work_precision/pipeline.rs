@@ -3,7 +3,7 @@
 use crate::study::Study;
 use tactile_imaging::Pipeline;
 use tactile_imaging::matching::CoherentPointDrift;
-use tactile_imaging::pipeline::{Binning, Stages, Trial};
+use tactile_imaging::pipeline::{Binning, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
 /// Presses on one sensor that differ in force and noise: one alone would say what its noise happened to do.
@@ -34,11 +34,11 @@ fn run(
     knob: &'static str,
     setting: &str,
     is_default: bool,
-    stages: impl Fn(&Trial) -> Box<dyn Stages>,
+    pipeline: impl Fn(&Trial) -> Pipeline,
 ) {
-    let stages: Vec<_> = trials.iter().map(stages).collect();
-    let strain = |(trial, stages): (&Trial, &dyn Stages)| {
-        let measured = trial.press(stages).and_then(|mut press| press.measure());
+    let pipelines: Vec<_> = trials.iter().map(pipeline).collect();
+    let strain = |(trial, pipeline): (&Trial, &Pipeline)| {
+        let measured = trial.press(pipeline).and_then(|mut press| press.measure());
         measured
             .expect("a measurement")
             .strain
@@ -48,7 +48,7 @@ fn run(
     let job = || {
         trials
             .iter()
-            .zip(stages.iter().map(AsRef::as_ref))
+            .zip(&pipelines)
             .map(strain)
             .collect::<Vec<_>>()
     };
@@ -69,11 +69,8 @@ pub(crate) fn strain(study: &mut Study) {
     let count = study.choose(4, 12);
     let usual = trials(Camera::default().shape, count);
     let with = |change: fn(Pipeline, usize) -> Pipeline, value: usize| {
-        move |trial: &Trial| -> Box<dyn Stages> {
-            Box::new(change(
-                trial.pipeline().expect("a calibrated sensor"),
-                value,
-            ))
+        move |trial: &Trial| -> Pipeline {
+            change(trial.pipeline().expect("a calibrated sensor"), value)
         }
     };
     run(
@@ -85,7 +82,7 @@ pub(crate) fn strain(study: &mut Study) {
         with(|pipeline, _| pipeline, 0),
     );
     for points in [50, 100, 400] {
-        let stages = with(
+        let changed = with(
             |pipeline, points| pipeline.with_control_points(points),
             points,
         );
@@ -95,22 +92,22 @@ pub(crate) fn strain(study: &mut Study) {
             "control points",
             &points.to_string(),
             false,
-            stages,
+            changed,
         );
     }
     for width in [1, 3, 11] {
-        let stages = with(|pipeline, width| pipeline.with_smoothing(width), width);
+        let changed = with(|pipeline, width| pipeline.with_smoothing(width), width);
         run(
             study,
             &usual,
             "smoothing",
             &format!("{width} px"),
             false,
-            stages,
+            changed,
         );
     }
     for side in study.choose(vec![3, 6], vec![2, 3, 5, 6, 8]) {
-        let stages = with(
+        let changed = with(
             |pipeline, side| pipeline.with_binning(Binning::Blocks(side)),
             side,
         );
@@ -120,12 +117,12 @@ pub(crate) fn strain(study: &mut Study) {
             "binning",
             &format!("{side} px"),
             false,
-            stages,
+            changed,
         );
     }
-    let drift = |trial: &Trial| -> Box<dyn Stages> {
+    let drift = |trial: &Trial| -> Pipeline {
         let pipeline = trial.pipeline().expect("a calibrated sensor");
-        Box::new(pipeline.with_matcher(CoherentPointDrift::default()))
+        pipeline.with_matcher(CoherentPointDrift::default())
     };
     run(study, &usual, "matcher", "point drift", false, drift);
     for shape in study.choose(vec![[260, 348]], vec![[130, 174], [260, 348], [521, 696]]) {

@@ -27,13 +27,13 @@ struct Json<'a> {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let source = Source::open(arguments)?;
-    let stages = source.stages(arguments)?;
+    let pipeline = source.pipeline(arguments)?;
     eprintln!("measuring");
     let mut timing = Vec::new();
     if arguments.repeat > 1 {
-        timing = repeat(&source, stages.as_ref(), arguments.repeat)?;
+        timing = repeat(&source, &pipeline, arguments.repeat)?;
     }
-    let mut press = source.press(stages.as_ref())?;
+    let mut press = source.press(&pipeline)?;
     let measurement = press.measure().map_err(|e| source.explain(e))?;
     let truth = source.truth();
     if arguments.json {
@@ -76,11 +76,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// Measures again and again from the frames, the reference being known; the time of every stage and of the whole.
 fn repeat(
     source: &Source,
-    stages: &dyn tactile_imaging::pipeline::Stages,
+    pipeline: &tactile_imaging::Pipeline,
     n: u32,
 ) -> Result<Vec<Timing>, Failure> {
     let mut times = vec![Vec::with_capacity(n as usize); Stage::ALL.len() + 1];
-    let first = source.press(stages)?;
+    let first = source.press(pipeline)?;
     for _ in 0..n {
         let start = Instant::now();
         let mut press = first.renewed();

@@ -1,6 +1,6 @@
 //! Where the frames come from: the simulator or a scene file.
 use crate::arguments::{Arguments, Polymer};
-use tactile_imaging::pipeline::{Press, Stages, Trial, Truth};
+use tactile_imaging::pipeline::{Pipeline, Press, Trial, Truth};
 use tactile_imaging::scene::{Scene, SceneData};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Elastic, Load, PressOptions, Sphere};
 
@@ -32,21 +32,18 @@ impl Source {
         )?)))
     }
 
-    pub(crate) fn stages(&self, arguments: &Arguments) -> Result<Box<dyn Stages>, Failure> {
-        Ok(match self {
-            Self::Simulated(trial) => Box::new(
-                trial
-                    .pipeline()?
-                    .with_control_points(arguments.points as usize),
-            ),
-            Self::Scene(own) => own.0.stages_with(&own.1, arguments.points as usize)?,
-        })
+    pub(crate) fn pipeline(&self, arguments: &Arguments) -> Result<Pipeline, Failure> {
+        let pipeline = match self {
+            Self::Simulated(trial) => trial.pipeline()?,
+            Self::Scene(own) => own.0.pipeline(&own.1)?,
+        };
+        Ok(pipeline.with_control_points(arguments.points as usize))
     }
 
-    pub(crate) fn press<'a>(&'a self, stages: &'a dyn Stages) -> Result<Press<'a>, Failure> {
+    pub(crate) fn press(&self, pipeline: &Pipeline) -> Result<Press<'_>, Failure> {
         match self {
-            Self::Simulated(trial) => Ok(trial.press(stages)?),
-            Self::Scene(own) => Ok(own.0.press(stages, &own.1)?),
+            Self::Simulated(trial) => Ok(trial.press(pipeline)?),
+            Self::Scene(own) => Ok(own.0.press(pipeline, &own.1)?),
         }
     }
 

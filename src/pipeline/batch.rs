@@ -1,7 +1,7 @@
 //! Many frames at once: serial, or over threads with the feature `rayon`; the bits are the same.
+use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
-use super::stages::{Stages, reference_frame};
 use crate::force::ForceWorkspace;
 use ndarray::ArrayView2;
 
@@ -33,14 +33,14 @@ type Reading = Result<Option<ContactReading>, PipelineError>;
 /// # Errors
 /// [`PipelineError::Sensor`] for a reference without pixels; a frame's own trouble stands in its place.
 pub fn contacts(
-    stages: &dyn Stages,
+    pipeline: &Pipeline,
     reference: ArrayView2<'_, u8>,
     frames: &[ArrayView2<'_, u8>],
 ) -> Result<Vec<Reading>, PipelineError> {
-    let reference = reference_frame(stages, &[reference])?;
+    let reference = pipeline.reference_frame(&[reference])?;
     let one = |(workspace, contact): &mut (ForceWorkspace, FrameContact),
                (frame, image): (usize, &ArrayView2<'_, u8>)| {
-        stages
+        pipeline
             .contact()
             .measure(workspace, *image, &reference, None, contact)
             .map_err(|source| PipelineError::Contact { frame, source })?;

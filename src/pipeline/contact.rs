@@ -6,6 +6,7 @@ use crate::force::{
     StopReason, StressCalibration,
 };
 use ndarray::{Array2, ArrayView2};
+use std::sync::Arc;
 
 /// What a frame says of its contact.
 ///
@@ -184,7 +185,7 @@ impl FrameContact {
 ///     fn pixel_size_m(&self) -> [f64; 2] { self.0.pixel_size_m() }
 /// }
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
-/// let pipeline = Pipeline::new(Gauged(LightContact::from_pairs(&pairs, [50e-6; 2])?), Object::sphere(3e-3));
+/// let pipeline = Pipeline::new(Gauged(LightContact::from_pairs(&pairs, [50e-6; 2])?), Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_gauged_frame(frame.view(), Some(0.98));
 /// assert_eq!(press.contact(0)?.and_then(|c| c.force_n).map(|f| f.value), Some(0.98));
@@ -209,6 +210,48 @@ pub trait ContactStage: Send + Sync {
 
     /// The size of a pixel in metres, x and y.
     fn pixel_size_m(&self) -> [f64; 2];
+}
+
+impl<C: ContactStage + ?Sized> ContactStage for Box<C> {
+    fn measure(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        gauge_n: Option<f64>,
+        contact: &mut FrameContact,
+    ) -> Result<(), ForceError> {
+        (**self).measure(workspace, frame, reference, gauge_n, contact)
+    }
+
+    fn polarity(&self) -> Polarity {
+        (**self).polarity()
+    }
+
+    fn pixel_size_m(&self) -> [f64; 2] {
+        (**self).pixel_size_m()
+    }
+}
+
+impl<C: ContactStage + ?Sized> ContactStage for Arc<C> {
+    fn measure(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        gauge_n: Option<f64>,
+        contact: &mut FrameContact,
+    ) -> Result<(), ForceError> {
+        (**self).measure(workspace, frame, reference, gauge_n, contact)
+    }
+
+    fn polarity(&self) -> Polarity {
+        (**self).polarity()
+    }
+
+    fn pixel_size_m(&self) -> [f64; 2] {
+        (**self).pixel_size_m()
+    }
 }
 
 /// Light that leaks where an object presses: brightness is force, through a calibration.

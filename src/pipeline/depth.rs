@@ -16,7 +16,7 @@ use ndarray::{Array2, ArrayView2};
 /// let table = [(0.0, 0.0), (100.0, 0.5e-3)];
 /// let contact = DarkContact::new(&table, [0.1e-3; 2])?;
 /// assert_eq!(contact.pixel_size_m(), [0.1e-3; 2]);
-/// let pipeline = Pipeline::new(contact, Object::sphere(4e-3))
+/// let pipeline = Pipeline::new(contact, Object::sphere(4e-3))?
 ///     .with_surface(DarkContact::depth_table(&table)?, SurfaceInput::Signal);
 /// // A stamp of 20 × 20 pixels, 0.3 mm deep.
 /// let reference = Array2::from_elem((64, 64), 200_u8);

@@ -37,6 +37,12 @@ pub enum PipelineError {
     /// The calibration could not be fitted.
     #[error("the force calibration cannot be fitted: {0}")]
     Calibration(#[source] ForceError),
+    /// The options of the reconstruction or the sampler are not usable.
+    #[error("the options of the surface stages are not usable: {0}")]
+    SurfaceOptions(#[source] SfsError),
+    /// The options of the warp are not usable.
+    #[error("the options of the warp are not usable: {0}")]
+    WarpOptions(#[source] TpsError),
     /// The depth table is not usable.
     #[error("the depth table is not usable: {0}")]
     DepthTable(#[source] SfsError),

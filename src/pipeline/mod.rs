@@ -5,8 +5,8 @@
 //!                  └─ surface ─ control points ─ match ─ warp ─ strain ─┴─ modulus
 //! ```
 //!
-//! A [`Pipeline`] holds the stages (type parameters with defaults, see its docs; [`BoxedPipeline`]: by name, from a
-//! configuration) and is `Send + Sync`. A [`Press`]
+//! A [`Pipeline`] holds the stages, each any implementation of its trait, given as a value or by its name in a configuration
+//! ([`StagesConfig`]); it is `Send + Sync` and cheap to clone. A [`Press`]
 //! holds frames and computes what it is asked for, with what that needs and nothing else: [`Press::contact`] touches no
 //! surface, [`Press::modulus`] of a ball none either, [`Press::measure`] everything. The [`Report`] says what ran,
 //! for how long, and what was skipped for which reason.
@@ -23,13 +23,15 @@
 mod ball;
 mod batch;
 mod binning;
-mod boxed;
 mod choice;
+mod composition;
+mod config;
 mod contact;
 mod depth;
 mod display;
 mod display_stream;
 mod error;
+mod estimators;
 mod flag;
 mod measurement;
 mod object;
@@ -39,23 +41,21 @@ mod report;
 mod session;
 mod settings;
 mod source;
-mod stages;
 mod strain_error;
 mod strain_spline;
 mod surface;
 #[cfg(feature = "simulate")]
 mod trial;
-mod typed;
 
 pub use ball::BallFit;
 pub use batch::contacts;
 pub use binning::Binning;
-pub use boxed::{BoxedPipeline, StagesConfig};
 pub use choice::{
-    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, EstimatorChoice,
-    FitWarp, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, UnknownStage,
-    WarpChoice,
+    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice,
+    UnknownStage, WarpChoice,
 };
+pub use composition::Pipeline;
+pub use config::StagesConfig;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
 pub use display::with_error;
@@ -67,13 +67,11 @@ pub use pair::{LEAST_MATCHES, PairStrain};
 pub use press::Press;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
 pub use session::{DRIFT_LIMIT_GREY, DriftWatch, SESSION_LOADS, Session, SessionStrain, Update};
-pub use settings::{DEFAULT_CONTROL_POINTS, Settings, Skips};
+pub use settings::{DEFAULT_CONTROL_POINTS, Settings, Skips, SurfaceInput};
 pub use source::FrameSource;
 #[cfg(feature = "scene")]
 pub use source::ImageFolder;
-pub use stages::{BoxedWarp, Stages};
 pub use strain_spline::StrainSpline;
-pub use surface::{ContactSurface, SurfaceInput};
+pub use surface::ContactSurface;
 #[cfg(feature = "simulate")]
 pub use trial::{FrameTruth, Trial, Truth};
-pub use typed::Pipeline;

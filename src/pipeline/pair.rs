@@ -1,10 +1,9 @@
 //! From two sets of control points to match, displacement and strain.
+use super::composition::Pipeline;
 use super::error::PipelineError;
-use super::stages::Stages;
 use super::strain_error::mean_strain_error;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::matching::{Matching, WarmStart};
-use crate::tps::Warp;
 use nalgebra::{Matrix3, Point3};
 
 /// Fewest matches from which a three-dimensional strain can be told.
@@ -48,13 +47,13 @@ pub struct PairStrain {
 }
 
 pub(super) fn match_points(
-    stages: &dyn Stages,
+    pipeline: &Pipeline,
     frames: [usize; 2],
     model: &[Point3<f64>],
     target: &[Point3<f64>],
 ) -> Result<Matching<f64, 3>, PipelineError> {
     let [from, to] = frames;
-    stages
+    pipeline
         .matcher()
         .match_points(model, target)
         .map_err(|source| PipelineError::Match { from, to, source })
@@ -62,14 +61,14 @@ pub(super) fn match_points(
 
 /// As [`match_points`], from where the matcher's last match ended.
 pub(super) fn match_next(
-    stages: &dyn Stages,
+    pipeline: &Pipeline,
     frames: [usize; 2],
     warm: &mut WarmStart,
     model: &[Point3<f64>],
     target: &[Point3<f64>],
 ) -> Result<Matching<f64, 3>, PipelineError> {
     let [from, to] = frames;
-    let found = stages.matcher().match_next(warm, model, target);
+    let found = pipeline.matcher().match_next(warm, model, target);
     found.map_err(|source| PipelineError::Match { from, to, source })
 }
 
@@ -78,7 +77,7 @@ pub(super) fn match_next(
 /// The matcher's own warp follows every point; its gradient across a surface, where no two points lie behind each other,
 /// would be noise. The warp fitted here is smooth. `grid_m` is the surfaces' pixel.
 pub(super) fn strain(
-    stages: &dyn Stages,
+    pipeline: &Pipeline,
     frames: [usize; 2],
     model: &[Point3<f64>],
     target: &[Point3<f64>],
@@ -105,14 +104,15 @@ pub(super) fn strain(
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let targets: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
     let weights: Vec<_> = pairs.iter().map(|&(i, _)| matching.confidence[i]).collect();
-    let warp = stages
-        .fit_warp(&sources, &targets, &weights)
+    let warp = pipeline
+        .warp()
+        .fit(&sources, &targets, Some(&weights))
         .map_err(|source| PipelineError::Warp { from, to, source })?;
     let mut gradients = vec![Matrix3::zeros(); model.len()];
     warp.jacobian_into(model, &mut gradients)
         .map_err(|source| PipelineError::Warp { from, to, source })?;
     gradients.iter_mut().for_each(|g| *g -= Matrix3::identity());
-    let measure = stages.strain();
+    let measure = pipeline.strain();
     let field = StrainField::from_gradients(&gradients, None, measure)
         .map_err(|source| PipelineError::Strain { from, to, source })?;
     let mut summary = field.summary();

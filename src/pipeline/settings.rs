@@ -2,14 +2,17 @@
 use super::binning::Binning;
 use super::choice::EstimatorChoice;
 use super::object::Object;
-use super::surface::SurfaceInput;
 use crate::elasticity::contact::Waveguide;
 
 /// Control points on each surface where nothing else is asked for: the paper's number.
 ///
 /// ```
 /// use tactile_imaging::{Object, Pipeline, pipeline::DEFAULT_CONTROL_POINTS};
-/// assert_eq!(Pipeline::new((), Object::sphere(3e-3)).settings().control_points, DEFAULT_CONTROL_POINTS);
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+/// assert_eq!(pipeline.settings().control_points, DEFAULT_CONTROL_POINTS);
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 pub const DEFAULT_CONTROL_POINTS: usize = 200;
 
@@ -50,15 +53,41 @@ impl Default for Skips {
     }
 }
 
+/// What of the frame the surface stage looks at.
+///
+/// ```
+/// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
+/// // A table of depths wants grey levels; shape from shading, the default, the cosine of the slope.
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let shading = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(4e-3))?;
+/// assert_eq!(shading.settings().surface_input, SurfaceInput::Shading);
+/// let table = DarkContact::depth_table(&[(0.0, 0.0), (100.0, 0.5e-3)])?;
+/// let depth = shading.with_surface(table, SurfaceInput::Signal);
+/// assert_eq!(depth.settings().smoothing_px, 1, "heights as they are measured");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SurfaceInput {
+    /// Signal over its greatest value, from 0 to 1: the cosine of the slope under frontal light.
+    #[default]
+    Shading,
+    /// The signal itself: grey levels above (or, for sensors that darken, below) the reference.
+    Signal,
+}
+
 /// What a pipeline knows beside its stages.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
-/// let pipeline = Pipeline::new((), Object::sphere(3e-3)).with_control_points(80).with_smoothing(3);
+/// # use tactile_imaging::force::CalibrationPair;
+/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80).with_smoothing(3);
 /// let settings: &Settings = pipeline.settings();
 /// assert_eq!((settings.control_points, settings.smoothing_px), (80, 3));
 /// assert_eq!(settings.binning, Binning::Auto);
 /// assert!(settings.waveguide.is_none(), "rigid beside the ball");
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Settings {

@@ -1,34 +1,13 @@
 //! From a frame's contact to its surface and the control points on it.
 use super::binning;
+use super::composition::Pipeline;
 use super::contact::FrameContact;
-use super::settings::Settings;
-use super::stages::Stages;
+use super::settings::{Settings, SurfaceInput};
 use crate::force::{BoundingBox, Polarity};
 use crate::sfs::{Domain, Frame, SfsError, Surface, Workspace};
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2, Axis};
 use std::sync::{Mutex, PoisonError};
-
-/// What of the frame the surface stage looks at.
-///
-/// ```
-/// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, SurfaceInput};
-/// // A table of depths wants grey levels; shape from shading, the default, the cosine of the slope.
-/// let shading = Pipeline::new((), Object::sphere(4e-3));
-/// assert_eq!(shading.settings().surface_input, SurfaceInput::Shading);
-/// let table = DarkContact::depth_table(&[(0.0, 0.0), (100.0, 0.5e-3)])?;
-/// let depth = shading.with_surface(table, SurfaceInput::Signal);
-/// assert_eq!(depth.settings().smoothing_px, 1, "heights as they are measured");
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SurfaceInput {
-    /// Signal over its greatest value, from 0 to 1: the cosine of the slope under frontal light.
-    #[default]
-    Shading,
-    /// The signal itself: grey levels above (or, for sensors that darken, below) the reference.
-    Signal,
-}
 
 /// A reconstructed surface and its place in the frame.
 ///
@@ -40,7 +19,7 @@ pub enum SurfaceInput {
 /// let depth_mm = |x: f64, y: f64| (16.0 - 0.01 * (x * x + y * y)).sqrt() - 3.2;
 /// let grey = |(r, c): (usize, usize)| 220 - (depth_mm(c as f64 - 32.0, r as f64 - 32.0) / 5e-3).round() as u8;
 /// let (reference, frame) = (Array2::from_elem((64, 64), 220_u8), Array2::from_shape_fn((64, 64), grey));
-/// let pipeline = Pipeline::new(DarkContact::new(&table, [1e-4; 2])?, Object::sphere(4e-3))
+/// let pipeline = Pipeline::new(DarkContact::new(&table, [1e-4; 2])?, Object::sphere(4e-3))?
 ///     .with_surface(DarkContact::depth_table(&table)?, SurfaceInput::Signal);
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_frame(frame.view());
@@ -117,7 +96,7 @@ impl SurfaceWorkspace {
         if side == 1 && settings.surface_input == SurfaceInput::Shading {
             binning::trim_rim(&mut self.mask, &self.signal);
         }
-        let ceiling = settings.surface_input.ceiling();
+        let ceiling = ceiling(settings.surface_input);
         // The width is that in the frame: a block has smoothed already.
         let width = (settings.smoothing_px / side) | 1;
         if width > 1 {
@@ -132,16 +111,17 @@ impl SurfaceWorkspace {
     }
 }
 
-impl SurfaceInput {
-    /// Greatest value of the input.
-    fn ceiling(self) -> f64 {
-        if self == Self::Shading { 1.0 } else { 255.0 }
+/// Greatest value of the input.
+fn ceiling(input: SurfaceInput) -> f64 {
+    match input {
+        SurfaceInput::Shading => 1.0,
+        SurfaceInput::Signal => 255.0,
     }
 }
 
 /// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks for.
 pub(super) fn reconstruct(
-    stages: &dyn Stages,
+    pipeline: &Pipeline,
     workspace: &mut SurfaceWorkspace,
     images: [ArrayView2<'_, u8>; 2],
     contact: &FrameContact,
@@ -150,19 +130,19 @@ pub(super) fn reconstruct(
     let (Some(region), Some(reading)) = (contact.region, contact.reading) else {
         return Err(SfsError::EmptyMask);
     };
-    let settings = stages.settings();
+    let settings = pipeline.settings();
     let scale = match settings.surface_input {
         SurfaceInput::Shading => 1.0 / reading.peak_grey,
         SurfaceInput::Signal => 1.0,
     };
-    let scale = if stages.contact().polarity() == Polarity::Darker {
+    let scale = if pipeline.contact().polarity() == Polarity::Darker {
         -scale
     } else {
         scale
     };
     let side = settings.binning.side(pixels, settings.control_points);
     let region = workspace.load(settings, images, contact, (region, scale, side));
-    let pixel_size_m = stages
+    let pixel_size_m = pipeline
         .contact()
         .pixel_size_m()
         .map(|size| size * side as f64);
@@ -173,7 +153,7 @@ pub(super) fn reconstruct(
         .sfs
         .get_mut()
         .unwrap_or_else(PoisonError::into_inner);
-    stages
+    pipeline
         .surface()
         .reconstruct_with(sfs, frame, &domain, &mut surface)?;
     Ok(ContactSurface {
@@ -186,14 +166,14 @@ pub(super) fn reconstruct(
 
 /// Control points on a surface, in metres from the frame's first pixel.
 pub(super) fn sample(
-    stages: &dyn Stages,
+    pipeline: &Pipeline,
     surface: &ContactSurface,
 ) -> Result<Vec<Point3<f64>>, SfsError> {
     let (heights, mask) = (&surface.surface.heights, &surface.surface.mask);
     let usable = mask.iter().filter(|m| **m).count();
-    let count = stages.settings().control_points.min(usable);
+    let count = pipeline.settings().control_points.min(usable);
     let size = surface.pixel_size_m;
-    let mut points = stages
+    let mut points = pipeline
         .sampler()
         .sample(heights.view(), Some(mask.view()), size, count)?;
     let [x, y] = surface.origin_m();

@@ -1,8 +1,8 @@
 //! A simulated press, measured blindly and laid beside its truth.
+use super::composition::Pipeline;
 use super::error::PipelineError;
 use super::object::Object;
 use super::press::Press;
-use super::typed::Pipeline;
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::force::CalibrationPair;
 use crate::simulate::{
@@ -141,8 +141,8 @@ impl Trial {
     ///
     /// # Errors
     /// [`PipelineError`].
-    pub fn press<'a>(&'a self, stages: &'a dyn super::Stages) -> Result<Press<'a>, PipelineError> {
-        let mut press = Press::new(stages, self.simulation.reference.view())?;
+    pub fn press(&self, pipeline: &Pipeline) -> Result<Press<'_>, PipelineError> {
+        let mut press = pipeline.press(self.simulation.reference.view())?;
         for frame in &self.simulation.frames {
             press.add_frame(frame.view());
         }

@@ -16,7 +16,7 @@ const UM: f64 = 1e6;
 /// use tactile_imaging::pipeline::{LightContact, Object};
 /// use tactile_imaging::plot::{PressPlotError, save_press_pages};
 /// let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f));
-/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, [20e-6, 20e-6])?, Object::sphere(3e-3));
+/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, [20e-6, 20e-6])?, Object::sphere(3e-3))?;
 /// let (reference, small) = (ndarray::Array2::from_elem((20, 30), 10), ndarray::Array2::from_elem((8, 8), 10));
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_frame(small.view());
@@ -51,7 +51,7 @@ pub enum PressPlotError {
 /// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
 /// # let made = scene.simulate();
 /// let contact = LightContact::from_pairs(&pairs, made.pixel_size_m)?;
-/// let pipeline = Pipeline::new(contact, Object::sphere(3e-3)).with_control_points(40);
+/// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?.with_control_points(40);
 /// let mut press = pipeline.press(made.reference.view())?;
 /// press.add_frame(made.frames[0].view());
 /// let summary = summary_lines(&press.measure()?);
@@ -103,7 +103,7 @@ pub fn save_press_pages(
 /// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
 /// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
 /// # let made = scene.simulate();
-/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, made.pixel_size_m)?, Object::sphere(3e-3));
+/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, made.pixel_size_m)?, Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(made.reference.view())?;
 /// press.add_frame(made.frames[0].view());
 /// let lines = summary_lines(&press.measure()?);
@@ -161,7 +161,7 @@ fn axes(title: impl Into<String>) -> Panel {
 
 /// The frames with the contact circles.
 fn frames_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
-    let size = press.stages().contact().pixel_size_m().map(|s| s * MM);
+    let size = press.pipeline().contact().pixel_size_m().map(|s| s * MM);
     let mut page = Page::new("Frames and contacts").columns(press.frames().min(2));
     for frame in 0..press.frames() {
         let title = force_title(press, frame)?;

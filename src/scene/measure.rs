@@ -2,8 +2,7 @@
 use super::{LoadedCalibration, Scene, SceneData, SceneError};
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::pipeline::{
-    BoxedPipeline, ContactStage, DEFAULT_CONTROL_POINTS, DarkContact, LightContact, Measurement,
-    Pipeline, PipelineError, Press, Stages, SurfaceInput,
+    DarkContact, LightContact, Measurement, Pipeline, PipelineError, Press, SurfaceInput,
 };
 
 impl Scene {
@@ -30,20 +29,11 @@ impl Scene {
     pub fn measure_file(path: impl AsRef<std::path::Path>) -> Result<Measurement, SceneError> {
         let scene = Self::read(path)?;
         let data = scene.load()?;
-        let stages = scene.stages(&data)?;
-        let mut press = scene.press(stages.as_ref(), &data)?;
+        let mut press = scene.press(&scene.pipeline(&data)?, &data)?;
         press.measure().map_err(|e| scene.measure_error(e))
     }
 
     /// The pipeline for this scene's sensor and object, of the stages it names.
-    ///
-    /// # Errors
-    /// [`SceneError::Measure`] where the calibration or the waveguide is not usable.
-    pub fn stages(&self, data: &SceneData) -> Result<Box<dyn Stages>, SceneError> {
-        self.stages_with(data, DEFAULT_CONTROL_POINTS)
-    }
-
-    /// As [`stages`](Self::stages), with a number of control points.
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -63,21 +53,16 @@ impl Scene {
     /// # let frame = ndarray::Array2::from_elem((20, 30), 10);
     /// # let calibration = LoadedCalibration::Pairs(pairs);
     /// # let data = SceneData { reference: frame.clone(), frames: vec![frame], calibration };
-    /// let stages = scene.stages_with(&data, 60)?; // the scene says: strain = "hencky"
-    /// assert_eq!(stages.settings().control_points, 60);
-    /// assert!(stages.strain().name().contains("Hencky"));
+    /// let pipeline = scene.pipeline(&data)?.with_control_points(60); // the scene says: strain = "hencky"
+    /// let mut press = scene.press(&pipeline, &data)?;
+    /// assert!(press.contact(0)?.is_none(), "as grey as the reference");
     /// # Ok(()) }
     /// ```
     ///
     /// # Errors
-    /// As [`stages`](Self::stages).
-    pub fn stages_with(
-        &self,
-        data: &SceneData,
-        control_points: usize,
-    ) -> Result<Box<dyn Stages>, SceneError> {
-        self.build_stages(data, control_points)
-            .map_err(|e| self.measure_error(e))
+    /// [`SceneError::Measure`] where the calibration or the waveguide is not usable.
+    pub fn pipeline(&self, data: &SceneData) -> Result<Pipeline, SceneError> {
+        self.build(data).map_err(|e| self.measure_error(e))
     }
 
     /// The scene's frames on a pipeline, ready to be asked.
@@ -86,22 +71,19 @@ impl Scene {
     /// [`SceneError::Measure`].
     pub fn press<'a>(
         &self,
-        stages: &'a dyn Stages,
+        pipeline: &Pipeline,
         data: &'a SceneData,
     ) -> Result<Press<'a>, SceneError> {
-        let mut press =
-            Press::new(stages, data.reference.view()).map_err(|e| self.measure_error(e))?;
+        let mut press = pipeline
+            .press(data.reference.view())
+            .map_err(|e| self.measure_error(e))?;
         for (image, frame) in data.frames.iter().zip(&self.frames) {
             press.add_gauged_frame(image.view(), frame.force_n);
         }
         Ok(press)
     }
 
-    fn build_stages(
-        &self,
-        data: &SceneData,
-        points: usize,
-    ) -> Result<Box<dyn Stages>, PipelineError> {
+    fn build(&self, data: &SceneData) -> Result<Pipeline, PipelineError> {
         let layer = |l: &super::SceneLayer| Layer {
             thickness_m: l.thickness_m,
             youngs_modulus_pa: l.youngs_modulus_pa,
@@ -109,28 +91,21 @@ impl Scene {
         };
         let layers = self.layers.iter().map(layer).collect();
         let waveguide = Waveguide::new(layers).map_err(PipelineError::Material)?;
-        let settings = Pipeline::new((), self.object)
-            .with_waveguide(waveguide)
-            .with_control_points(points)
-            .with_flat_field(self.flat_field)
-            .with_estimator(self.stages.estimator);
-        let boxed = |contact: Box<dyn ContactStage>| {
-            BoxedPipeline::from_config(contact, self.object, &self.stages)
-                .map_err(PipelineError::DepthTable)
-        };
-        Ok(match &data.calibration {
+        let pipeline = match &data.calibration {
             LoadedCalibration::Pairs(pairs) => {
                 let contact = LightContact::from_pairs(pairs, self.pixel_size_m)?;
-                Box::new(boxed(Box::new(contact))?.with_settings(settings.settings().clone()))
+                Pipeline::new(contact, self.object)?.with_stages(&self.stages)?
             }
             LoadedCalibration::DepthTable(table) => {
                 let contact = DarkContact::new(table, self.pixel_size_m)?;
-                let depth = DarkContact::depth_table(table)?;
-                let settings = settings.with_surface(depth.clone(), SurfaceInput::Signal);
-                let pipeline = boxed(Box::new(contact))?.with_settings(settings.settings().clone());
-                Box::new(pipeline.with_surface(Box::new(depth)))
+                Pipeline::new(contact, self.object)?
+                    .with_stages(&self.stages)?
+                    .with_surface(DarkContact::depth_table(table)?, SurfaceInput::Signal)
             }
-        })
+        };
+        Ok(pipeline
+            .with_waveguide(waveguide)
+            .with_flat_field(self.flat_field))
     }
 
     /// The pipeline's error with the field that it comes from.

@@ -162,8 +162,7 @@ pub struct SceneLayer {
 /// # let path = write_folder(&made, &calibration, folder.path())?;
 /// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
 /// let data = scene.load()?;
-/// let stages = scene.stages(&data)?;
-/// let mut press = scene.press(stages.as_ref(), &data)?;
+/// let mut press = scene.press(&scene.pipeline(&data)?, &data)?;
 /// let modulus = press.modulus().map_err(|e| scene.measure_error(e))?; // errors name file and field
 /// let (low, high) = (modulus.interval_95.lower, modulus.interval_95.upper);
 /// assert!(low < 103e3 && high.is_none_or(|high| high > 103e3));

@@ -147,7 +147,7 @@ impl PressScene {
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
     /// let pairs: Vec<_> = series.pairs().map(|(light, force)| CalibrationPair::loading(light, force)).collect();
-    /// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, camera.pixel_size_m)?, Object::sphere(3e-3));
+    /// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, camera.pixel_size_m)?, Object::sphere(3e-3))?;
     /// let (reference, frame) = (scene.reference(0), scene.frame(0, 0));
     /// let mut press = pipeline.press(reference.view())?;
     /// press.add_frame(frame.view());

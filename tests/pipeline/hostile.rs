@@ -1,10 +1,10 @@
 //! Ten thousand hostile presses: a typed error or a flagged answer, never a panic, never a silent NaN.
 use ndarray::{Array2, s};
 use proptest::prelude::*;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::pipeline::{Flag, Measurement, Object, Press, Session, Stages};
+use tactile_imaging::pipeline::{Flag, Measurement, Object, Session};
 use tactile_imaging::simulate::{Camera, Hostile, PressOptions};
 
 const SHAPE: [usize; 2] = [36, 44];
@@ -102,8 +102,8 @@ fn is_sound(m: &Measurement) -> bool {
 }
 
 /// Every frame through a session, in which no error may stick.
-fn stream(stages: Arc<dyn Stages>, reference: &Array2<u8>, frames: [&Array2<u8>; 2]) {
-    let mut session = Session::new(stages, reference.view()).unwrap();
+fn stream(pipeline: &Pipeline, reference: &Array2<u8>, frames: [&Array2<u8>; 2]) {
+    let mut session = Session::new(pipeline, reference.view()).unwrap();
     for frame in frames.into_iter().chain(frames) {
         if let Ok(update) = session.push(frame.view())
             && let Some(contact) = update.contact
@@ -141,9 +141,9 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
         spoil(first, spoilt[0], seed as u64),
         spoil(second, spoilt[1], !(seed as u64)),
     );
-    let pipeline = Arc::new(pipeline(object));
-    stream(pipeline.clone(), reference, [&first, &second]);
-    let mut press = Press::new(pipeline.as_ref(), reference.view()).unwrap();
+    let pipeline = pipeline(object);
+    stream(&pipeline, reference, [&first, &second]);
+    let mut press = pipeline.press(reference.view()).unwrap();
     press.add_frame(first.view());
     press.add_frame(second.view());
     // Two thirds go without surfaces where they can, to be quick.

@@ -6,14 +6,13 @@ mod streams;
 
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2};
-use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::io::write_grey_image;
 use tactile_imaging::pipeline::{
-    BallFit, BoxedPipeline, FrameSource, ImageFolder, Object, PipelineError, Press, Report,
-    Session, SkipReason, Skips, Stage, Stages, Trial, Update, contacts,
+    BallFit, FrameSource, ImageFolder, Object, PipelineError, Press, Report, Session, SkipReason,
+    Skips, Stage, Trial, Update, contacts,
 };
 use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
@@ -116,8 +115,8 @@ fn a_frame_without_contact_stops_there() {
 }
 
 /// All answers of a press that must not depend on what is skipped.
-fn answers(trial: &Trial, stages: &dyn Stages, twice: bool) -> (Vec<u64>, [usize; 6]) {
-    let mut press = Press::new(stages, trial.simulation.reference.view()).unwrap();
+fn answers(trial: &Trial, pipeline: &Pipeline, twice: bool) -> (Vec<u64>, [usize; 6]) {
+    let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
     for frame in &trial.simulation.frames {
         press.add_frame(frame.view());
         if twice {
@@ -293,8 +292,6 @@ fn everything_can_cross_threads() {
     crosses::<PipelineError>();
     crosses::<tactile_imaging::pipeline::Measurement>();
     crosses::<Press<'_>>();
-    crosses::<BoxedPipeline>();
-    crosses::<Box<dyn Stages>>();
     crosses::<Update>();
     crosses::<Report>();
     crosses::<ImageFolder>();
@@ -311,11 +308,7 @@ fn told<T: std::fmt::Display + serde::Serialize>(result: &T) -> String {
 fn every_result_can_be_read_by_people_and_programs() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
-    let mut session = Session::new(
-        Arc::new(pipeline.clone()),
-        trial.simulation.reference.view(),
-    )
-    .unwrap();
+    let mut session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
     let empty = trial.scene.reference(3);
     assert_eq!(
         told(&session.push(empty.view()).unwrap()),

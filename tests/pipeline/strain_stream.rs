@@ -1,19 +1,18 @@
 //! Strain along a stream: the same as a press's, with less work.
 use super::trial;
 use nalgebra::Matrix3;
-use std::sync::Arc;
 use tactile_imaging::elasticity::modulus::EstimatorKind;
 use tactile_imaging::pipeline::{
-    EstimatorChoice, Object, PipelineError, Session, SkipReason, Skips, Stage, Stages, Trial,
+    EstimatorChoice, Object, Pipeline, PipelineError, Session, SkipReason, Skips, Stage, Trial,
 };
 
-fn session(trial: &Trial, stages: impl Stages + 'static) -> Session {
-    Session::new(Arc::new(stages), trial.simulation.reference.view()).unwrap()
+fn session(trial: &Trial, pipeline: &Pipeline) -> Session {
+    Session::new(pipeline, trial.simulation.reference.view()).unwrap()
 }
 
 /// Mean strains of all frames against the first, and what the matches took.
 fn strains(trial: &Trial, skips: Skips) -> (Vec<Matrix3<f64>>, usize, Session) {
-    let mut session = session(trial, trial.pipeline().unwrap().with_skips(skips));
+    let mut session = session(trial, &trial.pipeline().unwrap().with_skips(skips));
     let (mut means, mut iterations) = (Vec::new(), 0);
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();
@@ -74,7 +73,7 @@ fn an_object_that_needs_strain_gets_its_modulus_from_the_stream() {
     pipeline = pipeline.with_object(object);
     let mut press = trial.press(&pipeline).unwrap();
     let expected = press.modulus().unwrap();
-    let mut session = session(&trial, pipeline.clone());
+    let mut session = session(&trial, &pipeline);
     assert!(
         matches!(session.modulus().unwrap_err(), PipelineError::Modulus(_)),
         "no strain yet"
@@ -93,7 +92,7 @@ fn an_object_that_needs_strain_gets_its_modulus_from_the_stream() {
 #[test]
 fn strain_is_measured_once_a_frame_and_starts_anew_when_told() {
     let trial = trial(&[0.7, 1.2], 7);
-    let mut session = session(&trial, trial.pipeline().unwrap());
+    let mut session = session(&trial, &trial.pipeline().unwrap());
     assert_eq!(
         session.strain().unwrap_err(),
         PipelineError::NoContact { frame: 0 }

@@ -2,7 +2,6 @@
 #![allow(clippy::print_stdout)]
 use super::trial;
 use ndarray::Array2;
-use std::sync::Arc;
 use tactile_imaging::force::{Estimate, ShearCalibration};
 use tactile_imaging::pipeline::{FrameSource, SESSION_LOADS, Session, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, LoadCycle, PressOptions};
@@ -12,7 +11,7 @@ fn a_session_refines_the_modulus_and_agrees_with_a_press() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
     let expected = trial.press(&pipeline).unwrap().modulus().unwrap();
-    let mut session = Session::new(Arc::new(pipeline), trial.simulation.reference.view()).unwrap();
+    let mut session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
     assert!(session.modulus().is_err(), "no load yet");
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();
@@ -28,10 +27,10 @@ fn a_session_refines_the_modulus_and_agrees_with_a_press() {
 #[test]
 fn a_session_over_a_stream_keeps_its_memory_and_its_answer() {
     let trial = trial(&[1.5], 7);
-    let stages = Arc::new(trial.pipeline().unwrap());
+    let pipeline = trial.pipeline().unwrap();
     let references: Vec<_> = (1..4).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
-    let mut session = Session::from_frames(stages, &views).unwrap();
+    let mut session = Session::from_frames(&pipeline, &views).unwrap();
     let cycle = LoadCycle {
         largest_force_n: 1.5,
         cycles: 2,
@@ -68,8 +67,8 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
         }),
         residual_sd_n: [0.0; 2],
     };
-    let stages = Arc::new(trial.pipeline().unwrap());
-    let session = Session::new(stages, trial.simulation.reference.view()).unwrap();
+    let pipeline = trial.pipeline().unwrap();
+    let session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
     let mut session = session.with_shear(calibration);
     let [first, second] = [0, 1].map(|k| trial.simulation.frames[k].view());
     assert_eq!(
@@ -113,8 +112,8 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
 #[test]
 fn drift_of_the_light_is_seen_in_frames_without_contact() {
     let trial = trial(&[0.7], 10);
-    let stages = Arc::new(trial.pipeline().unwrap());
-    let mut session = Session::new(stages, trial.simulation.reference.view()).unwrap();
+    let pipeline = trial.pipeline().unwrap();
+    let mut session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
     session.push(trial.scene.reference(4).view()).unwrap();
     assert_eq!(session.drift().frames, 1);
     assert!(session.drift_flag().is_none(), "{:?}", session.drift());
@@ -148,7 +147,7 @@ fn twenty_thousand_frames_leave_memory_and_answer_alone() {
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
-    let mut session = Session::from_frames(Arc::new(trial.pipeline().unwrap()), &views).unwrap();
+    let mut session = Session::from_frames(&trial.pipeline().unwrap(), &views).unwrap();
     let cycle = LoadCycle {
         largest_force_n: 1.5,
         cycles: 249,

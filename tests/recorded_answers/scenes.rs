@@ -2,13 +2,12 @@
 use super::{Answer, Answers};
 use nalgebra::Matrix3;
 use ndarray::Array2;
-use std::sync::Arc;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{
-    BoxedPipeline, ContactReading, DarkContact, EstimatorChoice, LightContact, MatcherChoice,
-    Object, Pipeline, Press, ReconstructionChoice, SamplerChoice, Session, StagesConfig,
-    StrainChoice, SurfaceInput, Trial, WarpChoice,
+    ContactReading, DarkContact, EstimatorChoice, MatcherChoice, Object, Pipeline, Press,
+    ReconstructionChoice, SamplerChoice, Session, StagesConfig, StrainChoice, SurfaceInput, Trial,
+    WarpChoice,
 };
 use tactile_imaging::scene::Scene;
 use tactile_imaging::simulate::{
@@ -235,6 +234,7 @@ fn dark() -> Vec<Answer> {
     ];
     for (name, object) in ["ball/", "punch/"].into_iter().zip(objects) {
         let mut pipeline = Pipeline::new(contact.clone(), object)
+            .expect("a pipeline")
             .with_surface(depths.clone(), SurfaceInput::Signal)
             .with_scale_errors(0.01, 0.002)
             .with_control_points(80);
@@ -305,22 +305,12 @@ fn stages_by_name() -> Vec<Answer> {
         },
     ));
     for (name, config) in configs {
-        let typed = trial
+        let pipeline = trial
             .pipeline()
+            .and_then(|pipeline| pipeline.with_stages(&config))
             .expect("a pipeline")
-            .with_control_points(40)
-            .with_estimator(config.estimator);
-        let contact = LightContact::from_pairs(&trial.pairs, trial.simulation.pixel_size_m)
-            .expect("a calibration");
-        let pipeline =
-            BoxedPipeline::from_config(Box::new(contact), typed.settings().object, &config)
-                .expect("stages")
-                .with_settings(typed.settings().clone());
-        let mut measured =
-            Press::new(&pipeline, trial.simulation.reference.view()).expect("a press");
-        for frame in &trial.simulation.frames {
-            measured.add_frame(frame.view());
-        }
+            .with_control_points(40);
+        let mut measured = trial.press(&pipeline).expect("a press");
         let heights = &measured.surface(1).expect("a surface").surface.heights;
         let heights: Vec<f64> = heights.iter().copied().filter(|h| h.is_finite()).collect();
         answers.add(
@@ -355,8 +345,8 @@ fn stream() -> Vec<Answer> {
         .with_control_points(60);
     let ratio = pipeline.clone().with_estimator(EstimatorChoice::PaperRatio);
     let reference = || trial.simulation.reference.view();
-    let mut session = Session::new(Arc::new(pipeline), reference()).expect("a session");
-    let mut by_strain = Session::new(Arc::new(ratio), reference()).expect("a session");
+    let mut session = Session::new(&pipeline, reference()).expect("a session");
+    let mut by_strain = Session::new(&ratio, reference()).expect("a session");
     session
         .push(trial.scene.reference(9).view())
         .expect("an update");
@@ -411,8 +401,11 @@ fn scene_file() -> Vec<Answer> {
     let path = write_folder(&made, &CalibrationOptions::default(), folder.path()).expect("files");
     let scene = Scene::read(&path).expect("a scene");
     let data = scene.load().expect("its files");
-    let stages = scene.stages_with(&data, 60).expect("its stages");
-    let mut measured = scene.press(stages.as_ref(), &data).expect("a press");
+    let pipeline = scene
+        .pipeline(&data)
+        .expect("its pipeline")
+        .with_control_points(60);
+    let mut measured = scene.press(&pipeline, &data).expect("a press");
     press(&mut answers, "", &mut measured);
     estimates(&mut answers, &mut measured);
     answers.all

@@ -1,6 +1,5 @@
 //! Frames that are hardly frames: a typed error, or an answer that is finite or flagged; never a panic.
 use ndarray::Array2;
-use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{
@@ -159,7 +158,7 @@ fn press_stage_by_stage(
     pipeline: &Pipeline,
     [reference, first, second]: &[Array2<u8>; 3],
 ) {
-    let Ok(mut press) = Press::new(pipeline, reference.view()) else {
+    let Ok(mut press) = pipeline.press(reference.view()) else {
         return;
     };
     press.add_frame(first.view());
@@ -256,7 +255,7 @@ fn measured_is_sound(case: &str, measured: &Measurement) {
 
 /// A stream of the same frames, twice, in which no error may stick: a sound frame pushed after an error is measured as ever.
 fn stream(case: &str, pipeline: &Pipeline, [reference, first, second]: &[Array2<u8>; 3]) {
-    let Ok(mut session) = Session::new(Arc::new(pipeline.clone()), reference.view()) else {
+    let Ok(mut session) = Session::new(pipeline, reference.view()) else {
         return;
     };
     let finite = |s: &SessionStrain| {

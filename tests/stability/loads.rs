@@ -1,7 +1,6 @@
 //! One load, many equal ones, loads in falling order, as many as a session keeps.
 use crate::press::{SI, coarse_camera, pipeline, relative, trial};
 use crate::table::{EXACT, Table};
-use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
@@ -58,7 +57,7 @@ pub(crate) fn many(table: &mut Table) {
 
 fn streamed(trial: &Trial, pipeline: &Pipeline) -> ModulusEstimate<f64> {
     let reference = trial.simulation.reference.view();
-    let mut session = Session::new(Arc::new(pipeline.clone()), reference).unwrap();
+    let mut session = Session::new(pipeline, reference).unwrap();
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();
     }

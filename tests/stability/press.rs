@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
-use tactile_imaging::pipeline::{Object, Press, Trial};
+use tactile_imaging::pipeline::{Object, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
 
 /// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
@@ -128,7 +128,7 @@ pub(crate) struct Answer {
 pub(crate) fn answer(pipeline: &Pipeline, images: &Images) -> Answer {
     let references = images.references.each_ref().map(|image| image.view());
     let reference = ReferenceFrame::from_frames(&references).expect("two exposures");
-    let mut press = Press::with_reference(pipeline, Arc::new(reference));
+    let mut press = pipeline.press_on(Arc::new(reference));
     images.frames.iter().for_each(|image| {
         press.add_frame(image.view());
     });

@@ -3,11 +3,11 @@ mod measure;
 mod modulus;
 mod results;
 
+use super::composition::Pipeline;
 use super::contact::FrameContact;
 use super::error::PipelineError;
 use super::pair::PairStrain;
 use super::report::{Report, SkipReason, Stage};
-use super::stages::{Stages, reference_frame};
 use super::surface::{ContactSurface, SurfaceWorkspace};
 use crate::force::{ForceWorkspace, ReferenceFrame};
 use crate::matching::Matching;
@@ -29,7 +29,7 @@ struct Loaded<'a> {
 /// Frames at one or more loads. Every result is computed when it is first asked for, with what it needs and nothing else,
 /// and kept. Matches, displacements and strains are from the first frame to a later one.
 ///
-/// Made by [`Pipeline::press`](super::Pipeline::press).
+/// Made by [`Pipeline::press`].
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
@@ -48,7 +48,7 @@ struct Loaded<'a> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Press<'a> {
-    stages: &'a dyn Stages,
+    pipeline: Pipeline,
     reference: Arc<ReferenceFrame>,
     frames: Vec<Loaded<'a>>,
     /// The frame whose results a frame shares: itself, or an equal one before it.
@@ -58,46 +58,20 @@ pub struct Press<'a> {
     report: Report,
 }
 
-impl<'a> Press<'a> {
-    /// Starts a press with stages as an object; see [`Pipeline::press`](super::Pipeline::press).
-    ///
-    /// ```
-    /// use tactile_imaging::pipeline::{BoxedPipeline, LightContact, Object, Press, StagesConfig};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
-    /// let light = Box::new(LightContact::from_pairs(&pairs, [50e-6; 2])?);
-    /// let stages = BoxedPipeline::from_config(light, Object::sphere(3e-3), &StagesConfig::default())?;
-    /// let (reference, frame) = (hertz(0.0), hertz(120.0));
-    /// let mut press = Press::new(&stages, reference.view())?;
-    /// press.add_frame(frame.view());
-    /// assert_eq!(press.stages().settings().object, Object::sphere(3e-3));
-    /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
-    /// assert!((force.value / 1.005 - 1.0).abs() < 0.01);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
+impl Pipeline {
+    /// Starts a press: add frames, then ask for what you want. The press holds a clone of the pipeline.
     ///
     /// # Errors
     /// [`PipelineError::Sensor`] for a reference without pixels, or too dark for the flat field that was asked for.
-    pub fn new(
-        stages: &'a dyn Stages,
-        reference: ArrayView2<'_, u8>,
-    ) -> Result<Self, PipelineError> {
-        Ok(Self::with_reference(
-            stages,
-            Arc::new(reference_frame(stages, &[reference])?),
-        ))
+    pub fn press<'a>(&self, reference: ArrayView2<'_, u8>) -> Result<Press<'a>, PipelineError> {
+        Ok(self.press_on(Arc::new(self.reference_frame(&[reference])?)))
     }
 
     /// Starts a press on a reference made before: its noise is measured once for many presses.
     ///
     /// ```
     /// use std::sync::Arc;
-    /// use tactile_imaging::force::ReferenceFrame;
-    /// use tactile_imaging::pipeline::{Object, Pipeline, Press};
+    /// use tactile_imaging::{Object, Pipeline, force::ReferenceFrame};
     /// # use tactile_imaging::force::CalibrationPair;
     /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
@@ -105,18 +79,19 @@ impl<'a> Press<'a> {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let (empty, frame) = (hertz(0.0), hertz(120.0));
-    /// // The mean of several exposures has less noise than one.
-    /// let reference = Arc::new(ReferenceFrame::from_frames(&[empty.view(), empty.view(), empty.view()])?);
-    /// let mut press = Press::with_reference(&pipeline, reference);
-    /// press.add_frame(frame.view());
-    /// let radius = press.contact(0)?.expect("a contact").contact_radius_m;
-    /// assert!((radius.value / 1e-3 - 1.0).abs() < 0.01);
+    /// let reference = Arc::new(ReferenceFrame::new(hertz(0.0).view())?);
+    /// for (peak, newton) in [(60.0, 0.503), (120.0, 1.005)] {
+    ///     let frame = hertz(peak);
+    ///     let mut press = pipeline.press_on(Arc::clone(&reference));
+    ///     press.add_frame(frame.view());
+    ///     let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
+    ///     assert!((force.value / newton - 1.0).abs() < 0.01);
+    /// }
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn with_reference(stages: &'a dyn Stages, reference: Arc<ReferenceFrame>) -> Self {
-        Self {
-            stages,
+    pub fn press_on<'a>(&self, reference: Arc<ReferenceFrame>) -> Press<'a> {
+        Press {
+            pipeline: self.clone(),
             reference,
             frames: Vec::new(),
             twins: Vec::new(),
@@ -125,7 +100,9 @@ impl<'a> Press<'a> {
             report: Report::default(),
         }
     }
+}
 
+impl<'a> Press<'a> {
     /// The same frames on the same reference, of which nothing is computed yet: to time it again.
     ///
     /// ```
@@ -143,7 +120,7 @@ impl<'a> Press<'a> {
     /// ```
     #[must_use]
     pub fn renewed(&self) -> Self {
-        let mut press = Self::with_reference(self.stages, Arc::clone(&self.reference));
+        let mut press = self.pipeline.press_on(Arc::clone(&self.reference));
         for frame in &self.frames {
             press.add_gauged_frame(frame.image, frame.gauge_n);
         }
@@ -165,7 +142,7 @@ impl<'a> Press<'a> {
     /// # });
     /// // A sensor that darkens knows depth, not force.
     /// let contact = DarkContact::new(&[(0.0, 0.0), (150.0, 0.5e-3)], [50e-6; 2])?;
-    /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3));
+    /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?;
     /// let (reference, frame) = (hertz(0.0).mapv(|v| 255 - v), hertz(120.0).mapv(|v| 255 - v));
     /// let mut press = pipeline.press(reference.view())?;
     /// assert_eq!(press.add_gauged_frame(frame.view(), Some(0.9)), 0);
@@ -178,7 +155,7 @@ impl<'a> Press<'a> {
     pub fn add_gauged_frame(&mut self, image: ArrayView2<'a, u8>, gauge_n: Option<f64>) -> usize {
         let index = self.frames.len();
         let equal = |f: &Loaded<'_>| f.gauge_n == gauge_n && f.image == image;
-        let skip = self.stages.settings().skips.equal_frames;
+        let skip = self.pipeline.settings().skips.equal_frames;
         let twin = if skip {
             self.frames.iter().position(equal)
         } else {
@@ -202,9 +179,9 @@ impl<'a> Press<'a> {
         index
     }
 
-    /// The stages.
-    pub fn stages(&self) -> &'a dyn Stages {
-        self.stages
+    /// The pipeline.
+    pub fn pipeline(&self) -> &Pipeline {
+        &self.pipeline
     }
 
     /// The image of a frame.

@@ -2,7 +2,7 @@
 use super::Press;
 use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate, SharedErrors};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::object::{
+use crate::pipeline::estimators::{
     LoadReading, all_estimates, chosen_estimate, radius_with_floor, series, split_errors,
 };
 use crate::pipeline::report::Stage;
@@ -15,11 +15,11 @@ impl Press<'_> {
     /// # Errors
     /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
-        let with_strain = self.stages.settings().needs_strain();
+        let with_strain = self.pipeline.settings().needs_strain();
         let (loads, shared) = self.loads(with_strain)?;
         let start = Instant::now();
         let loads = series(loads, shared)?;
-        let estimate = chosen_estimate(self.stages.settings(), &loads);
+        let estimate = chosen_estimate(self.pipeline.settings(), &loads);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate
     }
@@ -69,7 +69,7 @@ impl Press<'_> {
             Err(_) => self.loads(false)?,
         };
         let start = Instant::now();
-        let settings = self.stages.settings();
+        let settings = self.pipeline.settings();
         let loads = series(loads, shared)?;
         let estimates = all_estimates(&settings.object, settings.waveguide.as_ref(), &loads);
         self.report.ran(Stage::Modulus, start.elapsed());
@@ -83,7 +83,7 @@ impl Press<'_> {
     ) -> Result<(Vec<LoadState<f64>>, SharedErrors<f64>), PipelineError> {
         let mut readings = Vec::with_capacity(self.frames.len());
         let mut depths = Vec::with_capacity(self.frames.len());
-        let size = self.stages.contact().pixel_size_m();
+        let size = self.pipeline.contact().pixel_size_m();
         for frame in 0..self.frames.len() {
             let reading = self.reading(frame)?;
             let force = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
@@ -96,7 +96,7 @@ impl Press<'_> {
             });
             depths.push(reading.indentation_m);
         }
-        let (mut loads, shared) = split_errors(readings.iter().copied(), self.stages.settings());
+        let (mut loads, shared) = split_errors(readings.iter().copied(), self.pipeline.settings());
         for (load, depth) in loads.iter_mut().zip(depths) {
             load.indentation_m = depth.map(|d| Estimate::new(d.value, d.standard_error));
         }

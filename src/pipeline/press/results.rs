@@ -20,7 +20,7 @@ impl Press<'_> {
             let start = Instant::now();
             let mut contact = FrameContact::default();
             let loaded = &self.frames[at];
-            self.stages
+            self.pipeline
                 .contact()
                 .measure(
                     &mut self.force,
@@ -35,7 +35,7 @@ impl Press<'_> {
                 None => self
                     .report
                     .skipped(Stage::Surface, frame, SkipReason::NoContact, pixels),
-                Some(region) if self.stages.settings().skips.outside_contact => {
+                Some(region) if self.pipeline.settings().skips.outside_contact => {
                     let saved = pixels - region.rows() * region.columns();
                     self.report
                         .skipped(Stage::Surface, frame, SkipReason::OutsideContact, saved);
@@ -92,7 +92,7 @@ impl Press<'_> {
             let first = self.frames[0].contact.as_ref().unwrap_or(contact);
             let pixels = first.mask.iter().filter(|m| **m).count();
             let surface =
-                surface::reconstruct(self.stages, &mut self.surface, images, contact, pixels)
+                surface::reconstruct(&self.pipeline, &mut self.surface, images, contact, pixels)
                     .map_err(|source| PipelineError::Surface { frame, source })?;
             self.report.ran(Stage::Surface, start.elapsed());
             self.frames[at].surface = Some(surface);
@@ -130,7 +130,7 @@ impl Press<'_> {
                 .surface
                 .as_ref()
                 .ok_or(PipelineError::NoContact { frame })?;
-            let points = surface::sample(self.stages, surface)
+            let points = surface::sample(&self.pipeline, surface)
                 .map_err(|source| PipelineError::Surface { frame, source })?;
             self.report.ran(Stage::ControlPoints, start.elapsed());
             self.frames[at].points = Some(points);
@@ -162,7 +162,7 @@ impl Press<'_> {
         if self.frames[at].matching.is_none() {
             let start = Instant::now();
             let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
-            let matching = pair::match_points(self.stages, [0, frame], points(0), points(at))?;
+            let matching = pair::match_points(&self.pipeline, [0, frame], points(0), points(at))?;
             self.report.ran(Stage::Match, start.elapsed());
             self.frames[at].matching = Some(matching);
         }
@@ -192,7 +192,7 @@ impl Press<'_> {
                 .as_ref()
                 .map_or(0.0, |s| s.pixel_size_m[0].max(s.pixel_size_m[1]));
             let strain = pair::strain(
-                self.stages,
+                &self.pipeline,
                 [0, frame],
                 points(0),
                 points(at),

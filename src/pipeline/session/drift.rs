@@ -14,7 +14,7 @@ use crate::pipeline::flag::Flag;
 /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
 /// # });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+/// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
 /// // The lamp loses a grey level in one row out of four, then everywhere.
 /// let fading = ndarray::Array2::from_shape_fn((64, 64), |(r, _)| if r % 4 == 0 { 9 } else { 10 });
 /// session.push(fading.view())?;
@@ -38,7 +38,7 @@ pub const DRIFT_LIMIT_GREY: f64 = 0.5;
 /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
 /// # });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+/// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
 /// // The lamp fades by two grey levels and recovers by one.
 /// for loss in [0, 2, 1] {
 ///     session.push(hertz(0.0).mapv(|v| v - loss).view())?;

@@ -1,7 +1,7 @@
 //! The loads that a session has seen: a bounded number, similar ones merged.
 use crate::elasticity::modulus::Estimate;
 use crate::pipeline::contact::ContactReading;
-use crate::pipeline::object::{LoadReading, radius_with_floor};
+use crate::pipeline::estimators::{LoadReading, radius_with_floor};
 
 /// Loads that a session keeps apart; more are merged.
 ///
@@ -15,7 +15,7 @@ use crate::pipeline::object::{LoadReading, radius_with_floor};
 /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
 /// # });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+/// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
 /// for k in 0..40 {
 ///     session.push(hertz(100.0 + f64::from(k)).view())?;
 /// }

@@ -11,17 +11,16 @@ mod results;
 mod strain;
 mod update;
 
+use super::composition::Pipeline;
 use super::contact::{FrameContact, resize};
 use super::error::PipelineError;
 use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
-use super::stages::{Stages, reference_frame};
 use crate::force::{ForceWorkspace, ReferenceFrame, ShearCalibration, ShearTracker};
 pub use drift::{DRIFT_LIMIT_GREY, DriftWatch};
 pub use loads::SESSION_LOADS;
 use loads::SeenLoads;
 use ndarray::{Array2, ArrayView2};
-use std::sync::Arc;
 use std::time::Instant;
 use strain::FollowedStrain;
 pub use strain::SessionStrain;
@@ -35,7 +34,7 @@ pub use update::Update;
 /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
 /// let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
 /// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-/// let mut session = Session::new(Arc::new(trial.pipeline()?), trial.simulation.reference.view())?;
+/// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
 /// for frame in &trial.simulation.frames {
 ///     assert!(session.push(frame.view())?.contact.is_some());
 /// }
@@ -44,7 +43,7 @@ pub use update::Update;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Session {
-    stages: Arc<dyn Stages>,
+    pipeline: Pipeline,
     reference: ReferenceFrame,
     workspace: ForceWorkspace,
     contact: FrameContact,
@@ -65,11 +64,8 @@ impl Session {
     ///
     /// # Errors
     /// [`PipelineError::Sensor`].
-    pub fn new(
-        stages: Arc<dyn Stages>,
-        reference: ArrayView2<'_, u8>,
-    ) -> Result<Self, PipelineError> {
-        Self::from_frames(stages, &[reference])
+    pub fn new(pipeline: &Pipeline, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
+        Self::from_frames(pipeline, &[reference])
     }
 
     /// A session whose reference is the mean of frames without contact, from which the noise is measured too.
@@ -85,7 +81,7 @@ impl Session {
     /// # });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let empty = hertz(0.0);
-    /// let mut session = Session::from_frames(Arc::new(pipeline), &[empty.view(), empty.view(), empty.view()])?;
+    /// let mut session = Session::from_frames(&pipeline, &[empty.view(), empty.view(), empty.view()])?;
     /// let force = session.push(hertz(60.0).view())?.contact.and_then(|c| c.force_n).expect("a force");
     /// assert!((force.value / 0.503 - 1.0).abs() < 0.01);
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
@@ -94,12 +90,12 @@ impl Session {
     /// # Errors
     /// [`PipelineError::Sensor`] for no frames, or frames that differ in size.
     pub fn from_frames(
-        stages: Arc<dyn Stages>,
+        pipeline: &Pipeline,
         references: &[ArrayView2<'_, u8>],
     ) -> Result<Self, PipelineError> {
         Ok(Self {
-            reference: reference_frame(stages.as_ref(), references)?,
-            stages,
+            reference: pipeline.reference_frame(references)?,
+            pipeline: pipeline.clone(),
             workspace: ForceWorkspace::default(),
             contact: FrameContact::default(),
             last: Array2::default((0, 0)),
@@ -130,7 +126,7 @@ impl Session {
     /// });
     /// let stiffness_n_per_m = [Estimate { value: 400.0, standard_error: 4.0 }; 2];
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(Arc::new(pipeline), Array2::from_elem((64, 64), 10).view())?
+    /// let mut session = Session::new(&pipeline, Array2::from_elem((64, 64), 10).view())?
     ///     .with_shear(ShearCalibration { stiffness_n_per_m, residual_sd_n: [0.0; 2] });
     /// session.push(press(32.0).view())?;
     /// let shear = session.push(press(34.0).view())?.shear.expect("stiffnesses are known");
@@ -151,7 +147,7 @@ impl Session {
     pub fn push(&mut self, frame: ArrayView2<'_, u8>) -> Result<Update, PipelineError> {
         let number = self.frames;
         self.frames += 1;
-        let skip = self.stages.settings().skips.equal_frames;
+        let skip = self.pipeline.settings().skips.equal_frames;
         let repeated = skip && self.measured && self.last == frame;
         if repeated {
             self.report
@@ -160,7 +156,7 @@ impl Session {
             self.measure(number, frame)?;
         }
         let contact = self.contact.reading;
-        let size = self.stages.contact().pixel_size_m();
+        let size = self.pipeline.contact().pixel_size_m();
         let centroid = contact.map(|c| std::array::from_fn(|k| c.centroid_px[k].scaled(size[k])));
         let shear = self
             .shear
@@ -179,7 +175,7 @@ impl Session {
         self.measured = false;
         resize(&mut self.last, frame.dim());
         self.last.assign(&frame);
-        self.stages
+        self.pipeline
             .contact()
             .measure(
                 &mut self.workspace,
@@ -224,7 +220,7 @@ impl Session {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
     /// for peak in [120.0, 60.0, 120.0] {
     ///     session.push(hertz(peak).view())?;
     ///     session.push(hertz(0.0).view())?;
@@ -248,7 +244,7 @@ impl Session {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
     /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
     /// session.push(hertz(120.0).view())?;
     /// let drift = session.drift();
@@ -273,7 +269,7 @@ impl Session {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
     /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
     /// assert_eq!(session.drift_flag(), Some(Flag::LightDrifted { grey: -2.0 }));
     /// session.push(hertz(0.0).view())?;
@@ -296,7 +292,7 @@ impl Session {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(Arc::new(pipeline), hertz(0.0).view())?;
+    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
     /// for peak in [0.0, 120.0, 120.0, 120.0] {
     ///     session.push(hertz(peak).view())?;
     /// }

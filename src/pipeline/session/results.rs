@@ -3,7 +3,7 @@ use super::Session;
 use super::strain::{FollowedStrain, Frame, SessionStrain};
 use crate::elasticity::modulus::ModulusEstimate;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::object::{chosen_estimate, series, split_errors};
+use crate::pipeline::estimators::{chosen_estimate, series, split_errors};
 use crate::pipeline::report::Stage;
 use std::time::Instant;
 
@@ -20,7 +20,7 @@ impl Session {
     /// let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
     /// let loads = [0.7, 1.0, 1.2].map(Load::normal).to_vec();
     /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationOptions::default())?;
-    /// let mut session = Session::new(Arc::new(trial.pipeline()?), trial.simulation.reference.view())?;
+    /// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
     /// let mut across = Vec::new();
     /// for frame in &trial.simulation.frames {
     ///     session.push(frame.view())?;
@@ -48,8 +48,7 @@ impl Session {
             contact: &self.contact,
             reading,
         };
-        self.strain
-            .follow(self.stages.as_ref(), &frame, &mut self.report)
+        self.strain.follow(&self.pipeline, &frame, &mut self.report)
     }
 
     /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.
@@ -60,7 +59,7 @@ impl Session {
     /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
     /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-    /// # let mut session = Session::new(Arc::new(trial.pipeline()?), trial.simulation.reference.view())?;
+    /// # let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
     /// session.push(trial.simulation.frames[0].view())?;
     /// assert!(session.strain()?.is_none());
     /// session.push(trial.simulation.frames[1].view())?;
@@ -78,8 +77,8 @@ impl Session {
     /// [`PipelineError::Modulus`].
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
         let start = Instant::now();
-        let settings = self.stages.settings();
-        let size = self.stages.contact().pixel_size_m();
+        let settings = self.pipeline.settings();
+        let size = self.pipeline.contact().pixel_size_m();
         let (loads, shared) = if settings.needs_strain() {
             self.strain.loads(size, settings)
         } else {

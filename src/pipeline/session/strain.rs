@@ -4,13 +4,13 @@ use crate::elasticity::modulus::SharedErrors;
 use crate::elasticity::modulus::{Estimate, LoadState};
 use crate::force::ReferenceFrame;
 use crate::matching::{MatchReport, WarmStart};
+use crate::pipeline::composition::Pipeline;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::object::{LoadReading, radius_with_floor, split_errors};
+use crate::pipeline::estimators::{LoadReading, radius_with_floor, split_errors};
 use crate::pipeline::pair::{self, PairStrain};
 use crate::pipeline::report::{Report, SkipReason, Stage};
 use crate::pipeline::settings::Settings;
-use crate::pipeline::stages::Stages;
 use crate::pipeline::surface::{self, SurfaceWorkspace};
 use nalgebra::Point3;
 use ndarray::ArrayView2;
@@ -24,7 +24,7 @@ use std::time::Instant;
 /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
 /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-/// let mut session = Session::new(Arc::new(trial.pipeline()?), trial.simulation.reference.view())?;
+/// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
 /// for frame in &trial.simulation.frames {
 ///     session.push(frame.view())?;
 ///     if let Some(found) = session.strain()? {
@@ -84,14 +84,14 @@ impl FollowedStrain {
     /// The strain of `frame`; `None` where it is the one that strain is counted from.
     pub(super) fn follow(
         &mut self,
-        stages: &dyn Stages,
+        pipeline: &Pipeline,
         frame: &Frame<'_>,
         report: &mut Report,
     ) -> Result<Option<&SessionStrain>, PipelineError> {
         match &self.anchor {
             None => {
                 let pixels = frame.contact.mask.iter().filter(|m| **m).count();
-                let (points, grid_m) = self.points(stages, frame, pixels, report)?;
+                let (points, grid_m) = self.points(pipeline, frame, pixels, report)?;
                 let reading = frame.reading;
                 self.anchor = Some(Anchor {
                     frame: frame.number,
@@ -111,7 +111,7 @@ impl FollowedStrain {
             .is_none_or(|last| last.to != frame.number)
         {
             self.last = None;
-            self.last = self.measure(stages, frame, report)?;
+            self.last = self.measure(pipeline, frame, report)?;
         }
         Ok(self.last.as_ref())
     }
@@ -119,7 +119,7 @@ impl FollowedStrain {
     /// Control points of a frame's surface, and its pixel.
     fn points(
         &mut self,
-        stages: &dyn Stages,
+        pipeline: &Pipeline,
         frame: &Frame<'_>,
         pixels: usize,
         report: &mut Report,
@@ -130,45 +130,45 @@ impl FollowedStrain {
         };
         let start = Instant::now();
         let images = [frame.image, frame.reference.image()];
-        let surface = if stages.settings().skips.outside_contact {
-            surface::reconstruct(stages, &mut self.surface, images, frame.contact, pixels)
+        let surface = if pipeline.settings().skips.outside_contact {
+            surface::reconstruct(pipeline, &mut self.surface, images, frame.contact, pixels)
         } else {
             let contact = frame.contact.widened(frame.image.dim());
-            surface::reconstruct(stages, &mut self.surface, images, &contact, pixels)
+            surface::reconstruct(pipeline, &mut self.surface, images, &contact, pixels)
         };
         let surface = surface.map_err(failed)?;
         report.ran(Stage::Surface, start.elapsed());
         let start = Instant::now();
-        let points = surface::sample(stages, &surface).map_err(failed)?;
+        let points = surface::sample(pipeline, &surface).map_err(failed)?;
         report.ran(Stage::ControlPoints, start.elapsed());
         Ok((points, surface.pixel_size_m[0].max(surface.pixel_size_m[1])))
     }
 
     fn measure(
         &mut self,
-        stages: &dyn Stages,
+        pipeline: &Pipeline,
         frame: &Frame<'_>,
         report: &mut Report,
     ) -> Result<Option<SessionStrain>, PipelineError> {
         let Some(pixels) = self.anchor.as_ref().map(|anchor| anchor.pixels) else {
             return Ok(None);
         };
-        let (target, _) = self.points(stages, frame, pixels, report)?;
+        let (target, _) = self.points(pipeline, frame, pixels, report)?;
         let Some(anchor) = &self.anchor else {
             return Ok(None);
         };
         report.count_skip(Stage::Surface, SkipReason::KeptFromBefore, anchor.pixels);
         let frames = [anchor.frame as usize, frame.number as usize];
         let start = Instant::now();
-        let found = if stages.settings().skips.last_answer {
-            pair::match_next(stages, frames, &mut self.warm, &anchor.points, &target)?
+        let found = if pipeline.settings().skips.last_answer {
+            pair::match_next(pipeline, frames, &mut self.warm, &anchor.points, &target)?
         } else {
-            pair::match_points(stages, frames, &anchor.points, &target)?
+            pair::match_points(pipeline, frames, &anchor.points, &target)?
         };
         report.ran(Stage::Match, start.elapsed());
         if self.first_iterations == 0 {
             self.first_iterations = found.report.iterations;
-        } else if stages.settings().skips.last_answer {
+        } else if pipeline.settings().skips.last_answer {
             let saved = self
                 .first_iterations
                 .saturating_sub(found.report.iterations);
@@ -176,7 +176,7 @@ impl FollowedStrain {
         }
         let start = Instant::now();
         let strain = pair::strain(
-            stages,
+            pipeline,
             frames,
             &anchor.points,
             &target,

@@ -3,11 +3,12 @@
 use super::{Deformation, PrincipalStretches};
 use crate::error::{ElasticityError, Quantity};
 use nalgebra::{Matrix3, RealField};
+use std::sync::Arc;
 
 /// A way to measure strain: a symmetric tensor that vanishes when the material only moves and turns
 /// (the infinitesimal one: only moves).
 ///
-/// Object safe, so that a program can choose at run time. Cost: Green–Lagrange and infinitesimal
+/// Object safe, and a boxed or shared one is one too, so that a program can choose at run time. Cost: Green–Lagrange and infinitesimal
 /// some 10 ns, the others a small eigenvalue problem.
 ///
 /// ```
@@ -50,6 +51,34 @@ pub trait StrainMeasure<T: RealField + Copy> {
     /// The strain of a displacement gradient H (F = I + H). Errors as [`of`](Self::of).
     fn strain(&self, h: &Matrix3<T>) -> Result<Matrix3<T>, ElasticityError> {
         self.of(&Deformation::from_displacement_gradient(*h))
+    }
+}
+
+impl<T: RealField + Copy, M: StrainMeasure<T> + ?Sized> StrainMeasure<T> for Box<M> {
+    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+        (**self).of(deformation)
+    }
+
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn strain(&self, h: &Matrix3<T>) -> Result<Matrix3<T>, ElasticityError> {
+        (**self).strain(h)
+    }
+}
+
+impl<T: RealField + Copy, M: StrainMeasure<T> + ?Sized> StrainMeasure<T> for Arc<M> {
+    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+        (**self).of(deformation)
+    }
+
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn strain(&self, h: &Matrix3<T>) -> Result<Matrix3<T>, ElasticityError> {
+        (**self).strain(h)
     }
 }
 

@@ -20,6 +20,7 @@ pub(crate) use reflectance::FieldBuffers;
 pub use tsai_shah::TsaiShah;
 
 use crate::{Domain, Frame, Scalar, SfsError, Surface, Workspace};
+use std::sync::Arc;
 
 /// A way from one image to a surface.
 ///
@@ -103,5 +104,29 @@ pub trait SurfaceReconstruction<T: Scalar> {
             &mut surface,
         )?;
         Ok(surface)
+    }
+}
+
+impl<T: Scalar, R: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T> for Box<R> {
+    fn reconstruct_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        (**self).reconstruct_with(workspace, frame, domain, surface)
+    }
+}
+
+impl<T: Scalar, R: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T> for Arc<R> {
+    fn reconstruct_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        (**self).reconstruct_with(workspace, frame, domain, surface)
     }
 }

@@ -15,6 +15,7 @@ pub use equally_spaced::EquallySpaced;
 pub use random::Random;
 
 use crate::{Scalar, SfsError, Workspace};
+use std::sync::Arc;
 
 /// A way to choose control points on a surface.
 ///
@@ -82,6 +83,54 @@ pub trait ControlPointSampler<T: Scalar> {
         points.clear();
         points.extend(self.sample(surface, mask, pixel_size_m, count)?);
         Ok(())
+    }
+}
+
+impl<T: Scalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for Box<S> {
+    fn sample(
+        &self,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        (**self).sample(surface, mask, pixel_size_m, count)
+    }
+
+    fn sample_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+        points: &mut Vec<Point3<T>>,
+    ) -> Result<(), SfsError> {
+        (**self).sample_with(workspace, surface, mask, pixel_size_m, count, points)
+    }
+}
+
+impl<T: Scalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for Arc<S> {
+    fn sample(
+        &self,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        (**self).sample(surface, mask, pixel_size_m, count)
+    }
+
+    fn sample_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+        points: &mut Vec<Point3<T>>,
+    ) -> Result<(), SfsError> {
+        (**self).sample_with(workspace, surface, mask, pixel_size_m, count, points)
     }
 }
 

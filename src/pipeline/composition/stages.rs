@@ -1,14 +1,43 @@
-//! Another stage in the place of one.
-use super::Pipeline;
+//! Setters of the stages: any implementation, or one by its name.
+use super::{Pipeline, named};
 use crate::elasticity::strain::StrainMeasure;
 use crate::matching::PointMatcher;
 use crate::pipeline::binning::Binning;
+use crate::pipeline::config::StagesConfig;
 use crate::pipeline::contact::ContactStage;
-use crate::pipeline::surface::SurfaceInput;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::settings::SurfaceInput;
 use crate::sfs::{ControlPointSampler, SurfaceReconstruction};
 use crate::tps::WarpModel;
+use std::sync::Arc;
 
-impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
+impl Pipeline {
+    /// Takes the stages that a configuration names; a surface stage looks at shading.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::pipeline::{StagesConfig, StrainChoice};
+    /// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
+    /// let pipeline = trial.pipeline()?.with_stages(&config)?.with_control_points(60);
+    /// assert_eq!(trial.press(&pipeline)?.strain(1)?.measure, "Hencky");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::SurfaceOptions`], [`PipelineError::WarpOptions`] where a stage refuses its options.
+    pub fn with_stages(mut self, config: &StagesConfig) -> Result<Self, PipelineError> {
+        self.surface = named::reconstruction(config.reconstruction)?;
+        self.settings.surface_input = SurfaceInput::Shading;
+        self.sampler = named::sampler(config.sampler)?;
+        self.matcher = named::matcher(config.matcher);
+        self.warp = named::warp(config.warp)?;
+        self.strain = named::strain(config.strain);
+        self.settings.estimator = config.estimator;
+        Ok(self)
+    }
+
     /// Takes another way from frame to contact and force.
     ///
     /// ```
@@ -24,25 +53,9 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     #[must_use]
-    pub fn with_contact<C2: ContactStage>(self, contact: C2) -> Pipeline<C2, R, P, M, W, S> {
-        let Self {
-            surface,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            settings,
-            ..
-        } = self;
-        Pipeline {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            settings,
-        }
+    pub fn with_contact(mut self, contact: impl ContactStage + 'static) -> Self {
+        self.contact = Arc::new(contact);
+        self
     }
 
     /// Takes another way from image to surface, looking at `input`.
@@ -63,34 +76,18 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_surface<R2: SurfaceReconstruction<f64>>(
-        self,
-        surface: R2,
+    pub fn with_surface(
+        mut self,
+        surface: impl SurfaceReconstruction<f64> + Send + Sync + 'static,
         input: SurfaceInput,
-    ) -> Pipeline<C, R2, P, M, W, S> {
-        let Self {
-            contact,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            mut settings,
-            ..
-        } = self;
-        settings.surface_input = input;
+    ) -> Self {
+        self.surface = Arc::new(surface);
+        self.settings.surface_input = input;
         if input == SurfaceInput::Signal {
-            settings.smoothing_px = 1;
-            settings.binning = Binning::Blocks(1);
+            self.settings.smoothing_px = 1;
+            self.settings.binning = Binning::Blocks(1);
         }
-        Pipeline {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            settings,
-        }
+        self
     }
 
     /// Takes another choice of control points.
@@ -108,66 +105,37 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_sampler<P2: ControlPointSampler<f64>>(
-        self,
-        sampler: P2,
-    ) -> Pipeline<C, R, P2, M, W, S> {
-        let Self {
-            contact,
-            surface,
-            matcher,
-            warp,
-            strain,
-            settings,
-            ..
-        } = self;
-        Pipeline {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            settings,
-        }
+    pub fn with_sampler(
+        mut self,
+        sampler: impl ControlPointSampler<f64> + Send + Sync + 'static,
+    ) -> Self {
+        self.sampler = Arc::new(sampler);
+        self
     }
 
-    /// Takes another matcher.
+    /// Takes another matcher, one of your own too, or one chosen at run time.
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
     /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-    /// use tactile_imaging::matching::LinearAssignment;
+    /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
     /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::new()).with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;
     /// let matching = press.matching(1)?;
     /// assert!(matching.assignment.iter().all(Option::is_some), "without a limit to the distance every point has a partner");
+    /// let chosen: Box<dyn PointMatcher<f64, 3> + Send + Sync> = Box::new(LinearAssignment::new());
+    /// let pipeline = pipeline.with_matcher(chosen);
+    /// assert_eq!(trial.press(&pipeline)?.matching(1)?, matching);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_matcher<M2: PointMatcher<f64, 3>>(
-        self,
-        matcher: M2,
-    ) -> Pipeline<C, R, P, M2, W, S> {
-        let Self {
-            contact,
-            surface,
-            sampler,
-            warp,
-            strain,
-            settings,
-            ..
-        } = self;
-        Pipeline {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            settings,
-        }
+    pub fn with_matcher(
+        mut self,
+        matcher: impl PointMatcher<f64, 3> + Send + Sync + 'static,
+    ) -> Self {
+        self.matcher = Arc::new(matcher);
+        self
     }
 
     /// Takes another measure of strain.
@@ -186,25 +154,9 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_strain<S2: StrainMeasure<f64>>(self, strain: S2) -> Pipeline<C, R, P, M, W, S2> {
-        let Self {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            warp,
-            settings,
-            ..
-        } = self;
-        Pipeline {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            settings,
-        }
+    pub fn with_strain(mut self, strain: impl StrainMeasure<f64> + Send + Sync + 'static) -> Self {
+        self.strain = Arc::new(strain);
+        self
     }
 
     /// Takes another family of warps for the strain.
@@ -221,24 +173,8 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_warp<W2: WarpModel<f64, 3>>(self, warp: W2) -> Pipeline<C, R, P, M, W2, S> {
-        let Self {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            strain,
-            settings,
-            ..
-        } = self;
-        Pipeline {
-            contact,
-            surface,
-            sampler,
-            matcher,
-            warp,
-            strain,
-            settings,
-        }
+    pub fn with_warp(mut self, warp: impl WarpModel<f64, 3> + Send + Sync + 'static) -> Self {
+        self.warp = Arc::new(warp);
+        self
     }
 }

@@ -1,9 +1,4 @@
-//! Stages by name: what a configuration may say, and the default stage behind every name.
-mod boxed;
-
-pub use boxed::{
-    BoxedMatcher, BoxedReconstruction, BoxedSampler, BoxedStrain, BoxedWarpModel, FitWarp,
-};
+//! The names of stages in configurations.
 use std::fmt;
 
 /// A name that no stage of this kind has.
@@ -80,7 +75,7 @@ macro_rules! choice {
 
 choice! {
     /// Image to surface, under frontal light. Pentland's method needs oblique light: give it with its light to
-    /// [`BoxedPipeline::with_surface`](super::BoxedPipeline::with_surface).
+    /// [`Pipeline::with_surface`](super::Pipeline::with_surface).
     ///
     /// ```
     /// use tactile_imaging::pipeline::ReconstructionChoice;

@@ -6,7 +6,7 @@ use crate::pipeline::choice::EstimatorChoice;
 use crate::pipeline::object::Object;
 use crate::pipeline::settings::Skips;
 
-impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
+impl Pipeline {
     /// Tells of the sensor's layers: both bodies yield.
     ///
     /// ```
@@ -157,9 +157,12 @@ impl<C, R, P, M, W, S> Pipeline<C, R, P, M, W, S> {
     ///
     /// ```
     /// use tactile_imaging::{Object, Pipeline};
-    /// let pipeline = Pipeline::new((), Object::sphere(3e-3)).with_scale_errors(0.02, 0.005);
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_scale_errors(0.02, 0.005);
     /// assert_eq!((pipeline.settings().force_scale_error, pipeline.settings().length_scale_error), (0.02, 0.005));
     /// assert_eq!(pipeline.with_scale_errors(0.02, f64::NAN).settings().length_scale_error, 0.0);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     #[must_use]
     pub fn with_scale_errors(mut self, force: f64, length: f64) -> Self {
