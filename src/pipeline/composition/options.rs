@@ -94,9 +94,12 @@ impl Pipeline {
     ///
     /// ```
     /// use tactile_imaging::{Object, Pipeline};
-    /// let pipeline = Pipeline::new((), Object::sphere(3e-3));
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// assert_eq!(pipeline.settings().smoothing_px, 5);
     /// assert_eq!(pipeline.with_smoothing(8).settings().smoothing_px, 9);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     #[must_use]
     pub fn with_smoothing(mut self, width_px: usize) -> Self {

@@ -126,7 +126,7 @@ impl Pipeline {
     /// assert!(matching.assignment.iter().all(Option::is_some), "without a limit to the distance every point has a partner");
     /// let chosen: Box<dyn PointMatcher<f64, 3> + Send + Sync> = Box::new(LinearAssignment::new());
     /// let pipeline = pipeline.with_matcher(chosen);
-    /// assert_eq!(trial.press(&pipeline)?.matching(1)?, matching);
+    /// assert_eq!(trial.press(&pipeline)?.matching(1)?.assignment, matching.assignment);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
