@@ -33,7 +33,59 @@ pub enum DriftCorrection {
     Illumination,
     /// Illumination that also changed its distribution, as when an LED moves: d = f/(g + gₓ x + g_y y) − r.
     TiltedIllumination,
+    /// [`Illumination`](Self::Illumination) where the frame shows it, nothing where it does not: [`DriftOutcome`] says which.
+    Automatic,
 }
+
+/// Whether the drift of a frame is known.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{
+///     ContactDetector, ContactOptions, Detection, DriftCorrection, DriftOutcome, ForceError, ReferenceFrame,
+/// };
+///
+/// let options = ContactOptions::default().with_drift(DriftCorrection::Automatic);
+/// let outcome = |at_rest: u8, now: u8| -> Result<DriftOutcome, ForceError> {
+///     let reference = ReferenceFrame::new(Array2::from_elem((160, 160), at_rest).view())?;
+///     let frame = Array2::from_elem((160, 160), now);
+///     let found: Detection<f64> =
+///         ContactDetector::new(options).detect_with(&mut Default::default(), frame.view(), &reference)?;
+///     Ok(found.drift.outcome)
+/// };
+/// assert_eq!(outcome(100, 103)?, DriftOutcome::Corrected);
+/// // A black background shows nothing of the illumination.
+/// assert!(matches!(outcome(0, 0)?, DriftOutcome::TooDark { .. }));
+/// # Ok::<(), ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum DriftOutcome {
+    /// No correction was asked for.
+    #[default]
+    NotRequested,
+    /// The drift was estimated and corrected.
+    Corrected,
+    /// The background is too dark beside its noise: the illumination would be known to no better than this standard error, where
+    /// 0.5 % is required. Nothing was corrected.
+    TooDark {
+        /// Standard error of the relative illumination.
+        standard_error: f64,
+    },
+    /// Less than half of the frame agrees on one illumination, as under a contact that covers most of it. Nothing was corrected.
+    TooLittleBackground {
+        /// Share of the tiles that agree.
+        share: f64,
+    },
+}
+
+/// Largest standard error of an automatic correction: a force then is off by at most as much as a good gauge.
+const LARGEST_ERROR: f64 = 0.005;
+/// Least share of tiles that must agree: the median they start from is background only if most tiles are.
+const LEAST_SHARE: f64 = 0.5;
+/// Unevenness of the drift, as a share of the background, up to which a tile agrees.
+const UNEVEN: f64 = 0.01;
 
 /// The drift found in one frame. `coefficients` are [value, per column, per row] about the frame's middle: grey
 /// levels for stray light, shares for illumination.
@@ -55,8 +107,10 @@ pub enum DriftCorrection {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct IlluminationDrift {
-    /// The kind of correction.
+    /// The correction that was made.
     pub correction: DriftCorrection,
+    /// Whether the drift is known.
+    pub outcome: DriftOutcome,
     /// Offset (grey levels) or relative illumination (1 for unchanged) in the frame's middle, and its change per column and per row.
     pub coefficients: [f64; 3],
     /// Standard error of the first coefficient.
@@ -92,13 +146,16 @@ impl DriftLine {
 
 impl DriftCorrection {
     fn is_multiplicative(self) -> bool {
-        matches!(self, Self::Illumination | Self::TiltedIllumination)
+        matches!(
+            self,
+            Self::Illumination | Self::TiltedIllumination | Self::Automatic
+        )
     }
 
     fn terms(self) -> usize {
         match self {
             Self::None => 0,
-            Self::Offset | Self::Illumination => 1,
+            Self::Offset | Self::Illumination | Self::Automatic => 1,
             Self::Plane | Self::TiltedIllumination => 3,
         }
     }
@@ -218,7 +275,13 @@ pub(crate) fn fit(
         }
         kept = count;
     }
-    drift
+    match correction {
+        DriftCorrection::Automatic => drift.accepted(tiles, sd),
+        _ => IlluminationDrift {
+            outcome: DriftOutcome::Corrected,
+            ..drift
+        },
+    }
 }
 
 /// Derivative of a tile's sum by the first coefficient.
@@ -231,6 +294,34 @@ fn weight(drift: &IlluminationDrift, tile: &TileSum) -> f64 {
 }
 
 impl IlluminationDrift {
+    /// The automatic correction if it is sure enough, else none and the reason.
+    fn accepted(self, tiles: impl Iterator<Item = TileSum>, sd: f64) -> Self {
+        let (mut agree, mut all) = (0.0, 0.0);
+        for tile in tiles {
+            let limit = 3.0 * sd * tile.pixels.sqrt() + UNEVEN * tile.reference;
+            agree += f64::from(self.residual(&tile).abs() <= limit);
+            all += 1.0;
+        }
+        let share = agree / f64::max(all, 1.0);
+        let standard_error = self.standard_error;
+        let known = standard_error > 0.0 && standard_error <= LARGEST_ERROR && self.reference > 0.0;
+        let refused = |outcome| Self {
+            outcome,
+            ..Self::none()
+        };
+        if !known {
+            return refused(DriftOutcome::TooDark { standard_error });
+        }
+        if share < LEAST_SHARE {
+            return refused(DriftOutcome::TooLittleBackground { share });
+        }
+        Self {
+            correction: DriftCorrection::Illumination,
+            outcome: DriftOutcome::Corrected,
+            ..self
+        }
+    }
+
     /// One least-squares step on the given tiles; returns their number.
     fn step(&mut self, tiles: impl Iterator<Item = TileSum>, terms: usize, sd: f64) -> usize {
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];

@@ -11,6 +11,7 @@
 //! | `frame` | the pass over a frame, the reference, the noise of both, vignetting |
 //! | `drift` | drift of illumination and stray light since the reference was taken |
 //! | `contact` | detection, mask, aperture, sums over the aperture |
+//! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
 //! | `hertz` | the contact radius from the pressure profile |
 //! | `calibration` | pixel value to force and stress, (5) and (6) |
 //! | `pressure` | the local curve f of (5), fitted from frames |
@@ -36,6 +37,7 @@ mod drift;
 mod error;
 mod estimate;
 mod frame;
+mod health;
 mod hertz;
 mod image;
 mod lens;
@@ -51,13 +53,16 @@ pub use calibration::{
 pub use contact::{
     Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
 };
-pub use drift::{DriftCorrection, IlluminationDrift};
+pub use drift::{DriftCorrection, DriftOutcome, IlluminationDrift};
 pub use error::{ForceError, Requirement};
 pub use estimate::{Estimate, Real};
 pub use frame::{
     BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame,
 };
-pub use hertz::{HertzFit, HertzFitOptions};
+pub use health::{
+    ChartState, FrameCondition, HealthMonitor, HealthOptions, HealthReport, StuckPixels,
+};
+pub use hertz::{HertzFit, HertzFitOptions, ProfileShape};
 pub use image::{
     GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,
 };

@@ -13,6 +13,7 @@ use crate::drift::{self, DriftCorrection, IlluminationDrift};
 use crate::error::ForceError;
 use crate::estimate::{Estimate, Real};
 use crate::frame::{BoundingBox, DifferenceNoise, PassWorkspace, ReferenceFrame, TILE_COLUMNS};
+use crate::health::FrameCondition;
 
 /// Finds the contact in frames of one sensor.
 ///
@@ -69,6 +70,15 @@ impl DetectorWorkspace {
         let view =
             ArrayView2::from_shape((place.rows(), place.columns()), &self.region.pixels).ok()?;
         Some((place, view))
+    }
+
+    /// Brightness and noise of the last frame outside the contact, against the reference that it was compared with; `None` if no
+    /// frame of the reference's size was. O(tiles), so that a session can ask for it every so many frames.
+    pub fn condition(&mut self, reference: &ReferenceFrame) -> Option<FrameCondition> {
+        let size = reference.image().dim();
+        let tiles = reference.tile_sums(&self.pass.tiles)?;
+        let sd = reference.difference_variance().sqrt();
+        FrameCondition::of(size, tiles, sd, &mut self.scratch)
     }
 
     /// The grey histogram of the last frame's contact over its aperture, each pixel covering `pixel_area_m2`: a row of the fit of a
@@ -168,7 +178,9 @@ impl ContactDetector {
         if self.options.drift == DriftCorrection::None {
             return IlluminationDrift::none();
         }
-        let tiles = reference.tile_sums(&workspace.pass.tiles);
+        let Some(tiles) = reference.tile_sums(&workspace.pass.tiles) else {
+            return IlluminationDrift::none();
+        };
         drift::fit(self.options.drift, size, tiles, sd, &mut workspace.scratch)
     }
 

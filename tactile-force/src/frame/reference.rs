@@ -142,7 +142,7 @@ impl ReferenceFrame {
         };
         let flat = FlatField::fit(
             self.image.dim(),
-            self.tile_sums(&self.tiles),
+            (0..self.tiles.sums.len()).map(|k| self.tile_sum(&self.tiles, k)),
             self.own_variance(),
         )
         .filter(|_| mean >= 1.0);
@@ -246,12 +246,13 @@ impl ReferenceFrame {
         self.gain_known.then_some(self.noise.gain)
     }
 
-    /// Every tile of the last pass.
+    /// Every tile of the last pass; `None` if that was of a frame of another size, or none.
     pub(crate) fn tile_sums<'a>(
         &'a self,
         passed: &'a Tiles,
-    ) -> impl Iterator<Item = TileSum> + Clone + 'a {
-        (0..passed.sums.len()).map(move |k| self.tile_sum(passed, k))
+    ) -> Option<impl Iterator<Item = TileSum> + Clone + 'a> {
+        let same = (passed.rows, passed.columns) == (self.tiles.rows, self.tiles.columns);
+        same.then(|| (0..passed.sums.len()).map(move |k| self.tile_sum(passed, k)))
     }
 
     /// One tile of the last pass.

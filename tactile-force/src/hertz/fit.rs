@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::edge::BlurredEdge;
+use super::misfit::Misfit;
 use super::profile::{Level, Shape, level};
 use super::rings::{RingSums, Rings};
 use super::variance::PixelVariance;
@@ -88,7 +89,8 @@ impl HertzFitter {
         }
         let equations = self.assemble(rings, &state.shape, variance);
         let origin = [place.column_start as f64, place.row_start as f64];
-        self.report(&state, &equations, origin, pixel_size_m)
+        let misfit = Misfit::of(rings, &self.edge, &state.shape, variance, equations.chi2);
+        self.report(&state, &equations, misfit, origin, pixel_size_m)
     }
 
     /// Gauss–Newton steps on fixed rings until nothing moves; returns how far the centre went, in pixels.
@@ -195,6 +197,7 @@ impl HertzFitter {
         &self,
         state: &State,
         equations: &Equations,
+        misfit: Misfit,
         origin: [f64; 2],
         pixel_size_m: [f64; 2],
     ) -> Option<HertzFit<T>> {
@@ -216,6 +219,9 @@ impl HertzFitter {
                 std::array::from_fn(|j| T::nearest(covariance[(i, j)]))
             }),
             reduced_chi_squared: T::nearest(reduced),
+            radial_misfit: T::nearest(misfit.radial),
+            azimuthal_misfit: T::nearest(misfit.azimuthal),
+            shape: misfit.shape,
             iterations: state.iterations,
             stop: state.stop,
         })

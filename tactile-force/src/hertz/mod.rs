@@ -7,6 +7,7 @@
 
 mod edge;
 mod fit;
+mod misfit;
 mod options;
 mod outcome;
 mod profile;
@@ -14,7 +15,7 @@ mod rings;
 mod variance;
 
 pub use options::HertzFitOptions;
-pub use outcome::HertzFit;
+pub use outcome::{HertzFit, ProfileShape};
 
 pub(crate) use fit::{HertzFitter, Start};
 pub(crate) use rings::Rings;

@@ -3,6 +3,39 @@
 use crate::calibration::StopReason;
 use crate::estimate::{Estimate, Real};
 
+/// Whether a fitted contact is that of a ball.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::*;
+///
+/// let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-5 * v));
+/// let calibration = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let at_rest = Array2::from_elem((120, 120), 12_u8);
+/// let shape = |level: &dyn Fn(f64) -> f64| -> Result<Option<ProfileShape>, ForceError> {
+///     let frame = Array2::from_shape_fn((120, 120), |(y, x)| {
+///         12 + level((x as f64 - 60.2).hypot(y as f64 - 59.7) / 30.0).round() as u8
+///     });
+///     let m: ForceMeasurement<f64> =
+///         measure_force(frame.view(), at_rest.view(), [20e-6; 2], &calibration, &Default::default())?;
+///     Ok(m.profile.map(|p| p.shape))
+/// };
+/// assert_eq!(shape(&|r| 150.0 * (1.0 - r * r).max(0.0).sqrt())?, Some(ProfileShape::Hertz));
+/// // Even pressure, as under a soft pad.
+/// assert_eq!(shape(&|r| if r < 1.0 { 150.0 } else { 0.0 })?, Some(ProfileShape::NotHertz));
+/// # Ok::<(), ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum ProfileShape {
+    /// The pressure is Hertz's to within the misfit that the noise and a smooth guide explain.
+    Hertz,
+    /// Not a ball's profile: the misfit stands out of the noise and exceeds 1 % of the peak along the radius, or 3 % around it.
+    /// The contact radius then is that of the best ball, not of the contact.
+    NotHertz,
+}
+
 /// A fitted Hertz profile.
 ///
 /// ```
@@ -44,6 +77,12 @@ pub struct HertzFit<T> {
     pub covariance: [[T; 6]; 6],
     /// Residual variance over the noise model's: near 1 if the contact is Hertz's.
     pub reduced_chi_squared: T,
+    /// Root mean square misfit of the mean level at each radius, the noise's share subtracted, relative to the peak.
+    pub radial_misfit: T,
+    /// Root mean square misfit around the centre, the noise's and the radial share subtracted, relative to the peak.
+    pub azimuthal_misfit: T,
+    /// Whether the misfits are those of a ball.
+    pub shape: ProfileShape,
     /// Steps taken.
     pub iterations: usize,
     /// Why the fit stopped.

@@ -14,6 +14,7 @@ use crate::contact::{Contact, ContactDetector, Detection, DetectorWorkspace, Reg
 use crate::error::{ForceError, Requirement};
 use crate::estimate::{Estimate, Real};
 use crate::frame::{BoundingBox, ReferenceFrame};
+use crate::health::FrameCondition;
 use crate::hertz::{HertzFit, HertzFitter, Rings, Start};
 use crate::lens::LensGeometry;
 use local::{Local, Stress};
@@ -49,6 +50,11 @@ impl ForceWorkspace {
     /// The last contact's mask (1 inside) over its region, and the region's place in the frame.
     pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
         self.detector.mask()
+    }
+
+    /// Brightness and noise of the last frame outside the contact, as [`DetectorWorkspace::condition`].
+    pub fn condition(&mut self, reference: &ReferenceFrame) -> Option<FrameCondition> {
+        self.detector.condition(reference)
     }
 
     /// The pressure of the last contact in pascals over its region (zero outside the aperture), and the region's place in the

@@ -86,7 +86,8 @@ mod tests {
                 prop_assert!(x[j] >= 0.0);
                 // Rounding of thirteen products of order one.
                 prop_assert!(gradient[j] < 1e-9);
-                prop_assert!(if free[j] { gradient[j].abs() < 1e-9 } else { x[j] == 0.0 });
+                let complementary = if free[j] { gradient[j].abs() < 1e-9 } else { x[j] == 0.0 };
+                prop_assert!(complementary);
             }
         }
     }

@@ -1,162 +1,19 @@
 //! The local curve against an independent forward model: light that goes as a power of the pressure, vignetting, noise, whole
 //! grey levels. The scenes that are measured show another ball than the ones that calibrated.
 
-use ndarray::Array2;
 use proptest::prelude::*;
-use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use rand_distr::{Distribution, StandardNormal};
 use tactile_force::{
-    Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions,
-    Detection, DetectorWorkspace, ForceError, ForceMeasurement, ForceMeter, ForceOptions,
+    Branch, CalibrationFrame, CalibrationOptions, ForceError, ForceMeter, ForceOptions,
     ForceWorkspace, GreyHistogram, LinearCalibration, LocalCalibration, NoiseModel, PressureCurve,
-    PressureCurveOptions, ReferenceFrame, StressCalibration,
+    PressureCurveOptions, StressCalibration,
 };
 
-const SHAPE: (usize, usize) = (200, 240);
-const PIXEL_M: f64 = 40e-6;
-const AREA_M2: f64 = PIXEL_M * PIXEL_M;
-
-/// A sensor whose light goes as the pressure to the power `q`.
-#[derive(Clone, Copy)]
-struct Sensor {
-    q: f64,
-    vignetting: f64,
-    /// Relative lag of unloading: its light belongs to a pressure lower by this share.
-    hysteresis: f64,
-}
-
-/// Hertz: contact radius in metres of a ball of radius `ball_m` under a force; E* = 200 kPa.
-fn contact_radius(force_n: f64, ball_m: f64) -> f64 {
-    (0.75 * force_n * ball_m / 200e3).cbrt()
-}
-
-impl Sensor {
-    /// Grey level of a pressure: 120 at 60 kPa.
-    fn light(&self, pressure_pa: f64) -> f64 {
-        120.0 * (pressure_pa / 60e3).powf(self.q)
-    }
-
-    /// A frame of a contact at (x, y) pixels; without force, of the sensor at rest.
-    fn frame(
-        &self,
-        force_n: f64,
-        ball_m: f64,
-        [cx, cy]: [f64; 2],
-        branch: Branch,
-        seed: u64,
-    ) -> Array2<u8> {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let a = contact_radius(force_n, ball_m) / PIXEL_M;
-        let lag = if branch == Branch::Unloading {
-            1.0 - self.hysteresis
-        } else {
-            1.0
-        };
-        let peak = 1.5 * force_n / (std::f64::consts::PI * (a * PIXEL_M).powi(2)) * lag;
-        Array2::from_shape_fn(SHAPE, |(y, x)| {
-            let (x, y) = (x as f64, y as f64);
-            let mut light = 0.0;
-            if force_n > 0.0 && (x - cx).hypot(y - cy) < a + 2.0 {
-                // The mean over the pixel, by three by three points.
-                for k in 0..9 {
-                    let (dx, dy) = (
-                        f64::from(k % 3) / 3.0 - 1.0 / 3.0,
-                        f64::from(k / 3) / 3.0 - 1.0 / 3.0,
-                    );
-                    let r2 = ((x + dx - cx).powi(2) + (y + dy - cy).powi(2)) / (a * a);
-                    light += self.light(peak * (1.0 - r2).max(0.0).sqrt()) / 9.0;
-                }
-            }
-            let (u, v) = ((x - 119.5) / 119.5, (y - 99.5) / 99.5);
-            let even = 1.0 - 0.5 * self.vignetting * (u * u + v * v);
-            let expected = even * (light + 40.0);
-            let sd = (0.3 + 0.02 * expected).sqrt();
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            (expected + sd * noise).round().clamp(0.0, 255.0) as u8
-        })
-    }
-
-    fn reference(&self) -> ReferenceFrame {
-        let frames: Vec<_> = (0..8)
-            .map(|k| self.frame(0.0, 1.0, [0.0; 2], Branch::Loading, 900 + k))
-            .collect();
-        let views: Vec<_> = frames.iter().map(|f| f.view()).collect();
-        ReferenceFrame::from_frames(&views)
-            .unwrap()
-            .with_flat_field()
-            .unwrap()
-    }
-
-    /// Frames of a ball of 4 mm under 0.05 to 1 N, up and down, at places that differ, and a gauge good to 0.2 %.
-    fn calibration(
-        &self,
-        reference: &ReferenceFrame,
-        seed: u64,
-    ) -> (Vec<CalibrationFrame>, Vec<CalibrationPair<f64>>) {
-        let detector = ContactDetector::new(ContactOptions::default());
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut workspace = DetectorWorkspace::default();
-        let (mut frames, mut pairs) = (Vec::new(), Vec::new());
-        for k in 0..24 {
-            let step = if k < 12 { k + 1 } else { 24 - k };
-            let branch = if k < 12 {
-                Branch::Loading
-            } else {
-                Branch::Unloading
-            };
-            let force = f64::from(step) / 12.0;
-            let place = [
-                100.0 + 30.0 * rng.random::<f64>(),
-                85.0 + 25.0 * rng.random::<f64>(),
-            ];
-            let frame = self.frame(force, 4e-3, place, branch, 1000 * seed + k as u64);
-            let found: Detection<f64> = detector
-                .detect_with(&mut workspace, frame.view(), reference)
-                .unwrap();
-            let noise: f64 = StandardNormal.sample(&mut rng);
-            let gauge = force * (1.0 + 2e-3 * noise);
-            let histogram = workspace.grey_histogram(AREA_M2).unwrap();
-            let sum = found.contact.unwrap().integrated_pixel_value.value;
-            frames.push(CalibrationFrame::new(histogram, gauge, branch).unwrap());
-            pairs.push(CalibrationPair {
-                integrated_pixel_value: sum,
-                force_n: gauge,
-                branch,
-            });
-        }
-        (frames, pairs)
-    }
-
-    fn curve(&self, reference: &ReferenceFrame, seed: u64) -> PressureCurve {
-        PressureCurve::fit(
-            &self.calibration(reference, seed).0,
-            &PressureCurveOptions::default(),
-        )
-        .unwrap()
-    }
-}
-
-fn measure(
-    frame: &Array2<u8>,
-    reference: &ReferenceFrame,
-    calibration: &dyn StressCalibration<f64>,
-) -> ForceMeasurement<f64> {
-    let meter = ForceMeter::new([PIXEL_M; 2], &ForceOptions::default()).unwrap();
-    meter
-        .measure_with(
-            &mut ForceWorkspace::default(),
-            frame.view(),
-            reference,
-            calibration,
-        )
-        .unwrap()
-}
+use crate::simulated::{AREA_M2, PIXEL_M, Sensor, contact_radius, measure};
 
 fn sensor(q: f64) -> Sensor {
     Sensor {
         q,
-        vignetting: 0.1,
-        hysteresis: 0.0,
+        ..Sensor::default()
     }
 }
 
@@ -234,9 +91,8 @@ fn stated_errors_cover_the_truth() {
 #[test]
 fn the_report_says_what_was_learned() {
     let sensor = Sensor {
-        q: 1.1,
-        vignetting: 0.1,
         hysteresis: 0.03,
+        ..sensor(1.1)
     };
     let reference = sensor.reference();
     let curve = sensor.curve(&reference, 3);

@@ -1,0 +1,83 @@
+//! Brightness and noise of a frame outside the contact.
+
+use crate::drift::{DriftCorrection, IlluminationDrift, fit};
+use crate::estimate::Estimate;
+use crate::frame::TileSum;
+
+/// The state of a sensor as one frame shows it outside the contact.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+///
+/// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
+/// let frame = Array2::from_elem((160, 160), 51_u8);
+/// let mut workspace = DetectorWorkspace::default();
+/// let _: Detection<f64> =
+///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, frame.view(), &reference)?;
+/// let condition = workspace.condition(&reference).expect("a frame of that size");
+/// assert!((condition.brightness.value - 1.02).abs() < 1e-9);
+/// assert!((condition.background_grey - 51.0).abs() < 1e-9);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FrameCondition {
+    /// Background relative to the reference's: illumination times the camera's gain.
+    pub brightness: Estimate<f64>,
+    /// Mean grey level of the background.
+    pub background_grey: f64,
+    /// Scatter of the background over what the reference's noise explains, as a ratio of standard deviations.
+    pub noise_ratio: f64,
+}
+
+impl FrameCondition {
+    /// From the tiles of a frame of the given size; `sd` is the noise of one pixel's difference. `None` without background.
+    pub(crate) fn of(
+        size: (usize, usize),
+        tiles: impl Iterator<Item = TileSum> + Clone,
+        sd: f64,
+        scratch: &mut Vec<f64>,
+    ) -> Option<Self> {
+        let drift = fit(
+            DriftCorrection::Illumination,
+            size,
+            tiles.clone(),
+            sd,
+            scratch,
+        );
+        let (mut grey, mut pixels) = (0.0, 0.0);
+        scratch.clear();
+        for tile in tiles {
+            let residual = drift.residual(&tile) / (sd * tile.pixels.sqrt());
+            if drift_agrees(residual) {
+                scratch.push(residual.abs());
+                grey += tile.reference + tile.difference;
+                pixels += tile.pixels;
+            }
+        }
+        if pixels == 0.0 || scratch.is_empty() {
+            return None;
+        }
+        let middle = scratch.len() / 2;
+        let median = *scratch.select_nth_unstable_by(middle, f64::total_cmp).1;
+        Some(Self {
+            brightness: brightness(&drift),
+            background_grey: grey / pixels,
+            // The median of |z| of a normal sample is 0.6745.
+            noise_ratio: median / 0.674_489_750_196_081_7,
+        })
+    }
+}
+
+fn brightness(drift: &IlluminationDrift) -> Estimate<f64> {
+    Estimate {
+        value: drift.coefficients[0],
+        standard_error: drift.standard_error,
+    }
+}
+
+/// A tile within five standard deviations of the fitted brightness is background.
+fn drift_agrees(score: f64) -> bool {
+    score.abs() < 5.0
+}

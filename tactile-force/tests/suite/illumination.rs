@@ -1,0 +1,118 @@
+//! Drift of the illumination, frame by frame, estimated outside the contact and divided out.
+
+use tactile_force::{
+    Branch, ContactOptions, DriftCorrection, DriftOutcome, ForceMeasurement, ForceMeter,
+    ForceOptions, ForceWorkspace, ReferenceFrame, StressCalibration,
+};
+
+use crate::simulated::{PIXEL_M, Sensor, contact_radius};
+
+fn measure(
+    sensor: &Sensor,
+    reference: &ReferenceFrame,
+    calibration: &dyn StressCalibration<f64>,
+    (force, ball, seed): (f64, f64, u64),
+    drift: DriftCorrection,
+) -> ForceMeasurement<f64> {
+    let options = ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift));
+    let frame = sensor.frame(force, ball, [121.3, 97.6], Branch::Loading, seed);
+    ForceMeter::new([PIXEL_M; 2], &options)
+        .unwrap()
+        .measure_with(
+            &mut ForceWorkspace::default(),
+            frame.view(),
+            reference,
+            calibration,
+        )
+        .unwrap()
+}
+
+#[test]
+fn five_percent_from_frame_to_frame_are_divided_out() {
+    let sensor = Sensor {
+        q: 1.1,
+        ..Sensor::default()
+    };
+    let reference = sensor.reference();
+    let curve = sensor.curve(&reference, 1);
+    let (mut inside, mut count) = (0, 0);
+    for (k, illumination) in [0.95, 0.97, 1.0, 1.02, 1.05].into_iter().enumerate() {
+        let lit = Sensor {
+            illumination,
+            ..sensor
+        };
+        for (j, force) in [0.1, 0.2, 0.4].into_iter().enumerate() {
+            let scene = (force, 2.5e-3, (10 * k + j) as u64);
+            let found = measure(&lit, &reference, &curve, scene, DriftCorrection::Automatic);
+            assert_eq!(found.drift.outcome, DriftOutcome::Corrected);
+            let level = (found.drift.coefficients[0], found.drift.standard_error);
+            inside += usize::from((level.0 - illumination).abs() < 2.0 * level.1);
+            count += 1;
+            let error = found.force_n.value / force - 1.0;
+            let radius =
+                found.contact_radius_m.unwrap().value / contact_radius(force, 2.5e-3) - 1.0;
+            assert!(
+                error.abs() < 0.005 && radius.abs() < 0.002,
+                "{illumination} {force}: {error} {radius}"
+            );
+            if illumination == 1.05 {
+                let plain = measure(&lit, &reference, &curve, scene, DriftCorrection::None);
+                assert!((plain.force_n.value / force - 1.0).abs() > 0.04);
+            }
+        }
+    }
+    // Two standard errors; the reference's own error is common to all.
+    assert!(inside * 10 >= count * 8, "{inside} of {count}");
+}
+
+#[test]
+fn what_cannot_be_told_is_said_and_left_alone() {
+    // A background of a quarter of a grey level: whole grey levels hide it.
+    let dark = Sensor {
+        background: 0.25,
+        vignetting: 0.0,
+        ..Sensor::default()
+    };
+    let at_rest = dark.frame(0.0, 1.0, [0.0; 2], Branch::Loading, 1);
+    let reference = ReferenceFrame::new(at_rest.view()).unwrap();
+    let bright = Sensor::default();
+    let curve = bright.curve(&bright.reference(), 2);
+    let found = measure(
+        &dark,
+        &reference,
+        &curve,
+        (0.2, 2.5e-3, 5),
+        DriftCorrection::Automatic,
+    );
+    assert!(
+        matches!(found.drift.outcome, DriftOutcome::TooDark { .. }),
+        "{:?}",
+        found.drift
+    );
+    let plain = measure(
+        &dark,
+        &reference,
+        &curve,
+        (0.2, 2.5e-3, 5),
+        DriftCorrection::None,
+    );
+    assert_eq!(found.force_n, plain.force_n);
+    assert_eq!(plain.drift.outcome, DriftOutcome::NotRequested);
+    // A contact of 85 pixels' radius covers most of the frame.
+    let reference = bright.reference();
+    let found = measure(
+        &bright,
+        &reference,
+        &curve,
+        (0.25, 45e-3, 6),
+        DriftCorrection::Automatic,
+    );
+    assert!(
+        matches!(
+            found.drift.outcome,
+            DriftOutcome::TooLittleBackground { .. }
+        ),
+        "{:?}",
+        found.drift
+    );
+}

@@ -1,0 +1,121 @@
+//! A contact that is not a ball's says so.
+
+use ndarray::Array2;
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::{Distribution, StandardNormal};
+use tactile_force::{
+    Branch, CalibrationOptions, CalibrationPair, HertzFit, LinearCalibration, ProfileShape,
+    ReferenceFrame,
+};
+
+use crate::simulated::{SHAPE, Sensor, measure};
+
+/// The profile fitted to a contact whose light is `level` at (x, y) in units of a radius of 35 pixels, 120 grey levels at 1.
+fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut frame = |pressed: bool| {
+        Array2::from_shape_fn(SHAPE, |(y, x)| {
+            let mut light = 0.0;
+            for k in 0..if pressed { 9 } else { 0 } {
+                let (dx, dy) = (
+                    f64::from(k % 3) / 3.0 - 1.0 / 3.0,
+                    f64::from(k / 3) / 3.0 - 1.0 / 3.0,
+                );
+                light += 120.0 / 9.0
+                    * level(
+                        (x as f64 + dx - 121.3) / 35.0,
+                        (y as f64 + dy - 97.6) / 35.0,
+                    );
+            }
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            (40.0 + light + (1.0 + 0.02 * light).sqrt() * noise).round() as u8
+        })
+    };
+    let reference = ReferenceFrame::new(frame(false).view()).unwrap();
+    let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-6 * v));
+    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).unwrap();
+    measure(&frame(true), &reference, &line).profile.unwrap()
+}
+
+fn ball(x: f64, y: f64) -> f64 {
+    (1.0 - x * x - y * y).max(0.0).sqrt()
+}
+
+#[test]
+fn balls_are_balls() {
+    for seed in 0..20 {
+        let fit = fitted(ball, seed);
+        assert_eq!(
+            fit.shape,
+            ProfileShape::Hertz,
+            "{seed}: {} {}",
+            fit.radial_misfit,
+            fit.azimuthal_misfit
+        );
+        assert!(fit.radial_misfit < 0.003, "{seed}: {}", fit.radial_misfit);
+    }
+}
+
+#[test]
+fn punches_pads_ellipses_and_rings_are_not() {
+    let radius2 = |x: f64, y: f64| x * x + y * y;
+    let shapes: [(&str, &dyn Fn(f64, f64) -> f64); 5] = [
+        ("flat punch", &|x, y| {
+            if radius2(x, y) < 0.999 {
+                0.5 / (1.0 - radius2(x, y)).sqrt().max(0.4)
+            } else {
+                0.0
+            }
+        }),
+        ("even pressure", &|x, y| {
+            if radius2(x, y) < 1.0 { 1.0 } else { 0.0 }
+        }),
+        ("cone", &|x, y| (1.0 - radius2(x, y).sqrt()).max(0.0)),
+        ("ellipse", &|x, y| ball(x / 1.2, y * 1.2)),
+        ("ring", &|x, y| {
+            if radius2(x, y) < 0.16 {
+                0.3
+            } else {
+                ball(x, y)
+            }
+        }),
+    ];
+    for (name, level) in shapes {
+        let fit = fitted(level, 3);
+        println!(
+            "{name}: {:.4} {:.4}",
+            fit.radial_misfit, fit.azimuthal_misfit
+        );
+        assert_eq!(
+            fit.shape,
+            ProfileShape::NotHertz,
+            "{name}: {} {}",
+            fit.radial_misfit,
+            fit.azimuthal_misfit
+        );
+    }
+}
+
+#[test]
+fn the_curve_turns_a_balls_light_back_into_a_balls_pressure() {
+    let sensor = Sensor {
+        q: 0.8,
+        ..Sensor::default()
+    };
+    let reference = sensor.reference();
+    let curve = sensor.curve(&reference, 1);
+    let options = CalibrationOptions::default().with_zero_at_origin();
+    let sums = LinearCalibration::fit(&sensor.calibration(&reference, 1).1, &options).unwrap();
+    let frame = sensor.frame(0.4, 2.5e-3, [121.3, 97.6], Branch::Loading, 8);
+    let (pressure, light) = (
+        measure(&frame, &reference, &curve).profile.unwrap(),
+        measure(&frame, &reference, &sums).profile.unwrap(),
+    );
+    println!(
+        "pressure {:.4}, light {:.4}",
+        pressure.radial_misfit, light.radial_misfit
+    );
+    assert_eq!(pressure.shape, ProfileShape::Hertz);
+    // Light ∝ p^0.8 is (1 − r²)^0.4: the misfit shows, pressure has a third of it at most.
+    assert!(pressure.radial_misfit < 0.4 * light.radial_misfit);
+}
