@@ -44,15 +44,17 @@ impl Colour {
     ];
 }
 
-/// A map from the unit interval to colours.
+/// A map from values to colours; NaN is light grey.
 ///
 /// ```
-/// use tactile_imaging::plot::{ColorMap, Colour};
-/// assert_eq!(ColorMap::Grey.at(1.0), Colour::WHITE);
-/// assert_eq!(ColorMap::Viridis.at(-3.0), Colour(68, 1, 84), "held to [0, 1]");
-/// let (low, high) = (ColorMap::Diverging.at(0.0), ColorMap::Diverging.at(1.0));
-/// assert!(low.2 > low.0 && high.0 > high.2, "blue for negative, red for positive");
-/// assert_eq!(ColorMap::Viridis.at(f64::NAN), ColorMap::Grey.at(f64::NAN));
+/// use tactile_imaging::plot::{ColorMap, HeatMap, Page, Panel};
+/// let strain = ndarray::array![[-0.02, 0.0, 0.02]];
+/// let svg = |map| {
+///     let heat = HeatMap::of_pixels(strain.view(), [1.0, 1.0], "strain").colours(map);
+///     Page::new("").panel(Panel::new("").heat_map(heat)).to_svg()
+/// };
+/// assert_ne!(svg(ColorMap::Diverging)?, svg(ColorMap::Viridis)?);
+/// # Ok::<(), tactile_imaging::plot::PlotError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -97,7 +99,7 @@ const DIVERGING: [[f64; 3]; 5] = [
 
 impl ColorMap {
     /// The colour at `t`, held to [0, 1]; light grey where `t` is NaN.
-    pub fn at(self, t: f64) -> Colour {
+    pub(super) fn at(self, t: f64) -> Colour {
         if t.is_nan() {
             return Colour(235, 235, 235);
         }

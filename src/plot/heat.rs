@@ -1,6 +1,6 @@
-//! Heat maps: values on a grid, brought to the pixels of the page.
+//! Heat maps: values on a grid, averaged over the pixels of the page.
 use super::colour::ColorMap;
-use super::layer::range_of;
+use super::scale::range_of;
 use ndarray::{Array2, ArrayView2};
 use std::ops::Range;
 
@@ -58,7 +58,7 @@ impl HeatMap {
     }
 
     /// The colours of a bar, from one end to the other.
-    pub(super) fn of_bar(map: ColorMap, label: &str) -> Self {
+    pub(super) fn of_bar(map: ColorMap) -> Self {
         let values = Array2::from_shape_fn((64, 1), |(i, _)| i as f64 / 63.0);
         Self {
             values,
@@ -66,7 +66,7 @@ impl HeatMap {
             y: [0.0; 2],
             map,
             range: [0.0, 1.0],
-            label: label.into(),
+            label: String::new(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! What a panel can show.
 use super::colour::{ColorMap, Colour};
 use super::heat::HeatMap;
+use super::scale::range_of;
 
 /// The shape of a point.
 ///
@@ -142,13 +143,4 @@ impl Layer {
             _ => None,
         }
     }
-}
-
-/// Smallest and largest finite value; (0, 1) where there is none.
-pub(super) fn range_of<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
-    let start = [f64::INFINITY, f64::NEG_INFINITY];
-    let [lo, hi] = values
-        .filter(|v| v.is_finite())
-        .fold(start, |[lo, hi], &v| [lo.min(v), hi.max(v)]);
-    if lo > hi { [0.0, 1.0] } else { [lo, hi] }
 }

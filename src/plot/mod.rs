@@ -21,17 +21,17 @@
 //! assert!(svg.starts_with("<svg") && svg.contains("Calibration"));
 //! # Ok(()) }
 //! ```
+mod axes;
 mod colour;
 mod draw;
 mod heat;
 mod layer;
 mod legend;
-mod map;
-mod marks;
 mod page;
 mod panel;
 mod press;
 mod scale;
+mod svg;
 mod ticks;
 
 pub use colour::{ColorMap, Colour};
@@ -40,5 +40,5 @@ pub use layer::{Layer, Marker};
 pub use legend::Legend;
 pub use page::{Page, PlotError};
 pub use panel::Panel;
-pub use press::{PressPlotError, save_press_pages, summary_lines};
+pub use press::{save_press_pages, summary_lines};
 pub use scale::Scale;

@@ -1,8 +1,9 @@
 //! A page of panels, written as one SVG file.
-use super::draw::{draw_panel, style};
+use super::draw::{black, draw_panel};
 use super::panel::Panel;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use super::svg::{Anchor, Svg};
+use crate::pipeline::PipelineError;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Why a page could not be drawn or written.
@@ -19,13 +20,13 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
-    /// The drawing library refused.
-    #[error("cannot draw the page `{title}`: {message}")]
-    Draw {
+    /// A heat map could not be encoded as a PNG.
+    #[error("cannot encode an image of the page `{title}`: {source}")]
+    Encode {
         /// Title of the page.
         title: String,
-        /// What the library said.
-        message: String,
+        /// What the encoder said.
+        source: io::Error,
     },
     /// The file could not be written.
     #[error("cannot write {}: {source}", path.display())]
@@ -33,8 +34,11 @@ pub enum PlotError {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        source: io::Error,
     },
+    /// A result to be drawn could not be computed.
+    #[error(transparent)]
+    Measure(#[from] PipelineError),
 }
 
 /// Panels in rows and columns under one title.
@@ -95,15 +99,12 @@ impl Page {
     /// The page as the text of an SVG file.
     ///
     /// # Errors
-    /// [`PlotError::Draw`].
+    /// [`PlotError::Encode`].
     pub fn to_svg(&self) -> Result<String, PlotError> {
-        let mut svg = String::new();
-        self.draw(&mut svg).map_err(|e| PlotError::Draw {
+        self.draw().map_err(|source| PlotError::Encode {
             title: self.title.clone(),
-            message: e.to_string(),
-        })?;
-        // The back end leaves out the type's first half, which strict readers want.
-        Ok(svg.replace("\"data:png;base64,", "\"data:image/png;base64,"))
+            source,
+        })
     }
 
     /// Writes the page to a file, creating its folder where needed.
@@ -124,32 +125,23 @@ impl Page {
         })
     }
 
-    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn std::error::Error + '_>> {
-        let rows = self.panels.len().div_ceil(self.columns).max(1);
-        let head = if self.title.is_empty() { 8 } else { 44 };
+    fn draw(&self) -> io::Result<String> {
+        let rows = self.panels.len().div_ceil(self.columns).max(1) as u32;
+        let columns = self.columns as u32;
         let (width, height) = self.panel_size;
-        let size = (width * self.columns as u32, head + height * rows as u32);
-        let root = SVGBackend::with_string(svg, size).into_drawing_area();
-        let fail = |e: &dyn std::fmt::Display| e.to_string();
-        root.fill(&WHITE).map_err(|e| fail(&e))?;
-        let (title, body) = root.split_vertically(head);
-        let anchor = Pos::new(HPos::Center, VPos::Center);
-        title
-            .draw_text(
-                &self.title,
-                &style(20, BLACK).pos(anchor),
-                (size.0 as i32 / 2, 24),
-            )
-            .map_err(|e| fail(&e))?;
-        for (area, panel) in body
-            .split_evenly((rows, self.columns))
-            .iter()
-            .zip(&self.panels)
-        {
-            draw_panel(area, panel).map_err(|e| fail(&e))?;
+        let head = if self.title.is_empty() { 8 } else { 44 };
+        let mut svg = Svg::new(width * columns, head + height * rows);
+        let middle = 0.5 * f64::from(width * columns);
+        svg.text(&black(&self.title, [middle, 24.0], 20.0, Anchor::Middle));
+        let size = [f64::from(width), f64::from(height)];
+        for (k, panel) in self.panels.iter().enumerate() {
+            let (row, column) = (k / self.columns, k % self.columns);
+            let corner = [
+                column as f64 * size[0],
+                f64::from(head) + row as f64 * size[1],
+            ];
+            draw_panel(&mut svg, panel, corner, size)?;
         }
-        root.present().map_err(|e| fail(&e))?;
-        drop((title, body));
-        Ok(())
+        Ok(svg.finish())
     }
 }

@@ -1,39 +1,15 @@
 //! The pages of a press: frames, surfaces, matches, displacement, strain, summary.
-use super::{Colour, HeatMap, Marker, Page, Panel, PlotError};
+use super::colour::Colour;
+use super::heat::HeatMap;
+use super::layer::Marker;
+use super::page::{Page, PlotError};
+use super::panel::Panel;
 use crate::pipeline::{Measurement, PipelineError, Press, with_error};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 
 const MM: f64 = 1e3;
 const UM: f64 = 1e6;
-
-/// Why the pages of a press could not be made.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::Pipeline;
-/// use tactile_imaging::force::CalibrationPair;
-/// use tactile_imaging::pipeline::{LightContact, Object};
-/// use tactile_imaging::plot::{PressPlotError, save_press_pages};
-/// let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f));
-/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, [20e-6, 20e-6])?, Object::sphere(3e-3))?;
-/// let (reference, small) = (ndarray::Array2::from_elem((20, 30), 10), ndarray::Array2::from_elem((8, 8), 10));
-/// let mut press = pipeline.press(reference.view())?;
-/// press.add_frame(small.view());
-/// let error = save_press_pages(&mut press, vec![], std::env::temp_dir()).unwrap_err();
-/// assert!(matches!(error, PressPlotError::Measure(_)), "the frame is not of the reference's size");
-/// # Ok(()) }
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PressPlotError {
-    /// A result to be drawn could not be computed.
-    #[error(transparent)]
-    Measure(#[from] PipelineError),
-    /// A page could not be drawn or written.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
-}
 
 /// Writes every page that the press has results for to `folder`, as SVG; returns their paths. The lines of `summary` (a tab
 /// between name and value) make the last page.
@@ -63,12 +39,12 @@ pub enum PressPlotError {
 /// ```
 ///
 /// # Errors
-/// [`PressPlotError`].
+/// [`PlotError`].
 pub fn save_press_pages(
     press: &mut Press<'_>,
     summary: Vec<String>,
     folder: impl AsRef<Path>,
-) -> Result<Vec<PathBuf>, PressPlotError> {
+) -> Result<Vec<PathBuf>, PlotError> {
     let mut pages = vec![
         ("frames", frames_page(press)?),
         ("surfaces", surfaces_page(press)?),
@@ -160,7 +136,7 @@ fn axes(title: impl Into<String>) -> Panel {
 }
 
 /// The frames with the contact circles.
-fn frames_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
+fn frames_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
     let size = press.pipeline().contact().pixel_size_m().map(|s| s * MM);
     let mut page = Page::new("Frames and contacts").columns(press.frames().min(2));
     for frame in 0..press.frames() {
@@ -189,7 +165,7 @@ fn circle([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
 }
 
 /// Heights as maps, and a cut through the middle of each.
-fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
+fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
     let mut page = Page::new("Reconstructed surfaces").columns((press.frames() + 1).min(3));
     let mut cuts = axes("Cuts along x through the highest point").y_label("height (mm)");
     for frame in 0..press.frames() {
@@ -237,7 +213,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PressPlotError> {
 }
 
 /// Control points of both frames and their matches, from above and from the side.
-fn matches_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotError> {
+fn matches_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
     let (model, target) = (
         press.control_points(0)?.to_vec(),
         press.control_points(last)?.to_vec(),
@@ -273,7 +249,7 @@ fn matches_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotErr
 }
 
 /// Displacement as arrows and as lengths.
-fn displacement_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotError> {
+fn displacement_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
     let model = press.control_points(0)?.to_vec();
     let warped = &press.matching(last)?.warped;
     let at = |p: &nalgebra::Point3<f64>| [p.x * MM, p.y * MM];
@@ -303,7 +279,7 @@ fn displacement_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPl
 }
 
 /// The diagonal of the strain over the control points.
-fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotError> {
+fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
     let model = press.control_points(0)?.to_vec();
     let strain = press.strain(last)?;
     let mut page = Page::new(format!("{} strain", strain.measure)).columns(3);
@@ -320,7 +296,7 @@ fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PressPlotErro
     Ok(page)
 }
 
-fn summary_page(press: &mut Press<'_>, lines: Vec<String>) -> Result<Page, PressPlotError> {
+fn summary_page(press: &mut Press<'_>, lines: Vec<String>) -> Result<Page, PlotError> {
     let mut points = Vec::new();
     for frame in 0..press.frames() {
         if let Some(c) = press.contact(frame)?

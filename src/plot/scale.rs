@@ -1,6 +1,4 @@
-//! How axes count, and what they span.
-use super::layer::Layer;
-use super::panel::Panel;
+//! How axes count, and what values span.
 
 /// How an axis counts.
 ///
@@ -32,32 +30,17 @@ impl Scale {
     }
 }
 
-impl Panel {
-    /// The ranges of both axes on their scales, a little wider than the data (not around heat maps).
-    pub(super) fn ranges(&self) -> [[f64; 2]; 2] {
-        let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-        for layer in &self.layers {
-            layer.visit(|p| {
-                let q = [self.scales[0].forward(p[0]), self.scales[1].forward(p[1])];
-                if q.iter().all(|v| v.is_finite()) {
-                    for (b, v) in bounds.iter_mut().zip(q) {
-                        *b = [b[0].min(v), b[1].max(v)];
-                    }
-                }
-            });
-        }
-        let tight = self.layers.iter().any(|l| matches!(l, Layer::Heat(_)));
-        let [x, y] = bounds.map(|b| widen(b, if tight { 0.0 } else { 0.04 }));
-        let fixed = |r: Option<[f64; 2]>, s: Scale| r.map(|r| widen(r.map(|v| s.forward(v)), 0.0));
-        [
-            fixed(self.x_range, self.scales[0]).unwrap_or(x),
-            fixed(self.y_range, self.scales[1]).unwrap_or(y),
-        ]
-    }
+/// Smallest and largest finite value; (0, 1) where there is none.
+pub(super) fn range_of<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
+    let start = [f64::INFINITY, f64::NEG_INFINITY];
+    let [lo, hi] = values
+        .filter(|v| v.is_finite())
+        .fold(start, |[lo, hi], &v| [lo.min(v), hi.max(v)]);
+    if lo > hi { [0.0, 1.0] } else { [lo, hi] }
 }
 
 /// A range with a margin; never empty, never without bounds.
-fn widen([lo, hi]: [f64; 2], share: f64) -> [f64; 2] {
+pub(super) fn widen([lo, hi]: [f64; 2], share: f64) -> [f64; 2] {
     if !(lo.is_finite() && hi.is_finite()) {
         return [0.0, 1.0];
     }

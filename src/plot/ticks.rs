@@ -1,72 +1,48 @@
 //! Axes: tick positions and their labels.
 use super::scale::Scale;
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-use plotters::coord::types::RangedCoordf64;
-use std::ops::Range;
 
-/// One axis: its range, round values in it, and how their labels are written.
-pub(super) struct Axis {
-    inner: RangedCoordf64,
-    /// On the axis, as the range is: decimal logarithms on a logarithmic one.
-    ticks: Vec<f64>,
-    scale: Scale,
-    power: i32,
+/// A round value on an axis.
+pub(super) struct Tick {
+    /// The value on the axis's scale: a decimal logarithm on a logarithmic one.
+    pub(super) at: f64,
+    /// The value itself as text.
+    pub(super) label: String,
 }
 
-impl Axis {
-    /// From the first to the second value with about `wanted` ticks; both are decimal logarithms on a logarithmic axis.
-    pub(super) fn new(scale: Scale, [from, to]: [f64; 2], wanted: usize) -> Self {
-        let (lo, hi) = (from.min(to), from.max(to));
-        let ticks = match scale {
-            Scale::Linear => nice_ticks(lo, hi, wanted),
-            Scale::Log10 => decades(lo, hi, wanted),
-        };
-        let largest = ticks.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-        Self {
-            inner: (from..to).into(),
-            ticks,
-            scale,
-            power: common_power(largest),
+/// About `wanted` ticks between the ends of a range on its scale (decimal logarithms on a logarithmic one).
+pub(super) fn ticks(scale: Scale, [from, to]: [f64; 2], wanted: usize) -> Vec<Tick> {
+    let (low, high) = (from.min(to), from.max(to));
+    match scale {
+        Scale::Log10 => (decades(low, high, wanted).into_iter())
+            .map(|at| Tick {
+                at,
+                label: label(10_f64.powf(at)),
+            })
+            .collect(),
+        Scale::Linear => {
+            let values = nice_ticks(low, high, wanted);
+            let largest = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            let power = common_power(largest);
+            (values.into_iter())
+                .map(|at| Tick {
+                    at,
+                    label: label_with_power(at, power),
+                })
+                .collect()
         }
     }
 }
 
-impl Ranged for Axis {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        self.inner.map(value, limit)
+/// The value as a multiple of the power of ten that the axis's labels share.
+fn label_with_power(value: f64, power: i32) -> String {
+    if power == 0 {
+        return label(clean(value));
     }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() {
-            Vec::new()
-        } else {
-            self.ticks.clone()
-        }
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.inner.range()
-    }
-}
-
-impl ValueFormatter<f64> for Axis {
-    fn format_ext(&self, v: &f64) -> String {
-        match self.scale {
-            Scale::Log10 => label(10f64.powf(*v)),
-            Scale::Linear if self.power == 0 => label(clean(*v)),
-            Scale::Linear => {
-                let mantissa = clean(v / 10f64.powi(self.power));
-                let power = superscript(self.power);
-                if mantissa == 0.0 {
-                    "0".into()
-                } else {
-                    format!("{}×10{power}", label(mantissa))
-                }
-            }
-        }
+    let mantissa = clean(value / 10_f64.powi(power));
+    if mantissa == 0.0 {
+        "0".into()
+    } else {
+        format!("{}×10{}", label(mantissa), superscript(power))
     }
 }
 
@@ -159,8 +135,8 @@ mod tests {
     use super::*;
 
     fn labels(scale: Scale, range: [f64; 2], wanted: usize) -> Vec<String> {
-        let axis = Axis::new(scale, range, wanted);
-        axis.ticks.iter().map(|v| axis.format_ext(v)).collect()
+        let ticks = ticks(scale, range, wanted).into_iter();
+        ticks.map(|tick| tick.label).collect()
     }
 
     #[test]

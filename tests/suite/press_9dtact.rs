@@ -1,5 +1,5 @@
 //! A real press: the ball of the 9DTact sensor, its contact and its depth against the ball's geometry.
-#![allow(missing_docs, clippy::print_stdout)]
+#![allow(clippy::print_stdout)]
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
 use tactile_imaging::io::{read_grey_image, read_table};

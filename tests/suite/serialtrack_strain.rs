@@ -2,13 +2,7 @@
 //! the exact stretch.
 #![allow(clippy::print_stdout)]
 
-#[path = "../examples/strain_between/measure.rs"]
-#[allow(unreachable_pub, dead_code)]
-mod measure;
-#[path = "../examples/strain_between/robust_spline.rs"]
-#[allow(unreachable_pub, dead_code)]
-mod robust_spline;
-
+use crate::measure;
 use nalgebra::{Matrix3, Point3};
 use std::path::PathBuf;
 use tactile_imaging::elasticity::strain::GreenLagrange;

@@ -1,5 +1,4 @@
 //! The pipeline pulls: what is not asked for is not computed, what is skipped changes no answer, stages can be swapped.
-#![allow(missing_docs)]
 mod hostile;
 mod strain_stream;
 mod streams;

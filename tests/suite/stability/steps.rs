@@ -1,6 +1,6 @@
 //! Steps of load that are hardly one: the strain goes with them to zero.
-use crate::press::{Images, SI, answer, camera, pipeline, trial};
-use crate::table::{STRAIN, Table};
+use super::press::{Images, SI, answer, camera, pipeline, trial};
+use super::table::{STRAIN, Table};
 use ndarray::Array2;
 
 /// Without noise a share p of the pixels has another grey value; as many points stand otherwise, and independent errors of a share p

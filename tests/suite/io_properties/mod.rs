@@ -1,5 +1,4 @@
 //! No content makes a reader panic, and what is written is read back bit for bit.
-#![allow(missing_docs)]
 use nalgebra::Point3;
 use proptest::prelude::*;
 use tactile_imaging::io::{

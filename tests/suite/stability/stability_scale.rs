@@ -1,9 +1,9 @@
 //! Units, brightness and position: what the numbers are against the truth, and what must not change them.
-use crate::press::{
+use super::press::{
     Answer, Images, SI, Units, answer, camera, coarse_camera, pipeline, relative, trial,
 };
-use crate::table::{EXACT, STRAIN, Table};
-use crate::{loads, steps, symmetry};
+use super::table::{EXACT, STRAIN, Table};
+use super::{loads, steps, symmetry};
 use tactile_imaging::pipeline::Trial;
 
 #[test]

@@ -1,8 +1,8 @@
 //! One patterned block between plates: its frames, and the modulus as stress over strain.
 
 use super::bumps::{bumps, mean_frame};
-use super::measure::{self, Strain};
 use super::{NU, calibrate, force, force_covariance, log_uniform, reference, verbose};
+use crate::measure::{self, Strain};
 use nalgebra::DMatrix;
 use ndarray::Array2;
 use rand::{SeedableRng, rngs::ChaCha8Rng};

@@ -1,7 +1,5 @@
 //! Scene files from end to end: a simulated scene written to a folder is measured; every bad input gets its sentence.
-#![allow(missing_docs)]
 
-#[path = "scene_files/mistakes.rs"]
 mod mistakes;
 
 use mistakes::MISTAKES;

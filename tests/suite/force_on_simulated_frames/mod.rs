@@ -3,7 +3,6 @@
 //! The default camera's noise is 1 % of the brightest signal (2 of 200 grey levels, most of it photons).
 #![allow(clippy::print_stdout)]
 
-#[path = "force_on_simulated_frames/study.rs"]
 mod study;
 
 use ndarray::{Array2, ArrayView2};

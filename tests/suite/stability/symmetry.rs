@@ -1,6 +1,6 @@
 //! The contact elsewhere in the frame, mirrored and turned.
-use crate::press::{Answer, Images, SI, answer, pipeline, relative};
-use crate::table::{EXACT, STRAIN, Table};
+use super::press::{Answer, Images, SI, answer, pipeline, relative};
+use super::table::{EXACT, STRAIN, Table};
 use nalgebra::Matrix3;
 use ndarray::{Array2, Axis};
 use tactile_imaging::pipeline::Trial;

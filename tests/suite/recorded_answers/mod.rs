@@ -1,10 +1,8 @@
-//! The numbers of small simulated scenes, compared with those recorded in `tests/recorded_answers/answers.txt`.
+//! The numbers of small simulated scenes, compared with those recorded in `tests/suite/recorded_answers/answers.txt`.
 //!
 //! A change that is meant to leave every answer as it is shows that here. A change that is meant to move answers records them
-//! anew: `TACTILE_RECORD=1 cargo test --test recorded_answers`, and the difference of the text file says what moved.
-#![allow(missing_docs)]
+//! anew: `TACTILE_RECORD=1 cargo test --test suite recorded_answers`, and the difference of the text file says what moved.
 
-#[path = "recorded_answers/scenes.rs"]
 mod scenes;
 
 use std::fmt::Write as _;
@@ -81,7 +79,8 @@ fn difference(recorded: &str, answer: &Answer) -> Option<String> {
 
 #[test]
 fn answers_are_those_recorded() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recorded_answers/answers.txt");
+    let file =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/recorded_answers/answers.txt");
     let answers = scenes::all();
     if std::env::var_os("TACTILE_RECORD").is_some() {
         std::fs::write(&file, text_of(&answers)).expect("the file can be written");

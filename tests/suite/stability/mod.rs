@@ -1,5 +1,4 @@
 //! The whole pipeline in every unit, position and brightness, and at the ends of what frames and loads can be.
-#![allow(missing_docs)]
 mod degenerate;
 mod loads;
 mod press;

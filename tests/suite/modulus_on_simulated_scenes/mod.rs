@@ -5,19 +5,9 @@
 //! brightness; and knows the ball's radius, the waveguide and Poisson's ratio.
 #![allow(clippy::print_stdout)]
 
-#[path = "modulus_on_simulated_scenes/block.rs"]
 mod block;
-#[path = "modulus_on_simulated_scenes/bumps.rs"]
 mod bumps;
-#[path = "../examples/strain_between/measure.rs"]
-#[allow(unreachable_pub, dead_code)]
-mod measure;
-#[path = "../examples/strain_between/robust_spline.rs"]
-#[allow(unreachable_pub, dead_code)]
-mod robust_spline;
-#[path = "modulus_on_simulated_scenes/sphere.rs"]
 mod sphere;
-#[path = "modulus_on_simulated_scenes/uncertainty.rs"]
 mod uncertainty;
 
 use nalgebra::DMatrix;

@@ -1,6 +1,6 @@
 //! One load, many equal ones, loads in falling order, as many as a session keeps.
-use crate::press::{SI, coarse_camera, pipeline, relative, trial};
-use crate::table::{EXACT, Table};
+use super::press::{SI, coarse_camera, pipeline, relative, trial};
+use super::table::{EXACT, Table};
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;

@@ -1,6 +1,5 @@
 //! Calibration series, loading cycles, uniaxial compression, hostile scenes and scenes on disk.
 
-#[path = "simulator_families/uniaxial.rs"]
 mod uniaxial;
 
 use proptest::prelude::*;

@@ -1,5 +1,4 @@
 //! A session allocates nothing per frame once its buffers have their size.
-#![allow(missing_docs)]
 use tactile_imaging::pipeline::{SESSION_LOADS, Session, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
 

@@ -1,0 +1,22 @@
+//! Tests of the facade: one binary, so that everything below it is compiled and linked once.
+#![allow(missing_docs)]
+
+mod force_on_simulated_frames;
+mod io_properties;
+#[path = "../../examples/strain_between/measure.rs"]
+#[allow(unreachable_pub, dead_code)]
+mod measure;
+mod modulus_on_simulated_scenes;
+mod pipeline;
+mod press_9dtact;
+mod recorded_answers;
+#[path = "../../examples/strain_between/robust_spline.rs"]
+#[allow(unreachable_pub, dead_code)]
+mod robust_spline;
+mod scene_files;
+mod serialtrack_strain;
+mod session_allocations;
+mod simulator;
+mod simulator_families;
+mod simulator_recorded;
+mod stability;
