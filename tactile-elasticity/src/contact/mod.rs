@@ -10,11 +10,14 @@
 
 mod body;
 mod hertz;
+mod interpolation;
 mod layer_equation;
 mod layer_kernel;
 mod layer_series;
+mod layer_table;
 mod punch;
 mod quadrature;
+mod stack;
 mod tatara;
 mod waveguide;
 
@@ -30,5 +33,5 @@ pub use punch::{ConeContact, PunchContact, cone, flat_punch, tangent_of_degrees}
 pub use tatara::tatara_indentation_m;
 pub use waveguide::{Layer, Waveguide};
 
-pub(crate) use layer_equation::LayerTable;
+pub(crate) use layer_table::{LayerTable, SharedLayerTable};
 pub(crate) use tatara::Squeeze;

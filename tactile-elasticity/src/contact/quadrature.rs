@@ -30,14 +30,26 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
     (p, previous)
 }
 
-/// Nodes and weights over [0, end] in equal panels of 16 points.
-pub(crate) fn panels(end: f64, count: usize) -> Vec<(f64, f64)> {
+/// Edges from 0 to `end`: panels of width `first` at the origin, growing by half of what lies before, none above `widest`.
+pub(crate) fn panel_edges(end: f64, first: f64, widest: f64) -> Vec<f64> {
+    let mut edges = vec![0.0];
+    let mut last = 0.0;
+    while last < end {
+        last += (0.5 * last).max(first).min(widest);
+        edges.push(last);
+    }
+    edges
+}
+
+/// Nodes and weights between the edges, 16 points a panel.
+pub(crate) fn gauss_panels(edges: &[f64]) -> Vec<(f64, f64)> {
     let unit = gauss_legendre(16);
-    let width = end / count as f64;
-    (0..count)
-        .flat_map(|p| {
+    edges
+        .windows(2)
+        .flat_map(|edge| {
+            let (start, width) = (edge[0], edge[1] - edge[0]);
             unit.iter()
-                .map(move |&(x, w)| ((p as f64 + x) * width, w * width))
+                .map(move |&(x, w)| (start + x * width, w * width))
         })
         .collect()
 }

@@ -58,6 +58,18 @@ impl<T: RealField + Copy> Waveguide<T> {
         Ok(waveguide)
     }
 
+    /// A rigid flat: no layers.
+    ///
+    /// ```
+    /// use tactile_elasticity::contact::Waveguide;
+    ///
+    /// let flat = Waveguide::<f64>::rigid();
+    /// assert!(flat.layers().is_empty() && flat.compliance_per_pa() == 0.0);
+    /// ```
+    pub fn rigid() -> Self {
+        Self { layers: Vec::new() }
+    }
+
     /// The layers, the touched one first.
     ///
     /// ```
@@ -114,9 +126,13 @@ impl<T: RealField + Copy> Waveguide<T> {
     ///
     /// True while the contact is small beside every layer's thickness and the layers are alike.
     pub fn compliance_per_pa(&self) -> T {
-        self.sum(|l| {
+        if self.layers.is_empty() {
+            return T::zero();
+        }
+        let compliance = self.sum(|l| {
             (T::one() - l.poisson_ratio) * (T::one() + l.poisson_ratio) / l.youngs_modulus_pa
-        }) / self.thickness_m()
+        });
+        compliance / self.thickness_m()
     }
 
     /// [`compliance_per_pa`](Self::compliance_per_pa) as a [`Body`].

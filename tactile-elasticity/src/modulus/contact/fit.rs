@@ -26,7 +26,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
             let mut push = |length: Option<Estimate<f64>>,
                             wanted: bool,
                             quantity,
-                            law: &dyn Fn(f64) -> Option<LogForce>| {
+                            law: &dyn Fn(f64) -> Option<LogForce>,
+                            model_error: f64| {
                 let Some(length) = length.filter(|_| wanted) else {
                     return Ok(());
                 };
@@ -41,6 +42,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
                         length,
                         log_force,
                         log_modulus,
+                        model_error,
                     });
                 }
                 Ok(())
@@ -54,10 +56,17 @@ impl<L: ContactLaw> ContactEstimator<L> {
                 radius,
                 Quantity::ContactRadius,
                 &|a| self.law.of_contact_radius(a, share),
+                self.law
+                    .model_error(state.contact_radius_m.map(|a| a.value), None),
             )?;
-            push(state.indentation_m, depth, Quantity::Indentation, &|d| {
-                self.law.of_indentation(d, share)
-            })?;
+            push(
+                state.indentation_m,
+                depth,
+                Quantity::Indentation,
+                &|d| self.law.of_indentation(d, share),
+                self.law
+                    .model_error(None, state.indentation_m.map(|d| d.value)),
+            )?;
         }
         if all.is_empty() {
             return Err(ElasticityError::TooFewLoads {
@@ -84,6 +93,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
             shared.force_scale.powi(2)
                 + p.slope * q.slope * shared.length_scale.powi(2)
                 + p.size_slope * q.size_slope * shared.size.powi(2)
+                // One law errs the same way at all loads.
+                + all[i].model_error * all[j].model_error
         });
         [
             (
@@ -143,7 +154,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
     ) -> Result<Consistent, ElasticityError> {
         let share_at =
             |log_reduced: f64| (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0);
-        let mut share = 0.0;
+        let mut share = self.law.first_share();
         for _ in 0..60 {
             let (observations, mean) = self.mean(series, share)?;
             let steps = if reach == 0.0 {
@@ -296,6 +307,8 @@ struct Observation {
     length: Estimate<f64>,
     log_force: LogForce,
     log_modulus: f64,
+    /// Standard error of ln F that is the law's.
+    model_error: f64,
 }
 
 impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimator<L> {

@@ -1,7 +1,7 @@
 //! The estimators of this family, by what presses on what.
 
 use super::ContactEstimator;
-use crate::contact::{Bond, Waveguide};
+use crate::contact::{Body, Bond, Waveguide};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::law::{
     ConeLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw, WaveguideLaw,
@@ -200,8 +200,8 @@ impl ContactEstimator<TwoContactsLaw> {
 }
 
 impl ContactEstimator<WaveguideLaw> {
-    /// A soft sphere of radius R (m) and Poisson ratio ν on a waveguide whose layers, taken in series, are one layer of their
-    /// whole thickness.
+    /// A soft sphere of radius R (m) and Poisson ratio ν on the layers of a waveguide, or on a [rigid](Waveguide::rigid) flat; `bond`
+    /// is that of the lowest layer to its rigid base.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
@@ -211,7 +211,21 @@ impl ContactEstimator<WaveguideLaw> {
         waveguide: &Waveguide<T>,
         bond: Bond,
     ) -> Result<Self, ElasticityError> {
-        let law = WaveguideLaw::new(radius_m, waveguide, bond)?;
-        Ok(Self::from_law(law, poisson_ratio)?.with_waveguide(waveguide))
+        let law = WaveguideLaw::new(radius_m, poisson_ratio, waveguide, bond)?;
+        let touched = match waveguide
+            .layers()
+            .iter()
+            .find(|l| l.thickness_m > T::zero())
+        {
+            Some(top) => Body::elastic(top.youngs_modulus_pa, top.poisson_ratio)?,
+            None => Body::rigid(),
+        };
+        Ok(Self::from_law(law, poisson_ratio)?.with_other_body(touched))
+    }
+
+    /// The linear contact alone, without what finite strain adds and without the model's error in the interval.
+    pub fn without_finite_strain(mut self) -> Self {
+        self.law = self.law.without_finite_strain();
+        self
     }
 }

@@ -1,9 +1,7 @@
 //! A sphere on a layer with a rigid base.
 
 use super::{ContactLaw, LogForce, Sphere};
-use crate::contact::{
-    Bond, LayerContact, LayerEquation, LayerKernel, LayerSeries, LayerTable, Waveguide,
-};
+use crate::contact::{Bond, LayerContact, LayerEquation, LayerKernel, LayerSeries, LayerTable};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::EstimatorKind;
 use crate::scalar::widen;
@@ -173,72 +171,6 @@ impl ContactLaw for LayerLaw {
 
     fn depends_on_share(&self) -> bool {
         self.theory != LayerTheory::PublishedSeries
-    }
-}
-
-/// The sphere is the sample, and the waveguide it presses is a layer of known modulus on a rigid base.
-///
-/// ```
-/// use tactile_elasticity::contact::{Bond, Layer, Waveguide};
-/// use tactile_elasticity::modulus::{ContactLaw, EstimatorKind, SphereOnWaveguide, WaveguideLaw};
-///
-/// let gel = Waveguide::new(vec![Layer { thickness_m: 2e-3, youngs_modulus_pa: 100e3_f64, poisson_ratio: 0.5 }])?;
-/// let estimator = SphereOnWaveguide::new(5e-3, 0.5, &gel, Bond::Bonded)?;
-/// let law: &WaveguideLaw = estimator.law();
-/// assert_eq!(law.kind(), EstimatorKind::SphereOnWaveguide);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WaveguideLaw {
-    sphere: Sphere,
-    thickness_m: f64,
-    kernel: LayerKernel,
-}
-
-impl WaveguideLaw {
-    pub(crate) fn new<T: RealField + Copy>(
-        radius_m: T,
-        waveguide: &Waveguide<T>,
-        bond: Bond,
-    ) -> Result<Self, ElasticityError> {
-        Ok(Self {
-            sphere: Sphere::new(radius_m)?,
-            thickness_m: widen(waveguide.thickness_m()),
-            kernel: LayerKernel::new(bond, waveguide.poisson_ratio())?,
-        })
-    }
-
-    fn equation(&self, share: f64) -> LayerEquation {
-        LayerEquation::new(&self.kernel).with_share(share)
-    }
-}
-
-impl ContactLaw for WaveguideLaw {
-    fn kind(&self) -> EstimatorKind {
-        EstimatorKind::SphereOnWaveguide
-    }
-
-    fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce> {
-        of_radius(&self.sphere, &self.equation(share), a, self.thickness_m)
-    }
-
-    fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce> {
-        let hertz = self.sphere.of_indentation(d, share)?;
-        let chi = (self.sphere.radius_m() * d).sqrt() / self.thickness_m;
-        let (value, slope) = at_chi(&self.equation(share), chi)?;
-        Some(corrected(hertz, value, 0.5 * slope, 0.5 * slope))
-    }
-
-    fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
-        self.sphere.contact_ratio(contact_radius, indentation)
-    }
-
-    fn contact_ratio_limit(&self) -> f64 {
-        self.sphere.contact_ratio_limit()
-    }
-
-    fn depends_on_share(&self) -> bool {
-        true
     }
 }
 

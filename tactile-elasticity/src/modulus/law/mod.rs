@@ -1,14 +1,17 @@
 //! Contact laws of the form F = E* f(x), x the contact radius or the indentation.
 
+mod finite_strain;
 mod half_space;
 mod layer;
 mod tatara;
 mod two_contacts;
+mod waveguide;
 
 pub use half_space::{ConeLaw, Punch, Sphere};
-pub use layer::{LayerLaw, LayerTheory, WaveguideLaw};
+pub use layer::{LayerLaw, LayerTheory};
 pub use tatara::TataraLaw;
 pub use two_contacts::TwoContactsLaw;
+pub use waveguide::WaveguideLaw;
 
 use crate::modulus::EstimatorKind;
 
@@ -67,6 +70,18 @@ pub trait ContactLaw {
     fn depends_on_share(&self) -> bool {
         false
     }
+
+    /// The share from which the share that belongs to the answer is sought.
+    #[doc(hidden)]
+    fn first_share(&self) -> f64 {
+        0.0
+    }
+
+    /// Standard error of ln F that is the law's own, the same at every load of one size.
+    #[doc(hidden)]
+    fn model_error(&self, _contact_radius: Option<f64>, _indentation: Option<f64>) -> f64 {
+        0.0
+    }
 }
 
 impl<L: ContactLaw + ?Sized> ContactLaw for Box<L> {
@@ -100,5 +115,13 @@ impl<L: ContactLaw + ?Sized> ContactLaw for Box<L> {
 
     fn depends_on_share(&self) -> bool {
         (**self).depends_on_share()
+    }
+
+    fn first_share(&self) -> f64 {
+        (**self).first_share()
+    }
+
+    fn model_error(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> f64 {
+        (**self).model_error(contact_radius, indentation)
     }
 }

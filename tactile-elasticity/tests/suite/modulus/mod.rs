@@ -1,5 +1,6 @@
 //! Every estimator finds what its own law was fed, says how well, and refuses what it cannot use.
 
+mod finite_elements;
 mod intervals;
 mod laws;
 mod stress_over_strain;

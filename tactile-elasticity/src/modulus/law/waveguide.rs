@@ -1,0 +1,185 @@
+//! A soft sphere, the sample, on the layers of a waveguide.
+
+use super::finite_strain::FiniteStrain;
+use super::{ContactLaw, LogForce, Sphere};
+use crate::contact::{Bond, LayerKernel, SharedLayerTable, Waveguide};
+use crate::error::{ElasticityError, Quantity, poisson, positive};
+use crate::modulus::EstimatorKind;
+use crate::scalar::widen;
+use nalgebra::RealField;
+
+/// F = E* f(a): the linear contact of a ball with bonded layers on a rigid base, solved by its integral equation and tabulated, with
+/// what finite strain adds. E* is that of the ball and the touched layer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WaveguideLaw {
+    sphere: Sphere,
+    thickness_m: f64,
+    /// None on a rigid flat.
+    layers: Option<SharedLayerTable>,
+    finite_strain: Option<FiniteStrain>,
+}
+
+/// Contact radii tabulated, over the ball's radius; above the second no contact of a ball is meant.
+const TABULATED: (f64, f64) = (0.02, 1.6);
+
+/// Indentation over the ball's radius beyond which finite elements and this law part.
+const LARGEST_INDENTATION: f64 = 0.8;
+
+impl WaveguideLaw {
+    pub(crate) fn new<T: RealField + Copy>(
+        radius_m: T,
+        poisson_ratio: T,
+        waveguide: &Waveguide<T>,
+        bond: Bond,
+    ) -> Result<Self, ElasticityError> {
+        let radius = positive(widen(radius_m), Quantity::Radius)?;
+        let thickness_m = widen(waveguide.thickness_m());
+        let layers = if waveguide.layers().is_empty() {
+            None
+        } else {
+            let kernel = LayerKernel::of_layers(waveguide, bond)?;
+            let range = (
+                TABULATED.0 * radius / thickness_m,
+                TABULATED.1 * radius / thickness_m,
+            );
+            SharedLayerTable::new(&kernel, range)
+        };
+        Ok(Self {
+            sphere: Sphere::new(radius_m)?,
+            thickness_m,
+            layers,
+            finite_strain: Some(FiniteStrain::new(poisson(widen(poisson_ratio))?)),
+        })
+    }
+
+    pub(crate) fn without_finite_strain(mut self) -> Self {
+        self.finite_strain = None;
+        self
+    }
+
+    /// The contact of radius a; None beyond the table.
+    fn contact(&self, a: f64, share: f64) -> Option<Contact> {
+        let x = a / self.sphere.radius_m();
+        if x > TABULATED.1 {
+            return None;
+        }
+        let mut contact = Contact {
+            log_force: self.sphere.of_contact_radius(a, share)?,
+            log_indentation: 2.0 * a.ln() - self.sphere.radius_m().ln(),
+            indentation_slope: 2.0,
+            ball_part: 1.0,
+        };
+        if let Some(table) = &self.layers {
+            let layers = table.at(a / self.thickness_m, share)?;
+            contact.log_force.value += layers.force;
+            contact.log_force.slope += layers.force_slope;
+            contact.log_indentation += layers.indentation;
+            contact.indentation_slope += layers.indentation_slope;
+            // The ball's compliance (1 − s)/E* times the stiffness that the contact has, F/F_Hertz times E*.
+            contact.ball_part = ((1.0 - share) * layers.force.exp()).clamp(0.0, 1.0);
+        }
+        if let Some(strain) = &self.finite_strain {
+            let force = strain.force(x, contact.ball_part);
+            contact.log_force.value += force.0;
+            contact.log_force.slope += force.1;
+            contact.log_force.size_slope -= force.1;
+            let indentation = strain.indentation(x, contact.ball_part);
+            contact.log_indentation += indentation.0;
+            contact.indentation_slope += indentation.1;
+        }
+        Some(contact)
+    }
+
+    /// The contact radius of an indentation, by Newton's method in logarithms.
+    fn radius_of(&self, indentation: f64, share: f64) -> Option<(f64, Contact)> {
+        let target = indentation.ln();
+        let largest = (TABULATED.1 * self.sphere.radius_m()).ln();
+        let mut log_a = (0.5 * (target + self.sphere.radius_m().ln())).min(largest);
+        for _ in 0..40 {
+            let contact = self.contact(log_a.exp(), share)?;
+            let step = (contact.log_indentation - target) / contact.indentation_slope;
+            if step.abs() < 1e-12 {
+                return Some((log_a.exp(), contact));
+            }
+            // A step into what is not tabulated is halved by the limit.
+            log_a = (log_a - step.clamp(-0.5, 0.5)).min(largest);
+        }
+        None
+    }
+}
+
+struct Contact {
+    log_force: LogForce,
+    log_indentation: f64,
+    /// d ln δ/d ln a.
+    indentation_slope: f64,
+    /// The ball's part of the compliance, layers and their depth counted.
+    ball_part: f64,
+}
+
+impl ContactLaw for WaveguideLaw {
+    fn kind(&self) -> EstimatorKind {
+        EstimatorKind::SphereOnWaveguide
+    }
+
+    fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce> {
+        Some(self.contact(a, share)?.log_force)
+    }
+
+    fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce> {
+        if d > LARGEST_INDENTATION * self.sphere.radius_m() {
+            return None;
+        }
+        let (_, contact) = self.radius_of(d, share)?;
+        let slope = contact.log_force.slope / contact.indentation_slope;
+        // f has the dimension of an area; layers apart, its slopes in δ and R add up to 2.
+        Some(LogForce {
+            value: contact.log_force.value,
+            slope,
+            size_slope: contact.log_force.size_slope + slope,
+        })
+    }
+
+    fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64> {
+        self.sphere.contact_ratio(contact_radius, indentation)
+    }
+
+    fn contact_ratio_limit(&self) -> f64 {
+        if self.finite_strain.is_some() {
+            FiniteStrain::LARGEST_CONTACT_RATIO
+        } else {
+            self.sphere.contact_ratio_limit()
+        }
+    }
+
+    fn layer_ratio(
+        &self,
+        contact_radius: Option<f64>,
+        indentation: Option<f64>,
+    ) -> Option<(f64, f64)> {
+        self.layers.as_ref()?;
+        let a = self.contact_ratio(contact_radius, indentation)? * self.sphere.radius_m();
+        Some((a / self.thickness_m, FiniteStrain::LARGEST_LAYER_RATIO))
+    }
+
+    fn depends_on_share(&self) -> bool {
+        self.layers.is_some()
+    }
+
+    fn first_share(&self) -> f64 {
+        // A ball that yields alone may not reach an indentation that ball and layers share.
+        if self.layers.is_some() { 0.5 } else { 0.0 }
+    }
+
+    fn model_error(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> f64 {
+        let Some(strain) = &self.finite_strain else {
+            return 0.0;
+        };
+        let Some(x) = self.contact_ratio(contact_radius, indentation) else {
+            return 0.0;
+        };
+        let layer_ratio = x * self.sphere.radius_m() / self.thickness_m;
+        let layer_ratio = self.layers.as_ref().map(|_| layer_ratio);
+        strain.model_error(x, layer_ratio, contact_radius.is_none())
+    }
+}

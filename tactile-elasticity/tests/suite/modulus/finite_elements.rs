@@ -1,0 +1,97 @@
+//! Estimators against balls pressed in finite elements at finite strain.
+
+use super::*;
+use std::path::PathBuf;
+
+/// A load of a scene: force, contact radius.
+struct Scene {
+    name: String,
+    youngs_modulus_pa: f64,
+    poisson_ratio: f64,
+    radius_m: f64,
+    guide: Waveguide<f64>,
+    loads: Vec<LoadState<f64>>,
+}
+
+/// The scenes of `fem_press/scenes.csv`; none with one printed line where the data are not there.
+#[allow(clippy::print_stdout)]
+fn scenes() -> Vec<Scene> {
+    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
+        PathBuf::from,
+    );
+    let path = folder.join("fem_press").join("scenes.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        println!("skipped: no {} (set TACTILE_DATA)", path.display());
+        return Vec::new();
+    };
+    let mut scenes: Vec<Scene> = Vec::new();
+    for line in text.lines().skip(1) {
+        // The layers are a quoted JSON list with commas of its own.
+        let open = line.find('[').expect("layers");
+        let close = line.find(']').expect("layers");
+        let layers: Vec<serde_json::Value> =
+            serde_json::from_str(&line[open..=close].replace("\"\"", "\"")).expect("JSON");
+        let before: Vec<&str> = line[..open].trim_end_matches('"').split(',').collect();
+        let after: Vec<&str> = line[close + 1..]
+            .trim_start_matches('"')
+            .split(',')
+            .collect();
+        let number = |text: &str| text.parse::<f64>().expect("a number");
+        let layer = |l: &serde_json::Value| Layer {
+            thickness_m: l["thickness_m"].as_f64().unwrap(),
+            youngs_modulus_pa: l["youngs_modulus_pa"].as_f64().unwrap(),
+            poisson_ratio: l["poisson_ratio"].as_f64().unwrap(),
+        };
+        let load = LoadState::new(exact(number(after[1])))
+            .with_indentation(exact(number(after[2])))
+            .with_contact_radius(Estimate::new(number(after[3]), number(after[4])));
+        match scenes.last_mut().filter(|s| s.name == before[0]) {
+            Some(scene) => scene.loads.push(load),
+            None => scenes.push(Scene {
+                name: before[0].to_owned(),
+                youngs_modulus_pa: number(before[1]),
+                poisson_ratio: number(before[2]),
+                radius_m: number(before[3]),
+                guide: if layers.is_empty() {
+                    Waveguide::rigid()
+                } else {
+                    Waveguide::new(layers.iter().map(layer).collect()).unwrap()
+                },
+                loads: vec![load],
+            }),
+        }
+    }
+    scenes
+}
+
+#[test]
+fn balls_are_read_through_layers_and_on_a_flat() {
+    for scene in scenes() {
+        let estimator = SphereOnWaveguide::new(
+            scene.radius_m,
+            scene.poisson_ratio,
+            &scene.guide,
+            Bond::Bonded,
+        )
+        .unwrap();
+        for (evidence, tolerance) in [
+            (Evidence::ContactRadius, 0.05),
+            (Evidence::Indentation, 0.15),
+        ] {
+            let estimator = estimator.clone().with_evidence(evidence);
+            for load in &scene.loads {
+                let deep = load.indentation_m.unwrap().value > 0.8 * scene.radius_m;
+                if evidence == Evidence::Indentation && deep {
+                    assert!(estimator.estimate(&LoadSeries::new([*load])).is_err());
+                    continue;
+                }
+                let found = estimator.estimate(&LoadSeries::new([*load])).unwrap();
+                let gap = found.youngs_modulus_pa / scene.youngs_modulus_pa - 1.0;
+                assert!(gap.abs() < tolerance, "{} {evidence:?}: {gap}", scene.name);
+                let covered = found.interval_95.contains(scene.youngs_modulus_pa);
+                assert!(covered, "{} {evidence:?}: {gap}", scene.name);
+            }
+        }
+    }
+}
