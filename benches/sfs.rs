@@ -9,9 +9,9 @@ use criterion::{
 };
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    Alignment, Branch, BrooksHorn, ControlPointSampler, CosinePoisson, CurvatureAdaptive,
-    DepthTable, Domain, Eikonal, EquallySpaced, Frame, FrankotChellappa, Lighting,
-    MaskedLeastSquares, Pentland, Random, Rim, Scalar, SlopeIntegrator, Surface,
+    Alignment, BoundaryCondition, Branch, BrooksHorn, ControlPointSampler, CosinePoisson,
+    CurvatureAdaptive, DepthTable, Domain, Eikonal, EquallySpaced, Frame, FrankotChellappa,
+    Lighting, MaskedLeastSquares, Pentland, Random, Scalar, SlopeIntegrator, Surface,
     SurfaceReconstruction, TsaiShah, Workspace, height_error, slopes,
 };
 
@@ -137,9 +137,9 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
     let informed = masked.with_known_heights(known.view());
     let eikonal = Eikonal::new(lighting);
     let rim = eikonal
-        .with_rim(Rim::Height(0.0))
+        .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap()
-        .with_branch(Branch::Rising);
+        .with_branch(Branch::Convex);
     let mut methods: Vec<(&str, Method, &Domain<'_, f64>, Alignment)> = vec![
         (
             "eikonal-known",
@@ -240,7 +240,7 @@ fn contact_share(criterion: &mut Criterion) {
         let domain = Domain::pixels()
             .with_mask(mask.view())
             .with_known_heights(known.view());
-        let method = Eikonal::new(lighting).with_branch(Branch::Falling);
+        let method = Eikonal::new(lighting).with_branch(Branch::Concave);
         let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
         group.bench_function(
             BenchmarkId::new("eikonal", format!("{percent}%/{columns}x{rows}")),
@@ -263,7 +263,7 @@ fn points(criterion: &mut Criterion) {
         40.0 * (-((r as f64 - 150.0).powi(2) + (c as f64 - 140.0).powi(2)) / 8e3).exp()
     });
     let samplers: [(&str, Box<dyn ControlPointSampler<f64>>); 3] = [
-        ("equal", Box::new(EquallySpaced::new())),
+        ("equal", Box::new(EquallySpaced)),
         ("random", Box::new(Random::new(1))),
         ("adaptive", Box::new(CurvatureAdaptive::new(2.0).unwrap())),
     ];
@@ -346,8 +346,8 @@ fn integrate_as<T: Scalar>(criterion: &mut Criterion, scalar: &str, rows: usize,
         .throughput(Throughput::Elements((rows * columns) as u64))
         .sample_size(10);
     let methods: [(&str, Box<dyn SlopeIntegrator<T>>, f64); 3] = [
-        ("cosine-poisson", Box::new(CosinePoisson::new()), 1e-3),
-        ("frankot-chellappa", Box::new(FrankotChellappa::new()), 0.2),
+        ("cosine-poisson", Box::new(CosinePoisson), 1e-3),
+        ("frankot-chellappa", Box::new(FrankotChellappa), 0.2),
         ("least-squares", Box::new(MaskedLeastSquares::new()), 1e-3),
     ];
     for (name, method, bound) in methods {

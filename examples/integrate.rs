@@ -103,8 +103,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     };
     let (name, method): (_, Box<dyn SlopeIntegrator<f64>>) =
         match arguments.method.unwrap_or(automatic) {
-            Method::Poisson => ("poisson", Box::new(CosinePoisson::new())),
-            Method::FrankotChellappa => ("frankot-chellappa", Box::new(FrankotChellappa::new())),
+            Method::Poisson => ("poisson", Box::new(CosinePoisson)),
+            Method::FrankotChellappa => ("frankot-chellappa", Box::new(FrankotChellappa)),
             Method::LeastSquares => ("least-squares", Box::new(MaskedLeastSquares::new())),
         };
     let (ms, surface) = solve(method.as_ref(), &p, &q, &domain)?;

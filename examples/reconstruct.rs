@@ -13,8 +13,8 @@ use tactile_imaging::{
     io::{read_grey_image, read_grid, write_grid},
     plot::{HeatMap, Layer, Page, Panel},
     sfs::{
-        Branch, BrooksHorn, Domain, Eikonal, Frame, Lighting, Pentland, Rim, StopReason, Surface,
-        SurfaceReconstruction, TsaiShah, Workspace, render, reprojection,
+        BoundaryCondition, Branch, BrooksHorn, Domain, Eikonal, Frame, Lighting, Pentland,
+        StopReason, Surface, SurfaceReconstruction, TsaiShah, Workspace, render, reprojection,
     },
 };
 
@@ -197,15 +197,19 @@ fn choose(
             let rim = arguments
                 .rim
                 .or((!known && masked).then_some(0.0))
-                .map_or(Rim::Free, Rim::Height);
+                .map_or(BoundaryCondition::Free, BoundaryCondition::Height);
             let branch = match arguments.branch {
                 BranchName::Auto => Branch::Auto,
-                BranchName::Rising => Branch::Rising,
-                BranchName::Falling => Branch::Falling,
+                BranchName::Rising => Branch::Convex,
+                BranchName::Falling => Branch::Concave,
             };
             (
                 "eikonal",
-                Box::new(Eikonal::new(lighting).with_rim(rim)?.with_branch(branch)),
+                Box::new(
+                    Eikonal::new(lighting)
+                        .with_boundary(rim)?
+                        .with_branch(branch),
+                ),
             )
         }
         Method::TsaiShah => ("tsai-shah", Box::new(TsaiShah::new(lighting))),
@@ -214,7 +218,7 @@ fn choose(
             let occluding = masked && lighting.is_frontal();
             (
                 "brooks-horn",
-                Box::new(BrooksHorn::new(lighting).with_occluding_rim(occluding)),
+                Box::new(BrooksHorn::new(lighting).with_occluding_boundary(occluding)),
             )
         }
     })

@@ -3,8 +3,8 @@
 use crate::study::Study;
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    Alignment, BrooksHorn, CosinePoisson, Domain, Eikonal, FrankotChellappa, Lighting,
-    MaskedLeastSquares, Rim, Scalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
+    Alignment, BoundaryCondition, BrooksHorn, CosinePoisson, Domain, Eikonal, FrankotChellappa,
+    Lighting, MaskedLeastSquares, Scalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
     height_error,
 };
 
@@ -34,7 +34,7 @@ pub(crate) fn surfaces(study: &mut Study) {
     study.error_label = "mean error over the height";
     let light = Lighting::frontal();
     let eikonal = Eikonal::new(light)
-        .with_rim(Rim::Height(0.0))
+        .with_boundary(BoundaryCondition::Height(0.0))
         .expect("valid");
     let n = 96;
     surface(study, "eikonal", "default", true, n, &eikonal);
@@ -126,22 +126,15 @@ pub(crate) fn slopes(study: &mut Study) {
     study.error_label = "mean error over the height";
     for n in study.choose(vec![64, 128], vec![64, 128, 256, 512]) {
         let size = format!("{n} × {n}");
-        integral::<f64>(
-            study,
-            "cosine Poisson",
-            &size,
-            true,
-            n,
-            &CosinePoisson::new(),
-        );
-        integral::<f32>(study, "cosine, f32", &size, false, n, &CosinePoisson::new());
+        integral::<f64>(study, "cosine Poisson", &size, true, n, &CosinePoisson);
+        integral::<f32>(study, "cosine, f32", &size, false, n, &CosinePoisson);
         integral::<f64>(
             study,
             "Frankot–Chellappa",
             &size,
             false,
             n,
-            &FrankotChellappa::new(),
+            &FrankotChellappa,
         );
         for tolerance in [1e-2, 1e-4, 1e-8] {
             let method = MaskedLeastSquares::new()

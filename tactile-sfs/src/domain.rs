@@ -34,7 +34,7 @@ impl<'a, T: Scalar> Domain<'a, T> {
     /// The whole image, pixels of the given width and height, nothing known.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless both sizes are positive and finite.
+    /// [`SfsError::NotPositive`] unless both sizes are positive and finite.
     pub fn new(pixel_size_m: [T; 2]) -> Result<Self, SfsError> {
         let domain = Self {
             mask: None,
@@ -71,7 +71,7 @@ impl<'a, T: Scalar> Domain<'a, T> {
     /// let mut known = Array2::from_elem((4, 5), f64::NAN);
     /// known[[0, 0]] = 10.0;
     /// let domain = Domain::pixels().with_known_heights(known.view());
-    /// let z = CosinePoisson::new().integrate(p.view(), q.view(), &domain)?.heights;
+    /// let z = CosinePoisson.integrate(p.view(), q.view(), &domain)?.heights;
     /// assert!((z[[0, 0]] - 10.0).abs() < 1e-12 && (z[[3, 4]] - 12.0).abs() < 1e-12);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
@@ -145,13 +145,14 @@ pub(crate) fn same_shape(
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::BoundingBox;
+/// use tactile_sfs::{BoundingBox, CosinePoisson, Domain, SlopeIntegrator};
 /// let mut mask = Array2::from_elem((48, 64), false);
 /// (mask[[10, 20]], mask[[14, 22]]) = (true, true);
-/// let area = BoundingBox::of(mask.view()).ok_or("no pixel")?;
-/// assert_eq!(area, BoundingBox { top: 10, left: 20, rows: 5, columns: 3 });
-/// assert_eq!(area.area(), 15);
-/// # Ok::<(), &str>(())
+/// let slopes = Array2::<f64>::zeros((48, 64));
+/// let domain = Domain::pixels().with_mask(mask.view());
+/// let surface = CosinePoisson.integrate(slopes.view(), slopes.view(), &domain)?;
+/// assert_eq!(surface.bounding_box, BoundingBox { top: 10, left: 20, rows: 5, columns: 3 });
+/// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct BoundingBox {
@@ -167,7 +168,7 @@ pub struct BoundingBox {
 
 impl BoundingBox {
     /// The box of the true pixels, `None` if there are none.
-    pub fn of(mask: ArrayView2<'_, bool>) -> Option<Self> {
+    pub(crate) fn of(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let (mut top, mut bottom, mut left, mut right) = (usize::MAX, 0, usize::MAX, 0);
         for (row, line) in mask.outer_iter().enumerate() {
             let Some((first, last)) = ends(line) else {
@@ -187,7 +188,7 @@ impl BoundingBox {
     }
 
     /// Number of pixels.
-    pub fn area(&self) -> usize {
+    pub(crate) fn area(&self) -> usize {
         self.rows * self.columns
     }
 

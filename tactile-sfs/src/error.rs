@@ -1,14 +1,14 @@
-//! Everything that can be refused, with what was expected and what was found.
+//! Errors, each with what was expected and what was found.
 
 use thiserror::Error;
 
-/// Which input an error speaks of.
+/// The input that an error is about.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{CosinePoisson, Domain, Input, SfsError, SlopeIntegrator};
 /// let (p, q) = (Array2::<f64>::zeros((4, 5)), Array2::zeros((5, 4)));
-/// let error = CosinePoisson::new().integrate(p.view(), q.view(), &Domain::pixels()).unwrap_err();
+/// let error = CosinePoisson.integrate(p.view(), q.view(), &Domain::pixels()).unwrap_err();
 /// assert_eq!(error, SfsError::ShapeMismatch { input: Input::SlopeY, expected: [4, 5], found: [5, 4] });
 /// assert_eq!(Input::SlopeY.to_string(), "slopes along y");
 /// ```
@@ -82,15 +82,45 @@ pub enum SfsError {
         /// Rows and columns found.
         found: [usize; 2],
     },
-    /// An option is NaN, infinite or out of its range.
-    #[error("{option} is {found}, which is not {expected}")]
-    InvalidOption {
+    /// An option that must be positive is zero, negative, NaN or infinite.
+    #[error("{option} is {found}, which is not a positive finite number")]
+    NotPositive {
         /// Name of the option.
         option: &'static str,
-        /// The range the option must lie in.
-        expected: &'static str,
         /// The value found.
         found: f64,
+    },
+    /// An option that must be at least zero is negative, NaN or infinite.
+    #[error("{option} is {found}, which is not a finite number of at least zero")]
+    Negative {
+        /// Name of the option.
+        option: &'static str,
+        /// The value found.
+        found: f64,
+    },
+    /// An option is NaN or infinite.
+    #[error("{option} is {found}, which is not finite")]
+    NotFinite {
+        /// Name of the option.
+        option: &'static str,
+        /// The value found.
+        found: f64,
+    },
+    /// A quantile is NaN or outside (0, 1].
+    #[error("the quantile is {found}, which is not in (0, 1]")]
+    Quantile {
+        /// The value found.
+        found: f64,
+    },
+    /// The contact of a calibration press is as large as the ball, or its radius is not finite.
+    #[error(
+        "the contact radius is {found_m} m, which is not below the ball's radius of {ball_radius_m} m"
+    )]
+    ContactBeyondBall {
+        /// Radius of the contact in metres.
+        found_m: f64,
+        /// Radius of the ball in metres.
+        ball_radius_m: f64,
     },
     /// The light comes from behind the surface or grazes it (z ≤ 0): no shading carries shape then.
     #[error(
@@ -113,7 +143,7 @@ pub enum SfsError {
         method: &'static str,
     },
     /// The eikonal equation needs at least one height to start from.
-    #[error("no height is known: give known heights or a rim height")]
+    #[error("no height is known: give known heights or a height at the boundary")]
     NoKnownHeight,
     /// A slope is NaN or infinite where the integrator cannot skip it.
     #[error(
@@ -158,34 +188,28 @@ pub enum SfsError {
 }
 
 /// `Ok` if `value` is finite and positive.
-pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), SfsError> {
-    in_range(option, "a positive finite number", value, value > 0.0)
+pub(crate) fn positive(option: &'static str, found: f64) -> Result<(), SfsError> {
+    if found > 0.0 && found.is_finite() {
+        Ok(())
+    } else {
+        Err(SfsError::NotPositive { option, found })
+    }
 }
 
 /// `Ok` if `value` is finite and not negative.
-pub(crate) fn non_negative(option: &'static str, value: f64) -> Result<(), SfsError> {
-    in_range(
-        option,
-        "a finite number of at least zero",
-        value,
-        value >= 0.0,
-    )
-}
-
-/// `Ok` if `value` is finite and `inside` holds.
-pub(crate) fn in_range(
-    option: &'static str,
-    expected: &'static str,
-    value: f64,
-    inside: bool,
-) -> Result<(), SfsError> {
-    if inside && value.is_finite() {
+pub(crate) fn non_negative(option: &'static str, found: f64) -> Result<(), SfsError> {
+    if found >= 0.0 && found.is_finite() {
         Ok(())
     } else {
-        Err(SfsError::InvalidOption {
-            option,
-            expected,
-            found: value,
-        })
+        Err(SfsError::Negative { option, found })
+    }
+}
+
+/// `Ok` if `value` is finite.
+pub(crate) fn finite(option: &'static str, found: f64) -> Result<(), SfsError> {
+    if found.is_finite() {
+        Ok(())
+    } else {
+        Err(SfsError::NotFinite { option, found })
     }
 }

@@ -1,4 +1,4 @@
-//! Estimates of light and albedo from the image itself: asked for by name, never applied unasked.
+//! Estimates of light and albedo from the image itself; no method applies them by itself.
 
 use crate::{Domain, Frame, Lighting, Scalar, SfsError};
 
@@ -88,7 +88,7 @@ impl Statistics {
                 .then(|| frame.at(row, column).as_f64())
                 .filter(|value| value.is_finite())
         };
-        let [hx, hy] = domain.pixel_size_m.map(Scalar::as_f64);
+        let [hx, hy] = domain.pixel_size_m.map(T::as_f64);
         let mut sums = Self {
             count: 0,
             mean: 0.0,
@@ -137,7 +137,7 @@ fn enough(available: usize) -> Result<(), SfsError> {
 }
 
 /// Estimates the intensity at normal incidence: the given quantile of the intensities above the ambient, which is
-/// right if some part of the surface faces the light. 0.995 leaves out stray bright pixels.
+/// right if some part of the surface faces the light. 0.995 leaves out single bright pixels.
 ///
 /// In the unit of the image; O(pixels of the mask's box).
 ///
@@ -151,7 +151,7 @@ fn enough(available: usize) -> Result<(), SfsError> {
 /// ```
 ///
 /// # Errors
-/// Those of a wrong domain; [`SfsError::InvalidOption`] for a quantile outside (0, 1];
+/// Those of a wrong domain; [`SfsError::Quantile`] for a quantile outside (0, 1];
 /// [`SfsError::TooFewPixels`] below 16 finite pixels.
 pub fn estimate_normal_intensity<T: Scalar>(
     frame: Frame<'_, T>,
@@ -159,12 +159,9 @@ pub fn estimate_normal_intensity<T: Scalar>(
     ambient: T,
     quantile: f64,
 ) -> Result<T, SfsError> {
-    crate::error::in_range(
-        "quantile",
-        "in (0, 1]",
-        quantile,
-        quantile > 0.0 && quantile <= 1.0,
-    )?;
+    if !(quantile > 0.0 && quantile <= 1.0) {
+        return Err(SfsError::Quantile { found: quantile });
+    }
     let (rows, columns) = frame.dim();
     let area = domain.validate(rows, columns)?;
     let value = |(row, column)| (frame.at(row, column) - ambient).as_f64();

@@ -42,11 +42,10 @@ pub use frame::Frame;
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
 pub use quality::{
-    Alignment, ErrorSummary, HeightError, Reprojection, SlopeError, height_error, render,
-    reprojection, slope_error, slopes,
+    Alignment, ErrorSummary, HeightError, Reprojection, height_error, render, reprojection, slopes,
 };
 pub use reconstruct::{
-    BallCalibration, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Rim, Signal,
+    BallCalibration, BoundaryCondition, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Signal,
     SurfaceReconstruction, TsaiShah,
 };
 pub use sample::{ControlPointSampler, CurvatureAdaptive, EquallySpaced, Random};

@@ -1,4 +1,4 @@
-//! Light, albedo and ambient: what stands between slopes and grey levels.
+//! Light, albedo and ambient: the model from slopes to grey levels.
 
 use crate::error::{non_negative, positive};
 use crate::{Scalar, SfsError};
@@ -32,9 +32,9 @@ impl<T: Scalar> Lighting<T> {
     /// Light from `direction` (any length), albedo 1, ambient 0 and intensity 1 at normal incidence.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] for a direction that is zero or not finite, [`SfsError::LightFromBelow`] for z ≤ 0.
+    /// [`SfsError::NotPositive`] for a direction that is zero or not finite, [`SfsError::LightFromBelow`] for z ≤ 0.
     pub fn new(direction: [T; 3]) -> Result<Self, SfsError> {
-        let [x, y, z] = direction.map(Scalar::as_f64);
+        let [x, y, z] = direction.map(T::as_f64);
         let length = (x * x + y * y + z * z).sqrt();
         positive("length of the light direction", length)?;
         if z <= 0.0 {
@@ -61,7 +61,7 @@ impl<T: Scalar> Lighting<T> {
     /// The share of light the surface reflects, in the unit the caller likes: only albedo · I₀ matters.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_albedo(self, albedo: T) -> Result<Self, SfsError> {
         positive("albedo", albedo.as_f64())?;
         Ok(Self { albedo, ..self })
@@ -70,7 +70,7 @@ impl<T: Scalar> Lighting<T> {
     /// The intensity that every pixel has without the light.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite and not negative.
+    /// [`SfsError::Negative`] unless finite and not negative.
     pub fn with_ambient(self, ambient: T) -> Result<Self, SfsError> {
         non_negative("ambient", ambient.as_f64())?;
         Ok(Self { ambient, ..self })
@@ -79,7 +79,7 @@ impl<T: Scalar> Lighting<T> {
     /// I₀, what a white surface facing the light adds to the ambient: 255 for a full-range 8-bit frame.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_normal_intensity(self, normal_intensity: T) -> Result<Self, SfsError> {
         positive("intensity at normal incidence", normal_intensity.as_f64())?;
         Ok(Self {
@@ -98,16 +98,6 @@ impl<T: Scalar> Lighting<T> {
         self.albedo
     }
 
-    /// Ambient intensity.
-    pub fn ambient(&self) -> T {
-        self.ambient
-    }
-
-    /// Intensity a white surface facing the light adds to the ambient.
-    pub fn normal_intensity(&self) -> T {
-        self.normal_intensity
-    }
-
     /// Whether the light comes exactly from the viewer.
     pub fn is_frontal(&self) -> bool {
         self.direction[0] == T::zero() && self.direction[1] == T::zero()
@@ -119,7 +109,6 @@ impl<T: Scalar> Lighting<T> {
     /// use tactile_sfs::Lighting;
     /// let light = Lighting::new([0.0, 0.0, 5.0])?.with_normal_intensity(255.0)?.with_albedo(0.8)?.with_ambient(10.0)?;
     /// assert_eq!((light.direction(), light.is_frontal()), ([0.0, 0.0, 1.0], true));
-    /// assert_eq!((light.normal_intensity(), light.albedo(), light.ambient()), (255.0, 0.8, 10.0));
     /// let grey = light.shade(1.0, 0.0); // 45° from the light: 10 + 204/√2
     /// assert!((light.reflectance(grey) - 0.5_f64.sqrt()).abs() < 1e-12);
     /// # Ok::<(), tactile_sfs::SfsError>(())

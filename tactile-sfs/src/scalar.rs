@@ -38,6 +38,7 @@ scalar!(f32);
 scalar!(f64);
 
 pub(crate) mod sealed {
+    use num_traits::{Float, FromPrimitive};
     use rustfft::num_complex::Complex;
 
     /// A complex Fourier transform of one length, whatever the library behind it.
@@ -48,7 +49,20 @@ pub(crate) mod sealed {
         fn scratch_len(&self) -> usize;
     }
 
-    pub trait Sealed: Sized {
+    pub trait Sealed: Float + FromPrimitive {
+        /// `value` rounded to this type.
+        #[inline]
+        fn of(value: f64) -> Self {
+            // From f64 every float type can be made, by rounding.
+            Self::from_f64(value).unwrap_or_else(Self::nan)
+        }
+
+        /// This value as `f64`.
+        #[inline]
+        fn as_f64(self) -> f64 {
+            self.to_f64().unwrap_or(f64::NAN)
+        }
+
         fn plan_fft(length: usize, inverse: bool) -> Box<dyn LineFft<Self>>;
     }
 }
@@ -60,8 +74,8 @@ pub(crate) mod sealed {
 /// ```
 /// use tactile_sfs::Scalar;
 /// /// Metres of a height in pixels, in whatever precision it comes.
-/// fn metres<T: Scalar>(height_px: T, pixel_size_m: f64) -> f64 {
-///     (height_px * T::of(pixel_size_m)).as_f64()
+/// fn metres<T: Scalar>(height_px: T, pixel_size_m: T) -> T {
+///     height_px * pixel_size_m
 /// }
 /// assert_eq!(metres(4.0_f64, 0.5e-4), 2e-4);
 /// assert!((metres(4.0_f32, 0.5e-4) - 2e-4).abs() < 1e-10);
@@ -79,16 +93,4 @@ pub trait Scalar:
     + 'static
     + sealed::Sealed
 {
-    /// `value` rounded to this type.
-    #[inline]
-    fn of(value: f64) -> Self {
-        // From f64 every float type can be made, by rounding.
-        Self::from_f64(value).unwrap_or_else(Self::nan)
-    }
-
-    /// This value as `f64`.
-    #[inline]
-    fn as_f64(self) -> f64 {
-        self.to_f64().unwrap_or(f64::NAN)
-    }
 }

@@ -1,4 +1,4 @@
-//! What a reconstruction returns: heights, which of them to trust, and how they were found.
+//! The result of a reconstruction: heights, flags and a report.
 
 use core::ops::{BitOr, BitOrAssign};
 
@@ -31,7 +31,7 @@ pub enum StopReason {
     Direct,
     /// The change or the residual fell below the tolerance.
     Converged,
-    /// The limit of iterations came first; the residual tells how far it got.
+    /// The limit of iterations came first; the residual says how far it got.
     IterationLimit,
     /// Further iterations no longer improved the residual.
     Stagnated,
@@ -167,9 +167,9 @@ pub struct Report<T> {
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::zeros((2, 4)));
 /// let (mut workspace, mut surface) = (Workspace::new(), Surface::<f64>::new()); // used again for every frame
 /// let domain = Domain::pixels().with_mask(mask.view());
-/// CosinePoisson::new().integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
+/// CosinePoisson.integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
 /// assert!(surface.heights[[0, 3]].is_nan() && surface.filled(0.0)[[0, 3]] == 0.0);
-/// assert_eq!((surface.report.solved, surface.bounding_box.area()), (6, 6));
+/// assert_eq!((surface.report.solved, surface.bounding_box.columns), (6, 3));
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]

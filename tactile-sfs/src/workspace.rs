@@ -81,28 +81,7 @@ impl<T: Scalar> Workspace<T> {
         self.callback = Some(Box::new(callback));
     }
 
-    /// Removes the callback.
-    ///
-    /// ```
-    /// use core::ops::ControlFlow;
-    /// use ndarray::Array2;
-    /// use tactile_sfs::{BrooksHorn, Domain, Frame, Lighting, StopReason, Surface, SurfaceReconstruction, Workspace};
-    /// let image = Array2::from_shape_fn((16, 16), |(r, c)| 0.9 + 0.1 * ((r * c) as f64).cos());
-    /// let (method, mut surface) = (BrooksHorn::new(Lighting::frontal()), Surface::new());
-    /// let (mut workspace, frame) = (Workspace::new(), Frame::Real(image.view()));
-    /// workspace.on_progress(|_| ControlFlow::Break(()));
-    /// method.reconstruct_with(&mut workspace, frame, &Domain::pixels(), &mut surface)?;
-    /// assert_eq!(surface.report.stop, StopReason::Cancelled);
-    /// workspace.clear_progress();
-    /// method.reconstruct_with(&mut workspace, frame, &Domain::pixels(), &mut surface)?;
-    /// assert_ne!(surface.report.stop, StopReason::Cancelled);
-    /// # Ok::<(), tactile_sfs::SfsError>(())
-    /// ```
-    pub fn clear_progress(&mut self) {
-        self.callback = None;
-    }
-
-    /// Tells the callback; `Some(Cancelled)` if it wants to stop.
+    /// Calls the callback; `Some(Cancelled)` if it asks to stop.
     pub(crate) fn report(
         &mut self,
         iterations: usize,

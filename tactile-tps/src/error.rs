@@ -1,8 +1,8 @@
-//! What can be wrong with the input, each case with the numbers that say where.
+//! Errors, each with the numbers that say where.
 
 use thiserror::Error;
 
-/// The argument an error speaks of.
+/// The argument that an error is about.
 ///
 /// ```
 /// # use nalgebra::Point2;
@@ -14,15 +14,15 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Input {
-    /// The source points, where the spline is pinned.
+    /// The source points, the spline's centres.
     Sources,
-    /// The target points, the values taken there.
+    /// The target points, the values at the centres.
     Targets,
     /// The weights, one a point.
     Weights,
     /// The places a spline is evaluated at.
     Queries,
-    /// The caller's memory that takes the results.
+    /// The slice for the results.
     Output,
 }
 
@@ -68,7 +68,7 @@ pub enum TpsError {
     /// A coordinate is NaN or infinite.
     #[error("{input}: number {index} (from zero) is not finite")]
     NotFinite {
-        /// The argument with the bad number.
+        /// The argument that holds it.
         input: Input,
         /// Its position, counted from zero.
         index: usize,
@@ -99,11 +99,11 @@ pub enum TpsError {
         /// What was given.
         value: f64,
     },
-    /// The caller's watch stopped the fit before there was a spline.
+    /// The caller's callback stopped the fit before there was a spline.
     #[error("stopped by the caller")]
     Stopped,
-    /// The iterative solver keeps no factor to ask.
-    #[error("the iterative solver keeps no factor: ask for the direct one")]
+    /// Influences need a factor, and the iterative solver has none.
+    #[error("the iterative solver has no factor: use the direct one")]
     NoFactor,
     /// Two source points coincide, their targets differ, and no smoothing was asked for.
     #[error(

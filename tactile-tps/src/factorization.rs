@@ -7,10 +7,10 @@ use nalgebra::Point;
 
 use crate::{
     FitOptions, Kernel, Progress, R2LogR, Scalar, Smoothing, TpsError,
+    centres::Centres,
+    equations::Buffers,
     iterative::Iterative,
     options::validate_weight_count,
-    refine::Buffers,
-    sites::Sites,
     system::{Setting, System},
 };
 
@@ -31,13 +31,13 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
     pub(crate) kernel: K,
-    pub(crate) sites: Sites<D>,
+    pub(crate) centres: Centres<D>,
     pub(crate) system: System<D>,
-    /// The same with its spectrum, once a λ needs it.
+    /// The same with its spectrum, computed when a λ first needs it.
     pub(crate) spectral: OnceLock<System<D>>,
     pub(crate) weights: Option<Vec<T>>,
-    /// Weight of every site, empty if all are one.
-    pub(crate) site_weights: Vec<f64>,
+    /// Weight of every centre, empty if all weights are one.
+    pub(crate) centre_weights: Vec<f64>,
     pub(crate) smoothing: Smoothing<T>,
     rank_tolerance: f64,
     /// The preconditioner, if the solver iterates; the system is then without a factor.
@@ -46,7 +46,7 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
     pub(crate) tolerance: f64,
 }
 
-/// Memory that refits use again and again.
+/// Buffers that refits reuse.
 ///
 /// ```
 /// # use nalgebra::Point2;
@@ -56,7 +56,7 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
 /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
 /// let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(R2LogR));
 /// for step in 1..=3 {
-///     // From the second round on no memory is asked for.
+///     // No allocation from the second round on.
 ///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
 ///     factorization.fit_with(&mut workspace, &targets, &mut spline)?;
 ///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
@@ -69,7 +69,7 @@ pub struct Workspace<const D: usize> {
     pub(crate) buffers: Buffers,
     pub(crate) system: System<D>,
     pub(crate) iterative: Iterative<D>,
-    pub(crate) site_weights: Vec<f64>,
+    pub(crate) centre_weights: Vec<f64>,
 }
 
 impl<const D: usize> Workspace<D> {
@@ -97,7 +97,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::new(NegR))?;
-    /// assert_eq!(factorization.len(), 5);
+    /// assert!(factorization.fit(&sources)?.report().points == 5);
     /// let five_weights = FitOptions::new(NegR).with_weights(vec![1.0; 5])?;
     /// let error = Factorization::new(&sources[..4], &five_weights).unwrap_err();
     /// assert_eq!(error, TpsError::Length { input: Input::Weights, expected: 4, found: 5 });
@@ -111,7 +111,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Self::new_watched(sources, options, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`new`](Self::new), telling `watch` how the preparation for an iteration gets on. A direct solver runs without.
+    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation to `watch`, which may stop it. A
+    /// direct solver does not report.
     ///
     /// ```
     /// # use core::ops::ControlFlow;
@@ -127,7 +128,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// Those of [`new`](Self::new), and [`TpsError::Stopped`] if `watch` breaks off.
+    /// Those of [`new`](Self::new), and [`TpsError::Stopped`] if `watch` returns `Break`.
     pub fn new_watched(
         sources: &[Point<T, D>],
         options: &FitOptions<T, K>,
@@ -141,11 +142,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let mut system = System::default();
         if this.smoothing == Smoothing::Gcv {
             this.decompose();
-        } else if options.iterates(this.sites.len()) {
+        } else if options.iterates(this.centres.len()) {
             let mut iterative = Iterative::default();
             let built = iterative.build(
                 &this.setting(),
-                &this.site_weights,
+                &this.centre_weights,
                 lambda,
                 &mut system,
                 &mut watch,
@@ -155,25 +156,25 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             }
             this.iterative = Some(iterative);
         } else {
-            system.factor(&this.setting(), &this.site_weights, lambda)?;
+            system.factor(&this.setting(), &this.centre_weights, lambda)?;
         }
         this.system = system;
         Ok(this)
     }
 
-    /// The sites and what is asked for, without a factor.
+    /// The distinct centres and the options, without a factor.
     fn unfactored(sources: &[Point<T, D>], options: &FitOptions<T, K>) -> Result<Self, TpsError> {
         let kernel = options.kernel.clone();
-        let sites = Sites::new(sources, kernel.degree().is_some())?;
-        let mut site_weights = Vec::new();
-        sites.weigh(options.weights.as_deref(), &mut site_weights);
+        let centres = Centres::new(sources, kernel.degree().is_some())?;
+        let mut centre_weights = Vec::new();
+        centres.weigh(options.weights.as_deref(), &mut centre_weights);
         Ok(Self {
             kernel,
-            sites,
+            centres,
             system: System::default(),
             spectral: OnceLock::new(),
             weights: options.weights.clone(),
-            site_weights,
+            centre_weights,
             smoothing: options.smoothing,
             rank_tolerance: options.rank_tolerance.widen(),
             iterative: None,
@@ -182,52 +183,16 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// Number of source points.
-    ///
-    /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
-    /// assert_eq!((factorization.len(), factorization.is_empty()), (5, false));
-    /// # Ok(())
-    /// # }
-    /// ```
-    pub fn len(&self) -> usize {
-        self.sites.inputs()
-    }
-
-    /// Whether there are no source points; there always are.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    pub(crate) fn len(&self) -> usize {
+        self.centres.inputs()
     }
 
     /// Decomposes the matrix into eigenvalues and -vectors, so that a refit with any λ costs no more than one with new
     /// targets; some 10 n³ operations, once.
-    ///
-    /// Up to 256 points, and for cross-validation, the first refit that can use it does this unasked.
-    ///
-    /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, R2LogR, Smoothing, Spline, Workspace};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
-    /// factorization.decompose();
-    /// let (mut workspace, mut spline, mut energy) = (Workspace::new(), Spline::empty(R2LogR), f64::INFINITY);
-    /// for lambda in [1e-4, 1e-3, 1e-2] {
-    ///     factorization.refit_with(&mut workspace, &targets, None, Smoothing::Lambda(lambda), &mut spline)?;
-    ///     assert!(spline.bending_energy() < energy);
-    ///     energy = spline.bending_energy();
-    /// }
-    /// # Ok(())
-    /// # }
-    /// ```
-    pub fn decompose(&self) {
+    pub(crate) fn decompose(&self) {
         self.spectral.get_or_init(|| {
             let mut system = System::default();
-            system.decompose(&self.setting(), &self.site_weights);
+            system.decompose(&self.setting(), &self.centre_weights);
             system
         });
     }
@@ -235,7 +200,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     pub(crate) fn setting(&self) -> Setting<'_, K, D> {
         Setting {
             kernel: &self.kernel,
-            sites: &self.sites,
+            centres: &self.centres,
             rank_tolerance: self.rank_tolerance,
         }
     }
@@ -250,7 +215,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
 
     /// How much larger the kernel is outside than in the frame.
     pub(crate) fn unit(&self) -> f64 {
-        self.sites
+        self.centres
             .frame
             .scale
             .powi(self.kernel.degree().unwrap_or(0))

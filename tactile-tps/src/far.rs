@@ -1,4 +1,4 @@
-//! Where a plain sum loses its digits: how many are left, and the sum in twice the working precision.
+//! Cancellation far from the centres: how many digits a plain sum keeps, and the sum in double-double arithmetic.
 //!
 //! Far from the centres the terms wᵢ U grow like the distance's square while their sum grows like the distance: the side
 //! conditions cancel the rest. In plain arithmetic the digits cancel with it, twice: in the sum, and in the weights,
@@ -9,21 +9,21 @@ use nalgebra::Point;
 
 use crate::{
     Kernel, Scalar,
+    centres::Frame,
+    double_double::{DoubleDouble, two_sum},
     null_space::MAX,
     real::Real,
     sample::{Linear, Sample},
-    sites::Frame,
-    twofold::{Twofold, two_sum},
 };
 
-/// How large the terms of a spline's sum are, against what it is to give.
+/// Size of the terms of a spline's sum relative to its values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Terms {
     /// Largest Σ |wᵢ| of an output.
     pub(crate) weight: f64,
     /// Largest target.
     pub(crate) level: f64,
-    /// Squared distance from the frame's centre from which on the sum deserves a second look.
+    /// Squared distance from the frame's centre beyond which a sum is checked for lost digits.
     pub(crate) reach: f64,
 }
 
@@ -118,11 +118,11 @@ impl<R: Real, const D: usize> Jets<R, D> {
 /// The sums over the centres, and what it takes to rid them of the moments that rounding left in the weights.
 struct Sums<const D: usize, const M: usize> {
     /// Σ wU of each output.
-    jets: [Jets<Twofold, D>; M],
+    jets: [Jets<DoubleDouble, D>; M],
     /// Σ pU of each affine function p, to be subtracted.
     shadows: [Jets<f64, D>; MAX],
     /// Pᵀw of each output.
-    moments: [[Twofold; MAX]; M],
+    moments: [[DoubleDouble; MAX]; M],
     /// PᵀP.
     gram: [[f64; MAX]; MAX],
 }
@@ -132,17 +132,23 @@ impl<const D: usize, const M: usize> Sums<D, M> {
         Self {
             jets: [Jets::zero(); M],
             shadows: [Jets::zero(); MAX],
-            moments: [[Twofold::ZERO; MAX]; M],
+            moments: [[DoubleDouble::ZERO; MAX]; M],
             gram: [[0.0; MAX]; MAX],
         }
     }
 
-    fn add(&mut self, weights: &[Twofold; M], centre: &[f64; D], term: &Jets<Twofold, D>) {
+    fn add(
+        &mut self,
+        weights: &[DoubleDouble; M],
+        centre: &[f64; D],
+        term: &Jets<DoubleDouble, D>,
+    ) {
         let affine = |c: usize| if c == 0 { 1.0 } else { centre[c - 1] };
         for m in 0..M {
             self.jets[m].add(weights[m], term);
             for c in 0..=D {
-                self.moments[m][c] = self.moments[m][c] + weights[m] * Twofold::from_f64(affine(c));
+                self.moments[m][c] =
+                    self.moments[m][c] + weights[m] * DoubleDouble::from_f64(affine(c));
             }
         }
         let plain = term.map(|x| x.high);
@@ -153,13 +159,13 @@ impl<const D: usize, const M: usize> Sums<D, M> {
     }
 
     /// Σ wU with the moments taken out of w.
-    fn corrected(mut self) -> [Jets<Twofold, D>; M] {
+    fn corrected(mut self) -> [Jets<DoubleDouble, D>; M] {
         for (jets, moments) in self.jets.iter_mut().zip(&self.moments) {
             let correction = solve_gram(self.gram, moments.map(|x| x.high), D + 1);
             for c in 0..=D {
                 jets.add(
-                    Twofold::from_f64(-correction[c]),
-                    &self.shadows[c].map(Twofold::from_f64),
+                    DoubleDouble::from_f64(-correction[c]),
+                    &self.shadows[c].map(DoubleDouble::from_f64),
                 );
             }
         }
@@ -172,9 +178,9 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M>
     #[cold]
     #[inline(never)]
     pub(crate) fn sample(&self, point: &Point<T, D>) -> Sample<T, D, M> {
-        let x: [Twofold; D] = core::array::from_fn(|k| {
+        let x: [DoubleDouble; D] = core::array::from_fn(|k| {
             let shifted = two_sum(point[k].widen(), -self.frame.centre[k]);
-            Twofold {
+            DoubleDouble {
                 high: shifted.high / self.frame.scale,
                 low: shifted.low / self.frame.scale,
             }
@@ -182,34 +188,36 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Parts<'_, T, K, D, M>
         let mut sums = Sums::<D, M>::zero();
         for j in 0..self.centres[0].len() {
             let centre = core::array::from_fn(|k| self.centres[k][j].widen());
-            let weights = core::array::from_fn(|m| Twofold::from_f64(self.weights[m][j].widen()));
+            let weights =
+                core::array::from_fn(|m| DoubleDouble::from_f64(self.weights[m][j].widen()));
             sums.add(&weights, &centre, &self.term(&x, &centre));
         }
         self.finish(&x, &sums.corrected())
     }
 
     /// U and its derivatives about one centre.
-    fn term(&self, x: &[Twofold; D], centre: &[f64; D]) -> Jets<Twofold, D> {
-        let d: [Twofold; D] = core::array::from_fn(|k| x[k] - Twofold::from_f64(centre[k]));
-        let s = d.iter().fold(Twofold::ZERO, |s, &d| s + d * d);
+    fn term(&self, x: &[DoubleDouble; D], centre: &[f64; D]) -> Jets<DoubleDouble, D> {
+        let d: [DoubleDouble; D] =
+            core::array::from_fn(|k| x[k] - DoubleDouble::from_f64(centre[k]));
+        let s = d.iter().fold(DoubleDouble::ZERO, |s, &d| s + d * d);
         let jet = self.kernel.jet(s);
         let (slope, bend) = (
-            jet.first * Twofold::from_f64(2.0),
-            jet.second * Twofold::from_f64(4.0),
+            jet.first * DoubleDouble::from_f64(2.0),
+            jet.second * DoubleDouble::from_f64(4.0),
         );
         Jets {
             value: jet.value,
             gradient: d.map(|d| slope * d),
             hessian: core::array::from_fn(|k| {
                 core::array::from_fn(|i| {
-                    bend * d[k] * d[i] + if i == k { slope } else { Twofold::ZERO }
+                    bend * d[k] * d[i] + if i == k { slope } else { DoubleDouble::ZERO }
                 })
             }),
         }
     }
 
-    fn finish(&self, x: &[Twofold; D], sums: &[Jets<Twofold, D>; M]) -> Sample<T, D, M> {
-        let wide = |x: T| Twofold::from_f64(x.widen());
+    fn finish(&self, x: &[DoubleDouble; D], sums: &[Jets<DoubleDouble, D>; M]) -> Sample<T, D, M> {
+        let wide = |x: T| DoubleDouble::from_f64(x.widen());
         let scale = self.frame.scale;
         let value = core::array::from_fn(|m| {
             let constant = wide(self.affine.constant[m]) + sums[m].value;

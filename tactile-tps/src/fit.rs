@@ -1,18 +1,18 @@
-//! Splines to any targets by a factorisation that is there: a new spline, one that tells how it gets on, one refilled in place.
+//! Splines to any targets by an existing factorisation: a new spline, one with progress reports, one refilled in place.
 
 use core::ops::ControlFlow;
 
 use nalgebra::Point;
 
 use crate::{
-    Factorization, Kernel, Progress, Scalar, Spline, TpsError, Workspace, refine::Buffers,
+    Factorization, Kernel, Progress, Scalar, Spline, TpsError, Workspace, equations::Buffers,
     task::Task,
 };
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// The spline to these targets, with the weights and smoothing of the factorisation.
     ///
-    /// Measures the residual, and refines the solution where the condition number asks for it.
+    /// Measures the residual, and refines the solution where the condition number is large.
     ///
     /// ```
     /// # use nalgebra::Point2;
@@ -30,7 +30,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for bad targets.
+    /// [`TpsError`] for invalid targets.
     pub fn fit<const M: usize>(
         &self,
         targets: &[Point<T, M>],
@@ -38,8 +38,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         self.fit_watched(targets, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`fit`](Self::fit), telling `watch` how an iteration gets on. If `watch` breaks off the spline is the best so far,
-    /// and its report says how good it is. A direct solver runs without.
+    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`. If `watch` returns `Break`, the spline
+    /// is the best so far and its report says how good it is. A direct solver does not report.
     ///
     /// ```
     /// use core::ops::ControlFlow;
@@ -60,7 +60,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for bad targets.
+    /// [`TpsError`] for invalid targets.
     pub fn fit_watched<const M: usize>(
         &self,
         targets: &[Point<T, M>],
@@ -81,7 +81,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Ok(spline)
     }
 
-    /// As [`fit`](Self::fit), into a spline that is already there: two triangular solves, and no allocation once
+    /// As [`fit`](Self::fit), into an existing spline: two triangular solves, and no allocation once
     /// workspace and spline have grown. Refines only where the condition number exceeds 10⁸.
     ///
     /// ```
@@ -99,7 +99,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for bad targets; the spline is then left as it was.
+    /// [`TpsError`] for invalid targets; the spline is then left as it was.
     pub fn fit_with<const M: usize>(
         &self,
         workspace: &mut Workspace<D>,

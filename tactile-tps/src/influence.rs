@@ -7,10 +7,9 @@ use nalgebra::{Point, SVector};
 
 use crate::{
     Factorization, Kernel, Scalar, Smoothing, TpsError, Workspace,
-    null_space::MAX,
-    real::Lane,
-    refine::Buffers,
-    simd::{Job, dispatch},
+    column::{Column, Fill},
+    equations::Buffers,
+    simd::dispatch,
     warp::same_length,
 };
 
@@ -178,19 +177,19 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
     }
 
-    /// Hands what each column has of each source point to `sink`.
+    /// Solves for the influence of every source point on each column, and hands each to `sink`.
     fn follow<const R: usize>(
         &self,
         columns: &[Column<D>; R],
         buffers: &mut Buffers,
         mut sink: impl FnMut(usize, usize, T),
     ) {
-        let n = self.sites.len();
+        let n = self.centres.len();
         let Buffers { targets, work, .. } = buffers;
         targets.clear();
         targets.resize(R * n, 0.0);
         for (column, terms) in columns.iter().zip(targets.chunks_exact_mut(n)) {
-            let axes = core::array::from_fn(|k| &self.sites.axes[k][..]);
+            let axes = core::array::from_fn(|k| &self.centres.axes[k][..]);
             dispatch(Fill {
                 kernel: &self.kernel,
                 axes,
@@ -205,98 +204,19 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
                 sink(
                     r,
                     i,
-                    T::narrow(found[self.sites.site(i)] * self.share(i) / columns[r].unit),
+                    T::narrow(found[self.centres.centre(i)] * self.share(i) / columns[r].unit),
                 );
             }
         }
     }
 
-    /// The part of an input point in the target of its site.
+    /// The part of an input point in the target of its centre.
     fn share(&self, i: usize) -> f64 {
-        if self.sites.site_of.is_empty() {
+        if self.centres.centre_of.is_empty() {
             return 1.0;
         }
-        let total = self.site_weights[self.sites.site(i)];
+        let total = self.centre_weights[self.centres.centre(i)];
         let weight = self.weights.as_ref().map_or(1.0, |w| w[i].widen());
         if total > 0.0 { weight / total } else { 0.0 }
-    }
-}
-
-/// One right-hand side: the kernels and affine functions at a point, or their derivative along an axis.
-struct Column<const D: usize> {
-    point: [f64; D],
-    axis: Option<usize>,
-    affine: [f64; MAX],
-    /// Length of the frame's unit for a derivative, else one.
-    unit: f64,
-}
-
-impl<const D: usize> Column<D> {
-    fn value<T: Scalar, K>(factorization: &Factorization<T, D, K>, point: &Point<T, D>) -> Self {
-        let (span, point) = (
-            &factorization.system.span,
-            factorization.sites.frame.inside(point),
-        );
-        let affine = core::array::from_fn(|c| {
-            if c <= span.directions {
-                span.value(c, &point)
-            } else {
-                0.0
-            }
-        });
-        Self {
-            point,
-            axis: None,
-            affine,
-            unit: 1.0,
-        }
-    }
-
-    fn slope<T: Scalar, K>(
-        factorization: &Factorization<T, D, K>,
-        point: &Point<T, D>,
-        axis: usize,
-    ) -> Self {
-        let (span, frame) = (&factorization.system.span, &factorization.sites.frame);
-        let affine = core::array::from_fn(|c| {
-            if c <= span.directions {
-                span.slope(c, axis)
-            } else {
-                0.0
-            }
-        });
-        Self {
-            point: frame.inside(point),
-            axis: Some(axis),
-            affine,
-            unit: frame.scale,
-        }
-    }
-}
-
-/// Writes what a column has of the kernel about every site.
-struct Fill<'a, K, const D: usize> {
-    kernel: &'a K,
-    axes: [&'a [f64]; D],
-    column: &'a Column<D>,
-    terms: &'a mut [f64],
-}
-
-impl<K: Kernel, const D: usize> Job<f64> for Fill<'_, K, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lane<f64>>(self) {
-        let n = self.terms.len();
-        let axes = self.axes.map(|axis| &axis[..n]);
-        let point = self.column.point.map(L::new);
-        for (i, term) in self.terms.iter_mut().enumerate() {
-            let d: [L; D] = core::array::from_fn(|k| point[k] - L::new(axes[k][i]));
-            let s = d.iter().fold(L::zero(), |s, d| d.mul_add(*d, s));
-            *term = match self.column.axis {
-                None => self.kernel.value(s).get(),
-                Some(axis) => (L::from_f64(2.0) * self.kernel.jet(s).first * d[axis]).get(),
-            };
-        }
     }
 }

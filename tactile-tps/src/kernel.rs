@@ -1,4 +1,4 @@
-//! Radial kernels: what a spline is made of.
+//! Radial kernels.
 
 use crate::real::Real;
 
@@ -24,7 +24,7 @@ pub struct Jet<R> {
 /// A radial function U(r) that is conditionally positive definite of order at most two.
 ///
 /// That is: Σᵢⱼ wᵢ wⱼ U(|xᵢ − xⱼ|) > 0 for distinct points and any w ≠ 0 with Σ wᵢ = 0 and Σ wᵢ xᵢ = 0. The three
-/// kernels of the crate are; a kernel of your own needs [`jet`](Self::jet) alone.
+/// kernels of the crate are; an implementor writes [`jet`](Self::jet) alone.
 ///
 /// ```
 /// use tactile_tps::{Jet, Kernel, Real};
@@ -54,7 +54,7 @@ pub trait Kernel: Clone + Send + Sync {
 
     /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0; `None` if there is none.
     ///
-    /// Points are scaled to unit size inside when there is one. A kernel with a length of its own has none.
+    /// Points are scaled to unit size inside when there is one. A kernel with a length scale has none.
     ///
     /// ```
     /// use tactile_tps::{Kernel, NegR, R2LogR};

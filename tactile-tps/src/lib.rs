@@ -5,11 +5,11 @@
 //! | to | use |
 //! |---|---|
 //! | fit once | [`ThinPlateSpline::fit`](Spline::fit), or [`Spline::fit`] for other than D outputs |
-//! | fit again and again | [`Factorization`] with a [`Workspace`] |
+//! | fit repeatedly | [`Factorization`] with a [`Workspace`] |
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
-//! | carry the targets' uncertainty to values and Jacobians | [`Factorization::influence`], [`Factorization::jacobian_influence`] |
-//! | know how it went | [`FitReport`] |
-//! | take any warp | the object-safe trait [`Warp`]: splines, [`Affine`], [`Rigid`] |
+//! | propagate the targets' uncertainty to values and Jacobians | [`Factorization::influence`], [`Factorization::jacobian_influence`] |
+//! | see condition, residual and iterations | [`FitReport`] |
+//! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`], [`Rigid`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`], [`RigidModel`] |
 //!
 //! # Equations
@@ -25,7 +25,11 @@
 #![allow(clippy::needless_range_loop)]
 
 mod affine;
+mod centres;
 mod cholesky;
+mod column;
+mod double_double;
+mod equations;
 mod error;
 mod evaluate;
 mod factorization;
@@ -34,7 +38,9 @@ mod fit;
 mod influence;
 mod iterative;
 mod kernel;
+mod layout;
 mod logarithm;
+mod models;
 mod null_space;
 mod options;
 mod packed;
@@ -48,10 +54,11 @@ mod real;
 mod refine;
 mod refit;
 mod report;
+mod residual;
 mod reweight;
 mod sample;
 mod simd;
-mod sites;
+mod smoothing;
 mod solve;
 mod span;
 mod spectrum;
@@ -62,17 +69,18 @@ mod targets;
 mod task;
 mod tiles;
 mod triangular;
-mod twofold;
 mod values;
 mod warp;
 
-pub use affine::{Affine, AffineModel, Rigid, RigidModel};
+pub use affine::{Affine, Rigid};
 pub use error::{Input, TpsError};
 pub use factorization::{Factorization, Workspace};
 pub use kernel::{Jet, Kernel, NegR, R2LogR, R3};
-pub use options::{FitOptions, Smoothing, Solver};
+pub use models::{AffineModel, RigidModel};
+pub use options::{FitOptions, Solver};
 pub use progress::{Progress, Stage};
 pub use real::{Real, Scalar};
 pub use report::FitReport;
+pub use smoothing::Smoothing;
 pub use spline::{Spline, ThinPlateSpline};
 pub use warp::{Warp, WarpModel};

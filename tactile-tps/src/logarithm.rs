@@ -1,4 +1,4 @@
-//! Natural logarithms without branches or tables, which loops over many arguments turn into vector code.
+//! Natural logarithms without branches or tables, so that loops over them vectorise.
 //!
 //! x = 2ᵏ m with m in [√½, √2), f = m − 1, t = f/(2 + f) and ln m = 2 artanh t = f − f²/2 + t (f²/2 + R(t²)), R a
 //! minimax polynomial (coefficients of fdlibm, Sun Microsystems 1993; its error is below 2⁻⁵⁸, in f32 below 2⁻³⁴).

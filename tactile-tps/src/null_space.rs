@@ -1,4 +1,4 @@
-//! The affine functions at the sites, and the orthogonal complement the kernel is definite on.
+//! The affine functions at the centres, and the orthogonal complement the kernel is definite on.
 //!
 //! P = [1 X] (rows scaled by √weight) is factored P Π = Q [R; 0] by Householder reflectors with column pivoting. With
 //! Q = [Q₁ Q₂] the side condition Pᵀw = 0 reads w = Q₂z, and Q₂ᵀKQ₂ is positive definite. Q is kept in the
@@ -8,7 +8,7 @@
 //! places around the n rows are zero.
 
 use crate::{
-    cholesky::HEAD,
+    layout::HEAD,
     symmetric::{Columns, Reflect, Update},
 };
 
@@ -18,7 +18,7 @@ pub(crate) const MAX: usize = 4;
 /// Householder factorisation of the n × q matrix of affine functions.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NullSpace {
-    /// Number of sites.
+    /// Number of centres.
     pub(crate) n: usize,
     /// Number of affine functions, the rank of [1 X].
     pub(crate) q: usize,

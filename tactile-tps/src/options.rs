@@ -1,35 +1,6 @@
-//! What a fit may be asked for.
+//! Options of a fit: kernel, smoothing, weights, solver.
 
-use crate::{R2LogR, Scalar, TpsError, error::Input};
-
-/// How closely the spline keeps to its targets.
-///
-/// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{FitOptions, Smoothing, ThinPlateSpline};
-/// # fn main() -> Result<(), tactile_tps::TpsError> {
-/// let sources: Vec<Point2<f64>> = (0..25).map(|i| Point2::new(f64::from(i % 5), f64::from(i / 5))).collect();
-/// let noise = |i: usize| 0.01 * ((i * 7919 % 101) as f64 / 50.0 - 1.0);
-/// let targets: Vec<_> = sources.iter().enumerate().map(|(i, p)| Point2::new(p.x + noise(i), p.y)).collect();
-/// let options = FitOptions::default().with_smoothing(Smoothing::Gcv)?;
-/// let smooth = ThinPlateSpline::fit(&sources, &targets, &options)?;
-/// let through = ThinPlateSpline::fit(&sources, &targets, &options.with_smoothing(Smoothing::None)?)?;
-/// assert!(smooth.report().lambda > 0.0 && smooth.bending_energy() < through.bending_energy());
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Smoothing<T> {
-    /// Interpolate: λ = 0.
-    #[default]
-    None,
-    /// Minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw for this λ ≥ 0, in the units of the points and the kernel.
-    Lambda(T),
-    /// The λ of least generalised cross-validation (Craven & Wahba 1979; Golub, Heath & Wahba 1979).
-    Gcv,
-}
+use crate::{R2LogR, Scalar, Smoothing, TpsError, error::Input, smoothing::validate_smoothing};
 
 /// How the equations are solved.
 ///
@@ -192,10 +163,10 @@ impl<T: Scalar, K> FitOptions<T, K> {
         Ok(self)
     }
 
-    /// Directions in which the points extend less than this share of their largest extent are dropped.
+    /// Drops directions in which the points extend less than this fraction of their largest extent.
     ///
-    /// The default 0 drops those that rounding of the coordinates alone could have made. A surface that is nearly
-    /// flat deserves more: across it the spline's gradient is noise over thickness.
+    /// The default 0 drops those that rounding of the coordinates alone could have made. A nearly flat surface needs
+    /// more: across it the spline's gradient is noise divided by thickness.
     ///
     /// ```
     /// # use nalgebra::Point3;
@@ -235,7 +206,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
         self
     }
 
-    /// The residual at which an iterative solver stops: the largest at a point, relative to the largest target.
+    /// Sets the residual at which an iterative solver stops: the largest at a point, relative to the largest target.
     ///
     /// The default is 10⁻¹⁰. The spline's values are off by about as much; its report says how far it came.
     ///
@@ -264,7 +235,7 @@ impl<T: Scalar, K> FitOptions<T, K> {
         Ok(self)
     }
 
-    /// Whether so many points are to be solved for by iteration.
+    /// Whether the iterative solver is used for this many points.
     pub(crate) fn iterates(&self, points: usize) -> bool {
         match self.solver {
             _ if self.smoothing == Smoothing::Gcv => false,
@@ -272,17 +243,6 @@ impl<T: Scalar, K> FitOptions<T, K> {
             Solver::Direct => false,
             Solver::Iterative => true,
         }
-    }
-}
-
-pub(crate) fn validate_smoothing<T: Scalar>(smoothing: &Smoothing<T>) -> Result<(), TpsError> {
-    match smoothing {
-        Smoothing::Lambda(lambda) if !(lambda.widen() >= 0.0 && lambda.widen().is_finite()) => {
-            Err(TpsError::Lambda {
-                value: lambda.widen(),
-            })
-        }
-        _ => Ok(()),
     }
 }
 

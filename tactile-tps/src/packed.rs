@@ -1,4 +1,4 @@
-//! A matrix laid out for products with a few vectors: everything is read once, in order, and summed in registers.
+//! A matrix laid out for products with a few vectors: each entry is read once, in order, and summed in registers.
 
 use pulp::{Arch, Simd, WithSimd};
 

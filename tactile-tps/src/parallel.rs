@@ -1,4 +1,4 @@
-//! Batches of queries spread over threads; every query's sum runs as it does alone, so the bits are the same.
+//! Parallel evaluation of many queries, bit for bit as in serial.
 
 use nalgebra::{Point, SMatrix};
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
-//! What a spline is made of: its centres, their weights, the affine part.
+//! The parts of a spline: its centres, their weights, the affine part.
 
 use nalgebra::{Point, SMatrix, SVector};
 
-use crate::{Kernel, Scalar, Spline, far::Parts, sites::Frame};
+use crate::{Kernel, Scalar, Spline, centres::Frame, far::Parts};
 
 impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// Number of distinct centres.
@@ -34,7 +34,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         })
     }
 
-    /// The weight wᵢ of every centre, in the kernel's own units.
+    /// The weight wᵢ of every centre, in the kernel's units.
     ///
     /// ```
     /// # use nalgebra::Point2;
@@ -54,7 +54,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         (0..n).map(move |j| SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit))
     }
 
-    /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' own units.
+    /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' units.
     ///
     /// Kernels are scaled to unit size inside; what that leaves of a kernel like r² ln r, a multiple of r², is
     /// affine by the side conditions and is accounted for here.

@@ -1,21 +1,24 @@
-//! The same equations in twice the working precision, for point sets that leave plain arithmetic no digits.
+//! The spline's equations in double-double arithmetic, for point sets too ill-conditioned for plain `f64`.
 //!
 //! The steps are those of [`System`](crate::system::System), written plainly: Householder reflectors, applied to K from
 //! both sides, then Cholesky. It costs some fifty times as much and is used where the condition number asks for it.
 
-use crate::{Kernel, null_space::MAX, real::Real, sites::Sites, system::System, twofold::Twofold};
+use crate::{
+    Kernel, centres::Centres, double_double::DoubleDouble, null_space::MAX, real::Real,
+    system::System,
+};
 
 /// A dense matrix, column by column.
 struct Matrix {
     rows: usize,
-    data: Vec<Twofold>,
+    data: Vec<DoubleDouble>,
 }
 
 impl Matrix {
-    fn column(&mut self, j: usize) -> &mut [Twofold] {
+    fn column(&mut self, j: usize) -> &mut [DoubleDouble] {
         &mut self.data[j * self.rows..(j + 1) * self.rows]
     }
-    fn at(&self, i: usize, j: usize) -> Twofold {
+    fn at(&self, i: usize, j: usize) -> DoubleDouble {
         self.data[j * self.rows + i]
     }
 }
@@ -23,29 +26,33 @@ impl Matrix {
 /// A reflector I − τ v vᵀ with v zero before `head`.
 struct Reflector {
     head: usize,
-    tau: Twofold,
-    v: Vec<Twofold>,
+    tau: DoubleDouble,
+    v: Vec<DoubleDouble>,
 }
 
 impl Reflector {
     /// The reflector that takes x to (…, β, 0, …), which it does.
-    fn new(x: &mut [Twofold], head: usize) -> Self {
+    fn new(x: &mut [DoubleDouble], head: usize) -> Self {
         let norm = dot(&x[head..], &x[head..]).sqrt();
         let top = x[head];
-        let beta = if top > Twofold::ZERO { -norm } else { norm };
+        let beta = if top > DoubleDouble::ZERO {
+            -norm
+        } else {
+            norm
+        };
         let mut v = x.to_vec();
-        v[..head].fill(Twofold::ZERO);
-        x[head + 1..].fill(Twofold::ZERO);
+        v[..head].fill(DoubleDouble::ZERO);
+        x[head + 1..].fill(DoubleDouble::ZERO);
         x[head] = beta;
         if norm.high == 0.0 {
             return Self {
                 head,
-                tau: Twofold::ZERO,
+                tau: DoubleDouble::ZERO,
                 v,
             };
         }
         let scale = top - beta;
-        v[head] = Twofold::from_f64(1.0);
+        v[head] = DoubleDouble::from_f64(1.0);
         v[head + 1..].iter_mut().for_each(|x| *x = *x / scale);
         Self {
             head,
@@ -54,7 +61,7 @@ impl Reflector {
         }
     }
 
-    fn apply(&self, x: &mut [Twofold]) {
+    fn apply(&self, x: &mut [DoubleDouble]) {
         let product = dot(&self.v[self.head..], &x[self.head..]) * self.tau;
         x[self.head..]
             .iter_mut()
@@ -67,37 +74,38 @@ impl Reflector {
         let n = k.rows;
         (0..n).for_each(|j| self.apply(k.column(j)));
         for i in 0..n {
-            let row = (self.head..n).fold(Twofold::ZERO, |sum, j| sum + k.at(i, j) * self.v[j])
+            let row = (self.head..n)
+                .fold(DoubleDouble::ZERO, |sum, j| sum + k.at(i, j) * self.v[j])
                 * self.tau;
             (self.head..n).for_each(|j| k.data[j * n + i] = k.data[j * n + i] - row * self.v[j]);
         }
     }
 }
 
-fn dot(a: &[Twofold], b: &[Twofold]) -> Twofold {
+fn dot(a: &[DoubleDouble], b: &[DoubleDouble]) -> DoubleDouble {
     a.iter()
         .zip(b)
-        .fold(Twofold::ZERO, |sum, (a, b)| sum + *a * *b)
+        .fold(DoubleDouble::ZERO, |sum, (a, b)| sum + *a * *b)
 }
 
-/// Solves as [`System::solve`]; `None` if the matrix is not definite even now.
+/// Solves as [`System::solve`]; `None` if the matrix is not definite even in double-double arithmetic.
 ///
-/// `y` holds the values at all sites, output by output, and receives the weights.
+/// `y` holds the values at all centres, output by output, and receives the weights.
 pub(crate) fn solve<const D: usize, const M: usize, K: Kernel>(
     kernel: &K,
-    sites: &Sites<D>,
+    centres: &Centres<D>,
     system: &System<D>,
     lambda: f64,
     y: &mut [f64],
 ) -> Option<[[f64; MAX]; M]> {
-    let (n, count) = (system.active.len(), sites.len());
-    let scale = |i: usize| Twofold::from_f64(system.scales.get(i).copied().unwrap_or(1.0));
-    let projected = Projected::new(kernel, sites, system, scale, lambda)?;
+    let (n, count) = (system.active.len(), centres.len());
+    let scale = |i: usize| DoubleDouble::from_f64(system.scales.get(i).copied().unwrap_or(1.0));
+    let projected = Projected::new(kernel, centres, system, scale, lambda)?;
     let mut affine = [[0.0; MAX]; M];
     for m in 0..M {
         let values = &mut y[m * count..(m + 1) * count];
         let mut b: Vec<_> = (0..n)
-            .map(|i| Twofold::from_f64(values[system.active[i]]) * scale(i))
+            .map(|i| DoubleDouble::from_f64(values[system.active[i]]) * scale(i))
             .collect();
         affine[m] = projected.solve(&mut b);
         values.fill(0.0);
@@ -117,13 +125,13 @@ impl Projected {
     /// `None` if the matrix is not definite.
     fn new<K: Kernel, const D: usize>(
         kernel: &K,
-        sites: &Sites<D>,
+        centres: &Centres<D>,
         system: &System<D>,
-        scale: impl Fn(usize) -> Twofold,
+        scale: impl Fn(usize) -> DoubleDouble,
         lambda: f64,
     ) -> Option<Self> {
         let (n, q) = (system.active.len(), system.null.q);
-        let point = |i: usize| sites.precise(system.active[i]);
+        let point = |i: usize| centres.precise(system.active[i]);
         let mut k = kernel_matrix(kernel, n, point, &scale, lambda);
         let mut p = Matrix {
             rows: n,
@@ -145,13 +153,13 @@ impl Projected {
     }
 
     /// Turns scaled targets into scaled weights; returns the affine part.
-    fn solve(&self, b: &mut [Twofold]) -> [f64; MAX] {
+    fn solve(&self, b: &mut [DoubleDouble]) -> [f64; MAX] {
         let Self { k, p, reflectors } = self;
         let (n, q) = (b.len(), reflectors.len());
         reflectors.iter().for_each(|r| r.apply(b));
         substitute(k, q, b);
         let mut head: Vec<_> = (0..q)
-            .map(|i| b[i] - (q..n).fold(Twofold::ZERO, |s, j| s + k.at(i, j) * b[j]))
+            .map(|i| b[i] - (q..n).fold(DoubleDouble::ZERO, |s, j| s + k.at(i, j) * b[j]))
             .collect();
         let mut affine = [0.0; MAX];
         for i in (0..q).rev() {
@@ -159,7 +167,7 @@ impl Projected {
             head[i] = rest / p.at(i, i);
             affine[i] = head[i].high;
         }
-        b[..q].fill(Twofold::ZERO);
+        b[..q].fill(DoubleDouble::ZERO);
         reflectors.iter().rev().for_each(|r| r.apply(b));
         affine
     }
@@ -168,21 +176,21 @@ impl Projected {
 fn kernel_matrix<K: Kernel, const D: usize>(
     kernel: &K,
     n: usize,
-    point: impl Fn(usize) -> [Twofold; D],
-    scale: impl Fn(usize) -> Twofold,
+    point: impl Fn(usize) -> [DoubleDouble; D],
+    scale: impl Fn(usize) -> DoubleDouble,
     lambda: f64,
 ) -> Matrix {
     let mut k = Matrix {
         rows: n,
-        data: vec![Twofold::ZERO; n * n],
+        data: vec![DoubleDouble::ZERO; n * n],
     };
     for j in 0..n {
         for i in j..n {
             let (a, b) = (point(i), point(j));
-            let s = (0..D).fold(Twofold::ZERO, |s, c| s + (a[c] - b[c]) * (a[c] - b[c]));
+            let s = (0..D).fold(DoubleDouble::ZERO, |s, c| s + (a[c] - b[c]) * (a[c] - b[c]));
             let mut value = kernel.value(s) * scale(i) * scale(j);
             if i == j {
-                value = value + Twofold::from_f64(lambda);
+                value = value + DoubleDouble::from_f64(lambda);
             }
             (k.data[j * n + i], k.data[i * n + j]) = (value, value);
         }
@@ -212,7 +220,7 @@ fn cholesky(k: &mut Matrix, q: usize) -> Option<()> {
     Some(())
 }
 
-fn substitute(k: &Matrix, q: usize, b: &mut [Twofold]) {
+fn substitute(k: &Matrix, q: usize, b: &mut [DoubleDouble]) {
     let n = k.rows;
     for i in q..n {
         let rest = (q..i).fold(b[i], |rest, j| rest - k.at(i, j) * b[j]);

@@ -1,4 +1,4 @@
-//! Products with the kernel matrix, formed as they are needed.
+//! Products with the kernel matrix, whose entries are computed as they are needed.
 
 use crate::{
     Kernel,

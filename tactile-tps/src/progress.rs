@@ -1,6 +1,6 @@
-//! What a long fit tells while it runs.
+//! Progress of a long fit.
 
-/// How far a fit has come, given to the caller's watch.
+/// How far a fit has come, as reported to the caller.
 ///
 /// Units of `done` and `total` are points while the stage is preparation, steps of the iteration after.
 ///
@@ -65,5 +65,5 @@ pub enum Stage {
     Iteration,
 }
 
-/// A watch over a fit; it breaks the fit off by its answer.
+/// A callback that hears of a fit's progress and may stop it.
 pub(crate) type Watch<'a> = dyn FnMut(&Progress) -> core::ops::ControlFlow<()> + 'a;

@@ -6,11 +6,10 @@ use nalgebra::Point;
 
 use crate::{
     Factorization, Kernel, Scalar, Smoothing, Spline, TpsError, Workspace,
-    options::{validate_smoothing, validate_weights},
-    task::Task,
+    options::validate_weights, smoothing::validate_smoothing, task::Task,
 };
 
-/// Points up to which a refit with another λ decomposes the matrix unasked: a few milliseconds.
+/// Points up to which a refit with another λ decomposes the matrix by itself: a few milliseconds.
 const DECOMPOSE_POINTS: usize = 256;
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
@@ -44,7 +43,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for bad targets, weights or smoothing; the spline is then left as it was.
+    /// [`TpsError`] for invalid targets, weights or smoothing; the spline is then left as it was.
     pub fn refit_with<const M: usize>(
         &self,
         workspace: &mut Workspace<D>,
@@ -63,11 +62,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         if let Some(weights) = weights {
             let Workspace {
                 buffers,
-                site_weights,
+                centre_weights,
                 ..
             } = workspace;
-            self.sites.weigh(Some(weights), site_weights);
-            if let Some(task) = self.cheap(weights, site_weights, smoothing, &mut buffers.excess)
+            self.centres.weigh(Some(weights), centre_weights);
+            if let Some(task) = self.cheap(weights, centre_weights, smoothing, &mut buffers.excess)
                 && self.finish(&task, buffers, targets, spline)?
             {
                 return Ok(());
@@ -119,18 +118,18 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let Workspace {
             system,
             iterative,
-            site_weights,
+            centre_weights,
             ..
         } = workspace;
-        self.sites.weigh(weights, site_weights);
+        self.centres.weigh(weights, centre_weights);
         let (setting, lambda) = (self.setting(), self.inner_lambda(smoothing));
         if smoothing == Smoothing::Gcv {
-            system.decompose(&setting, site_weights);
+            system.decompose(&setting, centre_weights);
         } else if self.iterative.is_none() {
-            system.factor(&setting, site_weights, lambda)?;
+            system.factor(&setting, centre_weights, lambda)?;
         } else {
-            // Nobody watches, so nobody breaks off.
-            let _ = iterative.build(&setting, site_weights, lambda, system, &mut |_| {
+            // Without a callback nothing stops it.
+            let _ = iterative.build(&setting, centre_weights, lambda, system, &mut |_| {
                 ControlFlow::Continue(())
             });
         }
@@ -143,11 +142,11 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     fn cheap<'a>(
         &'a self,
         weights: &'a [T],
-        site_weights: &[f64],
+        centre_weights: &[f64],
         smoothing: Smoothing<T>,
         excess: &mut Vec<f64>,
     ) -> Option<Task<'a, T, D>> {
-        if smoothing == Smoothing::Gcv || site_weights.contains(&0.0) {
+        if smoothing == Smoothing::Gcv || centre_weights.contains(&0.0) {
             return None;
         }
         let task = |system, reweighting| {
@@ -159,7 +158,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             })
         };
         if self.inner_lambda(smoothing) == 0.0 {
-            let same = self.system.lambda == 0.0 && self.system.active.len() == self.sites.len();
+            let same = self.system.lambda == 0.0 && self.system.active.len() == self.centres.len();
             let task = task(&self.system, None).filter(|_| same);
             return task.map(|task| Task {
                 iterative: self.iterative.as_ref(),
@@ -171,15 +170,16 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
         self.decompose();
         let system = self.spectral.get()?;
-        let reweighting = system.reweighting(self.inner_lambda(smoothing), site_weights, excess)?;
+        let reweighting =
+            system.reweighting(self.inner_lambda(smoothing), centre_weights, excess)?;
         task(system, Some(reweighting))
     }
 
     /// Whether a refit with this smoothing and the factorisation's own weights is to go by the spectrum.
     fn decomposes(&self, smoothing: Smoothing<T>) -> bool {
-        let few = self.spectral.get().is_some() || self.sites.len() <= DECOMPOSE_POINTS;
+        let few = self.spectral.get().is_some() || self.centres.len() <= DECOMPOSE_POINTS;
         few && self.iterative.is_none()
-            && self.site_weights.is_empty()
+            && self.centre_weights.is_empty()
             && self.inner_lambda(smoothing) > 0.0
     }
 }

@@ -1,4 +1,4 @@
-//! What a fit has to say about itself.
+//! The report of a fit: condition, residual, iterations.
 
 /// How a spline was fitted and how far it can be trusted.
 ///

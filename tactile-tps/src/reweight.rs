@@ -1,4 +1,5 @@
-//! New weights without a new factorisation, by the spectrum at hand: equations of the few that differ, or conjugate gradients.
+//! New weights without a new factorisation, by the spectrum of the old one: a Woodbury update for a few weights
+//! that differ from the rest, or conjugate gradients.
 //!
 //! Weights enter the equations as a diagonal, (K + λW⁻¹) w + P a = y, Pᵀw = 0. With w = Q₂z, B = Q₂ᵀKQ₂ and any λ̄,
 //!
@@ -6,27 +7,27 @@
 //!
 //! and the spectrum of B gives C = (B + λ̄I)⁻¹ in one pass. A direction p = Cr + βp' has (B + λ̄I)p = r + β(B + λ̄I)p', so that
 //! a step costs one pass over the eigenvectors and no product with B (Eisenstat's trick, 1981). What C leaves is of
-//! condition at most (μ₁ + λ max W⁻¹)/(μ₁ + λ min W⁻¹) with μ₁ the least eigenvalue of B, and k weights apart from the rest
-//! are k directions: k + 1 steps. A few are met at once instead, by their [own equations](Reweighting::few).
+//! condition at most (μ₁ + λ max W⁻¹)/(μ₁ + λ min W⁻¹) with μ₁ the least eigenvalue of B, and k weights that differ from the
+//! rest are k directions: k + 1 steps. Up to sixteen of them take a [Woodbury update](Reweighting::woodbury) instead.
 
 use nalgebra::SMatrix;
 
 use crate::{
-    cholesky::HEAD,
+    layout::HEAD,
     null_space::{NullSpace, dot, ratio},
     spectrum::Spectrum,
 };
 
-/// Residual relative to the right-hand side at which the iteration stops: values at the sites are off by about as much.
+/// Residual relative to the right-hand side at which the iteration stops: values at the centres are off by about as much.
 const TOLERANCE: f64 = 1e-13;
 /// Condition number up to which a plain solution needs no refinement, as for a factored system.
 const CONDITION: f64 = 1e8;
 /// A factorisation takes as long as one step for every so many points.
 const POINTS_PER_STEP: usize = 18;
-/// Weights apart from the rest up to which their own equations are solved.
-const FEW: usize = 16;
+/// Weights that differ from the rest up to which the update is direct.
+const MOST_UPDATED: usize = 16;
 
-/// λW⁻¹ at the active sites, and how far to go with it.
+/// λW⁻¹ at the active centres, and how far to go with it.
 pub(crate) struct Reweighting<'a> {
     spectrum: &'a Spectrum,
     null: &'a NullSpace,
@@ -36,8 +37,8 @@ pub(crate) struct Reweighting<'a> {
     pub(crate) condition: f64,
     /// Steps after which a factorisation is cheaper.
     steps: usize,
-    /// How many weights are apart from the rest.
-    apart: usize,
+    /// How many weights differ from the rest.
+    differing: usize,
 }
 
 impl<'a> Reweighting<'a> {
@@ -63,10 +64,12 @@ impl<'a> Reweighting<'a> {
             0.0
         };
         let level = median(excess);
-        let apart = excess.iter().filter(|&&d| d != level).count();
+        let differing = excess.iter().filter(|&&d| d != level).count();
         let steps = null.n / POINTS_PER_STEP;
         let good = least + low > 0.0 && condition < CONDITION;
-        if !good || (apart > FEW && f64::min(bound, apart as f64) + 1.0 > steps as f64) {
+        if !good
+            || (differing > MOST_UPDATED && f64::min(bound, differing as f64) + 1.0 > steps as f64)
+        {
             return None;
         }
         excess.clear();
@@ -77,15 +80,15 @@ impl<'a> Reweighting<'a> {
             level,
             condition,
             steps,
-            apart,
+            differing,
         })
     }
 
-    /// By the equations of the few weights that differ (Woodbury 1950).
+    /// By an update of low rank for the weights that differ (Woodbury 1950; Hager 1989).
     ///
     /// With U the rows of Q₂ that carry an excess e, (A + UᵀeU)⁻¹b = A⁻¹(b − Uᵀt), (I + eUA⁻¹Uᵀ) t = eUA⁻¹b. All of it
     /// happens among the coefficients of the eigenvectors, where A is diagonal.
-    fn few<const M: usize>(
+    fn woodbury<const M: usize>(
         &self,
         b: &[f64],
         excess: &[f64],
@@ -102,7 +105,7 @@ impl<'a> Reweighting<'a> {
         work.extend_from_within(..);
         let (units, solved) = work.split_at_mut(length);
         spectrum.divide(solved, self.level);
-        let t = self.reactions::<M>(excess, units, solved, spare)?;
+        let t = self.solve_capacitance::<M>(excess, units, solved, spare)?;
         for (found, t) in spare.chunks_exact_mut(stride).zip(t.column_iter()) {
             for (solved, t) in solved.chunks_exact(stride).zip(&t) {
                 found.iter_mut().zip(solved).for_each(|(c, s)| *c -= t * s);
@@ -116,27 +119,27 @@ impl<'a> Reweighting<'a> {
         Some(())
     }
 
-    /// The t of [`few`](Self::few), from U, UA⁻¹ and A⁻¹b.
-    fn reactions<const M: usize>(
+    /// Solves the capacitance system of [`woodbury`](Self::woodbury) for t, from U, UA⁻¹ and A⁻¹b.
+    fn solve_capacitance<const M: usize>(
         &self,
         excess: &[f64],
         units: &[f64],
         solved: &[f64],
         found: &[f64],
-    ) -> Option<SMatrix<f64, FEW, M>> {
+    ) -> Option<SMatrix<f64, MOST_UPDATED, M>> {
         let row = |data: &'_ [f64], i: usize, unit: usize| {
             dot(
                 &units[unit * self.null.stride..][..self.null.stride],
                 &data[i * self.null.stride..][..self.null.stride],
             )
         };
-        let mut matrix = SMatrix::<f64, FEW, FEW>::identity();
-        let mut sides = SMatrix::<f64, FEW, M>::zeros();
+        let mut matrix = SMatrix::<f64, MOST_UPDATED, MOST_UPDATED>::identity();
+        let mut sides = SMatrix::<f64, MOST_UPDATED, M>::zeros();
         for (i, e) in excess.iter().filter(|e| **e != 0.0).enumerate() {
             // A row of large excess is scaled down.
             let scale = 1.0 / f64::max(e.abs(), 1.0);
             matrix[(i, i)] = scale;
-            (0..self.apart).for_each(|j| matrix[(i, j)] += scale * e * row(solved, j, i));
+            (0..self.differing).for_each(|j| matrix[(i, j)] += scale * e * row(solved, j, i));
             (0..M).for_each(|m| sides[(i, m)] = scale * e * row(found, m, i));
         }
         matrix.lu().solve_mut(&mut sides).then_some(sides)
@@ -146,12 +149,12 @@ impl<'a> Reweighting<'a> {
     fn units(&self, excess: &[f64], units: &mut Vec<f64>, group: &mut Vec<f64>) {
         const GROUP: usize = 4;
         let (stride, first) = (self.null.stride, self.null.rows().start);
-        let mut apart = (0..excess.len()).filter(|&i| excess[i] != 0.0);
+        let mut differing = (0..excess.len()).filter(|&i| excess[i] != 0.0);
         units.clear();
-        for start in (0..self.apart).step_by(GROUP) {
+        for start in (0..self.differing).step_by(GROUP) {
             group.clear();
             group.resize(GROUP * stride, 0.0);
-            for (column, i) in group.chunks_exact_mut(stride).zip(&mut apart) {
+            for (column, i) in group.chunks_exact_mut(stride).zip(&mut differing) {
                 column[first + i] = 1.0;
                 self.null.apply_transpose(column);
             }
@@ -159,7 +162,7 @@ impl<'a> Reweighting<'a> {
             self.spectrum
                 .coefficients::<GROUP>(group, &mut units[start * stride..]);
         }
-        units.truncate(self.apart * stride);
+        units.truncate(self.differing * stride);
     }
 
     /// Solves for `M` columns b = Q₂ᵀy, which it overwrites; z comes at the front of `work`, followed by Q₁ᵀEQ₂z
@@ -172,8 +175,8 @@ impl<'a> Reweighting<'a> {
         work: &mut Vec<f64>,
         spare: &mut Vec<f64>,
     ) -> Option<usize> {
-        if self.apart <= FEW {
-            return self.few::<M>(b, excess, work, spare).map(|()| 0);
+        if self.differing <= MOST_UPDATED {
+            return self.woodbury::<M>(b, excess, work, spare).map(|()| 0);
         }
         self.iterate::<M>(b, excess, work, spare)
     }

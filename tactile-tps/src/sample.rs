@@ -1,13 +1,13 @@
-//! From points to samples of a spline: into the frame, through the kernel sum, out again.
+//! Samples of a spline at points: scaling to the frame, the kernel sum, and scaling back.
 
 use nalgebra::{Point, SMatrix, SVector};
 
 use crate::{
     Kernel,
+    centres::Frame,
     evaluate::{BLOCK, Lanes, Sum, TAIL},
     real::{Lane, Scalar},
     simd::Job,
-    sites::Frame,
 };
 
 /// The affine part of a spline in its frame.

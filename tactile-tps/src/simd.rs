@@ -1,4 +1,4 @@
-//! Runs a loop compiled for the best instruction set the processor turns out to have.
+//! Run-time dispatch of a loop to the best instruction set of the processor.
 //!
 //! The loops are plain Rust over slices of one scalar; inlined into a function with wider vectors enabled, the
 //! compiler vectorises them. The arithmetic is written out (fused or not), so that the result does not depend on how.

@@ -1,7 +1,7 @@
-//! From targets to weights with a system that is ready: Qᵀ, the factor or the spectrum, and Q again.
+//! Solves of a factored system, from targets to weights: Qᵀ, the factor or the spectrum, then Q.
 
 use crate::{
-    cholesky::HEAD,
+    layout::HEAD,
     null_space::{MAX, dot},
     reweight::Reweighting,
     system::System,
@@ -12,7 +12,7 @@ impl<const D: usize> System<D> {
     pub(crate) fn cross_validate<const M: usize>(
         &self,
         y: &[f64],
-        sites: usize,
+        centres: usize,
         work: &mut Vec<f64>,
         spare: &mut Vec<f64>,
     ) -> Option<f64> {
@@ -21,7 +21,7 @@ impl<const D: usize> System<D> {
         work.resize(M * stride, 0.0);
         for (m, column) in work.chunks_exact_mut(stride).enumerate() {
             self.scaled(
-                &y[m * sites..(m + 1) * sites],
+                &y[m * centres..(m + 1) * centres],
                 &mut column[self.null.rows()],
             );
             self.null.apply_transpose(column);
@@ -31,27 +31,27 @@ impl<const D: usize> System<D> {
             .map(|spectrum| spectrum.cross_validate::<M>(work, n, spare))
     }
 
-    /// Solves for `M` outputs: `y` holds the values at all sites and receives the weights w; returns the affine parts.
+    /// Solves for `M` outputs: `y` holds the values at all centres and receives the weights w; returns the affine parts.
     ///
     /// `lambda` is what to add to a spectral system; a factored one has its own.
     pub(crate) fn solve<const M: usize>(
         &self,
         y: &mut [f64],
-        sites: usize,
+        centres: usize,
         lambda: f64,
         work: &mut Vec<f64>,
         spare: &mut Vec<f64>,
     ) -> [[f64; MAX]; M] {
-        let mut heads = self.rotate::<M>(y, sites, work);
+        let mut heads = self.rotate::<M>(y, centres, work);
         match &self.spectrum {
             Some(spectrum) => spectrum.solve::<M>(work, lambda, spare),
             None => self.cholesky.solve::<M>(work),
         }
-        self.lift(y, sites, work, &mut heads);
+        self.lift(y, centres, work, &mut heads);
         heads
     }
 
-    /// What a solve with other weights by this system's spectrum takes; `weights` are those of the sites, and all positive.
+    /// Prepares a solve with other weights by this system's spectrum; `weights` are those of the centres, all positive.
     pub(crate) fn reweighting(
         &self,
         lambda: f64,
@@ -69,15 +69,15 @@ impl<const D: usize> System<D> {
         excess: &[f64],
         [columns, work, spare]: [&mut Vec<f64>; 3],
     ) -> Option<([[f64; MAX]; M], usize)> {
-        let (sites, q, stride) = (excess.len(), self.null.q, self.null.stride);
-        let mut heads = self.rotate::<M>(y, sites, columns);
+        let (centres, q, stride) = (excess.len(), self.null.q, self.null.stride);
+        let mut heads = self.rotate::<M>(y, centres, columns);
         let steps = reweighting.solve::<M>(columns, excess, work, spare)?;
         for (head, column) in heads.iter_mut().zip(work.chunks_exact(stride)) {
             head.iter_mut()
                 .zip(&column[HEAD - q..HEAD])
                 .for_each(|(h, e)| *h -= e);
         }
-        self.lift(y, sites, &mut work[..M * stride], &mut heads);
+        self.lift(y, centres, &mut work[..M * stride], &mut heads);
         Some((heads, steps))
     }
 
@@ -85,7 +85,7 @@ impl<const D: usize> System<D> {
     fn rotate<const M: usize>(
         &self,
         y: &[f64],
-        sites: usize,
+        centres: usize,
         work: &mut Vec<f64>,
     ) -> [[f64; MAX]; M] {
         let (q, stride) = (self.null.q, self.null.stride);
@@ -94,7 +94,7 @@ impl<const D: usize> System<D> {
         let mut heads = [[0.0; MAX]; M];
         for (m, column) in work.chunks_exact_mut(stride).enumerate() {
             self.scaled(
-                &y[m * sites..(m + 1) * sites],
+                &y[m * centres..(m + 1) * centres],
                 &mut column[self.null.rows()],
             );
             self.null.apply_transpose(column);
@@ -107,7 +107,7 @@ impl<const D: usize> System<D> {
     fn lift<const M: usize>(
         &self,
         y: &mut [f64],
-        sites: usize,
+        centres: usize,
         work: &mut [f64],
         heads: &mut [[f64; MAX]; M],
     ) {
@@ -121,7 +121,7 @@ impl<const D: usize> System<D> {
             self.null.apply(column);
             self.scatter(
                 &column[self.null.rows()],
-                &mut y[m * sites..(m + 1) * sites],
+                &mut y[m * centres..(m + 1) * centres],
             );
             heads[m] = self.null.solve_upper(&heads[m][..q]);
         }
@@ -133,12 +133,12 @@ impl<const D: usize> System<D> {
     pub(crate) fn solve_adjoint<const R: usize>(
         &self,
         y: &mut [f64],
-        sites: usize,
+        centres: usize,
         p: [&[f64; MAX]; R],
         work: &mut Vec<f64>,
     ) {
         let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
-        self.rotate::<R>(y, sites, work);
+        self.rotate::<R>(y, centres, work);
         let heads = p.map(|p| self.null.solve_transpose(p));
         for (column, head) in work.chunks_exact_mut(stride).zip(&heads) {
             for (k, head) in head.iter().enumerate().take(q) {
@@ -155,7 +155,7 @@ impl<const D: usize> System<D> {
             self.null.apply(column);
             self.scatter(
                 &column[self.null.rows()],
-                &mut y[r * sites..(r + 1) * sites],
+                &mut y[r * centres..(r + 1) * centres],
             );
         }
     }
@@ -166,7 +166,7 @@ impl<const D: usize> System<D> {
         &self.cholesky.l[(HEAD - q + k) * stride + HEAD..][..n - q]
     }
 
-    /// Spreads the rows, each times its scale, over the sites.
+    /// Spreads the rows, each times its scale, over the centres.
     fn scatter(&self, rows: &[f64], y: &mut [f64]) {
         let scale = |i: usize| {
             if self.scales.is_empty() {
@@ -178,15 +178,15 @@ impl<const D: usize> System<D> {
         self.active
             .iter()
             .enumerate()
-            .for_each(|(i, &site)| y[site] = rows[i] * scale(i));
+            .for_each(|(i, &centre)| y[centre] = rows[i] * scale(i));
     }
 
-    /// The values at the active sites, each times its scale.
+    /// The values at the active centres, each times its scale.
     fn scaled(&self, y: &[f64], column: &mut [f64]) {
         self.active
             .iter()
             .zip(column.iter_mut())
-            .for_each(|(&site, value)| *value = y[site]);
+            .for_each(|(&centre, value)| *value = y[centre]);
         column
             .iter_mut()
             .zip(&self.scales)

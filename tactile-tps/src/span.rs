@@ -1,11 +1,11 @@
-//! Which directions the points span.
+//! The directions that the points span.
 
 use crate::{
-    cholesky::layout,
+    centres::Centres,
+    double_double::DoubleDouble,
+    layout::layout,
     null_space::{MAX, NullSpace},
     real::Real,
-    sites::Sites,
-    twofold::Twofold,
 };
 
 /// The directions points extend in, decided by the singular values of their centred coordinates.
@@ -30,16 +30,16 @@ impl<const D: usize> Default for Span<D> {
 }
 
 impl<const D: usize> Span<D> {
-    /// The span of the `active` sites. `tolerance` is the share of the largest extent below which a direction counts
+    /// The span of the `active` centres. `tolerance` is the share of the largest extent below which a direction counts
     /// as not spanned; `scratch` is overwritten.
     pub(crate) fn new(
-        sites: &Sites<D>,
+        centres: &Centres<D>,
         active: &[usize],
         tolerance: f64,
         scratch: &mut NullSpace,
     ) -> Self {
         let n = active.len();
-        let mean = |k: usize| active.iter().map(|&i| sites.axes[k][i]).sum::<f64>() / n as f64;
+        let mean = |k: usize| active.iter().map(|&i| centres.axes[k][i]).sum::<f64>() / n as f64;
         let means: [f64; D] = core::array::from_fn(mean);
         let mut rows = [[0.0; D]; D];
         if n >= D {
@@ -47,15 +47,15 @@ impl<const D: usize> Span<D> {
                 column
                     .iter_mut()
                     .zip(active)
-                    .for_each(|(v, &i)| *v = sites.axes[k][i] - means[k]);
+                    .for_each(|(v, &i)| *v = centres.axes[k][i] - means[k]);
             });
             rows = core::array::from_fn(|j| core::array::from_fn(|i| scratch.triangle(i, j)));
         } else {
-            for (i, &site) in active.iter().enumerate() {
-                (0..D).for_each(|k| rows[k][i] = sites.axes[k][site] - means[k]);
+            for (i, &centre) in active.iter().enumerate() {
+                (0..D).for_each(|k| rows[k][i] = centres.axes[k][centre] - means[k]);
             }
         }
-        Self::of_columns(rows, n, sites.grain, tolerance)
+        Self::of_columns(rows, n, centres.grain, tolerance)
     }
 
     fn of_columns(columns: [[f64; D]; D], n: usize, grain: f64, tolerance: f64) -> Self {
@@ -73,20 +73,22 @@ impl<const D: usize> Span<D> {
         }
     }
 
-    /// Writes affine function `c` of [1, x·b₁, …] at the sites `active`, each value times its `scale`.
+    /// Writes affine function `c` of [1, x·b₁, …] at the centres `active`, each value times its `scale`.
     pub(crate) fn fill(
         &self,
-        sites: &Sites<D>,
+        centres: &Centres<D>,
         active: &[usize],
         scales: &[f64],
         c: usize,
         column: &mut [f64],
     ) {
-        for (value, &site) in column.iter_mut().zip(active) {
+        for (value, &centre) in column.iter_mut().zip(active) {
             *value = match (c, &self.basis) {
                 (0, _) => 1.0,
-                (c, None) => sites.axes[c - 1][site],
-                (c, Some(basis)) => (0..D).map(|k| basis[c - 1][k] * sites.axes[k][site]).sum(),
+                (c, None) => centres.axes[c - 1][centre],
+                (c, Some(basis)) => (0..D)
+                    .map(|k| basis[c - 1][k] * centres.axes[k][centre])
+                    .sum(),
             };
         }
         column
@@ -125,12 +127,12 @@ impl<const D: usize> Span<D> {
     }
 
     /// Affine function `c` at a point, in twice the working precision.
-    pub(crate) fn precise(&self, c: usize, point: &[Twofold; D]) -> Twofold {
+    pub(crate) fn precise(&self, c: usize, point: &[DoubleDouble; D]) -> DoubleDouble {
         match (c, &self.basis) {
-            (0, _) => Twofold::from_f64(1.0),
+            (0, _) => DoubleDouble::from_f64(1.0),
             (c, None) => point[c - 1],
-            (c, Some(basis)) => (0..D).fold(Twofold::ZERO, |sum, k| {
-                sum + point[k] * Twofold::from_f64(basis[c - 1][k])
+            (c, Some(basis)) => (0..D).fold(DoubleDouble::ZERO, |sum, k| {
+                sum + point[k] * DoubleDouble::from_f64(basis[c - 1][k])
             }),
         }
     }

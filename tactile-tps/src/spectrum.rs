@@ -1,8 +1,8 @@
-//! Spectral decomposition of the projected matrix: any λ at the price of a product, and cross-validation.
+//! Spectral decomposition of the projected matrix: a solve with any λ costs a product; cross-validation.
 
 use nalgebra::DMatrix;
 
-use crate::{cholesky::HEAD, packed::Packed};
+use crate::{layout::HEAD, packed::Packed};
 
 /// A = V diag(μ) Vᵀ.
 #[derive(Clone, Debug, Default)]

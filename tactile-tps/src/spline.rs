@@ -4,11 +4,11 @@ use nalgebra::Point;
 
 use crate::{
     Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError,
+    centres::{Centres, Frame},
+    equations::{Buffers, Solution},
     far::Terms,
     product::energy,
-    refine::{Buffers, Solution},
     sample::Linear,
-    sites::{Frame, Sites},
     system::System,
 };
 
@@ -45,14 +45,14 @@ pub type ThinPlateSpline<T, const D: usize, K = R2LogR> = Spline<T, D, D, K>;
 
 /// A solution and what it was found with.
 pub(crate) struct Fitted<'a, const D: usize, const M: usize> {
-    pub(crate) sites: &'a Sites<D>,
+    pub(crate) centres: &'a Centres<D>,
     pub(crate) system: &'a System<D>,
     /// λ in the frame's units.
     pub(crate) lambda: f64,
     /// How much larger the kernel is outside than in the frame.
     pub(crate) unit: f64,
     pub(crate) solution: Solution<M>,
-    /// What was taken from the targets.
+    /// The offset subtracted from the targets.
     pub(crate) origin: [f64; M],
     /// Largest target.
     pub(crate) level: f64,
@@ -64,7 +64,7 @@ fn digits<T: Scalar>(error: f64) -> f64 {
 }
 
 impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
-    /// The spline that takes `sources` to `targets`.
+    /// Fits the spline that takes `sources` to `targets`.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -79,7 +79,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// ```
     ///
     /// # Errors
-    /// [`TpsError`] for bad input, coinciding points with different targets, or a kernel that is not definite.
+    /// [`TpsError`] for invalid input, coinciding points with different targets, or a kernel that is not definite.
     pub fn fit(
         sources: &[Point<T, D>],
         targets: &[Point<T, M>],
@@ -88,7 +88,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         Factorization::new(sources, options)?.fit(targets)
     }
 
-    /// A spline that is zero everywhere, for a refit to fill.
+    /// A spline that is zero everywhere, to be filled by a refit.
     ///
     /// ```
     /// # use nalgebra::Point2;
@@ -128,19 +128,19 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         }
     }
 
-    /// Takes over a solution, in memory that is already there where it suffices.
+    /// Takes over a solution, reusing memory where it suffices.
     pub(crate) fn assign(&mut self, fitted: &Fitted<'_, D, M>, buffers: &Buffers) {
         let Fitted {
-            sites,
+            centres,
             system,
             solution,
             origin,
             level,
             ..
         } = fitted;
-        self.frame = sites.frame;
+        self.frame = centres.frame;
         self.centres.clear();
-        sites
+        centres
             .axes
             .iter()
             .for_each(|axis| self.centres.extend(axis.iter().map(|&x| T::narrow(x))));
@@ -160,10 +160,10 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.record(fitted);
     }
 
-    /// Takes a solution down in the report.
+    /// Writes a solution's numbers into the report.
     fn record(&mut self, fitted: &Fitted<'_, D, M>) {
         let Fitted {
-            sites,
+            centres,
             system,
             lambda,
             unit,
@@ -174,9 +174,9 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         let rounding = self.terms.rounding::<T, K>(&self.kernel, 0.0);
         let report = &mut self.report;
         report.digits = digits::<T>(if *level > 0.0 { rounding / level } else { 0.0 });
-        report.points = sites.inputs();
-        report.merged = sites.inputs() - sites.len();
-        report.ignored = sites.len() - system.active.len();
+        report.points = centres.inputs();
+        report.merged = centres.inputs() - centres.len();
+        report.ignored = centres.len() - system.active.len();
         report.rank = system.null.q;
         report.extents.clear();
         report.extents.extend_from_slice(&system.span.extents);

@@ -1,4 +1,4 @@
-//! Work on one column: its part of a product with a symmetric matrix, a low-rank update, a block of reflectors.
+//! Symmetric products, low-rank updates and block reflectors, one column at a time.
 
 use pulp::{Arch, Simd, WithSimd};
 

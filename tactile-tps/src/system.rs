@@ -2,26 +2,29 @@
 
 use crate::{
     Kernel, TpsError,
-    cholesky::{Cholesky, HEAD, layout},
+    centres::Centres,
+    cholesky::Cholesky,
+    layout::{HEAD, layout},
     null_space::{MAX, NullSpace},
     real::Lane,
-    refine::PRECISE_POINTS,
     simd::{Job, dispatch},
-    sites::Sites,
     span::Span,
     spectrum::Spectrum,
     symmetric::Product,
 };
 
-/// What a system is made from.
+/// Points up to which double-double arithmetic is affordable.
+pub(crate) const PRECISE_POINTS: usize = 400;
+
+/// The inputs of a system.
 pub(crate) struct Setting<'a, K, const D: usize> {
     pub(crate) kernel: &'a K,
-    pub(crate) sites: &'a Sites<D>,
+    pub(crate) centres: &'a Centres<D>,
     /// Share of the largest extent below which a direction counts as not spanned.
     pub(crate) rank_tolerance: f64,
 }
 
-/// QᵀSQ, S = W^½ K W^½ + λI over the sites of positive weight, ready to be solved with.
+/// QᵀSQ, S = W^½ K W^½ + λI over the centres of positive weight, ready to be solved with.
 ///
 /// With v = W^{-½}w the equations K w + λ W⁻¹ w + P a = y, Pᵀw = 0 become S v + W^½P a = W^½y, (W^½P)ᵀv = 0: row
 /// scaling that keeps weights over many decades apart.
@@ -29,7 +32,7 @@ pub(crate) struct Setting<'a, K, const D: usize> {
 pub(crate) struct System<const D: usize> {
     /// λ in the frame's units; what a spectral system adds is given at the solve.
     pub(crate) lambda: f64,
-    /// Sites of positive weight.
+    /// Centres of positive weight.
     pub(crate) active: Vec<usize>,
     /// √weight of each; empty if all are one.
     pub(crate) scales: Vec<f64>,
@@ -39,14 +42,14 @@ pub(crate) struct System<const D: usize> {
     pub(crate) cholesky: Cholesky,
     pub(crate) spectrum: Option<Spectrum>,
     condition: f64,
-    /// Rounding left no definite matrix: the factor is of no use.
+    /// Rounding left an indefinite matrix: the factor cannot be used.
     pub(crate) indefinite: bool,
     scratch: Vec<f64>,
     spare: NullSpace,
 }
 
 impl<const D: usize> System<D> {
-    /// Factors for site weights (empty: all one) and λ ≥ 0: n³/3 multiplications and additions.
+    /// Factors for centre weights (empty: all one) and λ ≥ 0: n³/3 multiplications and additions.
     pub(crate) fn factor<K: Kernel>(
         &mut self,
         setting: &Setting<'_, K, D>,
@@ -80,7 +83,7 @@ impl<const D: usize> System<D> {
         Ok(())
     }
 
-    /// Decomposes for site weights and any λ > 0: some 10 n³ operations.
+    /// Decomposes for centre weights and any λ > 0: some 10 n³ operations.
     pub(crate) fn decompose<K: Kernel>(&mut self, setting: &Setting<'_, K, D>, weights: &[f64]) {
         self.lambda = 0.0;
         self.assemble(setting, weights, true);
@@ -103,8 +106,8 @@ impl<const D: usize> System<D> {
         weights: &[f64],
         scaled: bool,
     ) -> f64 {
-        let sites = setting.sites;
-        self.choose(sites.len(), weights, scaled);
+        let centres = setting.centres;
+        self.choose(centres.len(), weights, scaled);
         self.outline(setting);
         let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
         let Self {
@@ -119,7 +122,7 @@ impl<const D: usize> System<D> {
         scratch.clear();
         scratch.resize((MAX + D + 1) * stride, 0.0);
         let (product, places) = scratch.split_at_mut(MAX * stride);
-        gather(sites, active, scales, null.rows(), places);
+        gather(centres, active, scales, null.rows(), places);
         dispatch(Assemble::<_, D> {
             kernel: setting.kernel,
             places,
@@ -130,10 +133,15 @@ impl<const D: usize> System<D> {
         null.project(&mut cholesky.l, product)
     }
 
-    /// Finds what the active sites span and its complement.
+    /// Finds what the active centres span and its complement.
     pub(crate) fn outline<K>(&mut self, setting: &Setting<'_, K, D>) {
-        let sites = setting.sites;
-        self.span = Span::new(sites, &self.active, setting.rank_tolerance, &mut self.spare);
+        let centres = setting.centres;
+        self.span = Span::new(
+            centres,
+            &self.active,
+            setting.rank_tolerance,
+            &mut self.spare,
+        );
         let n = self.active.len();
         let q = n.min(1 + self.span.directions);
         let Self {
@@ -144,11 +152,11 @@ impl<const D: usize> System<D> {
             ..
         } = self;
         null.factor(n, q, layout(n, q), |c, column| {
-            span.fill(sites, active, scales, c, column)
+            span.fill(centres, active, scales, c, column)
         });
     }
 
-    /// Sites of positive weight, heaviest first so that the reflectors keep light rows apart.
+    /// Centres of positive weight, heaviest first so that the reflectors keep light rows apart.
     pub(crate) fn choose(&mut self, n: usize, weights: &[f64], scaled: bool) {
         self.active.clear();
         self.scales.clear();
@@ -166,9 +174,9 @@ impl<const D: usize> System<D> {
     }
 }
 
-/// Coordinates of the active sites at their places, axis by axis, and their scales after them.
+/// Coordinates of the active centres at their places, axis by axis, and their scales after them.
 fn gather<const D: usize>(
-    sites: &Sites<D>,
+    centres: &Centres<D>,
     active: &[usize],
     scales: &[f64],
     rows: core::ops::Range<usize>,
@@ -181,7 +189,7 @@ fn gather<const D: usize>(
             column
                 .iter_mut()
                 .zip(active)
-                .for_each(|(x, &site)| *x = sites.axes[k][site]);
+                .for_each(|(x, &centre)| *x = centres.axes[k][centre]);
         } else if scales.is_empty() {
             column.fill(1.0);
         } else {

@@ -1,10 +1,10 @@
-//! What the input points bring to their sites: weights, and targets that must agree where points coincide.
+//! Weights and targets of the distinct centres: merged where points coincide, where targets must agree.
 
 use nalgebra::Point;
 
-use crate::{Scalar, TpsError, refine::Buffers, sites::Sites};
+use crate::{Scalar, TpsError, centres::Centres, equations::Buffers};
 
-impl<const D: usize> Sites<D> {
+impl<const D: usize> Centres<D> {
     /// Coinciding points must have equal targets where the spline interpolates.
     pub(crate) fn agree<T: Scalar, const M: usize>(
         &self,
@@ -12,10 +12,10 @@ impl<const D: usize> Sites<D> {
         weights: Option<&[T]>,
     ) -> Result<(), TpsError> {
         let counts = |i: usize| weights.is_none_or(|w| w[i] > T::zero());
-        for second in (0..self.site_of.len()).filter(|&i| counts(i)) {
-            let site = self.site_of[second];
-            let same = |&i: &usize| self.site_of[i] == site && counts(i);
-            let first = (self.first[site]..second).find(same).unwrap_or(second);
+        for second in (0..self.centre_of.len()).filter(|&i| counts(i)) {
+            let centre = self.centre_of[second];
+            let same = |&i: &usize| self.centre_of[i] == centre && counts(i);
+            let first = (self.first[centre]..second).find(same).unwrap_or(second);
             if targets[first] != targets[second] {
                 return Err(TpsError::Conflict { first, second });
             }
@@ -23,7 +23,7 @@ impl<const D: usize> Sites<D> {
         Ok(())
     }
 
-    /// Values at the sites less `origin`: the targets, or their weighted mean where points coincide.
+    /// Values at the centres less `origin`: the targets, or their weighted mean where points coincide.
     pub(crate) fn gather<T: Scalar, const M: usize>(
         &self,
         targets: &[Point<T, M>],
@@ -35,7 +35,7 @@ impl<const D: usize> Sites<D> {
         buffers.targets.clear();
         buffers.targets.resize(n * M, 0.0);
         for (k, column) in buffers.targets.chunks_exact_mut(n).enumerate() {
-            if self.site_of.is_empty() {
+            if self.centre_of.is_empty() {
                 column
                     .iter_mut()
                     .zip(targets)
@@ -45,26 +45,26 @@ impl<const D: usize> Sites<D> {
             let totals = &mut buffers.work;
             totals.clear();
             totals.resize(n, 0.0);
-            for (target, (i, &site)) in targets.iter().zip(self.site_of.iter().enumerate()) {
+            for (target, (i, &centre)) in targets.iter().zip(self.centre_of.iter().enumerate()) {
                 let weight = weights.map_or(1.0, |w| w[i].widen());
-                totals[site] += weight;
+                totals[centre] += weight;
                 if weight > 0.0 {
-                    column[site] +=
-                        (target[k].widen() - origin[k] - column[site]) * (weight / totals[site]);
+                    column[centre] += (target[k].widen() - origin[k] - column[centre])
+                        * (weight / totals[centre]);
                 }
             }
         }
     }
 
-    /// Weight of every site, none if all are one.
+    /// Weight of every centre, none if all are one.
     pub(crate) fn weigh<T: Scalar>(&self, weights: Option<&[T]>, sums: &mut Vec<f64>) {
         sums.clear();
-        if weights.is_none() && self.site_of.is_empty() {
+        if weights.is_none() && self.centre_of.is_empty() {
             return;
         }
         sums.resize(self.len(), 0.0);
         for i in 0..self.inputs() {
-            sums[self.site(i)] += weights.map_or(1.0, |w| w[i].widen());
+            sums[self.centre(i)] += weights.map_or(1.0, |w| w[i].widen());
         }
     }
 }

@@ -1,4 +1,4 @@
-//! One fit from targets to spline, whatever solves the equations.
+//! One fit from targets to spline, by factor, spectrum or iteration.
 
 use core::ops::ControlFlow;
 
@@ -6,17 +6,17 @@ use nalgebra::Point;
 
 use crate::{
     Factorization, Kernel, Scalar, Smoothing, Spline, TpsError,
+    centres::finite,
+    equations::{Buffers, Equations, Solution},
     error::Input,
     iterative::{Iterative, Run},
     progress::Watch,
-    refine::{Buffers, Equations, Solution},
     reweight::Reweighting,
-    sites::finite,
     spline::Fitted,
     system::System,
 };
 
-/// One fit: what it is made with.
+/// A fit to be done: its system, weights and λ.
 pub(crate) struct Task<'a, T, const D: usize> {
     pub(crate) system: &'a System<D>,
     pub(crate) weights: Option<&'a [T]>,
@@ -70,7 +70,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         })
     }
 
-    /// As [`finish`](Self::finish), telling `watch` how an iteration gets on.
+    /// As [`finish`](Self::finish), reporting an iteration's progress to `watch`.
     pub(crate) fn watched<const M: usize>(
         &self,
         task: &Task<'_, T, D>,
@@ -83,7 +83,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         let gcv = task.smoothing == Smoothing::Gcv;
         self.check(targets, task.weights, lambda == 0.0 && !gcv)?;
         let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
-        self.sites.gather(targets, task.weights, &origin, buffers);
+        self.centres.gather(targets, task.weights, &origin, buffers);
         let lambda = if gcv {
             self.validated::<M>(system, buffers)?
         } else {
@@ -96,10 +96,10 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             .iter()
             .flat_map(|t| t.iter())
             .fold(0.0, |m, x| f64::max(m, x.widen().abs()));
-        let (sites, unit) = (&self.sites, self.unit());
+        let (centres, unit) = (&self.centres, self.unit());
         spline.assign(
             &Fitted {
-                sites,
+                centres,
                 system,
                 lambda,
                 unit,
@@ -129,13 +129,13 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
         finite(targets, Input::Targets)?;
         if through {
-            self.sites.agree(targets, weights)
+            self.centres.agree(targets, weights)
         } else {
             Ok(())
         }
     }
 
-    /// Solves for the targets in `buffers` by what the task has.
+    /// Solves for the targets in `buffers` with the task's factor, spectrum or preconditioner.
     fn solution<const M: usize>(
         &self,
         task: &Task<'_, T, D>,
@@ -155,7 +155,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         }
         let equations = Equations {
             kernel: &self.kernel,
-            sites: &self.sites,
+            centres: &self.centres,
             system,
             lambda,
         };
@@ -186,7 +186,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             spare,
             ..
         } = buffers;
-        let lambda = system.cross_validate::<M>(targets, self.sites.len(), work, spare);
+        let lambda = system.cross_validate::<M>(targets, self.centres.len(), work, spare);
         Ok(lambda.unwrap_or(0.0))
     }
 }

@@ -2,7 +2,7 @@
 
 use pulp::Simd;
 
-use crate::cholesky::PANEL;
+use crate::layout::PANEL;
 
 /// Columns of a block.
 pub(crate) const BLOCK: usize = 64;

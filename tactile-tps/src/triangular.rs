@@ -2,7 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::{cholesky::PANEL, tiles::load};
+use crate::{layout::PANEL, tiles::load};
 
 /// b ← (L Lᵀ)⁻¹ b for `R` columns of b, `stride` apart as those of L; the first `order` places of each count.
 pub(crate) struct Solve<'a, const R: usize> {

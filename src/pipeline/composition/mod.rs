@@ -81,7 +81,7 @@ impl Pipeline {
         Ok(Self {
             contact: Arc::new(contact),
             surface: Arc::new(named::eikonal()?),
-            sampler: Arc::new(EquallySpaced::new()),
+            sampler: Arc::new(EquallySpaced),
             matcher: Arc::new(named::near_by()),
             warp: Arc::new(StrainSpline),
             strain: Arc::new(GreenLagrange),

@@ -12,8 +12,8 @@ use crate::pipeline::choice::{
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::strain_spline::StrainSpline;
 use crate::sfs::{
-    BrooksHorn, ControlPointSampler, CurvatureAdaptive, Eikonal, EquallySpaced, Lighting, Random,
-    Rim, SurfaceReconstruction, TsaiShah,
+    BoundaryCondition, BrooksHorn, ControlPointSampler, CurvatureAdaptive, Eikonal, EquallySpaced,
+    Lighting, Random, SurfaceReconstruction, TsaiShah,
 };
 use crate::tps::{AffineModel, FitOptions, R3, RigidModel, Smoothing, WarpModel};
 use std::sync::Arc;
@@ -24,7 +24,7 @@ const CURVATURE_EMPHASIS: f64 = 4.0;
 /// The default reconstruction: frontal light, the contact's rim at height zero.
 pub(super) fn eikonal() -> Result<Eikonal<f64>, PipelineError> {
     Eikonal::new(Lighting::frontal())
-        .with_rim(Rim::Height(0.0))
+        .with_boundary(BoundaryCondition::Height(0.0))
         .map_err(PipelineError::SurfaceOptions)
 }
 
@@ -36,7 +36,7 @@ pub(super) fn reconstruction(
         ReconstructionChoice::Eikonal => Arc::new(eikonal()?),
         ReconstructionChoice::TsaiShah => Arc::new(TsaiShah::new(light)),
         ReconstructionChoice::BrooksHorn => {
-            Arc::new(BrooksHorn::new(light).with_occluding_rim(true))
+            Arc::new(BrooksHorn::new(light).with_occluding_boundary(true))
         }
     })
 }
@@ -45,7 +45,7 @@ pub(super) fn sampler(
     choice: SamplerChoice,
 ) -> Result<Arc<dyn ControlPointSampler<f64> + Send + Sync>, PipelineError> {
     Ok(match choice {
-        SamplerChoice::EquallySpaced => Arc::new(EquallySpaced::new()),
+        SamplerChoice::EquallySpaced => Arc::new(EquallySpaced),
         SamplerChoice::Curvature => Arc::new(
             CurvatureAdaptive::new(CURVATURE_EMPHASIS).map_err(PipelineError::SurfaceOptions)?,
         ),

@@ -66,7 +66,7 @@ impl Pipeline {
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::SurfaceInput;
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting};
-    /// let variational = BrooksHorn::new(Lighting::frontal()).with_occluding_rim(true);
+    /// let variational = BrooksHorn::new(Lighting::frontal()).with_occluding_boundary(true);
     /// let pipeline = trial.pipeline()?.with_surface(variational, SurfaceInput::Shading);
     /// let mut press = trial.press(&pipeline)?;
     /// let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());

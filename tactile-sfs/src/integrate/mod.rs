@@ -8,6 +8,8 @@ mod masked;
 pub(crate) mod shift;
 mod tridiagonal;
 
+use std::sync::Arc;
+
 use ndarray::ArrayView2;
 
 pub use cosine_poisson::CosinePoisson;
@@ -29,7 +31,7 @@ use crate::{Domain, Scalar, SfsError, Surface, Workspace};
 /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
 /// // The plane z = 0.3 x − 0.2 y comes back exactly.
 /// let (p, q) = (Array2::from_elem((5, 7), 0.3), Array2::from_elem((5, 7), -0.2));
-/// let surface = CosinePoisson::new().integrate(p.view(), q.view(), &Domain::pixels())?;
+/// let surface = CosinePoisson.integrate(p.view(), q.view(), &Domain::pixels())?;
 /// let z = &surface.heights;
 /// assert!((z[[0, 1]] - z[[0, 0]] - 0.3_f64).abs() < 1e-12);
 /// assert!((z[[1, 0]] - z[[0, 0]] + 0.2).abs() < 1e-12);
@@ -42,7 +44,7 @@ pub trait SlopeIntegrator<T: Scalar> {
     /// use ndarray::Array2;
     /// use tactile_sfs::{Domain, FrankotChellappa, CosinePoisson, SlopeIntegrator, Surface, Workspace};
     /// let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
-    /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson::new(), &FrankotChellappa::new()];
+    /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson, &FrankotChellappa];
     /// let flat = Array2::zeros((16, 16));
     /// for method in methods {
     ///     method.integrate_with(&mut workspace, flat.view(), flat.view(), &Domain::pixels(), &mut surface)?;
@@ -77,3 +79,23 @@ pub trait SlopeIntegrator<T: Scalar> {
         Ok(surface)
     }
 }
+
+/// What is implemented for a value is implemented for a pointer to it.
+macro_rules! forward {
+    ($pointer:ident) => {
+        impl<T: Scalar, M: SlopeIntegrator<T> + ?Sized> SlopeIntegrator<T> for $pointer<M> {
+            fn integrate_with(
+                &self,
+                workspace: &mut Workspace<T>,
+                p: ArrayView2<'_, T>,
+                q: ArrayView2<'_, T>,
+                domain: &Domain<'_, T>,
+                surface: &mut Surface<T>,
+            ) -> Result<(), SfsError> {
+                (**self).integrate_with(workspace, p, q, domain, surface)
+            }
+        }
+    };
+}
+forward!(Box);
+forward!(Arc);

@@ -1,4 +1,4 @@
-//! The constant a slope field leaves open: mean 0, or what known heights demand.
+//! The integration constant: mean height 0, or that of the known heights.
 
 use crate::{Domain, Scalar, Surface};
 

@@ -1,4 +1,4 @@
-//! Height and slope errors against truth.
+//! Errors of heights against truth.
 
 use ndarray::ArrayView2;
 
@@ -176,68 +176,4 @@ fn align(pairs: &[(f64, f64)], alignment: Alignment) -> (f64, f64) {
             (scale, t - scale * z)
         }
     }
-}
-
-/// Errors of slopes: of p, of q, and of their vector difference.
-///
-/// ```
-/// use ndarray::array;
-/// use tactile_sfs::{SlopeError, slope_error};
-/// let (p, q, flat) = (array![[0.3, 0.0]], array![[0.4, 0.0]], array![[0.0, 0.0]]);
-/// let SlopeError { p, q, vector } = slope_error([p.view(), q.view()], [flat.view(), flat.view()])?;
-/// assert_eq!((p.max, q.max), (0.3, 0.4));
-/// assert!((vector.max - 0.5_f64).abs() < 1e-12 && vector.pixels == 2);
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlopeError {
-    /// Error of p = ∂z/∂x.
-    pub p: ErrorSummary,
-    /// Error of q = ∂z/∂y.
-    pub q: ErrorSummary,
-    /// Length of the error vector.
-    pub vector: ErrorSummary,
-}
-
-/// Compares slopes (p, q) with true ones where all four are finite.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{slope_error, slopes};
-/// let z = Array2::from_shape_fn((5, 9), |(_, c)| (c as f64 - 4.0).powi(2)); // p = 2 (x − 4)
-/// let (p, q) = slopes(z.view(), [1.0, 1.0]);
-/// let truth = Array2::from_shape_fn((5, 9), |(_, c)| 2.0 * (c as f64 - 4.0));
-/// let error = slope_error([p.view(), q.view()], [truth.view(), Array2::zeros((5, 9)).view()])?;
-/// assert_eq!((error.p.max, error.q.max), (1.0, 0.0)); // one-sided at the border, exact inside
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-///
-/// # Errors
-/// [`SfsError::ShapeMismatch`]; [`SfsError::EmptyMask`] if no pixel can be compared.
-pub fn slope_error<T: Scalar>(
-    slopes: [ArrayView2<'_, T>; 2],
-    truth: [ArrayView2<'_, T>; 2],
-) -> Result<SlopeError, SfsError> {
-    let (rows, columns) = slopes[0].dim();
-    same_shape(Input::SlopeY, [rows, columns], slopes[1].dim())?;
-    same_shape(Input::Truth, [rows, columns], truth[0].dim())?;
-    same_shape(Input::Truth, [rows, columns], truth[1].dim())?;
-    let errors: Vec<(f64, f64)> = slopes[0]
-        .indexed_iter()
-        .map(|(at, p)| {
-            (
-                (*p - truth[0][at]).as_f64(),
-                (slopes[1][at] - truth[1][at]).as_f64(),
-            )
-        })
-        .filter(|(p, q)| p.is_finite() && q.is_finite())
-        .collect();
-    if errors.is_empty() {
-        return Err(SfsError::EmptyMask);
-    }
-    Ok(SlopeError {
-        p: ErrorSummary::of(errors.iter().map(|e| e.0)),
-        q: ErrorSummary::of(errors.iter().map(|e| e.1)),
-        vector: ErrorSummary::of(errors.iter().map(|e| e.0.hypot(e.1))),
-    })
 }

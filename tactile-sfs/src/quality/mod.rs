@@ -1,8 +1,8 @@
-//! How good a surface is: against truth where there is one, against the image where there is none.
+//! Errors of a surface: against the truth, or against the image where there is none.
 
 mod compare;
 mod shading;
 
-pub use compare::{Alignment, ErrorSummary, HeightError, SlopeError, height_error, slope_error};
+pub use compare::{Alignment, ErrorSummary, HeightError, height_error};
 pub(crate) use shading::slopes_at;
 pub use shading::{Reprojection, render, reprojection, slopes};

@@ -5,8 +5,9 @@
 
 use ndarray::Array2;
 
-use super::depth_table::{DepthTable, Signal};
-use crate::error::{in_range, positive};
+use super::depth_table::DepthTable;
+use super::signal::Signal;
+use crate::error::positive;
 use crate::{Domain, Frame, Scalar, SfsError};
 
 /// Fewest pixels of contact a calibration makes sense for.
@@ -66,7 +67,7 @@ impl<T: Scalar> DepthTable<T> {
     /// ```
     ///
     /// # Errors
-    /// Those of a wrong domain; [`SfsError::InvalidOption`] for a radius or threshold that is not positive, or a contact
+    /// Those of a wrong domain; [`SfsError::NotPositive`] for a radius or threshold that is not positive, or a contact
     /// wider than the ball; [`SfsError::TooFewPixels`] below 100 pixels of contact.
     pub fn from_ball(
         frame: Frame<'_, T>,
@@ -79,16 +80,16 @@ impl<T: Scalar> DepthTable<T> {
         positive("ball radius", ball_radius_m.as_f64())?;
         positive("contact threshold", threshold.as_f64())?;
         let signals = signals(&frame, &signal, domain)?;
-        let step = domain.pixel_size_m.map(Scalar::as_f64);
+        let step = domain.pixel_size_m.map(T::as_f64);
         let found = || contact_circle(&signals, threshold.as_f64(), step);
         let (centre_px, radius) = circle.map_or_else(found, Ok)?;
         let ball = ball_radius_m.as_f64();
-        in_range(
-            "contact radius",
-            "less than the ball's radius",
-            radius,
-            radius < ball,
-        )?;
+        if !(radius < ball) {
+            return Err(SfsError::ContactBeyondBall {
+                found_m: radius,
+                ball_radius_m: ball,
+            });
+        }
         let samples = cap_depths(&signals, step, centre_px, radius, ball)?;
         let entries = monotone_means(&samples)
             .into_iter()

@@ -2,7 +2,7 @@
 //!
 //! Minimises ∫ (R − n·s)² + λ |∇n|² over unit normals by the iteration n ← normalise(n̄ + (R − n̄·s) s/(1 + 4 λ)), n̄ the
 //! mean of the neighbours (the pixel's own equation solved exactly; the printed explicit form diverges for small λ); every few steps the slopes are projected on the integrable ones (in the Fourier domain), and the
-//! heights are those of the last projection. Normals have no infinite slopes, so the occluding rim is an ordinary
+//! heights are those of the last projection. Normals have no infinite slopes, so the occluding boundary is an ordinary
 //! boundary condition: there n lies in the image plane and points outwards.
 
 use rustfft::num_complex::Complex;
@@ -32,12 +32,12 @@ pub struct BrooksHorn<T> {
     smoothness: T,
     iterations: usize,
     project_every: usize,
-    occluding_rim: bool,
+    occluding_boundary: bool,
     max_slope: T,
 }
 
 impl<T: Scalar> BrooksHorn<T> {
-    /// λ = 0.02, 300 steps, a projection every 20, no occluding rim, slopes up to 10.
+    /// λ = 0.02, 300 steps, a projection every 20, no occluding boundary, slopes up to 10.
     pub fn new(lighting: Lighting<T>) -> Self {
         let (smoothness, max_slope) = (T::of(0.02), T::of(10.0));
         Self {
@@ -45,7 +45,7 @@ impl<T: Scalar> BrooksHorn<T> {
             smoothness,
             iterations: 300,
             project_every: 20,
-            occluding_rim: false,
+            occluding_boundary: false,
             max_slope,
         }
     }
@@ -53,7 +53,7 @@ impl<T: Scalar> BrooksHorn<T> {
     /// λ, the weight of smoothness against the image.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_smoothness(self, smoothness: T) -> Result<Self, SfsError> {
         positive("smoothness", smoothness.as_f64())?;
         Ok(Self { smoothness, ..self })
@@ -62,7 +62,7 @@ impl<T: Scalar> BrooksHorn<T> {
     /// Number of steps and of steps between projections.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] if either is 0.
+    /// [`SfsError::NotPositive`] if either is 0.
     pub fn with_iterations(
         self,
         iterations: usize,
@@ -82,23 +82,23 @@ impl<T: Scalar> BrooksHorn<T> {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{BrooksHorn, Domain, Lighting, SurfaceReconstruction};
-    /// // A hemisphere of radius 10 px, vertical at its rim.
+    /// // A hemisphere of radius 10 px, vertical at its boundary.
     /// let z = Array2::from_shape_fn((25, 25), |(r, c)| {
     ///     (100.0 - (r as f64 - 12.0).powi(2) - (c as f64 - 12.0).powi(2)).max(0.0).sqrt()
     /// });
     /// let (image, mask) = (z.mapv(|z| z / 10.0), z.mapv(|z| z > 0.0));
     /// let method = BrooksHorn::new(Lighting::frontal())
-    ///     .with_occluding_rim(true)
+    ///     .with_occluding_boundary(true)
     ///     .with_smoothness(0.05)?
     ///     .with_iterations(100, 20)?
     ///     .with_max_slope(5.0)?;
     /// let heights = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?.heights;
-    /// assert!(heights[[12, 12]] - heights[[12, 4]] > 2.0); // a bump: the rim says so, the light does not
+    /// assert!(heights[[12, 12]] - heights[[12, 4]] > 2.0); // a bump: the boundary says so, the light does not
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
-    pub fn with_occluding_rim(self, occluding_rim: bool) -> Self {
+    pub fn with_occluding_boundary(self, occluding_boundary: bool) -> Self {
         Self {
-            occluding_rim,
+            occluding_boundary,
             ..self
         }
     }
@@ -106,7 +106,7 @@ impl<T: Scalar> BrooksHorn<T> {
     /// Largest slope handed to the projection.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] if negative or not finite.
+    /// [`SfsError::Negative`] if negative or not finite.
     pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
         non_negative("steepest slope", max_slope.as_f64())?;
         Ok(Self { max_slope, ..self })
@@ -190,7 +190,7 @@ impl<T: Scalar> BrooksHorn<T> {
         (sum / T::of(count.max(1) as f64)).sqrt()
     }
 
-    /// Mean normal around a pixel of the frame, that of the occluding rim among them.
+    /// Mean normal around a pixel of the frame, that of the occluding boundary among them.
     fn mean(
         &self,
         field: &FieldBuffers<T>,
@@ -200,7 +200,7 @@ impl<T: Scalar> BrooksHorn<T> {
     ) -> [T; 3] {
         let at = [row - area.top, column - area.left];
         let (mut mean, mut outward) = neighbours(&field.normals, &field.reflectance, area, at);
-        // Where the frame cuts the surface off there is no rim.
+        // Where the frame cuts the surface off there is no boundary.
         let cut = [
             column == 0 || column + 1 == columns,
             row == 0 || row + 1 == rows,
@@ -208,7 +208,7 @@ impl<T: Scalar> BrooksHorn<T> {
         (0..2)
             .filter(|&axis| cut[axis])
             .for_each(|axis| outward[axis] = 0);
-        if self.occluding_rim && outward != [0, 0] {
+        if self.occluding_boundary && outward != [0, 0] {
             let length = T::of(f64::from(outward[0]).hypot(f64::from(outward[1])));
             let out = outward.map(|d| T::of(f64::from(d)) / length);
             mean = [mean[0] + out[0], mean[1] + out[1], mean[2]];

@@ -4,57 +4,14 @@
 //! calibrated table, linearly between the entries. No neighbour is involved, so nothing accumulates; the price is a
 //! calibration and even illumination.
 
-use ndarray::{Array2, ArrayView2, ArrayViewMut2};
+use ndarray::{ArrayView2, ArrayViewMut2};
 
-use crate::domain::same_shape;
-use crate::error::{Input, non_negative};
+use super::signal::Signal;
+use crate::error::non_negative;
 use crate::{
     BoundingBox, Domain, Frame, PixelFlags, Scalar, SfsError, Surface, SurfaceReconstruction,
     Workspace,
 };
-
-/// What is looked up in a [`DepthTable`].
-///
-/// ```
-/// use ndarray::{Array2, array};
-/// use tactile_sfs::{DepthTable, Domain, Signal, SurfaceReconstruction};
-/// let (reference, image) = (Array2::from_elem((1, 2), 200.0), array![[200.0, 180.0]]);
-/// let table = DepthTable::new(&[(0.0, 0.0), (40.0, 1e-3)])?; // a millimetre darkens by 40 grey levels
-/// let method = table.with_signal(Signal::Darkening(reference));
-/// let depth = method.reconstruct(image.view(), &Domain::new([1e-4, 1e-4])?)?.heights;
-/// assert_eq!(depth, array![[0.0, 0.5e-3]]);
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Signal<T> {
-    /// The intensity itself.
-    Intensity,
-    /// Reference minus image: sensors that grow darker with depth.
-    Darkening(Array2<T>),
-    /// Image minus reference: sensors that grow brighter with depth.
-    Brightening(Array2<T>),
-}
-
-impl<T: Scalar> Signal<T> {
-    pub(super) fn check_reference(&self, (rows, columns): (usize, usize)) -> Result<(), SfsError> {
-        match self {
-            Signal::Intensity => Ok(()),
-            Signal::Darkening(reference) | Signal::Brightening(reference) => {
-                same_shape(Input::Reference, [rows, columns], reference.dim())
-            }
-        }
-    }
-
-    pub(super) fn of_pixel(&self, frame: &Frame<'_, T>, row: usize, column: usize) -> T {
-        let intensity = frame.at(row, column);
-        match self {
-            Signal::Intensity => intensity,
-            Signal::Darkening(reference) => reference[[row, column]] - intensity,
-            Signal::Brightening(reference) => intensity - reference[[row, column]],
-        }
-    }
-}
 
 /// Depth from a calibration table of (signal, depth) pairs.
 ///
@@ -115,33 +72,21 @@ impl<T: Scalar> DepthTable<T> {
     /// use tactile_sfs::{DepthTable, Domain, Signal, SurfaceReconstruction};
     /// let dark = array![[20.0, 20.0]];
     /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?
-    ///     .with_signal(Signal::Brightening(dark.clone()))
+    ///     .with_signal(Signal::Brightening(dark))
     ///     .with_contact_threshold(2.0)?; // the camera's noise
     /// let depth = table.reconstruct(array![[21.5, 25.0]].view(), &Domain::new([1e-4, 1e-4])?)?.heights;
     /// assert_eq!(depth, array![[0.0, 0.5e-3]]); // 1.5 above the reference is no contact yet
-    /// assert_eq!(table.signal(), &Signal::Brightening(dark));
-    /// assert_eq!(table.entries().last(), Some(&(10.0, 1e-3)));
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite and not negative.
+    /// [`SfsError::Negative`] unless finite and not negative.
     pub fn with_contact_threshold(self, threshold: T) -> Result<Self, SfsError> {
         non_negative("contact threshold", threshold.as_f64())?;
         Ok(Self {
             contact_threshold: threshold,
             ..self
         })
-    }
-
-    /// What is looked up.
-    pub fn signal(&self) -> &Signal<T> {
-        &self.signal
-    }
-
-    /// The (signal, depth) pairs.
-    pub fn entries(&self) -> &[(T, T)] {
-        &self.entries
     }
 
     /// Depth of a signal and whether the signal lies within the table.

@@ -6,21 +6,24 @@ mod depth_table;
 mod eikonal;
 mod pentland;
 mod reflectance;
+mod signal;
 mod tsai_shah;
+
+use std::sync::Arc;
 
 use ndarray::ArrayView2;
 
 pub use ball_calibration::BallCalibration;
 pub use brooks_horn::BrooksHorn;
-pub use depth_table::{DepthTable, Signal};
+pub use depth_table::DepthTable;
 pub(crate) use eikonal::EikonalBuffers;
-pub use eikonal::{Branch, Eikonal, Rim};
+pub use eikonal::{BoundaryCondition, Branch, Eikonal};
 pub use pentland::Pentland;
 pub(crate) use reflectance::FieldBuffers;
+pub use signal::Signal;
 pub use tsai_shah::TsaiShah;
 
 use crate::{Domain, Frame, Scalar, SfsError, Surface, Workspace};
-use std::sync::Arc;
 
 /// A way from one image to a surface.
 ///
@@ -29,14 +32,14 @@ use std::sync::Arc;
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{Domain, Eikonal, Lighting, Rim, SurfaceReconstruction};
+/// use tactile_sfs::{Domain, Eikonal, Lighting, BoundaryCondition, SurfaceReconstruction};
 ///
 /// // A cone of slope 1 has n·s = 1/√2 everywhere.
 /// let (size, radius) = (41, 15.0_f64);
 /// let distance = |r: usize, c: usize| (r as f64 - 20.0).hypot(c as f64 - 20.0);
 /// let mask = Array2::from_shape_fn((size, size), |(r, c)| distance(r, c) < radius);
 /// let image = Array2::from_elem((size, size), 0.5_f64.sqrt());
-/// let method = Eikonal::new(Lighting::frontal()).with_rim(Rim::Height(0.0))?;
+/// let method = Eikonal::new(Lighting::frontal()).with_boundary(BoundaryCondition::Height(0.0))?;
 /// let surface = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?;
 /// assert!((surface.heights[[20, 20]] - radius).abs() < 1.5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -107,26 +110,23 @@ pub trait SurfaceReconstruction<T: Scalar> {
     }
 }
 
-impl<T: Scalar, R: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T> for Box<R> {
-    fn reconstruct_with(
-        &self,
-        workspace: &mut Workspace<T>,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-        surface: &mut Surface<T>,
-    ) -> Result<(), SfsError> {
-        (**self).reconstruct_with(workspace, frame, domain, surface)
-    }
+/// What is implemented for a value is implemented for a pointer to it.
+macro_rules! forward {
+    ($pointer:ident) => {
+        impl<T: Scalar, M: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T>
+            for $pointer<M>
+        {
+            fn reconstruct_with(
+                &self,
+                workspace: &mut Workspace<T>,
+                frame: Frame<'_, T>,
+                domain: &Domain<'_, T>,
+                surface: &mut Surface<T>,
+            ) -> Result<(), SfsError> {
+                (**self).reconstruct_with(workspace, frame, domain, surface)
+            }
+        }
+    };
 }
-
-impl<T: Scalar, R: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T> for Arc<R> {
-    fn reconstruct_with(
-        &self,
-        workspace: &mut Workspace<T>,
-        frame: Frame<'_, T>,
-        domain: &Domain<'_, T>,
-        surface: &mut Surface<T>,
-    ) -> Result<(), SfsError> {
-        (**self).reconstruct_with(workspace, frame, domain, surface)
-    }
-}
+forward!(Box);
+forward!(Arc);

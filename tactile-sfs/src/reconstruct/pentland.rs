@@ -58,7 +58,7 @@ impl<T: Scalar> Pentland<T> {
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_regularisation(self, regularisation: T) -> Result<Self, SfsError> {
         positive("regularisation", regularisation.as_f64())?;
         Ok(Self {

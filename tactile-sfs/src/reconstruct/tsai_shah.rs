@@ -15,7 +15,7 @@
 //! start. The eikonal method is better wherever a height is known, Brooks–Horn where none is.
 
 use super::FieldBuffers;
-use crate::error::{in_range, positive};
+use crate::error::{finite, positive};
 use crate::integrate::shift::write_levelled;
 use crate::{
     Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface, SurfaceReconstruction,
@@ -45,7 +45,7 @@ pub struct TsaiShah<T> {
 }
 
 impl<T: Scalar> TsaiShah<T> {
-    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the nearest of its rim.
+    /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the nearest point of its boundary.
     pub fn new(lighting: Lighting<T>) -> Self {
         let (noise, max_slope, start_slope) = (T::of(1e-2), T::of(5.0), T::of(0.5));
         Self {
@@ -60,7 +60,7 @@ impl<T: Scalar> TsaiShah<T> {
     /// Number of iterations; more do not make the method converge to the surface.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] for 0.
+    /// [`SfsError::NotPositive`] for 0.
     pub fn with_iterations(self, iterations: usize) -> Result<Self, SfsError> {
         positive("iterations", iterations as f64)?;
         Ok(Self { iterations, ..self })
@@ -69,7 +69,7 @@ impl<T: Scalar> TsaiShah<T> {
     /// Variance W of the reflectance: larger damps more.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_noise(self, noise: T) -> Result<Self, SfsError> {
         positive("noise variance", noise.as_f64())?;
         Ok(Self { noise, ..self })
@@ -78,7 +78,7 @@ impl<T: Scalar> TsaiShah<T> {
     /// Largest slope used in the residual.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
         positive("steepest slope", max_slope.as_f64())?;
         Ok(Self { max_slope, ..self })
@@ -86,32 +86,27 @@ impl<T: Scalar> TsaiShah<T> {
 }
 
 impl<T: Scalar> TsaiShah<T> {
-    /// Slope at the rim of the paraboloid the iteration starts from: positive for a bump, negative for a hollow, 0 for
+    /// Slope at the boundary of the paraboloid the iteration starts from: positive for a bump, negative for a hollow, 0 for
     /// the plane (which frontal light never leaves).
     ///
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
     /// let image = Array2::from_shape_fn((17, 17), |(r, c)| 1.0 - 1e-3 * ((r as f64 - 8.0).powi(2) + (c as f64 - 8.0).powi(2)));
-    /// let rise = |start_slope| {
+    /// let top = |start_slope| {
     ///     let method = TsaiShah::new(Lighting::frontal()).with_noise(0.05)?.with_max_slope(2.0)?.with_start_slope(start_slope)?;
     ///     let z = method.reconstruct(image.view(), &Domain::pixels())?.heights;
     ///     Ok::<f64, tactile_sfs::SfsError>(z[[8, 8]] - z[[8, 1]])
     /// };
-    /// assert!(rise(0.5)? > 0.0 && rise(-0.5)? < 0.0); // bump or hollow: the caller's choice under frontal light
-    /// assert!(rise(0.0)?.abs() < 1e-9);
+    /// assert!(top(0.5)? > 0.0 && top(-0.5)? < 0.0); // bump or hollow: the caller's choice under frontal light
+    /// assert!(top(0.0)?.abs() < 1e-9);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite.
+    /// [`SfsError::NotFinite`] unless finite.
     pub fn with_start_slope(self, start_slope: T) -> Result<Self, SfsError> {
-        in_range(
-            "slope of the start",
-            "a finite slope",
-            start_slope.as_f64(),
-            true,
-        )?;
+        finite("slope of the start", start_slope.as_f64())?;
         Ok(Self {
             start_slope,
             ..self
@@ -152,10 +147,10 @@ impl<T: Scalar> TsaiShah<T> {
         let determinant = xx * yy - xy * xy;
         let largest = 0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy);
         let minor = 2.0 * (determinant / largest).sqrt();
-        let bend = -0.5 * self.start_slope.as_f64() * minor / (4.0 * determinant);
+        let curvature = -0.5 * self.start_slope.as_f64() * minor / (4.0 * determinant);
         for (i, z) in field.heights.iter_mut().enumerate() {
             let (x, y) = (at(i).0 - cx, at(i).1 - cy);
-            *z = T::of(bend * (yy * x * x - 2.0 * xy * x * y + xx * y * y));
+            *z = T::of(curvature * (yy * x * x - 2.0 * xy * x * y + xx * y * y));
         }
     }
 }

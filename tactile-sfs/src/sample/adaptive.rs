@@ -1,4 +1,4 @@
-//! More points where the surface bends.
+//! More points where the surface is curved.
 
 use nalgebra::Point3;
 use ndarray::ArrayView2;
@@ -6,7 +6,7 @@ use ndarray::ArrayView2;
 use super::ControlPointSampler;
 use super::equally_spaced::spread;
 use super::lattice::Lattice;
-use crate::error::in_range;
+use crate::error::non_negative;
 use crate::{Scalar, SfsError, Workspace};
 
 /// Control points whose density grows with curvature: density ∝ 1 + emphasis · √(κ/κ̄), κ the root of the sum of squares
@@ -31,38 +31,14 @@ impl CurvatureAdaptive {
     /// The sampler; emphasis 0 is equal spacing.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless finite and not negative.
+    /// [`SfsError::Negative`] unless finite and not negative.
     pub fn new(emphasis: f64) -> Result<Self, SfsError> {
-        in_range(
-            "emphasis",
-            "a finite number of at least zero",
-            emphasis,
-            emphasis >= 0.0,
-        )?;
+        non_negative("emphasis", emphasis)?;
         Ok(Self { emphasis })
     }
 }
 
 impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
-    fn sample(
-        &self,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
-        count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError> {
-        let mut points = Vec::with_capacity(count);
-        self.sample_with(
-            &mut Workspace::new(),
-            surface,
-            mask,
-            pixel_size_m,
-            count,
-            &mut points,
-        )?;
-        Ok(points)
-    }
-
     fn sample_with(
         &self,
         workspace: &mut Workspace<T>,
@@ -76,19 +52,19 @@ impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
         let buffers = &mut workspace.points;
         let weight = core::mem::take(&mut buffers.weight);
         let mut lattice = Lattice::sparse(surface, mask, pixel_size_m, count, weight)?;
-        let step = pixel_size_m.map(Scalar::as_f64);
-        let bends = &mut buffers.bends;
-        bends.clear();
-        bends.extend(
+        let step = pixel_size_m.map(T::as_f64);
+        let curvatures = &mut buffers.curvatures;
+        curvatures.clear();
+        curvatures.extend(
             lattice
                 .nodes()
-                .map(|node| bend(surface, lattice.pixel(node), step)),
+                .map(|node| curvature(surface, lattice.pixel(node), step)),
         );
-        let mean = bends.iter().sum::<f64>() / bends.len() as f64;
+        let mean = curvatures.iter().sum::<f64>() / curvatures.len() as f64;
         if mean > 0.0 {
             let nodes = lattice.weight.iter_mut().filter(|weight| **weight > 0.0);
-            for (weight, bend) in nodes.zip(bends) {
-                *weight *= 1.0 + self.emphasis * (*bend / mean).sqrt();
+            for (weight, curvature) in nodes.zip(curvatures) {
+                *weight *= 1.0 + self.emphasis * (*curvature / mean).sqrt();
             }
         }
         spread(&lattice, count, buffers, points);
@@ -98,7 +74,11 @@ impl<T: Scalar> ControlPointSampler<T> for CurvatureAdaptive {
 }
 
 /// Root of the sum of squares of the second derivatives that can be formed.
-fn bend<T: Scalar>(z: ArrayView2<'_, T>, [row, column]: [usize; 2], [hx, hy]: [f64; 2]) -> f64 {
+fn curvature<T: Scalar>(
+    z: ArrayView2<'_, T>,
+    [row, column]: [usize; 2],
+    [hx, hy]: [f64; 2],
+) -> f64 {
     let here = z[[row, column]].as_f64();
     let second = |a: [usize; 2], b: [usize; 2], h: f64| -> f64 {
         match (z.get(a), z.get(b)) {

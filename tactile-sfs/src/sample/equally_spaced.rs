@@ -20,7 +20,7 @@ use crate::{Scalar, SfsError, Workspace};
 /// use tactile_sfs::{ControlPointSampler, EquallySpaced};
 /// // Level on the left, a roof of slope √3 on the right: twice the area, hence twice the points.
 /// let z = Array2::from_shape_fn((60, 120), |(_, c)| 3.0_f64.sqrt() * (c as f64 - 60.0).max(0.0));
-/// let points = EquallySpaced::new().sample(z.view(), None, [1.0, 1.0], 90)?;
+/// let points = EquallySpaced.sample(z.view(), None, [1.0, 1.0], 90)?;
 /// let level = points.iter().filter(|point| point.x < 60.0).count();
 /// assert!((27..=33).contains(&level));
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -28,33 +28,7 @@ use crate::{Scalar, SfsError, Workspace};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EquallySpaced;
 
-impl EquallySpaced {
-    /// The sampler; it has no options.
-    pub fn new() -> Self {
-        Self
-    }
-}
-
 impl<T: Scalar> ControlPointSampler<T> for EquallySpaced {
-    fn sample(
-        &self,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
-        count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError> {
-        let mut points = Vec::with_capacity(count);
-        self.sample_with(
-            &mut Workspace::new(),
-            surface,
-            mask,
-            pixel_size_m,
-            count,
-            &mut points,
-        )?;
-        Ok(points)
-    }
-
     fn sample_with(
         &self,
         workspace: &mut Workspace<T>,

@@ -7,6 +7,8 @@ mod lattice;
 mod random;
 mod strips;
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 
@@ -15,47 +17,25 @@ pub use equally_spaced::EquallySpaced;
 pub use random::Random;
 
 use crate::{Scalar, SfsError, Workspace};
-use std::sync::Arc;
 
 /// A way to choose control points on a surface.
 ///
 /// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel; between pixels the height is
 /// interpolated. None lies outside the mask or where the height is not finite, no two coincide, and the same input gives
-/// the same points. Exactly `count` points are returned. Object safe.
+/// the same points. Exactly `count` points are returned. Object safe; an implementor writes
+/// [`sample_with`](Self::sample_with) alone.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{ControlPointSampler, EquallySpaced};
 /// let flat = Array2::<f64>::zeros((60, 80));
-/// let points = EquallySpaced::new().sample(flat.view(), None, [1e-4, 1e-4], 48)?;
+/// let points = EquallySpaced.sample(flat.view(), None, [1e-4, 1e-4], 48)?;
 /// assert_eq!(points.len(), 48);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 pub trait ControlPointSampler<T: Scalar> {
-    /// Chooses `count` points on `surface` inside `mask`.
-    ///
-    /// ```
-    /// use ndarray::array;
-    /// use tactile_sfs::{ControlPointSampler, EquallySpaced};
-    /// let z = array![[5.0, 5.0], [5.0, f64::NAN]];
-    /// let points = EquallySpaced::new().sample(z.view(), None, [1.0, 2.0], 3)?;
-    /// assert!(points.iter().all(|point| point.z == 5.0 && (point.x, point.y) != (1.0, 2.0)));
-    /// # Ok::<(), tactile_sfs::SfsError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`],
-    /// [`SfsError::InvalidOption`] for a pixel size, [`SfsError::TooManyPoints`] for more points than pixels.
-    fn sample(
-        &self,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
-        count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError>;
-
-    /// The same into `points`, whose contents are replaced, with the buffers of `workspace`. The samplers of this crate
-    /// allocate nothing once both have grown; without an override this calls [`sample`](Self::sample).
+    /// Chooses `count` points on `surface` inside `mask` and puts them into `points`, whose contents are replaced, with the
+    /// buffers of `workspace`. The samplers of this crate allocate nothing once both have grown.
     ///
     /// ```
     /// use ndarray::Array2;
@@ -69,7 +49,9 @@ pub trait ControlPointSampler<T: Scalar> {
     /// ```
     ///
     /// # Errors
-    /// As [`sample`](Self::sample); `points` is then empty.
+    /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`],
+    /// [`SfsError::NotPositive`] for a pixel size, [`SfsError::TooManyPoints`] for more points than pixels; `points` is then
+    /// empty.
     fn sample_with(
         &self,
         workspace: &mut Workspace<T>,
@@ -78,15 +60,21 @@ pub trait ControlPointSampler<T: Scalar> {
         pixel_size_m: [T; 2],
         count: usize,
         points: &mut Vec<Point3<T>>,
-    ) -> Result<(), SfsError> {
-        let _ = workspace;
-        points.clear();
-        points.extend(self.sample(surface, mask, pixel_size_m, count)?);
-        Ok(())
-    }
-}
+    ) -> Result<(), SfsError>;
 
-impl<T: Scalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for Box<S> {
+    /// Chooses `count` points on `surface` inside `mask`.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::{ControlPointSampler, EquallySpaced};
+    /// let z = array![[5.0, 5.0], [5.0, f64::NAN]];
+    /// let points = EquallySpaced.sample(z.view(), None, [1.0, 2.0], 3)?;
+    /// assert!(points.iter().all(|point| point.z == 5.0 && (point.x, point.y) != (1.0, 2.0)));
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`sample_with`](Self::sample_with).
     fn sample(
         &self,
         surface: ArrayView2<'_, T>,
@@ -94,45 +82,39 @@ impl<T: Scalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for B
         pixel_size_m: [T; 2],
         count: usize,
     ) -> Result<Vec<Point3<T>>, SfsError> {
-        (**self).sample(surface, mask, pixel_size_m, count)
-    }
-
-    fn sample_with(
-        &self,
-        workspace: &mut Workspace<T>,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
-        count: usize,
-        points: &mut Vec<Point3<T>>,
-    ) -> Result<(), SfsError> {
-        (**self).sample_with(workspace, surface, mask, pixel_size_m, count, points)
+        let mut points = Vec::with_capacity(count);
+        self.sample_with(
+            &mut Workspace::new(),
+            surface,
+            mask,
+            pixel_size_m,
+            count,
+            &mut points,
+        )?;
+        Ok(points)
     }
 }
 
-impl<T: Scalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for Arc<S> {
-    fn sample(
-        &self,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
-        count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError> {
-        (**self).sample(surface, mask, pixel_size_m, count)
-    }
-
-    fn sample_with(
-        &self,
-        workspace: &mut Workspace<T>,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
-        count: usize,
-        points: &mut Vec<Point3<T>>,
-    ) -> Result<(), SfsError> {
-        (**self).sample_with(workspace, surface, mask, pixel_size_m, count, points)
-    }
+/// A sampler behind a pointer is one.
+macro_rules! forward {
+    ($pointer:ident) => {
+        impl<T: Scalar, S: ControlPointSampler<T> + ?Sized> ControlPointSampler<T> for $pointer<S> {
+            fn sample_with(
+                &self,
+                workspace: &mut Workspace<T>,
+                surface: ArrayView2<'_, T>,
+                mask: Option<ArrayView2<'_, bool>>,
+                pixel_size_m: [T; 2],
+                count: usize,
+                points: &mut Vec<Point3<T>>,
+            ) -> Result<(), SfsError> {
+                (**self).sample_with(workspace, surface, mask, pixel_size_m, count, points)
+            }
+        }
+    };
 }
+forward!(Box);
+forward!(Arc);
 
 /// Buffers of the samplers, kept between calls.
 #[derive(Debug, Default)]
@@ -142,7 +124,8 @@ pub(crate) struct SampleBuffers {
     /// Nodes in the order they are cut or drawn, and the key of each.
     nodes: Vec<usize>,
     keys: Vec<(f64, usize)>,
-    bends: Vec<f64>,
+    /// Curvature at the nodes.
+    curvatures: Vec<f64>,
     chosen: Vec<usize>,
     strips: strips::Strips,
     pixels: Vec<[usize; 2]>,

@@ -33,25 +33,6 @@ impl Random {
 }
 
 impl<T: Scalar> ControlPointSampler<T> for Random {
-    fn sample(
-        &self,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
-        count: usize,
-    ) -> Result<Vec<Point3<T>>, SfsError> {
-        let mut points = Vec::with_capacity(count);
-        self.sample_with(
-            &mut Workspace::new(),
-            surface,
-            mask,
-            pixel_size_m,
-            count,
-            &mut points,
-        )?;
-        Ok(points)
-    }
-
     fn sample_with(
         &self,
         workspace: &mut Workspace<T>,

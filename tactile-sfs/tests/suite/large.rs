@@ -23,7 +23,9 @@ fn paraboloid(radius: f32) -> (Array2<f32>, Array2<bool>, Array2<u8>) {
 fn check(radius: f32) {
     let (z, mask, image) = paraboloid(radius);
     let light = Lighting::frontal().with_normal_intensity(255.0).unwrap();
-    let method = Eikonal::new(light).with_rim(Rim::Height(0.0)).unwrap();
+    let method = Eikonal::new(light)
+        .with_boundary(BoundaryCondition::Height(0.0))
+        .unwrap();
     let surface = method
         .reconstruct_u8(image.view(), &Domain::pixels().with_mask(mask.view()))
         .unwrap();

@@ -1,12 +1,12 @@
 //! The tests of `tactile-sfs`, in one program: the generic code is compiled once for all of them.
 
 mod behaviour;
+mod boundaries;
 mod common;
 mod invariants;
 mod large;
 mod measured;
 mod order;
 mod recorded;
-mod rims;
 mod samplers;
 mod stability_scale;

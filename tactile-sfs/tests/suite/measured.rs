@@ -76,7 +76,9 @@ fn survey_vase_from_its_rim() {
             0
         }
     });
-    let method = Eikonal::new(light).with_rim(Rim::Height(0.0)).unwrap();
+    let method = Eikonal::new(light)
+        .with_boundary(BoundaryCondition::Height(0.0))
+        .unwrap();
     let surface = method
         .reconstruct_u8(image.view(), &Domain::pixels().with_mask(mask.view()))
         .unwrap();

@@ -4,8 +4,8 @@
 use crate::common::{Sampled, Shape, ellipsoid, gaussian, paraboloid, sphere, waves};
 use ndarray::Array2;
 use tactile_sfs::{
-    Alignment, Branch, CosinePoisson, Domain, Eikonal, Lighting, MaskedLeastSquares, Rim,
-    SlopeIntegrator, StopReason, SurfaceReconstruction, height_error,
+    Alignment, BoundaryCondition, Branch, CosinePoisson, Domain, Eikonal, Lighting,
+    MaskedLeastSquares, SlopeIntegrator, StopReason, SurfaceReconstruction, height_error,
 };
 
 const SIZES: [usize; 3] = [64, 128, 256];
@@ -24,10 +24,10 @@ fn rising(n: usize, shape: Shape) -> f64 {
         .unwrap()
         .with_mask(sampled.mask.view());
     let method = Eikonal::new(Lighting::frontal())
-        .with_rim(Rim::Height(0.0))
+        .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
     let surface = method
-        .with_branch(Branch::Rising)
+        .with_branch(Branch::Convex)
         .reconstruct(sampled.image.view(), &domain)
         .unwrap();
     let error = height_error(
@@ -53,7 +53,7 @@ fn falling(n: usize, shape: Shape) -> f64 {
         .unwrap()
         .with_mask(sampled.mask.view())
         .with_known_heights(known.view());
-    let method = Eikonal::new(Lighting::frontal()).with_branch(Branch::Falling);
+    let method = Eikonal::new(Lighting::frontal()).with_branch(Branch::Concave);
     let surface = method.reconstruct(sampled.image.view(), &domain).unwrap();
     let error = height_error(
         surface.heights.view(),
@@ -117,7 +117,7 @@ fn integrators_are_of_fourth_order() {
     };
     for shape in [gaussian as Shape, waves] {
         for method in [
-            &CosinePoisson::new() as &dyn SlopeIntegrator<f64>,
+            &CosinePoisson as &dyn SlopeIntegrator<f64>,
             &MaskedLeastSquares::new(),
         ] {
             let errors = SIZES.map(|n| solve(n, method, shape));
@@ -142,7 +142,7 @@ fn pixels_need_not_be_square() {
     let image = z.mapv(|z| z / 0.8);
     let domain = Domain::new([wide, high]).unwrap().with_mask(mask.view());
     let method = Eikonal::new(Lighting::frontal())
-        .with_rim(Rim::Height(0.0))
+        .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
     let surface = method.reconstruct(image.view(), &domain).unwrap();
     let error = height_error(
@@ -164,7 +164,7 @@ fn pixels_need_not_be_square() {
     });
     let domain = Domain::new([wide, high]).unwrap();
     for method in [
-        &CosinePoisson::new() as &dyn SlopeIntegrator<f64>,
+        &CosinePoisson as &dyn SlopeIntegrator<f64>,
         &MaskedLeastSquares::new(),
     ] {
         let surface = method.integrate(p.view(), q.view(), &domain).unwrap();

@@ -6,11 +6,10 @@ use std::fmt::Write as _;
 
 use ndarray::Array2;
 use tactile_sfs::{
-    Alignment, Branch, BrooksHorn, ControlPointSampler, CosinePoisson, CurvatureAdaptive,
-    DepthTable, Domain, Eikonal, EquallySpaced, Frame, FrankotChellappa, Lighting,
-    MaskedLeastSquares, Pentland, Random, Rim, Signal, SlopeIntegrator, Surface,
-    SurfaceReconstruction, TsaiShah, estimate_lighting, height_error, render, reprojection,
-    slope_error, slopes,
+    Alignment, BoundaryCondition, Branch, BrooksHorn, ControlPointSampler, CosinePoisson,
+    CurvatureAdaptive, DepthTable, Domain, Eikonal, EquallySpaced, Frame, FrankotChellappa,
+    Lighting, MaskedLeastSquares, Pentland, Random, Signal, SlopeIntegrator, Surface,
+    SurfaceReconstruction, TsaiShah, estimate_lighting, height_error, render, reprojection, slopes,
 };
 
 use super::common::{Sampled, ellipsoid, gaussian, paraboloid, sphere, waves};
@@ -64,7 +63,7 @@ fn reconstructions(answers: &mut Answers) {
     let oblique = Lighting::new([0.3, -0.2, 1.0]).expect("a light");
     let frontal = Lighting::frontal();
     let steep = Eikonal::new(frontal)
-        .with_rim(Rim::Height(0.1))
+        .with_boundary(BoundaryCondition::Height(0.1))
         .expect("a height");
     for (name, shape) in [
         ("sphere", sphere as super::common::Shape),
@@ -82,7 +81,7 @@ fn reconstructions(answers: &mut Answers) {
         answers.add_surface(&format!("eikonal/{name}"), &solve(&steep, &scene.image));
         let lit = render(scene.z.view(), [scene.pixel; 2], &oblique);
         let oblique_steep = Eikonal::new(oblique)
-            .with_rim(Rim::Height(0.0))
+            .with_boundary(BoundaryCondition::Height(0.0))
             .expect("a height");
         answers.add_surface(
             &format!("eikonal_oblique/{name}"),
@@ -95,7 +94,7 @@ fn reconstructions(answers: &mut Answers) {
         answers.add_surface(
             &format!("brooks_horn/{name}"),
             &solve(
-                &BrooksHorn::new(frontal).with_occluding_rim(true),
+                &BrooksHorn::new(frontal).with_occluding_boundary(true),
                 &scene.image,
             ),
         );
@@ -160,8 +159,8 @@ fn integrators(answers: &mut Answers) {
     known[[30, 24]] = 0.1;
     let whole = Domain::new([scene.pixel, 1.2 * scene.pixel]).expect("a size");
     let masked = whole.with_mask(disc.view());
-    let poisson = CosinePoisson::new();
-    let fourier = FrankotChellappa::new();
+    let poisson = CosinePoisson;
+    let fourier = FrankotChellappa;
     let squares = MaskedLeastSquares::new();
     let methods: [(&str, &dyn SlopeIntegrator<f64>); 3] = [
         ("poisson", &poisson),
@@ -185,7 +184,7 @@ fn integrators(answers: &mut Answers) {
 fn samplers(answers: &mut Answers) {
     let scene = Sampled::new(SIDE, ellipsoid);
     let adaptive = CurvatureAdaptive::new(4.0).expect("an emphasis");
-    let (even, random) = (EquallySpaced::new(), Random::new(11));
+    let (even, random) = (EquallySpaced, Random::new(11));
     let samplers: [(&str, &dyn ControlPointSampler<f64>); 3] = [
         ("equally_spaced", &even),
         ("adaptive", &adaptive),
@@ -223,8 +222,12 @@ fn quality(answers: &mut Answers) {
         );
     }
     let (p, q) = slopes(scene.z.view(), [scene.pixel; 2]);
-    let error = slope_error([p.view(), q.view()], [scene.p.view(), scene.q.view()]);
-    answers.add("slope_error", [error.expect("errors").vector.rms]);
+    let of_slope = |found: &Array2<f64>, truth: &Array2<f64>| {
+        let error = height_error(found.view(), truth.view(), None, Alignment::None);
+        error.expect("errors").error.rms
+    };
+    let length = of_slope(&p, &scene.p).hypot(of_slope(&q, &scene.q));
+    answers.add("slope_error", [length]);
     let image = render(scene.z.view(), [scene.pixel; 2], &light);
     let frame = Frame::Real(image.view());
     let found = reprojection(other.z.view(), frame, [scene.pixel; 2], &light).expect("errors");

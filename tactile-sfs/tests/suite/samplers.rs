@@ -6,7 +6,7 @@ use tactile_sfs::*;
 
 fn samplers() -> [Box<dyn ControlPointSampler<f64>>; 3] {
     [
-        Box::new(EquallySpaced::new()),
+        Box::new(EquallySpaced),
         Box::new(Random::new(3)),
         Box::new(CurvatureAdaptive::new(2.0).unwrap()),
     ]
@@ -107,7 +107,7 @@ fn the_same_surface_larger_gives_the_same_points_of_it() {
         })
     };
     let sample = |n: usize| {
-        EquallySpaced::new()
+        EquallySpaced
             .sample(bump(n).view(), None, [1.0; 2], 120)
             .unwrap()
     };
@@ -127,7 +127,7 @@ fn the_same_surface_larger_gives_the_same_points_of_it() {
 fn equal_spacing_is_even_on_the_surface() {
     let case = Sampled::new(200, gaussian);
     let z = case.z.mapv(|z| 3.0 * z);
-    let points = EquallySpaced::new()
+    let points = EquallySpaced
         .sample(z.view(), None, [case.pixel; 2], 200)
         .unwrap();
     let nearest: Vec<f64> = points

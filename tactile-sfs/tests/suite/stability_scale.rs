@@ -20,13 +20,13 @@ fn integrators() -> [Integrators; 3] {
     [
         (
             "Frankot-Chellappa",
-            Box::new(FrankotChellappa::new()),
-            Box::new(FrankotChellappa::new()),
+            Box::new(FrankotChellappa),
+            Box::new(FrankotChellappa),
         ),
         (
             "cosine Poisson",
-            Box::new(CosinePoisson::new()),
-            Box::new(CosinePoisson::new()),
+            Box::new(CosinePoisson),
+            Box::new(CosinePoisson),
         ),
         (
             "masked least squares",
@@ -93,7 +93,11 @@ fn saturated_and_constant_images_have_surfaces() {
     let methods: [(&str, Box<dyn SurfaceReconstruction<f64>>); 4] = [
         (
             "eikonal",
-            Box::new(Eikonal::new(light).with_rim(Rim::Height(0.0)).unwrap()),
+            Box::new(
+                Eikonal::new(light)
+                    .with_boundary(BoundaryCondition::Height(0.0))
+                    .unwrap(),
+            ),
         ),
         ("Tsai-Shah", Box::new(TsaiShah::new(light))),
         (

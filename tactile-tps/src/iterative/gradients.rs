@@ -5,24 +5,25 @@ use core::ops::ControlFlow;
 use super::{Iterative, Vectors};
 use crate::{
     Kernel, Progress, Stage,
-    cholesky::HEAD,
+    equations::{Buffers, Solution},
     evaluate::Sum,
+    layout::HEAD,
     null_space::{MAX, NullSpace, dot, ratio},
     product::Subtract,
     progress::Watch,
-    refine::{Buffers, Solution, largest, relative},
+    residual::{largest, relative},
     simd::dispatch,
     system::System,
 };
 
 /// Steps at most.
 const STEPS: usize = 200;
-/// Times the iteration starts afresh from a residual formed anew, which rounding had taken it away from.
+/// Restarts from a recomputed residual, from which rounding has made the iterated one drift.
 const STARTS: usize = 3;
 /// Steps without the residual halving after which rounding is taken to allow no more.
 const PATIENCE: usize = 25;
 
-/// One run: what it solves and how far it goes.
+/// One run: its system and its stopping rule.
 pub(crate) struct Run<'a, K, const D: usize> {
     pub(crate) kernel: &'a K,
     pub(crate) system: &'a System<D>,
@@ -32,7 +33,7 @@ pub(crate) struct Run<'a, K, const D: usize> {
 }
 
 impl<K: Kernel, const D: usize> Run<'_, K, D> {
-    /// Solves for the targets in `buffers`; weights come there. Stops early if `watch` says so.
+    /// Solves for the targets in `buffers`; weights come there. Stops early if `watch` returns `Break`.
     pub(crate) fn solve<const M: usize>(
         &self,
         buffers: &mut Buffers,
@@ -45,12 +46,14 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
             vectors,
             ..
         } = buffers;
-        let sites = targets.len() / M;
+        let centres = targets.len() / M;
         let Vectors {
             target, solution, ..
         } = vectors;
         target.clear();
-        (0..M).for_each(|m| target.extend(active.iter().map(|&site| targets[m * sites + site])));
+        (0..M).for_each(|m| {
+            target.extend(active.iter().map(|&centre| targets[m * centres + centre]))
+        });
         solution.clear();
         solution.resize(M * n, 0.0);
         let (mut answer, mut broken) = (Solution::new([[0.0; MAX]; M], 1.0), false);
@@ -66,12 +69,12 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
             broken = self.steps::<M>(vectors, &mut answer, watch).is_break();
         }
         weights.clear();
-        weights.resize(M * sites, 0.0);
+        weights.resize(M * centres, 0.0);
         for (m, column) in vectors.solution.chunks_exact(n).enumerate() {
             active
                 .iter()
                 .zip(column)
-                .for_each(|(&site, w)| weights[m * sites + site] = *w);
+                .for_each(|(&centre, w)| weights[m * centres + centre] = *w);
         }
         answer
     }

@@ -1,4 +1,4 @@
-//! Thousands of points without a matrix: preconditioned conjugate gradients with kernel sums formed afresh.
+//! Matrix-free solution for thousands of points: preconditioned conjugate gradients.
 //!
 //! The dense factor takes n³/3 operations and 8n² bytes. Here a step takes one sum over all pairs, n² kernels and no memory,
 //! and the preconditioner keeps the steps few whatever n. On the complement of the affine functions the matrix is definite,
@@ -12,8 +12,8 @@ use core::ops::ControlFlow;
 
 use crate::{
     Kernel, Progress, Stage,
+    centres::Centres,
     progress::Watch,
-    sites::Sites,
     system::{Setting, System},
 };
 pub(crate) use gradients::Run;
@@ -35,7 +35,7 @@ pub(crate) struct Vectors {
 /// Points from coarse to fine with their preconditioner.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Iterative<const D: usize> {
-    /// Coordinates of the active sites in order, axis by axis.
+    /// Coordinates of the active centres in order, axis by axis.
     axes: Vec<Vec<f64>>,
     /// λ/weight of each, empty without λ.
     diagonal: Vec<f64>,
@@ -52,8 +52,8 @@ impl<const D: usize> Iterative<D> {
         system: &mut System<D>,
         watch: &mut Watch<'_>,
     ) -> ControlFlow<()> {
-        system.choose(setting.sites.len(), weights, false);
-        let spacing = self.arrange(setting.sites, system);
+        system.choose(setting.centres.len(), weights, false);
+        let spacing = self.arrange(setting.centres, system);
         system.outline(setting);
         let weights: Vec<f64> = system
             .active
@@ -67,7 +67,7 @@ impl<const D: usize> Iterative<D> {
         }
         let ordered = Ordered {
             kernel: setting.kernel,
-            sites: setting.sites,
+            centres: setting.centres,
             order: &system.active,
             axes: core::array::from_fn(|k| &self.axes[k][..]),
             spacing: &spacing,
@@ -87,9 +87,9 @@ impl<const D: usize> Iterative<D> {
     }
 
     /// Orders the active points from coarse to fine; returns the squared distance of each to the nearest before it.
-    fn arrange(&mut self, sites: &Sites<D>, system: &mut System<D>) -> Vec<f64> {
+    fn arrange(&mut self, centres: &Centres<D>, system: &mut System<D>) -> Vec<f64> {
         let gathered = |order: &[usize]| -> Vec<Vec<f64>> {
-            sites
+            centres
                 .axes
                 .iter()
                 .map(|axis| order.iter().map(|&i| axis[i]).collect())

@@ -1,4 +1,4 @@
-//! From coarse to fine: an order of the points in which every next one is the farthest from those before it.
+//! Farthest-point order: from coarse to fine, every point the farthest from those before it.
 
 use crate::{
     real::Lane,

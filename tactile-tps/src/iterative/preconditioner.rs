@@ -11,11 +11,11 @@ use core::ops::ControlFlow;
 use super::ordering::Nearest;
 use crate::{
     Kernel,
-    sites::Sites,
+    centres::Centres,
     system::{Setting, System},
 };
 
-/// Earlier points a point is predicted from: with more the set-up costs more, with fewer there are more steps.
+/// Earlier points that a point is predicted from: with more the set-up costs more, with fewer there are more steps.
 const NEIGHBOURS: usize = 64;
 /// Points of the coarsest level, which are solved for exactly.
 const COARSE: usize = 512;
@@ -36,8 +36,8 @@ pub(crate) struct Preconditioner<const D: usize> {
 /// The points in order and what stands on the diagonal.
 pub(crate) struct Ordered<'a, K, const D: usize> {
     pub(crate) kernel: &'a K,
-    pub(crate) sites: &'a Sites<D>,
-    /// Site of each point.
+    pub(crate) centres: &'a Centres<D>,
+    /// Centre of each point.
     pub(crate) order: &'a [usize],
     pub(crate) axes: [&'a [f64]; D],
     /// Squared distance to the nearest before it.
@@ -52,11 +52,11 @@ impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
     fn factor(
         &self,
         places: &[usize],
-        local: &mut Sites<D>,
+        local: &mut Centres<D>,
         weights: &mut Vec<f64>,
         system: &mut System<D>,
     ) -> bool {
-        self.sites
+        self.centres
             .select(places.iter().map(|&i| self.order[i]), local);
         weights.clear();
         if !self.weights.is_empty() {
@@ -64,7 +64,7 @@ impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
         }
         let setting = Setting {
             kernel: self.kernel,
-            sites: local,
+            centres: local,
             rank_tolerance: 0.0,
         };
         system.factor(&setting, weights, self.lambda).is_ok() && !system.indefinite
@@ -74,7 +74,7 @@ impl<K: Kernel, const D: usize> Ordered<'_, K, D> {
 /// Splines of value one at the last of a few points and zero at the others, one after the other.
 struct Cardinal<'a, K, const D: usize> {
     points: &'a Ordered<'a, K, D>,
-    local: Sites<D>,
+    local: Centres<D>,
     local_weights: Vec<f64>,
     system: System<D>,
     unit: Vec<f64>,
@@ -83,7 +83,7 @@ struct Cardinal<'a, K, const D: usize> {
 
 impl<'a, K: Kernel, const D: usize> Cardinal<'a, K, D> {
     fn new(points: &'a Ordered<'a, K, D>) -> Self {
-        let (local, system) = (points.sites.clone(), System::default());
+        let (local, system) = (points.centres.clone(), System::default());
         Self {
             points,
             local,
@@ -115,7 +115,7 @@ impl<'a, K: Kernel, const D: usize> Cardinal<'a, K, D> {
 }
 
 impl<const D: usize> Preconditioner<D> {
-    /// Builds the factor; O(n m³ + n²) for m neighbours. Breaks off if `watch`, told how many points are done, says so.
+    /// Builds the factor; O(n m³ + n²) for m neighbours. Stops if `watch`, which hears how many points are done, returns `Break`.
     pub(crate) fn build<K: Kernel>(
         &mut self,
         points: &Ordered<'_, K, D>,
@@ -126,7 +126,7 @@ impl<const D: usize> Preconditioner<D> {
         let first: Vec<usize> = (0..self.coarse_points).collect();
         if !points.factor(
             &first,
-            &mut points.sites.clone(),
+            &mut points.centres.clone(),
             &mut Vec::new(),
             &mut self.coarse,
         ) {

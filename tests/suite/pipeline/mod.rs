@@ -13,7 +13,7 @@ use tactile_imaging::pipeline::{
     BallFit, FrameSource, ImageFolder, Object, PipelineError, Press, Report, Session, SkipReason,
     Skips, Stage, Trial, Update, contacts,
 };
-use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError};
+use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError, Workspace};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
@@ -197,18 +197,20 @@ fn surfaces_of_the_box_alone_equal_those_of_the_whole_frame() {
     }
 }
 
-/// A sampler of one's own: half as many points.
+/// A user's sampler: half as many points.
 struct Half;
 
 impl ControlPointSampler<f64> for Half {
-    fn sample(
+    fn sample_with(
         &self,
+        workspace: &mut Workspace<f64>,
         surface: ArrayView2<'_, f64>,
         mask: Option<ArrayView2<'_, bool>>,
         pixel_size_m: [f64; 2],
         count: usize,
-    ) -> Result<Vec<Point3<f64>>, SfsError> {
-        EquallySpaced::new().sample(surface, mask, pixel_size_m, count / 2)
+        points: &mut Vec<Point3<f64>>,
+    ) -> Result<(), SfsError> {
+        EquallySpaced.sample_with(workspace, surface, mask, pixel_size_m, count / 2, points)
     }
 }
 

@@ -113,7 +113,7 @@ impl Level {
 }
 
 /// Share of the coarse node across the edge of a block in a linear interpolation whose flux is continuous: a quarter where
-/// all weights are equal, none without an edge. `first` tells on which side of its block the node lies.
+/// all weights are equal, none without an edge. `first` is the side of its block on which the node lies.
 fn lean(before: f32, after: f32, first: bool) -> f32 {
     let across = if first { before } else { after };
     if across > 0.0 {

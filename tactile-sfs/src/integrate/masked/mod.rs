@@ -70,7 +70,7 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
     /// Relative residual at which the solve ends.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] unless positive and finite.
+    /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_tolerance(self, tolerance: T) -> Result<Self, SfsError> {
         positive("tolerance", tolerance.as_f64())?;
         Ok(Self { tolerance, ..self })
@@ -79,7 +79,7 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
     /// Most steps of conjugate gradients.
     ///
     /// # Errors
-    /// [`SfsError::InvalidOption`] for 0.
+    /// [`SfsError::NotPositive`] for 0.
     pub fn with_max_iterations(self, max_iterations: usize) -> Result<Self, SfsError> {
         positive("most iterations", max_iterations as f64)?;
         Ok(Self {
@@ -192,7 +192,7 @@ fn solve_directly<T: Scalar>(
     domain: &Domain<'_, T>,
     surface: &mut Surface<T>,
 ) -> Result<bool, SfsError> {
-    match CosinePoisson::new().integrate_with(workspace, p, q, domain, surface) {
+    match CosinePoisson.integrate_with(workspace, p, q, domain, surface) {
         Ok(()) => {
             let BoundingBox { top, left, .. } = surface.bounding_box;
             let pixels = surface.bounding_box.area();

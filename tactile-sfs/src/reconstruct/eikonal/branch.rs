@@ -8,7 +8,7 @@ use crate::{Lighting, Scalar};
 const UNREACHED: f64 = 0.01;
 
 impl<T: Scalar> EikonalBuffers<T> {
-    /// Whether the kept rising branch, shaded again, is at least as near to the image as the falling one in `value`.
+    /// Whether the kept convex branch, shaded again, is at least as near to the image as the concave one in `value`.
     pub(super) fn kept_is_better(&self, lighting: &Lighting<T>) -> bool {
         let light = lighting.direction();
         self.misfit(&self.kept, T::one(), light) <= self.misfit(&self.value, -T::one(), light)

@@ -4,8 +4,8 @@
 //! With the direction φ of the gradient, p²/n_x² + q²/n_y² = cos²φ_x + sin²φ_y, φ_x and φ_y in those two places. A second
 //! solve with k = 1 + cos²φ_x − cos²φ_y, φ from the first, removes that error (deferred correction).
 
+use super::boundary;
 use super::grid::{EikonalBuffers, Node};
-use super::rim;
 use crate::Scalar;
 
 /// Sweeps in one of four orders; returns the largest change.
@@ -27,9 +27,9 @@ pub(super) fn sweep<T: Scalar>(grid: &mut EikonalBuffers<T>, order: usize, toler
     change
 }
 
-/// Stores cos²φ of the solution's gradient for the second solve. Next to the rim, where one-sided differences of a height
-/// that may rise like a square root would tell nothing about its direction, that of ∇ sin θ is taken: both are normal to
-/// the rim.
+/// Stores cos²φ of the solution's gradient for the second solve. Next to the boundary, where one-sided differences of a
+/// height that may rise like a square root say nothing about its direction, that of ∇ sin θ is taken: both are normal to
+/// the boundary.
 pub(super) fn measure_directions<T: Scalar>(grid: &mut EikonalBuffers<T>) {
     let width = grid.width;
     for i in width..grid.node.len() - width {
@@ -40,8 +40,8 @@ pub(super) fn measure_directions<T: Scalar>(grid: &mut EikonalBuffers<T>) {
         let p = value[i + 1] - value[i - 1];
         let q = (value[i + width] - value[i - width]) / grid.aspect;
         let along_x = p * p / (p * p + q * q);
-        grid.along_x[i] = if along_x.is_nan() && !grid.rise[i].is_nan() {
-            rim::along_x(grid, i)
+        grid.along_x[i] = if along_x.is_nan() && !grid.offset[i].is_nan() {
+            boundary::along_x(grid, i)
         } else {
             along_x
         };

@@ -1,6 +1,5 @@
 //! The padded grid of the mask's bounding box the sweeps run on, in units of a pixel's width.
 
-use super::rim;
 use crate::{Domain, PixelFlags, Scalar, Surface};
 
 /// What a node of the grid is.
@@ -31,12 +30,12 @@ pub(crate) struct EikonalBuffers<T> {
     pub(super) sine: Vec<T>,
     /// Given heights: inside the mask at the pixel's centre, outside it at the mask's border; NaN elsewhere.
     pub(super) given: Vec<T>,
-    /// Height of the branch (its negative when falling), +∞ where not reached.
+    /// Height of the convex branch, or minus that of the concave one; +∞ where not reached.
     pub(super) value: Vec<T>,
     /// Values of the branch solved first.
     pub(super) kept: Vec<T>,
-    /// Height of a node above the rim next to it, NaN away from the rim.
-    pub(super) rise: Vec<T>,
+    /// Boundary offset: height of a node above the boundary next to it, NaN away from the boundary.
+    pub(super) offset: Vec<T>,
     /// 1/(slope · step)² of the edge to the next node in x and in y.
     pub(super) edges: Vec<[T; 2]>,
     /// cos²φ of the gradient of an earlier solution, and whether sweeps use it.
@@ -56,7 +55,7 @@ impl<T: Scalar> EikonalBuffers<T> {
         fill(&mut self.sine, length, T::zero());
         fill(&mut self.given, length, T::nan());
         fill(&mut self.value, length, T::infinity());
-        fill(&mut self.rise, length, T::nan());
+        fill(&mut self.offset, length, T::nan());
         fill(&mut self.edges, length, [T::one(); 2]);
         fill(&mut self.along_x, length, T::nan());
         self.corrected = false;
@@ -81,21 +80,6 @@ impl<T: Scalar> EikonalBuffers<T> {
             if self.node[i - 1] == Node::Outside {
                 self.edges[i - 1] = [T::one(); 2];
             }
-        }
-    }
-
-    /// Sets the values sweeping starts from.
-    pub(super) fn start(&mut self, rising: bool) {
-        let sign = if rising { T::one() } else { -T::one() };
-        for i in self.width..self.node.len() - self.width {
-            self.active[i] = self.node[i] == Node::Unknown;
-            self.value[i] = match self.node[i] {
-                Node::Known => sign * self.given[i],
-                Node::Unknown if !self.rise[i].is_nan() => {
-                    rim::lowest(self, i, sign) + self.rise[i]
-                }
-                _ => T::infinity(),
-            };
         }
     }
 

@@ -1,7 +1,7 @@
-//! From the frame to the grid: nodes, angles to the light, known heights, rim and edges.
+//! From the frame to the grid: nodes, angles to the light, known heights, boundary offsets and edges.
 
+use super::boundary;
 use super::grid::{EikonalBuffers, Node};
-use super::rim;
 use crate::{BoundingBox, Domain, Frame, Lighting, PixelFlags, Scalar, SfsError, Surface};
 
 /// What a solve starts from.
@@ -12,7 +12,7 @@ pub(super) struct Input<'a, 'f, 'd, T> {
     /// Darkest reflectance that is told from black.
     pub(super) least: T,
     /// Height at the mask's border.
-    pub(super) rim: Option<T>,
+    pub(super) boundary: Option<T>,
 }
 
 /// How many heights are known.
@@ -40,8 +40,10 @@ impl<T: Scalar> EikonalBuffers<T> {
                 .max(T::zero())
                 .sqrt();
         }
-        rim::measure(self);
-        if count.inside == 0 && (count.border == 0 || self.rise.iter().all(|rise| rise.is_nan())) {
+        boundary::measure(self);
+        if count.inside == 0
+            && (count.border == 0 || self.offset.iter().all(|offset| offset.is_nan()))
+        {
             return Err(SfsError::NoKnownHeight);
         }
         self.measure_edges();
@@ -63,7 +65,7 @@ impl<T: Scalar> EikonalBuffers<T> {
                 if in_box && input.domain.contains(row, column) {
                     surface.flags[at] = self.load_node(input, i, at);
                     count.inside += usize::from(self.node[i] == Node::Known);
-                } else if let Some(height) = input.domain.known(row, column).or(input.rim) {
+                } else if let Some(height) = input.domain.known(row, column).or(input.boundary) {
                     self.given[i] = height / width;
                     count.border += 1;
                 }

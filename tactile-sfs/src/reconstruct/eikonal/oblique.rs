@@ -7,12 +7,12 @@ use crate::Scalar;
 pub(super) fn sweep<T: Scalar>(
     grid: &mut EikonalBuffers<T>,
     [x, y, z]: [T; 3],
-    rising: bool,
+    convex: bool,
     order: usize,
     tolerance: T,
 ) -> T {
-    // The falling branch is the rising one of −z, which the mirrored light shades alike.
-    let light = if rising { [x, y, z] } else { [-x, -y, z] };
+    // The concave branch is the convex one of −z, which the mirrored light shades alike.
+    let light = if convex { [x, y, z] } else { [-x, -y, z] };
     let width = grid.width;
     let rows = grid.node.len() / width;
     let mut change = T::zero();

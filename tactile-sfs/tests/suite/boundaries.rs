@@ -11,7 +11,7 @@ fn spread(radius: f64, centre: [f64; 2], count: usize) -> f64 {
         (radius * radius - square(r, c)).max(0.0).sqrt()
     });
     let mask = Array2::from_shape_fn((n, n), |(r, c)| square(r, c) < radius * radius);
-    let points = EquallySpaced::new()
+    let points = EquallySpaced
         .sample(z.view(), Some(mask.view()), [1.0; 2], count)
         .unwrap();
     let middle = points

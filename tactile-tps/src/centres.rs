@@ -4,8 +4,8 @@ use nalgebra::Point;
 
 use crate::{
     Scalar, TpsError,
+    double_double::{DoubleDouble, two_sum},
     error::Input,
-    twofold::{Twofold, two_sum},
 };
 
 /// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power of two.
@@ -55,29 +55,29 @@ fn power_of_two(x: f64) -> f64 {
 
 /// Distinct points in their frame, and which input point went where.
 #[derive(Clone, Debug)]
-pub(crate) struct Sites<const D: usize> {
+pub(crate) struct Centres<const D: usize> {
     pub(crate) frame: Frame<D>,
     /// Coordinates in the frame, axis by axis.
     pub(crate) axes: [Vec<f64>; D],
     /// What rounding took from them.
     low: [Vec<f64>; D],
-    /// First input point of every site, ascending.
+    /// First input point of every centre, ascending.
     pub(crate) first: Vec<usize>,
-    /// Site of every input point; empty if they are the same.
-    pub(crate) site_of: Vec<usize>,
+    /// Centre of every input point; empty if they are the same.
+    pub(crate) centre_of: Vec<usize>,
     /// Rounding of the coordinates, relative to the frame.
     pub(crate) grain: f64,
     inputs: usize,
 }
 
-impl<const D: usize> Sites<D> {
+impl<const D: usize> Centres<D> {
     pub(crate) fn new<T: Scalar>(points: &[Point<T, D>], rescale: bool) -> Result<Self, TpsError> {
         if points.is_empty() {
             return Err(TpsError::Empty(Input::Sources));
         }
         finite(points, Input::Sources)?;
         let frame = Frame::around(points, rescale);
-        let (first, site_of) = merge(points);
+        let (first, centre_of) = merge(points);
         let exact = |i: usize, k: usize| two_sum(points[i][k].widen(), -frame.centre[k]);
         let axes = core::array::from_fn(|k| {
             first
@@ -100,22 +100,22 @@ impl<const D: usize> Sites<D> {
             axes,
             low,
             first,
-            site_of,
+            centre_of,
             grain: largest / frame.scale * T::UNIT_ROUNDOFF,
             inputs: points.len(),
         })
     }
 
-    /// Replaces `local` by these sites alone, in the same frame.
-    pub(crate) fn select(&self, sites: impl Iterator<Item = usize> + Clone, local: &mut Self) {
+    /// Replaces `local` by these centres alone, in the same frame.
+    pub(crate) fn select(&self, centres: impl Iterator<Item = usize> + Clone, local: &mut Self) {
         for k in 0..D {
             local.axes[k].clear();
-            local.axes[k].extend(sites.clone().map(|i| self.axes[k][i]));
+            local.axes[k].extend(centres.clone().map(|i| self.axes[k][i]));
             local.low[k].clear();
-            local.low[k].extend(sites.clone().map(|i| self.low[k][i]));
+            local.low[k].extend(centres.clone().map(|i| self.low[k][i]));
         }
         local.first.clear();
-        local.first.extend(sites.map(|i| self.first[i]));
+        local.first.extend(centres.map(|i| self.first[i]));
     }
 
     /// Number of distinct points.
@@ -123,11 +123,11 @@ impl<const D: usize> Sites<D> {
         self.first.len()
     }
 
-    /// A site's coordinates without rounding.
-    pub(crate) fn precise(&self, site: usize) -> [Twofold; D] {
-        core::array::from_fn(|k| Twofold {
-            high: self.axes[k][site],
-            low: self.low[k][site],
+    /// The exact coordinates of a centre.
+    pub(crate) fn precise(&self, centre: usize) -> [DoubleDouble; D] {
+        core::array::from_fn(|k| DoubleDouble {
+            high: self.axes[k][centre],
+            low: self.low[k][centre],
         })
     }
 
@@ -136,13 +136,13 @@ impl<const D: usize> Sites<D> {
         self.inputs
     }
 
-    /// Site of input point `i`.
+    /// Centre of input point `i`.
     #[inline(always)]
-    pub(crate) fn site(&self, i: usize) -> usize {
-        if self.site_of.is_empty() {
+    pub(crate) fn centre(&self, i: usize) -> usize {
+        if self.centre_of.is_empty() {
             i
         } else {
-            self.site_of[i]
+            self.centre_of[i]
         }
     }
 }
@@ -179,12 +179,12 @@ fn merge<T: Scalar, const D: usize>(points: &[Point<T, D>]) -> (Vec<usize>, Vec<
         }
     }
     let first: Vec<usize> = (0..points.len()).filter(|&i| leader[i] == i).collect();
-    let mut site_of = vec![0; points.len()];
-    for (site, &i) in first.iter().enumerate() {
-        site_of[i] = site;
+    let mut centre_of = vec![0; points.len()];
+    for (centre, &i) in first.iter().enumerate() {
+        centre_of[i] = centre;
     }
     for i in 0..points.len() {
-        site_of[i] = site_of[leader[i]];
+        centre_of[i] = centre_of[leader[i]];
     }
-    (first, site_of)
+    (first, centre_of)
 }

@@ -1,4 +1,4 @@
-//! Twice the working precision: unevaluated sums of two `f64` (Dekker 1971; Joldes, Muller & Popescu 2017).
+//! Double-double arithmetic: unevaluated sums of two `f64` (Dekker 1971; Joldes, Muller & Popescu 2017).
 
 use core::{
     cmp::Ordering,
@@ -9,17 +9,17 @@ use crate::real::Real;
 
 /// high + low with |low| at most half a unit in the last place of high: about 31 decimal digits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Twofold {
+pub(crate) struct DoubleDouble {
     pub(crate) high: f64,
     pub(crate) low: f64,
 }
 
 /// a + b and what rounding took from it.
 #[inline(always)]
-pub(crate) fn two_sum(a: f64, b: f64) -> Twofold {
+pub(crate) fn two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
     let part = high - a;
-    Twofold {
+    DoubleDouble {
         high,
         low: (a - (high - part)) + (b - part),
     }
@@ -27,24 +27,24 @@ pub(crate) fn two_sum(a: f64, b: f64) -> Twofold {
 
 /// The same for |a| ≥ |b|.
 #[inline(always)]
-fn quick_two_sum(a: f64, b: f64) -> Twofold {
+fn quick_two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
-    Twofold {
+    DoubleDouble {
         high,
         low: b - (high - a),
     }
 }
 
 #[inline(always)]
-fn two_product(a: f64, b: f64) -> Twofold {
+fn two_product(a: f64, b: f64) -> DoubleDouble {
     let high = a * b;
-    Twofold {
+    DoubleDouble {
         high,
         low: a.mul_add(b, -high),
     }
 }
 
-impl Twofold {
+impl DoubleDouble {
     pub(crate) const ZERO: Self = Self {
         high: 0.0,
         low: 0.0,
@@ -60,7 +60,7 @@ impl Twofold {
     }
 }
 
-impl Add for Twofold {
+impl Add for DoubleDouble {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -70,7 +70,7 @@ impl Add for Twofold {
     }
 }
 
-impl Neg for Twofold {
+impl Neg for DoubleDouble {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -81,7 +81,7 @@ impl Neg for Twofold {
     }
 }
 
-impl Sub for Twofold {
+impl Sub for DoubleDouble {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -89,7 +89,7 @@ impl Sub for Twofold {
     }
 }
 
-impl Mul for Twofold {
+impl Mul for DoubleDouble {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -99,7 +99,7 @@ impl Mul for Twofold {
     }
 }
 
-impl Div for Twofold {
+impl Div for DoubleDouble {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -111,7 +111,7 @@ impl Div for Twofold {
     }
 }
 
-impl PartialOrd for Twofold {
+impl PartialOrd for DoubleDouble {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         match self.high.partial_cmp(&other.high) {
             Some(Ordering::Equal) => self.low.partial_cmp(&other.low),
@@ -120,7 +120,7 @@ impl PartialOrd for Twofold {
     }
 }
 
-impl Real for Twofold {
+impl Real for DoubleDouble {
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         Self { high: x, low: 0.0 }
@@ -176,7 +176,7 @@ impl Real for Twofold {
 }
 
 /// ln 2 to twice the working precision.
-const LN_2: Twofold = Twofold {
+const LN_2: DoubleDouble = DoubleDouble {
     high: core::f64::consts::LN_2,
     low: 2.319_046_813_846_299_6e-17,
 };
@@ -186,7 +186,7 @@ mod tests {
     use super::*;
 
     /// Relative distance of two numbers that should be equal to some 31 digits.
-    fn off(a: Twofold, b: Twofold) -> f64 {
+    fn off(a: DoubleDouble, b: DoubleDouble) -> f64 {
         ((a - b).high / b.high).abs()
     }
 
@@ -196,8 +196,8 @@ mod tests {
     #[test]
     fn inverse_operations_undo_each_other() {
         for i in 1..200 {
-            let x = Twofold::from_f64(f64::from(i) * 0.37) / Twofold::from_f64(7.0);
-            let y = Twofold::from_f64(f64::from(i * i)) / Twofold::from_f64(11.0);
+            let x = DoubleDouble::from_f64(f64::from(i) * 0.37) / DoubleDouble::from_f64(7.0);
+            let y = DoubleDouble::from_f64(f64::from(i * i)) / DoubleDouble::from_f64(11.0);
             assert!(off(x / y * y, x) < CLOSE);
             assert!(off(x.sqrt() * x.sqrt(), x) < CLOSE);
             assert!(off(x.ln().exp(), x) < 1e-28, "{x:?}");
@@ -207,14 +207,14 @@ mod tests {
 
     #[test]
     fn logarithms_of_powers_and_products_agree() {
-        let ten = Twofold::from_f64(10.0).ln();
+        let ten = DoubleDouble::from_f64(10.0).ln();
         // ln 10 = 2.302585092994045684017991454684364207601101488628772976033…
-        let expected = Twofold {
+        let expected = DoubleDouble {
             high: core::f64::consts::LN_10,
             low: -2.170_756_223_382_249_4e-16,
         };
         assert!(off(ten, expected) < CLOSE);
-        let hundred = Twofold::from_f64(100.0).ln();
+        let hundred = DoubleDouble::from_f64(100.0).ln();
         assert!(off(hundred, ten + ten) < CLOSE);
     }
 }
