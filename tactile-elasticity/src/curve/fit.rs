@@ -92,7 +92,7 @@ pub struct CurveFit {
     pub youngs_modulus_pa: f64,
     /// Its standard error, from the 95 % interval's width.
     pub standard_error_pa: f64,
-    /// 95 % interval by profile likelihood.
+    /// 95 % interval by profile likelihood, and by the error that finite strain makes in the law.
     pub interval_95: Interval<f64>,
     /// Position where contact begins.
     pub contact_point_m: f64,
@@ -162,7 +162,7 @@ pub fn fit_curve(
             }
         }
     };
-    Ok(report(&problem, &best, nu, options))
+    Ok(report(&problem, &best, nu, options, indenter))
 }
 
 fn solve(problem: &Problem<'_>, contact: ContactPoint) -> Result<Profile, ElasticityError> {
@@ -184,7 +184,13 @@ fn worth_an_offset(plain: &Profile, shifted: &Profile, n: usize) -> bool {
     n * (plain.squares / shifted.squares).ln() > n.ln()
 }
 
-fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions) -> CurveFit {
+fn report(
+    problem: &Problem<'_>,
+    best: &Profile,
+    nu: f64,
+    options: &CurveOptions,
+    indenter: &Indenter,
+) -> CurveFit {
     let (curve, law) = (problem.curve, problem.law);
     let n = curve.force_n().len();
     let parameters = 1
@@ -211,9 +217,11 @@ fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions
         options.contact_point,
     );
     let to_modulus = 1.0 - nu * nu;
-    let (lower, upper) = (limits.0 * to_modulus, limits.1 * to_modulus);
     let minus_two_log = n as f64 * (best.squares / n as f64).ln();
     let depth = curve.span().1 - best.contact_m;
+    let model_error = indenter.model_error(law, depth);
+    let (lower, upper) = widened(limits, best.modulus, model_error);
+    let (lower, upper) = (lower * to_modulus, upper * to_modulus);
     let contact_ratio = law.contact_ratio(None, Some(depth));
     CurveFit {
         model: law.kind(),
@@ -233,6 +241,17 @@ fn report(problem: &Problem<'_>, best: &Profile, nu: f64, options: &CurveOptions
         statistics: FitStatistics::new(n, parameters + 1, best.squares, minus_two_log),
         warnings: warnings(law, depth, contact_ratio, n - 1),
     }
+}
+
+/// Limits around a modulus with the law's own standard error of ln F, which no number of points averages away.
+fn widened((lower, upper): (f64, f64), modulus: f64, model_error: f64) -> (f64, f64) {
+    if model_error == 0.0 {
+        return (lower, upper);
+    }
+    let own = quantile_95(None) * model_error;
+    let below = (modulus / lower).ln().hypot(own);
+    let above = (upper / modulus).ln().hypot(own);
+    (modulus * (-below).exp(), modulus * above.exp())
 }
 
 fn force(law: &dyn ContactLaw, p: &Profile, z: f64) -> f64 {

@@ -1,9 +1,10 @@
 //! What presses on what, and the laws that may describe it.
 
-use crate::contact::Bond;
+use crate::contact::{Bond, Waveguide};
 use crate::error::ElasticityError;
 use crate::modulus::{
     ConeLaw, ContactLaw, EstimatorKind, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw,
+    TipOnBallLaw, WaveguideLaw,
 };
 
 /// A rigid indenter and its sample. Lengths in m.
@@ -33,6 +34,13 @@ pub enum Indenter {
     Ball {
         /// The ball's radius.
         radius_m: f64,
+    },
+    /// A rigid spherical tip on a soft ball that lies on a rigid plate; the indentation is the tip's travel.
+    TipOnBall {
+        /// The tip's radius.
+        tip_radius_m: f64,
+        /// The ball's radius.
+        ball_radius_m: f64,
     },
     /// A flat circular punch.
     Punch {
@@ -82,9 +90,28 @@ impl Indenter {
             Self::Sphere {
                 thickness_m: None, ..
             } => vec![K::HertzSphere],
-            Self::Ball { .. } => vec![K::TataraSphere, K::HertzSphere],
+            Self::Ball { .. } => vec![K::SphereOnFlat, K::TataraSphere, K::HertzSphere],
+            Self::TipOnBall { .. } => vec![K::TipOnBall],
             Self::Punch { .. } => vec![K::FlatPunch],
             Self::Cone { .. } => vec![K::Cone],
+        }
+    }
+
+    /// Standard error of ln F that the law of this indenter makes at an indentation, by finite strain above all.
+    ///
+    /// Against finite elements (neo-Hookean half balls, ν = 0.495) Hertz's law of a ball's indentation carries 5 % too much at
+    /// δ/R = 0.02, 12 % at 0.08 and 28 % at 0.21; Tatara's 5 % and 9 % at the first and last. A rigid sphere's own roundness
+    /// takes 4 % off Hertz's force at δ/R = 0.42.
+    pub(crate) fn model_error(&self, law: &dyn ContactLaw, indentation: f64) -> f64 {
+        let own = law.model_error(None, Some(indentation));
+        let Some(ratio) = law.contact_ratio(None, Some(indentation)) else {
+            return own;
+        };
+        match (self, law.kind()) {
+            (_, EstimatorKind::SphereOnFlat) => own,
+            (_, EstimatorKind::TataraSphere) => 0.2 * ratio,
+            (Self::Ball { .. } | Self::TipOnBall { .. }, _) => 0.35 * ratio + 0.5 * ratio * ratio,
+            _ => 0.1 * ratio * ratio,
         }
     }
 
@@ -108,6 +135,21 @@ impl Indenter {
             (Self::Sphere { radius_m, .. } | Self::Ball { radius_m }, K::HertzSphere) => {
                 Ok(Some(Box::new(Sphere::new(radius_m)?)))
             }
+            (Self::Ball { radius_m }, K::SphereOnFlat) => {
+                let flat = Waveguide::rigid();
+                let law = WaveguideLaw::new(radius_m, nu, &flat, Bond::Bonded)?;
+                Ok(Some(Box::new(law)))
+            }
+            (
+                Self::TipOnBall {
+                    tip_radius_m,
+                    ball_radius_m,
+                },
+                K::TipOnBall,
+            ) => Ok(Some(Box::new(TipOnBallLaw::new(
+                tip_radius_m,
+                ball_radius_m,
+            )?))),
             (Self::Ball { radius_m }, K::TataraSphere) => {
                 Ok(Some(Box::new(TataraLaw::new(radius_m, nu)?)))
             }

@@ -22,9 +22,9 @@ pub use contact::{
 pub use estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-pub use law::{
-    ConeLaw, ContactLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw,
-    WaveguideLaw,
+pub use law::LayerTheory;
+pub(crate) use law::{
+    ConeLaw, ContactLaw, LayerLaw, Punch, Sphere, TataraLaw, TipOnBallLaw, WaveguideLaw,
 };
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};

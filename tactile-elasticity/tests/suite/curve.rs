@@ -186,6 +186,27 @@ fn squeezed_balls_are_tataras() {
     assert!(found.chosen().warnings.is_empty());
 }
 
+/// Both contacts of the ball take part: δ = (3F/4E*)^⅔ (R₁^(−⅓) + R₂^(−⅓)).
+#[test]
+fn a_tip_on_a_ball_on_a_plate() {
+    let (tip, ball, reduced) = (2e-3_f64, 5e-3_f64, E / (1.0 - NU * NU));
+    let forces: Vec<f64> = (1..40).map(|i| 1e-5 * f64::from(i)).collect();
+    let depth = |f: f64| {
+        let relative = tip * ball / (tip + ball);
+        (0.75 * f / reduced).powf(2.0 / 3.0) * (relative.powf(-1.0 / 3.0) + ball.powf(-1.0 / 3.0))
+    };
+    let z: Vec<f64> = forces.iter().map(|&f| depth(f)).collect();
+    let curve = IndentationCurve::new(&z, &forces).unwrap();
+    let indenter = Indenter::TipOnBall {
+        tip_radius_m: tip,
+        ball_radius_m: ball,
+    };
+    let found = select_model(&curve, &indenter, NU, Model::Auto, &CurveOptions::default());
+    let found = found.unwrap();
+    assert_eq!(found.chosen().model, EstimatorKind::TipOnBall);
+    assert!((found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-6);
+}
+
 #[test]
 fn bad_curves_are_named() {
     use ElasticityError as Bad;

@@ -56,7 +56,6 @@ pub enum Evidence {
 /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
 /// let loads = LoadSeries::new([load]);
 /// let rigid = HertzSphere::new(5e-3, 0.5)?;
-/// assert_eq!(rigid.law().kind(), EstimatorKind::HertzSphere);
 /// let plain = rigid.estimate(&loads)?;
 ///
 /// // What yields beside the sample makes it stiffer than it looked.
@@ -91,11 +90,6 @@ impl<L: ContactLaw> ContactEstimator<L> {
             other_compliance_per_pa: 0.0,
             evidence: Evidence::All,
         })
-    }
-
-    /// The law.
-    pub fn law(&self) -> &L {
-        &self.law
     }
 
     /// The other body of the contact yields too.

@@ -36,16 +36,6 @@ pub enum LayerTheory {
 }
 
 /// The layer is the sample and the sphere presses it.
-///
-/// ```
-/// use tactile_elasticity::contact::Bond;
-/// use tactile_elasticity::modulus::{BondedLayer, ContactLaw, EstimatorKind, LayerLaw, LayerTheory};
-///
-/// let estimator = BondedLayer::new(5e-3_f64, 2e-3, 0.5, Bond::Free, LayerTheory::IntegralEquation)?;
-/// let law: &LayerLaw = estimator.law();
-/// assert_eq!(law.kind(), EstimatorKind::FreeLayerIntegralEquation);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerLaw {
     sphere: Sphere,

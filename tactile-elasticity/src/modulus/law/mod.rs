@@ -4,14 +4,17 @@ mod finite_strain;
 mod half_space;
 mod layer;
 mod tatara;
+mod tip_on_ball;
 mod two_contacts;
 mod waveguide;
 
-pub use half_space::{ConeLaw, Punch, Sphere};
-pub use layer::{LayerLaw, LayerTheory};
-pub use tatara::TataraLaw;
-pub use two_contacts::TwoContactsLaw;
-pub use waveguide::WaveguideLaw;
+pub(crate) use half_space::{ConeLaw, Punch, Sphere};
+pub(crate) use layer::LayerLaw;
+pub use layer::LayerTheory;
+pub(crate) use tatara::TataraLaw;
+pub(crate) use tip_on_ball::TipOnBallLaw;
+pub(crate) use two_contacts::TwoContactsLaw;
+pub(crate) use waveguide::WaveguideLaw;
 
 use crate::modulus::EstimatorKind;
 
@@ -26,37 +29,25 @@ pub struct LogForce {
 /// A law F = E* f(x), implemented by this crate's indenters.
 ///
 /// `share` is the other body's part of 1/E*, in [0, 1): 0 where it is rigid. Most laws do not depend on it.
-///
-/// ```
-/// use tactile_elasticity::modulus::{ContactLaw, EstimatorKind, FlatPunch};
-///
-/// assert_eq!(FlatPunch::new(1e-3_f64, 0.5)?.law().kind(), EstimatorKind::FlatPunch);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
 pub trait ContactLaw {
     /// Which estimator the law makes.
     fn kind(&self) -> EstimatorKind;
 
     /// ln f of a contact radius (m); None where the radius says nothing or the law does not reach so far.
-    #[doc(hidden)]
     fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce>;
 
     /// ln f of an indentation (m); None where it says nothing or the law does not reach so far.
-    #[doc(hidden)]
     fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce>;
 
     /// a/R of what was measured, for laws with a radius.
-    #[doc(hidden)]
     fn contact_ratio(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> Option<f64>;
 
     /// The largest a/R for which the law is meant.
-    #[doc(hidden)]
     fn contact_ratio_limit(&self) -> f64 {
         f64::INFINITY
     }
 
     /// Contact over layer thickness and its limit, for laws with a layer.
-    #[doc(hidden)]
     fn layer_ratio(
         &self,
         _contact_radius: Option<f64>,
@@ -66,19 +57,16 @@ pub trait ContactLaw {
     }
 
     /// Whether f depends on the share.
-    #[doc(hidden)]
     fn depends_on_share(&self) -> bool {
         false
     }
 
     /// The share from which the share that belongs to the answer is sought.
-    #[doc(hidden)]
     fn first_share(&self) -> f64 {
         0.0
     }
 
     /// Standard error of ln F that is the law's own, the same at every load of one size.
-    #[doc(hidden)]
     fn model_error(&self, _contact_radius: Option<f64>, _indentation: Option<f64>) -> f64 {
         0.0
     }

@@ -8,14 +8,6 @@ use crate::scalar::widen;
 use nalgebra::RealField;
 
 /// Tatara's sphere: Hertz's radius, and an indentation lessened by the far contact; the sample is the sphere.
-///
-/// ```
-/// use tactile_elasticity::modulus::{ContactEstimator, TataraLaw, TataraSphere};
-///
-/// let estimator: ContactEstimator<TataraLaw> = TataraSphere::new(3e-3_f64, 0.5)?;
-/// assert_ne!(*estimator.law(), *TataraSphere::new(3e-3_f64, 0.3)?.law());
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TataraLaw {
     sphere: Sphere,

@@ -10,14 +10,6 @@ use nalgebra::RealField;
 ///
 /// Both carry F, and δ ∝ (F/E*)^⅔ at each: with s the other body's share of 1/E* at the near contact,
 /// δ = δ_near (1 + (1 − s)^⅔). The contact radius is the near one's.
-///
-/// ```
-/// use tactile_elasticity::modulus::{ContactEstimator, SphereBetweenPlates, TwoContactsLaw};
-///
-/// let estimator: ContactEstimator<TwoContactsLaw> = SphereBetweenPlates::new(3e-3_f64, 0.5)?;
-/// assert_ne!(*estimator.law(), *SphereBetweenPlates::new(4e-3_f64, 0.5)?.law());
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoContactsLaw {
     sphere: Sphere,

@@ -119,7 +119,10 @@ struct Contact {
 
 impl ContactLaw for WaveguideLaw {
     fn kind(&self) -> EstimatorKind {
-        EstimatorKind::SphereOnWaveguide
+        match self.layers {
+            Some(_) => EstimatorKind::SphereOnWaveguide,
+            None => EstimatorKind::SphereOnFlat,
+        }
     }
 
     fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce> {

@@ -2,6 +2,9 @@
 
 use super::*;
 use std::path::PathBuf;
+use tactile_elasticity::curve::{
+    Baseline, ContactPoint, CurveOptions, IndentationCurve, Indenter, fit_curve,
+};
 
 /// A load of a scene: force, contact radius.
 struct Scene {
@@ -93,5 +96,42 @@ fn balls_are_read_through_layers_and_on_a_flat() {
                 assert!(covered, "{} {evidence:?}: {gap}", scene.name);
             }
         }
+    }
+}
+
+/// The indentations of all balls on a rigid flat as one curve: in units of E and R they are one ball.
+#[test]
+fn a_curve_of_a_soft_ball_is_read_at_finite_strain() {
+    let scenes = scenes();
+    let on_flat = scenes.iter().filter(|s| s.guide.layers().is_empty());
+    let (radius, modulus, nu) = (3e-3, SAMPLE, 0.495);
+    let mut points = vec![(0.0, 0.0)];
+    for scene in on_flat {
+        let force_unit = scene.youngs_modulus_pa * scene.radius_m.powi(2);
+        let depths = scene.loads.iter().map(|l| l.indentation_m.unwrap().value);
+        points.extend(depths.zip(&scene.loads).map(|(depth, load)| {
+            let force = load.force_n.value / force_unit * modulus * radius * radius;
+            (depth / scene.radius_m * radius, force)
+        }));
+    }
+    points.retain(|p| p.0 < 0.24 * radius);
+    if points.len() < 2 {
+        return; // no data
+    }
+    let (z, f): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+    let curve = IndentationCurve::new(&z, &f).unwrap();
+    let ball = Indenter::Ball { radius_m: radius };
+    let options = CurveOptions {
+        baseline: Baseline::Zero,
+        contact_point: ContactPoint::At(0.0),
+    };
+    let fit = |kind| fit_curve(&curve, &ball, nu, kind, &options).unwrap();
+    let found = fit(EstimatorKind::SphereOnFlat);
+    assert!((found.youngs_modulus_pa / modulus - 1.0).abs() < 0.02);
+    // Hertz is a quarter off, and its interval says so.
+    let hertz = fit(EstimatorKind::HertzSphere);
+    assert!((hertz.youngs_modulus_pa / modulus - 1.0).abs() > 0.15);
+    for fit in [found, hertz] {
+        assert!(fit.interval_95.contains(modulus), "{}", fit.model);
     }
 }
