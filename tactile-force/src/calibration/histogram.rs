@@ -37,11 +37,13 @@ impl Default for GreyHistogram {
 
 impl GreyHistogram {
     /// Sorts the differences of a contact's pixels, in grey levels, each covering `pixel_area_m2`. Differences beyond ±255 count
-    /// as ±255.
+    /// as ±255; NaN is left out.
     pub fn from_differences(differences: impl Iterator<Item = f32>, pixel_area_m2: f64) -> Self {
         let mut histogram = Self::default();
         histogram.clear(pixel_area_m2);
-        differences.for_each(|d| histogram.add(d));
+        differences
+            .filter(|d| !d.is_nan())
+            .for_each(|d| histogram.add(d));
         histogram
     }
 
@@ -62,8 +64,7 @@ impl GreyHistogram {
     }
 
     pub(crate) fn add(&mut self, difference: f32) {
-        // `max` takes the number where the other is NaN.
-        let place = f64::from(difference.max(-255.0).min(255.0)) - f64::from(LEAST);
+        let place = f64::from(difference.clamp(-255.0, 255.0)) - f64::from(LEAST);
         let below = place as usize;
         let share = place - below as f64;
         self.area_m2[below] += (1.0 - share) * self.pixel_area_m2;

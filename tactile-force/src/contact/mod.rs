@@ -14,9 +14,11 @@ mod runs;
 mod summary;
 mod suspect;
 mod threshold;
+mod workspace;
 
-pub use detector::{ContactDetector, DetectorWorkspace};
+pub use detector::ContactDetector;
 pub use options::ContactOptions;
+pub use workspace::DetectorWorkspace;
 
 pub(crate) use region::Region;
 

@@ -30,13 +30,15 @@ pub struct DotPair {
 /// use tactile_force::{DotPair, LensFit, LensGeometry};
 ///
 /// let truth = LensGeometry::new([20e-6, 21e-6])?.with_distortion([159.5, 119.5], 199.3, [0.04, 0.002])?;
-/// // 9 × 7 dots, 0.7 mm apart, on a target that lies askew.
+/// // 9 × 7 dots, 0.7 mm apart, on a target turned by 20 mrad.
 /// let (sin, cos) = 0.02_f64.sin_cos();
-/// let dots: Vec<DotPair> = (0..63)
-///     .map(|k| [0.7e-3 * f64::from(k % 9), 0.7e-3 * f64::from(k / 9)])
-///     .map(|t| [0.3e-3 + cos * t[0] - sin * t[1], 0.2e-3 + sin * t[0] + cos * t[1]].into_iter().chain(t).collect::<Vec<_>>())
-///     .map(|p| DotPair { pixel: truth.to_pixels([p[0], p[1]]).unwrap(), target_m: [p[2], p[3]] })
-///     .collect();
+/// let mut dots = Vec::new();
+/// for k in 0..63 {
+///     let target_m = [0.7e-3 * f64::from(k % 9), 0.7e-3 * f64::from(k / 9)];
+///     let [x, y] = target_m;
+///     let place = [0.3e-3 + cos * x - sin * y, 0.2e-3 + sin * x + cos * y];
+///     dots.push(DotPair { pixel: truth.to_pixels(place).unwrap(), target_m });
+/// }
 /// let fit = LensFit::from_dots(&dots, (240, 320))?;
 /// assert!((fit.pixel_size_m[1].value / 21e-6 - 1.0).abs() < 1e-9);
 /// assert!((fit.distortion[0].value - 0.04).abs() < 1e-6);

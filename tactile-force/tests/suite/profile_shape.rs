@@ -1,4 +1,5 @@
 //! A contact that is not a ball's says so.
+#![allow(clippy::print_stdout)]
 
 use ndarray::Array2;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -9,6 +10,9 @@ use tactile_force::{
 };
 
 use crate::simulated::{SHAPE, Sensor, measure};
+
+/// Light at (x, y).
+type Level = dyn Fn(f64, f64) -> f64;
 
 /// The profile fitted to a contact whose light is `level` at (x, y) in units of a radius of 35 pixels, 120 grey levels at 1.
 fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit<f64> {
@@ -37,8 +41,12 @@ fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit<f64> {
     measure(&frame(true), &reference, &line).profile.unwrap()
 }
 
+fn radius2(x: f64, y: f64) -> f64 {
+    x * x + y * y
+}
+
 fn ball(x: f64, y: f64) -> f64 {
-    (1.0 - x * x - y * y).max(0.0).sqrt()
+    (1.0 - radius2(x, y)).max(0.0).sqrt()
 }
 
 #[test]
@@ -58,8 +66,7 @@ fn balls_are_balls() {
 
 #[test]
 fn punches_pads_ellipses_and_rings_are_not() {
-    let radius2 = |x: f64, y: f64| x * x + y * y;
-    let shapes: [(&str, &dyn Fn(f64, f64) -> f64); 5] = [
+    let shapes: [(&str, &Level); 5] = [
         ("flat punch", &|x, y| {
             if radius2(x, y) < 0.999 {
                 0.5 / (1.0 - radius2(x, y)).sqrt().max(0.4)

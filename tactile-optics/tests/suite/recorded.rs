@@ -49,7 +49,8 @@ fn closed_forms<T: Real>(answers: &mut Answers, scalar: &str) {
         (1.38, 1.0),
         (1.41, 1.0),
         (1.3, 1.0),
-        (1.4142, 1.0),
+        // Just below √2, where every ray is trapped.
+        (14_142.0 / 10_000.0, 1.0),
         (1.5, 1.33),
         (1.0001, 1.0),
     ] {

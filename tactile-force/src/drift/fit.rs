@@ -1,0 +1,181 @@
+//! The fit of a drift to the tiles outside the contact.
+
+use super::{DriftCorrection, DriftOutcome, IlluminationDrift};
+use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
+
+/// Largest standard error of an automatic correction: a force then is off by at most as much as a good gauge.
+const LARGEST_ERROR: f64 = 0.005;
+/// Least share of tiles that must agree: the median they start from is background only if most tiles are.
+const LEAST_SHARE: f64 = 0.5;
+/// Unevenness of the drift, as a share of the background, up to which a tile agrees.
+const UNEVEN: f64 = 0.01;
+
+/// Fits the correction to all tiles but those that stand out (the contact), by least squares on what stays, again and
+/// again until the set settles; `sd` is the noise of one pixel's difference.
+pub(crate) fn fit(
+    correction: DriftCorrection,
+    (rows, columns): (usize, usize),
+    tiles: impl Iterator<Item = TileSum> + Clone,
+    sd: f64,
+    scratch: &mut Vec<f64>,
+) -> IlluminationDrift {
+    let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
+    let mut drift = IlluminationDrift {
+        correction,
+        middle,
+        ..IlluminationDrift::none()
+    };
+    if correction.is_multiplicative() {
+        drift.coefficients[0] = 1.0;
+    }
+    let terms = correction.terms();
+    drift.coefficients[0] += median(
+        scratch,
+        tiles
+            .clone()
+            .map(|t| drift.residual(&t) / weight(&drift, &t)),
+    );
+    let mut kept = 0;
+    for _ in 0..20 {
+        let spread = 1.4826
+            * median(
+                scratch,
+                tiles.clone().map(|t| (drift.residual(&t) / t.pixels).abs()),
+            );
+        let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
+        let limit = 3.0 * spread.max(noise);
+        let before = drift;
+        let near = tiles
+            .clone()
+            .filter(|t| (before.residual(t) / t.pixels).abs() <= limit);
+        let count = drift.step(near, terms, sd);
+        drift.tiles = count;
+        if count == kept {
+            break;
+        }
+        kept = count;
+    }
+    match correction {
+        DriftCorrection::Automatic => drift.accepted(tiles, sd),
+        _ => IlluminationDrift {
+            outcome: DriftOutcome::Corrected,
+            ..drift
+        },
+    }
+}
+
+/// Derivative of a tile's sum by the first coefficient.
+fn weight(drift: &IlluminationDrift, tile: &TileSum) -> f64 {
+    if drift.correction.is_multiplicative() {
+        tile.reference.max(1.0)
+    } else {
+        tile.pixels
+    }
+}
+
+impl IlluminationDrift {
+    /// The automatic correction if it is sure enough, else none and the reason.
+    fn accepted(self, tiles: impl Iterator<Item = TileSum>, sd: f64) -> Self {
+        let (mut agree, mut all) = (0.0, 0.0);
+        for tile in tiles {
+            let limit = 3.0 * sd * tile.pixels.sqrt() + UNEVEN * tile.reference;
+            agree += f64::from(self.residual(&tile).abs() <= limit);
+            all += 1.0;
+        }
+        let share = agree / f64::max(all, 1.0);
+        let standard_error = self.standard_error;
+        let known = standard_error > 0.0 && standard_error <= LARGEST_ERROR && self.reference > 0.0;
+        let refused = |outcome| Self {
+            outcome,
+            ..Self::none()
+        };
+        if !known {
+            return refused(DriftOutcome::TooDark { standard_error });
+        }
+        if share < LEAST_SHARE {
+            return refused(DriftOutcome::TooLittleBackground { share });
+        }
+        Self {
+            correction: DriftCorrection::Illumination,
+            outcome: DriftOutcome::Corrected,
+            ..self
+        }
+    }
+
+    /// One least-squares step on the given tiles; returns their number.
+    fn step(&mut self, tiles: impl Iterator<Item = TileSum>, terms: usize, sd: f64) -> usize {
+        let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
+        let sums = Normal::of(self, tiles, terms, scale);
+        let Some(inverse) = sums.matrix.try_inverse() else {
+            return sums.count;
+        };
+        let step = inverse * sums.right;
+        for i in 0..terms {
+            self.coefficients[i] += step[i] / scale[i];
+            for j in 0..terms {
+                self.covariance[i][j] = inverse[(i, j)] * sd * sd / (scale[i] * scale[j]);
+            }
+        }
+        self.standard_error = self.covariance[0][0].sqrt();
+        self.reference = sums.reference / f64::max(sums.pixels, 1.0);
+        sums.count
+    }
+}
+
+/// Normal equations of the tiles' residuals, and the tiles' own sums.
+struct Normal {
+    matrix: nalgebra::Matrix3<f64>,
+    right: nalgebra::Vector3<f64>,
+    count: usize,
+    reference: f64,
+    pixels: f64,
+}
+
+impl Normal {
+    /// Places count from the frame's middle, in units of `scale`.
+    fn of(
+        drift: &IlluminationDrift,
+        tiles: impl Iterator<Item = TileSum>,
+        terms: usize,
+        scale: [f64; 3],
+    ) -> Self {
+        let (mut matrix, right) = (nalgebra::Matrix3::identity(), nalgebra::Vector3::zeros());
+        matrix.view_mut((0, 0), (terms, terms)).fill(0.0);
+        let mut sums = Self {
+            matrix,
+            right,
+            count: 0,
+            reference: 0.0,
+            pixels: 0.0,
+        };
+        for tile in tiles {
+            let w = weight(drift, &tile);
+            let at = [
+                1.0,
+                (tile.x - drift.middle[0]) / scale[1],
+                (tile.y - drift.middle[1]) / scale[2],
+            ];
+            let residual = drift.residual(&tile);
+            for i in 0..terms {
+                sums.right[i] += w * at[i] * residual / tile.pixels;
+                for j in 0..terms {
+                    sums.matrix[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
+                }
+            }
+            sums.count += 1;
+            sums.reference += tile.reference;
+            sums.pixels += tile.pixels;
+        }
+        sums
+    }
+}
+
+fn median(scratch: &mut Vec<f64>, values: impl Iterator<Item = f64>) -> f64 {
+    scratch.clear();
+    scratch.extend(values);
+    if scratch.is_empty() {
+        return 0.0;
+    }
+    let middle = scratch.len() / 2;
+    *scratch.select_nth_unstable_by(middle, f64::total_cmp).1
+}
