@@ -121,6 +121,12 @@ pub enum ElasticityError {
         /// The limit.
         limit: f64,
     },
+    /// An element of a finite-element mesh is degenerate or turned inside out.
+    #[error("element {element} of the mesh is degenerate or turned inside out")]
+    DegenerateElement {
+        /// Its index.
+        element: usize,
+    },
 }
 
 /// The quantities that errors speak of.
@@ -158,6 +164,7 @@ pub enum Quantity {
     Confidence,
     Layers,
     Samples,
+    PoissonRatio,
 }
 
 impl core::fmt::Display for Quantity {
@@ -184,6 +191,7 @@ impl core::fmt::Display for Quantity {
             Self::Confidence => "confidence level",
             Self::Layers => "layers",
             Self::Samples => "samples",
+            Self::PoissonRatio => "Poisson ratio",
         })
     }
 }

@@ -28,6 +28,8 @@
 pub mod contact;
 pub mod curve;
 mod error;
+#[cfg(feature = "fem")]
+pub mod fem;
 pub mod field;
 pub mod modulus;
 mod scalar;

@@ -1,0 +1,484 @@
+//! Contact: gaps of points on one surface from another, and the forces that keep them from closing.
+//!
+//! Gaps g are measured at Gauss points of the first surface and averaged over the hat functions φ of
+//! its nodes (linear on each half of an edge): $g_v = \int \varphi_v g / \int \varphi_v$. The pressure
+//! per reference area is $t = \sum_v \varphi_v t_v$ with $t_v = \langle \lambda_v - \varepsilon g_v
+//! \rangle$: one pressure for each node's displacement, a stable pair (pressures linear on each edge,
+//! but not continuous, oscillate). It derives from a potential, so that the tangent is symmetric; λ is
+//! updated to t between equilibria (augmented Lagrangian, Uzawa).
+
+use super::curve::{CurvePoint, SurfaceCurve};
+use super::element::{GAUSS3, quadratic};
+use super::material::Kinematics;
+
+/// The shape of a rigid body of revolution, with its lowest point at height zero.
+///
+/// ```
+/// use tactile_elasticity::fem::RigidShape;
+///
+/// let ball = RigidShape::Sphere { radius_m: 3e-3 };
+/// let cone = RigidShape::Cone { half_angle_rad: 1.2 };
+/// assert_ne!(ball, cone);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum RigidShape {
+    /// A plane at right angles to the axis.
+    Flat,
+    /// A sphere of this radius.
+    Sphere {
+        /// Its radius, in metres.
+        radius_m: f64,
+    },
+    /// The paraboloid r² / 2R, of which Hertz's theory speaks.
+    Paraboloid {
+        /// Its radius of curvature at the pole, in metres.
+        radius_m: f64,
+    },
+    /// A cone.
+    Cone {
+        /// Between its axis and its surface, in radians.
+        half_angle_rad: f64,
+    },
+}
+
+impl RigidShape {
+    /// Height at radius r, its slope and second derivative; `None` beyond the shape.
+    fn profile(self, r: f64) -> Option<[f64; 3]> {
+        match self {
+            Self::Flat => Some([0.0; 3]),
+            Self::Sphere { radius_m } => {
+                let below = radius_m * radius_m - r * r;
+                if below <= 0.0 {
+                    return None;
+                }
+                let root = below.sqrt();
+                let height = r * r / (radius_m + root);
+                Some([height, r / root, radius_m * radius_m / (below * root)])
+            }
+            Self::Paraboloid { radius_m } => {
+                Some([r * r / (2.0 * radius_m), r / radius_m, 1.0 / radius_m])
+            }
+            Self::Cone { half_angle_rad } => {
+                let slope = 1.0 / half_angle_rad.tan();
+                Some([r * slope, slope, 0.0])
+            }
+        }
+    }
+}
+
+/// What a surface may touch.
+#[derive(Debug, Clone)]
+pub(crate) enum Opposite {
+    /// Another body's surface.
+    Surface(SurfaceCurve),
+    /// A rigid shape above (+1) or below (−1) the surface.
+    Rigid {
+        shape: RigidShape,
+        side: f64,
+        /// Height of the shape's pole in the reference configuration.
+        height: f64,
+        /// Whether the approach moves it.
+        driven: bool,
+    },
+}
+
+/// A Gauss point of a surface at which gaps are measured.
+#[derive(Debug, Clone)]
+pub(crate) struct ContactPoint {
+    pub(crate) pair: usize,
+    pub(crate) nodes: [usize; 3],
+    pub(crate) shape: [f64; 3],
+    pub(crate) derivative: [f64; 3],
+}
+
+/// A node of a contact surface, which carries a pressure.
+#[derive(Debug, Clone)]
+pub(crate) struct ContactNode {
+    pub(crate) node: usize,
+    /// Gauss points around it with the hat function times their reference area.
+    pub(crate) points: Vec<(usize, f64)>,
+    /// Reference area of the hat function.
+    pub(crate) weight: f64,
+    /// Penalty ε: pressure per penetration, Pa/m.
+    pub(crate) penalty: f64,
+    /// Distance to its neighbours.
+    pub(crate) spacing: f64,
+}
+
+/// Stands for the approach among the displacement components of a [`Gap`].
+pub(crate) const DRIVER: usize = usize::MAX;
+
+/// A gap and its derivatives by the displacement components `dofs`.
+#[derive(Debug, Clone)]
+pub(crate) struct Gap {
+    pub(crate) value: f64,
+    pub(crate) dofs: Vec<usize>,
+    pub(crate) first: Vec<f64>,
+    /// Row after row.
+    pub(crate) second: Vec<f64>,
+    /// Axial component of the force by a unit pressure, over the reference area.
+    pub(crate) axial: f64,
+}
+
+/// Penalty of contact over the softer body's modulus and the edge's length: a pressure of a third of
+/// the modulus then leaves a thousandth of an element's penetration before the multipliers' update.
+/// Ten times less needs more updates, ten times more iterations; the Hertz test shows it.
+const PENALTY: f64 = 300.0;
+
+/// Gauss points of the edges, numbered from `first`, and their corner nodes.
+pub(crate) fn contact_points(
+    pair: usize,
+    first: usize,
+    edges: &[[usize; 3]],
+    nodes: &[[f64; 2]],
+    modulus: f64,
+) -> (Vec<ContactPoint>, Vec<ContactNode>) {
+    let mut points = Vec::new();
+    let mut corners: Vec<ContactNode> = Vec::new();
+    for &edge in edges {
+        for half in [0, 1] {
+            let middle = half as f64 - 0.5;
+            let mut length = 0.0;
+            let mut shares = [Vec::new(), Vec::new()];
+            for (x, gauss) in GAUSS3 {
+                let (shape, derivative) = quadratic(middle + 0.5 * x);
+                let [r, _] = combine(&shape, edge, |n| nodes[n]);
+                let [dr, dz] = combine(&derivative, edge, |n| nodes[n]);
+                let line = 0.5 * gauss * dr.hypot(dz);
+                length += line;
+                let weight = core::f64::consts::TAU * r * line;
+                for (share, hat) in shares.iter_mut().zip([0.5 * (1.0 - x), 0.5 * (1.0 + x)]) {
+                    share.push((first + points.len(), weight * hat));
+                }
+                points.push(ContactPoint {
+                    pair,
+                    nodes: edge,
+                    shape,
+                    derivative,
+                });
+            }
+            for (node, share) in [edge[half], edge[half + 1]].into_iter().zip(shares) {
+                let index = corners.iter().position(|corner| corner.node == node);
+                let index = index.unwrap_or_else(|| {
+                    corners.push(ContactNode {
+                        node,
+                        points: Vec::new(),
+                        weight: 0.0,
+                        penalty: f64::INFINITY,
+                        spacing: 0.0,
+                    });
+                    corners.len() - 1
+                });
+                let corner = &mut corners[index];
+                corner.weight += share.iter().map(|(_, weight)| weight).sum::<f64>();
+                corner.points.extend(share);
+                corner.spacing = length.max(corner.spacing);
+                corner.penalty = corner.penalty.min(0.5 * PENALTY * modulus / length);
+            }
+        }
+    }
+    (points, corners)
+}
+
+/// The average of gaps with weights that sum to `total`.
+pub(crate) fn averaged<'a>(gaps: impl Iterator<Item = (&'a Gap, f64)> + Clone, total: f64) -> Gap {
+    let mut dofs: Vec<usize> = Vec::with_capacity(24);
+    for (gap, _) in gaps.clone() {
+        for dof in &gap.dofs {
+            if !dofs.contains(dof) {
+                dofs.push(*dof);
+            }
+        }
+    }
+    let count = dofs.len();
+    let mut average = Gap {
+        value: 0.0,
+        first: vec![0.0; count],
+        second: vec![0.0; count * count],
+        dofs,
+        axial: 0.0,
+    };
+    for (gap, weight) in gaps {
+        let share = weight / total;
+        average.value += share * gap.value;
+        average.axial += share * gap.axial;
+        let place = |dof: &usize| average.dofs.iter().position(|d| d == dof).unwrap_or(0);
+        let places: Vec<usize> = gap.dofs.iter().map(place).collect();
+        for (i, &a) in places.iter().enumerate() {
+            average.first[a] += share * gap.first[i];
+            for (j, &b) in places.iter().enumerate() {
+                average.second[count * a + b] += share * gap.second[places.len() * i + j];
+            }
+        }
+    }
+    average
+}
+
+fn combine(shape: &[f64; 3], nodes: [usize; 3], at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for (n, node) in shape.iter().zip(nodes) {
+        let point = at(node);
+        sum[0] += n * point[0];
+        sum[1] += n * point[1];
+    }
+    sum
+}
+
+/// Where contact is judged: reference coordinates and displacements.
+#[derive(Clone, Copy)]
+pub(crate) struct Placement<'a> {
+    pub(crate) kinematics: Kinematics,
+    pub(crate) nodes: &'a [[f64; 2]],
+    pub(crate) displacement: &'a [f64],
+    pub(crate) approach: f64,
+}
+
+impl Placement<'_> {
+    pub(crate) fn current(&self, node: usize) -> [f64; 2] {
+        let [r, z] = self.nodes[node];
+        [
+            r + self.displacement[2 * node],
+            z + self.displacement[2 * node + 1],
+        ]
+    }
+
+    fn moved(&self, node: usize) -> [f64; 2] {
+        [self.displacement[2 * node], self.displacement[2 * node + 1]]
+    }
+
+    /// The gap of a point, `None` where there is nothing opposite to it.
+    pub(crate) fn gap(&self, point: &ContactPoint, opposite: &Opposite) -> Option<Gap> {
+        match opposite {
+            Opposite::Rigid {
+                shape,
+                side,
+                height,
+                driven,
+            } => self.rigid_gap(point, *shape, *side, *height, *driven),
+            Opposite::Surface(curve) => match self.kinematics {
+                Kinematics::Finite => self.surface_gap(point, curve),
+                Kinematics::Linear => self.vertical_gap(point, curve),
+            },
+        }
+    }
+
+    fn rigid_gap(
+        &self,
+        point: &ContactPoint,
+        shape: RigidShape,
+        side: f64,
+        height: f64,
+        driven: bool,
+    ) -> Option<Gap> {
+        let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
+        let position = combine(&point.shape, point.nodes, |n| self.current(n));
+        let linear = self.kinematics == Kinematics::Linear;
+        let [profile, slope, bend] =
+            shape.profile(if linear { reference[0] } else { position[0] })?;
+        let (slope, bend) = if linear { (0.0, 0.0) } else { (slope, bend) };
+        let moved = if driven { self.approach } else { 0.0 };
+        // Above the surface (side +1) the shape's pole is its lowest point; below, its highest.
+        let value = side * (height + moved - position[1]) + profile;
+        let mut dofs = Vec::with_capacity(7);
+        let mut first = Vec::with_capacity(7);
+        for (node, n) in point.nodes.iter().zip(&point.shape) {
+            dofs.extend([2 * node, 2 * node + 1]);
+            first.extend([n * slope, -side * n]);
+        }
+        if driven {
+            dofs.push(DRIVER);
+            first.push(side);
+        }
+        let count = dofs.len();
+        let mut second = vec![0.0; count * count];
+        for (i, a) in point.shape.iter().enumerate() {
+            for (j, b) in point.shape.iter().enumerate() {
+                second[2 * i * count + 2 * j] = a * b * bend;
+            }
+        }
+        Some(Gap {
+            value,
+            dofs,
+            first,
+            second,
+            axial: 1.0,
+        })
+    }
+
+    /// Distance to the closest point of the deformed surface, along its normal.
+    fn surface_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
+        let position = combine(&point.shape, point.nodes, |n| self.current(n));
+        let mut best: Option<(f64, CurvePoint, bool)> = None;
+        for segment in 0..curve.segments() {
+            let [a, b] = curve.ends(segment).map(|node| self.current(node));
+            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+            let to_a = (position[0] - a[0]).hypot(position[1] - a[1]);
+            // No point of the segment is nearer than this: cubics bulge less than a fifth.
+            if best
+                .as_ref()
+                .is_some_and(|(distance, _, _)| to_a - 1.2 * length > *distance)
+            {
+                continue;
+            }
+            let t = self.closest(curve, segment, position);
+            let at = curve.at(segment, t);
+            let [r, z] = at.sum(&at.position, |n| self.current(n));
+            let distance = (position[0] - r).hypot(position[1] - z);
+            if best.as_ref().is_none_or(|(least, _, _)| distance < *least) {
+                let beyond = segment + 1 == curve.segments() && t >= 1.0;
+                best = Some((distance, at, beyond));
+            }
+        }
+        let (_, at, beyond) = best?;
+        if beyond {
+            return None;
+        }
+        let on_curve = at.sum(&at.position, |n| self.current(n));
+        let along = at.sum(&at.first, |n| self.current(n));
+        let bend = at.sum(&at.second, |n| self.current(n));
+        let offset = [position[0] - on_curve[0], position[1] - on_curve[1]];
+        let metric = along[0] * along[0] + along[1] * along[1];
+        let scale = curve.side / metric.sqrt();
+        let normal = [along[1] * scale, -along[0] * scale];
+        let value = offset[0] * normal[0] + offset[1] * normal[1];
+        let curvature = bend[0] * normal[0] + bend[1] * normal[1];
+        let denominator = metric - value * curvature;
+        let mut dofs = Vec::with_capacity(14);
+        let mut first = Vec::with_capacity(14);
+        // Components of the relative displacement along the curve, and of the curve's turning.
+        let mut slip = Vec::with_capacity(14);
+        let mut turn = Vec::with_capacity(14);
+        for (node, n) in point.nodes.iter().zip(&point.shape) {
+            for k in 0..2 {
+                dofs.push(2 * node + k);
+                first.push(n * normal[k]);
+                slip.push(n * along[k]);
+                turn.push(0.0);
+            }
+        }
+        for (a, node) in at.nodes.iter().enumerate() {
+            for k in 0..2 {
+                let (n, dn) = (at.position[a][k], at.first[a][k]);
+                if n != 0.0 || dn != 0.0 {
+                    dofs.push(2 * node + k);
+                    first.push(-n * normal[k]);
+                    slip.push(-n * along[k]);
+                    turn.push(dn * normal[k]);
+                }
+            }
+        }
+        let count = dofs.len();
+        let mut second = vec![0.0; count * count];
+        // Deep within a strongly bent surface the closest point is not unique: no second derivative.
+        if denominator > 0.1 * metric {
+            let bent = curvature / metric;
+            for i in 0..count {
+                for j in 0..count {
+                    second[count * i + j] = -(slip[i] * turn[j]
+                        + turn[i] * slip[j]
+                        + value * turn[i] * turn[j]
+                        + bent * slip[i] * slip[j])
+                        / denominator;
+                }
+            }
+        }
+        Some(Gap {
+            value,
+            dofs,
+            first,
+            second,
+            axial: normal[1].abs(),
+        })
+    }
+
+    /// Parameter of a segment's closest point, within [0, 1].
+    fn closest(&self, curve: &SurfaceCurve, segment: usize, point: [f64; 2]) -> f64 {
+        let [a, b] = curve.ends(segment).map(|node| self.current(node));
+        let chord = [b[0] - a[0], b[1] - a[1]];
+        let square = chord[0] * chord[0] + chord[1] * chord[1];
+        let along = (point[0] - a[0]) * chord[0] + (point[1] - a[1]) * chord[1];
+        let mut t = (along / square).clamp(0.0, 1.0);
+        // Newton's method on (x − x(t)) · x'(t) = 0: segments are nearly straight, few steps do.
+        for _ in 0..20 {
+            let at = curve.at(segment, t);
+            let position = at.sum(&at.position, |n| self.current(n));
+            let slope = at.sum(&at.first, |n| self.current(n));
+            let bend = at.sum(&at.second, |n| self.current(n));
+            let offset = [point[0] - position[0], point[1] - position[1]];
+            let metric = slope[0] * slope[0] + slope[1] * slope[1];
+            let curved = metric - offset[0] * bend[0] - offset[1] * bend[1];
+            // Far from a strongly bent segment the derivative may vanish: the metric alone then.
+            let divisor = if curved > 0.1 * metric {
+                curved
+            } else {
+                metric
+            };
+            let step = (offset[0] * slope[0] + offset[1] * slope[1]) / divisor;
+            let next = (t + step).clamp(0.0, 1.0);
+            if (next - t).abs() < 1e-15 {
+                return next;
+            }
+            t = next;
+        }
+        t
+    }
+
+    /// Height over the undeformed surface at the same radius, both displaced along z.
+    fn vertical_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
+        let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
+        let moved = combine(&point.shape, point.nodes, |n| self.moved(n));
+        let segment = (0..curve.segments()).find(|&segment| {
+            let [a, b] = curve.ends(segment).map(|node| self.nodes[node][0]);
+            a <= reference[0] && reference[0] <= b
+        })?;
+        let [a, b] = curve.ends(segment).map(|node| self.nodes[node][0]);
+        let mut t = (reference[0] - a) / (b - a);
+        for _ in 0..5 {
+            let at = curve.at(segment, t);
+            let [r, _] = at.sum(&at.position, |n| self.nodes[n]);
+            let [slope, _] = at.sum(&at.first, |n| self.nodes[n]);
+            t += (reference[0] - r) / slope;
+        }
+        let at = curve.at(segment, t);
+        let [_, z] = at.sum(&at.position, |n| self.nodes[n]);
+        let [_, w] = at.sum(&at.position, |n| self.moved(n));
+        // The outward normal of a surface above points down.
+        let up = -curve.side;
+        let mut dofs = Vec::with_capacity(7);
+        let mut first = Vec::with_capacity(7);
+        for (node, n) in point.nodes.iter().zip(&point.shape) {
+            dofs.push(2 * node + 1);
+            first.push(up * n);
+        }
+        for (node, n) in at.nodes.iter().zip(&at.position) {
+            if n[1] != 0.0 {
+                dofs.push(2 * node + 1);
+                first.push(-up * n[1]);
+            }
+        }
+        Some(Gap {
+            value: up * (reference[1] + moved[1] - z - w),
+            second: vec![0.0; dofs.len() * dofs.len()],
+            dofs,
+            first,
+            axial: 1.0,
+        })
+    }
+}
+
+impl Placement<'_> {
+    /// Deformed area over reference area at a Gauss point (one in linear kinematics).
+    pub(crate) fn stretch(&self, point: &ContactPoint) -> f64 {
+        if self.kinematics == Kinematics::Linear {
+            return 1.0;
+        }
+        let area = |at: &dyn Fn(usize) -> [f64; 2]| {
+            let [r, _] = combine(&point.shape, point.nodes, at);
+            let [dr, dz] = combine(&point.derivative, point.nodes, at);
+            r * dr.hypot(dz)
+        };
+        area(&|n| self.current(n)) / area(&|n| self.nodes[n])
+    }
+}

@@ -1,0 +1,76 @@
+//! Axisymmetric finite elements at finite strain, with contact between deformable bodies.
+//!
+//! Bodies of revolution of compressible neo-Hookean material (or of Hooke's law) meet without friction
+//! or bonded: a soft ball on a rigid flat or on a layered guide, a guide's face on a block of tissue
+//! with a stiff inclusion. Loads are forces or approaches; what is not reached ends in a report.
+//!
+//! [`Scene`] has the ready models, [`Model`] puts bodies together freely. For three dimensions take a
+//! general package: CalculiX, FEniCSx or MOOSE.
+//!
+//! # Ready scenes
+//! ```
+//! use tactile_elasticity::fem::{Block, Guide, Interface, Layer, Load, Lump, Material, Scene};
+//!
+//! # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+//! let guide = Guide::new(
+//!     vec![
+//!         Layer { thickness_m: 2e-3, material: Material::new(136e3, 0.495)? },
+//!         Layer { thickness_m: 3e-3, material: Material::new(80e3, 0.495)? },
+//!         Layer { thickness_m: 5e-3, material: Material::new(34e3, 0.495)? },
+//!     ],
+//!     16e-3,
+//! )?;
+//! let lump = Lump { diameter_m: 11e-3, depth_m: 3.6e-3, material: Material::new(35e3, 0.495)? };
+//! let block = Block {
+//!     height_m: 31e-3,
+//!     radius_m: 40e-3,
+//!     material: Material::new(3.5e3, 0.495)?,
+//!     lump: Some(lump),
+//! };
+//! let scene = Scene::block_under_guide(&block, &guide, Interface::Bonded)?;
+//! let solution = scene.solve(&[Load::Approach(1.2e-3), Load::Approach(2.4e-3)]);
+//! for state in &solution.states {
+//!     let centre = state.pressure()[0].pressure_pa;
+//!     assert!(centre > 0.0 && state.force_n() > 0.0);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Method
+//! Nine-node quadrilaterals with three discontinuous pressures each (Q9/P1, inf–sup stable: no locking
+//! up to ν = 0.4999), the pressures and the centre node eliminated element by element; Newton's method
+//! with the consistent tangent, an envelope LDLᵀ factorisation, load steps halved and doubled by what
+//! converges. Contact without friction: pressures piecewise linear on the nodes of one surface, gaps
+//! from a smooth curve through the other's, augmented Lagrangian, the contact zone of each iteration
+//! by a primal–dual active set.
+//!
+//! # References
+//! T. J. R. Hughes, *The Finite Element Method* (1987). P. Wriggers, *Computational Contact Mechanics*
+//! (2006). M. Hintermüller, K. Ito & K. Kunisch, SIAM J. Optim. 13 (2003) 865. B. Yang, T. A. Laursen &
+//! X. Meng, Int. J. Numer. Meth. Eng. 62 (2005) 1183.
+mod block;
+mod bodies;
+mod contact;
+mod curve;
+mod element;
+mod interface;
+mod material;
+mod mesh;
+mod model;
+mod newton;
+mod radius;
+mod scene;
+mod sparse;
+mod state;
+mod system;
+
+pub use contact::RigidShape;
+pub use material::{Kinematics, Material};
+pub use mesh::{Boundary, Mesh};
+pub use model::{Body, Model, Support};
+pub use newton::{Load, Outcome, Report, Solution};
+pub use scene::{Block, Guide, Interface, Layer, Lump, Scene};
+pub use state::{ContactRadius, PressurePoint, State};
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,271 @@
+//! Bodies, materials, supports and contacts: what is to be solved.
+
+use super::contact::{ContactNode, ContactPoint, Opposite, RigidShape, contact_points};
+use super::curve::SurfaceCurve;
+use super::element::Geometry;
+use super::interface::BondedInterface;
+use super::material::{Kinematics, Material};
+use super::mesh::{Boundary, Mesh};
+use crate::ElasticityError;
+use crate::error::Quantity;
+use std::collections::BTreeMap;
+
+/// A body of a [`Model`].
+///
+/// ```
+/// use tactile_elasticity::fem::{Kinematics, Material, Mesh, Model};
+///
+/// let mesh = Mesh::rectangle(&[0.0, 1e-3], &[-1e-3, 0.0]);
+/// let mut model = Model::new(Kinematics::Finite);
+/// let body = model.add(&mesh, &[Material::new(1e5, 0.49).unwrap()]).unwrap();
+/// assert_eq!(model.materials(body)[0].youngs_modulus_pa(), 1e5);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Body(usize);
+
+/// How a boundary is held.
+///
+/// ```
+/// use tactile_elasticity::fem::Support;
+///
+/// assert_ne!(Support::Bonded, Support::Sliding);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Support {
+    /// No displacement but the support's own: glued to glass or to a stage.
+    Bonded,
+    /// Free to slide along r: a lubricated stage, or a plane of symmetry.
+    Sliding,
+}
+
+/// What a displacement component does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Motion {
+    Free,
+    Zero,
+    /// Moves by the approach times this.
+    Driven(f64),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    pub(crate) regions: core::ops::Range<usize>,
+    pub(crate) boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
+}
+
+/// An axisymmetric problem: bodies with their materials, supports and contacts.
+///
+/// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z.
+/// SI units; the axis of revolution is r = 0; guides lie below z = 0 and objects above.
+///
+/// ```
+/// use tactile_elasticity::fem::{Boundary, Kinematics, Load, Material, Mesh, Model, Support};
+///
+/// // A cylinder of 2 mm, 1 mm high, free to slide between plates, squeezed by a tenth of its height.
+/// let mesh = Mesh::rectangle(&[0.0, 1e-3, 2e-3], &[0.0, 1e-3]);
+/// let mut model = Model::new(Kinematics::Finite);
+/// let body = model.add(&mesh, &[Material::new(1e5, 0.45).unwrap()]).unwrap();
+/// model.drive(body, Boundary::Base, Support::Sliding);
+/// model.hold(body, Boundary::Contact, Support::Sliding);
+/// let solution = model.solve(&[Load::Approach(1e-4)]);
+/// let state = &solution.states[0];
+/// assert!((state.force_n() / (1e5 * 0.1 * 3.1416 * 4e-6) - 1.0).abs() < 0.15);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub(crate) kinematics: Kinematics,
+    pub(crate) nodes: Vec<[f64; 2]>,
+    pub(crate) elements: Vec<[usize; 9]>,
+    /// Material of each element, an index of `materials`.
+    pub(crate) regions: Vec<usize>,
+    pub(crate) geometry: Vec<Geometry>,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) parts: Vec<Part>,
+    /// Of each displacement component, 2 node + (0 for r, 1 for z).
+    pub(crate) motion: Vec<Motion>,
+    pub(crate) opposites: Vec<Opposite>,
+    pub(crate) points: Vec<ContactPoint>,
+    pub(crate) contact_nodes: Vec<ContactNode>,
+    /// A bonded interface whose pressure is wanted.
+    pub(crate) interface: Option<BondedInterface>,
+    /// External forces on displacement components, for tests by manufactured solutions.
+    pub(crate) external: Vec<f64>,
+}
+
+impl Model {
+    /// An empty model.
+    pub fn new(kinematics: Kinematics) -> Self {
+        Self {
+            kinematics,
+            nodes: Vec::new(),
+            elements: Vec::new(),
+            regions: Vec::new(),
+            geometry: Vec::new(),
+            materials: Vec::new(),
+            parts: Vec::new(),
+            motion: Vec::new(),
+            opposites: Vec::new(),
+            points: Vec::new(),
+            contact_nodes: Vec::new(),
+            interface: None,
+            external: Vec::new(),
+        }
+    }
+
+    /// Adds a body with one material a region.
+    ///
+    /// # Errors
+    /// Materials that are not one a region; an element that is degenerate or turned inside out.
+    pub fn add(&mut self, mesh: &Mesh, materials: &[Material]) -> Result<Body, ElasticityError> {
+        if materials.len() != mesh.region_count() {
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::Layers,
+                expected: mesh.region_count(),
+                found: materials.len(),
+            });
+        }
+        let mut geometry = Vec::with_capacity(mesh.elements.len());
+        for (index, element) in mesh.elements.iter().enumerate() {
+            let element = Geometry::new(&element.map(|node| mesh.nodes[node]));
+            geometry.push(element.ok_or(ElasticityError::DegenerateElement { element: index })?);
+        }
+        let (first, region) = (self.nodes.len(), self.materials.len());
+        self.nodes.extend(&mesh.nodes);
+        self.elements
+            .extend(mesh.elements.iter().map(|e| e.map(|node| node + first)));
+        self.regions.extend(mesh.regions.iter().map(|r| r + region));
+        self.geometry.extend(geometry);
+        self.materials.extend(materials);
+        for node in &mesh.nodes {
+            let radial = if node[0] == 0.0 {
+                Motion::Zero
+            } else {
+                Motion::Free
+            };
+            self.motion.extend([radial, Motion::Free]);
+            self.external.extend([0.0; 2]);
+        }
+        let shifted = mesh.boundaries.iter().map(|(name, edges)| {
+            (
+                *name,
+                edges
+                    .iter()
+                    .map(|edge| edge.map(|node| node + first))
+                    .collect(),
+            )
+        });
+        self.parts.push(Part {
+            regions: region..self.materials.len(),
+            boundaries: shifted.collect(),
+        });
+        Ok(Body(self.parts.len() - 1))
+    }
+
+    /// Number of elements of all bodies.
+    pub fn element_count(&self) -> usize {
+        self.elements.len()
+    }
+
+    /// Materials of a body, by region.
+    pub fn materials(&self, body: Body) -> &[Material] {
+        &self.materials[self.parts[body.0].regions.clone()]
+    }
+
+    /// Edges of a body's boundary, by the model's node numbers.
+    pub(crate) fn edges(&self, body: Body, boundary: Boundary) -> &[[usize; 3]] {
+        self.parts[body.0]
+            .boundaries
+            .get(&boundary)
+            .map_or(&[], Vec::as_slice)
+    }
+
+    /// Regions of a body among the model's.
+    pub(crate) fn body_regions(&self, body: Body) -> core::ops::Range<usize> {
+        self.parts[body.0].regions.clone()
+    }
+
+    /// Holds a boundary in its place.
+    pub fn hold(&mut self, body: Body, boundary: Boundary, support: Support) {
+        self.support(body, boundary, support, Motion::Zero);
+    }
+
+    /// Moves a boundary by the approach along +z.
+    pub fn drive(&mut self, body: Body, boundary: Boundary, support: Support) {
+        self.support(body, boundary, support, Motion::Driven(1.0));
+    }
+
+    fn support(&mut self, body: Body, boundary: Boundary, support: Support, axial: Motion) {
+        for edge in self.edges(body, boundary).to_vec() {
+            for node in edge {
+                self.motion[2 * node + 1] = axial;
+                if support == Support::Bonded {
+                    self.motion[2 * node] = Motion::Zero;
+                }
+            }
+        }
+    }
+
+    /// Lets two bodies' [`Boundary::Contact`] touch without friction.
+    ///
+    /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
+    /// convex of the two.
+    pub fn contact(&mut self, first: Body, second: Body) {
+        let opposite = Opposite::Surface(SurfaceCurve::new(
+            self.edges(second, Boundary::Contact),
+            &self.nodes,
+        ));
+        let softer = self.softest(first).min(self.softest(second));
+        self.add_points(first, opposite, softer);
+    }
+
+    /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole is
+    /// at `height_m` and does not move.
+    pub fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+        let opposite = Opposite::Rigid {
+            shape,
+            side: 1.0,
+            height: height_m,
+            driven: false,
+        };
+        let softer = self.softest(body);
+        self.add_points(body, opposite, softer);
+    }
+
+    /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
+    /// starts at `height_m` and moves by the approach.
+    pub fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+        let opposite = Opposite::Rigid {
+            shape,
+            side: -1.0,
+            height: height_m,
+            driven: true,
+        };
+        let softer = self.softest(body);
+        self.add_points(body, opposite, softer);
+    }
+
+    /// Makes the pressure on a body's [`Boundary::Interface`], above its first `lower` regions, the
+    /// pressure of the states.
+    pub(crate) fn bond(&mut self, body: Body, lower: usize) {
+        let first = self.body_regions(body).start;
+        let edges = self.edges(body, Boundary::Interface);
+        let is_lower = |index: usize| (first..first + lower).contains(&self.regions[index]);
+        self.interface = Some(BondedInterface::new(edges, &self.elements, is_lower));
+    }
+
+    fn add_points(&mut self, body: Body, opposite: Opposite, softer: f64) {
+        let edges = self.edges(body, Boundary::Contact).to_vec();
+        let pair = self.opposites.len();
+        self.opposites.push(opposite);
+        let first = self.points.len();
+        let (points, corners) = contact_points(pair, first, &edges, &self.nodes, softer);
+        self.points.extend(points);
+        self.contact_nodes.extend(corners);
+    }
+
+    fn softest(&self, body: Body) -> f64 {
+        let moduli = self.materials(body).iter().map(Material::youngs_modulus_pa);
+        moduli.fold(f64::INFINITY, f64::min)
+    }
+}

@@ -1,0 +1,382 @@
+//! Newton's method with load steps chosen by what converges.
+
+use super::model::Model;
+use super::state::State;
+use super::system::{Fields, Goal};
+
+/// One load: how far the driven boundaries have moved, or with what force.
+///
+/// ```
+/// use tactile_elasticity::fem::Load;
+///
+/// let loads = [0.2, 0.7, 1.2].map(Load::Force);
+/// assert_eq!(loads[1], Load::Force(0.7));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Load {
+    /// The approach δ, in metres.
+    Approach(f64),
+    /// The force on the driven boundaries, in newtons; positive presses.
+    Force(f64),
+}
+
+/// How a solution ended.
+///
+/// ```
+/// use tactile_elasticity::fem::Outcome;
+///
+/// assert_ne!(Outcome::Solved, Outcome::Stopped { load: 1, approach_m: 1e-3, force_n: 0.2 });
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum Outcome {
+    /// Every load has its state.
+    Solved,
+    /// This load was not reached; the states of those before it are given.
+    Stopped {
+        /// Index of the load.
+        load: usize,
+        /// The last approach in equilibrium, in metres.
+        approach_m: f64,
+        /// The force there, in newtons.
+        force_n: f64,
+    },
+}
+
+/// What the solver did.
+///
+/// ```
+/// # use tactile_elasticity::fem::*;
+/// # let mesh = Mesh::rectangle(&[0.0, 1e-3], &[0.0, 1e-3]);
+/// # let mut model = Model::new(Kinematics::Finite);
+/// # let body = model.add(&mesh, &[Material::new(1e5, 0.45).unwrap()]).unwrap();
+/// # model.drive(body, Boundary::Base, Support::Sliding);
+/// # model.hold(body, Boundary::Contact, Support::Sliding);
+/// let report = model.solve(&[Load::Approach(1e-4)]).report;
+/// assert_eq!(report.outcome, Outcome::Solved);
+/// assert!(report.iterations < 10);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Report {
+    /// Whether all loads were reached.
+    pub outcome: Outcome,
+    /// Load steps that converged.
+    pub steps: usize,
+    /// Load steps given up and taken again in halves.
+    pub rejected_steps: usize,
+    /// Newton iterations, of rejected steps too.
+    pub iterations: usize,
+}
+
+/// States at the loads that were reached, in order, and a report.
+///
+/// ```
+/// use tactile_elasticity::fem::{Load, Material, Outcome, Scene};
+///
+/// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+/// let solution = scene.solve(&[Load::Approach(0.3e-3), Load::Approach(f64::NAN)]);
+/// assert_eq!(solution.states.len(), 1);
+/// assert!(matches!(solution.report.outcome, Outcome::Stopped { load: 1, .. }));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// One state a load.
+    pub states: Vec<State>,
+    /// What the solver did.
+    pub report: Report,
+}
+
+/// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
+/// below what the forces are wanted to, and well above rounding.
+const TOLERANCE: f64 = 1e-8;
+/// Iterations of a load step before it is halved. Steps that converge take three to ten.
+const MAX_ITERATIONS: usize = 25;
+/// Halvings of a load step before the solver stops.
+const MAX_HALVINGS: usize = 10;
+/// Part of a Newton step below which it is given up, where elements are turned inside out before.
+const SHORTEST_STEP: f64 = 0.02;
+/// Updates of the contact multipliers a load.
+const AUGMENTATIONS: usize = 1;
+
+/// Imbalance at a guessed approach below which the force takes over.
+const SWITCH_TO_FORCE: f64 = 1e-2;
+
+/// An equilibrium.
+pub(crate) struct Equilibrium {
+    pub(crate) fields: Fields,
+    pub(crate) force: f64,
+}
+
+struct Solver<'a> {
+    model: &'a Model,
+    report: Report,
+    /// The equilibrium before the last one, for extrapolation.
+    before: Option<Equilibrium>,
+    last: Equilibrium,
+}
+
+impl Model {
+    /// Solves for the loads in order, each starting from the one before.
+    ///
+    /// A load that is not reached ends the solution: its [`Report`] says so. O(n b²) for each Newton
+    /// iteration with n unknowns in a system of half-width b.
+    pub fn solve(&self, loads: &[Load]) -> Solution {
+        let mut solver = Solver {
+            model: self,
+            report: Report {
+                outcome: Outcome::Solved,
+                steps: 0,
+                rejected_steps: 0,
+                iterations: 0,
+            },
+            before: None,
+            last: Equilibrium {
+                fields: Fields::zero(self),
+                force: 0.0,
+            },
+        };
+        let mut states = Vec::with_capacity(loads.len());
+        for (index, &load) in loads.iter().enumerate() {
+            if !solver.reach(load) {
+                solver.report.outcome = Outcome::Stopped {
+                    load: index,
+                    approach_m: solver.last.fields.approach,
+                    force_n: solver.last.force,
+                };
+                break;
+            }
+            states.push(State::new(self, &solver.last));
+        }
+        Solution {
+            states,
+            report: solver.report,
+        }
+    }
+
+    /// Height of all bodies together.
+    fn height(&self) -> f64 {
+        let heights = || self.nodes.iter().map(|node| node[1]);
+        heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Solver<'_> {
+    fn reach(&mut self, load: Load) -> bool {
+        let reached = match load {
+            Load::Approach(approach) => {
+                approach.is_finite() && self.advance(Goal::Approach(approach))
+            }
+            Load::Force(force) => {
+                force.is_finite() && self.touch(force) && self.advance(Goal::Force(force))
+            }
+        };
+        reached && self.augment(load)
+    }
+
+    /// Approaches until bodies that had a gap between them press on each other.
+    fn touch(&mut self, force: f64) -> bool {
+        // A small part of the bodies' height: the first contact is made in some steps of twice the
+        // size before.
+        let mut step = 1e-3 * self.model.height();
+        for _ in 0..12 {
+            if self.last.force.abs() > 1e-6 * force.abs() || force == 0.0 {
+                return true;
+            }
+            if !self.advance(Goal::Approach(self.last.fields.approach + step)) {
+                return false;
+            }
+            step *= 2.0;
+        }
+        false
+    }
+
+    fn advance(&mut self, goal: Goal) -> bool {
+        let mut fraction = 1.0;
+        let mut halvings = 0;
+        loop {
+            let now = self.position(goal, &self.last);
+            let target = match goal {
+                Goal::Approach(target) | Goal::Force(target) => target,
+            };
+            let done = fraction == 1.0;
+            let next = if done {
+                target
+            } else {
+                now + fraction * (target - now)
+            };
+            let step_goal = match goal {
+                Goal::Approach(_) => Goal::Approach(next),
+                Goal::Force(_) => Goal::Force(next),
+            };
+            match self.equilibrium(step_goal) {
+                Some(found) => {
+                    self.before = Some(core::mem::replace(&mut self.last, found));
+                    self.report.steps += 1;
+                    if done {
+                        return true;
+                    }
+                    // `fraction` is of what is left: this doubles the step.
+                    fraction = (2.0 * fraction / (1.0 - fraction)).min(1.0);
+                }
+                None => {
+                    self.report.rejected_steps += 1;
+                    halvings += 1;
+                    if halvings > MAX_HALVINGS {
+                        return false;
+                    }
+                    fraction *= 0.5;
+                }
+            }
+        }
+    }
+
+    fn position(&self, goal: Goal, equilibrium: &Equilibrium) -> f64 {
+        match goal {
+            Goal::Approach(_) => equilibrium.fields.approach,
+            Goal::Force(_) => equilibrium.force,
+        }
+    }
+
+    /// Equilibrium at the goal, from an extrapolation of the last two, else from the last.
+    fn equilibrium(&mut self, goal: Goal) -> Option<Equilibrium> {
+        if let Some(guess) = self.extrapolated(goal)
+            && let Some(found) = self.newton(guess, goal)
+        {
+            return Some(found);
+        }
+        self.newton(self.last.fields.clone(), goal)
+    }
+
+    fn extrapolated(&self, goal: Goal) -> Option<Fields> {
+        let before = self.before.as_ref()?;
+        let (from, to) = (self.position(goal, before), self.position(goal, &self.last));
+        let target = match goal {
+            Goal::Approach(target) | Goal::Force(target) => target,
+        };
+        let ratio = (target - to) / (to - from);
+        // Farther than three steps back reach, a linear extrapolation is worse than none.
+        if ratio.is_nan() || ratio.abs() > 3.0 || before.fields.approach == 0.0 {
+            return None;
+        }
+        let (a, b) = (&before.fields, &self.last.fields);
+        let displacement = a.displacement.iter().zip(&b.displacement);
+        let pressures = a.pressures.iter().zip(&b.pressures);
+        Some(Fields {
+            displacement: displacement.map(|(a, b)| b + ratio * (b - a)).collect(),
+            pressures: pressures
+                .map(|(a, b)| core::array::from_fn(|k| b[k] + ratio * (b[k] - a[k])))
+                .collect(),
+            approach: b.approach + ratio * (b.approach - a.approach),
+            multipliers: b.multipliers.clone(),
+            contact: b.contact.clone(),
+        })
+    }
+
+    fn newton(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
+        let model = self.model;
+        let wanted = goal;
+        let mut fields = start;
+        // A force is reached at a guessed approach first: the tangent of a contact that has only begun
+        // is no guide to where a force will be.
+        let mut goal = match goal {
+            Goal::Force(force) => Goal::Approach(self.approach_for(force)),
+            Goal::Approach(_) => goal,
+        };
+        let margin = |goal: Goal, fields: &Fields| match goal {
+            Goal::Approach(target) => target - fields.approach,
+            Goal::Force(_) => 0.0,
+        };
+        let mut system = model.assemble(&fields, margin(goal, &fields))?;
+        let mut worst = f64::INFINITY;
+        for iteration in 0..MAX_ITERATIONS {
+            let there = match goal {
+                Goal::Approach(target) => fields.approach == target,
+                Goal::Force(_) => true,
+            };
+            let imbalance = system.imbalance(goal);
+            if there && goal != wanted && imbalance < SWITCH_TO_FORCE {
+                goal = wanted;
+            }
+            if goal == wanted && there && (iteration > 0 || system.scale > 0.0) {
+                let imbalance = system.imbalance(goal);
+                if imbalance <= TOLERANCE {
+                    return Some(Equilibrium {
+                        force: system.force,
+                        fields,
+                    });
+                }
+            }
+            // Six iterations without gain: a shorter load step is worth more.
+            if iteration % 6 == 5 {
+                if imbalance > worst {
+                    return None;
+                }
+                worst = imbalance;
+            }
+            self.report.iterations += 1;
+            let step = system.step(&fields, goal).ok()?;
+            let mut length = 1.0;
+            (fields, system) = loop {
+                let mut trial = step.apply(&fields, length);
+                if let (Goal::Approach(target), true) = (goal, length == 1.0) {
+                    // Free of the rounding of the sum.
+                    trial.approach = target;
+                }
+                if let Some(next) = model.assemble(&trial, margin(goal, &trial)) {
+                    break (trial, next);
+                }
+                length *= 0.5;
+                if length < SHORTEST_STEP {
+                    return None;
+                }
+            };
+        }
+        None
+    }
+
+    /// The approach at which a force is expected: F ∝ δⁿ, with n from the last two equilibria.
+    fn approach_for(&self, force: f64) -> f64 {
+        let (last, here) = (self.last.force, self.last.fields.approach);
+        if !(force / last > 0.0 && here != 0.0) {
+            return here;
+        }
+        // Hertz's exponent where only one equilibrium is known, one without contact.
+        let guess = if self.model.contact_nodes.is_empty() {
+            1.0
+        } else {
+            1.5
+        };
+        let exponent = self.before.as_ref().map_or(guess, |before| {
+            let exponent = (last / before.force).ln() / (here / before.fields.approach).ln();
+            if exponent.is_finite() {
+                exponent.clamp(1.0, 3.0)
+            } else {
+                guess
+            }
+        });
+        here * (force / last).powf(1.0 / exponent)
+    }
+
+    /// Updates the contact multipliers at the last equilibrium and balances again.
+    fn augment(&mut self, load: Load) -> bool {
+        for _ in 0..AUGMENTATIONS {
+            let mut fields = self.last.fields.clone();
+            if self.model.contact_nodes.is_empty() {
+                return true;
+            }
+            fields.multipliers.clone_from(&fields.contact);
+            let goal = match load {
+                Load::Approach(approach) => Goal::Approach(approach),
+                Load::Force(force) => Goal::Force(force),
+            };
+            match self.newton(fields, goal) {
+                Some(found) => self.last = found,
+                None => return false,
+            }
+        }
+        true
+    }
+}

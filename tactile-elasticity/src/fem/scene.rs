@@ -1,0 +1,307 @@
+//! Ready models of what a sensor meets.
+
+use super::block::BlockMesh;
+use super::bodies::{ContactMesh, Inclusion, contact_lines};
+use super::contact::RigidShape;
+use super::material::{Kinematics, Material};
+use super::mesh::{Boundary, Mesh};
+use super::model::{Model, Support};
+use super::newton::{Load, Solution};
+use crate::ElasticityError;
+use crate::error::{Quantity, positive};
+
+/// A layer of a [`Guide`].
+///
+/// ```
+/// use tactile_elasticity::fem::{Layer, Material};
+///
+/// let epidermis = Layer { thickness_m: 2e-3, material: Material::new(136e3, 0.495).unwrap() };
+/// assert_eq!(epidermis.material.youngs_modulus_pa(), 136e3);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Layer {
+    /// Thickness, in metres.
+    pub thickness_m: f64,
+    /// What it is made of.
+    pub material: Material,
+}
+
+/// A soft guide: bonded layers, the first towards the object, the last bonded to rigid glass.
+///
+/// ```
+/// use tactile_elasticity::fem::{Guide, Layer, Material};
+///
+/// let layer = |thickness_m, modulus| Layer { thickness_m, material: Material::new(modulus, 0.495).unwrap() };
+/// let guide = Guide::new(vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)], 25e-3).unwrap();
+/// assert_eq!(guide.layers().len(), 3);
+/// assert!(Guide::new(vec![], 25e-3).is_err());
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Guide {
+    layers: Vec<Layer>,
+    radius_m: f64,
+}
+
+impl Guide {
+    /// Layers from the object's side to the glass, and the guide's radius in metres.
+    ///
+    /// # Errors
+    /// No layer; a thickness or a radius that is not positive.
+    pub fn new(layers: Vec<Layer>, radius_m: f64) -> Result<Self, ElasticityError> {
+        positive(radius_m, Quantity::Radius)?;
+        if layers.is_empty() {
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::Layers,
+                expected: 1,
+                found: 0,
+            });
+        }
+        for layer in &layers {
+            positive(layer.thickness_m, Quantity::Thickness)?;
+        }
+        Ok(Self { layers, radius_m })
+    }
+
+    /// The layers, from the object's side.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    fn thicknesses(&self) -> Vec<f64> {
+        self.layers.iter().map(|layer| layer.thickness_m).collect()
+    }
+
+    fn materials(&self) -> Vec<Material> {
+        self.layers.iter().map(|layer| layer.material).collect()
+    }
+}
+
+/// What lies between a guide's face and a block's surface, of [`Block`]'s example.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Interface {
+    /// The two move together.
+    Bonded,
+    /// They slide on each other and may part.
+    Frictionless,
+}
+
+/// A sphere of another material within a block, on its axis, of [`Block`]'s example.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Lump {
+    /// Its diameter, in metres.
+    pub diameter_m: f64,
+    /// From the block's surface to its top, in metres.
+    pub depth_m: f64,
+    /// What it is made of.
+    pub material: Material,
+}
+
+/// A cylindrical block of tissue whose far side is held.
+///
+/// ```
+/// use tactile_elasticity::fem::{Block, Guide, Interface, Layer, Load, Lump, Material, Scene};
+///
+/// let soft = Material::new(5e3, 0.495).unwrap();
+/// let stiff = Material::new(5e4, 0.495).unwrap();
+/// let lump = Lump { diameter_m: 10e-3, depth_m: 6e-3, material: stiff };
+/// let block = Block { height_m: 30e-3, radius_m: 40e-3, material: soft, lump: Some(lump) };
+/// let layer = Layer { thickness_m: 10e-3, material: stiff };
+/// let guide = Guide::new(vec![layer], 16e-3).unwrap();
+/// let scene = Scene::block_under_guide(&block, &guide, Interface::Bonded).unwrap();
+/// let plain = Scene::block_under_guide(&Block { lump: None, ..block }, &guide, Interface::Bonded).unwrap();
+/// let force = |scene: &Scene| scene.solve(&[Load::Approach(1e-3)]).states[0].force_n();
+/// assert!(force(&scene) > force(&plain));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Block {
+    /// Its height, in metres.
+    pub height_m: f64,
+    /// Its radius, in metres, greater than the guide's.
+    pub radius_m: f64,
+    /// What it is made of.
+    pub material: Material,
+    /// An inclusion, if it has one.
+    pub lump: Option<Lump>,
+}
+
+/// Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's circumference.
+const BLOCK_FINENESS: usize = 5;
+
+/// A model ready to be solved, with the pressure between guide and object as its result.
+///
+/// ```
+/// use tactile_elasticity::fem::{Load, Material, Scene};
+///
+/// let scene = Scene::ball_on_flat(3e-3, Material::new(103e3, 0.495).unwrap()).unwrap();
+/// let solution = scene.solve(&[Load::Force(0.2)]);
+/// let radius = solution.states[0].contact_radius().unwrap();
+/// assert!((radius.radius_m - 1.51e-3).abs() < 0.02e-3);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Scene {
+    model: Model,
+}
+
+impl Scene {
+    /// The half of a ball next to its contact with a rigid flat; its equator slides freely, as it
+    /// does where the ball is pressed the same way from both sides.
+    ///
+    /// # Errors
+    /// A radius that is not positive.
+    pub fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
+        positive(radius_m, Quantity::Radius)?;
+        let mut model = Model::new(Kinematics::Finite);
+        let ball = model.add(&Mesh::half_ball(radius_m, ball_mesh(radius_m)), &[material])?;
+        model.hold(ball, Boundary::Base, Support::Sliding);
+        model.contact_rigid_below(ball, RigidShape::Flat, 0.0);
+        Ok(Self { model })
+    }
+
+    /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
+    /// height, the glass moves by the approach.
+    ///
+    /// # Errors
+    /// A radius that is not positive; a guide that is not wider than the ball.
+    pub fn ball_on_guide(
+        radius_m: f64,
+        material: Material,
+        guide: &Guide,
+    ) -> Result<Self, ElasticityError> {
+        positive(radius_m, Quantity::Radius)?;
+        if guide.radius_m <= radius_m {
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::Radius,
+                found: radius_m,
+                limit: guide.radius_m,
+            });
+        }
+        let mut model = Model::new(Kinematics::Finite);
+        let size = ball_mesh(radius_m);
+        let ball = model.add(&Mesh::half_ball(radius_m, size), &[material])?;
+        let thickness: f64 = guide.thicknesses().iter().sum();
+        // The contact may grow to about the ball's own radius; beyond, elements grow freely.
+        let mut lines = contact_lines(
+            size.inner,
+            size.count,
+            size.growth,
+            0.15 * radius_m,
+            1.3 * radius_m,
+        );
+        let last = lines[lines.len() - 1];
+        let outer = contact_lines(
+            0.2 * radius_m,
+            1,
+            1.4,
+            0.5 * thickness,
+            guide.radius_m - last,
+        );
+        lines.extend(outer.iter().skip(1).map(|r| last + r));
+        let first = 2.0 * size.inner / size.count as f64;
+        let mesh = Mesh::layered_disc(&guide.thicknesses(), &lines, first, 1.35);
+        let disc = model.add(&mesh, &guide.materials())?;
+        model.hold(ball, Boundary::Base, Support::Sliding);
+        model.drive(disc, Boundary::Base, Support::Bonded);
+        model.contact(ball, disc);
+        Ok(Self { model })
+    }
+
+    /// A block with or without an inclusion under a guide's face; the block's far side is held, the
+    /// guide's glass moves by the approach.
+    ///
+    /// # Errors
+    /// Lengths that are not positive; a block no wider than the guide; an inclusion that is not
+    /// inside the block or not narrower than the guide.
+    pub fn block_under_guide(
+        block: &Block,
+        guide: &Guide,
+        interface: Interface,
+    ) -> Result<Self, ElasticityError> {
+        positive(block.height_m, Quantity::Thickness)?;
+        positive(block.radius_m, Quantity::Radius)?;
+        let out_of_range = |quantity, found, limit| ElasticityError::OutOfRange {
+            quantity,
+            found,
+            limit,
+        };
+        if block.radius_m <= guide.radius_m {
+            return Err(out_of_range(
+                Quantity::Radius,
+                guide.radius_m,
+                block.radius_m,
+            ));
+        }
+        if let Some(lump) = block.lump {
+            positive(lump.diameter_m, Quantity::Radius)?;
+            positive(lump.depth_m, Quantity::Thickness)?;
+            let bottom = lump.depth_m + lump.diameter_m;
+            if bottom >= block.height_m {
+                return Err(out_of_range(Quantity::Thickness, bottom, block.height_m));
+            }
+            if lump.diameter_m >= 2.0 * guide.radius_m {
+                return Err(out_of_range(
+                    Quantity::Radius,
+                    lump.diameter_m,
+                    2.0 * guide.radius_m,
+                ));
+            }
+        }
+        let bonded = interface == Interface::Bonded;
+        let meshes = BlockMesh {
+            block_height: block.height_m,
+            block_radius: block.radius_m,
+            disc_radius: guide.radius_m,
+            layers: guide.thicknesses(),
+            inclusion: block.lump.map(|lump| Inclusion {
+                radius: 0.5 * lump.diameter_m,
+                depth: lump.depth_m,
+            }),
+            bonded,
+            fineness: BLOCK_FINENESS,
+        }
+        .build();
+        let mut tissue = vec![block.material];
+        tissue.extend(block.lump.map(|lump| lump.material));
+        let mut model = Model::new(Kinematics::Finite);
+        match meshes.block {
+            None => {
+                let materials = [guide.materials(), tissue].concat();
+                let both = model.add(&meshes.guide, &materials)?;
+                model.drive(both, Boundary::Base, Support::Bonded);
+                model.hold(both, Boundary::Stage, Support::Bonded);
+                model.bond(both, guide.layers.len());
+            }
+            Some(mesh) => {
+                let disc = model.add(&meshes.guide, &guide.materials())?;
+                let tissue = model.add(&mesh, &tissue)?;
+                model.drive(disc, Boundary::Base, Support::Bonded);
+                model.hold(tissue, Boundary::Stage, Support::Bonded);
+                model.contact(disc, tissue);
+            }
+        }
+        Ok(Self { model })
+    }
+
+    /// Solves for the loads in order.
+    pub fn solve(&self, loads: &[Load]) -> Solution {
+        self.model.solve(loads)
+    }
+
+    /// The model, for what the scene does not offer.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+}
+
+/// Elements from a contact radius of an eighth of the ball's up to the whole ball.
+fn ball_mesh(radius: f64) -> ContactMesh {
+    ContactMesh {
+        inner: 0.06 * radius,
+        count: 5,
+        growth: 1.12,
+    }
+}

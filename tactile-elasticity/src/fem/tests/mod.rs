@@ -1,0 +1,4 @@
+//! Convergence of the elements and of contact, against exact solutions.
+
+mod contact;
+mod elements;
