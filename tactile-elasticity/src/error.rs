@@ -56,13 +56,12 @@ pub enum ElasticityError {
         /// 1/R₁ + 1/R₂.
         curvature_per_m: f64,
     },
-    /// The contact is no softer than the known body alone, so that nothing is left
-    /// for the sample's own compliance.
+    /// The contact is no softer than the other body alone: no compliance is left for the sample.
     #[error(
         "the sample is stiffer than can be resolved through this waveguide or indenter (above {lower_bound_pa} Pa with 95 % confidence)"
     )]
     StifferThanResolvable {
-        /// The 95 % lower limit of the modulus (zero where nothing is known of the errors).
+        /// The 95 % lower limit of the modulus (zero where the errors are unknown).
         lower_bound_pa: f64,
     },
     /// Fewer usable loads than the estimator needs.
@@ -129,7 +128,7 @@ pub enum ElasticityError {
     },
 }
 
-/// The quantities that errors speak of.
+/// The quantity that an error is about.
 ///
 /// ```
 /// use tactile_elasticity::{ElasticityError, Quantity, contact::flat_punch};

@@ -38,7 +38,7 @@ impl<T: RealField + Copy> Body<T> {
         Self { compliance_per_pa }
     }
 
-    /// A body that does not yield.
+    /// A rigid body, without compliance.
     pub fn rigid() -> Self {
         Self {
             compliance_per_pa: T::zero(),

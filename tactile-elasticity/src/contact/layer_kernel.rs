@@ -99,7 +99,7 @@ impl LayerKernel {
     /// ```
     /// use tactile_elasticity::contact::{Bond, LayerKernel};
     ///
-    /// // Long waves feel the base and move nothing; short ones do not know of it.
+    /// // Long waves feel the base and move nothing; short ones do not.
     /// let kernel = LayerKernel::new(Bond::Bonded, 0.5)?;
     /// assert!((kernel.deficit(0.0) - 1.0_f64).abs() < 1e-15 && kernel.deficit(25.0) < 1e-16);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())

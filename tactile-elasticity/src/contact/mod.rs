@@ -1,12 +1,13 @@
 //! Contact mechanics: forces, contact radii and indentations of elastic bodies.
 //!
-//! | room | contact |
+//! | item | contact |
 //! |---|---|
 //! | [`HertzContact`] | two spheres, small contact |
 //! | [`flat_punch`], [`cone`] | rigid punch and cone on a half-space |
-//! | [`LayerSeries`], [`LayerEquation`] | sphere on a layer: series in χ = √(Rδ)/h, and the solution itself |
+//! | [`LayerEquation`] | sphere on one or more bonded layers: the solution by an integral equation |
+//! | [`LayerSeries`] | sphere on one layer: series in χ = √(Rδ)/h |
 //! | [`tatara_indentation_m`] | sphere squeezed between two plates, large deformation |
-//! | [`Waveguide`] | elastic layers in series |
+//! | [`Waveguide`] | the layers of a sensor |
 
 mod body;
 mod hertz;

@@ -1,7 +1,7 @@
 //! Tatara's large-deformation sphere.
 //!
-//! A sphere pressed from both sides yields at each contact as Hertz says, less what the force on the far side pushes the
-//! contact region towards it: Boussinesq's displacement at (a, 2R) under a point force,
+//! A sphere pressed from both sides deforms at each contact as Hertz's law says, less the displacement that the force on the far
+//! side causes in the contact region: Boussinesq's displacement at (a, 2R) under a point force,
 //!
 //! δ = a²/R − (F/πE)·[(1 − ν²)/√(a² + 4R²) + 2(1 + ν)R²/(a² + 4R²)^{3⁄2}],  a³ = 3FR/(4E*)
 //!

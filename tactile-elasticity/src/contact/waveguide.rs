@@ -1,4 +1,4 @@
-//! The sensor's layers, which yield with the sample.
+//! The elastic layers of a sensor.
 
 use super::Body;
 use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};

@@ -1,4 +1,4 @@
-//! Which law a curve speaks for.
+//! Choice of the law that fits a curve best.
 
 use super::{CurveFit, CurveOptions, IndentationCurve, Indenter, Model, fit_curve};
 use crate::error::ElasticityError;

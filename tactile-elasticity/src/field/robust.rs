@@ -1,4 +1,4 @@
-//! Averages that a few wild points do not move.
+//! Averages that are robust against outliers.
 
 use nalgebra::RealField;
 

@@ -25,7 +25,7 @@ impl<T: RealField + Copy, F: Fn(&Point3<T>) -> Matrix3<T>> DisplacementGradient<
     }
 }
 
-/// The Jacobian of a map of positions, such as a spline's, as a displacement gradient: H = ∇f − I.
+/// Turns the Jacobian of a map of positions (a spline, say) into a displacement gradient: H = ∇f − I.
 ///
 /// ```
 /// use nalgebra::{Matrix3, Point3};

@@ -1,4 +1,4 @@
-//! The spread of an answer over repetitions of the experiment, drawn with a seed.
+//! The spread of a result over seeded repetitions of the experiment (parametric bootstrap).
 
 use super::{Estimate, LoadSeries, LoadState, ModulusEstimator};
 use crate::error::ElasticityError;
@@ -7,7 +7,7 @@ use nalgebra::RealField;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 
-/// How often and from which seed.
+/// A parametric bootstrap: number of repetitions and seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bootstrap {
@@ -17,7 +17,7 @@ pub struct Bootstrap {
     pub seed: u64,
 }
 
-/// What the repetitions say.
+/// Mean, spread and quantiles of the repetitions.
 ///
 /// ```
 /// use tactile_elasticity::modulus::Bootstrap;

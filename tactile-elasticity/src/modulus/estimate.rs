@@ -1,4 +1,4 @@
-//! What an estimator answers.
+//! Estimators and their results.
 
 use super::warning::Warning;
 use crate::error::ElasticityError;
@@ -145,7 +145,7 @@ impl<T: RealField + Copy> Interval<T> {
     }
 }
 
-/// Young's modulus with its error and all that bears on trusting it.
+/// Young's modulus with its error, its fit and its warnings.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;
@@ -178,7 +178,7 @@ pub struct ModulusEstimate<T> {
     pub warnings: Vec<Warning<T>>,
 }
 
-/// How one load fared.
+/// What one load contributed.
 ///
 /// ```
 /// use tactile_elasticity::contact::HertzContact;

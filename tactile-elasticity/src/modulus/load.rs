@@ -12,8 +12,8 @@ pub struct Estimate<T> {
     pub value: T,
     /// Its standard deviation over repetitions; zero where unknown.
     pub standard_error: T,
-    /// Degrees of freedom the standard error was itself learnt with (pairs less parameters of a calibration, parts of a jackknife
-    /// less one); None where it is known. Intervals are wider the fewer there are.
+    /// Degrees of freedom of the standard error where it was itself estimated (pairs less parameters of a calibration, parts of a
+    /// jackknife less one); None where it is known. Fewer degrees make wider intervals.
     pub degrees_of_freedom: Option<T>,
 }
 
@@ -27,7 +27,7 @@ impl<T: RealField + Copy> Estimate<T> {
         }
     }
 
-    /// With a standard error that was learnt from so few repetitions that it is itself uncertain.
+    /// With the degrees of freedom of a standard error that was estimated from few repetitions.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio};
@@ -36,9 +36,9 @@ impl<T: RealField + Copy> Estimate<T> {
     /// };
     /// let force = Estimate::new(0.12, 0.001);
     /// let known = PaperRatio::new().estimate(&LoadSeries::new([load(force)]))?;
-    /// let learnt = PaperRatio::new().estimate(&LoadSeries::new([load(force.with_degrees_of_freedom(5.0))]))?;
-    /// assert_eq!(known.standard_error_pa, learnt.standard_error_pa);
-    /// assert!(learnt.interval_95.lower < known.interval_95.lower); // Student's t instead of the normal distribution
+    /// let estimated = PaperRatio::new().estimate(&LoadSeries::new([load(force.with_degrees_of_freedom(5.0))]))?;
+    /// assert_eq!(known.standard_error_pa, estimated.standard_error_pa);
+    /// assert!(estimated.interval_95.lower < known.interval_95.lower); // Student's t instead of the normal distribution
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn with_degrees_of_freedom(mut self, degrees: T) -> Self {
@@ -76,7 +76,7 @@ impl Estimate<f64> {
     }
 }
 
-/// One load: the force and whatever else was seen of the contact.
+/// One load: the force and what was measured of the contact.
 ///
 /// Pressing forces are positive. Strain is that between the unloaded state (or the first load, see the estimators) and this
 /// load, positive where the object is squeezed.

@@ -61,7 +61,7 @@ impl<T> ModulusSelection<T> {
 ///     LoadState::new(Estimate::exact(f)).with_indentation(Estimate::new(d, 0.003 * d))
 /// });
 /// let series = LoadSeries::new(loads);
-/// // Against a layer of 1 mm, glued or sliding:
+/// // Against a layer of 1 mm, bonded or sliding:
 /// let estimator = BestOf::sphere_on_sample(0.005, 0.5, Some(1e-3))?;
 /// let selection = estimator.select(&series)?;
 /// assert_eq!(selection.chosen().estimator, EstimatorKind::HertzSphere);

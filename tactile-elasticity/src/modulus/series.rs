@@ -6,7 +6,7 @@ use crate::error::{ElasticityError, Quantity, not_negative};
 use crate::scalar::widen;
 use nalgebra::{DMatrix, RealField};
 
-/// Standard errors that all loads of a series share: no number of loads averages them away. Zero where negligible or unknown.
+/// Standard errors that all loads of a series have in common: averaging over loads does not reduce them. Zero where negligible or unknown.
 ///
 /// ```
 /// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors};
@@ -16,9 +16,9 @@ use nalgebra::{DMatrix, RealField};
 /// let shared = SharedErrors { force_scale: 0.02, ..SharedErrors::default() };
 /// let hertz = HertzSphere::new(5e-3, 0.5)?;
 /// let averaged = hertz.estimate(&series)?;
-/// let honest = hertz.estimate(&series.with_shared_errors(shared)?)?;
+/// let scaled = hertz.estimate(&series.with_shared_errors(shared)?)?;
 /// assert!(averaged.standard_error_pa < 0.005 * averaged.youngs_modulus_pa);
-/// assert!(honest.standard_error_pa > 0.02 * honest.youngs_modulus_pa);
+/// assert!(scaled.standard_error_pa > 0.02 * scaled.youngs_modulus_pa);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -62,7 +62,7 @@ impl<T: RealField + Copy> SharedErrors<T> {
     }
 }
 
-/// What an estimator works on: one or more loads with the errors that they share.
+/// The input of an estimator: one or more loads with the errors that they share.
 ///
 /// ```
 /// use nalgebra::DMatrix;

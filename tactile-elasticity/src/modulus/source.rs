@@ -5,13 +5,13 @@ use super::statistics::fewest;
 use crate::error::{ElasticityError, Quantity};
 use nalgebra::{DMatrix, DVector, RealField};
 
-/// A covariance of logarithms of moduli from one source, and the degrees of freedom it was learnt with.
+/// The covariance of logarithms of moduli from one source of error, and its degrees of freedom.
 pub(super) type LogErrors = (DMatrix<f64>, Option<f64>);
 
 /// Errors of one quantity over all loads.
 pub(super) struct Source {
     covariance: DMatrix<f64>,
-    /// Those of the least known error: what was learnt together (one calibration) does not become surer by repetition.
+    /// Those of the least known error: repetition does not improve a standard error that all loads take from one calibration.
     degrees: Option<f64>,
 }
 

@@ -13,7 +13,7 @@ pub(crate) fn quantile_95(degrees: Option<f64>) -> f64 {
     }
 }
 
-/// ν = (Σ vᵢ)²/Σ (vᵢ²/νᵢ) of a sum of variances vᵢ, each learnt with νᵢ degrees of freedom (Welch 1947, Satterthwaite 1946); None
+/// ν = (Σ vᵢ)²/Σ (vᵢ²/νᵢ) of a sum of variances vᵢ, each estimated with νᵢ degrees of freedom (Welch 1947, Satterthwaite 1946); None
 /// where all are known.
 pub(crate) fn effective_degrees(parts: &[(f64, Option<f64>)]) -> Option<f64> {
     let total: f64 = parts.iter().map(|p| p.0).sum();
@@ -71,7 +71,7 @@ impl CommonMean {
     }
 }
 
-/// The scatter is believed over the stated errors when χ² is this improbable.
+/// The errors are scaled up to the scatter when χ² is this improbable.
 const EXCESS_PROBABILITY: f64 = 1e-3;
 
 /// θ = (1ᵀΣ⁻¹z)/(1ᵀΣ⁻¹1). Σ = 0 means unknown: equal weights and the error from the scatter.

@@ -1,6 +1,6 @@
-//! A deformation gradient F = I + H that forgets nothing of how it was given.
+//! The deformation gradient F = I + H, kept in the form in which it was given so that no digits are lost.
 
-use super::twofold::Twofold;
+use super::double_double::DoubleDouble;
 use nalgebra::{Matrix2, Matrix3, RealField};
 
 /// F = I + H at a point, given by either, and the other rounded.
@@ -107,7 +107,7 @@ impl<T: RealField + Copy> Deformation<T> {
         sum.add(h[(0, 0)]).add(h[(1, 1)]).add(h[(2, 2)]).value()
     }
 
-    /// F⁻¹ by cofactors whose differences of products are carried twofold; None where det F = 0.
+    /// F⁻¹ by cofactors whose differences of products are summed in double-double; None where det F = 0.
     pub fn inverse(&self) -> Option<Matrix3<T>> {
         let f = &self.f;
         let det = determinant(f).value();
@@ -117,22 +117,22 @@ impl<T: RealField + Copy> Deformation<T> {
         Some(Matrix3::from_fn(|i, j| {
             let (r, s) = ((j + 1) % 3, (j + 2) % 3);
             let (p, q) = ((i + 1) % 3, (i + 2) % 3);
-            let minor = Twofold::zero().add_product(f[(r, p)], f[(s, q)]);
+            let minor = DoubleDouble::zero().add_product(f[(r, p)], f[(s, q)]);
             minor.add_product(-f[(r, q)], f[(s, p)]).value() / det
         }))
     }
 
-    /// E = ½(H + Hᵀ + HᵀH), carried twofold where the terms cancel (large rotation, little strain).
+    /// E = ½(H + Hᵀ + HᵀH), summed in double-double where the terms cancel (large rotation, little strain).
     pub(crate) fn green_lagrange(&self) -> Matrix3<T> {
         let plain = green_lagrange_plain(&self.h);
         if cancels(&self.h, &plain) {
-            self.green_lagrange_twofold()
+            self.green_lagrange_double_double()
         } else {
             plain
         }
     }
 
-    fn green_lagrange_twofold(&self) -> Matrix3<T> {
+    fn green_lagrange_double_double(&self) -> Matrix3<T> {
         let half: T = nalgebra::convert(0.5);
         let mut e = Matrix3::zeros();
         for i in 0..3 {
@@ -142,7 +142,7 @@ impl<T: RealField + Copy> Deformation<T> {
                 } else {
                     &self.h
                 };
-                let mut sum = Twofold::zero();
+                let mut sum = DoubleDouble::zero();
                 for k in 0..3 {
                     sum = sum.add_product(m[(k, i)], m[(k, j)]);
                 }
@@ -185,8 +185,8 @@ pub(crate) fn cancels<T: RealField + Copy>(h: &Matrix3<T>, e: &Matrix3<T>) -> bo
     (diagonal + shear) * many < of_h
 }
 
-fn determinant<T: RealField + Copy>(m: &Matrix3<T>) -> Twofold<T> {
-    let mut sum = Twofold::zero();
+fn determinant<T: RealField + Copy>(m: &Matrix3<T>) -> DoubleDouble<T> {
+    let mut sum = DoubleDouble::zero();
     for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         sum = sum.add_triple(m[(0, i)], m[(1, j)], m[(2, k)]);

@@ -13,10 +13,10 @@
 
 mod batch;
 mod deformation;
+mod double_double;
 mod invariants;
 mod measure;
 mod stretch;
-mod twofold;
 
 pub use batch::green_lagrange_into;
 #[cfg(feature = "rayon")]

@@ -49,7 +49,7 @@ pub struct Kirchhoff;
 /// use nalgebra::Matrix3;
 /// use tactile_elasticity::{strain::Deformation, stress::{FirstPiolaKirchhoff, Stress}};
 ///
-/// // 1 N on an undeformed 1 m², stretched twofold: half as much by the second measure.
+/// // 1 N on an undeformed 1 m², stretched to twice its length: half as much by the second measure.
 /// let twice = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(2.0));
 /// let nominal = Stress::<FirstPiolaKirchhoff, f64>::new(Matrix3::identity());
 /// assert_eq!(nominal.to_second(&twice)?.tensor_pa()[(0, 0)], 0.5);

@@ -38,7 +38,7 @@ use crate::strain::{Deformation, StrainMeasure, deviator, scaled_norm};
 use core::marker::PhantomData;
 use nalgebra::{Matrix3, RealField};
 
-/// A strain tensor that knows its measure.
+/// A strain tensor typed by its measure.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -55,7 +55,7 @@ pub struct Strain<M, T> {
     measure: PhantomData<M>,
 }
 
-/// A stress tensor (Pa) that knows its measure.
+/// A stress tensor (Pa) typed by its measure.
 ///
 /// ```
 /// use nalgebra::Matrix3;
@@ -98,7 +98,7 @@ impl<M, T: RealField + Copy> Strain<M, T> {
 }
 
 impl<M, T: RealField + Copy> Stress<M, T> {
-    /// A tensor (Pa) said to be of this measure.
+    /// From a tensor (Pa) of this measure.
     pub fn new(tensor_pa: Matrix3<T>) -> Self {
         Self {
             tensor: tensor_pa,

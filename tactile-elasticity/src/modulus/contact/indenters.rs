@@ -1,4 +1,4 @@
-//! The estimators of this family, by what presses on what.
+//! The estimators of this family: which body presses on which.
 
 use super::ContactEstimator;
 use crate::contact::{Body, Bond, Waveguide};
@@ -60,7 +60,7 @@ pub type Cone = ContactEstimator<ConeLaw>;
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub type BondedLayer = ContactEstimator<LayerLaw>;
-/// A soft sphere squeezed beyond Hertz's reach.
+/// Tatara's soft sphere: the extension of the far side counted; a/R up to 0.6.
 ///
 /// ```
 /// use tactile_elasticity::contact::tatara_indentation_m;
@@ -90,7 +90,14 @@ pub type TataraSphere = ContactEstimator<TataraLaw>;
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub type SphereBetweenPlates = ContactEstimator<TwoContactsLaw>;
-/// A soft sphere on a waveguide that is not deep beside the contact: the integral equation with both bodies yielding.
+/// A soft sphere on the layers of a waveguide, or on a [rigid](Waveguide::rigid) flat: the linear contact with N bonded layers
+/// ([`LayerEquation`](crate::contact::LayerEquation)), exact for thick and thin layers, with a correction for finite strain.
+///
+/// Range: a/R up to 1.2 and a/h up to 1.5, with a warning beyond. Against finite elements (neo-Hookean, ν = 0.495) the modulus from the
+/// contact radius is within 0.2 % on a rigid flat (a/R 0.1 to 0.9) and within 2 % on the paper's guide (a/R 0.6 to 1.07); from the
+/// indentation, the approach of the ball's centre, within 2 % and 15 %. The law's own error is part of the interval.
+///
+/// The set-up solves some 45 contact radii for a dozen ratios of stiffness; an estimate then interpolates.
 ///
 /// ```
 /// use tactile_elasticity::contact::{Bond, Layer, Waveguide};
@@ -155,7 +162,7 @@ impl ContactEstimator<ConeLaw> {
 }
 
 impl ContactEstimator<LayerLaw> {
-    /// A sphere of radius R (m) on a sample of thickness h (m) and Poisson ratio ν, glued to or sliding on its rigid base.
+    /// A sphere of radius R (m) on a sample of thickness h (m) and Poisson ratio ν, bonded to or sliding on its rigid base.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].

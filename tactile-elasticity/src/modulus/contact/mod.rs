@@ -25,7 +25,7 @@ use nalgebra::RealField;
 /// use tactile_elasticity::contact::HertzContact;
 /// use tactile_elasticity::modulus::*;
 ///
-/// // The indentation was measured with a zero that is off; the radius knows better.
+/// // The indentation was measured with a wrong zero: use the radius alone.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let load = LoadState::new(Estimate::new(1e-3, 1e-5))
 ///     .with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6))
@@ -58,14 +58,14 @@ pub enum Evidence {
 /// let rigid = HertzSphere::new(5e-3, 0.5)?;
 /// let plain = rigid.estimate(&loads)?;
 ///
-/// // What yields beside the sample makes it stiffer than it looked.
+/// // The other body's compliance is subtracted: the sample is stiffer than without.
 /// let steel = rigid.clone().with_other_body(Body::elastic(200e9, 0.3)?).estimate(&loads)?;
 /// let gel = Waveguide::new(vec![Layer { thickness_m: 10e-3, youngs_modulus_pa: 100e3, poisson_ratio: 0.5 }])?;
 /// let on_gel = rigid.clone().with_waveguide(&gel).estimate(&loads)?;
 /// assert!(steel.youngs_modulus_pa / plain.youngs_modulus_pa - 1.0 < 1e-6);
 /// assert!(on_gel.youngs_modulus_pa > 1.3 * plain.youngs_modulus_pa);
 ///
-/// // What all loads share is not averaged away.
+/// // Errors that all loads share are not reduced by averaging.
 /// let shared = SharedErrors { force_scale: 0.01, length_scale: 0.005, size: 0.002, ..SharedErrors::default() };
 /// let careful = rigid.estimate(&loads.with_shared_errors(shared)?)?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
@@ -92,13 +92,15 @@ impl<L: ContactLaw> ContactEstimator<L> {
         })
     }
 
-    /// The other body of the contact yields too.
+    /// With the other body's compliance.
     pub fn with_other_body<T: RealField + Copy>(mut self, body: Body<T>) -> Self {
         self.other_compliance_per_pa = widen(body.compliance_per_pa());
         self
     }
 
-    /// The sample is pressed on a waveguide, its layers in series and deep beside the contact.
+    /// With a waveguide as the other body, its layers in series: one half-space of their mean compliance.
+    ///
+    /// Good for a contact that is small beside layers that are alike; [`SphereOnWaveguide`] solves the layers.
     pub fn with_waveguide<T: RealField + Copy>(self, waveguide: &Waveguide<T>) -> Self {
         self.with_other_body(waveguide.as_body())
     }

@@ -33,10 +33,10 @@ pub trait ContactLaw {
     /// Which estimator the law makes.
     fn kind(&self) -> EstimatorKind;
 
-    /// ln f of a contact radius (m); None where the radius says nothing or the law does not reach so far.
+    /// ln f of a contact radius (m); None where the law does not depend on it or does not reach so far.
     fn of_contact_radius(&self, a: f64, share: f64) -> Option<LogForce>;
 
-    /// ln f of an indentation (m); None where it says nothing or the law does not reach so far.
+    /// ln f of an indentation (m); None where the law does not depend on it or does not reach so far.
     fn of_indentation(&self, d: f64, share: f64) -> Option<LogForce>;
 
     /// a/R of what was measured, for laws with a radius.

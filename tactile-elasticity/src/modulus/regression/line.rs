@@ -23,8 +23,8 @@ pub(super) struct Point {
 }
 
 impl Line {
-    /// The line through the points, or through them and the origin; weighted by their errors where these are known, again and
-    /// again, since the weights depend on the slope.
+    /// The line through the points, or through them and the origin; weighted by their errors where these are known. The
+    /// weights depend on the slope, so that the fit is iterated.
     pub(super) fn fit(points: &[Point], free: bool, known: bool) -> Self {
         let mut line = Self::weighted(points, |_| 1.0, free, false);
         if !known {

@@ -49,7 +49,7 @@ pub enum Intercept {
 /// S_i = S₀ + E e_i over many loads, with errors in both.
 ///
 /// Each load weighs 1/(σ_S² + E²σ_e²) (York's effective variance without correlation); without any
-/// standard errors all weigh the same and the scatter tells the error. At least two loads, three where neither errors nor a
+/// standard errors all weigh the same and the error is estimated from the scatter. At least two loads, three where neither errors nor a
 /// zero intercept are given.
 ///
 /// ```

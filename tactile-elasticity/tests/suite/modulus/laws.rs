@@ -217,7 +217,7 @@ fn loads_choose_their_law() {
     assert!((choice.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12 && choice.weights[0] > 0.99);
     assert_eq!(choice.estimates.len() + choice.left_out.len(), 4);
 
-    // A sliding layer tells itself from a glued and from a deep one.
+    // A sliding layer differs from a bonded and from a deep one.
     let equation = LayerEquation::new(&LayerKernel::new(Bond::Free, NU).unwrap());
     let load = |ratio: f64| {
         let (h, contact) = (2e-3, equation.solve(ratio).unwrap());

@@ -6,31 +6,31 @@ use nalgebra::RealField;
 
 /// An unevaluated sum `hi + lo`, |lo| no more than half an ulp of `hi`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Twofold<T> {
+pub(crate) struct DoubleDouble<T> {
     pub(crate) hi: T,
     pub(crate) lo: T,
 }
 
 /// a + b exactly.
-fn two_sum<T: RealField + Copy>(a: T, b: T) -> Twofold<T> {
+fn two_sum<T: RealField + Copy>(a: T, b: T) -> DoubleDouble<T> {
     let hi = a + b;
     let of_b = hi - a;
-    Twofold {
+    DoubleDouble {
         hi,
         lo: (a - (hi - of_b)) + (b - of_b),
     }
 }
 
 /// a · b exactly (unless it underflows).
-fn two_product<T: RealField + Copy>(a: T, b: T) -> Twofold<T> {
+fn two_product<T: RealField + Copy>(a: T, b: T) -> DoubleDouble<T> {
     let hi = a * b;
-    Twofold {
+    DoubleDouble {
         hi,
         lo: a.mul_add(b, -hi),
     }
 }
 
-impl<T: RealField + Copy> Twofold<T> {
+impl<T: RealField + Copy> DoubleDouble<T> {
     pub(crate) fn zero() -> Self {
         Self {
             hi: T::zero(),
@@ -48,13 +48,13 @@ impl<T: RealField + Copy> Twofold<T> {
         }
     }
 
-    pub(crate) fn add_twofold(self, other: Self) -> Self {
+    pub(crate) fn add_sum(self, other: Self) -> Self {
         self.add(other.lo).add(other.hi)
     }
 
     /// self + a·b.
     pub(crate) fn add_product(self, a: T, b: T) -> Self {
-        self.add_twofold(two_product(a, b))
+        self.add_sum(two_product(a, b))
     }
 
     /// self + a·b·c.
@@ -76,12 +76,12 @@ mod tests {
     fn cancelling_products_keep_their_difference() {
         // (1 + u)(1 - u) - 1 = -u², far below the rounding of the product itself.
         let u = 2f64.powi(-40);
-        let difference = Twofold::zero()
+        let difference = DoubleDouble::zero()
             .add_product(1.0 + u, 1.0 - u)
             .add(-1.0)
             .value();
         assert_eq!(difference, -u * u);
-        let triple = Twofold::<f32>::zero()
+        let triple = DoubleDouble::<f32>::zero()
             .add_triple(3.0, 5.0, 7.0)
             .add(-105.0)
             .value();
