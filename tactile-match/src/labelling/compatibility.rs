@@ -9,11 +9,12 @@ use nalgebra::{RealField, SVector};
 /// use nalgebra::Point2;
 /// use tactile_match::labelling::{LabellingOptions, LengthMaximum};
 /// use tactile_match::{PointMatcher, RelaxationLabelling};
-/// let points = [[0.0, 0.0], [1.0, 0.1], [2.5, 0.0], [0.3, 2.0], [1.6, 1.4]].map(Point2::from);
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
 /// for maximum in [LengthMaximum::PerPair, LengthMaximum::Global] {
 ///     let options = LabellingOptions::default().with_length_maximum(maximum);
-///     let found = RelaxationLabelling::new(options).match_points(&points, &points)?;
-///     assert!((0..5).all(|i| found.assignment[i] == Some(i)));
+///     let found = RelaxationLabelling::new(options).match_points(&model, &target)?;
+///     assert!((0..12).all(|i| found.assignment[i] == Some(i)));
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```

@@ -7,14 +7,16 @@ use nalgebra::{Point, RealField, SVector};
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::labelling::{NeighbourGraph, Neighbourhood};
-/// let line = [0.0, 1.0, 2.0, 10.0].map(|x| Point2::new(x, 0.0)); // distances 1, 1, 2, 8, 9, 10: the median is 5
-/// let degrees = |neighbourhood| {
-///     let graph = NeighbourGraph::new(&line, neighbourhood);
-///     [0, 1, 2, 3].map(|i| graph.of(i).len())
-/// };
-/// assert_eq!(degrees(Neighbourhood::MedianRadius), [2, 2, 2, 0]); // the far point stands alone
-/// assert_eq!(degrees(Neighbourhood::Nearest(1)), [1, 1, 1, 1]);
+/// use tactile_match::labelling::{LabellingOptions, Neighbourhood};
+/// use tactile_match::{PointMatcher, RelaxationLabelling};
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
+/// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
+/// for neighbourhood in [Neighbourhood::MedianRadius, Neighbourhood::Nearest(4)] {
+///     let options = LabellingOptions::default().with_neighbourhood(neighbourhood)?;
+///     let found = RelaxationLabelling::new(options).match_points(&model, &target)?;
+///     assert!((0..12).all(|i| found.assignment[i] == Some(i)));
+/// }
+/// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Neighbourhood {
