@@ -43,7 +43,7 @@ impl GreyHistogram {
         histogram.clear(pixel_area_m2);
         differences
             .filter(|d| !d.is_nan())
-            .for_each(|d| histogram.add(d));
+            .for_each(|d| histogram.add_many(d, 1.0));
         histogram
     }
 
@@ -63,12 +63,13 @@ impl GreyHistogram {
         self.pixel_area_m2 = pixel_area_m2;
     }
 
-    pub(crate) fn add(&mut self, difference: f32) {
+    /// Adds a number of pixels of one difference.
+    pub(crate) fn add_many(&mut self, difference: f32, pixels: f64) {
         let place = f64::from(difference.clamp(-255.0, 255.0)) - f64::from(LEAST);
         let below = place as usize;
-        let share = place - below as f64;
-        self.area_m2[below] += (1.0 - share) * self.pixel_area_m2;
-        self.area_m2[below + 1] += share * self.pixel_area_m2;
+        let (share, area) = (place - below as f64, pixels * self.pixel_area_m2);
+        self.area_m2[below] += (1.0 - share) * area;
+        self.area_m2[below + 1] += share * area;
     }
 
     /// Grey level and area of the bins that are not empty.

@@ -24,7 +24,7 @@ use crate::frame::DifferenceNoise;
 ///     }
 ///
 ///     fn read(&self, histogram: &GreyHistogram, _noise: &DifferenceNoise) -> ForceReading<f64> {
-///         let force_n = Estimate { value: histogram.integral(|g| self.pressure_pa(g).value), standard_error: 0.0 };
+///         let force_n = Estimate { value: histogram.integral(|g| self.value_pa(g)), standard_error: 0.0 };
 ///         ForceReading { force_n, noise_n: 0.0, calibration_n: 0.0, degrees_of_freedom: None, out_of_range: false }
 ///     }
 /// }
@@ -37,6 +37,11 @@ use crate::frame::DifferenceNoise;
 pub trait LocalCalibration: Send + Sync {
     /// Pressure in pascals of a grey-level difference, with its standard error. Rises with the grey level and is zero at zero.
     fn pressure_pa(&self, grey: f64) -> Estimate<f64>;
+
+    /// The pressure alone, for tables: what [`pressure_pa`](Self::pressure_pa) has as its value.
+    fn value_pa(&self, grey: f64) -> f64 {
+        self.pressure_pa(grey).value
+    }
 
     /// Force of a contact from its histogram, Σ A(g) f(g), with its errors.
     fn read(&self, histogram: &GreyHistogram, noise: &DifferenceNoise) -> ForceReading<f64>;

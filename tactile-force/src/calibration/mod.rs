@@ -79,6 +79,8 @@ pub struct ForceReading<T> {
 /// assert!(line.standard_error_n(1e5) < 1e-12 && line.error_covariance_n2(1e5, 2e5).abs() < 1e-24);
 /// assert!((line.integrated_pixel_value(0.5).unwrap() - 1e5).abs() < 1e-6);
 /// assert!(line.report().r_squared > 0.999_999);
+/// // A line of frame sums holds for contacts of one shape; it has no curve that holds pixel by pixel.
+/// assert!(line.local().is_none());
 /// // Stress of one grey level on pixels of (20 µm)².
 /// let step = line.stress_per_grey_level_pa(1e5, 4e-10);
 /// assert!((step - 12_500.0).abs() < 1e-6);

@@ -32,10 +32,10 @@ pub enum Robustness {
 /// The options of a calibration fit.
 ///
 /// ```
-/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration};
+/// use tactile_force::{CalibrationOptions, CalibrationPair, LinearCalibration, Robustness, StressCalibration};
 ///
 /// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
-/// let options = CalibrationOptions::default().with_zero_at_origin();
+/// let options = CalibrationOptions::default().with_zero_at_origin().with_robustness(Robustness::None);
 /// let line = LinearCalibration::fit(&pairs, &options)?;
 /// assert_eq!(line.force_n(0.0), 0.0);
 /// assert!((line.sensitivity_n(1.0) - (2.0 + 0.1 * 6.0 / 14.0_f64)).abs() < 1e-12);

@@ -44,6 +44,20 @@ impl DetectorWorkspace {
 
     /// Brightness and noise of the last frame outside the contact, against the reference that it was compared with; `None` if no
     /// frame of the reference's size was. O(tiles), so that a session can ask for it every so many frames.
+    ///
+    /// ```
+    /// # use ndarray::Array2;
+    /// # use tactile_force::{ContactDetector, ContactOptions, Detection, DetectorWorkspace, ReferenceFrame};
+    /// # let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
+    /// let mut workspace = DetectorWorkspace::default();
+    /// assert!(workspace.condition(&reference).is_none(), "no frame yet");
+    /// # let dimmed = Array2::from_elem((160, 160), 49_u8);
+    /// let _: Detection<f64> =
+    ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, dimmed.view(), &reference)?;
+    /// let condition = workspace.condition(&reference).expect("a frame");
+    /// assert!((condition.brightness.value - 0.98).abs() < 1e-9);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
     pub fn condition(&mut self, reference: &ReferenceFrame) -> Option<FrameCondition> {
         let size = reference.image().dim();
         let tiles = reference.tile_sums(&self.pass.tiles)?;

@@ -22,6 +22,7 @@ use crate::error::{ForceError, Requirement};
 /// // The corners of a frame of 1392 × 1042 pixels appear 3 % too close to its middle.
 /// let plain = LensGeometry::new([21.6e-6, 22.0e-6])?;
 /// let lens = plain.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+/// assert_eq!((lens.pixel_size_m(), lens.distortion()), ([21.6e-6, 22.0e-6], [0.03, 0.0]));
 /// assert_eq!(lens.to_metres([695.5, 520.5]), plain.to_metres([695.5, 520.5]));
 /// let corner = lens.to_metres([0.0, 0.0]);
 /// assert!(corner[0] < -0.4e-3);
@@ -40,6 +41,11 @@ pub struct LensGeometry {
     radius_px: f64,
     distortion: [f64; 2],
 }
+
+/// Points of a contour that is undistorted.
+const DIRECTIONS: usize = 16;
+/// Radius of the ring, as a share of the contact's, on which a quadratic has the mean that it has over Hertz's pressure: √0.4.
+const HERTZ_RADIUS: f64 = 0.632_455_532_033_675_9;
 
 /// Value and derivatives of the map at a pixel.
 struct Local {
@@ -165,6 +171,68 @@ impl LensGeometry {
     pub fn pixel_area_m2(&self, pixel: [f64; 2]) -> f64 {
         let [[xu, xv], [yu, yv]] = self.local(pixel).jacobian;
         (xu * yv - xv * yu).abs()
+    }
+
+    /// Mean area of a pixel over a ball's contact around a centre [x, y], weighted with Hertz's pressure: right to second order
+    /// in the contact's radius. dS of (6) for a contact that is not small beside the frame.
+    ///
+    /// ```
+    /// use tactile_force::LensGeometry;
+    ///
+    /// let lens = LensGeometry::new([20e-6; 2])?.with_distortion([100.0, 100.0], 100.0, [0.05, 0.0])?;
+    /// // Around the centre of distortion pixels grow by 4 k₁ρ², on average over the pressure by 4 k₁ · 0.4 a²/R².
+    /// let mean = lens.mean_pixel_area_m2([100.0, 100.0], 30.0);
+    /// assert!((mean / 4e-10 - 1.0 - 4.0 * 0.05 * 0.4 * 0.09).abs() < 1e-4);
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn mean_pixel_area_m2(&self, centre_px: [f64; 2], radius_px: f64) -> f64 {
+        let ring = Self::ring(centre_px, HERTZ_RADIUS * radius_px, 1.0);
+        ring.map(|p| self.pixel_area_m2(p)).sum::<f64>() / DIRECTIONS as f64
+    }
+
+    /// Undistorted centre [X, Y] and radius, in metres, of a contact seen as a circle of `radius_px` pixel widths where pixels are
+    /// `aspect` times as high as wide: the radius is that of the circle of the undistorted contour's area.
+    pub(crate) fn contact_m(
+        &self,
+        centre_px: [f64; 2],
+        radius_px: f64,
+        aspect: f64,
+    ) -> ([f64; 2], f64) {
+        let (mut centre, mut weights) = ([0.0; 2], 0.0);
+        for pixel in Self::ring(centre_px, HERTZ_RADIUS * radius_px, aspect) {
+            let (place, weight) = (self.to_metres(pixel), self.pixel_area_m2(pixel));
+            centre = [centre[0] + weight * place[0], centre[1] + weight * place[1]];
+            weights += weight;
+        }
+        let mut twice_area = 0.0;
+        let mut before: Option<[f64; 2]> = None;
+        let contour = Self::ring(centre_px, radius_px, aspect).map(|p| self.to_metres(p));
+        let closed = contour.clone().chain(contour.take(1));
+        for place in closed {
+            if let Some(last) = before {
+                twice_area += last[0] * place[1] - last[1] * place[0];
+            }
+            before = Some(place);
+        }
+        // A regular polygon with n corners on a circle has n sin(2π/n)/2 of its squared radius.
+        let turn = std::f64::consts::TAU / DIRECTIONS as f64;
+        let radius = (twice_area / (DIRECTIONS as f64 * turn.sin())).sqrt();
+        (centre.map(|c| c / weights), radius)
+    }
+
+    /// Pixels on a circle of `radius_px` pixel widths.
+    fn ring(
+        centre_px: [f64; 2],
+        radius_px: f64,
+        aspect: f64,
+    ) -> impl Iterator<Item = [f64; 2]> + Clone {
+        (0..DIRECTIONS).map(move |k| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / DIRECTIONS as f64).sin_cos();
+            [
+                centre_px[0] + radius_px * cos,
+                centre_px[1] + radius_px * sin / aspect,
+            ]
+        })
     }
 
     fn local(&self, pixel: [f64; 2]) -> Local {

@@ -66,8 +66,8 @@ impl<T: Real> ForceMeter<T> {
         })
     }
 
-    /// The same meter behind a lens that distorts: places, areas and radii in metres are undistorted, with the size that a pixel
-    /// has at the contact's centroid.
+    /// The same meter behind a lens that distorts: the contact's contour and centre are undistorted, areas and stresses take the
+    /// mean size of a pixel over the contact.
     ///
     /// ```
     /// use tactile_force::{ForceMeter, LensGeometry};
@@ -141,9 +141,10 @@ impl<T: Real> ForceMeter<T> {
             };
         };
         let place = contact.centroid_px.map(|c| c.value.as_f64());
+        let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px.as_f64());
         PixelSize {
             step: lens.pixel_step_m(place).map(T::nearest),
-            area: T::nearest(lens.pixel_area_m2(place)),
+            area: T::nearest(area),
         }
     }
 
@@ -179,10 +180,18 @@ impl<T: Real> ForceMeter<T> {
         } = stress;
         let [x, y] = contact.centroid_px;
         let mut centroid_m = [x.scaled(pixel.step[0]), y.scaled(pixel.step[1])];
+        let mut profile = profile;
         if let Some(lens) = &self.lens {
-            let place = lens.to_metres([x.value.as_f64(), y.value.as_f64()]);
+            let aspect = (pixel.step[1] / pixel.step[0]).as_f64();
+            let seen = profile.map_or(contact.equivalent_radius_px, |p| p.radius_px.value);
+            let centre = [x.value.as_f64(), y.value.as_f64()];
+            let (place, radius_m) = lens.contact_m(centre, seen.as_f64(), aspect);
             centroid_m[0].value = T::nearest(place[0]);
             centroid_m[1].value = T::nearest(place[1]);
+            if let Some(profile) = &mut profile {
+                let undistorted = T::nearest(radius_m) / profile.radius_m.value;
+                profile.radius_m = profile.radius_m.scaled(undistorted);
+            }
         }
         let radius = contact_radius(&contact, profile, pixel.area.sqrt());
         let brightest = Estimate {

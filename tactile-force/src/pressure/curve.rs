@@ -36,6 +36,7 @@ use crate::frame::DifferenceNoise;
 /// let pressure = curve.pressure_pa(100.0);
 /// assert!((pressure.value / 1e4 - 1.0).abs() < 0.01);
 /// assert_eq!(curve.pressure_pa(0.0).value, 0.0);
+/// assert_eq!(curve.fit_report().identified_grey[1], 144.0);
 /// // Half of a contact at 40 grey levels, half at 120.
 /// let greys = (0..1000).map(|k| if k < 500 { 40.0 } else { 120.0 });
 /// let noise = DifferenceNoise { background: 2.0, gain: 0.02, common: 0.0, scale: 0.0, flat_field: 0.0 };
@@ -86,6 +87,11 @@ impl PressureCurve {
 impl LocalCalibration for PressureCurve {
     fn pressure_pa(&self, grey: f64) -> Estimate<f64> {
         self.coefficients.pressure_pa(grey)
+    }
+
+    fn value_pa(&self, grey: f64) -> f64 {
+        let c = &self.coefficients;
+        c.basis.integrals(grey).dot(&c.slopes())
     }
 
     fn read(&self, histogram: &GreyHistogram, noise: &DifferenceNoise) -> ForceReading<f64> {

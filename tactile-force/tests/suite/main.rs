@@ -12,6 +12,7 @@ mod pressure;
 mod profile_shape;
 mod recorded;
 mod reference;
+mod sensor;
 mod simulated;
 mod stability;
 mod stability_scale;

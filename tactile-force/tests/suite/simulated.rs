@@ -26,6 +26,10 @@ pub(crate) struct Sensor {
     pub(crate) illumination: f64,
     /// Grey level of the sensor at rest, in the frame's middle.
     pub(crate) background: f64,
+    /// Share by which the lens moves the frame's corners inwards.
+    pub(crate) barrel: f64,
+    /// Height of a pixel over its width.
+    pub(crate) aspect: f64,
 }
 
 impl Default for Sensor {
@@ -36,6 +40,8 @@ impl Default for Sensor {
             hysteresis: 0.0,
             illumination: 1.0,
             background: 40.0,
+            barrel: 0.0,
+            aspect: 1.0,
         }
     }
 }
@@ -51,7 +57,24 @@ impl Sensor {
         120.0 * (pressure_pa / 60e3).powf(self.q)
     }
 
-    /// A frame of a contact at (x, y) pixels; without force, of the sensor at rest.
+    /// The undistorted place of a pixel, in pixel widths from where the first pixel would be: the image of a place at the
+    /// distance ρ (corners: 1) from the middle lies at ρ (1 − barrel ρ²), solved here by iteration.
+    pub(crate) fn place(&self, x: f64, y: f64) -> [f64; 2] {
+        let middle = [0.5 * (SHAPE.1 as f64 - 1.0), 0.5 * (SHAPE.0 as f64 - 1.0)];
+        let seen = [x - middle[0], self.aspect * (y - middle[1])];
+        let corner = middle[0].hypot(self.aspect * middle[1]);
+        let mut shrunk = 1.0;
+        for _ in 0..20 {
+            let rho = seen[0].hypot(seen[1]) / corner / shrunk;
+            shrunk = 1.0 - self.barrel * rho * rho;
+        }
+        [
+            middle[0] + seen[0] / shrunk,
+            self.aspect * middle[1] + seen[1] / shrunk,
+        ]
+    }
+
+    /// A frame of a contact at an undistorted place (x, y) in pixel widths; without force, of the sensor at rest.
     pub(crate) fn frame(
         &self,
         force_n: f64,
@@ -68,17 +91,25 @@ impl Sensor {
             1.0
         };
         let peak = 1.5 * force_n / (std::f64::consts::PI * (a * PIXEL_M).powi(2)) * lag;
+        let distorted = self.barrel != 0.0 || self.aspect != 1.0;
         Array2::from_shape_fn(SHAPE, |(y, x)| {
             let (x, y) = (x as f64, y as f64);
             let mut light = 0.0;
-            if force_n > 0.0 && (x - cx).hypot(y - cy) < a + 2.0 {
+            // Distortion moves a contact by less than twenty pixels.
+            let margin = if distorted { 20.0 } else { 2.0 };
+            if force_n > 0.0 && (x - cx).hypot(y - cy) < a + margin {
                 // The mean over the pixel, by three by three points.
                 for k in 0..9 {
                     let (dx, dy) = (
                         f64::from(k % 3) / 3.0 - 1.0 / 3.0,
                         f64::from(k / 3) / 3.0 - 1.0 / 3.0,
                     );
-                    let r2 = ((x + dx - cx).powi(2) + (y + dy - cy).powi(2)) / (a * a);
+                    let [px, py] = if distorted {
+                        self.place(x + dx, y + dy)
+                    } else {
+                        [x + dx, y + dy]
+                    };
+                    let r2 = ((px - cx).powi(2) + (py - cy).powi(2)) / (a * a);
                     light += self.light(peak * (1.0 - r2).max(0.0).sqrt()) / 9.0;
                 }
             }
