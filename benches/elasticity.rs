@@ -5,7 +5,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::hint::black_box;
-use tactile_imaging::elasticity::contact::{Bond, LayerEquation, LayerKernel};
+use tactile_imaging::elasticity::contact::{Bond, LayerEquation};
 use tactile_imaging::elasticity::curve::{
     CurveOptions, IndentationCurve, Indenter, Model, select_model,
 };
@@ -73,7 +73,7 @@ fn strain(c: &mut Criterion) {
 }
 
 fn layers(c: &mut Criterion) {
-    let equation = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5).unwrap());
+    let equation = LayerEquation::new(Bond::Bonded, 0.5).unwrap();
     let error = equation.solve(1.0).unwrap().force_ratio - 3.371_098_31;
     assert!(error.abs() < 1e-8);
     println!("sphere on a bonded layer, a/h = 1: force ratio off by {error:.1e}");

@@ -9,19 +9,20 @@
 //! compliance and the touched layer's, the deficit 1 − L counts with the layer's share of it. K is analytic, so that Nyström's
 //! method on Gauss nodes converges exponentially.
 
-use super::layer_kernel::LayerKernel;
+use super::layer_kernel::{Bond, LayerKernel};
 use super::quadrature::gauss_legendre;
+use super::waveguide::Waveguide;
 use crate::error::{ElasticityError, Quantity, positive};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, RealField};
 use std::f64::consts::FRAC_2_PI;
 
 /// The contact of a sphere with layers at one ratio of contact radius to their thickness.
 ///
 /// ```
-/// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
+/// use tactile_elasticity::contact::{Bond, LayerEquation};
 ///
 /// // A contact small beside the layer is Hertz's.
-/// let contact = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5)?).solve(1e-4)?;
+/// let contact = LayerEquation::new(Bond::Bonded, 0.5)?.solve(1e-4)?;
 /// assert!((contact.force_ratio - 1.0_f64).abs() < 2e-4 && (contact.indentation_ratio - 1.0).abs() < 2e-4);
 /// assert!((contact.chi / contact.a_over_h - 1.0).abs() < 2e-4);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -44,7 +45,19 @@ pub struct LayerContact {
 /// The largest a/h solved for; beyond, a thin-layer asymptote is the better theory.
 pub(crate) const LARGEST_A_OVER_H: f64 = 20.0;
 
-/// Solves contacts of a sphere with the layers of a kernel.
+/// The contact of a sphere with layers on a rigid base.
+///
+/// ```
+/// use tactile_elasticity::contact::{Bond, Layer, LayerEquation, Waveguide};
+///
+/// // A soft layer below makes a stiff one yield more than a rigid base does.
+/// let layer = |thickness_m, youngs_modulus_pa| Layer { thickness_m, youngs_modulus_pa, poisson_ratio: 0.5_f64 };
+/// let on_soft = Waveguide::new(vec![layer(2e-3, 1e5), layer(8e-3, 1e4)])?;
+/// let on_rigid = Waveguide::new(vec![layer(10e-3, 1e5)])?;
+/// let force = |guide| LayerEquation::of_layers(&guide, Bond::Bonded)?.solve(0.2).map(|c| c.force_ratio_same_radius);
+/// assert!(force(on_soft)? < 0.9 * force(on_rigid)?);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerEquation {
     kernel: LayerKernel,
@@ -52,23 +65,41 @@ pub struct LayerEquation {
 }
 
 impl LayerEquation {
-    /// Of a layer kernel, for a sphere that does not yield.
-    pub fn new(kernel: &LayerKernel) -> Self {
-        Self {
-            kernel: kernel.clone(),
+    /// Of one layer with Poisson ratio ν under a rigid sphere.
+    ///
+    /// # Errors
+    /// [`ElasticityError::PoissonRatio`].
+    pub fn new<T: RealField + Copy>(bond: Bond, poisson_ratio: T) -> Result<Self, ElasticityError> {
+        Ok(Self {
+            kernel: LayerKernel::new(bond, poisson_ratio)?,
             share: 1.0,
-        }
+        })
     }
 
-    /// Of a sphere that yields too: `share` is the touched layer's part of 1/E*, in [0, 1].
+    /// Of layers bonded to one another, the touched one first, under a rigid sphere; `bond` is that of the lowest layer to the rigid
+    /// base.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
+    pub fn of_layers<T: RealField + Copy>(
+        waveguide: &Waveguide<T>,
+        bond: Bond,
+    ) -> Result<Self, ElasticityError> {
+        Ok(Self {
+            kernel: LayerKernel::of_layers(waveguide, bond)?,
+            share: 1.0,
+        })
+    }
+
+    /// With a sphere that yields too: `share` is the touched layer's part of 1/E*, in [0, 1].
     ///
     /// A share outside is taken as its nearer end.
     ///
     /// ```
-    /// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
+    /// use tactile_elasticity::contact::{Bond, LayerEquation};
     ///
     /// // The more the sphere itself yields, the less the layer's depth matters.
-    /// let layer = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5)?);
+    /// let layer = LayerEquation::new(Bond::Bonded, 0.5)?;
     /// let half = layer.clone().with_share(0.5).solve(1.0)?.force_ratio;
     /// assert!(1.0 < half && half < layer.solve(1.0)?.force_ratio);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -78,6 +109,18 @@ impl LayerEquation {
         self
     }
 
+    pub(crate) fn of_kernel(kernel: &LayerKernel) -> Self {
+        Self {
+            kernel: kernel.clone(),
+            share: 1.0,
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn kernel(&self) -> &LayerKernel {
+        &self.kernel
+    }
+
     /// The contact at a/h; O(n³ + n² q) with n ≈ 24 + 6 a/h₁ nodes, h₁ the touched layer's thickness, and some hundreds of
     /// wavenumbers q.
     ///
@@ -85,8 +128,8 @@ impl LayerEquation {
     /// [`ElasticityError::NotPositive`], and [`ElasticityError::OutOfRange`] beyond a/h = 20.
     ///
     /// ```
-    /// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
-    /// let layer = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5)?);
+    /// use tactile_elasticity::contact::{Bond, LayerEquation};
+    /// let layer = LayerEquation::new(Bond::Bonded, 0.5)?;
     /// let contact = layer.solve(1.0)?;
     /// assert!((contact.chi - 0.747_940_830_3f64).abs() < 1e-9);
     /// assert!((contact.force_ratio - 3.371_098_31f64).abs() < 1e-7);
@@ -182,12 +225,11 @@ fn flat_and_round(
 
 #[cfg(test)]
 mod tests {
-    use super::super::layer_kernel::Bond;
     use super::*;
 
     #[test]
     fn a_deep_layer_is_a_half_space() {
-        let equation = LayerEquation::new(&LayerKernel::new(Bond::Free, 0.3).unwrap());
+        let equation = LayerEquation::new(Bond::Free, 0.3).unwrap();
         let contact = equation.solve(1e-6).unwrap();
         // The series' linear term is 0.74 χ.
         assert!((contact.force_ratio - 1.0).abs() < 1e-6);
@@ -196,8 +238,9 @@ mod tests {
 
     #[test]
     fn without_a_share_the_layer_does_not_matter() {
-        let equation =
-            LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5).unwrap()).with_share(0.0);
+        let equation = LayerEquation::new(Bond::Bonded, 0.5)
+            .unwrap()
+            .with_share(0.0);
         assert!((equation.solve(3.0).unwrap().force_ratio - 1.0).abs() < 1e-14);
     }
 
@@ -205,7 +248,7 @@ mod tests {
     fn gauss_nodes_are_enough() {
         // The force of a layer 20 times thinner than the contact changes by less than 10⁻⁹ with one more node: compare
         // with the solution at nearly the same a/h, whose node count differs.
-        let equation = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.3).unwrap());
+        let equation = LayerEquation::new(Bond::Bonded, 0.3).unwrap();
         let (a, b) = (
             equation.solve(5.0 - 1e-9).unwrap(),
             equation.solve(5.0).unwrap(),

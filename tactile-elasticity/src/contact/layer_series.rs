@@ -55,16 +55,29 @@ impl LayerSeries {
     ///
     /// `share` is the layer's share of the whole compliance: 1 where the other body is rigid.
     ///
-    /// ```
-    /// use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel, LayerSeries};
+    /// # Errors
+    /// [`ElasticityError::PoissonRatio`].
     ///
-    /// let kernel = LayerKernel::new(Bond::Bonded, 0.5)?;
-    /// let exact = LayerEquation::new(&kernel).solve(0.5)?;
-    /// let series = LayerSeries::corrected(&kernel, 1.0).force_ratio(exact.chi);
+    /// ```
+    /// use tactile_elasticity::contact::{Bond, LayerEquation, LayerSeries};
+    ///
+    /// let exact = LayerEquation::new(Bond::Bonded, 0.5)?.solve(0.5)?;
+    /// let series = LayerSeries::corrected(Bond::Bonded, 0.5, 1.0)?.force_ratio(exact.chi);
     /// assert!((series / exact.force_ratio - 1.0_f64).abs() < 0.01);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn corrected(kernel: &LayerKernel, share: f64) -> Self {
+    pub fn corrected<T: RealField + Copy>(
+        bond: Bond,
+        poisson_ratio: T,
+        share: f64,
+    ) -> Result<Self, ElasticityError> {
+        Ok(Self::of_kernel(
+            &LayerKernel::new(bond, poisson_ratio)?,
+            share,
+        ))
+    }
+
+    pub(crate) fn of_kernel(kernel: &LayerKernel, share: f64) -> Self {
         let (m0, m2) = kernel.moments();
         let (m0, m2) = (share * m0, share * m2);
         Self {

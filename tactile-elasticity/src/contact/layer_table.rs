@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn the_table_agrees_with_the_equation_between_its_nodes() {
-        let equation = LayerEquation::new(&LayerKernel::new(Bond::Bonded, 0.5).unwrap());
+        let equation = LayerEquation::new(Bond::Bonded, 0.5).unwrap();
         let table = LayerTable::new(&equation);
         for a in [3e-6, 0.0123, 0.3, 0.77, 2.3, 11.0] {
             let exact = equation.solve(a).unwrap();
@@ -158,8 +158,7 @@ mod tests {
 
     #[test]
     fn the_slope_is_the_derivative() {
-        let kernel = LayerKernel::new(Bond::Bonded, 0.4).unwrap();
-        let table = LayerTable::new(&LayerEquation::new(&kernel));
+        let table = LayerTable::new(&LayerEquation::new(Bond::Bonded, 0.4).unwrap());
         let (high, low) = (
             table.of_chi(0.5 * 1.001).unwrap().0,
             table.of_chi(0.5 / 1.001).unwrap().0,
@@ -176,10 +175,11 @@ mod tests {
             poisson_ratio: 0.495,
         };
         let layers = vec![layer(2e-3, 1.36e5), layer(3e-3, 8e4), layer(5e-3, 3.4e4)];
-        let stack = LayerKernel::of_layers(&Waveguide::new(layers).unwrap(), Bond::Bonded).unwrap();
-        let single = LayerKernel::new(Bond::Bonded, 0.5).unwrap();
-        for kernel in [stack, single] {
-            let table = SharedLayerTable::new(&kernel, (0.01, 3.0)).unwrap();
+        let guide = Waveguide::new(layers).unwrap();
+        let stack = LayerEquation::of_layers(&guide, Bond::Bonded).unwrap();
+        let single = LayerEquation::new(Bond::Bonded, 0.5).unwrap();
+        for equation in [stack, single] {
+            let table = SharedLayerTable::new(equation.kernel(), (0.01, 3.0)).unwrap();
             for (a, share) in [
                 (0.004, 0.5),
                 (0.05, 0.03),
@@ -187,7 +187,7 @@ mod tests {
                 (1.1, 0.98),
                 (2.6, 0.7),
             ] {
-                let exact = LayerEquation::new(&kernel).with_share(share);
+                let exact = equation.clone().with_share(share);
                 let exact = exact.solve(a).unwrap();
                 let found = table.at(a, share).unwrap();
                 // Below the table the correction is taken as linear in a: its square is left out.

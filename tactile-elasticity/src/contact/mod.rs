@@ -28,11 +28,12 @@ pub use hertz::{
     reduced_modulus_from_indentation,
 };
 pub use layer_equation::{LayerContact, LayerEquation};
-pub use layer_kernel::{Bond, LayerKernel};
+pub use layer_kernel::Bond;
 pub use layer_series::LayerSeries;
 pub use punch::{ConeContact, PunchContact, cone, flat_punch, tangent_of_degrees};
 pub use tatara::tatara_indentation_m;
 pub use waveguide::{Layer, Waveguide};
 
+pub(crate) use layer_kernel::LayerKernel;
 pub(crate) use layer_table::{LayerTable, SharedLayerTable};
 pub(crate) use tatara::Squeeze;

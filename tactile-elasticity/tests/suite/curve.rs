@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_elasticity::ElasticityError;
-use tactile_elasticity::contact::{Bond, LayerEquation, LayerKernel};
+use tactile_elasticity::contact::{Bond, LayerEquation, LayerSeries};
 use tactile_elasticity::curve::*;
 use tactile_elasticity::modulus::{EstimatorKind, Warning};
 
@@ -41,8 +41,8 @@ fn hertz(d: f64) -> f64 {
 fn layer(d: f64) -> f64 {
     // The series is within 10⁻³ at the χ ≤ 0.26 used here.
     let chi = (R * d).sqrt() / 3e-3;
-    let kernel = LayerKernel::new(Bond::Bonded, NU).unwrap();
-    hertz(d) * tactile_elasticity::contact::LayerSeries::corrected(&kernel, 1.0).force_ratio(chi)
+    let series = LayerSeries::corrected(Bond::Bonded, NU, 1.0).unwrap();
+    hertz(d) * series.force_ratio(chi)
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn the_law_is_chosen_that_made_the_curve() {
 #[test]
 fn a_thin_layer_needs_the_integral_equation() {
     let h = 0.3e-3;
-    let equation = LayerEquation::new(&LayerKernel::new(Bond::Bonded, NU).unwrap());
+    let equation = LayerEquation::new(Bond::Bonded, NU).unwrap();
     // Positions by contact radius, so that no law has to be inverted.
     let points: Vec<_> = (1..120)
         .map(|i| {

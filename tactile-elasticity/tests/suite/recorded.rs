@@ -108,10 +108,10 @@ fn contacts(answers: &mut Answers) {
         ("bonded 0.3", Bond::Bonded, 0.3),
         ("free", Bond::Free, 0.4),
     ] {
-        let kernel = LayerKernel::new(bond, nu).unwrap();
-        let series = LayerSeries::corrected(&kernel, 0.7);
+        let series = LayerSeries::corrected(bond, nu, 0.7).unwrap();
         for ratio in [0.01, 0.4, 1.5, 7.0] {
-            let contact = LayerEquation::new(&kernel)
+            let contact = LayerEquation::new(bond, nu)
+                .unwrap()
                 .with_share(0.8)
                 .solve(ratio)
                 .unwrap();

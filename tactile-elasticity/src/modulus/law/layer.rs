@@ -61,7 +61,7 @@ impl LayerLaw {
         let kernel = LayerKernel::new(bond, poisson_ratio)?;
         let series = match theory {
             LayerTheory::PublishedSeries => LayerSeries::published(bond, poisson_ratio)?,
-            _ => LayerSeries::corrected(&kernel, 1.0),
+            _ => LayerSeries::of_kernel(&kernel, 1.0),
         };
         Ok(Self {
             sphere: Sphere::new(radius_m)?,
@@ -78,7 +78,7 @@ impl LayerLaw {
     /// With the solution tabulated, for many evaluations against a rigid sphere.
     pub(crate) fn tabulated(mut self) -> Self {
         if self.theory == LayerTheory::IntegralEquation {
-            self.table = Some(LayerTable::new(&LayerEquation::new(&self.kernel)));
+            self.table = Some(LayerTable::new(&LayerEquation::of_kernel(&self.kernel)));
         }
         self
     }
@@ -92,11 +92,11 @@ impl LayerLaw {
         match (self.theory, &self.table) {
             (LayerTheory::IntegralEquation, Some(table)) if share == 0.0 => table.of_chi(chi),
             (LayerTheory::IntegralEquation, _) => at_chi(
-                &LayerEquation::new(&self.kernel).with_share(1.0 - share),
+                &LayerEquation::of_kernel(&self.kernel).with_share(1.0 - share),
                 chi,
             ),
             (LayerTheory::CorrectedSeries, _) if share > 0.0 => {
-                let series = LayerSeries::corrected(&self.kernel, 1.0 - share);
+                let series = LayerSeries::of_kernel(&self.kernel, 1.0 - share);
                 Some((series.force_ratio(chi).ln(), series.log_slope(chi)))
             }
             _ => Some((
@@ -124,7 +124,7 @@ impl ContactLaw for LayerLaw {
         if self.theory != LayerTheory::IntegralEquation {
             return None;
         }
-        let equation = LayerEquation::new(&self.kernel).with_share(1.0 - share);
+        let equation = LayerEquation::of_kernel(&self.kernel).with_share(1.0 - share);
         of_radius(&self.sphere, &equation, a, self.thickness_m)
     }
 

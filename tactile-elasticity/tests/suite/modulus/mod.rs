@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_elasticity::contact::{
-    Body, Bond, HertzContact, Layer, LayerEquation, LayerKernel, Waveguide, cone, flat_punch,
+    Body, Bond, HertzContact, Layer, LayerEquation, Waveguide, cone, flat_punch,
     reduced_modulus_pa, tatara_indentation_m,
 };
 use tactile_elasticity::modulus::*;
