@@ -128,8 +128,8 @@ impl<T: Real> Led<T> {
             );
         }
         let power = self.exponent + one;
-        let rim = self.half_angle.cos().max(T::zero()).powf(power);
-        let cosine = (one - u * (one - rim)).powf(power.recip());
+        let edge = self.half_angle.cos().max(T::zero()).powf(power);
+        let cosine = (one - u * (one - edge)).powf(power.recip());
         let sine = ((one - cosine) * (one + cosine)).max(T::zero()).sqrt();
         let (across, up) = ((v + v) * T::PI()).sin_cos();
         ([cosine, sine * across, sine * up], one)

@@ -14,7 +14,7 @@ const ENOUGH: usize = 1 << 15;
 const FEWEST: u64 = 30;
 
 /// Variance per grey level: that of the pixels brighter than half the peak, by their second differences in both directions
-/// (as the reference's own noise, see [`crate::NoiseModel`]), less the background's, over their mean. The rim, where the signal itself bends, is darker.
+/// (as the reference's own noise, see [`crate::NoiseModel`]), less the background's, over their mean. The edge, where the signal itself bends, is darker.
 /// Of a large contact every so many rows are enough: 30 000 pixels know a variance to 1 %, a standard error to half of that.
 pub(super) fn gain(region: &Region, histogram: &mut Vec<u64>, background: f64, peak: f32) -> f64 {
     histogram.clear();

@@ -41,14 +41,14 @@ impl ContactDetector {
             f64::from(sign) * drift.residual(&tile) > z * tile.pixels.sqrt()
         };
         // The last tile of a band is its smallest: a band whose sums stay below that tile's noise has no bright tile.
-        let quiet = |band: usize| {
+        let below_noise = |band: usize| {
             drift.is_zero() && {
                 let last = reference.tile_sum(tiles, (band + 1) * tiles.columns - 1);
                 f64::from(tiles.greatest(band, sign)) <= z * last.pixels.sqrt()
             }
         };
         (0..tiles.rows)
-            .filter(|&band| !quiet(band))
+            .filter(|&band| !below_noise(band))
             .flat_map(|band| {
                 (band * tiles.columns..(band + 1) * tiles.columns).filter(|&k| stands_out(k))
             })

@@ -105,7 +105,7 @@ impl<T: Real> HertzProfile<T> {
 
 /// ∫∫ √(1 − x² − y²)₊ times 1, x − origin and (x − about)² over a rectangle, for the unit disc.
 ///
-/// Along y in closed form; along x by quadrature between the special places where a side meets the rim, with x = m + h sin φ, which
+/// Along y in closed form; along x by quadrature between the special places where a side meets the edge, with x = m + h sin φ, which
 /// turns the powers 3/2 at those places into whole ones.
 fn strip(gauss: &Gauss<32>, x: [f64; 2], y: [f64; 2], [origin, about]: [f64; 2]) -> [f64; 3] {
     let ends = x.map(|x| x.clamp(-1.0, 1.0));
@@ -163,7 +163,7 @@ fn piece(gauss: &Gauss<32>, ends: [f64; 2], y: [f64; 2], [origin, about]: [f64; 
 }
 
 /// ∫ √(w² − y²) dy between two limits, cut to |y| ≤ w, as ½w²[(Δ − sin Δ) + sin Δ (1 + cos Σ)] with y = w sin θ, Δ and Σ the difference
-/// and sum of the two θ. Nothing cancels, neither for limits close together nor near the rim.
+/// and sum of the two θ. Nothing cancels, neither for limits close together nor near the edge.
 fn chord(w2: f64, y: [f64; 2]) -> f64 {
     let w = w2.sqrt();
     let [p, q] = y.map(|y| y.clamp(-w, w));

@@ -45,12 +45,12 @@ fn image(value: &Value) -> Option<Array2<f64>> {
 type Condition = Box<dyn Fn(f64, f64) -> f64>;
 
 /// Checks one number and keeps the worst ratio of error to allowance.
-struct Judge {
+struct Score {
     worst: (f64, String),
     failed: Vec<String>,
 }
 
-impl Judge {
+impl Score {
     fn check(&mut self, what: String, found: f64, expected: f64, allowed: f64) {
         let ratio = (found - expected).abs() / allowed;
         if ratio.is_nan() || ratio > 1.0 {
@@ -87,7 +87,7 @@ struct Moments<'a> {
 impl Moments<'_> {
     /// Conditions of the moments of an image whose pixels are exact: 1 for a sum of one sign, else Σ|d|/|Σd| over what double-double
     /// arithmetic has to spare. The variance's and centroid's inputs are exact, too.
-    fn check(&self, judge: &mut Judge) {
+    fn check(&self, score: &mut Score) {
         let m = ImageMoments::of(self.pixels.view(), self.background).unwrap();
         let d = self.pixels.mapv(|p| p - self.background);
         let condition = if self.rounded {
@@ -95,13 +95,13 @@ impl Moments<'_> {
         } else {
             1.0
         };
-        self.relative(judge, "sum", m.sum, condition);
-        self.relative(judge, "force", m.sum * self.pitch * self.pitch, condition);
-        self.relative(judge, "min", m.least, 1.0);
-        self.relative(judge, "max", m.greatest, 1.0);
+        self.relative(score, "sum", m.sum, condition);
+        self.relative(score, "force", m.sum * self.pitch * self.pitch, condition);
+        self.relative(score, "min", m.least, 1.0);
+        self.relative(score, "max", m.greatest, 1.0);
         // An alternating image of 1e16 has a mean of 9: the condition of the mean of exact pixels is 1 in double-double.
-        self.relative(judge, "mean", m.mean, condition);
-        self.variance(judge, &m);
+        self.relative(score, "mean", m.mean, condition);
+        self.variance(score, &m);
         let status = match m.status {
             MomentStatus::Ok => "ok",
             MomentStatus::Empty => "empty",
@@ -113,12 +113,12 @@ impl Moments<'_> {
             "{}",
             self.id
         );
-        self.place(judge, &m, condition);
+        self.place(score, &m, condition);
     }
 
-    fn relative(&self, judge: &mut Judge, key: &str, found: f64, condition: f64) {
+    fn relative(&self, score: &mut Score, key: &str, found: f64, condition: f64) {
         if !self.expected[key].is_null() {
-            judge.relative(
+            score.relative(
                 format!("{} {key}", self.id),
                 found,
                 number(&self.expected[key]),
@@ -127,7 +127,7 @@ impl Moments<'_> {
         }
     }
 
-    fn variance(&self, judge: &mut Judge, m: &ImageMoments<f64>) {
+    fn variance(&self, score: &mut Score, m: &ImageMoments<f64>) {
         if number(&self.expected.get("variance").cloned().unwrap_or(0.0.into())) == 0.0 {
             assert!(
                 m.variance == 0.0,
@@ -142,12 +142,12 @@ impl Moments<'_> {
             } else {
                 1.0
             };
-            self.relative(judge, "variance", m.variance, condition);
+            self.relative(score, "variance", m.variance, condition);
         }
     }
 
     /// Centroid and radius of gyration.
-    fn place(&self, judge: &mut Judge, m: &ImageMoments<f64>, condition: f64) {
+    fn place(&self, score: &mut Score, m: &ImageMoments<f64>, condition: f64) {
         let (id, expected, pitch) = (self.id, self.expected, self.pitch);
         assert_eq!(
             m.centroid_px.is_none(),
@@ -157,7 +157,7 @@ impl Moments<'_> {
         if let (Some(c), Some(e)) = (m.centroid_px, expected["centroid"].as_array()) {
             for (k, axis) in ["x", "y"].iter().enumerate() {
                 let what = format!("{id} centroid {axis}");
-                judge.relative(what, (c[k] + 0.5) * pitch, number(&e[k]), condition);
+                score.relative(what, (c[k] + 0.5) * pitch, number(&e[k]), condition);
             }
         }
         if let (Some(r), Some(e)) = (
@@ -167,7 +167,7 @@ impl Moments<'_> {
             if e == 0.0 {
                 assert_eq!(r, 0.0, "{id}")
             } else {
-                judge.relative(format!("{id} gyration"), r * pitch, e, condition)
+                score.relative(format!("{id} gyration"), r * pitch, e, condition)
             }
         }
     }
@@ -175,7 +175,7 @@ impl Moments<'_> {
 
 /// Distances from the centre are rounded when the centre is subtracted: cond = position over distance to what matters.
 fn profile(
-    judge: &mut Judge,
+    score: &mut Score,
     id: &str,
     found: Option<ProfileMoments<f64>>,
     expected: &Value,
@@ -183,21 +183,21 @@ fn profile(
 ) {
     assert_eq!(found.is_none(), expected.is_null(), "{id}");
     let Some(m) = found else { return };
-    judge.relative(
+    score.relative(
         format!("{id} integral"),
         m.integral,
         number(&expected["force"]),
         condition,
     );
     for k in 0..2 {
-        judge.relative(
+        score.relative(
             format!("{id} centroid {k}"),
             m.centroid[k],
             number(&expected["centroid"][k]),
             condition,
         );
     }
-    judge.relative(
+    score.relative(
         format!("{id} gyration"),
         m.radius_of_gyration,
         number(&expected["radius_of_gyration"]),
@@ -257,7 +257,7 @@ fn gaussian_condition(centre: [f64; 2], sd: f64) -> Condition {
     })
 }
 
-/// A pixel cut by the rim down to a depth d (of its farthest corner inside) changes as d^1.5 or faster.
+/// A pixel cut by the edge down to a depth d (of its farthest corner inside) changes as d^1.5 or faster.
 fn hertz_condition(centre: [f64; 2], a: f64, pitch: f64) -> Condition {
     Box::new(move |x: f64, y: f64| {
         let far = |x: f64, c: f64| ((x - c).abs() - 0.5 * pitch).max(0.0);
@@ -268,7 +268,7 @@ fn hertz_condition(centre: [f64; 2], a: f64, pitch: f64) -> Condition {
 }
 
 /// Every pixel of a blob against the reference's.
-fn check_pixels(judge: &mut Judge, id: &str, blob: &Blob, reference: &Array2<f64>, pitch: f64) {
+fn check_pixels(score: &mut Score, id: &str, blob: &Blob, reference: &Array2<f64>, pitch: f64) {
     for ((row, column), &e) in reference.indexed_iter() {
         let (x, y) = ((column as f64 + 0.5) * pitch, (row as f64 + 0.5) * pitch);
         let what = format!("{id} pixel {row} {column}");
@@ -276,16 +276,16 @@ fn check_pixels(judge: &mut Judge, id: &str, blob: &Blob, reference: &Array2<f64
             assert_eq!(blob.pixels[[row, column]], 0.0, "{what} lies outside");
             continue;
         }
-        judge.relative(what, blob.pixels[[row, column]], e, (blob.condition)(x, y));
+        score.relative(what, blob.pixels[[row, column]], e, (blob.condition)(x, y));
     }
 }
 
-fn check_blob(judge: &mut Judge, case: &Value, id: &str, pitch: f64) {
+fn check_blob(score: &mut Score, case: &Value, id: &str, pitch: f64) {
     let (size, expected) = (case["size"].as_u64().unwrap() as usize, &case["expected"]);
     let centre = ["cx", "cy"].map(|c| number(&case["params"][c]));
     let blob = Blob::of(case, size, pitch, centre);
     profile(
-        judge,
+        score,
         &format!("{id} plane"),
         Some(blob.whole),
         &expected["plane"],
@@ -293,7 +293,7 @@ fn check_blob(judge: &mut Judge, case: &Value, id: &str, pitch: f64) {
     );
     let [x, y] = centre.map(|c| 0.0_f64.max(c.min(size as f64 * pitch)));
     profile(
-        judge,
+        score,
         &format!("{id} frame"),
         blob.within,
         &expected["frame"],
@@ -302,7 +302,7 @@ fn check_blob(judge: &mut Judge, case: &Value, id: &str, pitch: f64) {
     let reference = image(&expected["pixels"]);
     match &reference {
         None => assert!(blob.pixels.iter().all(|v| *v == 0.0), "{id}"),
-        Some(reference) => check_pixels(judge, id, &blob, reference, pitch),
+        Some(reference) => check_pixels(score, id, &blob, reference, pitch),
     }
     let (id, pixels) = match &reference {
         None => (id.to_owned(), &blob.pixels),
@@ -317,7 +317,7 @@ fn check_blob(judge: &mut Judge, case: &Value, id: &str, pitch: f64) {
         expected,
         rounded: true,
     }
-    .check(judge);
+    .check(score);
 }
 
 #[test]
@@ -326,7 +326,7 @@ fn every_image_case() {
         println!("skipped: no reference data (set TACTILE_DATA)");
         return;
     };
-    let mut judge = Judge {
+    let mut score = Score {
         worst: (0.0, String::new()),
         failed: Vec::new(),
     };
@@ -347,21 +347,21 @@ fn every_image_case() {
                 expected,
                 rounded: false,
             }
-            .check(&mut judge);
+            .check(&mut score);
         } else {
-            check_blob(&mut judge, case, id, pitch);
+            check_blob(&mut score, case, id, pitch);
         }
     }
     println!(
         "{} cases; worst {:.3} of the allowance: {}",
         cases.len(),
-        judge.worst.0,
-        judge.worst.1
+        score.worst.0,
+        score.worst.1
     );
     assert!(
-        judge.failed.is_empty(),
+        score.failed.is_empty(),
         "{} failed:\n{}",
-        judge.failed.len(),
-        judge.failed[..judge.failed.len().min(40)].join("\n")
+        score.failed.len(),
+        score.failed[..score.failed.len().min(40)].join("\n")
     );
 }

@@ -171,7 +171,7 @@ proptest! {
         let grid = PixelGrid { rows: 9, columns: 9, size: [1.0; 2], first: [0.5; 2] };
         let sum = blob.image(&grid).sum();
         let part = blob.within(&Rectangle { x: [0.0, 9.0], y: [0.0, 9.0] });
-        // 81 pixels of rounding, and the rim's position: an ulp of 14 where the profile has depth d costs 14/d ulps.
+        // 81 pixels of rounding, and the edge's position: an ulp of 14 where the profile has depth d costs 14/d ulps.
         let whole = part.map_or(0.0, |p| p.integral);
         prop_assert!((sum - whole).abs() <= 1e-13 * (whole + sum) + 1e-15, "{sum} {whole}");
     }

@@ -108,7 +108,7 @@ mod tests {
                 let [gx, gy] = dimple.gradient(x, y);
                 let dx = (dimple.height(x + h, y) - dimple.height(x - h, y)) / (2.0 * h);
                 let dy = (dimple.height(x, y + h) - dimple.height(x, y - h)) / (2.0 * h);
-                // Second differences of a curvature that jumps by 12 at the rim: h times that.
+                // Second differences of a curvature that jumps by 12 at the edge: h times that.
                 assert!((gx - dx).abs() < 2e-5 && (gy - dy).abs() < 2e-5);
                 assert!(gx.hypot(gy) <= dimple.steepest() * (1.0 + 1e-15));
             }
