@@ -52,7 +52,7 @@ fn vase(n: usize) -> Case {
 
 fn data() -> PathBuf {
     std::env::var_os("TACTILE_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data")),
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
         PathBuf::from,
     )
 }

@@ -41,7 +41,7 @@ def simd_level():
 
 def binary():
     """Builds the bench in the release profile and returns its path."""
-    command = ["cargo", "bench", "--profile", "release", "--bench", "instructions", "--no-run", "--message-format=json"]
+    command = ["cargo", "bench", "-p", "tactile-benches", "--profile", "release", "--bench", "instructions", "--no-run", "--message-format=json"]
     messages = (json.loads(line) for line in run(command).splitlines() if line.startswith("{"))
     built = [m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "instructions"]
     return built[-1]

@@ -1,10 +1,10 @@
 //! Time against error: every knob that trades one for the other, stage by stage and for the whole pipeline.
 //!
 //! ```console
-//! cargo bench --bench work_precision              # some minutes
-//! cargo bench --bench work_precision -- --quick   # under two minutes: fewer repeats, smaller problems
-//! cargo bench --bench work_precision -- matching  # one study
-//! cargo bench --bench work_precision -- --quick --within=1.5   # judged less strictly: a machine that is not ours alone
+//! cargo bench -p tactile-benches --bench work_precision              # some minutes
+//! cargo bench -p tactile-benches --bench work_precision -- --quick   # under two minutes: fewer repeats, smaller problems
+//! cargo bench -p tactile-benches --bench work_precision -- matching  # one study
+//! cargo bench -p tactile-benches --bench work_precision -- --quick --within=1.5   # judged less strictly: a machine that is not ours alone
 //! ```
 //! Writes `target/work_precision/STUDY.csv` and `.svg` (time on one axis, error on the other, the front drawn, defaults marked) and fails if
 //! a default lies more than 20 % behind the front of its study, that is, if some setting is at once more than 1.2 times faster and
@@ -63,7 +63,7 @@ fn main() -> ExitCode {
     });
     let folder = Path::new(concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/target/work_precision"
+        "/../target/work_precision"
     ));
     std::fs::create_dir_all(folder).expect("a folder for the results");
     let mut behind = 0;

@@ -8,7 +8,7 @@ pub(crate) fn spline_fits() -> Vec<(String, Option<f64>, Option<f64>)> {
         || {
             PathBuf::from(concat!(
                 env!("CARGO_MANIFEST_DIR"),
-                "/../shared/peers/PEERS.md"
+                "/../../shared/peers/PEERS.md"
             ))
         },
         PathBuf::from,

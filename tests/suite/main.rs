@@ -1,6 +1,7 @@
 //! Tests of the facade: one binary, so that everything below it is compiled and linked once.
 #![allow(missing_docs)]
 
+mod architecture;
 mod force_on_simulated_frames;
 mod io_properties;
 #[path = "../../examples/strain_between/measure.rs"]

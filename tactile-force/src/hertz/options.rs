@@ -29,7 +29,7 @@ impl Default for HertzFitOptions {
         Self {
             blur_px: None,
             fit_background: false,
-            // A clean contact takes 5 to 8 steps: `cargo bench --bench work_precision` shows the error after 1, 2 and 5.
+            // A clean contact takes 5 to 8 steps: `cargo bench -p tactile-benches --bench work_precision` shows the error after 1, 2 and 5.
             max_iterations: 50,
         }
     }

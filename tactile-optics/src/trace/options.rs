@@ -35,7 +35,7 @@ impl<T: Real> Default for TraceOptions<T> {
     fn default() -> Self {
         Self {
             geometry: Geometry::Volume,
-            // The guided share to 2×10⁻⁴ in 20 ms: `cargo bench --bench work_precision -- optics` shows what more rays buy.
+            // The guided share to 2×10⁻⁴ in 20 ms: `cargo bench -p tactile-benches --bench work_precision -- optics` shows what more rays buy.
             rays: 4096,
             seed: 1,
             cutoff: real(1e-6),

@@ -24,7 +24,7 @@ const NU: f64 = 0.5;
 /// Error of the force gauge, as a share of its range.
 const GAUGE: f64 = 1e-3;
 
-/// Scenes per study; coverage needs more than the thirty of the error bars. `SCENES` overrides.
+/// Scenes per study: thirty for the errors; coverage, which takes more, is tight in `.ci/run studies`. `SCENES` overrides.
 fn scenes(default: u64) -> u64 {
     std::env::var("SCENES")
         .ok()
@@ -163,10 +163,12 @@ fn force_covariance(
 
 #[test]
 fn spheres_of_10_to_500_kilopascal() {
-    Study::run(scenes(40), "spheres", sphere::trial).check();
+    Study::run(scenes(30), "spheres", sphere::trial).check();
 }
 
+/// Stage by stage, without a [`Pipeline`](tactile_imaging::Pipeline): its surfaces are read from shading, which says nothing of a
+/// patterned block, so that the strain here is that of the bumps' centres.
 #[test]
-fn blocks_by_the_papers_ratio() {
-    Study::run(scenes(120), "blocks", block::trial).check();
+fn blocks_by_the_ratio_of_stress_and_the_strain_of_their_bumps() {
+    Study::run(scenes(30), "blocks", block::trial).check();
 }

@@ -1,7 +1,11 @@
 //! One sphere: its loads, its frames, and the modulus from force and contact radius.
 
-use super::{NU, calibrate, estimate, force, force_covariance, log_uniform, reference, verbose};
-use rand::{SeedableRng, rngs::ChaCha8Rng};
+use super::{
+    GAUGE, NU, calibrate, estimate, force, force_covariance, log_uniform, reference,
+    unit_calibration, verbose,
+};
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::StandardNormal;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::{
     Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator,
@@ -27,7 +31,8 @@ fn waveguide() -> Waveguide<f64> {
     Waveguide::new(layers).unwrap()
 }
 
-/// A sphere, and the rigid ball that makes contacts of the same size and brightness at the same forces.
+/// A sphere, and the rigid ball that calibrates: chosen, from the sphere's largest contact as measured and the gauge's force there,
+/// to make contacts of the same size and brightness at the same forces. The sphere's modulus has no part in the choice.
 struct Presses {
     modulus: f64,
     radius: f64,
@@ -66,14 +71,19 @@ impl Presses {
             ..PressOptions::default()
         };
         let sphere = PressScene::new(options.clone()).unwrap();
+        let noise: f64 = rng.sample(StandardNormal);
+        let last = LOADS as usize - 1;
+        let largest_force = sphere.options().loads[last].force_n * (1.0 + GAUGE * noise);
+        let seen_radius = contact_radius(&sphere, last);
+        // Hertz for a rigid ball: a³ = 3FR·c/4 with c the waveguide's compliance (1 − ν²)/E.
         let rigid = Sphere {
-            radius_m: radius / (reduced * compliance),
+            radius_m: seen_radius.powi(3) / (0.75 * largest_force * compliance),
             material: Elastic::RIGID,
         };
         let ball = PressScene::new(PressOptions {
             object: rigid,
             loads: (1..=GAUGE_LOADS)
-                .map(|k| Load::normal(force_at(0.3) * f64::from(k) / 20.0))
+                .map(|k| Load::normal(largest_force * f64::from(k) / f64::from(GAUGE_LOADS)))
                 .collect(),
             gain: Gain::GreyPerPascal(sphere.grey_per_pascal()),
             seed: seed + 1_000_000,
@@ -107,6 +117,16 @@ impl Presses {
             found.fit.chi_squared
         );
     }
+}
+
+/// The contact's radius as a frame shows it; that needs no calibration.
+fn contact_radius(scene: &PressScene, load: usize) -> f64 {
+    let pixel_size_m = scene.options().camera.pixel_size_m;
+    let meter = ForceMeter::new(pixel_size_m, &ForceOptions::default()).unwrap();
+    let (dark, frame) = (reference(&[scene.reference(20)]), scene.frame(load, 21));
+    let mut workspace = ForceWorkspace::default();
+    let measured = meter.measure_with(&mut workspace, frame.view(), &dark, &unit_calibration());
+    measured.unwrap().contact_radius_m.unwrap().value
 }
 
 /// Truth and estimate.
