@@ -7,7 +7,7 @@
 //! but not continuous, oscillate). It derives from a potential, so that the tangent is symmetric; λ is
 //! updated to t between equilibria (augmented Lagrangian, Uzawa).
 
-use super::curve::{CurvePoint, SurfaceCurve};
+use super::curve::{BEND, CurvePoint, SurfaceCurve};
 use super::element::{GAUSS3, quadratic};
 use super::material::Kinematics;
 
@@ -310,34 +310,34 @@ impl Placement<'_> {
     /// Distance to the closest point of the deformed surface, along its normal.
     fn surface_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
         let position = combine(&point.shape, point.nodes, |n| self.current(n));
-        let mut best: Option<(f64, CurvePoint, bool)> = None;
-        for segment in 0..curve.segments() {
-            let [a, b] = curve.ends(segment).map(|node| self.current(node));
+        let mut best: Option<(f64, CurvePoint, f64, bool)> = None;
+        for (index, edge) in curve.edges().iter().enumerate() {
+            let [a, _, b] = edge.map(|node| self.current(node));
             let length = (b[0] - a[0]).hypot(b[1] - a[1]);
             let to_a = (position[0] - a[0]).hypot(position[1] - a[1]);
-            // No point of the segment is nearer than this: cubics bulge less than a fifth.
+            // No point of the edge is nearer than this: edges bulge less than a fifth.
             if best
                 .as_ref()
-                .is_some_and(|(distance, _, _)| to_a - 1.2 * length > *distance)
+                .is_some_and(|(distance, ..)| to_a - 1.2 * length > *distance)
             {
                 continue;
             }
-            let t = self.closest(curve, segment, position);
-            let at = curve.at(segment, t);
+            let xi = self.closest(curve, index, position);
+            let at = curve.at(index, xi);
             let [r, z] = at.sum(&at.position, |n| self.current(n));
             let distance = (position[0] - r).hypot(position[1] - z);
-            if best.as_ref().is_none_or(|(least, _, _)| distance < *least) {
-                let beyond = segment + 1 == curve.segments() && t >= 1.0;
-                best = Some((distance, at, beyond));
+            if best.as_ref().is_none_or(|(least, ..)| distance < *least) {
+                let beyond = index + 1 == curve.edges().len() && xi >= 1.0;
+                best = Some((distance, at, xi, beyond));
             }
         }
-        let (_, at, beyond) = best?;
+        let (_, at, xi, beyond) = best?;
         if beyond {
             return None;
         }
         let on_curve = at.sum(&at.position, |n| self.current(n));
         let along = at.sum(&at.first, |n| self.current(n));
-        let bend = at.sum(&at.second, |n| self.current(n));
+        let bend = at.sum(&BEND, |n| self.current(n));
         let offset = [position[0] - on_curve[0], position[1] - on_curve[1]];
         let metric = along[0] * along[0] + along[1] * along[1];
         let scale = curve.side / metric.sqrt();
@@ -345,126 +345,147 @@ impl Placement<'_> {
         let value = offset[0] * normal[0] + offset[1] * normal[1];
         let curvature = bend[0] * normal[0] + bend[1] * normal[1];
         let denominator = metric - value * curvature;
-        let mut dofs = Vec::with_capacity(14);
-        let mut first = Vec::with_capacity(14);
-        // Components of the relative displacement along the curve, and of the curve's turning.
-        let mut slip = Vec::with_capacity(14);
-        let mut turn = Vec::with_capacity(14);
-        for (node, n) in point.nodes.iter().zip(&point.shape) {
-            for k in 0..2 {
-                dofs.push(2 * node + k);
-                first.push(n * normal[k]);
-                slip.push(n * along[k]);
-                turn.push(0.0);
-            }
-        }
-        for (a, node) in at.nodes.iter().enumerate() {
-            for k in 0..2 {
-                let (n, dn) = (at.position[a][k], at.first[a][k]);
-                if n != 0.0 || dn != 0.0 {
-                    dofs.push(2 * node + k);
-                    first.push(-n * normal[k]);
-                    slip.push(-n * along[k]);
-                    turn.push(dn * normal[k]);
-                }
-            }
-        }
-        let count = dofs.len();
-        let mut second = vec![0.0; count * count];
-        // Deep within a strongly bent surface the closest point is not unique: no second derivative.
-        if denominator > 0.1 * metric {
+        let mut relative = Relative::new(point, &at, normal, along);
+        // At a kink between edges, or deep within a strongly bent surface, the closest point does not
+        // slide or is not unique: no second derivative.
+        if xi.abs() < 1.0 && denominator > 0.1 * metric {
             let bent = curvature / metric;
-            for i in 0..count {
-                for j in 0..count {
-                    second[count * i + j] = -(slip[i] * turn[j]
-                        + turn[i] * slip[j]
-                        + value * turn[i] * turn[j]
-                        + bent * slip[i] * slip[j])
-                        / denominator;
-                }
-            }
+            relative.fill_second(|slip_i, turn_i, slip_j, turn_j| {
+                -(slip_i * turn_j
+                    + turn_i * slip_j
+                    + value * turn_i * turn_j
+                    + bent * slip_i * slip_j)
+                    / denominator
+            });
         }
-        Some(Gap {
-            value,
-            dofs,
-            first,
-            second,
-            axial: normal[1].abs(),
-        })
+        Some(relative.gap(value, normal))
     }
 
-    /// Parameter of a segment's closest point, within [0, 1].
-    fn closest(&self, curve: &SurfaceCurve, segment: usize, point: [f64; 2]) -> f64 {
-        let [a, b] = curve.ends(segment).map(|node| self.current(node));
+    /// Parameter of an edge's closest point, within [−1, 1].
+    fn closest(&self, curve: &SurfaceCurve, edge: usize, point: [f64; 2]) -> f64 {
+        let [a, _, b] = curve.edges()[edge].map(|node| self.current(node));
         let chord = [b[0] - a[0], b[1] - a[1]];
         let square = chord[0] * chord[0] + chord[1] * chord[1];
         let along = (point[0] - a[0]) * chord[0] + (point[1] - a[1]) * chord[1];
-        let mut t = (along / square).clamp(0.0, 1.0);
-        // Newton's method on (x − x(t)) · x'(t) = 0: segments are nearly straight, few steps do.
+        let mut xi = (2.0 * along / square - 1.0).clamp(-1.0, 1.0);
+        // Newton's method on (x − x(ξ)) · x'(ξ) = 0: edges are nearly straight, few steps do.
         for _ in 0..20 {
-            let at = curve.at(segment, t);
+            let at = curve.at(edge, xi);
             let position = at.sum(&at.position, |n| self.current(n));
             let slope = at.sum(&at.first, |n| self.current(n));
-            let bend = at.sum(&at.second, |n| self.current(n));
+            let bend = at.sum(&BEND, |n| self.current(n));
             let offset = [point[0] - position[0], point[1] - position[1]];
             let metric = slope[0] * slope[0] + slope[1] * slope[1];
             let curved = metric - offset[0] * bend[0] - offset[1] * bend[1];
-            // Far from a strongly bent segment the derivative may vanish: the metric alone then.
+            // Far from a strongly bent edge the derivative may vanish: the metric alone then.
             let divisor = if curved > 0.1 * metric {
                 curved
             } else {
                 metric
             };
             let step = (offset[0] * slope[0] + offset[1] * slope[1]) / divisor;
-            let next = (t + step).clamp(0.0, 1.0);
-            if (next - t).abs() < 1e-15 {
+            let next = (xi + step).clamp(-1.0, 1.0);
+            if (next - xi).abs() < 1e-15 {
                 return next;
             }
-            t = next;
+            xi = next;
         }
-        t
+        xi
+    }
+
+    /// Edge and parameter of a surface's point at a reference radius.
+    fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
+        let edge = curve.edges().iter().position(|edge| {
+            let [a, _, b] = edge.map(|node| self.nodes[node][0]);
+            a <= radius && radius <= b
+        })?;
+        let [a, _, b] = curve.edges()[edge].map(|node| self.nodes[node][0]);
+        let mut xi = 2.0 * (radius - a) / (b - a) - 1.0;
+        for _ in 0..5 {
+            let at = curve.at(edge, xi);
+            let [r, _] = at.sum(&at.position, |n| self.nodes[n]);
+            let [slope, _] = at.sum(&at.first, |n| self.nodes[n]);
+            xi += (radius - r) / slope;
+        }
+        Some((edge, xi))
     }
 
     /// Height over the undeformed surface at the same radius, both displaced along z.
     fn vertical_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
         let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
         let moved = combine(&point.shape, point.nodes, |n| self.moved(n));
-        let segment = (0..curve.segments()).find(|&segment| {
-            let [a, b] = curve.ends(segment).map(|node| self.nodes[node][0]);
-            a <= reference[0] && reference[0] <= b
-        })?;
-        let [a, b] = curve.ends(segment).map(|node| self.nodes[node][0]);
-        let mut t = (reference[0] - a) / (b - a);
-        for _ in 0..5 {
-            let at = curve.at(segment, t);
-            let [r, _] = at.sum(&at.position, |n| self.nodes[n]);
-            let [slope, _] = at.sum(&at.first, |n| self.nodes[n]);
-            t += (reference[0] - r) / slope;
-        }
-        let at = curve.at(segment, t);
+        let (edge, xi) = self.opposite(curve, reference[0])?;
+        let at = curve.at(edge, xi);
         let [_, z] = at.sum(&at.position, |n| self.nodes[n]);
         let [_, w] = at.sum(&at.position, |n| self.moved(n));
         // The outward normal of a surface above points down.
         let up = -curve.side;
-        let mut dofs = Vec::with_capacity(7);
-        let mut first = Vec::with_capacity(7);
-        for (node, n) in point.nodes.iter().zip(&point.shape) {
-            dofs.push(2 * node + 1);
-            first.push(up * n);
-        }
-        for (node, n) in at.nodes.iter().zip(&at.position) {
-            if n[1] != 0.0 {
-                dofs.push(2 * node + 1);
-                first.push(-up * n[1]);
+        let value = up * (reference[1] + moved[1] - z - w);
+        Some(Relative::new(point, &at, [0.0, up], [0.0; 2]).gap(value, [0.0, up]))
+    }
+}
+
+/// Components of the displacement of a point relative to one of a curve, by their nodes'.
+struct Relative {
+    dofs: Vec<usize>,
+    /// Along the normal.
+    first: Vec<f64>,
+    /// Along the curve.
+    slip: Vec<f64>,
+    /// The curve's turning.
+    turn: Vec<f64>,
+    second: Vec<f64>,
+}
+
+impl Relative {
+    fn new(point: &ContactPoint, at: &CurvePoint, normal: [f64; 2], along: [f64; 2]) -> Self {
+        let mut relative = Self {
+            dofs: Vec::with_capacity(12),
+            first: Vec::with_capacity(12),
+            slip: Vec::with_capacity(12),
+            turn: Vec::with_capacity(12),
+            second: vec![0.0; 144],
+        };
+        let own = point
+            .nodes
+            .iter()
+            .zip(point.shape)
+            .map(|(node, n)| (*node, n, 0.0));
+        let weights = at.position.iter().zip(&at.first);
+        let other = at
+            .nodes
+            .iter()
+            .zip(weights)
+            .map(|(node, (n, dn))| (*node, -n, *dn));
+        for (node, n, dn) in own.chain(other) {
+            for k in 0..2 {
+                relative.dofs.push(2 * node + k);
+                relative.first.push(n * normal[k]);
+                relative.slip.push(n * along[k]);
+                relative.turn.push(dn * normal[k]);
             }
         }
-        Some(Gap {
-            value: up * (reference[1] + moved[1] - z - w),
-            second: vec![0.0; dofs.len() * dofs.len()],
-            dofs,
-            first,
-            axial: 1.0,
-        })
+        relative
+    }
+
+    fn fill_second(&mut self, value: impl Fn(f64, f64, f64, f64) -> f64) {
+        let count = self.dofs.len();
+        for i in 0..count {
+            for j in 0..count {
+                self.second[count * i + j] =
+                    value(self.slip[i], self.turn[i], self.slip[j], self.turn[j]);
+            }
+        }
+    }
+
+    fn gap(self, value: f64, normal: [f64; 2]) -> Gap {
+        Gap {
+            value,
+            dofs: self.dofs,
+            first: self.first,
+            second: self.second,
+            axial: normal[1].abs(),
+        }
     }
 }
 

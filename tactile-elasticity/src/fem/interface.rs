@@ -1,4 +1,4 @@
-//! Pressure on a bonded interface.
+//! Pressure on an interface whose nodes the bodies share.
 
 use super::element::{GAUSS3, quadratic};
 use super::model::Model;
@@ -12,15 +12,18 @@ pub(crate) struct BondedInterface {
     /// Nodes from the axis outwards.
     pub(crate) nodes: Vec<usize>,
     pub(crate) edges: Vec<[usize; 3]>,
-    /// Elements of the lower body that touch the interface.
+    /// Elements of one of the bodies that touch the interface.
     pub(crate) elements: Vec<usize>,
+    /// −1 where that body is the lower one: it is pushed down. +1 for the upper one.
+    pub(crate) sign: f64,
 }
 
 impl BondedInterface {
     pub(crate) fn new(
         edges: &[[usize; 3]],
         elements: &[[usize; 9]],
-        is_lower: impl Fn(usize) -> bool,
+        is_inside: impl Fn(usize) -> bool,
+        sign: f64,
     ) -> Self {
         let mut nodes: Vec<usize> = Vec::new();
         for &node in edges.iter().flatten() {
@@ -29,10 +32,11 @@ impl BondedInterface {
             }
         }
         let touching = (0..elements.len()).filter(|&index| {
-            is_lower(index) && elements[index].iter().any(|node| nodes.contains(node))
+            is_inside(index) && elements[index].iter().any(|node| nodes.contains(node))
         });
         Self {
             edges: edges.to_vec(),
+            sign,
             elements: touching.collect(),
             nodes,
         }
@@ -40,7 +44,7 @@ impl BondedInterface {
 }
 
 impl Model {
-    /// Axial forces on the lower body's interface nodes from the elements above, upwards negative.
+    /// Axial forces that press the bodies together at the interface's nodes.
     pub(crate) fn interface_forces(
         &self,
         interface: &BondedInterface,
@@ -59,7 +63,7 @@ impl Model {
             };
             for (local, node) in nodes.iter().enumerate() {
                 if let Some(place) = interface.nodes.iter().position(|n| n == node) {
-                    forces[place] -= element.internal[2 * local + 1];
+                    forces[place] += interface.sign * element.internal[2 * local + 1];
                 }
             }
         }
@@ -101,7 +105,7 @@ impl Model {
     }
 
     /// Axial force per projected deformed area at the interface's nodes: the nodal forces that the
-    /// elements below put in balance, spread over the interface by its quadratic shape functions.
+    /// elements of one side put in balance, spread over the interface by its quadratic shape functions.
     pub(crate) fn interface_pressure(
         &self,
         interface: &BondedInterface,

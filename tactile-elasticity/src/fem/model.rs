@@ -89,6 +89,8 @@ pub struct Model {
     pub(crate) contact_nodes: Vec<ContactNode>,
     /// A bonded interface whose pressure is wanted.
     pub(crate) interface: Option<BondedInterface>,
+    /// The node whose axial displacement a node shares.
+    pub(crate) partners: Vec<Option<usize>>,
     /// External forces on displacement components, for tests by manufactured solutions.
     pub(crate) external: Vec<f64>,
 }
@@ -109,6 +111,7 @@ impl Model {
             points: Vec::new(),
             contact_nodes: Vec::new(),
             interface: None,
+            partners: Vec::new(),
             external: Vec::new(),
         }
     }
@@ -145,6 +148,7 @@ impl Model {
             };
             self.motion.extend([radial, Motion::Free]);
             self.external.extend([0.0; 2]);
+            self.partners.push(None);
         }
         let shifted = mesh.boundaries.iter().map(|(name, edges)| {
             (
@@ -211,12 +215,43 @@ impl Model {
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
     pub fn contact(&mut self, first: Body, second: Body) {
-        let opposite = Opposite::Surface(SurfaceCurve::new(
-            self.edges(second, Boundary::Contact),
-            &self.nodes,
-        ));
+        let curve = SurfaceCurve::new(self.edges(second, Boundary::Contact), &self.nodes);
         let softer = self.softest(first).min(self.softest(second));
-        self.add_points(first, opposite, softer);
+        self.add_points(first, Opposite::Surface(curve), softer);
+    }
+
+    /// Lets two surfaces that touch from the start slide on each other without friction: nodes at the same
+    /// place share their axial displacement. The pressure on the second body's surface, above the first,
+    /// becomes the pressure of the states.
+    ///
+    /// The nodes of one place do not stay at one radius: where the second body spreads more, the first
+    /// feels its pressure somewhat further in, which matters little where the first is the stiffer.
+    /// The surfaces are not let part.
+    pub(crate) fn slide(&mut self, first: Body, second: Body) {
+        let nodes: Vec<usize> = self
+            .edges(first, Boundary::Contact)
+            .iter()
+            .flatten()
+            .copied()
+            .collect();
+        let mut shared = Vec::new();
+        for edge in self.edges(second, Boundary::Contact).to_vec() {
+            for other in edge {
+                let [s, w] = self.nodes[other];
+                let near = |node: &usize| {
+                    let [r, z] = self.nodes[*node];
+                    // Meshes built on the same lines: rounding alone parts their nodes.
+                    (r - s).abs() + (z - w).abs() < 1e-9 * (1.0 + r)
+                };
+                self.partners[other] = nodes.iter().copied().find(near);
+            }
+            if edge.iter().all(|&node| self.partners[node].is_some()) {
+                shared.push(edge);
+            }
+        }
+        let regions = self.body_regions(second);
+        let is_upper = |index: usize| regions.contains(&self.regions[index]);
+        self.interface = Some(BondedInterface::new(&shared, &self.elements, is_upper, 1.0));
     }
 
     /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole is
@@ -251,7 +286,7 @@ impl Model {
         let first = self.body_regions(body).start;
         let edges = self.edges(body, Boundary::Interface);
         let is_lower = |index: usize| (first..first + lower).contains(&self.regions[index]);
-        self.interface = Some(BondedInterface::new(edges, &self.elements, is_lower));
+        self.interface = Some(BondedInterface::new(edges, &self.elements, is_lower, -1.0));
     }
 
     fn add_points(&mut self, body: Body, opposite: Opposite, softer: f64) {

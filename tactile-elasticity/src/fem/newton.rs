@@ -1,5 +1,7 @@
 //! Newton's method with load steps chosen by what converges.
 
+use super::contact::Opposite;
+use super::material::Kinematics;
 use super::model::Model;
 use super::state::State;
 use super::system::{Fields, Goal};
@@ -104,6 +106,16 @@ const AUGMENTATIONS: usize = 1;
 /// Imbalance at a guessed approach below which the force takes over.
 const SWITCH_TO_FORCE: f64 = 1e-2;
 
+/// First step of a contact, over the bodies' height.
+const FIRST_STEP: f64 = 1e-3;
+/// Growth of the approach in one step where two deformable surfaces slide on each other.
+const LARGEST_GROWTH: f64 = 2.2;
+/// Largest step of the approach there, over the bodies' height.
+const LARGEST_STEP: f64 = 0.03;
+/// Change of force and approach, in parts of themselves, below which a contact whose points hop between
+/// two edges counts as settled: the direction of the pressure jumps there by the edges' kink.
+const SETTLED: f64 = 3e-6;
+
 /// An equilibrium.
 pub(crate) struct Equilibrium {
     pub(crate) fields: Fields,
@@ -167,20 +179,52 @@ impl Solver<'_> {
     fn reach(&mut self, load: Load) -> bool {
         let reached = match load {
             Load::Approach(approach) => {
-                approach.is_finite() && self.advance(Goal::Approach(approach))
+                approach.is_finite()
+                    && self.walk(|_| approach)
+                    && self.advance(Goal::Approach(approach))
             }
             Load::Force(force) => {
-                force.is_finite() && self.touch(force) && self.advance(Goal::Force(force))
+                force.is_finite()
+                    && self.touch(force)
+                    && self.walk(|solver| solver.approach_for(force))
+                    && self.advance(Goal::Force(force))
             }
         };
         reached && self.augment(load)
+    }
+
+    /// Goes towards an approach, which may change on the way, in steps that two deformable surfaces take:
+    /// a contact that grows manyfold in one step does not settle.
+    fn walk(&mut self, target: impl Fn(&Self) -> f64) -> bool {
+        if !self.slides() {
+            return true;
+        }
+        loop {
+            let here = self.last.fields.approach;
+            let height = self.model.height();
+            let next = (LARGEST_GROWTH * here)
+                .min(here + LARGEST_STEP * height)
+                .max(FIRST_STEP * height);
+            if target(self) <= next {
+                return true;
+            }
+            if !self.advance(Goal::Approach(next)) {
+                return false;
+            }
+        }
+    }
+
+    /// Whether deformed surfaces slide on each other.
+    fn slides(&self) -> bool {
+        let surface = |opposite: &Opposite| matches!(opposite, Opposite::Surface(_));
+        self.model.kinematics == Kinematics::Finite && self.model.opposites.iter().any(surface)
     }
 
     /// Approaches until bodies that had a gap between them press on each other.
     fn touch(&mut self, force: f64) -> bool {
         // A small part of the bodies' height: the first contact is made in some steps of twice the
         // size before.
-        let mut step = 1e-3 * self.model.height();
+        let mut step = FIRST_STEP * self.model.height();
         for _ in 0..12 {
             if self.last.force.abs() > 1e-6 * force.abs() || force == 0.0 {
                 return true;
@@ -251,6 +295,10 @@ impl Solver<'_> {
     }
 
     fn extrapolated(&self, goal: Goal) -> Option<Fields> {
+        if self.slides() {
+            // Nodes that came into contact since do not go on as they did.
+            return None;
+        }
         let before = self.before.as_ref()?;
         let (from, to) = (self.position(goal, before), self.position(goal, &self.last));
         let target = match goal {
@@ -289,8 +337,10 @@ impl Solver<'_> {
             Goal::Approach(target) => target - fields.approach,
             Goal::Force(_) => 0.0,
         };
+        let slides = self.slides();
         let mut system = model.assemble(&fields, margin(goal, &fields))?;
         let mut worst = f64::INFINITY;
+        let mut previous = [f64::NAN; 2];
         for iteration in 0..MAX_ITERATIONS {
             let there = match goal {
                 Goal::Approach(target) => fields.approach == target,
@@ -302,7 +352,12 @@ impl Solver<'_> {
             }
             if goal == wanted && there && (iteration > 0 || system.scale > 0.0) {
                 let imbalance = system.imbalance(goal);
-                if imbalance <= TOLERANCE {
+                let now = [system.force, fields.approach];
+                let settled =
+                    (now.iter().zip(previous)).all(|(a, b)| (a - b).abs() <= SETTLED * a.abs());
+                let kinked = settled && slides && imbalance < SWITCH_TO_FORCE;
+                previous = now;
+                if imbalance <= TOLERANCE || kinked {
                     return Some(Equilibrium {
                         force: system.force,
                         fields,

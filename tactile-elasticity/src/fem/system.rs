@@ -227,7 +227,23 @@ impl Model {
             let dofs = candidate.gap.dofs.iter().filter(|&&dof| dof != DRIVER);
             groups.push(dofs.map(|dof| dof / 2).collect());
         }
-        let position = reverse_cuthill_mckee(self.nodes.len(), &groups);
+        // Partners get neighbouring numbers: they are one node to the ordering.
+        let mut followers: Vec<Option<usize>> = vec![None; self.nodes.len()];
+        for (node, partner) in self.partners.iter().enumerate() {
+            if let Some(partner) = *partner {
+                followers[partner] = Some(node);
+            }
+        }
+        let one: Vec<Vec<usize>> = groups
+            .iter()
+            .map(|group| {
+                group
+                    .iter()
+                    .map(|&node| self.partners[node].unwrap_or(node))
+                    .collect()
+            })
+            .collect();
+        let position = reverse_cuthill_mckee(self.nodes.len(), &one);
         let mut order = vec![0; self.nodes.len()];
         for (node, &place) in position.iter().enumerate() {
             order[place] = node;
@@ -241,8 +257,17 @@ impl Model {
         }
         let mut slots = vec![Slot::Nowhere; 2 * self.nodes.len()];
         let mut equations = 0;
-        for node in order {
+        let partnered = |node: &usize| self.partners[*node].is_none();
+        let order = order.into_iter().filter(partnered);
+        for node in order
+            .flat_map(|node| [Some(node), followers[node]])
+            .flatten()
+        {
             for dof in [2 * node, 2 * node + 1] {
+                if let (Some(partner), 1) = (self.partners[node], dof % 2) {
+                    slots[dof] = slots[2 * partner + 1];
+                    continue;
+                }
                 slots[dof] = match self.motion[dof] {
                     Motion::Zero => Slot::Nowhere,
                     Motion::Driven(factor) => Slot::Driver(factor),
