@@ -53,7 +53,7 @@ pub(crate) struct PassWorkspace {
 }
 
 impl ReferenceFrame {
-    /// From one frame; its noise is estimated by [`NoiseModel::of_frame`].
+    /// From one frame; its noise is estimated from its second differences in both directions.
     ///
     /// # Errors
     /// An empty image, or a side longer than 16384 pixels.

@@ -49,7 +49,7 @@ impl ForceWorkspace {
     }
 
     /// The pressure of the last contact in pascals over its region (zero outside the aperture), and the region's place in the
-    /// frame; `None` without contact, or if the calibration had no [local curve](StressCalibration::local). O(pixels of the region).
+    /// frame; `None` without contact, or if the calibration had no [local curve](crate::StressCalibration::local). O(pixels of the region).
     ///
     /// ```
     /// use ndarray::Array2;
