@@ -48,7 +48,7 @@ pub use reconstruct::{
     BallCalibration, BoundaryCondition, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Signal,
     SurfaceReconstruction, TsaiShah,
 };
-pub use sample::{ControlPointSampler, CurvatureAdaptive, EquallySpaced, Random};
+pub use sample::{ContactSampler, ControlPointSampler, CurvatureAdaptive, EquallySpaced, Random};
 pub use scalar::Scalar;
 pub use surface::{Component, PixelFlags, Report, StopReason, Surface};
 pub use workspace::{Progress, Workspace};

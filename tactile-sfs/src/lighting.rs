@@ -117,10 +117,15 @@ impl<T: Scalar> Lighting<T> {
         (intensity - self.ambient) / (self.albedo * self.normal_intensity)
     }
 
+    /// Intensity of a reflectance.
+    pub(crate) fn intensity(&self, reflectance: T) -> T {
+        self.ambient + self.albedo * self.normal_intensity * reflectance
+    }
+
     /// Intensity of a surface element with slopes p = ∂z/∂x and q = ∂z/∂y; attached shadows get the ambient.
     pub fn shade(&self, p: T, q: T) -> T {
         let [x, y, z] = self.direction;
         let cosine = (z - p * x - q * y) / (T::one() + p * p + q * q).sqrt();
-        self.ambient + self.albedo * self.normal_intensity * cosine.max(T::zero())
+        self.intensity(cosine.max(T::zero()))
     }
 }

@@ -52,6 +52,7 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send>;
 #[derive(Default)]
 pub struct Workspace<T> {
     pub(crate) eikonal: crate::reconstruct::EikonalBuffers<T>,
+    pub(crate) profile: crate::reconstruct::ProfileBuffers<T>,
     pub(crate) poisson: crate::integrate::PoissonBuffers<T>,
     pub(crate) field: crate::reconstruct::FieldBuffers<T>,
     pub(crate) fourier: crate::integrate::FourierBuffers<T>,

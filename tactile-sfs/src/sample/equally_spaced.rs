@@ -4,6 +4,7 @@ use nalgebra::Point3;
 use ndarray::ArrayView2;
 
 use super::lattice::Lattice;
+use super::strips::Weights;
 use super::{ControlPointSampler, SampleBuffers, crowded};
 use crate::{Scalar, SfsError, Workspace};
 
@@ -76,7 +77,14 @@ fn at_centroids<T: Scalar>(
     points: &mut Vec<Point3<T>>,
 ) -> bool {
     let SampleBuffers { strips, pixels, .. } = buffers;
-    strips.find(lattice, count);
+    let grid = Weights {
+        weight: &lattice.weight,
+        columns: lattice.columns,
+        rows: lattice.rows,
+        count: lattice.count as f64,
+        aspect: lattice.aspect(),
+    };
+    strips.find(&grid, count);
     pixels.clear();
     for &place in &strips.places {
         let (pixel, point) = lattice.point_near(place);

@@ -1,6 +1,7 @@
 //! Control points on a surface: the trait and its implementations.
 
 mod adaptive;
+mod contact;
 mod crowded;
 mod equally_spaced;
 mod lattice;
@@ -13,6 +14,7 @@ use nalgebra::Point3;
 use ndarray::ArrayView2;
 
 pub use adaptive::CurvatureAdaptive;
+pub use contact::ContactSampler;
 pub use equally_spaced::EquallySpaced;
 pub use random::Random;
 
@@ -21,7 +23,8 @@ use crate::{Scalar, SfsError, Workspace};
 /// A way to choose control points on a surface.
 ///
 /// Points are (x, y, z) in metres, x = column · width, y = row · height of a pixel; between pixels the height is
-/// interpolated. None lies outside the mask or where the height is not finite, no two coincide, and the same input gives
+/// interpolated. None lies outside the mask (for [`ContactSampler`]: outside the contour) or where the height is not
+/// finite, no two coincide, and the same input gives
 /// the same points. Exactly `count` points are returned. Object safe; an implementor writes
 /// [`sample_with`](Self::sample_with) alone.
 ///
@@ -119,6 +122,8 @@ forward!(Arc);
 /// Buffers of the samplers, kept between calls.
 #[derive(Debug, Default)]
 pub(crate) struct SampleBuffers {
+    /// Squared heights.
+    squares: Vec<f64>,
     /// Weights of the lattice's nodes.
     weight: Vec<f64>,
     /// Nodes in the order they are cut or drawn, and the key of each.

@@ -4,8 +4,18 @@
 //! Cuts run through nodes: where the surface is the same but larger, or lies elsewhere between the pixels, the points
 //! are the same points of the surface.
 
-use super::lattice::Lattice;
-use crate::Scalar;
+/// A grid of weights to be cut into cells.
+pub(super) struct Weights<'a> {
+    /// Row by row; 0 where there is no surface.
+    pub(super) weight: &'a [f64],
+    pub(super) columns: usize,
+    /// Rows with a weight.
+    pub(super) rows: usize,
+    /// Pixels on the surface.
+    pub(super) count: f64,
+    /// Height of a pixel over its width.
+    pub(super) aspect: f64,
+}
 
 /// Weight of a piece of a column, and its moment along the column.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,23 +36,24 @@ pub(super) struct Strips {
 
 impl Strips {
     /// Finds the centroids of `points` cells of equal weight.
-    pub(super) fn find<T: Scalar>(&mut self, lattice: &Lattice<'_, T>, points: usize) {
+    pub(super) fn find(&mut self, grid: &Weights<'_>, points: usize) {
         let row_weight = |row: usize| {
-            lattice.weight[row * lattice.columns..][..lattice.columns]
+            grid.weight[row * grid.columns..][..grid.columns]
                 .iter()
                 .sum()
         };
-        let bands = bands(lattice, points);
+        let bands = bands(grid, points);
+        let lines = grid.weight.len() / grid.columns;
         let share = |band: usize| (band * points / bands) as f64 / points as f64;
         self.rows
-            .find((0..lattice.rows).map(row_weight), (1..=bands).map(share));
+            .find((0..lines).map(row_weight), (1..=bands).map(share));
         self.pieces.clear();
-        self.pieces.resize(lattice.columns, Piece::default());
+        self.pieces.resize(grid.columns, Piece::default());
         self.places.clear();
         let mut top = 0.0;
         for band in 0..bands {
             let bottom = self.rows.at[band];
-            gather(lattice, top, bottom, &mut self.pieces);
+            gather(grid, top, bottom, &mut self.pieces);
             self.split((band + 1) * points / bands - band * points / bands);
             top = bottom;
         }
@@ -68,9 +79,9 @@ impl Strips {
 }
 
 /// Number of strips that makes cells about as wide as high.
-fn bands<T: Scalar>(lattice: &Lattice<'_, T>, points: usize) -> usize {
-    let width = lattice.count as f64 / lattice.rows as f64;
-    let square = points as f64 * lattice.rows as f64 * lattice.aspect() / width;
+fn bands(grid: &Weights<'_>, points: usize) -> usize {
+    let width = grid.count / grid.rows as f64;
+    let square = points as f64 * grid.rows as f64 * grid.aspect / width;
     (square.sqrt().round() as usize).clamp(1, points)
 }
 
@@ -114,10 +125,10 @@ fn parts(from: f64, to: f64, nodes: usize) -> impl Iterator<Item = (usize, f64, 
 }
 
 /// Sums the columns of the strip between two cuts.
-fn gather<T: Scalar>(lattice: &Lattice<'_, T>, top: f64, bottom: f64, strip: &mut [Piece]) {
+fn gather(grid: &Weights<'_>, top: f64, bottom: f64, strip: &mut [Piece]) {
     strip.fill(Piece::default());
-    for (row, share, middle) in parts(top, bottom, lattice.rows) {
-        let weights = &lattice.weight[row * lattice.columns..][..lattice.columns];
+    for (row, share, middle) in parts(top, bottom, grid.weight.len() / grid.columns) {
+        let weights = &grid.weight[row * grid.columns..][..grid.columns];
         for (piece, weight) in strip.iter_mut().zip(weights) {
             piece.weight += share * weight;
             piece.moment += share * weight * middle;

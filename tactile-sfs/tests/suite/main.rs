@@ -3,6 +3,7 @@
 mod behaviour;
 mod boundaries;
 mod common;
+mod contacts;
 mod invariants;
 mod large;
 mod measured;

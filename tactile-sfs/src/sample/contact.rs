@@ -1,0 +1,289 @@
+//! Points of a round body that meets a plane: to the sub-pixel contour, and with heights that know of the vertical boundary.
+//!
+//! Near the boundary z rises as the square root of the distance, and no interpolation of z between pixels follows it. Its
+//! square does: z² = a² − x² − y² for a ball, a smooth function whose zero is the contour. So squares are continued one pixel
+//! beyond the mask, areas count a pixel by the part of it that lies inside the contour, and heights between pixels are
+//! roots of interpolated squares.
+
+use nalgebra::Point3;
+use ndarray::ArrayView2;
+
+use super::strips::Weights;
+use super::{ControlPointSampler, SampleBuffers};
+use crate::{BoundingBox, Domain, Scalar, SfsError, Workspace};
+
+/// Squared slope above which ground counts no steeper (63°), as for [`EquallySpaced`](super::EquallySpaced).
+const STEEPEST_SQUARED: f64 = 4.0;
+
+/// The eight neighbours (down, right), and the weight of each one's continuation: a diagonal reaches further.
+const NEIGHBOURS: [(isize, isize, f64); 8] = [
+    (0, 1, 1.0),
+    (1, 0, 1.0),
+    (0, -1, 1.0),
+    (-1, 0, 1.0),
+    (1, 1, 0.5),
+    (1, -1, 0.5),
+    (-1, 1, 0.5),
+    (-1, -1, 0.5),
+];
+
+/// Equally spaced control points on a round body that meets the plane z = 0 at its contour, as a contact does: each stands
+/// for the same area of the surface, and cells and heights run to the contour between the pixels.
+///
+/// The points of two loads correspond in contacts of twenty pixels' radius too, where those of
+/// [`EquallySpaced`](super::EquallySpaced) follow the pixels at the boundary. Heights below zero move the plane down to the
+/// lowest. O(pixels of the mask's box).
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{ContactSampler, ControlPointSampler};
+/// // Two balls of 12.0 and 14.4 pixels: the second is the first, a fifth larger.
+/// let points = |radius: f64| {
+///     let z = Array2::from_shape_fn((40, 40), |(r, c)| {
+///         (radius * radius - (r as f64 - 19.7).powi(2) - (c as f64 - 20.2).powi(2)).max(0.0).sqrt()
+///     });
+///     ContactSampler.sample(z.view(), Some(z.mapv(|z| z > 0.0).view()), [1.0; 2], 50)
+/// };
+/// let centre = nalgebra::Vector3::new(20.2, 19.7, 0.0);
+/// let farthest = points(12.0)?.iter().zip(points(14.4)?).map(|(small, large)| {
+///     ((small.coords - centre) * 1.2 - (large.coords - centre)).norm()
+/// }).fold(0.0, f64::max);
+/// assert!(farthest < 0.6, "in pixels: {farthest}");
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ContactSampler;
+
+impl<T: Scalar> ControlPointSampler<T> for ContactSampler {
+    fn sample_with(
+        &self,
+        workspace: &mut Workspace<T>,
+        surface: ArrayView2<'_, T>,
+        mask: Option<ArrayView2<'_, bool>>,
+        pixel_size_m: [T; 2],
+        count: usize,
+        points: &mut Vec<Point3<T>>,
+    ) -> Result<(), SfsError> {
+        points.clear();
+        let (rows, columns) = surface.dim();
+        let domain = Domain {
+            mask,
+            pixel_size_m,
+            known_heights: None,
+        };
+        let area = domain.validate(rows, columns)?;
+        let SampleBuffers {
+            squares,
+            weight,
+            strips,
+            ..
+        } = &mut workspace.points;
+        let field = Field::load(core::mem::take(squares), weight, surface, &domain, area);
+        let available = field.solved;
+        if available == 0 {
+            return Err(SfsError::EmptyMask);
+        }
+        if count > available {
+            return Err(SfsError::TooManyPoints {
+                requested: count,
+                available,
+            });
+        }
+        let grid = field.weigh(weight);
+        if count > 0 {
+            strips.find(&grid, count);
+            points.extend(strips.places.iter().map(|&place| field.point(place)));
+        }
+        *squares = field.squares;
+        Ok(())
+    }
+}
+
+/// Squared heights over the mask's box and one pixel around it, in squares of a pixel's width; NaN where unknown.
+struct Field<T> {
+    squares: Vec<f64>,
+    columns: usize,
+    rows: usize,
+    /// Pixel of the frame under the first place, less one.
+    area: BoundingBox,
+    pixel_size_m: [T; 2],
+    aspect: f64,
+    /// Height of the plane in pixel widths.
+    plane: f64,
+    /// Pixels with a height.
+    solved: usize,
+}
+
+impl<T: Scalar> Field<T> {
+    fn load(
+        mut squares: Vec<f64>,
+        spare: &mut Vec<f64>,
+        surface: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        area: BoundingBox,
+    ) -> Self {
+        let [width, height] = domain.pixel_size_m.map(T::as_f64);
+        let (rows, columns) = (area.rows + 2, area.columns + 2);
+        squares.clear();
+        squares.resize(rows * columns, f64::NAN);
+        let usable = |&(row, column): &(usize, usize)| {
+            domain.contains(row, column) && surface[[row, column]].is_finite()
+        };
+        let plane = area
+            .pixels()
+            .filter(usable)
+            .map(|(row, column)| surface[[row, column]].as_f64() / width)
+            .fold(0.0, f64::min);
+        let mut field = Self {
+            squares,
+            columns,
+            rows,
+            area,
+            pixel_size_m: domain.pixel_size_m,
+            aspect: height / width,
+            plane,
+            solved: 0,
+        };
+        for at @ (row, column) in area.pixels().filter(usable) {
+            let place = (row - area.top + 1) * columns + column - area.left + 1;
+            field.squares[place] = (surface[[at.0, at.1]].as_f64() / width - plane).powi(2);
+            field.solved += 1;
+        }
+        field.continue_outwards(spare);
+        field
+    }
+
+    /// Continues the squares to the pixels next to the mask: those of a ball, whose second difference is −2 a pixel squared.
+    ///
+    /// A pixel outside the mask has its middle outside the contour: where the continuation is above zero (a cliff at the
+    /// boundary), the contour is put halfway.
+    fn continue_outwards(&mut self, inner: &mut Vec<f64>) {
+        inner.clone_from(&self.squares);
+        let at = |row: isize, column: isize| -> f64 {
+            let inside = row >= 0
+                && column >= 0
+                && (row as usize) < self.rows
+                && (column as usize) < self.columns;
+            if inside {
+                inner[row as usize * self.columns + column as usize]
+            } else {
+                f64::NAN
+            }
+        };
+        for row in 0..self.rows {
+            for column in 0..self.columns {
+                let place = row * self.columns + column;
+                if !inner[place].is_nan() {
+                    continue;
+                }
+                let (r, c) = (row as isize, column as isize);
+                let (mut sum, mut nearest, mut total) = (0.0, 0.0, 0.0);
+                for (down, right, weight) in NEIGHBOURS {
+                    let near = at(r + down, c + right);
+                    let far = at(r + 2 * down, c + 2 * right);
+                    if near.is_nan() || far.is_nan() {
+                        continue;
+                    }
+                    let step = (down as f64 * self.aspect).powi(2) + (right * right) as f64;
+                    sum += weight * (2.0 * near - far - 2.0 * step);
+                    nearest += weight * near;
+                    total += weight;
+                }
+                if total > 0.0 {
+                    let continued = sum / total;
+                    self.squares[place] = if continued > 0.0 {
+                        -nearest / total
+                    } else {
+                        continued
+                    };
+                }
+            }
+        }
+    }
+
+    fn square(&self, row: isize, column: isize) -> f64 {
+        let inside = row >= 0
+            && column >= 0
+            && (row as usize) < self.rows
+            && (column as usize) < self.columns;
+        if inside {
+            self.squares[row as usize * self.columns + column as usize]
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// Area of the surface over the part of every pixel inside the contour, per area of a pixel.
+    fn weigh<'a>(&self, weight: &'a mut Vec<f64>) -> Weights<'a> {
+        weight.clear();
+        let (mut covered, mut filled) = (0.0, 0);
+        for row in 0..self.rows as isize {
+            let before = covered;
+            for column in 0..self.columns as isize {
+                let here = self.square(row, column);
+                if here.is_nan() {
+                    weight.push(0.0);
+                    continue;
+                }
+                let along = [self.square(row, column - 1), self.square(row, column + 1)];
+                let down = [self.square(row - 1, column), self.square(row + 1, column)];
+                let (gx, gy) = (difference(here, along), difference(here, down));
+                // The contour crosses the pixel where |square| is below half of what it changes over the pixel.
+                let change = (gx.abs() + gy.abs()).max(f64::MIN_POSITIVE);
+                let cover = (0.5 + here / change).clamp(0.0, 1.0);
+                let slope_squared = if here > 0.0 {
+                    (gx * gx + (gy / self.aspect).powi(2)) / (4.0 * here)
+                } else {
+                    STEEPEST_SQUARED
+                };
+                weight.push(cover * (1.0 + slope_squared.min(STEEPEST_SQUARED)).sqrt());
+                covered += cover;
+            }
+            filled += usize::from(covered > before);
+        }
+        Weights {
+            weight,
+            columns: self.columns,
+            rows: filled.max(1),
+            count: covered,
+            aspect: self.aspect,
+        }
+    }
+
+    /// The point at a place (x, y) of the field; its height is the root of the bilinear square.
+    fn point(&self, [x, y]: [f64; 2]) -> Point3<T> {
+        let (left, top) = (x.floor(), y.floor());
+        let (right, down) = (x - left, y - top);
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (row, column, share) in [
+            (0, 0, (1.0 - down) * (1.0 - right)),
+            (0, 1, (1.0 - down) * right),
+            (1, 0, down * (1.0 - right)),
+            (1, 1, down * right),
+        ] {
+            let square = self.square(top as isize + row, left as isize + column);
+            if !square.is_nan() {
+                sum += share * square;
+                total += share;
+            }
+        }
+        let square = if total > 0.0 { sum / total } else { 0.0 };
+        let height = self.plane + square.max(0.0).sqrt();
+        let [width_m, height_m] = self.pixel_size_m;
+        Point3::new(
+            T::of(x + self.area.left as f64 - 1.0) * width_m,
+            T::of(y + self.area.top as f64 - 1.0) * height_m,
+            T::of(height) * width_m,
+        )
+    }
+}
+
+/// Central difference, or one-sided where a neighbour is missing.
+fn difference(here: f64, [before, after]: [f64; 2]) -> f64 {
+    match (before.is_nan(), after.is_nan()) {
+        (false, false) => 0.5 * (after - before),
+        (false, true) => here - before,
+        (true, false) => after - here,
+        (true, true) => 0.0,
+    }
+}
