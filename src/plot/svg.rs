@@ -1,12 +1,21 @@
-//! Writing the elements of an SVG file.
-use std::fmt::Write;
+//! The shapes of a page as elements of an SVG file.
 use std::io;
+use std::mem;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use svg::Document;
+use svg::node::Node;
+use svg::node::element::{
+    Circle, ClipPath, Element, Group, Image, Polygon, Polyline, Rectangle, Text as TextElement,
+};
 
 use super::colour::Colour;
 
-/// The text of an SVG file under construction.
+/// An SVG file under construction.
 pub(super) struct Svg {
-    text: String,
+    size: (u32, u32),
+    content: Vec<Element>,
     /// How many clipping boxes have been named.
     clips: usize,
 }
@@ -28,14 +37,15 @@ impl Stroke {
         }
     }
 
-    fn attributes(self) -> String {
-        let dash = if self.dashed {
-            r#" stroke-dasharray="6 4""#
-        } else {
-            ""
-        };
-        let colour = hex(self.colour);
-        format!(r#"stroke="{colour}" stroke-width="{}"{dash}"#, self.width)
+    /// The element with this outline.
+    fn around(self, element: impl Into<Element>) -> Element {
+        let mut element = element.into();
+        element.assign("stroke", hex(self.colour));
+        element.assign("stroke-width", self.width);
+        if self.dashed {
+            element.assign("stroke-dasharray", "6 4");
+        }
+        element
     }
 }
 
@@ -59,29 +69,27 @@ pub(super) enum Anchor {
 
 impl Svg {
     pub(super) fn new(width: u32, height: u32) -> Self {
-        let text = format!(
-            "<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-             xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\">\n"
-        );
-        let mut svg = Self { text, clips: 0 };
-        svg.rectangle(
-            [0.0; 2],
-            [f64::from(width), f64::from(height)],
-            Colour::WHITE,
-            None,
-        );
+        let mut svg = Self {
+            size: (width, height),
+            content: Vec::new(),
+            clips: 0,
+        };
+        let size = [f64::from(width), f64::from(height)];
+        svg.rectangle([0.0; 2], size, Colour::WHITE, None);
         svg
     }
 
-    pub(super) fn finish(mut self) -> String {
-        self.text.push_str("</svg>\n");
-        self.text
-    }
-
-    /// Adds one element; writing to a string cannot fail.
-    fn element(&mut self, element: std::fmt::Arguments<'_>) {
-        let _ = self.text.write_fmt(element);
-        self.text.push('\n');
+    pub(super) fn finish(self) -> String {
+        let (width, height) = self.size;
+        let mut document = Document::new()
+            .set("width", width)
+            .set("height", height)
+            .set("viewBox", (0, 0, width, height))
+            .set("font-family", "sans-serif");
+        for element in self.content {
+            document = document.add(element);
+        }
+        document.to_string()
     }
 
     /// What is drawn by `inside` is cut at the box.
@@ -92,13 +100,16 @@ impl Svg {
         inside: impl FnOnce(&mut Self),
     ) {
         self.clips += 1;
-        let id = self.clips;
-        let (place, size) = (place(corner), extent(size));
-        self.element(format_args!(
-            r#"<clipPath id="box{id}"><rect {place} {size}/></clipPath><g clip-path="url(#box{id})">"#
-        ));
+        let id = format!("box{}", self.clips);
+        let around = mem::take(&mut self.content);
         inside(self);
-        self.element(format_args!("</g>"));
+        let drawn = mem::replace(&mut self.content, around);
+        let mut group = Group::new().set("clip-path", format!("url(#{id})"));
+        for element in drawn {
+            group = group.add(element);
+        }
+        let clip = ClipPath::new().set("id", id).add(boxed(corner, size));
+        self.content.extend([clip.into(), group.into()]);
     }
 
     pub(super) fn rectangle(
@@ -108,66 +119,62 @@ impl Svg {
         fill: Colour,
         stroke: Option<Stroke>,
     ) {
-        let (place, size, fill) = (place(corner), extent(size), hex(fill));
-        let outline = stroke.map_or(String::new(), |s| format!(" {}", s.attributes()));
-        self.element(format_args!(
-            r#"<rect {place} {size} fill="{fill}"{outline}/>"#
-        ));
+        let filled = boxed(corner, size).set("fill", hex(fill));
+        self.content.push(match stroke {
+            Some(stroke) => stroke.around(filled),
+            None => filled.into(),
+        });
     }
 
     /// The outline of a box, with nothing inside.
     pub(super) fn outline(&mut self, corner: [f64; 2], size: [f64; 2], stroke: Stroke) {
-        let (place, size, stroke) = (place(corner), extent(size), stroke.attributes());
-        self.element(format_args!(
-            r#"<rect {place} {size} fill="none" {stroke}/>"#
-        ));
+        let empty = boxed(corner, size).set("fill", "none");
+        self.content.push(stroke.around(empty));
     }
 
     pub(super) fn line(&mut self, points: &[[f64; 2]], stroke: Stroke) {
-        let (points, stroke) = (list(points), stroke.attributes());
-        self.element(format_args!(
-            r#"<polyline points="{points}" fill="none" {stroke}/>"#
-        ));
+        let line = Polyline::new()
+            .set("points", list(points))
+            .set("fill", "none");
+        self.content.push(stroke.around(line));
     }
 
     pub(super) fn polygon(&mut self, points: &[[f64; 2]], fill: Colour) {
-        let (points, fill) = (list(points), hex(fill));
-        self.element(format_args!(
-            r#"<polygon points="{points}" fill="{fill}"/>"#
-        ));
+        let polygon = Polygon::new()
+            .set("points", list(points))
+            .set("fill", hex(fill));
+        self.content.push(polygon.into());
     }
 
     pub(super) fn disc(&mut self, centre: [f64; 2], radius: f64, fill: Colour) {
-        let ([x, y], fill) = (centre.map(short), hex(fill));
-        self.element(format_args!(
-            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}"/>"#
-        ));
+        self.content
+            .push(circle(centre, radius).set("fill", hex(fill)).into());
     }
 
     pub(super) fn ring(&mut self, centre: [f64; 2], radius: f64, stroke: Stroke) {
-        let ([x, y], stroke) = (centre.map(short), stroke.attributes());
-        self.element(format_args!(
-            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="none" {stroke}/>"#
-        ));
+        let empty = circle(centre, radius).set("fill", "none");
+        self.content.push(stroke.around(empty));
     }
 
     pub(super) fn text(&mut self, text: &Text<'_>) {
-        let ([x, y], fill) = (text.at.map(short), hex(text.colour));
+        let [x, y] = text.at.map(short);
         let anchor = match text.anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
             Anchor::End => "end",
         };
-        let turned = if text.upright {
-            format!(r#" transform="rotate(-90 {x} {y})""#)
-        } else {
-            String::new()
-        };
-        let (size, content) = (text.size, escaped(text.content));
         // A third of an em below the anchor puts the middle of lower-case letters on it.
-        self.element(format_args!(
-            r#"<text x="{x}" y="{y}" dy="0.35em" font-size="{size}" text-anchor="{anchor}" fill="{fill}"{turned}>{content}</text>"#
-        ));
+        let mut element = TextElement::new(text.content)
+            .set("x", x)
+            .set("y", y)
+            .set("dy", "0.35em")
+            .set("font-size", text.size)
+            .set("text-anchor", anchor)
+            .set("fill", hex(text.colour));
+        if text.upright {
+            element = element.set("transform", format!("rotate(-90 {x} {y})"));
+        }
+        self.content.push(element.into());
     }
 
     /// Pixels of red, green and blue, row by row, as an embedded PNG.
@@ -186,26 +193,37 @@ impl Svg {
         let mut writer = encoder.write_header()?;
         writer.write_image_data(rgb)?;
         writer.finish()?;
-        let (place, data) = (place(corner), base64(&file));
-        self.element(format_args!(
-            r#"<image {place} width="{width}" height="{height}" href="data:image/png;base64,{data}"/>"#
-        ));
+        let [x, y] = corner.map(short);
+        let image = Image::new()
+            .set("x", x)
+            .set("y", y)
+            .set("width", width)
+            .set("height", height)
+            .set(
+                "href",
+                format!("data:image/png;base64,{}", STANDARD.encode(&file)),
+            );
+        self.content.push(image.into());
         Ok(())
     }
 }
 
+fn boxed(corner: [f64; 2], size: [f64; 2]) -> Rectangle {
+    let ([x, y], [width, height]) = (corner.map(short), size.map(short));
+    Rectangle::new()
+        .set("x", x)
+        .set("y", y)
+        .set("width", width)
+        .set("height", height)
+}
+
+fn circle(centre: [f64; 2], radius: f64) -> Circle {
+    let [x, y] = centre.map(short);
+    Circle::new().set("cx", x).set("cy", y).set("r", radius)
+}
+
 fn hex(Colour(r, g, b): Colour) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
-}
-
-fn place(corner: [f64; 2]) -> String {
-    let [x, y] = corner.map(short);
-    format!(r#"x="{x}" y="{y}""#)
-}
-
-fn extent(size: [f64; 2]) -> String {
-    let [width, height] = size.map(short);
-    format!(r#"width="{width}" height="{height}""#)
 }
 
 /// A coordinate to a hundredth of a pixel, never a negative zero.
@@ -219,44 +237,9 @@ fn list(points: &[[f64; 2]]) -> String {
     points.join(" ")
 }
 
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-}
-
-/// Base64 with padding (RFC 4648, section 4).
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for group in bytes.chunks(3) {
-        let byte = |k: usize| u32::from(group.get(k).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for digit in 0..4 {
-            if digit > group.len() {
-                text.push('=');
-            } else {
-                let value = bits >> (18 - 6 * digit) & 63;
-                text.push(char::from(DIGITS[value as usize]));
-            }
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_is_that_of_the_standard() {
-        // RFC 4648, section 10.
-        let found = ["", "f", "fo", "foo", "foob", "fooba", "foobar"].map(|s| base64(s.as_bytes()));
-        let expected = [
-            "", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy",
-        ];
-        assert_eq!(found, expected);
-    }
 
     #[test]
     fn text_is_escaped() {
@@ -286,23 +269,7 @@ mod tests {
             .nth(1)
             .and_then(|s| s.split('"').next())
             .unwrap();
-        let digits: Vec<u32> = (data.chars().filter(|c| *c != '='))
-            .map(|c| match c {
-                'A'..='Z' => c as u32 - 65,
-                'a'..='z' => c as u32 - 71,
-                '0'..='9' => c as u32 + 4,
-                '+' => 62,
-                _ => 63,
-            })
-            .collect();
-        let mut file = Vec::new();
-        for group in digits.chunks(4) {
-            let bits = group
-                .iter()
-                .enumerate()
-                .fold(0, |b, (k, d)| b | d << (18 - 6 * k));
-            file.extend_from_slice(&u32::to_be_bytes(bits)[1..group.len()]);
-        }
+        let file = STANDARD.decode(data).unwrap();
         let mut reader = png::Decoder::new(io::Cursor::new(file))
             .read_info()
             .unwrap();

@@ -101,6 +101,11 @@ impl Camera {
         ]
     }
 
+    /// The centre asked for, or the frame's middle.
+    pub(super) fn centre_px(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
+        asked.unwrap_or_else(|| self.middle_px())
+    }
+
     /// Turns expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255. Each (`seed`, `frame`)
     /// has its own noise. A caller may pass any image; O(pixels).
     pub fn expose(&self, expected_grey: ArrayView2<'_, f64>, seed: u64, frame: u64) -> Array2<u8> {

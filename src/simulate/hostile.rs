@@ -1,4 +1,4 @@
-//! Scenes on which a measurement must fail in a civil way: with a flag, an error or a value, never a panic.
+//! Scenes on which a measurement must end with a flag, an error or a value, never a panic.
 
 use ndarray::Array2;
 

@@ -15,6 +15,15 @@ pub(super) struct LightLaw {
 }
 
 impl LightLaw {
+    /// Light at a pressure, in grey levels above the background.
+    pub(super) fn grey_at(&self, pressure_pa: f64) -> f64 {
+        if self.largest_pressure_pa == 0.0 {
+            return 0.0;
+        }
+        let share = pressure_pa / self.largest_pressure_pa;
+        self.grey_per_pascal * self.largest_pressure_pa * self.response.light(share)
+    }
+
     /// Unblurred light of a contact over `window`, in grey levels above the background.
     pub(super) fn patch(&self, contact: &Contact, disc: &Disc, window: Window) -> Patch {
         if self.largest_pressure_pa == 0.0 {
@@ -22,13 +31,7 @@ impl LightLaw {
         }
         let exact = contact.is_hertzian() && !matches!(self.response, Response::Power { .. });
         if !exact {
-            let largest = self.grey_per_pascal * self.largest_pressure_pa;
-            return disc.average_radial(window, |r_m| {
-                largest
-                    * self
-                        .response
-                        .light(contact.pressure_pa(r_m) / self.largest_pressure_pa)
-            });
+            return disc.average_radial(window, |r_m| self.grey_at(contact.pressure_pa(r_m)));
         }
         let peak = contact.peak_pressure_pa;
         let mut patch = disc.average(Profile::Hemisphere, window);

@@ -170,12 +170,7 @@ impl Waveguide {
     }
 
     /// Thickness of the whole stack in metres.
-    ///
-    /// ```
-    /// let waveguide = tactile_imaging::simulate::Waveguide::default();
-    /// assert!((waveguide.thickness_m() - 10e-3).abs() < 1e-15, "2, 3 and 5 mm");
-    /// ```
-    pub fn thickness_m(&self) -> f64 {
+    fn thickness_m(&self) -> f64 {
         self.layers.iter().map(|l| l.thickness_m).sum()
     }
 

@@ -3,18 +3,19 @@
 //! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. It shares no code with the
 //! measuring crates, so that a measurement of a simulated frame is a test and not a tautology.
 //!
-//! | room | what it holds |
+//! | module | what it holds |
 //! |---|---|
 //! | [`material`](Elastic) | the pressed sphere, the waveguide's layers |
 //! | [`contact`](Contact) | sphere on waveguide: pressure, radius, indentation, surface displacement |
+//! | [`contact_state`](ContactState) | contacts computed elsewhere, as tables over the radius |
 //! | `pixel_average` | exact averages of the contact pressure over pixels |
 //! | [`light`](Response) | pressure → grey levels |
 //! | [`camera`](Camera) | blur, vignetting, photon and read noise, quantisation |
 //! | [`press`](PressScene) | one sphere pressed at several loads: frames and [`PressTruth`] |
 //! | [`calibration`](CalibrationSeries) | light against gauge force, loading and unloading |
-//! | [`stream`](FrameStream) | frames of loading cycles at camera rate, lamps drifting |
+//! | [`stream`](FrameStream) | frames of loading cycles at camera rate, with drifting illumination |
 //! | [`uniaxial`](UniaxialScene) | a patterned block squeezed between plates: stress over strain is the modulus exactly |
-//! | [`hostile`](Hostile) | scenes on which a measurement must fail in a civil way |
+//! | [`hostile`](Hostile) | scenes on which a measurement must end with a flag or an error |
 //! | `folder` | a scene written as files (feature `scene`) |
 //!
 //! # Conventions

@@ -78,16 +78,9 @@ impl Disc {
     /// Rows and columns (first, one past the last) that the disc touches, widened by `margin` pixels and cut to what
     /// lies within `margin` of a frame of `shape`.
     pub(super) fn window(&self, shape: [usize; 2], margin: usize) -> Window {
-        let m = margin as isize;
         let span = |axis: usize, length: usize| {
-            let (c, r) = (
-                self.centre_px[axis],
-                self.radius_m / self.pixel_size_m[axis],
-            );
-            let (limit, lowest) = (length as isize + m, -m);
-            let first = ((c - r + 0.5).floor() as isize - m).clamp(lowest, limit);
-            let last = ((c + r + 0.5).ceil() as isize + m).clamp(first, limit);
-            [first, last]
+            let radius_px = self.radius_m / self.pixel_size_m[axis];
+            touched(self.centre_px[axis], radius_px, length, margin)
         };
         [span(1, shape[0]), span(0, shape[1])]
     }
@@ -125,6 +118,16 @@ impl Disc {
             values,
         }
     }
+}
+
+/// First and one past the last of the pixels along one axis that lie within `half` of `centre`, widened by `margin` and cut to what lies
+/// within `margin` of a frame of `length` pixels.
+pub(super) fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 2] {
+    let margin = margin as isize;
+    let limit = length as isize + margin;
+    let first = ((centre - half + 0.5).floor() as isize - margin).clamp(-margin, limit);
+    let last = ((centre + half + 0.5).ceil() as isize + margin).clamp(first, limit);
+    [first, last]
 }
 
 /// Where the pixel is smaller than this share of 1 − ρ², quadrature of order 8 is exact to rounding: its error falls as

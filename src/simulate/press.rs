@@ -8,7 +8,7 @@ use super::error::SimulateError;
 use super::leak::LightLaw;
 use super::material::Sphere;
 use super::pixel_average::{Disc, Patch};
-use super::press_options::{Gain, Load, PressOptions};
+use super::press_options::{Load, PressOptions};
 
 /// A checked scene that makes frames and knows the truth.
 ///
@@ -51,11 +51,9 @@ impl PressScene {
             .map(|c| c.peak_pressure_pa)
             .fold(0.0, f64::max);
         let response = options.response;
-        let grey_per_pascal = match options.gain {
-            Gain::GreyPerPascal(gain) => gain,
-            Gain::PeakGrey(_) if largest_pressure_pa == 0.0 => 0.0,
-            Gain::PeakGrey(grey) => grey / (largest_pressure_pa * response.light(1.0)),
-        };
+        let grey_per_pascal = options
+            .gain
+            .grey_per_pascal(largest_pressure_pa * response.light(1.0));
         let light = LightLaw {
             response,
             grey_per_pascal,
@@ -154,9 +152,7 @@ impl PressScene {
     /// The contact's disc on the image plane.
     pub(super) fn disc(&self, load: usize) -> Disc {
         let options = &self.options;
-        let middle = options
-            .centre_px
-            .unwrap_or_else(|| options.camera.middle_px());
+        let middle = options.camera.centre_px(options.centre_px);
         let pixel_size_m = options.camera.pixel_size_m;
         let shear = options.loads[load].shear_n;
         let centre_px = std::array::from_fn(|k| {

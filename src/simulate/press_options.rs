@@ -33,6 +33,16 @@ pub enum Gain {
 }
 
 impl Gain {
+    /// Grey levels per pascal in a scene whose brightest place shows the light of `largest_pa`; 0 where a peak is asked for and nothing is
+    /// lit.
+    pub(super) fn grey_per_pascal(self, largest_pa: f64) -> f64 {
+        match self {
+            Self::GreyPerPascal(gain) => gain,
+            Self::PeakGrey(grey) if largest_pa > 0.0 => grey / largest_pa,
+            Self::PeakGrey(_) => 0.0,
+        }
+    }
+
     pub(super) fn validate(self) -> Result<(), SimulateError> {
         match self {
             Self::PeakGrey(value) | Self::GreyPerPascal(value) => not_negative("gain", value),

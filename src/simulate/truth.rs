@@ -172,8 +172,8 @@ impl PressTruth {
 /// Pixels whose expected grey level exceeds 255; the frame is made only where one can.
 fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
     let (options, lamps) = (scene.options(), scene.options().loads[load].illumination);
-    let brightest = options.camera.background_grey
-        + scene.grey_per_pascal() * scene.contact(load).peak_pressure_pa;
+    let peak = scene.contact(load).peak_pressure_pa;
+    let brightest = options.camera.background_grey + scene.light().grey_at(peak);
     let lit = lamps.level + 0.5 * (lamps.tilt[0].abs() + lamps.tilt[1].abs());
     if brightest * lit <= 255.0 {
         return 0;

@@ -19,8 +19,7 @@ use ndarray::Array2;
 
 use super::error::SimulateError;
 use super::light::Illumination;
-use super::pixel_average::Patch;
-use super::press_options::Gain;
+use super::pixel_average::{Patch, touched};
 use super::relief::Relief;
 use super::uniaxial_options::UniaxialOptions;
 use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
@@ -68,16 +67,11 @@ impl UniaxialScene {
             relief,
             grey_per_pascal: 1.0,
         };
-        scene.grey_per_pascal = match scene.options.gain {
-            Gain::GreyPerPascal(gain) => gain,
-            Gain::PeakGrey(grey) => {
-                let loads = 0..scene.states.len();
-                let peak = loads
-                    .flat_map(|k| scene.pressure(k).values)
-                    .fold(0.0, f64::max);
-                if peak > 0.0 { grey / peak } else { 0.0 }
-            }
-        };
+        let loads = 0..scene.states.len();
+        let largest_pa = loads
+            .flat_map(|k| scene.pressure(k).values)
+            .fold(0.0, f64::max);
+        scene.grey_per_pascal = scene.options.gain.grey_per_pascal(largest_pa);
         Ok(scene)
     }
 
@@ -234,9 +228,7 @@ impl UniaxialScene {
     }
 
     fn centre_px(&self) -> [f64; 2] {
-        self.options
-            .centre_px
-            .unwrap_or_else(|| self.options.camera.middle_px())
+        self.options.camera.centre_px(self.options.centre_px)
     }
 
     fn centre_m(&self) -> [f64; 2] {
@@ -247,14 +239,12 @@ impl UniaxialScene {
     /// Pixel averages of the pressure over the face and the blur's reach.
     fn pressure(&self, load: usize) -> Patch {
         let (s, camera, relief) = (&self.states[load], &self.options.camera, &self.relief);
-        let (centre, reach) = (self.centre_px(), camera.blur_reach() as isize);
+        let centre = self.centre_px();
         let pixel: [f64; 2] = std::array::from_fn(|k| camera.pixel_size_m[k] / s.stretch_lateral);
         // First pixel and pixel edges in material coordinates, along x and y.
         let span = |k: usize, length: usize| {
             let half = 0.5 * self.options.face_m[k] / pixel[k];
-            let limit = length as isize + reach;
-            let first = ((centre[k] - half + 0.5).floor() as isize - reach).clamp(-reach, limit);
-            let last = ((centre[k] + half + 0.5).ceil() as isize + reach).clamp(first, limit);
+            let [first, last] = touched(centre[k], half, length, camera.blur_reach());
             let edges = (first..=last)
                 .map(|i| (i as f64 - 0.5 - centre[k]) * pixel[k])
                 .collect::<Vec<_>>();

@@ -6,7 +6,7 @@ use super::super::colour::ColorMap;
 use super::super::heat::HeatMap;
 use super::super::svg::{Anchor, Stroke, Svg, Text};
 use super::super::ticks::{label, nice_ticks};
-use super::{AXIS, TICK_TEXT, black};
+use super::style::{AXIS, TICK_TEXT, black};
 
 const WIDTH: f64 = 14.0;
 

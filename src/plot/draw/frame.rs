@@ -4,7 +4,7 @@ use super::super::colour::Colour;
 use super::super::panel::Panel;
 use super::super::svg::{Anchor, Stroke, Svg, Text};
 use super::super::ticks::{Tick, ticks};
-use super::{AXIS, TICK_TEXT, black};
+use super::style::{AXIS, TICK_TEXT, black};
 
 const GRID: Stroke = Stroke::new(Colour(228, 228, 228), 1.0);
 const LINE: Stroke = Stroke::new(AXIS, 1.0);

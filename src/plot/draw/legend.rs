@@ -5,7 +5,7 @@ use super::super::layer::Layer;
 use super::super::legend::Legend;
 use super::super::panel::Panel;
 use super::super::svg::{Anchor, Stroke, Svg};
-use super::black;
+use super::style::black;
 
 /// Space around the legend, for a sample, for a letter and for a line, in pixels.
 const MARGIN: f64 = 8.0;

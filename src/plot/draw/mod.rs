@@ -3,31 +3,15 @@ mod bar;
 mod frame;
 mod legend;
 mod marks;
+pub(super) mod style;
 
 use std::io;
 
 use super::axes::{Axes, TOP};
-use super::colour::Colour;
 use super::layer::Layer;
 use super::panel::Panel;
-use super::svg::{Anchor, Svg, Text};
-
-/// The colour of numbers at ticks.
-const TICK_TEXT: Colour = Colour(40, 40, 40);
-/// The colour of axes and of frames around colour bars.
-const AXIS: Colour = Colour(90, 90, 90);
-
-/// A line of black text.
-pub(super) fn black(content: &str, at: [f64; 2], size: f64, anchor: Anchor) -> Text<'_> {
-    Text {
-        content,
-        at,
-        size,
-        colour: Colour::BLACK,
-        anchor,
-        upright: false,
-    }
-}
+use super::svg::{Anchor, Svg};
+use style::black;
 
 /// Draws `panel` in the area with this corner and size.
 pub(super) fn draw_panel(

@@ -79,28 +79,47 @@ fn pipeline(object: u8) -> Pipeline {
         .with_control_points(16)
 }
 
-fn is_sound(m: &Measurement) -> bool {
-    let modulus = &m.youngs_modulus_pa;
-    let mut numbers = vec![modulus.value, modulus.standard_error, modulus.interval_95.0];
-    for f in &m.frames {
+/// Whether a contact's numbers that are no numbers are owned up to: by a flag that says what is wrong with that contact. A flag about the law
+/// (a/R beyond Hertz's range stands on most of these scenes) or about another frame excuses nothing.
+fn excuses_contact(flag: &Flag, in_frame: usize) -> bool {
+    matches!(flag,
+        Flag::Saturated { frame, .. }
+        | Flag::OutOfCalibration { frame }
+        | Flag::TouchesEdge { frame }
+        | Flag::ProfileNotConverged { frame } if *frame == in_frame)
+}
+
+fn assert_sound(m: &Measurement) {
+    for (k, f) in m.frames.iter().enumerate() {
         let (force, radius) = (f.force_n, f.contact_radius_m);
-        numbers.extend([
+        let mut numbers = vec![
             force.value,
             force.standard_error,
             radius.value,
             radius.standard_error,
-        ]);
-        numbers.extend(
-            f.centroid_px
-                .into_iter()
-                .chain(f.centroid_sd_px)
-                .chain(f.surface_height_m),
-        );
+        ];
+        numbers.extend(f.centroid_px.into_iter().chain(f.centroid_sd_px));
+        numbers.extend(f.surface_height_m);
+        let sound = numbers.iter().all(|v| v.is_finite());
+        let excused = m.flags.iter().any(|flag| excuses_contact(flag, k));
+        assert!(sound || excused, "frame {k} has a silent NaN: {m:?}");
     }
     if let Some(strain) = &m.strain {
-        numbers.extend(strain.mean.iter().chain(&strain.standard_error).flatten());
+        let numbers = strain.mean.iter().chain(&strain.standard_error).flatten();
+        let sound = numbers.into_iter().all(|v| v.is_finite());
+        let excused = m
+            .flags
+            .iter()
+            .any(|f| matches!(f, Flag::Folded { .. } | Flag::Unmatched { .. }));
+        assert!(sound || excused, "the strain has a silent NaN: {m:?}");
     }
-    numbers.iter().all(|v| v.is_finite())
+    let modulus = &m.youngs_modulus_pa;
+    let numbers = [modulus.value, modulus.standard_error, modulus.interval_95.0];
+    // Without a number there is nothing that a broken assumption could be a caution about.
+    assert!(
+        numbers.iter().all(|v| v.is_finite()),
+        "the modulus has a NaN: {m:?}"
+    );
 }
 
 /// Every frame through a session, in which no error may stick.
@@ -117,7 +136,8 @@ fn stream(pipeline: &Pipeline, reference: &Array2<u8>, frames: [&Array2<u8>; 2])
                 contact.contact_radius_m.value,
             ];
             assert!(
-                finite.iter().all(|v| v.is_finite()) || contact.flags(0).next().is_some(),
+                finite.iter().all(|v| v.is_finite())
+                    || contact.flags(0).any(|flag| excuses_contact(&flag, 0)),
                 "{contact:?}"
             );
             if let Ok(Some(found)) = session.strain() {
@@ -129,10 +149,7 @@ fn stream(pipeline: &Pipeline, reference: &Array2<u8>, frames: [&Array2<u8>; 2])
         }
     }
     if let Ok(modulus) = session.modulus() {
-        assert!(
-            modulus.youngs_modulus_pa.is_finite() || !modulus.warnings.is_empty(),
-            "{modulus:?}"
-        );
+        assert!(modulus.youngs_modulus_pa.is_finite(), "{modulus:?}");
     }
 }
 
@@ -153,20 +170,14 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
         if let Ok(modulus) = press.modulus() {
             let sound =
                 modulus.youngs_modulus_pa.is_finite() && modulus.standard_error_pa.is_finite();
-            assert!(
-                sound || !modulus.warnings.is_empty(),
-                "a silent NaN: {modulus:?}"
-            );
+            assert!(sound, "a NaN: {modulus:?}");
         }
         return;
     }
     let Ok(measured) = press.measure() else {
         return;
     };
-    assert!(
-        is_sound(&measured) || !measured.flags.is_empty(),
-        "a silent NaN: {measured:?}"
-    );
+    assert_sound(&measured);
     let flagged = |wanted: fn(&Flag) -> bool| measured.flags.iter().any(wanted);
     let whole = spoilt[0] > 3;
     match Hostile::ALL.get(kinds[0]) {
