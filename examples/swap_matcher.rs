@@ -102,14 +102,14 @@ fn report(
     trial: &Trial,
     pipeline: &Pipeline,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let measurement = trial.press(pipeline)?.measure()?;
+    let measurement = trial.press(pipeline)?.measure();
     println!("{name}");
-    if let Some(matching) = &measurement.matching {
+    if let Ok(matching) = &measurement.matching {
         println!("  match    {matching}");
     }
-    if let Some(strain) = &measurement.strain {
+    if let Ok(strain) = &measurement.strain {
         println!("  strain   {strain}");
     }
-    println!("  modulus {}", measurement.youngs_modulus_pa);
+    println!("  modulus {}", measurement.youngs_modulus_pa?);
     Ok(())
 }

@@ -38,12 +38,8 @@ fn run(
 ) {
     let pipelines: Vec<_> = trials.iter().map(pipeline).collect();
     let strain = |(trial, pipeline): (&Trial, &Pipeline)| {
-        let measured = trial.press(pipeline).and_then(|mut press| press.measure());
-        measured
-            .expect("a measurement")
-            .strain
-            .expect("a strain")
-            .mean
+        let measured = trial.press(pipeline).map(|mut press| press.measure());
+        measured.expect("a press").strain.expect("a strain").mean
     };
     let job = || {
         trials
@@ -96,7 +92,10 @@ pub(crate) fn strain(study: &mut Study) {
         );
     }
     for width in [1, 3, 11] {
-        let changed = with(|pipeline, width| pipeline.with_smoothing(width), width);
+        let changed = with(
+            |pipeline, width| pipeline.with_smoothing(width).expect("odd"),
+            width,
+        );
         run(
             study,
             &usual,
@@ -108,7 +107,11 @@ pub(crate) fn strain(study: &mut Study) {
     }
     for side in study.choose(vec![3, 6], vec![2, 3, 5, 6, 8]) {
         let changed = with(
-            |pipeline, side| pipeline.with_binning(Binning::Blocks(side)),
+            |pipeline, side| {
+                pipeline
+                    .with_binning(Binning::Blocks(side))
+                    .expect("a block")
+            },
             side,
         );
         run(

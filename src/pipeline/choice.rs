@@ -175,7 +175,8 @@ choice! {
     /// assert_eq!(EstimatorChoice::default().name(), "best");
     /// ```
     EstimatorChoice, "estimator":
-    /// The one that fits the object best: [`HertzSphere`](crate::elasticity::modulus::HertzSphere) for a ball, else [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
+    /// The default for the object: [`HertzSphere`](crate::elasticity::modulus::HertzSphere) for a ball, the law of its shape for a layer and a
+    /// cone, else [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
     Best = "best",
     /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio): stress over strain, equation (31).
     PaperRatio = "paper-ratio",
@@ -183,6 +184,18 @@ choice! {
     Regression = "regression",
     /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere); a ball alone.
     Sphere = "sphere",
+    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide); a ball alone, on a waveguide whose layers are known.
+    SphereOnWaveguide = "sphere-on-waveguide",
+    /// [`SphereBetweenPlates`](crate::elasticity::modulus::SphereBetweenPlates); a ball alone.
+    SphereBetweenPlates = "sphere-between-plates",
+    /// [`TataraSphere`](crate::elasticity::modulus::TataraSphere); a ball alone.
+    TataraSphere = "tatara-sphere",
+    /// [`BondedLayer`](crate::elasticity::modulus::BondedLayer) by its integral equation; a layer alone.
+    BondedLayer = "bonded-layer",
+    /// [`Cone`](crate::elasticity::modulus::Cone); a cone alone, and from depths.
+    Cone = "cone",
+    /// [`BestOf`](crate::elasticity::modulus::BestOf): of all contact laws of a ball or a layer the one with the least Akaike criterion.
+    LeastAkaike = "least-akaike",
     /// [`FlatPunch`](crate::elasticity::modulus::FlatPunch); a flat-ended cylinder alone, and from depths (a depth table's).
     FlatPunch = "flat-punch",
 }

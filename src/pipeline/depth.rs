@@ -76,7 +76,7 @@ impl ContactStage for DarkContact {
         _workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge_n: Option<f64>,
+        gauge: Option<Estimate<f64>>,
         contact: &mut FrameContact,
     ) -> Result<(), ForceError> {
         let image = reference.image();
@@ -105,7 +105,7 @@ impl ContactStage for DarkContact {
             .map(|&at| darkness(at))
             .fold(0.0, f64::max);
         let saturated = patch.pixels.iter().filter(|&&at| frame[at] == 0).count();
-        contact.reading = Some(self.reading(&patch, frame.dim(), gauge_n, peak, saturated));
+        contact.reading = Some(self.reading(&patch, frame.dim(), gauge, peak, saturated));
         Ok(())
     }
 
@@ -123,7 +123,7 @@ impl DarkContact {
         &self,
         patch: &Patch,
         (rows, columns): (usize, usize),
-        gauge_n: Option<f64>,
+        gauge: Option<Estimate<f64>>,
         peak: f64,
         saturated: usize,
     ) -> ContactReading {
@@ -138,11 +138,8 @@ impl DarkContact {
         let (step, _) = self.table.depth(peak - 1.0);
         let b = patch.region;
         ContactReading {
-            force_n: gauge_n.map(|value| Estimate {
-                value,
-                standard_error: 0.0,
-            }),
-            force_noise_n: 0.0,
+            force_n: gauge,
+            force_noise_n: gauge.map_or(0.0, |gauge| gauge.standard_error),
             force_calibration_n: 0.0,
             contact_radius_m: Estimate {
                 value: radius_px * pixel,

@@ -1,6 +1,8 @@
 //! What a person at a bench wants to read.
+use super::error::PipelineError;
 use super::measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 use crate::force::Estimate;
+use crate::matching::StopReason;
 use std::fmt::{self, Display, Formatter};
 
 /// A value with its standard error, scaled to a unit: two significant digits of the error decide the decimals.
@@ -43,8 +45,11 @@ impl Display for ModulusResult {
 
 impl Display for FrameResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (force, radius) = (self.force_n, self.contact_radius_m);
-        write!(f, "force {} N", estimate(force, 1.0))?;
+        match self.force_n {
+            Ok(force) => write!(f, "force {} N", estimate(force, 1.0))?,
+            Err(_) => f.write_str("force unknown")?,
+        }
+        let radius = self.contact_radius_m;
         if let Some(gauge) = self.gauge_force_n {
             write!(f, " (gauge {gauge:.4} N)")?;
         }
@@ -70,7 +75,7 @@ impl Display for MatchResult {
             self.points,
             self.residual_m * 1e6,
             self.mean_displacement_m * 1e6,
-            self.stop.to_lowercase(),
+            stop_text(self.stop),
             self.iterations
         )
     }
@@ -90,18 +95,37 @@ impl Display for StrainResult {
     }
 }
 
+/// A result under its heading, or why there is none.
+fn line<T: Display>(
+    f: &mut Formatter<'_>,
+    heading: &str,
+    result: &Result<T, PipelineError>,
+) -> fmt::Result {
+    match result {
+        Ok(value) => writeln!(f, "{heading:<16} {value}"),
+        Err(error) => writeln!(f, "{heading:<16} none: {error}"),
+    }
+}
+
+fn stop_text(stop: StopReason) -> &'static str {
+    match stop {
+        StopReason::Converged => "converged",
+        StopReason::Exact => "exact",
+        StopReason::IterationLimit => "not converged",
+        StopReason::Callback => "stopped by the caller",
+        StopReason::Degenerate => "degenerate",
+        _ => "stopped",
+    }
+}
+
 impl Display for Measurement {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Young's modulus  {}", self.youngs_modulus_pa)?;
+        line(f, "Young's modulus", &self.youngs_modulus_pa)?;
         for (i, frame) in self.frames.iter().enumerate() {
-            writeln!(f, "frame {:<10} {frame}", i + 1)?;
+            line(f, &format!("frame {}", i + 1), frame)?;
         }
-        if let Some(matching) = &self.matching {
-            writeln!(f, "match            {matching}")?;
-        }
-        if let Some(strain) = &self.strain {
-            writeln!(f, "strain           {strain}")?;
-        }
+        line(f, "match", &self.matching)?;
+        line(f, "strain", &self.strain)?;
         writeln!(f, "all estimators:")?;
         for estimate in &self.estimators {
             writeln!(f, "  {estimate}")?;

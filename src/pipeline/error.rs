@@ -49,6 +49,21 @@ pub enum PipelineError {
     /// The waveguide or the object is not physical.
     #[error("the waveguide or the object is not physical: {0}")]
     Material(#[source] ElasticityError),
+    /// A relative error is negative or not finite.
+    #[error("a relative error must be finite and not negative, found {found}")]
+    ScaleError {
+        /// What was given.
+        found: f64,
+    },
+    /// The smoothing has no middle pixel.
+    #[error("the smoothing must be an odd number of pixels wide, found {found}")]
+    EvenSmoothing {
+        /// What was given.
+        found: usize,
+    },
+    /// Blocks of no pixels.
+    #[error("a block must have a side of at least one pixel")]
+    EmptyBlocks,
     /// There is no frame of this number.
     #[error("there is no frame {}: the press has {frames}", frame + 1)]
     NoSuchFrame {
@@ -72,10 +87,16 @@ pub enum PipelineError {
         frame: usize,
     },
     /// The force of a frame is not known: no calibration and no gauge reading.
-    #[error("the force of frame {} is not known: a depth table needs a gauge reading (`force_N`)", frame + 1)]
+    #[error("the force of frame {} is not known: without a calibration it takes a gauge reading (`force_N`)", frame + 1)]
     NoForce {
         /// The frame.
         frame: usize,
+    },
+    /// A match and a strain take two frames.
+    #[error("a strain takes two frames, found {found}")]
+    TooFewFrames {
+        /// How many there are.
+        found: usize,
     },
     /// No surface could be reconstructed.
     #[error("frame {}: no surface: {source}", frame + 1)]
@@ -128,11 +149,11 @@ pub enum PipelineError {
         source: ElasticityError,
     },
     /// The estimator that was chosen is for another object.
-    #[error("the estimator \"{estimator}\" needs {needs} as the object")]
+    #[error("the estimator \"{estimator}\" needs {needs}")]
     WrongEstimator {
         /// The estimator.
         estimator: EstimatorChoice,
-        /// The object it is for.
+        /// What it needs.
         needs: &'static str,
     },
     /// The loads do not determine a modulus.

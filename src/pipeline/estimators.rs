@@ -1,182 +1,246 @@
-//! Loads, the errors they share, and the modulus estimators that fit the object.
+//! The modulus estimators: the default one, and those behind the names of a configuration.
 use super::choice::EstimatorChoice;
 use super::error::PipelineError;
 use super::object::Object;
-use super::settings::Settings;
 use crate::elasticity::ElasticityError;
-use crate::elasticity::contact::Waveguide;
+use crate::elasticity::contact::{Body, Bond, Waveguide};
 use crate::elasticity::modulus::{
-    Estimate, Evidence, FlatPunch, HertzSphere, LoadSeries, LoadState, ModulusEstimate,
-    ModulusEstimator, PaperRatio, SharedErrors, StrainReference, StressStrainRegression,
+    BestOf, BondedLayer, Cone, FlatPunch, HertzSphere, LayerTheory, ModulusEstimator, PaperRatio,
+    SphereBetweenPlates, SphereOnWaveguide, StrainReference, StressStrainRegression, TataraSphere,
 };
+use std::sync::{Arc, OnceLock};
 
-/// What one load says, before errors are split into its own and those that all loads share.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LoadReading {
-    pub force_n: f64,
-    /// Error of the force from noise.
-    pub noise_n: f64,
-    /// Error of the force from the calibration.
-    pub calibration_n: f64,
-    pub radius_m: Estimate<f64>,
+/// An estimator that pipelines and their clones share.
+pub(super) type SharedEstimator = Arc<dyn ModulusEstimator<f64> + Send + Sync>;
+
+/// The estimator where none is chosen. This is the place to change the default.
+///
+/// A ball: Hertz's law, both bodies yielding, the waveguide's layers in series. A sample on a rigid base, a cone: their own laws. Else
+/// stress over strain, equation (31).
+fn default_of(
+    object: Object,
+    waveguide: Option<&Waveguide<f64>>,
+) -> Result<SharedEstimator, ElasticityError> {
+    match object {
+        Object::Sphere {
+            radius_m,
+            poisson_ratio,
+        } => shared(
+            HertzSphere::new(radius_m, poisson_ratio)?.with_other_body(pressed_on(waveguide)),
+        ),
+        Object::Layer {
+            indenter_radius_m,
+            thickness_m,
+            poisson_ratio,
+        } => shared(layer(indenter_radius_m, thickness_m, poisson_ratio)?),
+        Object::Cone {
+            half_angle_rad,
+            poisson_ratio,
+        } => shared(Cone::new(half_angle_rad, poisson_ratio)?),
+        Object::FlatPunch { .. } | Object::Unknown { .. } => shared(paper_ratio(object)?),
+    }
 }
 
-/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one is common to all loads (the
-/// slope's); what a load has beyond that (the offset's) is its own.
-pub(crate) fn split_errors(
-    readings: impl Iterator<Item = LoadReading> + Clone,
-    settings: &Settings,
-) -> (Vec<LoadState<f64>>, SharedErrors<f64>) {
-    let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
-    let common = readings
-        .clone()
-        .map(|r| relative(&r))
-        .fold(f64::INFINITY, f64::min);
-    let common = if common.is_finite() { common } else { 0.0 };
-    let load = |r: LoadReading| {
-        let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2))
-            .max(0.0)
-            .sqrt();
-        LoadState::new(Estimate::new(r.force_n, r.noise_n.hypot(rest)))
-            .with_contact_radius(r.radius_m)
+/// Every estimator that fits the object, the paper's ratio first.
+pub(super) fn that_fit(
+    object: Object,
+    waveguide: Option<&Waveguide<f64>>,
+) -> Result<Vec<SharedEstimator>, PipelineError> {
+    let build = || {
+        let mut estimators = vec![shared(paper_ratio(object)?)?];
+        match object {
+            Object::FlatPunch {
+                radius_m,
+                poisson_ratio,
+            } => {
+                let punch = FlatPunch::new(radius_m, poisson_ratio)?;
+                estimators.push(shared(punch.with_other_body(pressed_on(waveguide)))?);
+            }
+            Object::Sphere { .. } | Object::Layer { .. } | Object::Cone { .. } => {
+                estimators.push(default_of(object, waveguide)?);
+            }
+            Object::Unknown { .. } => {}
+        }
+        estimators.push(shared(StressStrainRegression::new())?);
+        Ok(estimators)
     };
-    let shared = SharedErrors {
-        force_scale: common.hypot(settings.force_scale_error),
-        length_scale: settings.length_scale_error,
-        ..SharedErrors::default()
+    build().map_err(PipelineError::Material)
+}
+
+/// The estimator of a name.
+fn named(
+    choice: EstimatorChoice,
+    object: Object,
+    waveguide: Option<&Waveguide<f64>>,
+) -> Result<SharedEstimator, PipelineError> {
+    let needs = |needs| PipelineError::WrongEstimator {
+        estimator: choice,
+        needs,
     };
-    (readings.map(load).collect(), shared)
+    const BALL: &str = "a ball as the object";
+    let ball = || match object {
+        Object::Sphere {
+            radius_m,
+            poisson_ratio,
+        } => Ok((radius_m, poisson_ratio)),
+        _ => Err(needs(BALL)),
+    };
+    let built = match choice {
+        EstimatorChoice::Best => default_of(object, waveguide),
+        EstimatorChoice::PaperRatio => paper_ratio(object).and_then(shared),
+        EstimatorChoice::Regression => shared(StressStrainRegression::new()),
+        EstimatorChoice::Sphere => {
+            let (radius_m, poisson_ratio) = ball()?;
+            HertzSphere::new(radius_m, poisson_ratio)
+                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide))))
+        }
+        EstimatorChoice::SphereOnWaveguide => {
+            let (radius_m, poisson_ratio) = ball()?;
+            let layers = waveguide.ok_or(needs("the layers of the waveguide"))?;
+            SphereOnWaveguide::new(radius_m, poisson_ratio, layers, Bond::Bonded).and_then(shared)
+        }
+        EstimatorChoice::SphereBetweenPlates => {
+            let (radius_m, poisson_ratio) = ball()?;
+            SphereBetweenPlates::new(radius_m, poisson_ratio)
+                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide))))
+        }
+        EstimatorChoice::TataraSphere => {
+            let (radius_m, poisson_ratio) = ball()?;
+            TataraSphere::new(radius_m, poisson_ratio)
+                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide))))
+        }
+        EstimatorChoice::FlatPunch => match object {
+            Object::FlatPunch {
+                radius_m,
+                poisson_ratio,
+            } => FlatPunch::new(radius_m, poisson_ratio)
+                .and_then(|e| shared(e.with_other_body(pressed_on(waveguide)))),
+            _ => return Err(needs("a flat punch as the object")),
+        },
+        EstimatorChoice::Cone => match object {
+            Object::Cone { .. } => default_of(object, waveguide),
+            _ => return Err(needs("a cone as the object")),
+        },
+        EstimatorChoice::BondedLayer => match object {
+            Object::Layer { .. } => default_of(object, waveguide),
+            _ => return Err(needs("a layer as the object")),
+        },
+        EstimatorChoice::LeastAkaike => return least_akaike(object, waveguide, needs(BALL)),
+    };
+    built.map_err(PipelineError::Material)
 }
 
-/// The contact radius with what no profile can know better: a hundredth of a pixel, by which a rim of pixels, blur and the
-/// contact's true shape differ from the fitted profile.
-pub(crate) fn radius_with_floor(
-    value: f64,
-    standard_error: f64,
-    pixel_size_m: [f64; 2],
-) -> Estimate<f64> {
-    let floor = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
-    Estimate::new(value, standard_error.hypot(floor))
-}
-
-/// Loads with the errors that they share.
-pub(crate) fn series(
-    loads: Vec<LoadState<f64>>,
-    shared: SharedErrors<f64>,
-) -> Result<LoadSeries<f64>, PipelineError> {
-    LoadSeries::new(loads)
-        .with_shared_errors(shared)
-        .map_err(PipelineError::Modulus)
-}
-
-type Attempt = Result<ModulusEstimate<f64>, ElasticityError>;
-
-/// The estimate that the settings ask for.
-pub(crate) fn chosen_estimate(
-    settings: &Settings,
-    loads: &LoadSeries<f64>,
-) -> Result<ModulusEstimate<f64>, PipelineError> {
-    let (object, waveguide, choice) = (
-        settings.object,
-        settings.waveguide.as_ref(),
-        settings.estimator,
-    );
-    let attempt = match (choice, object) {
+/// The object's contact laws, of which Akaike's criterion chooses.
+fn least_akaike(
+    object: Object,
+    waveguide: Option<&Waveguide<f64>>,
+    wrong_object: PipelineError,
+) -> Result<SharedEstimator, PipelineError> {
+    let build = match (object, waveguide) {
         (
-            EstimatorChoice::Best | EstimatorChoice::Sphere,
             Object::Sphere {
                 radius_m,
                 poisson_ratio,
             },
-        ) => {
-            hertz(radius_m, poisson_ratio, waveguide, Evidence::All).and_then(|e| e.estimate(loads))
-        }
+            Some(waveguide),
+        ) => BestOf::sphere_as_sample(radius_m, poisson_ratio, waveguide),
         (
-            EstimatorChoice::FlatPunch,
-            Object::FlatPunch {
+            Object::Sphere {
                 radius_m,
                 poisson_ratio,
             },
-        ) => flat_punch(radius_m, poisson_ratio, waveguide).and_then(|e| e.estimate(loads)),
-        (EstimatorChoice::Best | EstimatorChoice::PaperRatio, _) => {
-            paper_ratio(&object).and_then(|e| e.estimate(loads))
-        }
-        (EstimatorChoice::Regression, _) => StressStrainRegression::new().estimate(loads),
-        (EstimatorChoice::Sphere, _) => {
-            return Err(PipelineError::WrongEstimator {
-                estimator: choice,
-                needs: "a ball",
-            });
-        }
-        (EstimatorChoice::FlatPunch, _) => {
-            return Err(PipelineError::WrongEstimator {
-                estimator: choice,
-                needs: "a flat punch",
-            });
-        }
+            None,
+        ) => sphere_on_rigid_flat(radius_m, poisson_ratio),
+        (
+            Object::Layer {
+                indenter_radius_m,
+                thickness_m,
+                poisson_ratio,
+            },
+            _,
+        ) => BestOf::sphere_on_sample(indenter_radius_m, poisson_ratio, Some(thickness_m)),
+        _ => return Err(wrong_object),
     };
-    attempt.map_err(PipelineError::Modulus)
+    build.and_then(shared).map_err(PipelineError::Material)
 }
 
-/// Every estimate that the loads allow: the paper's ratio first, then the others that make sense for the object. What an
-/// estimator cannot do with these loads is left out.
-pub(crate) fn all_estimates(
-    object: &Object,
-    waveguide: Option<&Waveguide<f64>>,
-    loads: &LoadSeries<f64>,
-) -> Vec<ModulusEstimate<f64>> {
-    let mut attempts: Vec<Attempt> = vec![paper_ratio(object).and_then(|e| e.estimate(loads))];
-    match *object {
-        Object::Sphere {
-            radius_m,
-            poisson_ratio,
-        } => {
-            let both = hertz(radius_m, poisson_ratio, waveguide, Evidence::All);
-            attempts.push(both.and_then(|e| e.estimate(loads)));
-        }
-        Object::FlatPunch {
-            radius_m,
-            poisson_ratio,
-        } => {
-            let punch = flat_punch(radius_m, poisson_ratio, waveguide);
-            attempts.push(punch.and_then(|e| e.estimate(loads)));
-        }
-        Object::Unknown { .. } => {}
-    }
-    attempts.push(StressStrainRegression::new().estimate(loads));
-    attempts.into_iter().filter_map(Result::ok).collect()
+fn sphere_on_rigid_flat(radius_m: f64, poisson_ratio: f64) -> Result<BestOf<f64>, ElasticityError> {
+    Ok(BestOf::new(TataraSphere::new(radius_m, poisson_ratio)?)
+        .or(SphereBetweenPlates::new(radius_m, poisson_ratio)?)
+        .or(HertzSphere::new(radius_m, poisson_ratio)?))
 }
 
-fn hertz(
-    radius_m: f64,
+fn layer(
+    indenter_radius_m: f64,
+    thickness_m: f64,
     poisson_ratio: f64,
-    waveguide: Option<&Waveguide<f64>>,
-    evidence: Evidence,
-) -> Result<HertzSphere, ElasticityError> {
-    let estimator = HertzSphere::new(radius_m, poisson_ratio)?.with_evidence(evidence);
-    Ok(match waveguide {
-        Some(waveguide) => estimator.with_waveguide(waveguide),
-        None => estimator,
-    })
-}
-
-fn flat_punch(
-    radius_m: f64,
-    poisson_ratio: f64,
-    waveguide: Option<&Waveguide<f64>>,
-) -> Result<FlatPunch, ElasticityError> {
-    let punch = FlatPunch::new(radius_m, poisson_ratio)?;
-    Ok(match waveguide {
-        Some(waveguide) => punch.with_waveguide(waveguide),
-        None => punch,
-    })
+) -> Result<BondedLayer, ElasticityError> {
+    let theory = LayerTheory::IntegralEquation;
+    BondedLayer::new(
+        indenter_radius_m,
+        thickness_m,
+        poisson_ratio,
+        Bond::Bonded,
+        theory,
+    )
 }
 
 /// Stress over strain, counted from the first load, as the paper matches two pressed frames.
-fn paper_ratio(object: &Object) -> Result<PaperRatio, ElasticityError> {
+fn paper_ratio(object: Object) -> Result<PaperRatio, ElasticityError> {
     let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
     match object.sphere_radius_m() {
         Some(radius_m) => ratio.with_sphere_radius(radius_m),
         None => Ok(ratio),
+    }
+}
+
+/// What the sample is pressed on: the waveguide's layers in series, rigid without layers.
+fn pressed_on(waveguide: Option<&Waveguide<f64>>) -> Body<f64> {
+    waveguide.map_or_else(Body::rigid, Waveguide::as_body)
+}
+
+fn shared(
+    estimator: impl ModulusEstimator<f64> + Send + Sync + 'static,
+) -> Result<SharedEstimator, ElasticityError> {
+    Ok(Arc::new(estimator))
+}
+
+/// A pipeline's estimator: given as a value, or by a name and then built from object and waveguide when it is first needed.
+#[derive(Clone)]
+pub(super) enum EstimatorStage {
+    Given(SharedEstimator),
+    Named {
+        choice: EstimatorChoice,
+        /// Clones share what is built: a law may hold tables.
+        built: Arc<OnceLock<Result<SharedEstimator, PipelineError>>>,
+    },
+}
+
+impl EstimatorStage {
+    pub(super) fn named(choice: EstimatorChoice) -> Self {
+        Self::Named {
+            choice,
+            built: Arc::default(),
+        }
+    }
+
+    /// The object or the waveguide has changed: a named estimator is built anew.
+    pub(super) fn renew(&mut self) {
+        if let Self::Named { choice, .. } = *self {
+            *self = Self::named(choice);
+        }
+    }
+
+    pub(super) fn get(
+        &self,
+        object: Object,
+        waveguide: Option<&Waveguide<f64>>,
+    ) -> Result<SharedEstimator, PipelineError> {
+        match self {
+            Self::Given(estimator) => Ok(Arc::clone(estimator)),
+            Self::Named { choice, built } => built
+                .get_or_init(|| named(*choice, object, waveguide))
+                .clone(),
+        }
     }
 }

@@ -1,12 +1,13 @@
 //! Typed cautions: the result stands, but not unconditionally.
 use super::contact::ContactReading;
+use crate::elasticity::modulus::Warning;
 use std::fmt;
 
 /// A caution about a result. Frames are counted from 0 in the fields and from 1 in the sentences.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Flag, Object, Pipeline};
-/// # use tactile_imaging::force::CalibrationPair;
+/// # use tactile_imaging::force::{CalibrationPair, Estimate};
 /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
 /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
@@ -17,8 +18,8 @@ use std::fmt;
 /// // The camera sees the right half of the contact, and a gauge reads 1 N.
 /// let [reference, half] = [&reference, &frame].map(|image| image.slice(ndarray::s![.., 32..]));
 /// let mut press = pipeline.press(reference)?;
-/// press.add_gauged_frame(half, Some(1.0));
-/// let flags = press.measure()?.flags;
+/// press.add_gauged_frame(half, Some(Estimate { value: 1.0, standard_error: 0.0 }));
+/// let flags = press.measure().flags;
 /// assert!(flags.contains(&Flag::TouchesEdge { frame: 0 }));
 /// assert!(flags.iter().any(|flag| matches!(flag, Flag::GaugeDisagrees { measured_n, .. } if *measured_n < 0.6)));
 /// assert_eq!(flags[0].to_string(), "frame 1: the contact reaches the frame's edge");
@@ -87,15 +88,11 @@ pub enum Flag {
         /// How many.
         points: usize,
     },
-    /// There is no strain; the modulus does without it.
-    NoStrain {
-        /// Why.
-        reason: String,
-    },
     /// An assumption of the estimator is broken.
     Assumption {
-        /// Which, in words.
-        warning: String,
+        /// Which.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::text"))]
+        warning: Warning<f64>,
     },
 }
 
@@ -181,8 +178,7 @@ impl fmt::Display for Flag {
             Self::Unmatched { points } => write!(f, "{points} control points have no partner"),
             Self::Folded { points: 1 } => write!(f, "the warp folds over at 1 control point"),
             Self::Folded { points } => write!(f, "the warp folds over at {points} control points"),
-            Self::NoStrain { reason } => write!(f, "no strain: {reason}"),
-            Self::Assumption { warning } => f.write_str(warning),
+            Self::Assumption { warning } => write!(f, "{warning}"),
         }
     }
 }

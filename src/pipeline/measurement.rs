@@ -1,8 +1,10 @@
 //! All results of a press as plain data: for people ([`Display`](std::fmt::Display)) and programs (feature `serde`).
+use super::error::PipelineError;
 use super::flag::Flag;
 use super::report::Report;
-use crate::elasticity::modulus::ModulusEstimate;
+use crate::elasticity::modulus::{EstimatorKind, ModulusEstimate, Warning};
 use crate::force::Estimate;
+use crate::matching::StopReason;
 
 /// A modulus with its error.
 ///
@@ -27,9 +29,11 @@ pub struct ModulusResult {
     /// Its 95 % interval in pascals; no upper end where the loads do not bound it.
     pub interval_95: (f64, Option<f64>),
     /// Which estimator.
-    pub estimator: String,
+    #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::text"))]
+    pub estimator: EstimatorKind,
     /// Where the estimator's assumptions fail.
-    pub warnings: Vec<String>,
+    #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::texts"))]
+    pub warnings: Vec<Warning<f64>>,
 }
 
 impl From<&ModulusEstimate<f64>> for ModulusResult {
@@ -38,8 +42,8 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
             value: estimate.youngs_modulus_pa,
             standard_error: estimate.standard_error_pa,
             interval_95: (estimate.interval_95.lower, estimate.interval_95.upper),
-            estimator: estimate.estimator.to_string(),
-            warnings: estimate.warnings.iter().map(ToString::to_string).collect(),
+            estimator: estimate.estimator,
+            warnings: estimate.warnings.clone(),
         }
     }
 }
@@ -52,14 +56,16 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::FrameResult;
 /// let pipeline = trial.pipeline()?;
-/// let frames: Vec<FrameResult> = trial.press(&pipeline)?.measure()?.frames;
+/// let measurement = trial.press(&pipeline)?.measure();
+/// let frames: Vec<&FrameResult> = measurement.frames.iter().flatten().collect();
 /// // A ball of 3 mm radius under 0.7 N and 1.2 N.
 /// for (frame, force_n) in frames.iter().zip([0.7, 1.2]) {
-///     assert!((frame.force_n.value / force_n - 1.0).abs() < 0.02);
+///     let force = frame.force_n.as_ref().expect("a calibrated sensor").value;
+///     assert!((force / force_n - 1.0).abs() < 0.02);
 ///     let radius = frame.contact_radius_m.value;
 ///     assert!((frame.contact_ratio.expect("a ball") - radius / 3e-3).abs() < 1e-12);
 ///     let stress = frame.mean_stress_pa.expect("a force").value;
-///     assert!((stress * std::f64::consts::PI * radius * radius - frame.force_n.value).abs() < 1e-12);
+///     assert!((stress * std::f64::consts::PI * radius * radius - force).abs() < 1e-12);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -67,7 +73,8 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FrameResult {
     /// Normal force in newtons.
-    pub force_n: Estimate<f64>,
+    #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
+    pub force_n: Result<Estimate<f64>, PipelineError>,
     /// What a gauge read, in newtons.
     pub gauge_force_n: Option<f64>,
     /// Contact radius in metres.
@@ -82,8 +89,9 @@ pub struct FrameResult {
     pub contact_area_m2: f64,
     /// F/(π a²) in pascals.
     pub mean_stress_pa: Option<Estimate<f64>>,
-    /// Greatest height of the reconstructed surface in metres, where it was reconstructed.
-    pub surface_height_m: Option<f64>,
+    /// Greatest height of the reconstructed surface in metres.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
+    pub surface_height_m: Result<f64, PipelineError>,
 }
 
 /// How the control points of the first and the last frame were matched.
@@ -94,7 +102,7 @@ pub struct FrameResult {
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::MatchResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
-/// let matching: MatchResult = trial.press(&pipeline)?.measure()?.matching.expect("two frames");
+/// let matching: MatchResult = trial.press(&pipeline)?.measure().matching?;
 /// assert_eq!(matching.points, 60);
 /// assert!(matching.matched > 50 && matching.mean_confidence > 0.5);
 /// assert!(matching.residual_m < matching.mean_displacement_m, "the warp takes points to their partners");
@@ -116,7 +124,7 @@ pub struct MatchResult {
     /// Iterations.
     pub iterations: usize,
     /// Why the matcher stopped.
-    pub stop: String,
+    pub stop: StopReason,
 }
 
 /// The strain between the first and the last frame.
@@ -127,7 +135,7 @@ pub struct MatchResult {
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::StrainResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
-/// let strain: StrainResult = trial.press(&pipeline)?.measure()?.strain.expect("two frames");
+/// let strain: StrainResult = trial.press(&pipeline)?.measure().strain?;
 /// // From 0.7 N to 1.2 N the apparent surface grows by s = (1.2/0.7)^⅓: e_xx = (s² − 1)/2 = 0.216.
 /// assert!((strain.mean[0][0] - 0.216).abs() < 0.03);
 /// assert_eq!(strain.mean[0][2], strain.mean[2][0], "symmetric");
@@ -136,8 +144,8 @@ pub struct MatchResult {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct StrainResult {
-    /// The measure of strain.
-    pub measure: String,
+    /// The name of the measure of strain.
+    pub measure: &'static str,
     /// Mean over the control points, rows of the tensor (x, y, z).
     pub mean: [[f64; 3]; 3],
     /// Standard error of the mean.
@@ -150,7 +158,7 @@ pub struct StrainResult {
     pub folded: usize,
 }
 
-/// All results of a press.
+/// All results of a press: what a stage computed, or why it could not, whatever became of the others.
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
@@ -158,8 +166,8 @@ pub struct StrainResult {
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::Measurement;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
-/// let measurement: Measurement = trial.press(&pipeline)?.measure()?;
-/// let modulus = &measurement.youngs_modulus_pa;
+/// let measurement: Measurement = trial.press(&pipeline)?.measure();
+/// let modulus = measurement.youngs_modulus_pa.as_ref().expect("two loads");
 /// assert!((modulus.value / 103e3 - 1.0).abs() < 0.0538, "the ball's 103 kPa");
 /// assert_eq!(measurement.frames.len(), 2);
 /// assert!(measurement.estimators.contains(modulus), "beside the paper's ratio");
@@ -169,17 +177,23 @@ pub struct StrainResult {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Measurement {
-    /// Young's modulus by the estimator that fits the object best.
-    pub youngs_modulus_pa: ModulusResult,
+    /// Young's modulus by the pipeline's estimator.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
+    pub youngs_modulus_pa: Result<ModulusResult, PipelineError>,
     /// By every estimator that the frames allow, the paper's ratio first.
     pub estimators: Vec<ModulusResult>,
     /// What every frame says.
-    pub frames: Vec<FrameResult>,
-    /// The strain; none with one frame.
-    pub strain: Option<StrainResult>,
-    /// The match; none with one frame.
-    #[cfg_attr(feature = "serde", serde(rename = "match"))]
-    pub matching: Option<MatchResult>,
+    #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::each"))]
+    pub frames: Vec<Result<FrameResult, PipelineError>>,
+    /// The strain between the first frame and the last.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
+    pub strain: Result<StrainResult, PipelineError>,
+    /// The match between the first frame and the last.
+    #[cfg_attr(
+        feature = "serde",
+        serde(rename = "match", serialize_with = "super::outcome::one")
+    )]
+    pub matching: Result<MatchResult, PipelineError>,
     /// Cautions.
     pub flags: Vec<Flag>,
     /// What was computed and what was skipped.

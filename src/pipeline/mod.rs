@@ -33,8 +33,11 @@ mod display_stream;
 mod error;
 mod estimators;
 mod flag;
+mod load_reading;
 mod measurement;
 mod object;
+#[cfg(feature = "serde")]
+mod outcome;
 mod pair;
 mod press;
 mod report;

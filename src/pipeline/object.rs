@@ -1,14 +1,15 @@
 //! What is pressed.
+use super::error::PipelineError;
+use crate::elasticity::modulus::{Cone, HertzSphere};
 
 /// The pressed object, as far as it is known.
 ///
 /// ```
 /// use tactile_imaging::Object;
-/// // A ball's modulus comes from the contact alone; a punch's needs the strain, and so surfaces and matches.
 /// let ball = Object::sphere(3e-3);
-/// assert_eq!((ball.sphere_radius_m(), ball.needs_strain()), (Some(3e-3), false));
+/// assert_eq!(ball.sphere_radius_m(), Some(3e-3));
 /// let punch = Object::FlatPunch { radius_m: 2e-3, poisson_ratio: 0.48 };
-/// assert_eq!((punch.sphere_radius_m(), punch.needs_strain()), (None, true));
+/// assert_eq!(punch.sphere_radius_m(), None);
 /// assert_eq!(ball, Object::Sphere { radius_m: 3e-3, poisson_ratio: Object::DEFAULT_POISSON_RATIO });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +32,22 @@ pub enum Object {
         /// Its radius in metres.
         radius_m: f64,
         /// Its Poisson ratio.
+        poisson_ratio: f64,
+    },
+    /// A thin flat sample, bonded to a rigid base and pressed by a rigid ball: the sensor's own gel, for instance.
+    Layer {
+        /// The ball's radius in metres.
+        indenter_radius_m: f64,
+        /// The sample's thickness in metres.
+        thickness_m: f64,
+        /// The sample's Poisson ratio.
+        poisson_ratio: f64,
+    },
+    /// A deep sample, pressed by a rigid cone.
+    Cone {
+        /// Half of the cone's opening angle, from its axis, in radians.
+        half_angle_rad: f64,
+        /// The sample's Poisson ratio.
         poisson_ratio: f64,
     },
     /// Nothing is known of its shape: stress over strain is all there is.
@@ -61,8 +78,31 @@ impl Object {
         }
     }
 
-    /// Whether the estimator that fits this object best looks at strain; a ball's looks at the contact alone.
-    pub fn needs_strain(&self) -> bool {
-        !matches!(self, Self::Sphere { .. })
+    /// Refuses what is not physical.
+    pub(super) fn checked(self) -> Result<Self, PipelineError> {
+        let length_and_ratio =
+            |length_m, poisson_ratio| HertzSphere::new(length_m, poisson_ratio).map(drop);
+        let checked = match self {
+            Self::Sphere {
+                radius_m,
+                poisson_ratio,
+            }
+            | Self::FlatPunch {
+                radius_m,
+                poisson_ratio,
+            } => length_and_ratio(radius_m, poisson_ratio),
+            Self::Layer {
+                indenter_radius_m,
+                thickness_m,
+                poisson_ratio,
+            } => length_and_ratio(indenter_radius_m, poisson_ratio)
+                .and_then(|()| length_and_ratio(thickness_m, poisson_ratio)),
+            Self::Cone {
+                half_angle_rad,
+                poisson_ratio,
+            } => Cone::new(half_angle_rad, poisson_ratio).map(drop),
+            Self::Unknown { poisson_ratio } => length_and_ratio(1.0, poisson_ratio),
+        };
+        checked.map(|()| self).map_err(PipelineError::Material)
     }
 }

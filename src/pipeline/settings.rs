@@ -1,6 +1,5 @@
 //! What a pipeline knows beside its stages.
 use super::binning::Binning;
-use super::choice::EstimatorChoice;
 use super::object::Object;
 use crate::elasticity::contact::Waveguide;
 
@@ -82,7 +81,7 @@ pub enum SurfaceInput {
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
 /// # use tactile_imaging::force::CalibrationPair;
 /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80).with_smoothing(3);
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80).with_smoothing(3)?;
 /// let settings: &Settings = pipeline.settings();
 /// assert_eq!((settings.control_points, settings.smoothing_px), (80, 3));
 /// assert_eq!(settings.binning, Binning::Auto);
@@ -112,8 +111,6 @@ pub struct Settings {
     pub force_scale_error: f64,
     /// Relative error common to all lengths: that of the pixel size.
     pub length_scale_error: f64,
-    /// Loads to the modulus.
-    pub estimator: EstimatorChoice,
     /// What may be left out.
     pub skips: Skips,
 }
@@ -131,27 +128,7 @@ impl Settings {
             flat_field: false,
             force_scale_error: 1e-3,
             length_scale_error: 0.0,
-            estimator: EstimatorChoice::Best,
             skips: Skips::default(),
-        }
-    }
-
-    /// Whether the modulus is estimated from strain, and so needs surfaces and matches.
-    ///
-    /// ```
-    /// # use tactile_imaging::pipeline::{EstimatorChoice, Object, Pipeline};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1e5, 2e5].map(|value| CalibrationPair::loading(value, 1e-5 * value));
-    /// let pipeline = Pipeline::from_pairs(&pairs, [21.55e-6; 2], Object::sphere(3e-3))?;
-    /// assert!(!pipeline.settings().needs_strain(), "the contact's radius is enough");
-    /// assert!(pipeline.with_estimator(EstimatorChoice::PaperRatio).settings().needs_strain());
-    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-    /// ```
-    pub fn needs_strain(&self) -> bool {
-        match self.estimator {
-            EstimatorChoice::Best => self.object.needs_strain(),
-            EstimatorChoice::PaperRatio | EstimatorChoice::Regression => true,
-            EstimatorChoice::Sphere | EstimatorChoice::FlatPunch => false,
         }
     }
 }

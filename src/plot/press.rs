@@ -30,7 +30,7 @@ const UM: f64 = 1e6;
 /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?.with_control_points(40);
 /// let mut press = pipeline.press(made.reference.view())?;
 /// press.add_frame(made.frames[0].view());
-/// let summary = summary_lines(&press.measure()?);
+/// let summary = summary_lines(&press.measure());
 /// let folder = tempfile::tempdir()?;
 /// let paths = save_press_pages(&mut press, summary, folder.path())?;
 /// let names: Vec<_> = paths.iter().filter_map(|p| p.file_name()).collect();
@@ -82,23 +82,34 @@ pub fn save_press_pages(
 /// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, made.pixel_size_m)?, Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(made.reference.view())?;
 /// press.add_frame(made.frames[0].view());
-/// let lines = summary_lines(&press.measure()?);
+/// let lines = summary_lines(&press.measure());
 /// assert!(lines[0].starts_with("Young's modulus\t") && lines[0].ends_with(" kPa"));
 /// assert!(lines.iter().any(|line| line.starts_with("force 1\t0.7")));
 /// # Ok(()) }
 /// ```
 pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
-    let modulus = &measurement.youngs_modulus_pa;
-    let value = with_error(modulus.value, modulus.standard_error, 1e-3);
-    let mut lines = vec![format!("Young's modulus\t{value} kPa")];
-    lines.push(format!("estimator\t{}", modulus.estimator));
+    let mut lines = Vec::new();
+    match &measurement.youngs_modulus_pa {
+        Ok(modulus) => {
+            let value = with_error(modulus.value, modulus.standard_error, 1e-3);
+            lines.push(format!("Young's modulus\t{value} kPa"));
+            lines.push(format!("estimator\t{}", modulus.estimator));
+        }
+        Err(error) => lines.push(format!("Young's modulus\tnone: {error}")),
+    }
     for (i, frame) in measurement.frames.iter().enumerate() {
-        let (f, a) = (frame.force_n, frame.contact_radius_m);
-        lines.push(format!(
-            "force {}\t{} N",
-            i + 1,
-            with_error(f.value, f.standard_error, 1.0)
-        ));
+        let frame = match frame {
+            Ok(frame) => frame,
+            Err(error) => {
+                lines.push(format!("frame {}\tnone: {error}", i + 1));
+                continue;
+            }
+        };
+        if let Ok(f) = &frame.force_n {
+            let value = with_error(f.value, f.standard_error, 1.0);
+            lines.push(format!("force {}\t{value} N", i + 1));
+        }
+        let a = frame.contact_radius_m;
         lines.push(format!(
             "contact radius {}\t{} mm",
             i + 1,
@@ -108,13 +119,13 @@ pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
             lines.push(format!("a/R {}\t{ratio:.3}", i + 1));
         }
     }
-    if let Some(m) = &measurement.matching {
+    if let Ok(m) = &measurement.matching {
         lines.push(format!(
             "matches\t{} of {} control points",
             m.matched, m.points
         ));
     }
-    if let Some(s) = &measurement.strain {
+    if let Ok(s) = &measurement.strain {
         lines.push(format!(
             "mean strain e_zz\t{}",
             with_error(s.mean[2][2], s.standard_error[2][2], 1.0)

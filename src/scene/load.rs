@@ -12,6 +12,7 @@ use std::path::Path;
 /// use tactile_imaging::scene::LoadedCalibration;
 /// let name = |calibration: &LoadedCalibration| match calibration {
 ///     LoadedCalibration::Pairs(pairs) => format!("{} readings, the last of {} N", pairs.len(), pairs[1].force_n),
+///     LoadedCalibration::Gauge => "a gauge's forces".into(),
 ///     LoadedCalibration::DepthTable(rows) => format!("down to {} m", rows[1].1),
 /// };
 /// let pairs = [0.0, 1.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
@@ -24,6 +25,8 @@ pub enum LoadedCalibration {
     Pairs(Vec<CalibrationPair<f64>>),
     /// Darkness in grey levels and depth in metres.
     DepthTable(Vec<(f64, f64)>),
+    /// None: the forces are a gauge's.
+    Gauge,
 }
 
 /// A scene's images and calibration.
@@ -99,6 +102,7 @@ impl Scene {
             read().map_err(|source| self.file_error(field, source))
         };
         match &self.calibration {
+            CalibrationSource::Gauge => Ok(LoadedCalibration::Gauge),
             CalibrationSource::Pairs(path) => {
                 let pairs = columns(
                     "calibration.pairs",

@@ -4,23 +4,24 @@
 //! reference = "reference.png"            # the sensor without contact
 //! pixel_size_m = [21.55e-6, 21.55e-6]    # x, y, on the sensing surface
 //!
-//! [calibration]                          # one of the two
+//! [calibration]                          # one of the two; not needed where every frame has its force_N
 //! pairs = "calibration.csv"              # columns integrated_pixel_value,force_N
 //! # depth_table = "depth.csv"            # columns darkness_grey_levels,depth_mm
 //!
 //! [[frames]]
 //! image = "frame_1.png"
 //! force_N = 0.70                         # a gauge reading, if there is one
+//! force_error_N = 0.002                  # its standard error; without, that of the force scale alone (0.1 %)
 //!
 //! [[frames]]
 //! image = "frame_2.png"
 //!
 //! [object]
-//! shape = "sphere"                       # or "flat_punch", "unknown"
+//! shape = "sphere"                       # or "flat_punch", "unknown"; "layer" (radius_m of the ball on it, thickness_m); "cone" (half_angle_rad)
 //! radius_m = 3e-3
 //! poisson_ratio = 0.5
 //!
-//! [waveguide]                            # from the object's side to the glass
+//! [waveguide]                            # from the object's side to the glass; without, or with waveguide = "rigid": rigid
 //! layers = [
 //!     { refractive_index = 1.41, thickness_m = 2e-3, youngs_modulus_pa = 1.36e5, poisson_ratio = 0.5 },
 //!     { refractive_index = 1.40, thickness_m = 3e-3, youngs_modulus_pa = 8.0e4 },
@@ -38,7 +39,8 @@
 //! matcher = "annealed-softassign"        # or "relaxation-labelling", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
 //! warp = "thin-plate-spline"             # or "cubic-spline", "affine", "rigid"
 //! strain = "green-lagrange"              # or "euler-almansi", "hencky", "biot", "infinitesimal"
-//! estimator = "best"                     # or "paper-ratio", "regression", "sphere" (a ball's), "flat-punch"
+//! estimator = "best"                     # or "paper-ratio", "regression"; of a ball "sphere", "sphere-on-waveguide", "sphere-between-plates",
+//!                                        # "tatara-sphere"; "bonded-layer", "cone", "flat-punch"; "least-akaike" of a ball's or a layer's laws
 //! ```
 //!
 //! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`io::image`](crate::io::image)).
@@ -83,6 +85,8 @@ pub enum CalibrationSource {
     Pairs(PathBuf),
     /// A table of darkness and depth.
     DepthTable(PathBuf),
+    /// None: every frame has a gauge's reading of its force.
+    Gauge,
 }
 
 /// A frame with contact.
@@ -100,7 +104,7 @@ pub enum CalibrationSource {
 /// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]";
 /// let frames = "[[frames]]\nimage = \"one.png\"\nforce_N = 0.7\n[[frames]]\nimage = \"two.png\"";
 /// let scene = Scene::parse(&format!("{head}\n{frames}\n{rest}"), "press/scene.toml")?;
-/// assert_eq!(scene.frames[0], SceneFrame { image: "press/one.png".into(), force_n: Some(0.7) });
+/// assert_eq!(scene.frames[0], SceneFrame { image: "press/one.png".into(), force_n: Some(0.7), force_error_n: None });
 /// assert_eq!(scene.frames[1].force_n, None, "no gauge: the calibration tells the force");
 /// # Ok::<(), tactile_imaging::scene::SceneError>(())
 /// ```
@@ -110,6 +114,8 @@ pub struct SceneFrame {
     pub image: PathBuf,
     /// What a gauge read, if there was one.
     pub force_n: Option<f64>,
+    /// The standard error of that reading in newtons, if one is stated.
+    pub force_error_n: Option<f64>,
 }
 
 /// A layer of the waveguide.
@@ -241,6 +247,8 @@ impl Scene {
         let fields = Fields::new(file, &table);
         fields.only(&tables::FIELDS)?;
         let folder = file.parent().unwrap_or(Path::new(""));
+        let frames = tables::frames(&fields, folder)?;
+        let gauged = frames.iter().all(|frame| frame.force_n.is_some());
         Ok(Self {
             file: file.into(),
             reference: folder
@@ -250,8 +258,8 @@ impl Scene {
                 "two positive numbers [x, y] (metres per pixel)",
             )?,
             flat_field: tables::flat_field(&fields)?,
-            calibration: tables::calibration(&fields, folder)?,
-            frames: tables::frames(&fields, folder)?,
+            calibration: tables::calibration(&fields, folder, gauged)?,
+            frames,
             object: tables::object(&fields)?,
             layers: tables::layers(&fields)?,
             stages: stages::read(&fields)?,

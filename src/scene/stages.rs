@@ -20,7 +20,9 @@ pub(super) fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
         "strain",
         "estimator",
     ])?;
-    if fields.has("reconstruction") && scene.table("calibration", "a table")?.has("depth_table") {
+    let depth_table =
+        scene.has("calibration") && scene.table("calibration", "a table")?.has("depth_table");
+    if fields.has("reconstruction") && depth_table {
         let given = toml::Value::String(
             fields
                 .string("reconstruction", ReconstructionChoice::EXPECTED)?

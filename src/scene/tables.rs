@@ -30,8 +30,12 @@ pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
 pub(super) fn calibration(
     fields: &Fields<'_>,
     folder: &Path,
+    gauged: bool,
 ) -> Result<CalibrationSource, SceneError> {
-    const EXPECTED: &str = "a table with `pairs` or `depth_table`";
+    const EXPECTED: &str = "a table with `pairs` or `depth_table`, or `force_N` in every frame";
+    if gauged && !fields.has("calibration") {
+        return Ok(CalibrationSource::Gauge);
+    }
     let fields = fields.table("calibration", EXPECTED)?;
     fields.only(&["pairs", "depth_table"])?;
     match (fields.has("pairs"), fields.has("depth_table")) {
@@ -62,18 +66,34 @@ pub(super) fn calibration(
 pub(super) fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFrame>, SceneError> {
     let tables = fields.tables("frames", "one or more [[frames]] tables with `image`")?;
     let frame = |f: &Fields<'_>| {
-        f.only(&["image", "force_N"])?;
+        f.only(&["image", "force_N", "force_error_N"])?;
         let image = folder.join(f.string("image", "the path of an image")?);
         let force_n = f.optional_number("force_N", "a positive number (newtons)", positive)?;
-        Ok(SceneFrame { image, force_n })
+        let not_negative = |v: f64| v >= 0.0 && v.is_finite();
+        let force_error_n = f.optional_number(
+            "force_error_N",
+            "zero or a positive number (newtons)",
+            not_negative,
+        )?;
+        Ok(SceneFrame {
+            image,
+            force_n,
+            force_error_n,
+        })
     };
     tables.iter().map(frame).collect()
 }
 
 pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
-    const SHAPE: &str = "\"sphere\", \"flat_punch\" or \"unknown\"";
+    const SHAPE: &str = "\"sphere\", \"flat_punch\", \"layer\", \"cone\" or \"unknown\"";
     let fields = fields.table("object", "a table with `shape`")?;
-    fields.only(&["shape", "radius_m", "poisson_ratio"])?;
+    fields.only(&[
+        "shape",
+        "radius_m",
+        "thickness_m",
+        "half_angle_rad",
+        "poisson_ratio",
+    ])?;
     let shape = fields.string("shape", SHAPE)?;
     let poisson_ratio = fields
         .optional_number("poisson_ratio", "a number above -1, at most 0.5", poisson)?
@@ -88,6 +108,19 @@ pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
             radius_m: radius()?,
             poisson_ratio,
         }),
+        "layer" => Ok(Object::Layer {
+            indenter_radius_m: radius()?,
+            thickness_m: fields.number("thickness_m", "a positive number (metres)", positive)?,
+            poisson_ratio,
+        }),
+        "cone" => Ok(Object::Cone {
+            half_angle_rad: fields.number(
+                "half_angle_rad",
+                "a number between 0 and π/2 (radians)",
+                |v| v > 0.0 && v < std::f64::consts::FRAC_PI_2,
+            )?,
+            poisson_ratio,
+        }),
         "unknown" => {
             let _ = fields.optional_number("radius_m", "a positive number (metres)", positive)?;
             Ok(Object::Unknown { poisson_ratio })
@@ -97,10 +130,15 @@ pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
 }
 
 pub(super) fn layers(fields: &Fields<'_>) -> Result<Vec<SceneLayer>, SceneError> {
-    if !fields.has("waveguide") {
-        return Err(fields.missing("waveguide", "a table with `layers`"));
+    const EXPECTED: &str = "a table with `layers`, or \"rigid\" (as where it is absent)";
+    if !fields.has("waveguide")
+        || fields
+            .string("waveguide", EXPECTED)
+            .is_ok_and(|s| s == "rigid")
+    {
+        return Ok(Vec::new());
     }
-    let fields = fields.table("waveguide", "a table with `layers`")?;
+    let fields = fields.table("waveguide", EXPECTED)?;
     fields.only(&["layers"])?;
     let tables = fields.tables(
         "layers",

@@ -3,11 +3,14 @@ mod named;
 mod options;
 mod stages;
 
+use super::choice::EstimatorChoice;
 use super::contact::{ContactStage, LightContact};
 use super::error::PipelineError;
+use super::estimators::EstimatorStage;
 use super::object::Object;
 use super::settings::Settings;
 use super::strain_spline::StrainSpline;
+use crate::elasticity::modulus::ModulusEstimator;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
 use crate::matching::PointMatcher;
@@ -26,10 +29,11 @@ use std::sync::Arc;
 /// | points to matches | [`with_matcher`](Self::with_matcher) | [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by |
 /// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation |
 /// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
+/// | loads to the modulus | [`with_estimator`](Self::with_estimator) | Hertz's law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
 ///
 /// A setter takes any value that implements the stage's trait, a `Box` or an `Arc` of one too, so that a program can choose at run time;
 /// [`with_stages`](Self::with_stages) takes stages by the names of a configuration. The stages are shared: a clone copies
-/// seven pointers and the settings.
+/// pointers and the settings.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -58,6 +62,7 @@ pub struct Pipeline {
     matcher: Arc<dyn PointMatcher<f64, 3> + Send + Sync>,
     warp: Arc<dyn WarpModel<f64, 3> + Send + Sync>,
     strain: Arc<dyn StrainMeasure<f64> + Send + Sync>,
+    estimator: EstimatorStage,
     settings: Settings,
 }
 
@@ -65,15 +70,16 @@ impl Pipeline {
     /// The default stages behind any contact stage; no waveguide, 200 control points.
     ///
     /// ```
+    /// use tactile_imaging::elasticity::modulus::ModulusEstimator;
     /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline};
     /// let contact = DarkContact::new(&[(0.0, 0.0), (100.0, 0.5e-3)], [0.1e-3; 2])?;
     /// let pipeline = Pipeline::new(contact, Object::Unknown { poisson_ratio: 0.48 })?;
-    /// assert!(pipeline.settings().object.needs_strain());
+    /// assert!(pipeline.estimator()?.needs_strain(), "stress over strain");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::SurfaceOptions`] where a default stage refuses its options.
+    /// [`PipelineError::Material`] for an object that is not physical, [`PipelineError::SurfaceOptions`] where a default stage refuses its options.
     pub fn new(
         contact: impl ContactStage + 'static,
         object: Object,
@@ -85,7 +91,8 @@ impl Pipeline {
             matcher: Arc::new(named::near_by()),
             warp: Arc::new(StrainSpline),
             strain: Arc::new(GreenLagrange),
-            settings: Settings::new(object),
+            estimator: EstimatorStage::named(EstimatorChoice::default()),
+            settings: Settings::new(object.checked()?),
         })
     }
 
@@ -109,6 +116,16 @@ impl Pipeline {
     /// The contact stage.
     pub fn contact(&self) -> &dyn ContactStage {
         self.contact.as_ref()
+    }
+
+    /// The estimator of the modulus; one that goes by its name is built when it is first needed, for all clones.
+    ///
+    /// # Errors
+    /// [`PipelineError::WrongEstimator`] where the chosen one does not fit the object.
+    pub fn estimator(&self) -> Result<Arc<dyn ModulusEstimator<f64> + Send + Sync>, PipelineError> {
+        let settings = &self.settings;
+        self.estimator
+            .get(settings.object, settings.waveguide.as_ref())
     }
 
     pub(super) fn surface(&self) -> &dyn SurfaceReconstruction<f64> {

@@ -2,12 +2,12 @@
 use super::Pipeline;
 use crate::elasticity::contact::Waveguide;
 use crate::pipeline::binning::Binning;
-use crate::pipeline::choice::EstimatorChoice;
+use crate::pipeline::error::PipelineError;
 use crate::pipeline::object::Object;
 use crate::pipeline::settings::Skips;
 
 impl Pipeline {
-    /// Tells of the sensor's layers: both bodies yield.
+    /// Sets the sensor's layers: the waveguide yields beside the object. Without, it is rigid.
     ///
     /// ```
     /// use tactile_imaging::elasticity::contact::{Layer, Waveguide};
@@ -35,6 +35,7 @@ impl Pipeline {
     #[must_use]
     pub fn with_waveguide(mut self, waveguide: Waveguide<f64>) -> Self {
         self.settings.waveguide = Some(waveguide);
+        self.estimator.renew();
         self
     }
 
@@ -43,35 +44,22 @@ impl Pipeline {
     /// ```
     /// # use tactile_imaging::pipeline::{Object, Pipeline};
     /// # use tactile_imaging::force::CalibrationPair;
+    /// use tactile_imaging::elasticity::modulus::ModulusEstimator;
     /// let pairs = [0.0, 1e5, 2e5].map(|value| CalibrationPair::loading(value, 1e-5 * value));
     /// let pipeline = Pipeline::from_pairs(&pairs, [21.55e-6; 2], Object::sphere(3e-3))?;
-    /// assert!(!pipeline.settings().object.needs_strain());
-    /// let unknown = pipeline.with_object(Object::Unknown { poisson_ratio: 0.5 });
-    /// assert!(unknown.settings().object.needs_strain());
+    /// assert!(!pipeline.estimator()?.needs_strain(), "the contact's radius is enough");
+    /// let unknown = pipeline.with_object(Object::Unknown { poisson_ratio: 0.5 })?;
+    /// assert!(unknown.estimator()?.needs_strain());
+    /// assert!(unknown.with_object(Object::sphere(f64::NAN)).is_err());
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
-    #[must_use]
-    pub fn with_object(mut self, object: Object) -> Self {
-        self.settings.object = object;
-        self
-    }
-
-    /// Takes another estimator of the modulus. For one of your own see [`Press::load_states`](crate::pipeline::Press::load_states).
     ///
-    /// ```
-    /// # use tactile_imaging::pipeline::{EstimatorChoice, Trial};
-    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-    /// let ratio = trial.pipeline()?.with_estimator(EstimatorChoice::PaperRatio);
-    /// let modulus = trial.press(&ratio)?.modulus()?;
-    /// assert_eq!(modulus.estimator.to_string(), "stress over mean strain");
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    #[must_use]
-    pub fn with_estimator(mut self, estimator: EstimatorChoice) -> Self {
-        self.settings.estimator = estimator;
-        self
+    /// # Errors
+    /// [`PipelineError::Material`] for a size that is not positive or a Poisson ratio outside (−1, ½].
+    pub fn with_object(mut self, object: Object) -> Result<Self, PipelineError> {
+        self.settings.object = object.checked()?;
+        self.estimator.renew();
+        Ok(self)
     }
 
     /// Sets the number of control points.
@@ -90,7 +78,7 @@ impl Pipeline {
         self
     }
 
-    /// Sets the width in pixels of the smoothing before the surface stage: odd, 1 for none (even widths count as one more).
+    /// Sets the width in pixels of the smoothing before the surface stage: odd, 1 for none.
     ///
     /// ```
     /// use tactile_imaging::{Object, Pipeline};
@@ -98,13 +86,19 @@ impl Pipeline {
     /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// assert_eq!(pipeline.settings().smoothing_px, 5);
-    /// assert_eq!(pipeline.with_smoothing(8).settings().smoothing_px, 9);
+    /// assert_eq!(pipeline.clone().with_smoothing(9)?.settings().smoothing_px, 9);
+    /// assert!(pipeline.with_smoothing(8).is_err());
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
-    #[must_use]
-    pub fn with_smoothing(mut self, width_px: usize) -> Self {
-        self.settings.smoothing_px = width_px | 1;
-        self
+    ///
+    /// # Errors
+    /// [`PipelineError::EvenSmoothing`].
+    pub fn with_smoothing(mut self, width_px: usize) -> Result<Self, PipelineError> {
+        if width_px.is_multiple_of(2) {
+            return Err(PipelineError::EvenSmoothing { found: width_px });
+        }
+        self.settings.smoothing_px = width_px;
+        Ok(self)
     }
 
     /// Sets the grid of the surface stage (default [`Binning::Auto`] for shading, every pixel for signals).
@@ -114,16 +108,21 @@ impl Pipeline {
     /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::Binning;
-    /// let pipeline = trial.pipeline()?.with_binning(Binning::Blocks(2));
+    /// let pipeline = trial.pipeline()?.with_binning(Binning::Blocks(2))?;
     /// let mut press = trial.press(&pipeline)?;
     /// // Blocks of 2 × 2 pixels of 172.4 µm.
     /// assert!((press.surface(0)?.pixel_size_m[0] - 344.8e-6).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[must_use]
-    pub fn with_binning(mut self, binning: Binning) -> Self {
+    ///
+    /// # Errors
+    /// [`PipelineError::EmptyBlocks`].
+    pub fn with_binning(mut self, binning: Binning) -> Result<Self, PipelineError> {
+        if binning == Binning::Blocks(0) {
+            return Err(PipelineError::EmptyBlocks);
+        }
         self.settings.binning = binning;
-        self
+        Ok(self)
     }
 
     /// Corrects vignetting by the reference's own brightness or not (default: not); see [`Settings::flat_field`](crate::pipeline::Settings::flat_field).
@@ -155,24 +154,29 @@ impl Pipeline {
         self
     }
 
-    /// Sets the relative errors common to all forces (default 0.1 %) and to all lengths (default none). What is negative or
-    /// not finite counts as zero.
+    /// Sets the relative errors common to all forces (default 0.1 %) and to all lengths (default none).
     ///
     /// ```
     /// use tactile_imaging::{Object, Pipeline};
     /// # use tactile_imaging::force::CalibrationPair;
     /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_scale_errors(0.02, 0.005);
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_scale_errors(0.02, 0.005)?;
     /// assert_eq!((pipeline.settings().force_scale_error, pipeline.settings().length_scale_error), (0.02, 0.005));
-    /// assert_eq!(pipeline.with_scale_errors(0.02, f64::NAN).settings().length_scale_error, 0.0);
+    /// assert!(pipeline.with_scale_errors(0.02, f64::NAN).is_err());
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
-    #[must_use]
-    pub fn with_scale_errors(mut self, force: f64, length: f64) -> Self {
-        let valid = |v: f64| if v > 0.0 && v.is_finite() { v } else { 0.0 };
-        self.settings.force_scale_error = valid(force);
-        self.settings.length_scale_error = valid(length);
-        self
+    ///
+    /// # Errors
+    /// [`PipelineError::ScaleError`] for a negative or not finite one.
+    pub fn with_scale_errors(mut self, force: f64, length: f64) -> Result<Self, PipelineError> {
+        for found in [force, length] {
+            if !(found >= 0.0 && found.is_finite()) {
+                return Err(PipelineError::ScaleError { found });
+            }
+        }
+        self.settings.force_scale_error = force;
+        self.settings.length_scale_error = length;
+        Ok(self)
     }
 
     /// Sets what may be left out.

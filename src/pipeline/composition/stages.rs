@@ -1,11 +1,13 @@
 //! Setters of the stages: any implementation, or one by its name.
 use super::{Pipeline, named};
+use crate::elasticity::modulus::ModulusEstimator;
 use crate::elasticity::strain::StrainMeasure;
 use crate::matching::PointMatcher;
 use crate::pipeline::binning::Binning;
 use crate::pipeline::config::StagesConfig;
 use crate::pipeline::contact::ContactStage;
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::estimators::EstimatorStage;
 use crate::pipeline::settings::SurfaceInput;
 use crate::sfs::{ControlPointSampler, SurfaceReconstruction};
 use crate::tps::WarpModel;
@@ -34,7 +36,7 @@ impl Pipeline {
         self.matcher = named::matcher(config.matcher);
         self.warp = named::warp(config.warp)?;
         self.strain = named::strain(config.strain);
-        self.settings.estimator = config.estimator;
+        self.estimator = EstimatorStage::named(config.estimator);
         Ok(self)
     }
 
@@ -87,6 +89,28 @@ impl Pipeline {
             self.settings.smoothing_px = 1;
             self.settings.binning = Binning::Blocks(1);
         }
+        self
+    }
+
+    /// Takes another estimator of the modulus. Strains of the loads are counted from the first.
+    ///
+    /// ```
+    /// # use tactile_imaging::pipeline::Trial;
+    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::elasticity::modulus::{EstimatorKind, TataraSphere};
+    /// let tatara = trial.pipeline()?.with_estimator(TataraSphere::new(3e-3, 0.5)?);
+    /// let modulus = trial.press(&tatara)?.modulus()?;
+    /// assert_eq!(modulus.estimator, EstimatorKind::TataraSphere);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_estimator(
+        mut self,
+        estimator: impl ModulusEstimator<f64> + Send + Sync + 'static,
+    ) -> Self {
+        self.estimator = EstimatorStage::Given(Arc::new(estimator));
         self
     }
 

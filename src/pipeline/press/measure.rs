@@ -1,4 +1,4 @@
-//! Everything that a press can say, measured in one go.
+//! Everything that the frames of a press say, in one go.
 use super::Press;
 use crate::matching::StopReason;
 use crate::pipeline::error::PipelineError;
@@ -9,53 +9,43 @@ use crate::pipeline::measurement::{
 use nalgebra::Matrix3;
 
 impl Press<'_> {
-    /// Measures everything: all stages on all frames.
+    /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error stands in its place.
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
     /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
-    /// let measurement = trial.press(&pipeline)?.measure()?;
-    /// let height = measurement.frames[0].surface_height_m.expect("a surface");
+    /// let measurement = trial.press(&pipeline)?.measure();
+    /// let first = measurement.frames[0].as_ref().expect("a contact");
+    /// let height = first.surface_height_m.as_ref().expect("a surface");
     /// assert!((height / trial.truth().frames[0].surface_height_m - 1.0).abs() < 0.1);
     /// // At 0.7 N the ball is in contact beyond its own radius: Hertz holds for a/R up to 0.3.
     /// assert!(measurement.flags.iter().any(|flag| flag.to_string().contains("small-contact theory does not hold")));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    ///
-    /// # Errors
-    /// [`PipelineError`]: a frame without contact or force, loads that do not determine a modulus. Where the modulus
-    /// does without strain, trouble with surfaces and matches is a flag, not an error.
-    pub fn measure(&mut self) -> Result<Measurement, PipelineError> {
-        let youngs_modulus_pa = ModulusResult::from(&self.modulus()?);
+    pub fn measure(&mut self) -> Measurement {
         let mut flags = Vec::new();
-        let last = self.frames().saturating_sub(1);
-        let (mut matching, mut strain) = (None, None);
-        if last > 0 {
-            match self.match_and_strain(last, &mut flags) {
-                Ok((m, s)) => (matching, strain) = (Some(m), Some(s)),
-                Err(error) => flags.push(Flag::NoStrain {
-                    reason: error.to_string(),
-                }),
-            }
-        }
-        let estimators: Vec<_> = self.estimates()?.iter().map(ModulusResult::from).collect();
+        let youngs_modulus_pa = self.modulus().map(|m| ModulusResult::from(&m));
+        let matching = self.match_result(&mut flags);
+        let strain = self.strain_result(&mut flags);
+        let estimates = self.estimates().unwrap_or_default();
         let frames = (0..self.frames())
-            .map(|i| self.frame_result(i, &mut flags))
-            .collect::<Result<_, _>>()?;
-        let warnings = youngs_modulus_pa.warnings.iter().cloned();
-        flags.extend(warnings.map(|warning| Flag::Assumption { warning }));
-        let report = self.report().clone();
-        Ok(Measurement {
+            .map(|frame| self.frame_result(frame, &mut flags))
+            .collect();
+        if let Ok(modulus) = &youngs_modulus_pa {
+            let warnings = modulus.warnings.iter().copied();
+            flags.extend(warnings.map(|warning| Flag::Assumption { warning }));
+        }
+        Measurement {
             youngs_modulus_pa,
-            estimators,
+            estimators: estimates.iter().map(ModulusResult::from).collect(),
             frames,
             strain,
             matching,
             flags,
-            report,
-        })
+            report: self.report().clone(),
+        }
     }
 
     fn frame_result(
@@ -63,13 +53,10 @@ impl Press<'_> {
         frame: usize,
         flags: &mut Vec<Flag>,
     ) -> Result<FrameResult, PipelineError> {
-        let reading = *self
-            .contact(frame)?
-            .ok_or(PipelineError::NoContact { frame })?;
-        let force_n = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
-        let gauge_force_n = self.gauge_n(frame);
+        let reading = self.reading(frame)?;
+        let gauge_force_n = self.gauge(frame).map(|gauge| gauge.value);
         flags.extend(reading.flags(frame));
-        if let Some(gauge_n) = gauge_force_n {
+        if let (Some(gauge_n), Some(force_n)) = (gauge_force_n, reading.force_n) {
             let apart = (gauge_n - force_n.value).abs();
             if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {
                 flags.push(Flag::GaugeDisagrees {
@@ -80,12 +67,12 @@ impl Press<'_> {
             }
         }
         let radius = self.pipeline.settings().object.sphere_radius_m();
-        let surface_height_m = self.surface(frame).ok().map(|s| {
+        let surface_height_m = self.surface(frame).map(|s| {
             let heights = s.surface.heights.iter().copied().filter(|h| h.is_finite());
             heights.fold(0.0, f64::max)
         });
         Ok(FrameResult {
-            force_n,
+            force_n: reading.force_n.ok_or(PipelineError::NoForce { frame }),
             gauge_force_n,
             contact_radius_m: reading.contact_radius_m,
             contact_ratio: radius.map(|r| reading.contact_radius_m.value / r),
@@ -97,28 +84,31 @@ impl Press<'_> {
         })
     }
 
-    fn match_and_strain(
-        &mut self,
-        frame: usize,
-        flags: &mut Vec<Flag>,
-    ) -> Result<(MatchResult, StrainResult), PipelineError> {
+    /// The last frame, if there are two.
+    fn last(&self) -> Result<usize, PipelineError> {
+        match self.frames() {
+            found @ 0..2 => Err(PipelineError::TooFewFrames { found }),
+            frames => Ok(frames - 1),
+        }
+    }
+
+    fn match_result(&mut self, flags: &mut Vec<Flag>) -> Result<MatchResult, PipelineError> {
+        let last = self.last()?;
         let model = self.control_points(0)?.to_vec();
-        let matching = self.matching(frame)?;
-        let n = model.len() as f64;
-        let lengths = model
-            .iter()
-            .zip(&matching.warped)
-            .map(|(a, b)| (b - a).norm());
+        let matching = self.matching(last)?;
+        let count = model.len() as f64;
+        let displacements = model.iter().zip(&matching.warped);
+        let lengths = displacements.map(|(from, to)| (to - from).norm());
         let result = MatchResult {
             points: model.len(),
             matched: matching.assignment.iter().flatten().count(),
-            mean_confidence: matching.confidence.iter().sum::<f64>() / n,
+            mean_confidence: matching.confidence.iter().sum::<f64>() / count,
             residual_m: matching.report.residual,
-            mean_displacement_m: lengths.sum::<f64>() / n,
+            mean_displacement_m: lengths.sum::<f64>() / count,
             iterations: matching.report.iterations,
-            stop: format!("{:?}", matching.report.stop),
+            stop: matching.report.stop,
         };
-        if matching.report.stop == StopReason::IterationLimit {
+        if result.stop == StopReason::IterationLimit {
             flags.push(Flag::MatchNotConverged);
         }
         if result.matched < result.points {
@@ -126,22 +116,26 @@ impl Press<'_> {
                 points: result.points - result.matched,
             });
         }
-        let strain = self.strain(frame)?;
+        Ok(result)
+    }
+
+    fn strain_result(&mut self, flags: &mut Vec<Flag>) -> Result<StrainResult, PipelineError> {
+        let last = self.last()?;
+        let strain = self.strain(last)?;
         let summary = &strain.summary;
         if !summary.folded.is_empty() {
             flags.push(Flag::Folded {
                 points: summary.folded.len(),
             });
         }
-        let strain = StrainResult {
-            measure: strain.measure.into(),
+        Ok(StrainResult {
+            measure: strain.measure,
             mean: rows(&summary.mean),
             standard_error: rows(&summary.standard_error),
             spread: rows(&summary.spread),
             used: summary.used,
             folded: summary.folded.len(),
-        };
-        Ok((result, strain))
+        })
     }
 }
 

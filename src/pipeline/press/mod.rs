@@ -9,7 +9,7 @@ use super::error::PipelineError;
 use super::pair::PairStrain;
 use super::report::{Report, SkipReason, Stage};
 use super::surface::{ContactSurface, SurfaceWorkspace};
-use crate::force::{ForceWorkspace, ReferenceFrame};
+use crate::force::{Estimate, ForceWorkspace, ReferenceFrame};
 use crate::matching::Matching;
 use nalgebra::Point3;
 use ndarray::ArrayView2;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// A frame and what is known of it so far.
 struct Loaded<'a> {
     image: ArrayView2<'a, u8>,
-    gauge_n: Option<f64>,
+    gauge: Option<Estimate<f64>>,
     contact: Option<FrameContact>,
     surface: Option<ContactSurface>,
     points: Option<Vec<Point3<f64>>>,
@@ -122,7 +122,7 @@ impl<'a> Press<'a> {
     pub fn renewed(&self) -> Self {
         let mut press = self.pipeline.press_on(Arc::clone(&self.reference));
         for frame in &self.frames {
-            press.add_gauged_frame(frame.image, frame.gauge_n);
+            press.add_gauged_frame(frame.image, frame.gauge);
         }
         press
     }
@@ -132,9 +132,11 @@ impl<'a> Press<'a> {
         self.add_gauged_frame(image, None)
     }
 
-    /// Adds a frame with a gauge's reading of the force; returns its number.
+    /// Adds a frame with a gauge's reading of the force in newtons (standard error 0: exact but for
+    /// [`Settings::force_scale_error`](super::Settings::force_scale_error)); returns its number.
     ///
     /// ```
+    /// use tactile_imaging::force::Estimate;
     /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline, PipelineError};
     /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
     /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
@@ -145,16 +147,21 @@ impl<'a> Press<'a> {
     /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?;
     /// let (reference, frame) = (hertz(0.0).mapv(|v| 255 - v), hertz(120.0).mapv(|v| 255 - v));
     /// let mut press = pipeline.press(reference.view())?;
-    /// assert_eq!(press.add_gauged_frame(frame.view(), Some(0.9)), 0);
-    /// assert_eq!((press.gauge_n(0), press.image(0)), (Some(0.9), Some(frame.view())));
+    /// let gauge = Estimate { value: 0.9, standard_error: 2e-3 };
+    /// assert_eq!(press.add_gauged_frame(frame.view(), Some(gauge)), 0);
+    /// assert_eq!((press.gauge(0), press.image(0)), (Some(gauge), Some(frame.view())));
     /// assert!(press.modulus().is_ok());
     /// press.add_frame(frame.view());
     /// assert_eq!(press.modulus().unwrap_err(), PipelineError::NoForce { frame: 1 });
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
-    pub fn add_gauged_frame(&mut self, image: ArrayView2<'a, u8>, gauge_n: Option<f64>) -> usize {
+    pub fn add_gauged_frame(
+        &mut self,
+        image: ArrayView2<'a, u8>,
+        gauge: Option<Estimate<f64>>,
+    ) -> usize {
         let index = self.frames.len();
-        let equal = |f: &Loaded<'_>| f.gauge_n == gauge_n && f.image == image;
+        let equal = |f: &Loaded<'_>| f.gauge == gauge && f.image == image;
         let skip = self.pipeline.settings().skips.equal_frames;
         let twin = if skip {
             self.frames.iter().position(equal)
@@ -169,7 +176,7 @@ impl<'a> Press<'a> {
         let (contact, surface, points, matching, strain) = (None, None, None, None, None);
         self.frames.push(Loaded {
             image,
-            gauge_n,
+            gauge,
             contact,
             surface,
             points,
@@ -200,8 +207,8 @@ impl<'a> Press<'a> {
     }
 
     /// The gauge's reading of a frame's force, if there was one.
-    pub fn gauge_n(&self, frame: usize) -> Option<f64> {
-        self.frames.get(frame)?.gauge_n
+    pub fn gauge(&self, frame: usize) -> Option<Estimate<f64>> {
+        self.frames.get(frame)?.gauge
     }
 
     fn twin(&self, frame: usize) -> Result<usize, PipelineError> {

@@ -1,31 +1,29 @@
 //! The modulus of a press, and the loads it is estimated from.
 use super::Press;
-use crate::elasticity::modulus::{Estimate, LoadState, ModulusEstimate, SharedErrors};
+use crate::elasticity::modulus::{Estimate, LoadSeries, ModulusEstimate};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::estimators::{
-    LoadReading, all_estimates, chosen_estimate, radius_with_floor, series, split_errors,
-};
+use crate::pipeline::estimators::that_fit;
+use crate::pipeline::load_reading::{LoadReading, radius_with_floor, series, split_errors};
 use crate::pipeline::report::Stage;
 use std::time::Instant;
 
 impl Press<'_> {
-    /// Young's modulus by the estimator of the settings: unless another was chosen, the one that fits the object best. For a
+    /// Young's modulus by the estimator of the pipeline. For a
     /// ball that takes the contacts alone: no surface is reconstructed.
     ///
     /// # Errors
     /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
-        let with_strain = self.pipeline.settings().needs_strain();
-        let (loads, shared) = self.loads(with_strain)?;
+        let estimator = self.pipeline.estimator()?;
+        let loads = self.loads(estimator.needs_strain())?;
         let start = Instant::now();
-        let loads = series(loads, shared)?;
-        let estimate = chosen_estimate(self.pipeline.settings(), &loads);
+        let estimate = estimator.estimate(&loads).map_err(PipelineError::Modulus);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate
     }
 
-    /// What every frame says of its load, with the strain since the first: what an estimator of your own needs
-    /// ([`ModulusEstimator`](crate::elasticity::modulus::ModulusEstimator)).
+    /// What every frame says of its load, with the strain since the first and the errors that all share: what
+    /// [estimators](crate::elasticity::modulus::ModulusEstimator) take.
     ///
     /// ```
     /// # use tactile_imaging::pipeline::Trial;
@@ -33,7 +31,8 @@ impl Press<'_> {
     /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// # let pipeline = trial.pipeline()?;
-    /// let loads = trial.press(&pipeline)?.load_states()?;
+    /// let series = trial.press(&pipeline)?.load_series()?;
+    /// let loads = series.loads();
     /// assert!((loads[1].force_n.value - 1.2).abs() < 0.01);
     /// assert!(loads[0].mean_strain.is_none() && loads[1].mean_strain.is_some());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -41,8 +40,8 @@ impl Press<'_> {
     ///
     /// # Errors
     /// [`PipelineError::NoForce`], and those of the contacts and of [`strain`](Self::strain).
-    pub fn load_states(&mut self) -> Result<Vec<LoadState<f64>>, PipelineError> {
-        Ok(self.loads(true)?.0)
+    pub fn load_series(&mut self) -> Result<LoadSeries<f64>, PipelineError> {
+        self.loads(true)
     }
 
     /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
@@ -64,23 +63,28 @@ impl Press<'_> {
     /// # Errors
     /// Those of the contacts; what an estimator cannot do is left out.
     pub fn estimates(&mut self) -> Result<Vec<ModulusEstimate<f64>>, PipelineError> {
-        let (loads, shared) = match self.loads(true) {
+        let loads = match self.loads(true) {
             Ok(loads) => loads,
             Err(_) => self.loads(false)?,
         };
         let start = Instant::now();
         let settings = self.pipeline.settings();
-        let loads = series(loads, shared)?;
-        let estimates = all_estimates(&settings.object, settings.waveguide.as_ref(), &loads);
+        let mut estimators = that_fit(settings.object, settings.waveguide.as_ref())?;
+        if let Ok(chosen) = self.pipeline.estimator()
+            && estimators.iter().all(|e| e.kind() != chosen.kind())
+        {
+            estimators.push(chosen);
+        }
+        let estimates = estimators
+            .iter()
+            .filter_map(|e| e.estimate(&loads).ok())
+            .collect();
         self.report.ran(Stage::Modulus, start.elapsed());
         Ok(estimates)
     }
 
     /// What every frame says of its load, and the relative errors that all share.
-    fn loads(
-        &mut self,
-        with_strain: bool,
-    ) -> Result<(Vec<LoadState<f64>>, SharedErrors<f64>), PipelineError> {
+    fn loads(&mut self, with_strain: bool) -> Result<LoadSeries<f64>, PipelineError> {
         let mut readings = Vec::with_capacity(self.frames.len());
         let mut depths = Vec::with_capacity(self.frames.len());
         let size = self.pipeline.contact().pixel_size_m();
@@ -110,6 +114,6 @@ impl Press<'_> {
                     Some(Estimate::new(value, summary.standard_error[(2, 2)]));
             }
         }
-        Ok((loads, shared))
+        series(loads, shared)
     }
 }

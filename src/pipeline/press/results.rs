@@ -26,7 +26,7 @@ impl Press<'_> {
                     &mut self.force,
                     loaded.image,
                     &self.reference,
-                    loaded.gauge_n,
+                    loaded.gauge,
                     &mut contact,
                 )
                 .map_err(|source| PipelineError::Contact { frame, source })?;

@@ -1,7 +1,7 @@
 //! The loads that a session has seen: a bounded number, similar ones merged.
 use crate::elasticity::modulus::Estimate;
 use crate::pipeline::contact::ContactReading;
-use crate::pipeline::estimators::{LoadReading, radius_with_floor};
+use crate::pipeline::load_reading::{LoadReading, radius_with_floor};
 
 /// Loads that a session keeps apart; more are merged.
 ///

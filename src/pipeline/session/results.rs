@@ -3,7 +3,7 @@ use super::Session;
 use super::strain::{FollowedStrain, Frame, SessionStrain};
 use crate::elasticity::modulus::ModulusEstimate;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::estimators::{chosen_estimate, series, split_errors};
+use crate::pipeline::load_reading::{series, split_errors};
 use crate::pipeline::report::Stage;
 use std::time::Instant;
 
@@ -71,20 +71,22 @@ impl Session {
         self.strain = FollowedStrain::default();
     }
 
-    /// Young's modulus from all loads so far, by the estimator of the settings. Where that needs strain the loads are those whose [`strain`](Self::strain) was asked for.
+    /// Young's modulus from all loads so far, by the estimator of the pipeline. Where that needs strain the loads are those whose [`strain`](Self::strain) was asked for.
     ///
     /// # Errors
     /// [`PipelineError::Modulus`].
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
+        let estimator = self.pipeline.estimator()?;
         let start = Instant::now();
         let settings = self.pipeline.settings();
         let size = self.pipeline.contact().pixel_size_m();
-        let (loads, shared) = if settings.needs_strain() {
+        let (loads, shared) = if estimator.needs_strain() {
             self.strain.loads(size, settings)
         } else {
             split_errors(self.loads.readings(size), settings)
         };
-        let estimate = chosen_estimate(settings, &series(loads, shared)?);
+        let loads = series(loads, shared)?;
+        let estimate = estimator.estimate(&loads).map_err(PipelineError::Modulus);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate
     }

@@ -7,7 +7,7 @@ use crate::matching::{MatchReport, WarmStart};
 use crate::pipeline::composition::Pipeline;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::estimators::{LoadReading, radius_with_floor, split_errors};
+use crate::pipeline::load_reading::{LoadReading, radius_with_floor, split_errors};
 use crate::pipeline::pair::{self, PairStrain};
 use crate::pipeline::report::{Report, SkipReason, Stage};
 use crate::pipeline::settings::Settings;

@@ -43,6 +43,19 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     /// assert_eq!(estimator.kind(), EstimatorKind::PaperRatio);
     /// ```
     fn kind(&self) -> EstimatorKind;
+
+    /// Whether it uses the loads' strains. Without them a caller can leave out surfaces, matches and warps.
+    ///
+    /// ```
+    /// use tactile_elasticity::modulus::{HertzSphere, ModulusEstimator, PaperRatio};
+    ///
+    /// let estimators: [Box<dyn ModulusEstimator<f64>>; 2] = [Box::new(PaperRatio::new()), Box::new(HertzSphere::new(3e-3, 0.5)?)];
+    /// assert_eq!(estimators.map(|e| e.needs_strain()), [true, false]);
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    fn needs_strain(&self) -> bool {
+        true
+    }
 }
 
 impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> for Box<E> {
@@ -53,6 +66,10 @@ impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> f
     fn kind(&self) -> EstimatorKind {
         (**self).kind()
     }
+
+    fn needs_strain(&self) -> bool {
+        (**self).needs_strain()
+    }
 }
 
 impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> for Arc<E> {
@@ -62,6 +79,10 @@ impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> f
 
     fn kind(&self) -> EstimatorKind {
         (**self).kind()
+    }
+
+    fn needs_strain(&self) -> bool {
+        (**self).needs_strain()
     }
 }
 

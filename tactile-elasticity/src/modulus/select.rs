@@ -198,6 +198,10 @@ impl<T: RealField + Copy> ModulusEstimator<T> for BestOf<T> {
     fn kind(&self) -> EstimatorKind {
         EstimatorKind::BestOf
     }
+
+    fn needs_strain(&self) -> bool {
+        self.candidates.iter().any(|c| c.needs_strain())
+    }
 }
 
 /// AICc; where the loads are too few for it, AIC from χ², which differs by a constant between laws of the same loads.

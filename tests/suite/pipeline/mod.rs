@@ -337,10 +337,10 @@ fn every_result_can_be_read_by_people_and_programs() {
     );
     assert!(told(&update.contact.unwrap()).contains(" mm   centroid ("));
     let mut press = trial.press(&pipeline).unwrap();
-    let measured = press.measure().unwrap();
+    let measured = press.measure();
     assert!(told(&measured).contains("cautions:"));
-    assert!(told(&measured.youngs_modulus_pa).contains(" kPa"));
-    assert!(told(&measured.frames[0]).contains("contact radius"));
+    assert!(told(measured.youngs_modulus_pa.as_ref().unwrap()).contains(" kPa"));
+    assert!(told(measured.frames[0].as_ref().unwrap()).contains("contact radius"));
     assert!(told(measured.matching.as_ref().unwrap()).contains("control points matched"));
     assert!(told(measured.strain.as_ref().unwrap()).contains("e_zz"));
     assert!(measured.flags.iter().all(|flag| !told(flag).is_empty()));

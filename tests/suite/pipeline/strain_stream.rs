@@ -2,9 +2,13 @@
 #![allow(clippy::print_stdout)]
 use super::trial;
 use nalgebra::Matrix3;
-use tactile_imaging::elasticity::modulus::EstimatorKind;
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::elasticity::modulus::{
+    EstimatorKind, HertzSphere, LoadSeries, ModulusEstimate, ModulusEstimator,
+};
 use tactile_imaging::pipeline::{
-    EstimatorChoice, Object, Pipeline, PipelineError, Session, SkipReason, Skips, Stage, Trial,
+    EstimatorChoice, Object, Pipeline, PipelineError, Session, SkipReason, Skips, Stage,
+    StagesConfig, Trial,
 };
 
 fn session(trial: &Trial, pipeline: &Pipeline) -> Session {
@@ -90,7 +94,7 @@ fn an_object_that_needs_strain_gets_its_modulus_from_the_stream() {
     let trial = trial(&[0.7, 0.9, 1.2], 6);
     let object = Object::Unknown { poisson_ratio: 0.5 };
     let mut pipeline = trial.pipeline().unwrap();
-    pipeline = pipeline.with_object(object);
+    pipeline = pipeline.with_object(object).unwrap();
     let mut press = trial.press(&pipeline).unwrap();
     let expected = press.modulus().unwrap();
     let mut session = session(&trial, &pipeline);
@@ -147,7 +151,11 @@ fn strain_is_measured_once_a_frame_and_starts_anew_when_told() {
 fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
     let trial = trial(&[0.7, 0.9, 1.2], 8);
     let modulus = |choice| {
-        let pipeline = trial.pipeline().unwrap().with_estimator(choice);
+        let config = StagesConfig {
+            estimator: choice,
+            ..StagesConfig::default()
+        };
+        let pipeline = trial.pipeline().unwrap().with_stages(&config).unwrap();
         let mut press = trial.press(&pipeline).unwrap();
         let found = press.modulus().map(|m| m.estimator);
         (found, press.report().work(Stage::Surface).runs)
@@ -174,4 +182,63 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
         error.to_string(),
         "the estimator \"flat-punch\" needs a flat punch as the object"
     );
+    let laws = [
+        (
+            EstimatorChoice::SphereOnWaveguide,
+            EstimatorKind::SphereOnWaveguide,
+        ),
+        (
+            EstimatorChoice::SphereBetweenPlates,
+            EstimatorKind::SphereBetweenPlates,
+        ),
+        (EstimatorChoice::TataraSphere, EstimatorKind::TataraSphere),
+    ];
+    for (choice, kind) in laws {
+        assert_eq!(modulus(choice), (Ok(kind), 0), "{choice}");
+    }
+    assert!(modulus(EstimatorChoice::LeastAkaike).0.is_ok());
+    for choice in [EstimatorChoice::BondedLayer, EstimatorChoice::Cone] {
+        let error = modulus(choice).0.unwrap_err();
+        assert!(
+            matches!(error, PipelineError::WrongEstimator { .. }),
+            "{error}"
+        );
+    }
+}
+
+/// An estimator of a user's own: the load over a length.
+struct Stiffness;
+
+impl ModulusEstimator<f64> for Stiffness {
+    fn estimate(&self, series: &LoadSeries<f64>) -> Result<ModulusEstimate<f64>, ElasticityError> {
+        let mut estimate = HertzSphere::new(3e-3, 0.5)?.estimate(series)?;
+        estimate.youngs_modulus_pa = series.loads()[0].force_n.value / 1e-6;
+        estimate.estimator = self.kind();
+        Ok(estimate)
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        EstimatorKind::Other("stiffness")
+    }
+
+    fn needs_strain(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn an_estimator_of_a_users_own_is_a_stage_boxed_too() {
+    let trial = trial(&[0.7, 1.2], 8);
+    let boxed: Box<dyn ModulusEstimator<f64> + Send + Sync> = Box::new(Stiffness);
+    for pipeline in [
+        trial.pipeline().unwrap().with_estimator(Stiffness),
+        trial.pipeline().unwrap().with_estimator(boxed),
+    ] {
+        let mut press = trial.press(&pipeline).unwrap();
+        let modulus = press.modulus().unwrap();
+        assert_eq!(modulus.estimator, EstimatorKind::Other("stiffness"));
+        assert!((modulus.youngs_modulus_pa / 0.7e6 - 1.0).abs() < 0.02);
+        assert_eq!(press.report().work(Stage::Surface).runs, 0);
+        assert!(press.estimates().unwrap().contains(&modulus));
+    }
 }

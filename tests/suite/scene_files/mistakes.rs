@@ -193,7 +193,10 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
     (
         "[object]",
         "[stages]\nmatcher = \"icp\"\n[object]",
-        &["`stages.matcher` must be one of \"relaxation\"", "\"icp\""],
+        &[
+            "`stages.matcher` must be one of \"annealed-softassign\"",
+            "\"icp\"",
+        ],
     ),
     (
         "[object]",

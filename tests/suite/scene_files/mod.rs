@@ -7,9 +7,10 @@ use ndarray::Array2;
 use std::fs;
 use std::path::Path;
 use tactile_imaging::Pipeline;
+use tactile_imaging::elasticity::modulus::{EstimatorKind, ModulusEstimator};
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::io::write_grey_image;
-use tactile_imaging::pipeline::EstimatorChoice;
+use tactile_imaging::pipeline::{Measurement, PipelineError};
 use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
 use tactile_imaging::simulate::{
@@ -44,13 +45,12 @@ fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
         )
         .unwrap();
         let measured = Scene::measure_file(path).unwrap();
-        let error = measured.youngs_modulus_pa.value / material.youngs_modulus_pa - 1.0;
+        let modulus = measured.youngs_modulus_pa.unwrap();
+        let error = modulus.value / material.youngs_modulus_pa - 1.0;
         assert!(error.abs() < PAPER_ERROR, "error {error}");
-        assert_eq!(measured.youngs_modulus_pa.estimator, "Hertz sphere");
+        assert_eq!(modulus.estimator, EstimatorKind::HertzSphere);
         assert!(
-            measured.estimators[0]
-                .estimator
-                .contains("stress over mean strain"),
+            measured.estimators[0].estimator == EstimatorKind::PaperRatio,
             "the paper's ratio is first"
         );
         assert!(
@@ -109,7 +109,10 @@ fn sentence(folder: &Path, text: &str) -> String {
     let path = folder.join("scene.toml");
     fs::write(&path, text).unwrap();
     match Scene::measure_file(&path) {
-        Ok(measured) => format!("measured {}", measured.youngs_modulus_pa.value),
+        Ok(measured) => match measured.youngs_modulus_pa {
+            Ok(modulus) => format!("measured {}", modulus.value),
+            Err(error) => Scene::read(&path).unwrap().measure_error(error).to_string(),
+        },
         Err(error) => error.to_string(),
     }
 }
@@ -245,9 +248,10 @@ fn stages_by_name_are_those_given_as_values() {
         ratio
             .pipeline(&ratio.load().unwrap())
             .unwrap()
-            .settings()
-            .estimator,
-        EstimatorChoice::PaperRatio
+            .estimator()
+            .unwrap()
+            .kind(),
+        EstimatorKind::PaperRatio
     );
     let data = scene.load().unwrap();
     let heights = |name: &str| {
@@ -284,4 +288,96 @@ fn a_flat_field_is_asked_for_by_its_key() {
             wanted
         );
     }
+}
+
+#[test]
+fn a_gauge_alone_gives_force_contact_and_modulus() {
+    let folder = tempfile::tempdir().unwrap();
+    small_scene(folder.path());
+    let gauged = VALID
+        .replace("[calibration]\npairs = \"pairs.csv\"\n", "")
+        .replace(
+            "image = \"two.pgm\"",
+            "image = \"two.pgm\"\nforce_N = 1.1\nforce_error_N = 0.02",
+        );
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, &gauged).unwrap();
+    let measured = Scene::measure_file(&path).unwrap();
+    let frames: Vec<_> = measured
+        .frames
+        .iter()
+        .map(|f| f.as_ref().unwrap())
+        .collect();
+    let forces = [0, 1].map(|k| frames[k].force_n.clone().unwrap());
+    assert_eq!(
+        forces.map(|f| (f.value, f.standard_error)),
+        [(0.8, 0.0), (1.1, 0.02)]
+    );
+    fs::write(&path, VALID).unwrap();
+    let calibrated = Scene::measure_file(&path).unwrap();
+    let radius = |m: &Measurement| m.frames[0].as_ref().unwrap().contact_radius_m;
+    assert_eq!(
+        radius(&measured),
+        radius(&calibrated),
+        "the contact is that of the light"
+    );
+    assert!(measured.youngs_modulus_pa.is_ok());
+    // One frame without its force: a calibration is missing.
+    let half = gauged.replace("force_N = 1.1\nforce_error_N = 0.02", "");
+    assert!(sentence(folder.path(), &half).contains("`calibration` is missing"));
+}
+
+#[test]
+fn a_waveguide_can_be_rigid() {
+    let layers = "[waveguide]\nlayers = [{ refractive_index = 1.41, thickness_m = 0.1, youngs_modulus_pa = 1e7 }]\n";
+    let without = VALID.replace(layers, "");
+    for text in [without.clone(), format!("waveguide = \"rigid\"\n{without}")] {
+        assert!(Scene::parse(&text, "scene.toml").unwrap().layers.is_empty());
+    }
+    let wrong =
+        Scene::parse(&format!("waveguide = \"soft\"\n{without}"), "scene.toml").unwrap_err();
+    assert!(
+        wrong.to_string().contains("`waveguide` must be a table"),
+        "{wrong}"
+    );
+}
+
+#[test]
+fn what_a_stage_cannot_do_withholds_nothing_of_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    small_scene(folder.path());
+    let path = folder.path().join("scene.toml");
+    // A flat punch's law takes depths, which light does not give.
+    let text = VALID
+        .replace("shape = \"sphere\"", "shape = \"flat_punch\"")
+        .replace("[object]", "[stages]\nestimator = \"flat-punch\"\n[object]");
+    fs::write(&path, text).unwrap();
+    let measured = Scene::measure_file(&path).unwrap();
+    assert!(matches!(
+        measured.youngs_modulus_pa,
+        Err(PipelineError::Modulus(_))
+    ));
+    for frame in &measured.frames {
+        let frame = frame.as_ref().unwrap();
+        assert!(frame.force_n.is_ok() && frame.surface_height_m.is_ok());
+    }
+    assert!(measured.strain.is_ok() && measured.matching.is_ok());
+    assert!(
+        !measured.estimators.is_empty(),
+        "stress over strain has an answer"
+    );
+    let json = serde_json::to_value(&measured).unwrap();
+    assert!(json["youngs_modulus_pa"]["error"].is_string());
+    assert!(json["strain"]["value"]["mean"].is_array());
+    assert!(json["frames"][0]["value"]["force_n"]["value"]["value"].is_number());
+    // An empty frame in the middle costs its own results alone.
+    let text = VALID.replace("image = \"two.pgm\"", "image = \"reference.png\"");
+    fs::write(&path, text).unwrap();
+    let measured = Scene::measure_file(&path).unwrap();
+    assert!(measured.frames[0].is_ok());
+    assert_eq!(
+        measured.frames[1],
+        Err(PipelineError::NoContact { frame: 1 })
+    );
+    assert!(measured.strain.is_err() && measured.youngs_modulus_pa.is_err());
 }

@@ -4,7 +4,9 @@ use super::table::{EXACT, Table};
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, SESSION_LOADS, Session, Trial};
+use tactile_imaging::pipeline::{
+    EstimatorChoice, PipelineError, SESSION_LOADS, Session, StagesConfig, Trial,
+};
 
 /// Rising by 35 mN from 0.2 N: the last within the calibration.
 fn steps(loads: usize) -> Vec<f64> {
@@ -127,8 +129,12 @@ fn strained(
     choice: EstimatorChoice,
 ) -> Result<ModulusEstimate<f64>, PipelineError> {
     let trial = trial(coarse_camera(), 200.0, forces);
+    let config = StagesConfig {
+        estimator: choice,
+        ..StagesConfig::default()
+    };
     let pipeline = pipeline(&trial, SI)
-        .with_estimator(choice)
+        .with_stages(&config)?
         .with_control_points(60);
     trial.press(&pipeline)?.modulus()
 }

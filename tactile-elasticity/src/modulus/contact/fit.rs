@@ -344,4 +344,8 @@ impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimato
     fn kind(&self) -> EstimatorKind {
         self.law.kind()
     }
+
+    fn needs_strain(&self) -> bool {
+        false
+    }
 }

@@ -1,0 +1,63 @@
+//! What each load says, and the errors that all loads share.
+use super::error::PipelineError;
+use super::settings::Settings;
+use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
+
+/// What one load says, before errors are split into its own and those that all loads share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LoadReading {
+    pub force_n: f64,
+    /// Error of the force from noise.
+    pub noise_n: f64,
+    /// Error of the force from the calibration.
+    pub calibration_n: f64,
+    pub radius_m: Estimate<f64>,
+}
+
+/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one is common to all loads (the
+/// slope's); what a load has beyond that (the offset's) is its own.
+pub(super) fn split_errors(
+    readings: impl Iterator<Item = LoadReading> + Clone,
+    settings: &Settings,
+) -> (Vec<LoadState<f64>>, SharedErrors<f64>) {
+    let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
+    let common = readings
+        .clone()
+        .map(|r| relative(&r))
+        .fold(f64::INFINITY, f64::min);
+    let common = if common.is_finite() { common } else { 0.0 };
+    let load = |r: LoadReading| {
+        let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2))
+            .max(0.0)
+            .sqrt();
+        LoadState::new(Estimate::new(r.force_n, r.noise_n.hypot(rest)))
+            .with_contact_radius(r.radius_m)
+    };
+    let shared = SharedErrors {
+        force_scale: common.hypot(settings.force_scale_error),
+        length_scale: settings.length_scale_error,
+        ..SharedErrors::default()
+    };
+    (readings.map(load).collect(), shared)
+}
+
+/// The contact radius with what no profile can know better: a hundredth of a pixel, by which a rim of pixels, blur and the
+/// contact's true shape differ from the fitted profile.
+pub(super) fn radius_with_floor(
+    value: f64,
+    standard_error: f64,
+    pixel_size_m: [f64; 2],
+) -> Estimate<f64> {
+    let floor = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
+    Estimate::new(value, standard_error.hypot(floor))
+}
+
+/// Loads with the errors that they share.
+pub(super) fn series(
+    loads: Vec<LoadState<f64>>,
+    shared: SharedErrors<f64>,
+) -> Result<LoadSeries<f64>, PipelineError> {
+    LoadSeries::new(loads)
+        .with_shared_errors(shared)
+        .map_err(PipelineError::Modulus)
+}
