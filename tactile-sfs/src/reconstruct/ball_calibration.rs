@@ -84,7 +84,7 @@ impl<T: Scalar> DepthTable<T> {
         let found = || contact_circle(&signals, threshold.as_f64(), step);
         let (centre_px, radius) = circle.map_or_else(found, Ok)?;
         let ball = ball_radius_m.as_f64();
-        if !(radius < ball) {
+        if radius.is_nan() || radius >= ball {
             return Err(SfsError::ContactBeyondBall {
                 found_m: radius,
                 ball_radius_m: ball,
