@@ -247,12 +247,12 @@ impl Scene {
         let fields = Fields::new(file, &table);
         fields.only(&tables::FIELDS)?;
         let folder = file.parent().unwrap_or(Path::new(""));
+        let reference = fields.string("reference", "the path of the image without contact")?;
         let frames = tables::frames(&fields, folder)?;
         let gauged = frames.iter().all(|frame| frame.force_n.is_some());
         Ok(Self {
             file: file.into(),
-            reference: folder
-                .join(fields.string("reference", "the path of the image without contact")?),
+            reference: folder.join(reference),
             pixel_size_m: fields.positive_pair(
                 "pixel_size_m",
                 "two positive numbers [x, y] (metres per pixel)",
