@@ -84,13 +84,7 @@ impl<T: Scalar> DepthTable<T> {
         let found = || contact_circle(&signals, threshold.as_f64(), step);
         let (centre_px, radius) = circle.map_or_else(found, Ok)?;
         let ball = ball_radius_m.as_f64();
-<<<<<<< HEAD
         if radius.is_nan() || radius >= ball {
-=======
-        // Also where the caller's circle is NaN.
-        let inside_ball = radius < ball;
-        if !inside_ball {
->>>>>>> 3e8b957 (The record of public items and the changelog follow the surface and spline crates)
             return Err(SfsError::ContactBeyondBall {
                 found_m: radius,
                 ball_radius_m: ball,
