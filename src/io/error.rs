@@ -1,6 +1,6 @@
 //! The errors of reading and writing files.
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What a reader wanted to find at the place that [`ReadError`] names.
 ///
@@ -119,6 +119,82 @@ pub enum ReadError {
         /// The names in the header (empty: there is no header).
         found: Vec<String>,
     },
+    /// A column is there more than once.
+    #[error("{}: the column `{column}` occurs more than once: rename one", path.display())]
+    RepeatedColumn {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+    },
+    /// A column's unit is not one of its quantity.
+    #[error("{}: the column `{column}` is in `{found}`, expected one of {known}", path.display())]
+    Unit {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// The units that are known.
+        known: String,
+        /// The unit in the heading.
+        found: String,
+    },
+    /// A table that is not UTF-8.
+    #[error("{} is UTF-16 text: save it as UTF-8", path.display())]
+    Encoding {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A folder, a pipe or a device instead of a file.
+    #[error("cannot read {}: it is {found}, not a file", path.display())]
+    NotAFile {
+        /// What should be a file.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
+    },
+    /// The file is larger than any that is meant to be read.
+    #[error("{} has {bytes} bytes, more than the {limit} that are read", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+        /// The largest size that is read.
+        limit: u64,
+    },
+    /// An image of more pixels than any that is meant to be read.
+    #[error("the image {} is {width} × {height} pixels, more than the {} million that are read", path.display(), limit / 1_000_000)]
+    TooManyPixels {
+        /// The file.
+        path: PathBuf,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// The largest number of pixels that is read.
+        limit: u64,
+    },
+    /// Samples of 16 bits that look like those of a camera with fewer.
+    #[error("the 16-bit image {} has no sample above {brightest}: say how many bits its camera gives (bits = {likely}, or 16)", path.display())]
+    UnclearBits {
+        /// The file.
+        path: PathBuf,
+        /// The largest sample.
+        brightest: u16,
+        /// The number of bits that the largest sample suggests.
+        likely: u8,
+    },
+    /// Samples with more bits than the caller said.
+    #[error("the image {} has a sample of {brightest}, more than {bits} bits hold", path.display())]
+    TooFewBits {
+        /// The file.
+        path: PathBuf,
+        /// The largest sample.
+        brightest: u16,
+        /// The bits the caller gave.
+        bits: u8,
+    },
     /// The file is empty, or has a header alone.
     #[error("{}: expected {expected}, found none", path.display())]
     Empty {
@@ -145,27 +221,7 @@ fn list(names: &[String]) -> String {
     }
 }
 
-/// Reads a whole file; the error names it.
-pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
-    std::fs::read(path).map_err(|source| ReadError::Open {
-        path: path.into(),
-        source,
-    })
-}
-
-/// Writes a whole file, creating its folder where needed.
-pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
-    let write = || {
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)?;
-        }
-        std::fs::write(path, bytes)
-    };
-    write().map_err(|source| ReadError::Write {
-        path: path.into(),
-        source,
-    })
-}
+pub(crate) use super::files::{read_bytes, write_bytes};
 
 /// The field as it can stand in a message: at most 40 characters, no control characters.
 pub(crate) fn shorten(field: &str) -> String {

@@ -38,7 +38,19 @@ pub fn read_grid(path: impl AsRef<Path>) -> Result<Array2<f64>, ReadError> {
 /// # Errors
 /// As [`read_grid`].
 pub fn parse_grid(bytes: &[u8], name: impl AsRef<Path>) -> Result<Array2<f64>, ReadError> {
-    Ok(parse_table(bytes, name.as_ref(), Expected::NumberOrNan)?.values)
+    let path = name.as_ref();
+    let table = parse_table(bytes, path, Expected::NumberOrNan)?;
+    // A matrix has no names; a line of words is the header of another kind of table.
+    if let Some(word) = table.header.first() {
+        return Err(ReadError::Field {
+            path: path.into(),
+            line: 1,
+            column: 1,
+            expected: Expected::NumberOrNan,
+            found: word.clone(),
+        });
+    }
+    Ok(table.values)
 }
 
 /// Writes a matrix without a header; reading it again gives the same bits (NaN stays NaN).

@@ -1,10 +1,14 @@
 //! Grey images from PNG, PGM and JPEG files.
 //!
 //! Colour is turned to grey by the luma of Rec. 601, Y = 0.299 R + 0.587 G + 0.114 B, on the stored (gamma-coded) values,
-//! as OpenCV and most camera software do; alpha is ignored. Samples of 16 bits keep their precision: levels are on the
-//! scale of 8 bits, 0 to 255, with fractions (v/257).
+//! as OpenCV and most camera software do; alpha is ignored.
+//!
+//! Levels are on the scale of 8 bits, 0 to 255, and samples of more bits keep their precision as fractions: a sample v
+//! becomes 255 v/m, where m is the largest value that the camera gives. A PGM or PPM says m (its `maxval`). A PNG of 16
+//! bits does not: m is 65535, or 2ᵇ − 1 where the caller gives the bits b. A camera of 12 bits often writes its samples
+//! into 16 as they are; an image without any sample above 4095 is therefore refused until the bits are given.
 use super::error::{ReadError, read_bytes, write_bytes};
-use ::image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use ndarray::{Array2, ArrayView2};
 use std::io::Cursor;
 use std::path::Path;
@@ -31,6 +35,18 @@ pub const REC_601: [f64; 3] = [0.299, 0.587, 0.114];
 /// assert!(parse_grey_image(&line(LARGEST_SIDE + 1), "line.pgm").is_err());
 /// ```
 pub const LARGEST_SIDE: u32 = 30_000;
+
+/// Most pixels that are read: the largest sensors have 50 to 60 million, and an image of more needs gigabytes.
+///
+/// ```
+/// use tactile_imaging::io::{ReadError, image::{LARGEST_IMAGE, parse_grey_image}};
+/// let bomb = parse_grey_image(b"P5\n20000 20000\n255\n", "bomb.pgm").unwrap_err();
+/// assert!(matches!(bomb, ReadError::TooManyPixels { limit: LARGEST_IMAGE, .. }));
+/// ```
+pub const LARGEST_IMAGE: u64 = 64_000_000;
+
+/// Samples of 16 bits that do not go beyond this may be those of a camera with 12.
+const TWELVE_BITS: u16 = 4095;
 
 /// A grey image, `[row, column]`.
 ///
@@ -74,10 +90,32 @@ impl GreyImage {
 /// ```
 ///
 /// # Errors
-/// [`ReadError::Open`] and [`ReadError::Image`].
+/// [`ReadError`] where the file cannot be read or decoded, is too large, or its depth is not clear.
 pub fn read_grey_image(path: impl AsRef<Path>) -> Result<GreyImage, ReadError> {
     let path = path.as_ref();
     parse_grey_image(&read_bytes(path)?, path)
+}
+
+/// Reads a grey image of a camera with this many bits, 1 to 16: samples of 16 bits in the file are scaled by 2ᵇ − 1.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{ReadError, read_grey_image, read_grey_image_of_bits};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("frame.png");
+/// let samples = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![4095, 819]);
+/// samples.ok_or("two samples")?.save(&path)?;
+/// assert!(matches!(read_grey_image(&path), Err(ReadError::UnclearBits { likely: 12, .. })));
+/// assert_eq!(read_grey_image_of_bits(&path, 12)?.levels, ndarray::array![[255.0, 51.0]]);
+/// assert!(matches!(read_grey_image_of_bits(&path, 10), Err(ReadError::TooFewBits { .. })));
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// As [`read_grey_image`]; [`ReadError::TooFewBits`] where a sample needs more bits. Images of 8 bits are not scaled.
+pub fn read_grey_image_of_bits(path: impl AsRef<Path>, bits: u8) -> Result<GreyImage, ReadError> {
+    let path = path.as_ref();
+    parse(&read_bytes(path)?, path, Some(bits))
 }
 
 /// Decodes a grey image from the bytes of a file; `name` stands for the file in errors.
@@ -92,21 +130,116 @@ pub fn read_grey_image(path: impl AsRef<Path>) -> Result<GreyImage, ReadError> {
 /// ```
 ///
 /// # Errors
-/// [`ReadError::Image`].
+/// As [`read_grey_image`].
 pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImage, ReadError> {
-    let decode = || {
-        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(LARGEST_SIDE);
-        limits.max_image_height = Some(LARGEST_SIDE);
-        reader.limits(limits);
-        reader.decode()
-    };
-    let decoded = decode().map_err(|source| ReadError::Image {
-        path: name.as_ref().into(),
+    parse(bytes, name.as_ref(), None)
+}
+
+fn parse(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<GreyImage, ReadError> {
+    let broken = |source| ReadError::Image {
+        path: path.into(),
         source,
-    })?;
-    Ok(to_grey(decoded))
+    };
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| broken(e.into()))?;
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(LARGEST_SIDE);
+    limits.max_image_height = Some(LARGEST_SIDE);
+    // Four samples of 16 bits a pixel, the widest that is decoded.
+    limits.max_alloc = Some(8 * LARGEST_IMAGE);
+    reader.limits(limits.clone());
+    let mut decoder = reader.into_decoder().map_err(broken)?;
+    decoder.set_limits(limits).map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    // Before anything is decoded: a header of some bytes can announce any size.
+    if u64::from(width) * u64::from(height) > LARGEST_IMAGE {
+        return Err(ReadError::TooManyPixels {
+            path: path.into(),
+            width,
+            height,
+            limit: LARGEST_IMAGE,
+        });
+    }
+    let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    let largest = full_scale(&decoded, bytes, path, bits)?;
+    Ok(to_grey(decoded, largest))
+}
+
+/// The sample that stands for the level 255.
+fn full_scale(
+    image: &DynamicImage,
+    bytes: &[u8],
+    path: &Path,
+    bits: Option<u8>,
+) -> Result<f64, ReadError> {
+    let announced = pnm_maxval(bytes);
+    if !is_wide(image) {
+        return Ok(announced.map_or(255.0, f64::from));
+    }
+    match (bits, announced) {
+        (Some(bits), _) => {
+            let brightest = brightest(image);
+            let largest = (1_u32 << bits.clamp(1, 16)) - 1;
+            if u32::from(brightest) > largest {
+                return Err(ReadError::TooFewBits {
+                    path: path.into(),
+                    brightest,
+                    bits,
+                });
+            }
+            Ok(f64::from(largest))
+        }
+        (None, Some(maxval)) => Ok(f64::from(maxval)),
+        (None, None) => {
+            let brightest = brightest(image);
+            if brightest > TWELVE_BITS {
+                return Ok(65_535.0);
+            }
+            Err(ReadError::UnclearBits {
+                path: path.into(),
+                brightest,
+                likely: if brightest > 1023 { 12 } else { 10 },
+            })
+        }
+    }
+}
+
+/// The largest value of a sample that the header of a PGM, PPM or PAM announces.
+fn pnm_maxval(bytes: &[u8]) -> Option<u16> {
+    let kind = bytes.strip_prefix(b"P")?.first()?;
+    // No header is longer; words beyond it are samples.
+    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
+    let lines = header
+        .lines()
+        .map(|line| line.split('#').next().unwrap_or(""));
+    let mut words = lines.flat_map(str::split_ascii_whitespace);
+    let word = match kind {
+        b'2' | b'3' | b'5' | b'6' => words.nth(3),
+        b'7' => words.skip_while(|word| *word != "MAXVAL").nth(1),
+        _ => None,
+    };
+    word?.parse().ok().filter(|&maxval| maxval > 0)
+}
+
+fn is_wide(image: &DynamicImage) -> bool {
+    image.color().bytes_per_pixel() / image.color().channel_count() > 1
+}
+
+/// The largest sample of 16 bits, of any colour.
+fn brightest(image: &DynamicImage) -> u16 {
+    let largest = |samples: &[u16], channels: usize, colours: usize| {
+        let pixels = samples.chunks(channels);
+        pixels.flat_map(|p| p.iter().take(colours)).copied().max()
+    };
+    let found = match image {
+        DynamicImage::ImageLuma16(i) => largest(i.as_raw(), 1, 1),
+        DynamicImage::ImageLumaA16(i) => largest(i.as_raw(), 2, 1),
+        DynamicImage::ImageRgb16(i) => largest(i.as_raw(), 3, 3),
+        DynamicImage::ImageRgba16(i) => largest(i.as_raw(), 4, 3),
+        _ => None,
+    };
+    found.unwrap_or(u16::MAX)
 }
 
 /// Writes an 8-bit grey image: PGM where the name ends in `.pgm`, else PNG.
@@ -157,31 +290,33 @@ pub fn write_grey_image(
     write_bytes(path, &bytes)
 }
 
-fn to_grey(image: DynamicImage) -> GreyImage {
+/// Levels from samples of which `largest` stands for 255.
+fn to_grey(image: DynamicImage, largest: f64) -> GreyImage {
     let colour = image.color().has_color();
     let shape = (image.height() as usize, image.width() as usize);
+    let scale = largest / 255.0;
     let luma = |rgb: [f64; 3]| (0..3).map(|i| REC_601[i] * rgb[i]).sum::<f64>();
-    let wide = image.color().bytes_per_pixel() / image.color().channel_count() > 1;
+    let wide = is_wide(&image);
     let levels: Vec<f64> = match (wide, colour) {
         (false, false) => image
             .into_luma_alpha8()
             .pixels()
-            .map(|p| f64::from(p.0[0]))
+            .map(|p| f64::from(p.0[0]) / scale)
             .collect(),
         (false, true) => image
             .into_rgb8()
             .pixels()
-            .map(|p| luma(p.0.map(f64::from)))
+            .map(|p| luma(p.0.map(|v| f64::from(v) / scale)))
             .collect(),
         (true, false) => image
             .into_luma_alpha16()
             .pixels()
-            .map(|p| f64::from(p.0[0]) / 257.0)
+            .map(|p| f64::from(p.0[0]) / scale)
             .collect(),
         (true, true) => image
             .into_rgb16()
             .pixels()
-            .map(|p| luma(p.0.map(|v| f64::from(v) / 257.0)))
+            .map(|p| luma(p.0.map(|v| f64::from(v) / scale)))
             .collect(),
     };
     let levels = Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape));
@@ -227,5 +362,18 @@ mod tests {
             error.starts_with("cannot decode the image frame.png: "),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_pgm_is_scaled_by_the_largest_value_it_announces() {
+        let image = pnm(
+            "P5\n# a camera of 12 bits\n2 1\n4095\n",
+            &[0x0f, 0xff, 0x03, 0x33],
+        );
+        // 4095 / 255 is not a whole number: the quotient is right to rounding.
+        assert!((image.levels[[0, 0]] - 255.0).abs() < 1e-12);
+        assert!((image.levels[[0, 1]] - 51.0).abs() < 1e-12);
+        let coarse = pnm("P2\n2 1\n15\n15 3\n", b"");
+        assert_eq!(coarse.levels.as_slice().unwrap(), [255.0, 51.0]);
     }
 }

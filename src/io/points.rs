@@ -1,12 +1,15 @@
-//! Point sets in CSV: one point a row, two or three columns, header or none.
+//! Point sets in CSV: one point a row.
+//!
+//! With a header the columns `x`, `y` and, in space, `z` are found by name, other columns (an `id`) are passed over, and
+//! units (`x_um`, `y (mm)`) are converted to metres. Without one the file has two or three columns in any unit.
 use super::error::{Expected, ReadError, read_bytes, write_bytes};
-use super::table::parse_table;
+use super::table::{Column, Table, parse_table};
+use super::units::{Heading, Quantity};
 use nalgebra::{Point, Point2, Point3};
-use ndarray::Array2;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Points of a file whose number of columns is not known beforehand.
+/// Points of a file whose number of coordinates is not known beforehand.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -25,13 +28,13 @@ use std::path::Path;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum PointTable {
-    /// The file has two columns.
+    /// Points of two coordinates.
     Plane(Vec<Point2<f64>>),
-    /// The file has three columns.
+    /// Points of three coordinates.
     Space(Vec<Point3<f64>>),
 }
 
-/// Reads points with two or three coordinates, as many as the file has columns.
+/// Reads points with two or three coordinates, as many as the file has.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -48,18 +51,50 @@ pub enum PointTable {
 /// # Errors
 /// [`ReadError`], see the [module](super).
 pub fn read_point_table(path: impl AsRef<Path>) -> Result<PointTable, ReadError> {
+    read_point_table_in(path).map(|(points, _)| points)
+}
+
+/// As [`read_point_table`], and whether the file names the unit of its coordinates: they are in metres if it does, and
+/// in the file's own unit if not.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{PointTable, points::read_point_table_in};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("points.csv");
+/// std::fs::write(&path, "id,x_mm,y_mm\n7,500,1500\n")?;
+/// assert_eq!(read_point_table_in(&path)?, (PointTable::Plane(vec![[0.5, 1.5].into()]), true));
+/// std::fs::write(&path, "id,x,y\n7,500,1500\n")?;
+/// assert_eq!(read_point_table_in(&path)?, (PointTable::Plane(vec![[500.0, 1500.0].into()]), false));
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// As [`read_point_table`].
+pub fn read_point_table_in(path: impl AsRef<Path>) -> Result<(PointTable, bool), ReadError> {
     let path = path.as_ref();
-    let values = parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)?.values;
-    match values.ncols() {
-        2 => Ok(PointTable::Plane(to_points(&values))),
-        3 => Ok(PointTable::Space(to_points(&values))),
-        found => Err(ReadError::Line {
-            path: path.into(),
-            line: 1,
-            expected: Expected::TwoOrThreeColumns,
-            found,
-        }),
-    }
+    let table = parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)?;
+    let headings: Vec<Heading> = table.header.iter().map(|h| Heading::parse(h)).collect();
+    let in_metres = headings.iter().any(|h| h.name == "x" && h.unit.is_some());
+    let dimensions = match table.values.ncols() {
+        _ if headings.iter().any(|h| h.name == "z") => 3,
+        _ if !headings.is_empty() => 2,
+        columns @ (2 | 3) => columns,
+        found => {
+            return Err(ReadError::Line {
+                path: path.into(),
+                line: 1,
+                expected: Expected::TwoOrThreeColumns,
+                found,
+            });
+        }
+    };
+    let points = if dimensions == 3 {
+        PointTable::Space(to_points(&table, path)?)
+    } else {
+        PointTable::Plane(to_points(&table, path)?)
+    };
+    Ok((points, in_metres))
 }
 
 /// Reads points with `D` coordinates.
@@ -104,16 +139,7 @@ pub fn parse_points<const D: usize>(
     name: impl AsRef<Path>,
 ) -> Result<Vec<Point<f64, D>>, ReadError> {
     let path = name.as_ref();
-    let values = parse_table(bytes, path, Expected::FiniteNumber)?.values;
-    if values.ncols() == D {
-        return Ok(to_points(&values));
-    }
-    Err(ReadError::Line {
-        path: path.into(),
-        line: 1,
-        expected: Expected::Columns(D),
-        found: values.ncols(),
-    })
+    to_points(&parse_table(bytes, path, Expected::FiniteNumber)?, path)
 }
 
 /// Writes points with a header; reading them again gives the same bits.
@@ -146,10 +172,45 @@ pub fn write_points<const D: usize>(
     write_bytes(path.as_ref(), text.as_bytes())
 }
 
-fn to_points<const D: usize>(values: &Array2<f64>) -> Vec<Point<f64, D>> {
-    values
-        .rows()
-        .into_iter()
-        .map(|row| Point::from(std::array::from_fn(|i| row[i])))
-        .collect()
+fn to_points<const D: usize>(table: &Table, path: &Path) -> Result<Vec<Point<f64, D>>, ReadError> {
+    let headings: Vec<Heading> = table.header.iter().map(|h| Heading::parse(h)).collect();
+    let has = |name: &str| headings.iter().any(|h| h.name == name);
+    if D == 2 && has("z") {
+        return Err(ReadError::Line {
+            path: path.into(),
+            line: 1,
+            expected: Expected::Columns(2),
+            found: 3,
+        });
+    }
+    let unit_of = |axis: &str| {
+        headings
+            .iter()
+            .find(|h| h.name == axis)
+            .map(|h| h.unit.is_some())
+    };
+    let axes = ["x", "y", "z"];
+    // A unit beside one coordinate and none beside another leaves open what the other is in.
+    if let Some(axis) = axes[..D]
+        .iter()
+        .find(|axis| unit_of(axis).is_some_and(|u| Some(u) != unit_of("x")))
+    {
+        return Err(ReadError::Unit {
+            path: path.into(),
+            column: (*axis).into(),
+            known: "the units of length, as the others are".into(),
+            found: String::new(),
+        });
+    }
+    let names: [[&str; 1]; D] = std::array::from_fn(|i| [axes[i]]);
+    let wanted: [Column<'_>; D] = std::array::from_fn(|i| Column {
+        names: &names[i],
+        quantity: Quantity::Length,
+        unit: "m",
+    });
+    let columns = table.columns(wanted, path)?;
+    let rows = 0..table.values.nrows();
+    Ok(rows
+        .map(|row| Point::from(std::array::from_fn(|i| columns[i][row])))
+        .collect())
 }

@@ -1,16 +1,42 @@
 //! Tables of numbers in CSV: the reader below points, grids, calibration pairs and depth tables.
 //!
-//! Fields are separated by commas, semicolons or tabs (the first of these that the first line has). The first line is a
-//! header if none of its fields is a number. Empty lines and lines that start with `#` are passed over.
+//! Fields are separated by commas, semicolons or tabs (the first of these that the first line has); a field may stand in
+//! double quotes. The first line is a header if none of its fields is a number. Empty lines and lines that start with
+//! `#` are passed over.
 use super::error::{Expected, ReadError, read_bytes, shorten};
+use super::units::{Heading, Quantity};
 use ndarray::Array2;
 use std::path::Path;
+
+/// A column that a reader looks for.
+///
+/// ```
+/// use std::path::Path;
+/// use tactile_imaging::io::{Column, Quantity, Table};
+/// let values = ndarray::array![[0.0, 5.0, 1.5], [0.1, 10.0, 4.2]];
+/// let header = ["time_s", "indentation (µm)", "force_mN"].map(String::from).to_vec();
+/// let table = Table { header, values };
+/// let indentation = Column { names: &["indentation", "depth"], quantity: Quantity::Length, unit: "m" };
+/// let force = Column { names: &["force"], quantity: Quantity::Force, unit: "N" };
+/// let [z, f] = table.columns([indentation, force], Path::new("curve.csv"))?;
+/// assert_eq!((z[1], f[1]), (10.0 * 1e-6, 4.2 * 1e-3), "found by name, in SI");
+/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Column<'a> {
+    /// Names that it may have, the usual one first, without the unit.
+    pub names: &'a [&'a str],
+    /// What it measures.
+    pub quantity: Quantity,
+    /// Its unit where the file names none.
+    pub unit: &'a str,
+}
 
 /// A rectangular table of numbers with the names of its columns, if it has a header.
 ///
 /// ```
 /// use std::path::Path;
-/// use tactile_imaging::io::{ReadError, Table};
+/// use tactile_imaging::io::{Column, Quantity, ReadError, Table};
 /// let path = Path::new("calibration.csv");
 /// let values = ndarray::array![[5e4, 0.5], [1e5, 1.0]];
 /// let table = Table { header: vec!["integrated_pixel_value".into(), "force_N".into()], values };
@@ -18,6 +44,8 @@ use std::path::Path;
 /// let bare = Table { header: vec![], ..table.clone() };
 /// assert_eq!(bare.column("force_n", 1, path)?, [0.5, 1.0], "without one the position does");
 /// assert!(matches!(table.column("depth_mm", 0, path), Err(ReadError::MissingColumn { .. })));
+/// let force = Column { names: &["force"], quantity: Quantity::Force, unit: "N" };
+/// assert_eq!(table.columns([force], path)?, [[0.5, 1.0]], "by name without its unit");
 /// # Ok::<(), ReadError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -41,14 +69,74 @@ impl Table {
                 .iter()
                 .position(|h| h.eq_ignore_ascii_case(name))
         };
-        let missing = || ReadError::MissingColumn {
-            path: path.into(),
-            column: name.into(),
-            found: self.header.clone(),
-        };
         found
             .map(|i| self.values.column(i).to_vec())
-            .ok_or_else(missing)
+            .ok_or_else(|| self.missing(name, path))
+    }
+
+    /// The wanted columns in SI units: by name where the file has a header, whatever other columns it has; by position
+    /// in a file without one, which must then have exactly these.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingColumn`], [`ReadError::Unit`] and, where the number of columns is wrong,
+    /// [`ReadError::Line`]; `path` is the name they give to the file.
+    pub fn columns<const N: usize>(
+        &self,
+        wanted: [Column<'_>; N],
+        path: &Path,
+    ) -> Result<[Vec<f64>; N], ReadError> {
+        let headings: Vec<Heading> = self.header.iter().map(|h| Heading::parse(h)).collect();
+        if headings.is_empty() && self.values.ncols() != N {
+            return Err(ReadError::Line {
+                path: path.into(),
+                line: 1,
+                expected: Expected::Columns(N),
+                found: self.values.ncols(),
+            });
+        }
+        let mut found = [const { Vec::new() }; N];
+        for (position, column) in wanted.iter().enumerate() {
+            let (at, factor) = if headings.is_empty() {
+                (position, column.quantity.in_si(column.unit).unwrap_or(1.0))
+            } else {
+                let at = self.find(column, &headings, path)?;
+                let factor = headings[at].factor(column.quantity, column.unit, path)?;
+                (at, factor)
+            };
+            found[position] = self.values.column(at).iter().map(|v| v * factor).collect();
+        }
+        Ok(found)
+    }
+
+    /// The position of a column among the headings: the first of its names that occurs, which must not occur twice.
+    fn find(
+        &self,
+        column: &Column<'_>,
+        headings: &[Heading],
+        path: &Path,
+    ) -> Result<usize, ReadError> {
+        for name in column.names {
+            let mut at = (0..headings.len()).filter(|&i| headings[i].name == *name);
+            match (at.next(), at.next()) {
+                (None, _) => {}
+                (Some(i), None) => return Ok(i),
+                (Some(_), Some(_)) => {
+                    return Err(ReadError::RepeatedColumn {
+                        path: path.into(),
+                        column: (*name).into(),
+                    });
+                }
+            }
+        }
+        Err(self.missing(column.names.first().copied().unwrap_or_default(), path))
+    }
+
+    fn missing(&self, column: &str, path: &Path) -> ReadError {
+        ReadError::MissingColumn {
+            path: path.into(),
+            column: column.into(),
+            found: self.header.clone(),
+        }
     }
 }
 
@@ -74,77 +162,78 @@ pub fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
 }
 
 /// Parses the bytes of a table; `path` is the name that errors give.
+///
+/// A field becomes a number at once, so that a file of any shape needs little more memory than its numbers.
 pub(crate) fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<Table, ReadError> {
-    let mut reader = reader(bytes);
-    let (mut header, mut values, mut columns) = (Vec::new(), Vec::new(), None);
-    for record in reader.byte_records() {
-        let record = record.map_err(|e| ReadError::Open {
-            path: path.into(),
-            source: e.into(),
-        })?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let fields: Vec<_> = record.iter().map(String::from_utf8_lossy).collect();
-        let first = columns.is_none();
-        if *columns.get_or_insert(fields.len()) != fields.len() {
-            let expected = Expected::Columns(columns.unwrap_or(0));
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return Err(ReadError::Encoding { path: path.into() });
+    }
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let delimiter = delimiter(bytes);
+    let mut header = Vec::new();
+    let mut values = Vec::new();
+    let mut columns = None;
+    for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
+        let text = String::from_utf8_lossy(line);
+        let text = text.trim();
+        if text.is_empty() || text.starts_with('#') {
+            continue;
+        }
+        let line = i as u64 + 1;
+        let fields = || text.split(delimiter).map(unquoted);
+        if columns.is_none() && is_header(fields()) {
+            header = fields().map(shorten).collect();
+            columns = Some(header.len());
+            continue;
+        }
+        let before = values.len();
+        for (column, field) in fields().enumerate() {
+            values.push(number(field, &cell).ok_or_else(|| ReadError::Field {
+                path: path.into(),
+                line,
+                column: column + 1,
+                expected: cell.clone(),
+                found: shorten(field),
+            })?);
+        }
+        let found = values.len() - before;
+        let expected = *columns.get_or_insert(found);
+        if found != expected {
             return Err(ReadError::Line {
                 path: path.into(),
                 line,
-                expected,
-                found: fields.len(),
+                expected: Expected::Columns(expected),
+                found,
             });
         }
-        if first && is_header(&fields) {
-            header = fields.iter().map(|f| shorten(f)).collect();
-            continue;
-        }
-        push_numbers(&fields, &cell, path, line, &mut values)?;
     }
-    let columns = columns.filter(|_| !values.is_empty());
     let empty = || ReadError::Empty {
         path: path.into(),
         expected: Expected::Rows,
     };
-    let columns = columns.ok_or_else(empty)?;
+    let columns = columns.filter(|_| !values.is_empty()).ok_or_else(empty)?;
     let values =
         Array2::from_shape_vec((values.len() / columns, columns), values).map_err(|_| empty())?;
     Ok(Table { header, values })
 }
 
-/// Rows of trimmed fields, of whatever length; `#` starts a comment.
-fn reader(bytes: &[u8]) -> csv::Reader<&[u8]> {
-    csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .delimiter(delimiter(bytes))
-        .from_reader(bytes)
-}
-
-/// Appends a row's numbers.
-fn push_numbers(
-    fields: &[std::borrow::Cow<'_, str>],
-    cell: &Expected,
-    path: &Path,
-    line: u64,
-    values: &mut Vec<f64>,
-) -> Result<(), ReadError> {
-    for (i, field) in fields.iter().enumerate() {
-        values.push(number(field, cell).ok_or_else(|| ReadError::Field {
-            path: path.into(),
-            line,
-            column: i + 1,
-            expected: cell.clone(),
-            found: shorten(field),
-        })?);
-    }
-    Ok(())
+/// The field without the blanks around it and without its quotes.
+fn unquoted(field: &str) -> &str {
+    let field = field.trim();
+    let inside = field.strip_prefix('"').and_then(|f| f.strip_suffix('"'));
+    inside.map_or(field, str::trim)
 }
 
 /// A first line is a header when it has a word that is no number, and no number.
-fn is_header(fields: &[std::borrow::Cow<'_, str>]) -> bool {
-    fields.iter().all(|f| f.parse::<f64>().is_err()) && fields.iter().any(|f| !f.is_empty())
+fn is_header<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
+    let mut words = false;
+    for field in fields {
+        if field.parse::<f64>().is_ok() {
+            return false;
+        }
+        words |= !field.is_empty();
+    }
+    words
 }
 
 fn number(field: &str, cell: &Expected) -> Option<f64> {
@@ -156,18 +245,14 @@ fn number(field: &str, cell: &Expected) -> Option<f64> {
 }
 
 /// The separator of the first line that has one.
-fn delimiter(bytes: &[u8]) -> u8 {
-    let lines = bytes
-        .split(|&b| b == b'\n')
-        .filter(|l| !l.starts_with(b"#"));
+fn delimiter(bytes: &[u8]) -> char {
+    let mut lines = bytes.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
     let first = lines
-        .into_iter()
-        .find(|l| !l.trim_ascii().is_empty())
+        .find(|l| !l.is_empty() && !l.starts_with(b"#"))
         .unwrap_or_default();
-    [b',', b';', b'\t']
-        .into_iter()
-        .find(|d| first.contains(d))
-        .unwrap_or(b',')
+    let separators = [',', ';', '\t'];
+    let found = separators.into_iter().find(|&d| first.contains(&(d as u8)));
+    found.unwrap_or(',')
 }
 
 #[cfg(test)]
@@ -220,5 +305,58 @@ mod tests {
             message("x,y\n"),
             "t.csv: expected at least one row of numbers, found none"
         );
+    }
+    #[test]
+    fn quotes_marks_and_line_ends_of_other_programs_are_understood() {
+        let table = parse("\u{feff}\"x\",\"y\"\r\n\"1\",2\r\n").unwrap();
+        assert_eq!(table.header, ["x", "y"]);
+        assert_eq!(table.values, ndarray::array![[1.0, 2.0]]);
+        let utf_16 = [0xff, 0xfe, b'1', 0];
+        let error = parse_table(&utf_16, Path::new("t.csv"), Expected::FiniteNumber).unwrap_err();
+        assert!(matches!(error, ReadError::Encoding { .. }));
+    }
+
+    const INDENTATION: Column<'_> = Column {
+        names: &["indentation", "depth"],
+        quantity: Quantity::Length,
+        unit: "m",
+    };
+    const FORCE: Column<'_> = Column {
+        names: &["force"],
+        quantity: Quantity::Force,
+        unit: "N",
+    };
+
+    fn curve(text: &str) -> Result<[Vec<f64>; 2], ReadError> {
+        parse(text)?.columns([INDENTATION, FORCE], Path::new("t.csv"))
+    }
+
+    #[test]
+    fn columns_are_found_by_name_and_come_in_si() {
+        let named = curve("time_s,force_mN,depth (µm)\n0,5,10\n").unwrap();
+        assert_eq!(named, [vec![10.0 * 1e-6], vec![5.0 * 1e-3]]);
+        assert_eq!(
+            curve("0.5;2\n").unwrap(),
+            [vec![0.5], vec![2.0]],
+            "without a header by position"
+        );
+    }
+
+    #[test]
+    fn what_is_not_clear_is_refused() {
+        let message = |text: &str| curve(text).unwrap_err().to_string();
+        assert_eq!(
+            message("1,2,3\n"),
+            "t.csv, line 1: expected 2 columns, found 3"
+        );
+        assert_eq!(
+            message("depth_m,load_kg\n1,2\n"),
+            "t.csv: expected a column named `force`, found `depth_m`, `load_kg`"
+        );
+        assert_eq!(
+            message("depth_m,force_N,force_mN\n1,2,3\n"),
+            "t.csv: the column `force` occurs more than once: rename one"
+        );
+        assert!(message("depth_m,force (lbf)\n1,2\n").contains("is in `lbf`"));
     }
 }

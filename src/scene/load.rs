@@ -1,7 +1,9 @@
 //! The files of a scene, read and checked against each other.
 use super::{CalibrationSource, Scene, SceneError};
 use crate::force::CalibrationPair;
-use crate::io::{ReadError, read_grey_image, read_table};
+use crate::io::{
+    Column, Quantity, ReadError, read_grey_image, read_grey_image_of_bits, read_table,
+};
 use ndarray::Array2;
 use std::path::Path;
 
@@ -87,41 +89,53 @@ impl Scene {
     }
 
     fn image(&self, field: &str, path: &Path) -> Result<Array2<u8>, SceneError> {
-        read_grey_image(path)
-            .map(|i| i.to_u8())
+        let read = match self.bits {
+            Some(bits) => read_grey_image_of_bits(path, bits),
+            None => read_grey_image(path),
+        };
+        read.map(|i| i.to_u8())
             .map_err(|source| self.file_error(field, source))
     }
 
     fn load_calibration(&self) -> Result<LoadedCalibration, SceneError> {
-        let columns = |field: &str, path: &Path, names: [&str; 2]| {
+        let columns = |field: &str, path: &Path, wanted: [Column<'_>; 2]| {
             let read = || {
-                let table = read_table(path)?;
-                let first = table.column(names[0], 0, path)?;
-                Ok(first.into_iter().zip(table.column(names[1], 1, path)?))
+                let [first, second] = read_table(path)?.columns(wanted, path)?;
+                Ok(first.into_iter().zip(second))
             };
             read().map_err(|source| self.file_error(field, source))
         };
         match &self.calibration {
             CalibrationSource::Gauge => Ok(LoadedCalibration::Gauge),
             CalibrationSource::Pairs(path) => {
-                let pairs = columns(
-                    "calibration.pairs",
-                    path,
-                    ["integrated_pixel_value", "force_N"],
-                )?;
+                let value = Column {
+                    names: &["integrated_pixel_value"],
+                    quantity: Quantity::Number,
+                    unit: "grey_levels",
+                };
+                let force = Column {
+                    names: &["force"],
+                    quantity: Quantity::Force,
+                    unit: "N",
+                };
+                let pairs = columns("calibration.pairs", path, [value, force])?;
                 Ok(LoadedCalibration::Pairs(
                     pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect(),
                 ))
             }
             CalibrationSource::DepthTable(path) => {
-                let rows = columns(
-                    "calibration.depth_table",
-                    path,
-                    ["darkness_grey_levels", "depth_mm"],
-                )?;
-                Ok(LoadedCalibration::DepthTable(
-                    rows.map(|(d, z)| (d, z * 1e-3)).collect(),
-                ))
+                let darkness = Column {
+                    names: &["darkness"],
+                    quantity: Quantity::Number,
+                    unit: "grey_levels",
+                };
+                let depth = Column {
+                    names: &["depth"],
+                    quantity: Quantity::Length,
+                    unit: "mm",
+                };
+                let rows = columns("calibration.depth_table", path, [darkness, depth])?;
+                Ok(LoadedCalibration::DepthTable(rows.collect()))
             }
         }
     }

@@ -28,9 +28,10 @@
 //! ]
 //! ```
 //!
-//! Two more may stand there (`flat_field` above the first table):
+//! More may stand there (`flat_field` and `bits` above the first table):
 //!
 //! ```toml
+//! bits = 12                              # of the camera, where its samples stand in files of 16 bits that do not say so
 //! flat_field = "reference"               # divides by the reference's own brightness: corrects vignetting; not by default
 //!
 //! [stages]                               # each by name; these are the defaults
@@ -55,7 +56,7 @@ mod tables;
 pub use error::SceneError;
 pub use load::{LoadedCalibration, SceneData};
 
-use crate::io::ReadError;
+use crate::io::read_bytes;
 use crate::pipeline::{Object, StagesConfig};
 use fields::Fields;
 use std::path::{Path, PathBuf};
@@ -184,6 +185,8 @@ pub struct Scene {
     pub pixel_size_m: [f64; 2],
     /// Whether vignetting is corrected by the reference's own brightness.
     pub flat_field: bool,
+    /// Bits of the camera, for images of 16 bits; told from the file where not given.
+    pub bits: Option<u8>,
     /// How grey levels become force or depth.
     pub calibration: CalibrationSource,
     /// The frames, in the order of the file.
@@ -203,12 +206,7 @@ impl Scene {
     /// [`SceneError`]: one sentence that names the file and the field.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| {
-            SceneError::Open(Box::new(ReadError::Open {
-                path: path.into(),
-                source,
-            }))
-        })?;
+        let bytes = read_bytes(path).map_err(|error| SceneError::Open(Box::new(error)))?;
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
@@ -258,6 +256,7 @@ impl Scene {
                 "two positive numbers [x, y] (metres per pixel)",
             )?,
             flat_field: tables::flat_field(&fields)?,
+            bits: tables::bits(&fields)?,
             calibration: tables::calibration(&fields, folder, gauged)?,
             frames,
             object: tables::object(&fields)?,

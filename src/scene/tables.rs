@@ -5,10 +5,11 @@ use crate::pipeline::Object;
 use std::path::Path;
 
 /// What may stand at the top of a scene file.
-pub(super) const FIELDS: [&str; 8] = [
+pub(super) const FIELDS: [&str; 9] = [
     "reference",
     "pixel_size_m",
     "flat_field",
+    "bits",
     "calibration",
     "frames",
     "object",
@@ -25,6 +26,13 @@ pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
         "reference" => Ok(true),
         other => Err(fields.wrong("flat_field", EXPECTED, &toml::Value::String(other.into()))),
     }
+}
+
+pub(super) fn bits(fields: &Fields<'_>) -> Result<Option<u8>, SceneError> {
+    const EXPECTED: &str = "a whole number from 8 to 16, the bits of the camera";
+    let accept = |bits: f64| (8.0..=16.0).contains(&bits) && bits.fract() == 0.0;
+    let bits = fields.optional_number("bits", EXPECTED, accept)?;
+    Ok(bits.map(|bits| bits as u8))
 }
 
 pub(super) fn calibration(

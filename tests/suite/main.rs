@@ -4,14 +4,14 @@
 mod architecture;
 mod force_on_simulated_frames;
 mod io_properties;
-#[path = "../../examples/strain_between/measure.rs"]
+#[path = "../../src/bin/tactile/strain/measure.rs"]
 #[allow(unreachable_pub, dead_code)]
 mod measure;
 mod modulus_on_simulated_scenes;
 mod pipeline;
 mod press_9dtact;
 mod recorded_answers;
-#[path = "../../examples/strain_between/robust_spline.rs"]
+#[path = "../../src/bin/tactile/strain/robust_spline.rs"]
 #[allow(unreachable_pub, dead_code)]
 mod robust_spline;
 mod scene_files;

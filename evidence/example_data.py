@@ -1,0 +1,186 @@
+#!/usr/bin/env python3
+"""Write the small inputs in examples/data that the help of the program `tactile` uses.
+
+    evidence/example_data.py          write them
+    evidence/example_data.py --check  fail where one differs from what this script writes
+
+Standard library only, the same bytes everywhere.
+"""
+import math
+import pathlib
+import struct
+import sys
+import zlib
+
+FOLDER = pathlib.Path(__file__).parent.parent / "examples" / "data"
+
+
+def scattered(k, step):
+    """The k-th of evenly scattered numbers between 0 and 1."""
+    return (0.5 + k * step) % 1.0
+
+
+def error(k, step):
+    """A number that stands for a measurement error: scattered between -1/2 and 1/2."""
+    return scattered(k, step) - 0.5
+
+
+def place(k):
+    """Point k of a field of 10 by 10."""
+    return 10 * scattered(k, 0.7548776662), 10 * scattered(k, 0.5698402910)
+
+
+def moved(k):
+    """Where point k is after the deformation: 5 % longer along x, 2 % shorter along y, sheared, and read with an error."""
+    x, y = place(k)
+    return 1.05 * x + 0.02 * y + 0.01 * error(k, 0.831), 0.98 * y + 0.3 + 0.01 * error(k, 0.417)
+
+
+def points(rows):
+    return "id,x_mm,y_mm\n" + "".join(f"{k},{x:.4f},{y:.4f}\n" for k, (x, y) in rows)
+
+
+def cases():
+    rows = [f"m {x:.4f} {y:.4f}" for x, y in map(place, range(60))]
+    # The targets are in another order.
+    rows += [f"t {x:.4f} {y:.4f}" for x, y in (moved(37 * k % 60) for k in range(60))]
+    space = [(x, y, 0.02 * ((x - 5) ** 2 + (y - 5) ** 2)) for x, y in map(place, range(50))]
+    rows.append("case pressed 3 50 50")
+    rows += [f"m {x:.4f} {y:.4f} {z:.4f}" for x, y, z in space]
+    rows += [f"t {1.03 * x:.4f} {1.03 * y:.4f} {0.9 * z:.4f}" for x, y, z in reversed(space)]
+    return "case stretched 2 60 60\n" + "\n".join(rows) + "\n"
+
+
+def slopes(along_x):
+    """Of the saddle 0.005 x² + 0.01 y² around the middle of 24 rows and 32 columns."""
+    cell = (lambda r, c: 0.01 * (c - 15.5)) if along_x else (lambda r, c: 0.02 * (r - 11.5))
+    return "".join(",".join(f"{cell(r, c):.3f}" for c in range(32)) + "\n" for r in range(24))
+
+
+def ball():
+    """A ball of 20 px radius lit from the camera, 48 by 48."""
+    def level(r, c):
+        share = ((r - 23.5) ** 2 + (c - 23.5) ** 2) / 400
+        return round(255 * (1 - share) ** 0.5) if share < 1 else 0
+    return "P2\n48 48\n255\n" + "".join(" ".join(str(level(r, c)) for c in range(48)) + "\n" for r in range(48))
+
+
+def curve():
+    """A sphere of 5 mm radius on a deep sample of 30 kPa (Poisson's ratio 1/2), which it meets after 30 µm."""
+    rows = ["time_s,indentation_um,force_mN"]
+    for i in range(60):
+        z = 4.0 * i - 30.0
+        force = 4 / 3 * 40e3 * 5e-3**0.5 * (1e-6 * max(z, 0.0)) ** 1.5
+        rows.append(f"{0.05 * i:.2f},{4.0 * i:.1f},{1e3 * force + 0.05 * error(i, 0.618034):.4f}")
+    return "\n".join(rows) + "\n"
+
+
+# A sensor that grows darker where it is pressed: 60 grey levels for each millimetre. A ball of 4 mm radius, 0.6 mm deep,
+# on pixels of 100 µm.
+PIXEL_MM, BALL_MM, DEPTH_MM, LEVELS_PER_MM = 0.1, 4.0, 0.6, 60.0
+
+
+def dark(pressed):
+    def level(r, c):
+        noise = 2 * error(97 * r + 31 * c + (5000 if pressed else 0), 0.618034)
+        distance = PIXEL_MM * ((r - 31.5) ** 2 + (c - 39.5) ** 2) ** 0.5
+        depth = DEPTH_MM - BALL_MM + max(BALL_MM**2 - distance**2, 0.0) ** 0.5
+        return round(150 + noise - (LEVELS_PER_MM * max(depth, 0.0) if pressed else 0.0))
+    return "P2\n80 64\n255\n" + "".join(" ".join(str(level(r, c)) for c in range(80)) + "\n" for r in range(64))
+
+
+def depth_table():
+    return "darkness_grey_levels,depth_mm\n" + "".join(f"{6 * k},{6 * k / LEVELS_PER_MM:.2f}\n" for k in range(11))
+
+
+# A press on a sensor that grows brighter in proportion to the pressure: a ball of 3 mm radius and 103 kPa on a deep guide of
+# 100 kPa, both incompressible, at two loads within Hertz's range (a/R 0.23 and 0.29). Pixels of 40 um, 130 rows, 174 columns.
+PIXEL_M, RADIUS_M, GREY_PER_PA = 40e-6, 3e-3, 0.012
+REDUCED_PA = 1 / (0.75 / 103e3 + 0.75 / 100e3)
+LOADS_N = [0.01, 0.02]
+
+
+def png(rows):
+    """A grey image of 8 bits, not compressed: the bytes do not depend on the compressor."""
+    def chunk(tag, data):
+        return struct.pack(">I", len(data)) + tag + data + struct.pack(">I", zlib.crc32(tag + data))
+    size = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 0, 0, 0, 0)
+    data = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows), 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", size) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+
+
+def frame(force, seed):
+    """Hertz's pressure p0 sqrt(1 - r^2/a^2) in grey levels above 10, and the noise of the camera."""
+    a = (3 * force * RADIUS_M / (4 * REDUCED_PA)) ** (1 / 3)
+    peak = GREY_PER_PA * 3 * force / (2 * math.pi * a * a) if force else 0.0
+
+    def level(r, c):
+        share = PIXEL_M**2 * ((r - 64.5) ** 2 + (c - 86.5) ** 2) / (a * a) if force else 1.0
+        noise = 2 * error(174 * r + c + seed, 0.7548776662)
+        return round(10 + noise + peak * math.sqrt(max(1 - share, 0.0)))
+    return png([[level(r, c) for c in range(174)] for r in range(130)])
+
+
+def calibration():
+    rows = ["integrated_pixel_value,force_N"]
+    for k in list(range(9)) + list(range(7, -1, -1)):
+        force = 0.004 * k
+        value = GREY_PER_PA * force / PIXEL_M**2
+        rows.append(f"{value:.0f},{force + 2e-5 * error(len(rows), 0.618034):.6f}")
+    return "\n".join(rows) + "\n"
+
+
+def scene():
+    frames = "".join(f'[[frames]]\nimage = "frame_{k + 1}.png"\n\n' for k in range(len(LOADS_N)))
+    return f"""# A ball on a soft sensor, frames at {LOADS_N[0]} and {LOADS_N[1]} N; the ball has 103 kPa.
+reference = "reference.png"
+pixel_size_m = [{PIXEL_M}, {PIXEL_M}]
+
+[calibration]
+pairs = "calibration.csv"
+
+{frames}[object]
+shape = "sphere"
+radius_m = {RADIUS_M}
+poisson_ratio = 0.5
+
+[waveguide]
+layers = [{{ refractive_index = 1.40, thickness_m = 10e-3, youngs_modulus_pa = 100e3, poisson_ratio = 0.5 }}]
+"""
+
+
+FILES = {
+    "press/reference.png": lambda: frame(0.0, 0),
+    "press/frame_1.png": lambda: frame(LOADS_N[0], 40_000),
+    "press/frame_2.png": lambda: frame(LOADS_N[1], 80_000),
+    "press/calibration.csv": calibration,
+    "press/scene.toml": scene,
+    "before.csv": lambda: points((k, place(k)) for k in range(120)),
+    # In another order, and without every 17th.
+    "after.csv": lambda: points((j, moved(j)) for j in (37 * k % 120 for k in range(120)) if j % 17),
+    # Row by row, for a warp.
+    "sources.csv": lambda: points((k, place(k)) for k in range(40)),
+    "targets.csv": lambda: points((k, moved(k)) for k in range(40)),
+    "queries.csv": lambda: points((k, (1.0 + 2 * (k % 5), 1.0 + 2 * (k // 5))) for k in range(25)),
+    "cases.txt": cases,
+    "slope_x.csv": lambda: slopes(True),
+    "slope_y.csv": lambda: slopes(False),
+    "ball.pgm": ball,
+    "curve.csv": curve,
+    "dark_reference.pgm": lambda: dark(False),
+    "dark_frame.pgm": lambda: dark(True),
+    "depth_table.csv": depth_table,
+}
+
+if __name__ == "__main__":
+    differing = []
+    for name, make in FILES.items():
+        path, content = FOLDER / name, make()
+        content = content if isinstance(content, bytes) else content.encode()
+        if "--check" not in sys.argv:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        elif not path.exists() or path.read_bytes() != content:
+            differing.append(name)
+    if differing:
+        sys.exit(f"differ from what evidence/example_data.py writes: {', '.join(differing)}")

@@ -1,0 +1,30 @@
+//! Writes a simulated press as a folder that `tactile measure` reads: frames, calibration, scene.toml.
+//!
+//! ```text
+//! cargo run --release --example simulate_press -- target/press
+//! ```
+use std::error::Error;
+use std::path::PathBuf;
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, PressOptions, PressScene, write_folder,
+};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args_os().nth(1).unwrap_or("target/press".into());
+    // Small frames of the paper's field of view.
+    let camera = Camera {
+        shape: [130, 174],
+        pixel_size_m: [172.4e-6; 2],
+        ..Camera::default()
+    };
+    let scene = PressScene::new(PressOptions {
+        camera,
+        ..PressOptions::default()
+    })?;
+    let calibration = CalibrationOptions {
+        steps: 8,
+        ..CalibrationOptions::default()
+    };
+    write_folder(&scene, &calibration, &PathBuf::from(folder))?;
+    Ok(())
+}

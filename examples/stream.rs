@@ -1,0 +1,40 @@
+//! Force and modulus of a stream of frames, as they come from the camera.
+#![allow(clippy::print_stdout)]
+use ndarray::Array2;
+use std::error::Error;
+use tactile_imaging::pipeline::{FrameSource, Session, Trial, with_error};
+use tactile_imaging::simulate::{CalibrationOptions, Camera, LoadCycle, PressOptions};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let camera = Camera {
+        shape: [260, 348],
+        pixel_size_m: [86.2e-6; 2],
+        ..Camera::default()
+    };
+    let options = PressOptions {
+        camera,
+        ..PressOptions::default()
+    };
+    let trial = Trial::new(options, &CalibrationOptions::default())?;
+    // Any source of frames will do; this one simulates loading and unloading.
+    let mut source = trial.scene.stream(LoadCycle {
+        largest_force_n: 1.2,
+        period_s: 0.5,
+        ..LoadCycle::default()
+    })?;
+    let reference = trial.scene.reference(1);
+    let mut session = Session::new(&trial.pipeline()?, reference.view())?;
+    let mut frame = Array2::zeros((0, 0));
+    while let Some(time_s) = source.next_frame(&mut frame)? {
+        let update = session.push(frame.view())?;
+        let Some(force) = update.contact.and_then(|contact| contact.force_n) else {
+            continue;
+        };
+        // Two loads are needed before there is a modulus.
+        let modulus = session.modulus().map_or("-".to_owned(), |m| {
+            with_error(m.youngs_modulus_pa, m.standard_error_pa, 1e-3)
+        });
+        println!("{time_s:6.3} s   {:.4} N   {modulus} kPa", force.value);
+    }
+    Ok(())
+}

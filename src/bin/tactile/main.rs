@@ -1,0 +1,56 @@
+//! The program `tactile`: every stage of an optical tactile sensor's measurement, and the whole, from the command line.
+//!
+//! ```text
+//! cargo run --release --features cli -- measure
+//! ```
+#![allow(unreachable_pub)]
+
+mod arguments;
+mod calibrate;
+mod console;
+mod context;
+mod depth;
+mod failure;
+mod force;
+mod images;
+mod indent;
+mod integrate;
+mod interrupt;
+mod light;
+mod match_points;
+mod measure;
+mod memory;
+mod numbers;
+mod outputs;
+mod progress;
+mod reconstruct;
+mod strain;
+mod stream;
+mod warp;
+
+use arguments::Program;
+use clap::Parser;
+use context::Context;
+use failure::Exit;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let program = match Program::try_parse() {
+        Ok(program) => program,
+        Err(error) => return ExitCode::from(arguments::explain(&error).code()),
+    };
+    let mut context = Context::new(&program);
+    let exit = match program.command.run(&mut context) {
+        Ok(exit) => exit,
+        Err(failure) => {
+            context.console.note(&failure);
+            failure.exit
+        }
+    };
+    let exit = if context.interrupt.requested() {
+        Exit::Interrupted
+    } else {
+        exit
+    };
+    ExitCode::from(context.console.close(exit).code())
+}

@@ -1,0 +1,80 @@
+//! A bar on the terminal for what takes longer than a second.
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::time::{Duration, Instant};
+
+/// How long a job may take before it shows how far it is.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Shows how far a job is and how long it will take; nothing where standard error is no terminal.
+pub struct Progress {
+    bar: ProgressBar,
+    started: Instant,
+    shown: bool,
+}
+
+impl Progress {
+    /// Of a job of `total` steps.
+    pub fn of(total: usize, job: impl Into<String>) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
+        let style = ProgressStyle::with_template("{msg} [{bar:32}] {percent} %, {eta} left");
+        Self::new(bar, style.ok(), job)
+    }
+
+    /// Of a job whose length is not known; the clock runs by itself.
+    pub fn without_end(job: impl Into<String>) -> Self {
+        let progress = Self::new(ProgressBar::hidden(), None, job);
+        let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}");
+        if let Ok(style) = style {
+            progress.bar.set_style(style);
+        }
+        progress
+    }
+
+    fn new(bar: ProgressBar, style: Option<ProgressStyle>, job: impl Into<String>) -> Self {
+        if let Some(style) = style {
+            bar.set_style(style);
+        }
+        bar.set_message(job.into());
+        Self {
+            bar,
+            started: Instant::now(),
+            shown: false,
+        }
+    }
+
+    /// Tells that so many steps are done.
+    pub fn done(&mut self, steps: usize) {
+        self.bar.set_position(steps as u64);
+        if !self.shown && self.started.elapsed() > PATIENCE {
+            self.shown = true;
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Runs a job that cannot tell how far it is, with the time it has taken so far on the terminal.
+pub fn waiting<R>(job: impl Into<String>, work: impl FnOnce() -> R) -> R {
+    let progress = Progress::without_end(job);
+    let bar = progress.bar.clone();
+    let (end, ended) = std::sync::mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            if ended
+                .recv_timeout(PATIENCE)
+                .is_err_and(|e| e == std::sync::mpsc::RecvTimeoutError::Timeout)
+            {
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+                bar.enable_steady_tick(Duration::from_millis(200));
+            }
+        });
+        let result = work();
+        drop(end);
+        result
+    })
+}

@@ -1,0 +1,87 @@
+//! Every example in the help runs as it stands.
+use super::harness::{folder_with_examples, run, text, words};
+use std::collections::BTreeSet;
+
+/// The commands of a help's examples, without what explains them.
+fn examples(help: &str) -> Vec<String> {
+    let lines = help
+        .lines()
+        .filter_map(|line| line.strip_prefix("  tactile "));
+    lines
+        .map(|line| line.split("   ").next().unwrap_or(line).to_owned())
+        .collect()
+}
+
+fn help(arguments: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}");
+    text(&output.stdout)
+}
+
+/// The subcommands that the help lists.
+fn subcommands() -> Vec<String> {
+    let help = help(&["--help"]);
+    let list = help.split("Commands:").nth(1).expect("a list of commands");
+    let lines = list
+        .lines()
+        .skip(1)
+        .take_while(|line| line.starts_with("  "));
+    let names = lines.filter_map(|line| line.split_whitespace().next());
+    names
+        .filter(|name| *name != "help")
+        .map(Into::into)
+        .collect()
+}
+
+fn runs(example: &str) {
+    let folder = folder_with_examples();
+    let output = run(folder.path(), &words(example));
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "tactile {example}: {errors}");
+    assert!(
+        !output.stdout.is_empty(),
+        "tactile {example} prints nothing"
+    );
+    // Files go to --out and nowhere else.
+    let entries = std::fs::read_dir(folder.path()).unwrap();
+    let left: BTreeSet<_> = entries.map(|e| e.unwrap().file_name()).collect();
+    let expected = if example.contains("--out") { 2 } else { 1 };
+    assert_eq!(left.len(), expected, "tactile {example} leaves {left:?}");
+}
+
+#[test]
+fn every_example_of_every_subcommand_runs() {
+    let names = subcommands();
+    assert!(names.len() >= 12, "{names:?}");
+    for name in names {
+        let found = examples(&help(&[&name, "--help"]));
+        assert!(!found.is_empty(), "the help of {name} shows no example");
+        found.iter().for_each(|example| runs(example));
+    }
+}
+
+#[test]
+fn the_first_help_shows_one_example_for_each_subcommand() {
+    let shown = examples(&help(&["--help"]));
+    let first: Vec<&str> = shown.iter().map(|e| e.split(' ').next().unwrap()).collect();
+    let mut names = subcommands();
+    for name in &first {
+        names.retain(|n| n != name);
+    }
+    assert!(names.is_empty(), "no example for {names:?}");
+    shown.iter().for_each(|example| runs(example));
+}
+
+#[test]
+fn json_is_one_object() {
+    let folder = folder_with_examples();
+    for example in examples(&help(&["--help"])) {
+        let mut arguments = words(&example);
+        arguments.push("--json");
+        let output = run(folder.path(), &arguments);
+        let value: serde_json::Value = serde_json::from_slice(&output.stdout)
+            .unwrap_or_else(|e| panic!("tactile {example}: {e}"));
+        assert!(value.is_object(), "tactile {example}");
+    }
+}

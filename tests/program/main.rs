@@ -1,0 +1,8 @@
+//! The program `tactile` as a user meets it: what the help shows runs, and what is wrong is said in one sentence.
+#![cfg(unix)]
+
+mod bad_calls;
+mod bad_files;
+mod harness;
+mod help;
+mod outputs;

@@ -1,0 +1,80 @@
+//! Results that cannot be written, and readers that go away.
+use super::harness::{folder_with_examples, run, tactile, text, words};
+use std::fs::{self, File};
+use std::process::Stdio;
+
+const STRAIN: &str = "strain examples/data/before.csv examples/data/after.csv";
+
+#[test]
+fn a_reader_that_goes_away_ends_the_printing_and_not_the_program() {
+    for example in [
+        "light --rays 100 --out results",
+        "strain examples/data/before.csv examples/data/after.csv --out results",
+        "match examples/data/cases.txt --out results",
+        "--help",
+        "strain --help",
+    ] {
+        let folder = folder_with_examples();
+        let mut child = tactile(folder.path(), &words(example))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let errors = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "tactile {example}: {errors}");
+        assert!(errors.is_empty(), "tactile {example}: {errors}");
+        if example.contains("--out") {
+            let written = fs::read_dir(folder.path().join("results")).unwrap().count();
+            assert!(written > 0, "tactile {example} wrote nothing");
+        }
+    }
+}
+
+#[test]
+fn a_full_disk_is_a_sentence() {
+    let folder = folder_with_examples();
+    let full = || File::options().write(true).open("/dev/full").unwrap();
+    for example in ["light --rays 100", STRAIN, &format!("{STRAIN} --json")] {
+        let output = tactile(folder.path(), &words(example))
+            .stdout(Stdio::from(full()))
+            .output()
+            .unwrap();
+        let errors = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "tactile {example}: {errors}");
+        assert!(
+            errors.starts_with("tactile: cannot write to standard output: "),
+            "{errors}"
+        );
+        assert_eq!(errors.lines().count(), 1, "{errors}");
+    }
+    // A result that is a link to the full device is written to as it is.
+    fs::create_dir(folder.path().join("results")).unwrap();
+    std::os::unix::fs::symlink("/dev/full", folder.path().join("results/pairs.csv")).unwrap();
+    let output = run(folder.path(), &words(&format!("{STRAIN} --out results")));
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{errors}");
+    assert!(errors.contains("results/pairs.csv"), "{errors}");
+}
+
+#[test]
+fn a_stage_without_an_answer_does_not_hide_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..9).map(|k| format!("{},{}\n", k % 3, k / 3)).collect();
+    fs::write(folder.path().join("few.csv"), rows).unwrap();
+    let output = run(
+        folder.path(),
+        &words("strain few.csv few.csv --json --out results"),
+    );
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value["match"]["value"]["pairs"], 9);
+    assert!(
+        value["strain"]["error"]
+            .as_str()
+            .unwrap()
+            .contains("too few")
+    );
+    assert!(folder.path().join("results/pairs.csv").exists());
+}
