@@ -84,7 +84,7 @@ choice! {
     /// assert!(error.starts_with("stage `reconstruction` must be one of \"eikonal\""));
     /// ```
     ReconstructionChoice, "reconstruction":
-    /// [`Eikonal`](crate::sfs::Eikonal), zero height at the rim.
+    /// [`Eikonal`](crate::sfs::Eikonal), zero height at the contour of the fitted profile.
     Eikonal = "eikonal",
     /// [`TsaiShah`](crate::sfs::TsaiShah): quick, and much too low on the fine frames of a whole contact.
     TsaiShah = "tsai-shah",
@@ -97,9 +97,11 @@ choice! {
     ///
     /// ```
     /// use tactile_imaging::pipeline::SamplerChoice;
-    /// assert_eq!(SamplerChoice::default().name(), "equally-spaced");
+    /// assert_eq!(SamplerChoice::default().name(), "contact");
     /// ```
     SamplerChoice, "sampler":
+    /// [`ContactSampler`](crate::sfs::ContactSampler): equally spaced up to the sub-pixel contour of the contact.
+    Contact = "contact",
     /// [`EquallySpaced`](crate::sfs::EquallySpaced).
     EquallySpaced = "equally-spaced",
     /// [`CurvatureAdaptive`](crate::sfs::CurvatureAdaptive) of emphasis 4.

@@ -36,7 +36,7 @@
 //!
 //! [stages]                               # each by name; these are the defaults
 //! reconstruction = "eikonal"             # or "tsai-shah", "brooks-horn"; not with a depth table
-//! sampler = "equally-spaced"             # or "curvature", "random"
+//! sampler = "contact"                    # or "equally-spaced", "curvature", "random"
 //! matcher = "annealed-softassign"        # or "relaxation-labelling", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
 //! warp = "thin-plate-spline"             # or "cubic-spline", "affine", "rigid"
 //! strain = "green-lagrange"              # or "euler-almansi", "hencky", "biot", "infinitesimal"

@@ -8,13 +8,13 @@ use super::contact::{ContactStage, LightContact};
 use super::error::PipelineError;
 use super::estimators::EstimatorStage;
 use super::object::Object;
-use super::settings::Settings;
+use super::settings::{Settings, SurfaceInput};
 use super::strain_spline::StrainSpline;
 use crate::elasticity::modulus::ModulusEstimator;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
 use crate::matching::PointMatcher;
-use crate::sfs::{ControlPointSampler, EquallySpaced, SurfaceReconstruction};
+use crate::sfs::{ContactSampler, ControlPointSampler, EquallySpaced, SurfaceReconstruction};
 use crate::tps::WarpModel;
 use ndarray::ArrayView2;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use std::sync::Arc;
 /// |---|---|---|
 /// | frame to contact and force | [`with_contact`](Self::with_contact) | [`LightContact`] with a linear calibration |
 /// | image to surface | [`with_surface`](Self::with_surface) | [`Eikonal`](crate::sfs::Eikonal), frontal light, zero height at the rim |
-/// | surface to control points | [`with_sampler`](Self::with_sampler) | [`EquallySpaced`] |
+/// | surface to control points | [`with_sampler`](Self::with_sampler) | [`ContactSampler`]; [`EquallySpaced`] where the surface is read from a signal |
 /// | points to matches | [`with_matcher`](Self::with_matcher) | [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by |
 /// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation |
 /// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
@@ -58,7 +58,8 @@ use std::sync::Arc;
 pub struct Pipeline {
     contact: Arc<dyn ContactStage>,
     surface: Arc<dyn SurfaceReconstruction<f64> + Send + Sync>,
-    sampler: Arc<dyn ControlPointSampler<f64> + Send + Sync>,
+    /// None: the default for what the surface is read from.
+    sampler: Option<Arc<dyn ControlPointSampler<f64> + Send + Sync>>,
     matcher: Arc<dyn PointMatcher<f64, 3> + Send + Sync>,
     warp: Arc<dyn WarpModel<f64, 3> + Send + Sync>,
     strain: Arc<dyn StrainMeasure<f64> + Send + Sync>,
@@ -87,7 +88,7 @@ impl Pipeline {
         Ok(Self {
             contact: Arc::new(contact),
             surface: Arc::new(named::eikonal()?),
-            sampler: Arc::new(EquallySpaced),
+            sampler: None,
             matcher: Arc::new(named::near_by()),
             warp: Arc::new(StrainSpline),
             strain: Arc::new(GreenLagrange),
@@ -133,7 +134,12 @@ impl Pipeline {
     }
 
     pub(super) fn sampler(&self) -> &dyn ControlPointSampler<f64> {
-        self.sampler.as_ref()
+        match (&self.sampler, self.settings.surface_input) {
+            (Some(sampler), _) => sampler.as_ref(),
+            (None, SurfaceInput::Shading) => &ContactSampler,
+            // Depths read from a signal end in a step at the contact's boundary, not at the plane.
+            (None, SurfaceInput::Signal) => &EquallySpaced,
+        }
     }
 
     pub(super) fn matcher(&self) -> &dyn PointMatcher<f64, 3> {

@@ -12,8 +12,8 @@ use crate::pipeline::choice::{
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::strain_spline::StrainSpline;
 use crate::sfs::{
-    BoundaryCondition, BrooksHorn, ControlPointSampler, CurvatureAdaptive, Eikonal, EquallySpaced,
-    Lighting, Random, SurfaceReconstruction, TsaiShah,
+    BoundaryCondition, BrooksHorn, ContactSampler, ControlPointSampler, CurvatureAdaptive, Eikonal,
+    EquallySpaced, Lighting, Random, SurfaceReconstruction, TsaiShah,
 };
 use crate::tps::{AffineModel, FitOptions, R3, RigidModel, Smoothing, WarpModel};
 use std::sync::Arc;
@@ -21,10 +21,11 @@ use std::sync::Arc;
 /// How much denser [`SamplerChoice::Curvature`] samples where the surface bends: between even spacing (1) and points at the rim alone.
 const CURVATURE_EMPHASIS: f64 = 4.0;
 
-/// The default reconstruction: frontal light, the contact's rim at height zero.
+/// The default reconstruction: frontal light, height zero on the sub-pixel contour of the profile fitted to the contact.
 pub(super) fn eikonal() -> Result<Eikonal<f64>, PipelineError> {
     Eikonal::new(Lighting::frontal())
         .with_boundary(BoundaryCondition::Height(0.0))
+        .map(|eikonal| eikonal.with_fitted_profile(true))
         .map_err(PipelineError::SurfaceOptions)
 }
 
@@ -45,6 +46,7 @@ pub(super) fn sampler(
     choice: SamplerChoice,
 ) -> Result<Arc<dyn ControlPointSampler<f64> + Send + Sync>, PipelineError> {
     Ok(match choice {
+        SamplerChoice::Contact => Arc::new(ContactSampler),
         SamplerChoice::EquallySpaced => Arc::new(EquallySpaced),
         SamplerChoice::Curvature => Arc::new(
             CurvatureAdaptive::new(CURVATURE_EMPHASIS).map_err(PipelineError::SurfaceOptions)?,

@@ -32,7 +32,7 @@ impl Pipeline {
     pub fn with_stages(mut self, config: &StagesConfig) -> Result<Self, PipelineError> {
         self.surface = named::reconstruction(config.reconstruction)?;
         self.settings.surface_input = SurfaceInput::Shading;
-        self.sampler = named::sampler(config.sampler)?;
+        self.sampler = Some(named::sampler(config.sampler)?);
         self.matcher = named::matcher(config.matcher);
         self.warp = named::warp(config.warp)?;
         self.strain = named::strain(config.strain);
@@ -133,7 +133,7 @@ impl Pipeline {
         mut self,
         sampler: impl ControlPointSampler<f64> + Send + Sync + 'static,
     ) -> Self {
-        self.sampler = Arc::new(sampler);
+        self.sampler = Some(Arc::new(sampler));
         self
     }
 
