@@ -80,7 +80,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Ok(influence)
     }
 
-    /// [`influence`](Self::influence) at many points, into the caller's memory: row by row, [`len`](Self::len) entries a
+    /// [`influence`](Self::influence) at many points, into the caller's memory: row by row, `n` entries (one per source point) a
     /// point. Allocates nothing once the workspace has grown.
     ///
     /// ```
@@ -132,7 +132,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// [`jacobian_influence`](Self::jacobian_influence) at many points, into the caller's memory: row by row,
-    /// [`len`](Self::len) entries a point. Allocates nothing once the workspace has grown.
+    /// `n` entries (one per source point) a point. Allocates nothing once the workspace has grown.
     ///
     /// ```
     /// # use nalgebra::{Point2, Vector2};

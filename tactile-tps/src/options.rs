@@ -28,7 +28,7 @@ pub enum Solver {
     Automatic,
     /// A dense factor: n³/3 operations and 8n² bytes, to rounding.
     Direct,
-    /// Preconditioned conjugate gradients: n² kernels a step, O(n) memory, to the [tolerance](FitOptions::tolerance).
+    /// Preconditioned conjugate gradients: n² kernels a step, O(n) memory, to the [tolerance](FitOptions::with_tolerance).
     Iterative,
 }
 

@@ -17,7 +17,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// is already there; allocates nothing once workspace and spline have grown.
     ///
     /// The same weights and λ cost two triangular solves; another λ without weights two products once the matrix is
-    /// [decomposed](Self::decompose). Positive weights leave an interpolating spline as it is, and cost the two solves. With
+    /// decomposed into eigenvectors. Positive weights leave an interpolating spline as it is, and cost the two solves. With
     /// λ > 0, up to sixteen weights that differ from the rest are met by a small system of their own, weights near each other
     /// by conjugate gradients on the decomposed matrix, to 1e-13 of the targets; weights far apart, or of zero, cost a
     /// factorisation. An iterative solver builds its preconditioner anew for another λ, or other weights beside one.

@@ -21,7 +21,7 @@ use tactile_imaging::tps::{
 ///
 /// The files are CSV, a point a row: columns x, y and, in space, z, found by name where there is a header. Row i of
 /// TARGETS is where row i of SOURCES goes. λ weighs the bending energy wᵀKw against the squared distances to the targets;
-/// 0 passes through every target. --out gets warped.csv: fx,fy[,fz] and the Jacobian dfx_dx,dfx_dy,… at every query.
+/// 0 passes through every target. --out gets warped.csv: fx, fy (and fz) and the Jacobian dfx_dx,dfx_dy,… at every query.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

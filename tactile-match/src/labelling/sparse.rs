@@ -7,12 +7,12 @@ use crate::{MatchError, Matching, PointMatcher};
 use nalgebra::Point;
 use tactile_tps::Scalar;
 
-/// The paper's method over the likeliest candidates of every point: [`RelaxationLabelling`] with the same options, at a fraction of its cost.
+/// The paper's method over the likeliest candidates of every point: [`RelaxationLabelling`](crate::RelaxationLabelling) with the same options, at a fraction of its cost.
 ///
 /// Only the `c` pairs of largest first probability of every model point are kept; the others stay zero, which (20) would not change.
 /// What pair `(a, b)` says for pair `(i, j)` in (19) does not depend on M: these links, `I A c²` at most, are computed once an
 /// outer iteration, and a sweep costs one multiplication each instead of `O(I J A B)`. With all candidates
-/// (`candidates ≥ J`) the answer is that of [`RelaxationLabelling`] to rounding. The other candidates of a
+/// (`candidates ≥ J`) the answer is that of [`RelaxationLabelling`](crate::RelaxationLabelling) to rounding. The other candidates of a
 /// point whose match is settled (to a hundred roundings) leave the sweeps.
 ///
 /// ```
