@@ -166,44 +166,45 @@ fn parse(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<GreyImage, ReadE
     Ok(to_grey(decoded, largest))
 }
 
-/// The sample that stands for the level 255.
+/// The decoded sample that stands for the level 255. The decoder stretches the samples of a PGM, PPM or PAM from the largest
+/// value that the header announces to the full range of 8 or 16 bits.
 fn full_scale(
     image: &DynamicImage,
     bytes: &[u8],
     path: &Path,
     bits: Option<u8>,
 ) -> Result<f64, ReadError> {
-    let announced = pnm_maxval(bytes);
     if !is_wide(image) {
-        return Ok(announced.map_or(255.0, f64::from));
+        return Ok(255.0);
     }
+    let brightest = brightest(image);
+    let announced = pnm_maxval(bytes);
     match (bits, announced) {
         (Some(bits), _) => {
-            let brightest = brightest(image);
-            let largest = (1_u32 << bits.clamp(1, 16)) - 1;
-            if u32::from(brightest) > largest {
+            let stretch = announced.map_or(1.0, |maxval| FULL_RANGE / f64::from(maxval));
+            let largest = stretch * f64::from((1_u32 << bits.clamp(1, 16)) - 1);
+            // Half a sample for the decoder's rounding.
+            if f64::from(brightest) > largest + 0.5 {
                 return Err(ReadError::TooFewBits {
                     path: path.into(),
-                    brightest,
+                    brightest: (f64::from(brightest) / stretch).round() as u16,
                     bits,
                 });
             }
-            Ok(f64::from(largest))
+            Ok(largest)
         }
-        (None, Some(maxval)) => Ok(f64::from(maxval)),
-        (None, None) => {
-            let brightest = brightest(image);
-            if brightest > TWELVE_BITS {
-                return Ok(65_535.0);
-            }
-            Err(ReadError::UnclearBits {
-                path: path.into(),
-                brightest,
-                likely: if brightest > 1023 { 12 } else { 10 },
-            })
-        }
+        (None, Some(_)) => Ok(FULL_RANGE),
+        (None, None) if brightest > TWELVE_BITS => Ok(FULL_RANGE),
+        (None, None) => Err(ReadError::UnclearBits {
+            path: path.into(),
+            brightest,
+            likely: if brightest > 1023 { 12 } else { 10 },
+        }),
     }
 }
+
+/// The largest sample of 16 bits.
+const FULL_RANGE: f64 = 65_535.0;
 
 /// The largest value of a sample that the header of a PGM, PPM or PAM announces.
 fn pnm_maxval(bytes: &[u8]) -> Option<u16> {
@@ -370,10 +371,28 @@ mod tests {
             "P5\n# a camera of 12 bits\n2 1\n4095\n",
             &[0x0f, 0xff, 0x03, 0x33],
         );
-        // 4095 / 255 is not a whole number: the quotient is right to rounding.
+        // 65535 / 4095 and its products are right to rounding; the decoder rounds 819 of 4095 to 13107 of 65535, which is exact.
         assert!((image.levels[[0, 0]] - 255.0).abs() < 1e-12);
         assert!((image.levels[[0, 1]] - 51.0).abs() < 1e-12);
         let coarse = pnm("P2\n2 1\n15\n15 3\n", b"");
         assert_eq!(coarse.levels.as_slice().unwrap(), [255.0, 51.0]);
+    }
+
+    #[test]
+    fn bits_given_beside_an_announced_largest_value_count_in_its_samples() {
+        let bytes = [b"P5\n2 1\n4095\n".as_slice(), &[0x03, 0xff, 0x01, 0x55]].concat();
+        let path = Path::new("frame.pgm");
+        let image = parse(&bytes, path, Some(10)).unwrap();
+        // 1023 of ten bits is 255, 341 a third of it; the decoder rounds to one part in 65535.
+        assert!((image.levels[[0, 0]] - 255.0).abs() < 255.0 / 16_000.0);
+        assert!((image.levels[[0, 1]] - 85.0).abs() < 255.0 / 16_000.0);
+        assert!(matches!(
+            parse(&bytes, path, Some(9)),
+            Err(ReadError::TooFewBits {
+                brightest: 1023,
+                bits: 9,
+                ..
+            })
+        ));
     }
 }

@@ -1,13 +1,16 @@
 //! Point sets in CSV: one point a row.
 //!
 //! With a header the columns `x`, `y` and, in space, `z` are found by name, other columns (an `id`) are passed over, and
-//! units (`x_um`, `y (mm)`) are converted to metres. Without one the file has two or three columns in any unit.
+//! units (`x_um`, `y (mm)`) are converted to metres; pixels (`x_px`) stay pixels. Without one the file has two or three columns in any unit.
 use super::error::{Expected, ReadError, read_bytes, write_bytes};
 use super::table::{Column, Table, parse_table};
 use super::units::{Heading, Quantity};
 use nalgebra::{Point, Point2, Point3};
 use std::fmt::Write as _;
 use std::path::Path;
+
+/// The unit of positions in an image.
+const PIXELS: &str = "px";
 
 /// Points of a file whose number of coordinates is not known beforehand.
 ///
@@ -75,7 +78,11 @@ pub fn read_point_table_in(path: impl AsRef<Path>) -> Result<(PointTable, bool),
     let path = path.as_ref();
     let table = parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)?;
     let headings: Vec<Heading> = table.header.iter().map(|h| Heading::parse(h)).collect();
-    let in_metres = headings.iter().any(|h| h.name == "x" && h.unit.is_some());
+    let unit = headings
+        .iter()
+        .find(|h| h.name == "x")
+        .and_then(|h| h.unit.as_deref());
+    let in_metres = unit.is_some_and(|unit| unit != PIXELS);
     let dimensions = match table.values.ncols() {
         _ if headings.iter().any(|h| h.name == "z") => 3,
         _ if !headings.is_empty() => 2,
@@ -127,7 +134,7 @@ pub fn read_points<const D: usize>(
 /// use nalgebra::Point3;
 /// use tactile_imaging::io::points::parse_points;
 /// let points = parse_points::<3>(b"x_mm;y_mm;z_mm\n# rim\n1;2;0.5\n", "points.csv")?;
-/// assert_eq!(points, [Point3::new(1.0, 2.0, 0.5)]);
+/// assert_eq!(points, [Point3::new(1e-3, 2e-3, 5e-4)]);
 /// assert!(parse_points::<2>(b"1,2,0.5\n", "points.csv").is_err());
 /// # Ok::<(), tactile_imaging::io::ReadError>(())
 /// ```
@@ -203,10 +210,19 @@ fn to_points<const D: usize>(table: &Table, path: &Path) -> Result<Vec<Point<f64
         });
     }
     let names: [[&str; 1]; D] = std::array::from_fn(|i| [axes[i]]);
+    // Positions of tracked points are often in pixels, which have no length here: they stay as they are.
+    let in_pixels = headings
+        .iter()
+        .any(|h| h.name == "x" && h.unit.as_deref() == Some(PIXELS));
+    let (quantity, unit) = if in_pixels {
+        (Quantity::Number, PIXELS)
+    } else {
+        (Quantity::Length, "m")
+    };
     let wanted: [Column<'_>; D] = std::array::from_fn(|i| Column {
         names: &names[i],
-        quantity: Quantity::Length,
-        unit: "m",
+        quantity,
+        unit,
     });
     let columns = table.columns(wanted, path)?;
     let rows = 0..table.values.nrows();

@@ -84,7 +84,7 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
     (
         "pairs = \"pairs.csv\"",
         "depth_table = \"pairs.csv\"",
-        &["`calibration.depth_table`", "darkness_grey_levels"],
+        &["`calibration.depth_table`", "`darkness`"],
     ),
     (
         "[calibration]",
