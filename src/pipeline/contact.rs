@@ -140,6 +140,11 @@ pub struct FrameContact {
 }
 
 impl FrameContact {
+    /// Number of the contact's pixels.
+    pub(super) fn pixels(&self) -> usize {
+        self.mask.iter().filter(|inside| **inside).count()
+    }
+
     /// Gives up the saving of the contact's box: the mask is laid out over the whole frame.
     pub(super) fn widened(&self, (rows, columns): (usize, usize)) -> Self {
         let Some(region) = self.region else {

@@ -1,4 +1,5 @@
 //! What each load says, and the errors that all loads share.
+use super::contact::ContactReading;
 use super::error::PipelineError;
 use super::settings::Settings;
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
@@ -12,33 +13,30 @@ pub(super) struct LoadReading {
     /// Error of the force from the calibration.
     pub calibration_n: f64,
     pub radius_m: Estimate<f64>,
+    pub indentation_m: Option<Estimate<f64>>,
+    /// Strain since the first load.
+    pub mean_strain: Option<Estimate<f64>>,
 }
 
-/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one is common to all loads (the
-/// slope's); what a load has beyond that (the offset's) is its own.
-pub(super) fn split_errors(
-    readings: impl Iterator<Item = LoadReading> + Clone,
-    settings: &Settings,
-) -> (Vec<LoadState<f64>>, SharedErrors<f64>) {
-    let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
-    let common = readings
-        .clone()
-        .map(|r| relative(&r))
-        .fold(f64::INFINITY, f64::min);
-    let common = if common.is_finite() { common } else { 0.0 };
-    let load = |r: LoadReading| {
-        let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2))
-            .max(0.0)
-            .sqrt();
-        LoadState::new(Estimate::new(r.force_n, r.noise_n.hypot(rest)))
-            .with_contact_radius(r.radius_m)
-    };
-    let shared = SharedErrors {
-        force_scale: common.hypot(settings.force_scale_error),
-        length_scale: settings.length_scale_error,
-        ..SharedErrors::default()
-    };
-    (readings.map(load).collect(), shared)
+impl LoadReading {
+    /// What a contact says of its load; `None` where its force is not known.
+    pub(super) fn of(
+        contact: &ContactReading,
+        mean_strain: Option<Estimate<f64>>,
+        pixel_size_m: [f64; 2],
+    ) -> Option<Self> {
+        let radius = contact.contact_radius_m;
+        Some(Self {
+            force_n: contact.force_n?.value,
+            noise_n: contact.force_noise_n,
+            calibration_n: contact.force_calibration_n,
+            radius_m: radius_with_floor(radius.value, radius.standard_error, pixel_size_m),
+            indentation_m: contact
+                .indentation_m
+                .map(|depth| Estimate::new(depth.value, depth.standard_error)),
+            mean_strain,
+        })
+    }
 }
 
 /// The contact radius with what no profile can know better: a hundredth of a pixel, by which a rim of pixels, blur and the
@@ -52,12 +50,34 @@ pub(super) fn radius_with_floor(
     Estimate::new(value, standard_error.hypot(floor))
 }
 
-/// Loads with the errors that they share.
+/// Loads and the relative errors they share. Of the calibration's errors the smallest relative one is common to all loads (the
+/// slope's); what a load has beyond that (the offset's) is its own.
 pub(super) fn series(
-    loads: Vec<LoadState<f64>>,
-    shared: SharedErrors<f64>,
+    readings: impl Iterator<Item = LoadReading> + Clone,
+    settings: &Settings,
 ) -> Result<LoadSeries<f64>, PipelineError> {
-    LoadSeries::new(loads)
+    let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
+    let common = readings
+        .clone()
+        .map(|r| relative(&r))
+        .fold(f64::INFINITY, f64::min);
+    let common = if common.is_finite() { common } else { 0.0 };
+    let load = |r: LoadReading| {
+        let rest = (r.calibration_n.powi(2) - (common * r.force_n).powi(2))
+            .max(0.0)
+            .sqrt();
+        let force = Estimate::new(r.force_n, r.noise_n.hypot(rest));
+        let mut load = LoadState::new(force).with_contact_radius(r.radius_m);
+        load.indentation_m = r.indentation_m;
+        load.mean_strain = r.mean_strain;
+        load
+    };
+    let shared = SharedErrors {
+        force_scale: common.hypot(settings.force_scale_error),
+        length_scale: settings.length_scale_error,
+        ..SharedErrors::default()
+    };
+    LoadSeries::new(readings.map(load).collect::<Vec<_>>())
         .with_shared_errors(shared)
         .map_err(PipelineError::Modulus)
 }

@@ -41,6 +41,7 @@ mod outcome;
 mod pair;
 mod press;
 mod report;
+mod runner;
 mod session;
 mod settings;
 mod source;

@@ -2,8 +2,10 @@
 use super::composition::Pipeline;
 use super::error::PipelineError;
 use super::strain_error::mean_strain_error;
+use super::surface::ControlPoints;
 use crate::elasticity::field::{StrainField, StrainSummary};
-use crate::matching::{Matching, WarmStart};
+use crate::elasticity::modulus::Estimate;
+use crate::matching::Matching;
 use nalgebra::{Matrix3, Point3};
 
 /// Fewest matches from which a three-dimensional strain can be told.
@@ -46,45 +48,32 @@ pub struct PairStrain {
     pub summary: StrainSummary<f64>,
 }
 
-pub(super) fn match_points(
-    pipeline: &Pipeline,
-    frames: [usize; 2],
-    model: &[Point3<f64>],
-    target: &[Point3<f64>],
-) -> Result<Matching<f64, 3>, PipelineError> {
-    let [from, to] = frames;
-    pipeline
-        .matcher()
-        .match_points(model, target)
-        .map_err(|source| PipelineError::Match { from, to, source })
-}
-
-/// As [`match_points`], from where the matcher's last match ended.
-pub(super) fn match_next(
-    pipeline: &Pipeline,
-    frames: [usize; 2],
-    warm: &mut WarmStart,
-    model: &[Point3<f64>],
-    target: &[Point3<f64>],
-) -> Result<Matching<f64, 3>, PipelineError> {
-    let [from, to] = frames;
-    let found = pipeline.matcher().match_next(warm, model, target);
-    found.map_err(|source| PipelineError::Match { from, to, source })
+impl PairStrain {
+    /// The strain of a load for equation (31), which takes the size of the mean e_zz: the sign says whether the load rose from the first
+    /// frame to the second, by `force_step_n`.
+    pub(super) fn of_load(&self, force_step_n: f64) -> Estimate<f64> {
+        let size = self.summary.mean[(2, 2)].abs();
+        let error = self.summary.standard_error[(2, 2)];
+        Estimate::new(size.copysign(force_step_n), error)
+    }
 }
 
 /// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.
 ///
 /// The matcher's own warp follows every point; its gradient across a surface, where no two points lie behind each other,
-/// would be noise. The warp fitted here is smooth. `grid_m` is the surfaces' pixel.
+/// would be noise. The warp fitted here is smooth.
 pub(super) fn strain(
     pipeline: &Pipeline,
     frames: [usize; 2],
-    model: &[Point3<f64>],
+    model: &ControlPoints,
     target: &[Point3<f64>],
     matching: &Matching<f64, 3>,
-    grid_m: f64,
 ) -> Result<PairStrain, PipelineError> {
     let [from, to] = frames;
+    let ControlPoints {
+        points: model,
+        grid_m,
+    } = model;
     let pairs = matching
         .assignment
         .iter()
@@ -116,7 +105,7 @@ pub(super) fn strain(
     let field = StrainField::from_gradients(&gradients, None, measure)
         .map_err(|source| PipelineError::Strain { from, to, source })?;
     let mut summary = field.summary();
-    let noise = mean_strain_error(&sources, &targets, grid_m);
+    let noise = mean_strain_error(&sources, &targets, *grid_m);
     summary
         .standard_error
         .zip_apply(&noise, |error, noise| *error = error.hypot(noise));

@@ -164,11 +164,20 @@ pub(super) fn reconstruct(
     })
 }
 
-/// Control points on a surface, in metres from the frame's first pixel.
+/// Control points on a surface.
+#[derive(Debug)]
+pub(super) struct ControlPoints {
+    /// In metres from the frame's first pixel.
+    pub(super) points: Vec<Point3<f64>>,
+    /// The longer side of the surface's pixel in metres.
+    pub(super) grid_m: f64,
+}
+
+/// Samples the control points of a surface.
 pub(super) fn sample(
     pipeline: &Pipeline,
     surface: &ContactSurface,
-) -> Result<Vec<Point3<f64>>, SfsError> {
+) -> Result<ControlPoints, SfsError> {
     let (heights, mask) = (&surface.surface.heights, &surface.surface.mask);
     let usable = mask.iter().filter(|m| **m).count();
     let count = pipeline.settings().control_points.min(usable);
@@ -181,7 +190,10 @@ pub(super) fn sample(
         p.x += x;
         p.y += y;
     }
-    Ok(points)
+    Ok(ControlPoints {
+        points,
+        grid_m: size[0].max(size[1]),
+    })
 }
 
 /// How far a pixel is to be smoothed: not at all on slopes above 60°, where smoothing would round off the rim and noise does

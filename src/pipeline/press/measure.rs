@@ -66,7 +66,7 @@ impl Press<'_> {
                 });
             }
         }
-        let radius = self.pipeline.settings().object.sphere_radius_m();
+        let radius = self.pipeline().settings().object.sphere_radius_m();
         let surface_height_m = self.surface(frame).map(|s| {
             let heights = s.surface.heights.iter().copied().filter(|h| h.is_finite());
             heights.fold(0.0, f64::max)

@@ -8,10 +8,10 @@ use super::contact::FrameContact;
 use super::error::PipelineError;
 use super::pair::PairStrain;
 use super::report::{Report, SkipReason, Stage};
-use super::surface::{ContactSurface, SurfaceWorkspace};
-use crate::force::{Estimate, ForceWorkspace, ReferenceFrame};
+use super::runner::{SkipRecords, StageRunner};
+use super::surface::{ContactSurface, ControlPoints};
+use crate::force::{Estimate, ReferenceFrame};
 use crate::matching::Matching;
-use nalgebra::Point3;
 use ndarray::ArrayView2;
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ struct Loaded<'a> {
     gauge: Option<Estimate<f64>>,
     contact: Option<FrameContact>,
     surface: Option<ContactSurface>,
-    points: Option<Vec<Point3<f64>>>,
+    points: Option<ControlPoints>,
     matching: Option<Matching<f64, 3>>,
     strain: Option<PairStrain>,
 }
@@ -48,14 +48,10 @@ struct Loaded<'a> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Press<'a> {
-    pipeline: Pipeline,
-    reference: Arc<ReferenceFrame>,
+    runner: StageRunner,
     frames: Vec<Loaded<'a>>,
     /// The frame whose results a frame shares: itself, or an equal one before it.
     twins: Vec<usize>,
-    force: ForceWorkspace,
-    surface: SurfaceWorkspace,
-    report: Report,
 }
 
 impl Pipeline {
@@ -91,13 +87,9 @@ impl Pipeline {
     /// ```
     pub fn press_on<'a>(&self, reference: Arc<ReferenceFrame>) -> Press<'a> {
         Press {
-            pipeline: self.clone(),
-            reference,
+            runner: StageRunner::new(self.clone(), reference, SkipRecords::EachFrame),
             frames: Vec::new(),
             twins: Vec::new(),
-            force: ForceWorkspace::default(),
-            surface: SurfaceWorkspace::default(),
-            report: Report::default(),
         }
     }
 }
@@ -120,7 +112,8 @@ impl<'a> Press<'a> {
     /// ```
     #[must_use]
     pub fn renewed(&self) -> Self {
-        let mut press = self.pipeline.press_on(Arc::clone(&self.reference));
+        let reference = Arc::clone(self.runner.reference());
+        let mut press = self.pipeline().press_on(reference);
         for frame in &self.frames {
             press.add_gauged_frame(frame.image, frame.gauge);
         }
@@ -162,33 +155,32 @@ impl<'a> Press<'a> {
     ) -> usize {
         let index = self.frames.len();
         let equal = |f: &Loaded<'_>| f.gauge == gauge && f.image == image;
-        let skip = self.pipeline.settings().skips.equal_frames;
+        let skip = self.pipeline().settings().skips.equal_frames;
         let twin = if skip {
             self.frames.iter().position(equal)
         } else {
             None
         };
         if twin.is_some() {
-            self.report
-                .skipped(Stage::Contact, index, SkipReason::EqualFrame, image.len());
+            self.runner
+                .skip(Stage::Contact, index, SkipReason::EqualFrame, image.len());
         }
         self.twins.push(twin.unwrap_or(index));
-        let (contact, surface, points, matching, strain) = (None, None, None, None, None);
         self.frames.push(Loaded {
             image,
             gauge,
-            contact,
-            surface,
-            points,
-            matching,
-            strain,
+            contact: None,
+            surface: None,
+            points: None,
+            matching: None,
+            strain: None,
         });
         index
     }
 
     /// The pipeline.
     pub fn pipeline(&self) -> &Pipeline {
-        &self.pipeline
+        self.runner.pipeline()
     }
 
     /// The image of a frame.
@@ -203,7 +195,7 @@ impl<'a> Press<'a> {
 
     /// What was computed and skipped so far.
     pub fn report(&self) -> &Report {
-        &self.report
+        self.runner.report()
     }
 
     /// The gauge's reading of a frame's force, if there was one.

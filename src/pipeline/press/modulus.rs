@@ -1,11 +1,9 @@
 //! The modulus of a press, and the loads it is estimated from.
 use super::Press;
-use crate::elasticity::modulus::{Estimate, LoadSeries, ModulusEstimate};
+use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::estimators::that_fit;
-use crate::pipeline::load_reading::{LoadReading, radius_with_floor, series, split_errors};
-use crate::pipeline::report::Stage;
-use std::time::Instant;
+use crate::pipeline::load_reading::LoadReading;
 
 impl Press<'_> {
     /// Young's modulus by the estimator of the pipeline. For a
@@ -14,12 +12,9 @@ impl Press<'_> {
     /// # Errors
     /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
-        let estimator = self.pipeline.estimator()?;
+        let estimator = self.pipeline().estimator()?;
         let loads = self.loads(estimator.needs_strain())?;
-        let start = Instant::now();
-        let estimate = estimator.estimate(&loads).map_err(PipelineError::Modulus);
-        self.report.ran(Stage::Modulus, start.elapsed());
-        estimate
+        self.runner.modulus(estimator.as_ref(), &loads)
     }
 
     /// What every frame says of its load, with the strain since the first and the errors that all share: what
@@ -67,53 +62,36 @@ impl Press<'_> {
             Ok(loads) => loads,
             Err(_) => self.loads(false)?,
         };
-        let start = Instant::now();
-        let settings = self.pipeline.settings();
+        let settings = self.pipeline().settings();
         let mut estimators = that_fit(settings.object, settings.waveguide.as_ref())?;
-        if let Ok(chosen) = self.pipeline.estimator()
+        if let Ok(chosen) = self.pipeline().estimator()
             && estimators.iter().all(|e| e.kind() != chosen.kind())
         {
             estimators.push(chosen);
         }
         let estimates = estimators
             .iter()
-            .filter_map(|e| e.estimate(&loads).ok())
-            .collect();
-        self.report.ran(Stage::Modulus, start.elapsed());
-        Ok(estimates)
+            .filter_map(|estimator| self.runner.modulus(estimator.as_ref(), &loads).ok());
+        Ok(estimates.collect())
     }
 
     /// What every frame says of its load, and the relative errors that all share.
     fn loads(&mut self, with_strain: bool) -> Result<LoadSeries<f64>, PipelineError> {
-        let mut readings = Vec::with_capacity(self.frames.len());
-        let mut depths = Vec::with_capacity(self.frames.len());
-        let size = self.pipeline.contact().pixel_size_m();
+        let mut readings: Vec<LoadReading> = Vec::with_capacity(self.frames.len());
+        let size = self.pipeline().contact().pixel_size_m();
         for frame in 0..self.frames.len() {
-            let reading = self.reading(frame)?;
-            let force = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
-            let a = reading.contact_radius_m;
-            readings.push(LoadReading {
-                force_n: force.value,
-                noise_n: reading.force_noise_n,
-                calibration_n: reading.force_calibration_n,
-                radius_m: radius_with_floor(a.value, a.standard_error, size),
-            });
-            depths.push(reading.indentation_m);
+            let contact = self.reading(frame)?;
+            let reading = LoadReading::of(&contact, None, size);
+            readings.push(reading.ok_or(PipelineError::NoForce { frame })?);
         }
-        let (mut loads, shared) = split_errors(readings.iter().copied(), self.pipeline.settings());
-        for (load, depth) in loads.iter_mut().zip(depths) {
-            load.indentation_m = depth.map(|d| Estimate::new(d.value, d.standard_error));
-        }
-        for frame in 1..if with_strain { loads.len() } else { 0 } {
+        let strained = if with_strain { readings.len() } else { 0 };
+        for frame in 1..strained {
+            // A frame that equals the first has no strain.
             if self.twins[frame] != 0 {
                 let step = readings[frame].force_n - readings[0].force_n;
-                let summary = &self.strain(frame)?.summary;
-                // (31) takes the strain's size; its sign says whether the load rose.
-                let value = summary.mean[(2, 2)].abs().copysign(step);
-                loads[frame].mean_strain =
-                    Some(Estimate::new(value, summary.standard_error[(2, 2)]));
+                readings[frame].mean_strain = Some(self.strain(frame)?.of_load(step));
             }
         }
-        series(loads, shared)
+        self.runner.load_series(readings.iter().copied())
     }
 }

@@ -1,13 +1,11 @@
 //! What a press says of its frames, one stage after the other: contact, surface, control points, match, strain.
-use super::Press;
+use super::{Loaded, Press};
 use crate::matching::Matching;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::pair::{self, PairStrain};
-use crate::pipeline::report::{SkipReason, Stage};
-use crate::pipeline::surface::{self, ContactSurface};
+use crate::pipeline::pair::PairStrain;
+use crate::pipeline::surface::{ContactSurface, ControlPoints};
 use nalgebra::Point3;
-use std::time::Instant;
 
 impl Press<'_> {
     /// The contact of a frame with its force; `None` where nothing touches.
@@ -17,32 +15,10 @@ impl Press<'_> {
     pub fn contact(&mut self, frame: usize) -> Result<Option<&ContactReading>, PipelineError> {
         let at = self.twin(frame)?;
         if self.frames[at].contact.is_none() {
-            let start = Instant::now();
             let mut contact = FrameContact::default();
             let loaded = &self.frames[at];
-            self.pipeline
-                .contact()
-                .measure(
-                    &mut self.force,
-                    loaded.image,
-                    &self.reference,
-                    loaded.gauge,
-                    &mut contact,
-                )
-                .map_err(|source| PipelineError::Contact { frame, source })?;
-            let pixels = loaded.image.len();
-            match contact.region {
-                None => self
-                    .report
-                    .skipped(Stage::Surface, frame, SkipReason::NoContact, pixels),
-                Some(region) if self.pipeline.settings().skips.outside_contact => {
-                    let saved = pixels - region.rows() * region.columns();
-                    self.report
-                        .skipped(Stage::Surface, frame, SkipReason::OutsideContact, saved);
-                }
-                Some(_) => contact = contact.widened(loaded.image.dim()),
-            }
-            self.report.ran(Stage::Contact, start.elapsed());
+            self.runner
+                .contact(frame, loaded.image, loaded.gauge, &mut contact)?;
             self.frames[at].contact = Some(contact);
         }
         Ok(self.frames[at]
@@ -81,20 +57,15 @@ impl Press<'_> {
         self.contact(0)?;
         let at = self.twin(frame)?;
         if self.frames[at].surface.is_none() {
-            let start = Instant::now();
             let loaded = &self.frames[at];
             let contact = loaded
                 .contact
                 .as_ref()
                 .ok_or(PipelineError::NoContact { frame })?;
-            let images = [loaded.image, self.reference.image()];
-            // All surfaces have the first one's grid, so that what the grid does to them leaves no strain.
             let first = self.frames[0].contact.as_ref().unwrap_or(contact);
-            let pixels = first.mask.iter().filter(|m| **m).count();
-            let surface =
-                surface::reconstruct(&self.pipeline, &mut self.surface, images, contact, pixels)
-                    .map_err(|source| PipelineError::Surface { frame, source })?;
-            self.report.ran(Stage::Surface, start.elapsed());
+            let surface = self
+                .runner
+                .surface(frame, loaded.image, contact, first.pixels())?;
             self.frames[at].surface = Some(surface);
         }
         self.frames[at]
@@ -125,17 +96,14 @@ impl Press<'_> {
         self.surface(frame)?;
         let at = self.twin(frame)?;
         if self.frames[at].points.is_none() {
-            let start = Instant::now();
             let surface = self.frames[at]
                 .surface
                 .as_ref()
                 .ok_or(PipelineError::NoContact { frame })?;
-            let points = surface::sample(&self.pipeline, surface)
-                .map_err(|source| PipelineError::Surface { frame, source })?;
-            self.report.ran(Stage::ControlPoints, start.elapsed());
+            let points = self.runner.control_points(frame, surface)?;
             self.frames[at].points = Some(points);
         }
-        Ok(self.frames[at].points.as_deref().unwrap_or_default())
+        Ok(&known_points(&self.frames, at)?.points)
     }
 
     /// The matches of the first frame's control points to those of a later frame.
@@ -160,10 +128,13 @@ impl Press<'_> {
         self.control_points(frame)?;
         let at = self.twin(frame)?;
         if self.frames[at].matching.is_none() {
-            let start = Instant::now();
-            let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
-            let matching = pair::match_points(&self.pipeline, [0, frame], points(0), points(at))?;
-            self.report.ran(Stage::Match, start.elapsed());
+            let (model, target) = (
+                known_points(&self.frames, 0)?,
+                known_points(&self.frames, at)?,
+            );
+            let matching = self
+                .runner
+                .matching([0, frame], &model.points, &target.points)?;
             self.frames[at].matching = Some(matching);
         }
         self.frames[at]
@@ -181,25 +152,17 @@ impl Press<'_> {
         self.matching(frame)?;
         let at = self.twin(frame)?;
         if self.frames[at].strain.is_none() {
-            let start = Instant::now();
-            let points = |i: usize| self.frames[i].points.as_deref().unwrap_or_default();
+            let (model, target) = (
+                known_points(&self.frames, 0)?,
+                known_points(&self.frames, at)?,
+            );
             let matching = self.frames[at]
                 .matching
                 .as_ref()
                 .ok_or(PipelineError::NoContact { frame })?;
-            let grid_m = self.frames[at]
-                .surface
-                .as_ref()
-                .map_or(0.0, |s| s.pixel_size_m[0].max(s.pixel_size_m[1]));
-            let strain = pair::strain(
-                &self.pipeline,
-                [0, frame],
-                points(0),
-                points(at),
-                matching,
-                grid_m,
-            )?;
-            self.report.ran(Stage::Strain, start.elapsed());
+            let strain = self
+                .runner
+                .strain([0, frame], model, &target.points, matching)?;
             self.frames[at].strain = Some(strain);
         }
         self.frames[at]
@@ -207,4 +170,15 @@ impl Press<'_> {
             .as_ref()
             .ok_or(PipelineError::NoContact { frame })
     }
+}
+
+/// The control points of a frame, which the stage before has sampled.
+fn known_points<'f>(
+    frames: &'f [Loaded<'_>],
+    frame: usize,
+) -> Result<&'f ControlPoints, PipelineError> {
+    frames[frame]
+        .points
+        .as_ref()
+        .ok_or(PipelineError::NoContact { frame })
 }

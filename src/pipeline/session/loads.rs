@@ -33,11 +33,12 @@ struct MergedLoad {
     force_variance: f64,
     radius_variance: f64,
     calibration: f64,
-    strain: Option<Estimate<f64>>,
+    indentation_m: Option<Estimate<f64>>,
+    mean_strain: Option<Estimate<f64>>,
 }
 
 impl MergedLoad {
-    fn of(reading: &ContactReading, strain: Option<Estimate<f64>>) -> Option<Self> {
+    fn of(reading: &ContactReading, mean_strain: Option<Estimate<f64>>) -> Option<Self> {
         let force = reading.force_n?;
         Some(Self {
             frames: 1.0,
@@ -46,7 +47,10 @@ impl MergedLoad {
             force_variance: reading.force_noise_n.powi(2),
             radius_variance: reading.contact_radius_m.standard_error.powi(2),
             calibration: (reading.force_calibration_n / force.value).abs(),
-            strain,
+            indentation_m: reading
+                .indentation_m
+                .map(|depth| Estimate::new(depth.value, depth.standard_error)),
+            mean_strain,
         })
     }
 
@@ -54,6 +58,12 @@ impl MergedLoad {
     fn merged(self, other: Self) -> Self {
         let frames = self.frames + other.frames;
         let (a, b) = (self.frames / frames, other.frames / frames);
+        let mean = |one: Option<Estimate<f64>>, two: Option<Estimate<f64>>| {
+            one.zip(two).map(|(s, o)| {
+                let error = (a * s.standard_error).hypot(b * o.standard_error);
+                Estimate::new(a * s.value + b * o.value, error)
+            })
+        };
         Self {
             frames,
             force_n: a * self.force_n + b * other.force_n,
@@ -61,10 +71,8 @@ impl MergedLoad {
             force_variance: a * a * self.force_variance + b * b * other.force_variance,
             radius_variance: a * a * self.radius_variance + b * b * other.radius_variance,
             calibration: a * self.calibration + b * other.calibration,
-            strain: self.strain.zip(other.strain).map(|(s, o)| {
-                let error = (a * s.standard_error).hypot(b * o.standard_error);
-                Estimate::new(a * s.value + b * o.value, error)
-            }),
+            indentation_m: mean(self.indentation_m, other.indentation_m),
+            mean_strain: mean(self.mean_strain, other.mean_strain),
         }
     }
 
@@ -74,6 +82,8 @@ impl MergedLoad {
             noise_n: self.force_variance.sqrt(),
             calibration_n: self.calibration * self.force_n,
             radius_m: radius_with_floor(self.radius_m, self.radius_variance.sqrt(), pixel_size_m),
+            indentation_m: self.indentation_m,
+            mean_strain: self.mean_strain,
         }
     }
 }
@@ -97,11 +107,6 @@ impl SeenLoads {
         pixel_size_m: [f64; 2],
     ) -> impl Iterator<Item = LoadReading> + Clone {
         self.0.iter().map(move |load| load.reading(pixel_size_m))
-    }
-
-    /// The strains of all loads, in the same order.
-    pub(super) fn strains(&self) -> impl Iterator<Item = Option<Estimate<f64>>> + '_ {
-        self.0.iter().map(|load| load.strain)
     }
 
     /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its profile fitted.

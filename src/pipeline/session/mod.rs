@@ -16,12 +16,13 @@ use super::contact::{FrameContact, resize};
 use super::error::PipelineError;
 use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
-use crate::force::{ForceWorkspace, ReferenceFrame, ShearCalibration, ShearTracker};
+use super::runner::{SkipRecords, StageRunner};
+use crate::force::{ShearCalibration, ShearTracker};
 pub use drift::{DRIFT_LIMIT_GREY, DriftWatch};
 pub use loads::SESSION_LOADS;
 use loads::SeenLoads;
 use ndarray::{Array2, ArrayView2};
-use std::time::Instant;
+use std::sync::Arc;
 use strain::FollowedStrain;
 pub use strain::SessionStrain;
 pub use update::Update;
@@ -43,9 +44,7 @@ pub use update::Update;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Session {
-    pipeline: Pipeline,
-    reference: ReferenceFrame,
-    workspace: ForceWorkspace,
+    runner: StageRunner,
     contact: FrameContact,
     last: Array2<u8>,
     /// Whether `contact` is that of `last`, and which frame that was.
@@ -56,7 +55,6 @@ pub struct Session {
     shear: Option<ShearTracker<f64>>,
     strain: FollowedStrain,
     drift: DriftWatch,
-    report: Report,
 }
 
 impl Session {
@@ -93,10 +91,9 @@ impl Session {
         pipeline: &Pipeline,
         references: &[ArrayView2<'_, u8>],
     ) -> Result<Self, PipelineError> {
+        let reference = Arc::new(pipeline.reference_frame(references)?);
         Ok(Self {
-            reference: pipeline.reference_frame(references)?,
-            pipeline: pipeline.clone(),
-            workspace: ForceWorkspace::default(),
+            runner: StageRunner::new(pipeline.clone(), reference, SkipRecords::Summed),
             contact: FrameContact::default(),
             last: Array2::default((0, 0)),
             measured: false,
@@ -106,7 +103,6 @@ impl Session {
             shear: None,
             strain: FollowedStrain::default(),
             drift: DriftWatch::default(),
-            report: Report::default(),
         })
     }
 
@@ -147,16 +143,20 @@ impl Session {
     pub fn push(&mut self, frame: ArrayView2<'_, u8>) -> Result<Update, PipelineError> {
         let number = self.frames;
         self.frames += 1;
-        let skip = self.pipeline.settings().skips.equal_frames;
+        let skip = self.runner.pipeline().settings().skips.equal_frames;
         let repeated = skip && self.measured && self.last == frame;
         if repeated {
-            self.report
-                .count_skip(Stage::Contact, SkipReason::EqualFrame, frame.len());
+            self.runner.skip(
+                Stage::Contact,
+                number as usize,
+                SkipReason::EqualFrame,
+                frame.len(),
+            );
         } else {
             self.measure(number, frame)?;
         }
         let contact = self.contact.reading;
-        let size = self.pipeline.contact().pixel_size_m();
+        let size = self.runner.pipeline().contact().pixel_size_m();
         let centroid = contact.map(|c| std::array::from_fn(|k| c.centroid_px[k].scaled(size[k])));
         let shear = self
             .shear
@@ -171,31 +171,15 @@ impl Session {
     }
 
     fn measure(&mut self, number: u64, frame: ArrayView2<'_, u8>) -> Result<(), PipelineError> {
-        let start = Instant::now();
         self.measured = false;
         resize(&mut self.last, frame.dim());
         self.last.assign(&frame);
-        self.pipeline
-            .contact()
-            .measure(
-                &mut self.workspace,
-                frame,
-                &self.reference,
-                None,
-                &mut self.contact,
-            )
-            .map_err(|source| PipelineError::Contact {
-                frame: number as usize,
-                source,
-            })?;
+        self.runner
+            .contact(number as usize, frame, None, &mut self.contact)?;
         self.measured = true;
         self.measured_frame = number;
-        self.report.ran(Stage::Contact, start.elapsed());
-        match self.contact.reading {
-            None => self
-                .report
-                .count_skip(Stage::Surface, SkipReason::NoContact, frame.len()),
-            Some(reading) => self.loads.learn(&reading, None),
+        if let Some(reading) = &self.contact.reading {
+            self.loads.learn(reading, None);
         }
         if let Some(grey) = self.contact.background_step_grey {
             self.drift.watch(grey);
@@ -303,6 +287,6 @@ impl Session {
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     pub fn report(&self) -> &Report {
-        &self.report
+        self.runner.report()
     }
 }

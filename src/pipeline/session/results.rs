@@ -3,9 +3,6 @@ use super::Session;
 use super::strain::{FollowedStrain, Frame, SessionStrain};
 use crate::elasticity::modulus::ModulusEstimate;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::load_reading::{series, split_errors};
-use crate::pipeline::report::Stage;
-use std::time::Instant;
 
 impl Session {
     /// Strain of the last frame against the load where strain began to be asked for; that load's own answer is `None`.
@@ -44,11 +41,10 @@ impl Session {
         let frame = Frame {
             number: self.measured_frame,
             image: self.last.view(),
-            reference: &self.reference,
             contact: &self.contact,
             reading,
         };
-        self.strain.follow(&self.pipeline, &frame, &mut self.report)
+        self.strain.follow(&mut self.runner, &frame)
     }
 
     /// Counts strain anew, from the next load that [`strain`](Self::strain) is asked for.
@@ -76,18 +72,13 @@ impl Session {
     /// # Errors
     /// [`PipelineError::Modulus`].
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
-        let estimator = self.pipeline.estimator()?;
-        let start = Instant::now();
-        let settings = self.pipeline.settings();
-        let size = self.pipeline.contact().pixel_size_m();
-        let (loads, shared) = if estimator.needs_strain() {
-            self.strain.loads(size, settings)
+        let estimator = self.runner.pipeline().estimator()?;
+        let size = self.runner.pipeline().contact().pixel_size_m();
+        let loads = if estimator.needs_strain() {
+            self.runner.load_series(self.strain.loads(size))?
         } else {
-            split_errors(self.loads.readings(size), settings)
+            self.runner.load_series(self.loads.readings(size))?
         };
-        let loads = series(loads, shared)?;
-        let estimate = estimator.estimate(&loads).map_err(PipelineError::Modulus);
-        self.report.ran(Stage::Modulus, start.elapsed());
-        estimate
+        self.runner.modulus(estimator.as_ref(), &loads)
     }
 }

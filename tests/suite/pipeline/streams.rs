@@ -161,7 +161,7 @@ fn twenty_thousand_frames_leave_memory_and_answer_alone() {
         });
         assert!(k < 1_000 || count.count_total == 0, "frame {k}: {count:?}");
         assert!(
-            session.loads() <= SESSION_LOADS && session.report().skips.len() <= 2,
+            session.loads() <= SESSION_LOADS && session.report().skips.len() <= 3,
             "memory is flat"
         );
         if k == 1_000 {

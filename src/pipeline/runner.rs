@@ -1,0 +1,225 @@
+//! Runs the stages of a pipeline one at a time, for a press and a session alike: times every run, and records what was skipped.
+use super::composition::Pipeline;
+use super::contact::FrameContact;
+use super::error::PipelineError;
+use super::load_reading::{self, LoadReading};
+use super::pair::{self, PairStrain};
+use super::report::{Report, SkipReason, Stage};
+use super::surface::{self, ContactSurface, ControlPoints, SurfaceWorkspace};
+use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator};
+use crate::force::{Estimate, ForceWorkspace, ReferenceFrame};
+use crate::matching::{MatchError, Matching, WarmStart};
+use nalgebra::Point3;
+use ndarray::ArrayView2;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How skips enter the report.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum SkipRecords {
+    /// One entry for every skip, with its frame.
+    EachFrame,
+    /// One entry for every kind of skip, its savings summed: a stream's report must not grow.
+    Summed,
+}
+
+/// Where the last match of a stream ended.
+#[derive(Default)]
+pub(super) struct MatchHistory {
+    warm: WarmStart,
+    /// Iterations of the first match, which had nothing to start from.
+    first_iterations: Option<usize>,
+}
+
+/// A pipeline at work on the frames of one sensor.
+pub(super) struct StageRunner {
+    pipeline: Pipeline,
+    reference: Arc<ReferenceFrame>,
+    force: ForceWorkspace,
+    surface: SurfaceWorkspace,
+    skip_records: SkipRecords,
+    report: Report,
+}
+
+impl StageRunner {
+    pub(super) fn new(
+        pipeline: Pipeline,
+        reference: Arc<ReferenceFrame>,
+        skip_records: SkipRecords,
+    ) -> Self {
+        Self {
+            pipeline,
+            reference,
+            force: ForceWorkspace::default(),
+            surface: SurfaceWorkspace::default(),
+            skip_records,
+            report: Report::default(),
+        }
+    }
+
+    pub(super) fn pipeline(&self) -> &Pipeline {
+        &self.pipeline
+    }
+
+    pub(super) fn reference(&self) -> &Arc<ReferenceFrame> {
+        &self.reference
+    }
+
+    pub(super) fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Records that work on a frame was left out.
+    pub(super) fn skip(&mut self, stage: Stage, frame: usize, reason: SkipReason, saved: usize) {
+        match self.skip_records {
+            SkipRecords::EachFrame => self.report.skipped(stage, frame, reason, saved),
+            SkipRecords::Summed => self.report.count_skip(stage, reason, saved),
+        }
+    }
+
+    /// Measures the contact of a frame into `contact`.
+    pub(super) fn contact(
+        &mut self,
+        frame: usize,
+        image: ArrayView2<'_, u8>,
+        gauge: Option<Estimate<f64>>,
+        contact: &mut FrameContact,
+    ) -> Result<(), PipelineError> {
+        let start = Instant::now();
+        self.pipeline
+            .contact()
+            .measure(&mut self.force, image, &self.reference, gauge, contact)
+            .map_err(|source| PipelineError::Contact { frame, source })?;
+        self.report.ran(Stage::Contact, start.elapsed());
+        let pixels = image.len();
+        match contact.region {
+            None => self.skip(Stage::Surface, frame, SkipReason::NoContact, pixels),
+            Some(region) if self.pipeline.settings().skips.outside_contact => {
+                let saved = pixels - region.rows() * region.columns();
+                self.skip(Stage::Surface, frame, SkipReason::OutsideContact, saved);
+            }
+            Some(_) => {}
+        }
+        Ok(())
+    }
+
+    /// Reconstructs the surface of a contact. All surfaces that are compared have one grid, so that what the grid does to them leaves no
+    /// strain: the grid for a contact of `grid_pixels` pixels.
+    pub(super) fn surface(
+        &mut self,
+        frame: usize,
+        image: ArrayView2<'_, u8>,
+        contact: &FrameContact,
+        grid_pixels: usize,
+    ) -> Result<ContactSurface, PipelineError> {
+        let start = Instant::now();
+        let images = [image, self.reference.image()];
+        let (pipeline, workspace) = (&self.pipeline, &mut self.surface);
+        let surface = if pipeline.settings().skips.outside_contact {
+            surface::reconstruct(pipeline, workspace, images, contact, grid_pixels)
+        } else {
+            let contact = contact.widened(image.dim());
+            surface::reconstruct(pipeline, workspace, images, &contact, grid_pixels)
+        };
+        let surface = surface.map_err(|source| PipelineError::Surface { frame, source })?;
+        self.report.ran(Stage::Surface, start.elapsed());
+        Ok(surface)
+    }
+
+    /// Samples the control points of a surface.
+    pub(super) fn control_points(
+        &mut self,
+        frame: usize,
+        surface: &ContactSurface,
+    ) -> Result<ControlPoints, PipelineError> {
+        let start = Instant::now();
+        let points = surface::sample(&self.pipeline, surface)
+            .map_err(|source| PipelineError::Surface { frame, source })?;
+        self.report.ran(Stage::ControlPoints, start.elapsed());
+        Ok(points)
+    }
+
+    /// Matches the control points of two frames.
+    pub(super) fn matching(
+        &mut self,
+        frames: [usize; 2],
+        model: &[Point3<f64>],
+        target: &[Point3<f64>],
+    ) -> Result<Matching<f64, 3>, PipelineError> {
+        self.matched(frames, |pipeline| {
+            pipeline.matcher().match_points(model, target)
+        })
+    }
+
+    /// As [`matching`](Self::matching), from where the last match ended, unless that skip is turned off.
+    pub(super) fn next_matching(
+        &mut self,
+        frames: [usize; 2],
+        history: &mut MatchHistory,
+        model: &[Point3<f64>],
+        target: &[Point3<f64>],
+    ) -> Result<Matching<f64, 3>, PipelineError> {
+        if !self.pipeline.settings().skips.last_answer {
+            return self.matching(frames, model, target);
+        }
+        let warm = &mut history.warm;
+        let matching = self.matched(frames, |pipeline| {
+            pipeline.matcher().match_next(warm, model, target)
+        })?;
+        let iterations = matching.report.iterations;
+        match history.first_iterations {
+            None => history.first_iterations = Some(iterations),
+            Some(first) => {
+                let saved = first.saturating_sub(iterations);
+                self.skip(Stage::Match, frames[1], SkipReason::NearLastAnswer, saved);
+            }
+        }
+        Ok(matching)
+    }
+
+    fn matched(
+        &mut self,
+        [from, to]: [usize; 2],
+        run: impl FnOnce(&Pipeline) -> Result<Matching<f64, 3>, MatchError>,
+    ) -> Result<Matching<f64, 3>, PipelineError> {
+        let start = Instant::now();
+        let matching =
+            run(&self.pipeline).map_err(|source| PipelineError::Match { from, to, source })?;
+        self.report.ran(Stage::Match, start.elapsed());
+        Ok(matching)
+    }
+
+    /// Works out the strain between two frames from the match of their control points.
+    pub(super) fn strain(
+        &mut self,
+        frames: [usize; 2],
+        model: &ControlPoints,
+        target: &[Point3<f64>],
+        matching: &Matching<f64, 3>,
+    ) -> Result<PairStrain, PipelineError> {
+        let start = Instant::now();
+        let strain = pair::strain(&self.pipeline, frames, model, target, matching)?;
+        self.report.ran(Stage::Strain, start.elapsed());
+        Ok(strain)
+    }
+
+    /// What estimators take: the loads, and the errors that all share.
+    pub(super) fn load_series(
+        &self,
+        readings: impl Iterator<Item = LoadReading> + Clone,
+    ) -> Result<LoadSeries<f64>, PipelineError> {
+        load_reading::series(readings, self.pipeline.settings())
+    }
+
+    /// Estimates the modulus. An estimate that fails is timed too: it has looked at the data.
+    pub(super) fn modulus(
+        &mut self,
+        estimator: &dyn ModulusEstimator<f64>,
+        loads: &LoadSeries<f64>,
+    ) -> Result<ModulusEstimate<f64>, PipelineError> {
+        let start = Instant::now();
+        let estimate = estimator.estimate(loads).map_err(PipelineError::Modulus);
+        self.report.ran(Stage::Modulus, start.elapsed());
+        estimate
+    }
+}
