@@ -120,6 +120,40 @@ pub enum ElasticityError {
         /// The limit.
         limit: f64,
     },
+    /// A contact table was made for another ball or guide.
+    #[error("the contact table was made for {quantity} {expected}, not {found}")]
+    TableMismatch {
+        /// What differs.
+        quantity: Quantity,
+        /// The table's.
+        expected: f64,
+        /// What was given.
+        found: f64,
+    },
+    /// A contact table of another version of its format.
+    #[error("a contact table of version {expected} is needed, found version {found}")]
+    TableVersion {
+        /// The version that this crate reads.
+        expected: u32,
+        /// The file's.
+        found: u32,
+    },
+    /// The contacts of a table do not make a force that grows with contact radius and modulus.
+    #[error("the table's force does not grow with contact radius and modulus everywhere")]
+    NotMonotone,
+    /// Finite elements did not reach a contact that a table needs.
+    #[error(
+        "the solver stopped at {force_n} N with E = {youngs_modulus_pa} Pa: the table lacks larger contacts"
+    )]
+    NotReached {
+        /// The ball's modulus.
+        youngs_modulus_pa: f64,
+        /// The largest force in equilibrium.
+        force_n: f64,
+    },
+    /// The caller cancelled the computation.
+    #[error("cancelled")]
+    Cancelled,
     /// An element of a finite-element mesh is degenerate or turned inside out.
     #[error("element {element} of the mesh is degenerate or turned inside out")]
     DegenerateElement {

@@ -7,6 +7,7 @@
 //! | [`LayerEquation`] | sphere on one or more bonded layers: the solution by an integral equation |
 //! | [`LayerSeries`] | sphere on one layer: series in χ = √(Rδ)/h |
 //! | [`tatara_indentation_m`] | sphere squeezed between two plates, large deformation |
+//! | [`ContactTable`] | soft ball on a guide, tabulated by finite elements |
 //! | [`Waveguide`] | the layers of a sensor |
 
 mod body;
@@ -19,6 +20,7 @@ mod layer_table;
 mod punch;
 mod quadrature;
 mod stack;
+mod table;
 mod tatara;
 mod waveguide;
 
@@ -31,9 +33,13 @@ pub use layer_equation::{LayerContact, LayerEquation};
 pub use layer_kernel::Bond;
 pub use layer_series::LayerSeries;
 pub use punch::{ConeContact, PunchContact, cone, flat_punch, tangent_of_degrees};
+pub use table::{ContactCurve, ContactTable};
+#[cfg(feature = "fem")]
+pub use table::{TableOptions, TableProgress};
 pub use tatara::tatara_indentation_m;
 pub use waveguide::{Layer, Waveguide};
 
 pub(crate) use layer_kernel::LayerKernel;
 pub(crate) use layer_table::{LayerTable, SharedLayerTable};
+pub(crate) use table::TabulatedForce;
 pub(crate) use tatara::Squeeze;

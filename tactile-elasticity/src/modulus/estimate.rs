@@ -104,6 +104,8 @@ pub enum EstimatorKind {
     SphereOnWaveguide,
     /// A soft ball on a rigid flat, at finite strain.
     SphereOnFlat,
+    /// A soft ball on what its table of contacts was made for.
+    TabulatedContact,
     SphereBetweenPlates,
     TipOnBall,
     FlatPunch,
@@ -127,6 +129,7 @@ impl core::fmt::Display for EstimatorKind {
             Self::HertzSphere => "Hertz sphere",
             Self::SphereOnWaveguide => "sphere on a layered waveguide",
             Self::SphereOnFlat => "sphere on a rigid flat, finite strain",
+            Self::TabulatedContact => "sphere, tabulated contacts",
             Self::TipOnBall => "rigid tip on a ball on a plate",
             Self::SphereBetweenPlates => "Hertz sphere between two bodies",
             Self::FlatPunch => "flat punch",

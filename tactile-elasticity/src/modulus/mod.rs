@@ -11,6 +11,7 @@ mod select;
 mod series;
 mod source;
 mod statistics;
+mod tabulated;
 mod warning;
 
 pub use crate::selection::SelectionReason;
@@ -32,4 +33,5 @@ pub use regression::{Intercept, StressStrainRegression};
 pub use select::{BestOf, ModulusSelection};
 pub use series::{LoadSeries, SharedErrors};
 pub(crate) use statistics::quantile_95;
+pub use tabulated::TabulatedContact;
 pub use warning::Warning;

@@ -1,0 +1,382 @@
+//! Young's modulus of a ball from a table of its contacts.
+
+use super::estimate::{
+    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+};
+use super::load::{Estimate, LoadState};
+use super::series::LoadSeries;
+use super::source::LogErrors;
+use super::statistics::{CommonMean, common_mean, fewest, quantile_95};
+use super::warning::Warning;
+use crate::contact::{ContactTable, TabulatedForce, Waveguide};
+use crate::error::{ElasticityError, Quantity, positive};
+use crate::scalar::{narrow, widen};
+use nalgebra::{DMatrix, RealField};
+use std::sync::Arc;
+
+/// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]: the E at which the tabulated forces at the measured contact radii fit the
+/// measured forces best, all loads at once.
+///
+/// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton), with the covariance of forces and radii, the
+/// errors that all loads share, and the table's own error; the interval is carried through the table, and is open above where it leaves it. Loads
+/// outside the table are not used, with a warning; O(n³) in the loads, some microseconds for two.
+///
+/// ```
+/// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};
+/// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact};
+///
+/// let contact_radius_m: Vec<f64> = (1..=10).map(|k| 0.1e-3 * f64::from(k)).collect();
+/// let force_n = contact_radius_m.iter().map(|a| 4.0 / 3.0 * 80e3 * a.powi(3) / 3e-3).collect();
+/// let curve = ContactCurve { youngs_modulus_pa: 60e3, contact_radius_m, force_n };
+/// let flat = Waveguide::rigid();
+/// let table = ContactTable::new(3e-3, 0.5, &flat, vec![curve])?;
+///
+/// let load = LoadState::new(Estimate::new(5e-3, 1e-5)).with_contact_radius(Estimate::new(0.5e-3, 1e-6));
+/// let estimate = TabulatedContact::new(table.clone(), 3e-3, 0.5, &flat)?.estimate(&LoadSeries::new([load]))?;
+/// assert!((estimate.youngs_modulus_pa / 67.5e3 - 1.0).abs() < 1e-9);
+/// assert!(TabulatedContact::new(table, 4e-3, 0.5, &flat).is_err()); // another ball than the table's
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct TabulatedContact {
+    table: Arc<ContactTable>,
+}
+
+/// Standard error of ln F that finite elements leave beside the interpolation's: meshes of twice the elements move F by this
+/// (`a_finer_mesh_moves_the_table_little`).
+const ELEMENT_ERROR: f64 = 3e-3;
+
+/// Part of ln F below which a change of ln E changes nothing: the ball is rigid beside the guide.
+const LEAST_SENSITIVITY: f64 = 0.01;
+
+impl TabulatedContact {
+    /// For a ball of radius R (m) and Poisson ratio ν on a guide: those that the table was made for.
+    ///
+    /// # Errors
+    /// [`ElasticityError::TableMismatch`] for any other ball or guide.
+    pub fn new(
+        table: impl Into<Arc<ContactTable>>,
+        radius_m: f64,
+        poisson_ratio: f64,
+        guide: &Waveguide<f64>,
+    ) -> Result<Self, ElasticityError> {
+        let table = table.into();
+        table.check_made_for(radius_m, poisson_ratio, guide)?;
+        Ok(Self { table })
+    }
+
+    /// The loads with a contact radius.
+    fn contacts(&self, loads: &[LoadState<f64>]) -> Result<Vec<Contact>, ElasticityError> {
+        let mut contacts = Vec::with_capacity(loads.len());
+        for (load, state) in loads.iter().enumerate() {
+            let force = state.force_n.validated(Quantity::Force)?;
+            let Some(radius) = state.contact_radius_m else {
+                continue;
+            };
+            let radius = radius.validated(Quantity::ContactRadius)?;
+            positive(radius.value, Quantity::ContactRadius)?;
+            positive(force.value, Quantity::Force)?;
+            contacts.push(Contact {
+                load,
+                force,
+                radius,
+            });
+        }
+        Ok(contacts)
+    }
+
+    /// The fit to the loads that the table covers at the modulus it finds.
+    fn fit_covered(
+        &self,
+        mut contacts: Vec<Contact>,
+        series: &LoadSeries<f64>,
+    ) -> Result<(Vec<Contact>, Fit), ElasticityError> {
+        loop {
+            if contacts.is_empty() {
+                return Err(ElasticityError::TooFewLoads {
+                    expected: 1,
+                    found: 0,
+                });
+            }
+            let fit = self.fit(&contacts, series)?;
+            let outside = |c: &&Contact| !self.table.covers(c.radius.value, fit.log_modulus);
+            let Some(first) = contacts.iter().find(outside) else {
+                return Ok((contacts, fit));
+            };
+            let [smallest, largest] = self.table.contact_ratios(fit.log_modulus);
+            let ratio = first.radius.value / self.table.radius_m();
+            let limit = if ratio < smallest { smallest } else { largest };
+            let (found, limit) = (first.radius.value, limit * self.table.radius_m());
+            contacts.retain(|c| self.table.covers(c.radius.value, fit.log_modulus));
+            if contacts.is_empty() {
+                return Err(ElasticityError::OutOfRange {
+                    quantity: Quantity::ContactRadius,
+                    found,
+                    limit,
+                });
+            }
+        }
+    }
+
+    /// ln E at which the tabulated forces fit best, started in the table's middle.
+    fn fit(&self, contacts: &[Contact], series: &LoadSeries<f64>) -> Result<Fit, ElasticityError> {
+        let [lowest, highest] = self.table.log_moduli();
+        let mut log_modulus = if lowest.is_finite() {
+            0.5 * (lowest + highest)
+        } else {
+            0.0
+        };
+        // Newton's method in one unknown on a function that is nearly a straight line: three or four steps, ten where it bends.
+        const STEPS: usize = 30;
+        const SETTLED: f64 = 1e-11;
+        for step in 0..STEPS {
+            let forces: Vec<TabulatedForce> = (contacts.iter())
+                .map(|c| self.table.at(c.radius.value, log_modulus))
+                .collect();
+            let sources = self.sources(contacts, &forces, series);
+            // The ln E that each load asks for, along its tangent.
+            let own: Vec<f64> = (contacts.iter().zip(&forces))
+                .map(|(c, f)| log_modulus + (c.force.value.ln() - f.log_force) / sensitivity(f))
+                .collect();
+            let mut mean = common_mean(&own, &(&sources[0].0 + &sources[1].0 + &sources[2].0))?;
+            let next = mean.mean.clamp(lowest, highest);
+            let moved = (next - log_modulus).abs();
+            let at_limit = next != mean.mean;
+            log_modulus = next;
+            if moved < SETTLED || step + 1 == STEPS {
+                mean.degrees = mean.degrees_from(sources.iter().map(|s| (&s.0, s.1)));
+                let sensitivity = (mean.weights.iter().zip(&forces))
+                    .map(|(w, f)| w * sensitivity(f))
+                    .sum();
+                return Ok(Fit {
+                    log_modulus,
+                    mean,
+                    own,
+                    sensitivity,
+                    above: at_limit && next == highest,
+                    below: at_limit && next == lowest,
+                });
+            }
+        }
+        unreachable!("the last step returns")
+    }
+
+    /// Covariances of each load's ln E, with their degrees of freedom: of forces, of radii, of what all have in common.
+    fn sources(
+        &self,
+        contacts: &[Contact],
+        forces: &[TabulatedForce],
+        series: &LoadSeries<f64>,
+    ) -> [LogErrors; 3] {
+        let (given, shared) = (series.force_covariance(), series.shared_errors());
+        let n = contacts.len();
+        let over = |f: &dyn Fn(usize, usize) -> f64| {
+            DMatrix::from_fn(n, n, |i, j| {
+                f(i, j) / (sensitivity(&forces[i]) * sensitivity(&forces[j]))
+            })
+        };
+        let of_forces = over(&|i, j| match given {
+            Some(c) => {
+                c[(contacts[i].load, contacts[j].load)]
+                    / (contacts[i].force.value * contacts[j].force.value)
+            }
+            None if i == j => contacts[i].force.relative_error().powi(2),
+            None => 0.0,
+        });
+        let of_radii = over(&|i, j| {
+            if i == j {
+                (forces[i].radius_slope * contacts[i].radius.relative_error()).powi(2)
+            } else {
+                0.0
+            }
+        });
+        let model = self.table.interpolation_error().hypot(ELEMENT_ERROR);
+        let nu = self.table.poisson_ratio();
+        let of_poisson_ratio = 2.0 * nu / (1.0 - nu * nu) * shared.poisson_ratio;
+        let of_all = over(&|i, j| {
+            let (p, q) = (&forces[i], &forces[j]);
+            // F has the dimension E R²: what does not follow a follows R, what does not follow E follows the guide's moduli.
+            let size = |f: &TabulatedForce| (2.0 - f.radius_slope) * shared.size;
+            let guide = |f: &TabulatedForce| (1.0 - f.modulus_slope) * shared.other_body;
+            shared.force_scale.powi(2)
+                + p.radius_slope * q.radius_slope * shared.length_scale.powi(2)
+                + size(p) * size(q)
+                + guide(p) * guide(q)
+                + p.modulus_slope * q.modulus_slope * of_poisson_ratio.powi(2)
+                + model * model
+        });
+        [
+            (
+                of_forces,
+                fewest(contacts.iter().map(|c| c.force.degrees_of_freedom)),
+            ),
+            (
+                of_radii,
+                fewest(contacts.iter().map(|c| c.radius.degrees_of_freedom)),
+            ),
+            (of_all, None),
+        ]
+    }
+
+    /// ln E where the tabulated forces, weighted as in the mean, have changed by `step` in ln F; None beyond the table's moduli.
+    fn limit(&self, contacts: &[Contact], fit: &Fit, step: f64) -> Option<f64> {
+        let force = |log_modulus: f64| {
+            let (mut value, mut slope) = (0.0, 0.0);
+            for (c, w) in contacts.iter().zip(&fit.mean.weights) {
+                let f = self.table.at(c.radius.value, log_modulus);
+                value += w * f.log_force;
+                slope += w * sensitivity(&f);
+            }
+            (value, slope)
+        };
+        let [lowest, highest] = self.table.log_moduli();
+        let target = force(fit.log_modulus).0 + step;
+        let mut log_modulus = (fit.log_modulus + step / fit.sensitivity).clamp(lowest, highest);
+        for _ in 0..20 {
+            let (value, slope) = force(log_modulus);
+            let next = log_modulus + (target - value) / slope;
+            if (next - log_modulus).abs() < 1e-9 {
+                return Some(next);
+            }
+            // The force grows with E: where the limit asks for more, there is none within the table.
+            if next > highest && log_modulus == highest || next < lowest && log_modulus == lowest {
+                return None;
+            }
+            log_modulus = next.clamp(lowest, highest);
+        }
+        None
+    }
+
+    fn diagnose<T: RealField + Copy>(
+        &self,
+        loads: &[LoadState<f64>],
+        contacts: &[Contact],
+        fit: &Fit,
+    ) -> Vec<LoadDiagnostics<T>> {
+        let mut all: Vec<LoadDiagnostics<T>> = (loads.iter())
+            .map(|l| LoadDiagnostics {
+                contact_ratio: (l.contact_radius_m)
+                    .map(|a| narrow(a.value / self.table.radius_m())),
+                ..LoadDiagnostics::unused()
+            })
+            .collect();
+        for (k, contact) in contacts.iter().enumerate() {
+            let own = &mut all[contact.load];
+            own.used = true;
+            own.youngs_modulus_pa = Some(narrow(fit.own[k].exp()));
+            own.standardized_residual = Some(narrow(fit.mean.standardized_residuals[k]));
+        }
+        all
+    }
+
+    fn warnings<T: RealField + Copy>(
+        &self,
+        loads: &[LoadDiagnostics<T>],
+        fit: &Fit,
+        bounded: bool,
+    ) -> Vec<Warning<T>> {
+        let limit = self.table.contact_ratios(fit.log_modulus)[1];
+        let mut warnings: Vec<Warning<T>> = (loads.iter().enumerate())
+            .filter_map(|(load, d)| Some((load, d.contact_ratio?)))
+            .filter(|&(_, ratio)| widen(ratio) > limit)
+            .map(|(load, ratio)| Warning::LargeContact {
+                load,
+                ratio,
+                limit: narrow(limit),
+            })
+            .collect();
+        warnings.extend(fit.mean.excess.map(|x| Warning::ExcessScatter {
+            reduced_chi_squared: narrow(x),
+        }));
+        if fit.mean.standard_error.is_infinite() {
+            warnings.push(Warning::NoErrorEstimate);
+        } else if !bounded {
+            warnings.push(Warning::UnboundedAbove);
+        }
+        warnings
+    }
+}
+
+/// ∂ln F/∂ln E, kept from zero.
+fn sensitivity(force: &TabulatedForce) -> f64 {
+    force.modulus_slope.max(LEAST_SENSITIVITY)
+}
+
+/// A load with a contact radius.
+struct Contact {
+    load: usize,
+    force: Estimate<f64>,
+    radius: Estimate<f64>,
+}
+
+struct Fit {
+    log_modulus: f64,
+    mean: CommonMean,
+    /// ln E of each load alone.
+    own: Vec<f64>,
+    /// ∂ln F/∂ln E, weighted as the mean.
+    sensitivity: f64,
+    /// The best ln E lies above, below the table's.
+    above: bool,
+    below: bool,
+}
+
+impl<T: RealField + Copy> ModulusEstimator<T> for TabulatedContact {
+    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+        let series = series.widened();
+        let contacts = self.contacts(series.loads())?;
+        let (contacts, fit) = self.fit_covered(contacts, &series)?;
+        let known = fit.mean.standard_error.is_finite();
+        let reach = quantile_95(fit.mean.degrees) * fit.mean.standard_error * fit.sensitivity;
+        let lower = if known {
+            self.limit(&contacts, &fit, -reach)
+        } else {
+            None
+        };
+        if fit.above {
+            return Err(ElasticityError::StifferThanResolvable {
+                lower_bound_pa: lower.map_or(0.0, f64::exp),
+            });
+        }
+        if fit.below {
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::YoungsModulus,
+                found: fit.mean.mean.exp(),
+                limit: self.table.log_moduli()[0].exp(),
+            });
+        }
+        let upper = if known {
+            self.limit(&contacts, &fit, reach)
+        } else {
+            None
+        };
+        let modulus = fit.log_modulus.exp();
+        let loads = self.diagnose(series.loads(), &contacts, &fit);
+        let warnings = self.warnings(&loads, &fit, upper.is_some());
+        Ok(ModulusEstimate {
+            youngs_modulus_pa: narrow(modulus),
+            standard_error_pa: narrow(modulus * fit.mean.standard_error),
+            interval_95: Interval {
+                lower: narrow(lower.map_or(0.0, f64::exp)),
+                upper: upper.map(|u| narrow(u.exp())),
+            },
+            estimator: EstimatorKind::TabulatedContact,
+            loads,
+            fit: FitStatistics::new(
+                contacts.len(),
+                1,
+                fit.mean.chi_squared,
+                fit.mean.minus_two_log_likelihood,
+            ),
+            warnings,
+        })
+    }
+
+    fn kind(&self) -> EstimatorKind {
+        EstimatorKind::TabulatedContact
+    }
+
+    fn needs_strain(&self) -> bool {
+        false
+    }
+}
