@@ -33,7 +33,8 @@ use std::sync::Arc;
 ///
 /// let load = LoadState::new(Estimate::new(5e-3, 1e-5)).with_contact_radius(Estimate::new(0.5e-3, 1e-6));
 /// let estimate = TabulatedContact::new(table.clone(), 3e-3, 0.5, &flat)?.estimate(&LoadSeries::new([load]))?;
-/// assert!((estimate.youngs_modulus_pa / 67.5e3 - 1.0).abs() < 1e-9);
+/// let relative_error: f64 = estimate.youngs_modulus_pa / 67.5e3 - 1.0;
+/// assert!(relative_error.abs() < 1e-9);
 /// assert!(TabulatedContact::new(table, 4e-3, 0.5, &flat).is_err()); // another ball than the table's
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
