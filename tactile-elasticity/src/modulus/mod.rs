@@ -2,6 +2,7 @@
 
 mod bootstrap;
 mod contact;
+mod covariance;
 mod estimate;
 mod law;
 mod load;

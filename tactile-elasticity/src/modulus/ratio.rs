@@ -1,16 +1,17 @@
 //! The paper's modulus: stress over mean strain, equation (31).
 
+use super::covariance::Covariance;
 use super::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 use super::load::{Estimate, LoadState};
 use super::series::LoadSeries;
-use super::source::{LogErrors, Source};
-use super::statistics::{CommonMean, common_mean, effective_degrees, quantile_95};
+use super::source::{LogErrors, total};
+use super::statistics::{CommonMean, common_mean, effective_degrees, fewest, quantile_95};
 use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::scalar::{narrow, widen};
-use nalgebra::{DMatrix, RealField};
+use nalgebra::RealField;
 
 /// Strain beyond which one modulus no longer describes a rubber.
 pub(crate) const LINEAR_STRAIN: f64 = 0.1;
@@ -139,29 +140,69 @@ impl PaperRatio {
         Ok(ratios)
     }
 
-    /// Covariances of the ln E, from forces, areas and strains, each with its degrees of freedom.
+    /// Covariances of the ln E, from forces, areas, strains and the scale of all stresses, each with its degrees of freedom.
     ///
-    /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A.
-    fn sources(&self, series: &LoadSeries<f64>, ratios: &[Ratio]) -> [LogErrors; 3] {
+    /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A. What the first load's stress errs by, all ratios share.
+    fn sources(&self, series: &LoadSeries<f64>, ratios: &[Ratio]) -> [LogErrors; 4] {
         let loads = series.loads();
         let areas: Vec<_> = loads.iter().map(LoadState::area).collect();
         let area_of = |k: usize| areas[k].map_or(1.0, |a| a.value);
-        let stress_slope = |i: usize, k: usize| {
-            let base = self.reference == StrainReference::FirstLoad && k == 0;
-            (f64::from(ratios[i].load == k) - f64::from(base)) / ratios[i].stress_pa
+        let from_first = self.reference == StrainReference::FirstLoad;
+        let own = |i: usize| ratios[i].load;
+        let none = Covariance::none(ratios.iter().map(|r| r.load));
+
+        // Change of ln E of ratio i with the force, and with the area, of load k.
+        let by_force = |i: usize, k: usize| 1.0 / (ratios[i].stress_pa * area_of(k));
+        let by_area = |i: usize, k: usize| {
+            loads[k].force_n.value / (ratios[i].stress_pa * area_of(k).powi(2))
         };
-        let slopes =
-            |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(ratios.len(), loads.len(), f);
-        let by_force = slopes(&|i, k| stress_slope(i, k) / area_of(k));
-        let by_area =
-            slopes(&|i, k| -stress_slope(i, k) * loads[k].force_n.value / area_of(k).powi(2));
-        let by_strain = slopes(&|i, k| -f64::from(ratios[i].load == k) / ratios[i].strain);
-        let forces: Vec<_> = loads.iter().map(|l| Some(l.force_n)).collect();
-        let strains: Vec<_> = loads.iter().map(|l| l.mean_strain).collect();
+        let force_error = |k: usize| loads[k].force_n.standard_error;
+        let area_error = |k: usize| areas[k].map_or(0.0, |a| a.standard_error);
+        let forces = match series.force_covariance() {
+            Some(given) => none.clone().with_given(|i, j| {
+                let (k, l) = (own(i), own(j));
+                let of_pair = |k: usize, l: usize| by_force(i, k) * by_force(j, l) * given[(k, l)];
+                let about_first = if from_first {
+                    of_pair(0, 0) - of_pair(k, 0) - of_pair(0, l)
+                } else {
+                    0.0
+                };
+                of_pair(k, l) + about_first
+            }),
+            None => {
+                let forces = none
+                    .clone()
+                    .with_own(|i| by_force(i, own(i)) * force_error(own(i)));
+                if from_first {
+                    forces.with_shared(|i| by_force(i, 0) * force_error(0))
+                } else {
+                    forces
+                }
+            }
+        };
+        let mut of_areas = none
+            .clone()
+            .with_own(|i| by_area(i, own(i)) * area_error(own(i)));
+        if from_first {
+            of_areas = of_areas.with_shared(|i| by_area(i, 0) * area_error(0));
+        }
+        let scale = none.clone().with_shared(|_| series.stress_scale_error());
+        let strains = match series.strain_covariance() {
+            Some(given) => none
+                .with_given(|i, j| given[(own(i), own(j))] / (ratios[i].strain * ratios[j].strain)),
+            None => none.with_own(|i| {
+                loads[own(i)].mean_strain.map_or(0.0, |e| e.standard_error) / ratios[i].strain
+            }),
+        };
+        let degrees = |of: &dyn Fn(usize) -> Option<Estimate<f64>>| {
+            let estimates = (0..loads.len()).filter_map(of);
+            fewest(estimates.map(|e| e.degrees_of_freedom))
+        };
         [
-            Source::new(&forces, series.force_covariance()).through(&by_force),
-            Source::new(&areas, None).through(&by_area),
-            Source::new(&strains, series.strain_covariance()).through(&by_strain),
+            (forces, degrees(&|k| Some(loads[k].force_n))),
+            (of_areas, degrees(&|k| areas[k])),
+            (strains, degrees(&|k| loads[k].mean_strain)),
+            (scale, None),
         ]
     }
 
@@ -262,13 +303,9 @@ impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
         let loads = series.loads();
         let ratios = self.ratios(loads)?;
         let sources = self.sources(&series, &ratios);
-        let scale_variance = series.stress_scale_error().powi(2);
-        let shared = DMatrix::repeat(ratios.len(), ratios.len(), scale_variance);
-        let covariance = sources.iter().fold(shared.clone(), |sum, s| sum + &s.0);
         let logs: Vec<f64> = ratios.iter().map(Ratio::log).collect();
-        let mean = common_mean(&logs, &covariance)?;
-        let errors = sources.iter().map(|s| (&s.0, s.1)).chain([(&shared, None)]);
-        let reach = quantile_95(mean.degrees_from(errors)) * mean.standard_error;
+        let mean = common_mean(&logs, &total(&sources))?;
+        let reach = quantile_95(mean.degrees_from(&sources)) * mean.standard_error;
         let modulus = mean.mean.exp();
         let diagnostics = self.diagnose(loads, &ratios, &mean);
         Ok(ModulusEstimate {

@@ -1,17 +1,18 @@
 //! Young's modulus of a ball from a table of its contacts.
 
+use super::covariance::Covariance;
 use super::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 use super::load::{Estimate, LoadState};
 use super::series::LoadSeries;
-use super::source::LogErrors;
+use super::source::{LogErrors, total};
 use super::statistics::{CommonMean, common_mean, fewest, quantile_95};
 use super::warning::Warning;
 use crate::contact::{ContactTable, TabulatedForce, Waveguide};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::scalar::{narrow, widen};
-use nalgebra::{DMatrix, RealField};
+use nalgebra::RealField;
 use std::sync::Arc;
 
 /// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]: the E at which the tabulated forces at the measured contact radii fit the
@@ -19,7 +20,7 @@ use std::sync::Arc;
 ///
 /// ln F(aᵢ, E) = ln Fᵢ is solved for ln E by generalised least squares (Gauss–Newton), with the covariance of forces and radii, the
 /// errors that all loads share, and the table's own error; the interval is carried through the table, and is open above where it leaves it. Loads
-/// outside the table are not used, with a warning; O(n³) in the loads, some microseconds for two.
+/// outside the table are not used, with a warning; O(n) in the loads (O(n³) with a given covariance), some microseconds for two.
 ///
 /// ```
 /// use tactile_elasticity::contact::{ContactCurve, ContactTable, Waveguide};
@@ -139,13 +140,13 @@ impl TabulatedContact {
             let own: Vec<f64> = (contacts.iter().zip(&forces))
                 .map(|(c, f)| log_modulus + (c.force.value.ln() - f.log_force) / sensitivity(f))
                 .collect();
-            let mut mean = common_mean(&own, &(&sources[0].0 + &sources[1].0 + &sources[2].0))?;
+            let mut mean = common_mean(&own, &total(&sources))?;
             let next = mean.mean.clamp(lowest, highest);
             let moved = (next - log_modulus).abs();
             let at_limit = next != mean.mean;
             log_modulus = next;
             if moved < SETTLED || step + 1 == STEPS {
-                mean.degrees = mean.degrees_from(sources.iter().map(|s| (&s.0, s.1)));
+                mean.degrees = mean.degrees_from(&sources);
                 let sensitivity = (mean.weights.iter().zip(&forces))
                     .map(|(w, f)| w * sensitivity(f))
                     .sum();
@@ -169,43 +170,37 @@ impl TabulatedContact {
         forces: &[TabulatedForce],
         series: &LoadSeries<f64>,
     ) -> [LogErrors; 3] {
-        let (given, shared) = (series.force_covariance(), series.shared_errors());
-        let n = contacts.len();
-        let over = |f: &dyn Fn(usize, usize) -> f64| {
-            DMatrix::from_fn(n, n, |i, j| {
-                f(i, j) / (sensitivity(&forces[i]) * sensitivity(&forces[j]))
-            })
+        let shared = series.shared_errors();
+        let none = Covariance::none(contacts.iter().map(|c| c.load));
+        // What an error of ln F does to ln E.
+        let over = |i: usize, of_log_force: f64| of_log_force / sensitivity(&forces[i]);
+        let of_forces = match series.force_covariance() {
+            Some(given) => none.clone().with_given(|i, j| {
+                let [p, q] = [&contacts[i], &contacts[j]];
+                let relative = given[(p.load, q.load)] / (p.force.value * q.force.value);
+                over(i, 1.0) * over(j, 1.0) * relative
+            }),
+            None => none
+                .clone()
+                .with_own(|i| over(i, contacts[i].force.relative_error())),
         };
-        let of_forces = over(&|i, j| match given {
-            Some(c) => {
-                c[(contacts[i].load, contacts[j].load)]
-                    / (contacts[i].force.value * contacts[j].force.value)
-            }
-            None if i == j => contacts[i].force.relative_error().powi(2),
-            None => 0.0,
-        });
-        let of_radii = over(&|i, j| {
-            if i == j {
-                (forces[i].radius_slope * contacts[i].radius.relative_error()).powi(2)
-            } else {
-                0.0
-            }
+        let of_radii = none.clone().with_own(|i| {
+            over(
+                i,
+                forces[i].radius_slope * contacts[i].radius.relative_error(),
+            )
         });
         let model = self.table.interpolation_error().hypot(ELEMENT_ERROR);
         let nu = self.table.poisson_ratio();
         let of_poisson_ratio = 2.0 * nu / (1.0 - nu * nu) * shared.poisson_ratio;
-        let of_all = over(&|i, j| {
-            let (p, q) = (&forces[i], &forces[j]);
+        let of_all = none
+            .with_shared(|i| over(i, shared.force_scale))
+            .with_shared(|i| over(i, forces[i].radius_slope * shared.length_scale))
             // F has the dimension E R²: what does not follow a follows R, what does not follow E follows the guide's moduli.
-            let size = |f: &TabulatedForce| (2.0 - f.radius_slope) * shared.size;
-            let guide = |f: &TabulatedForce| (1.0 - f.modulus_slope) * shared.other_body;
-            shared.force_scale.powi(2)
-                + p.radius_slope * q.radius_slope * shared.length_scale.powi(2)
-                + size(p) * size(q)
-                + guide(p) * guide(q)
-                + p.modulus_slope * q.modulus_slope * of_poisson_ratio.powi(2)
-                + model * model
-        });
+            .with_shared(|i| over(i, (2.0 - forces[i].radius_slope) * shared.size))
+            .with_shared(|i| over(i, (1.0 - forces[i].modulus_slope) * shared.other_body))
+            .with_shared(|i| over(i, forces[i].modulus_slope * of_poisson_ratio))
+            .with_shared(|i| over(i, model));
         [
             (
                 of_forces,

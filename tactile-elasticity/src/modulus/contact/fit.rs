@@ -2,17 +2,18 @@
 
 use super::{ContactEstimator, Evidence};
 use crate::error::{ElasticityError, Quantity, positive};
+use crate::modulus::covariance::Covariance;
 use crate::modulus::estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 use crate::modulus::law::{ContactLaw, LogForce};
 use crate::modulus::load::{Estimate, LoadState};
 use crate::modulus::series::LoadSeries;
-use crate::modulus::source::LogErrors;
+use crate::modulus::source::{LogErrors, total};
 use crate::modulus::statistics::{CommonMean, common_mean, fewest, quantile_95};
 use crate::modulus::warning::Warning;
 use crate::scalar::{narrow, widen};
-use nalgebra::{DMatrix, RealField};
+use nalgebra::RealField;
 
 impl<L: ContactLaw> ContactEstimator<L> {
     fn observe(
@@ -79,23 +80,26 @@ impl<L: ContactLaw> ContactEstimator<L> {
 
     /// Covariances of the ln E*, with their degrees of freedom: of forces, of lengths, of what all have in common.
     fn sources(&self, all: &[Observation], series: &LoadSeries<f64>) -> [LogErrors; 3] {
-        let (given, shared) = (series.force_covariance(), series.shared_errors());
-        let over = |f: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(all.len(), all.len(), f);
-        let forces = over(&|i, j| match given {
-            Some(c) => c[(all[i].load, all[j].load)] / (all[i].force.value * all[j].force.value),
-            None if all[i].load == all[j].load => all[i].force.relative_error().powi(2),
-            None => 0.0,
-        });
-        let own = |o: &Observation| (o.log_force.slope * o.length.relative_error()).powi(2);
-        let lengths = over(&|i, j| if i == j { own(&all[i]) } else { 0.0 });
-        let common = over(&|i, j| {
-            let (p, q) = (all[i].log_force, all[j].log_force);
-            shared.force_scale.powi(2)
-                + p.slope * q.slope * shared.length_scale.powi(2)
-                + p.size_slope * q.size_slope * shared.size.powi(2)
-                // One law errs the same way at all loads.
-                + all[i].model_error * all[j].model_error
-        });
+        let shared = series.shared_errors();
+        let none = Covariance::none(all.iter().map(|o| o.load));
+        let forces = match series.force_covariance() {
+            Some(given) => none.clone().with_given(|i, j| {
+                let loads = (all[i].load, all[j].load);
+                given[loads] / (all[i].force.value * all[j].force.value)
+            }),
+            None => none
+                .clone()
+                .with_shared_in_load(|i| all[i].force.relative_error()),
+        };
+        let lengths = none
+            .clone()
+            .with_own(|i| all[i].log_force.slope * all[i].length.relative_error());
+        let common = none
+            .with_shared(|_| shared.force_scale)
+            .with_shared(|i| all[i].log_force.slope * shared.length_scale)
+            .with_shared(|i| all[i].log_force.size_slope * shared.size)
+            // One law errs the same way at all loads.
+            .with_shared(|i| all[i].model_error);
         [
             (
                 forces,
@@ -139,8 +143,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let all = self.observe(series.loads(), share)?;
         let logs: Vec<f64> = all.iter().map(|o| o.log_modulus).collect();
         let sources = self.sources(&all, series);
-        let mut mean = common_mean(&logs, &(&sources[0].0 + &sources[1].0 + &sources[2].0))?;
-        mean.degrees = mean.degrees_from(sources.iter().map(|s| (&s.0, s.1)));
+        let mut mean = common_mean(&logs, &total(&sources))?;
+        mean.degrees = mean.degrees_from(&sources);
         Ok((all, mean))
     }
 
@@ -219,7 +223,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
         all: &[Observation],
         mean: &CommonMean,
     ) -> Vec<LoadDiagnostics<T>> {
-        let own = |i: usize| all.iter().enumerate().filter(move |(_, o)| o.load == i);
+        // Observations come in the order of their loads.
+        let mut observed = all.iter().zip(&mean.standardized_residuals).peekable();
         (0..loads.len())
             .map(|i| {
                 let value = |e: Option<Estimate<f64>>| e.map(|e| e.value);
@@ -227,20 +232,25 @@ impl<L: ContactLaw> ContactEstimator<L> {
                     value(loads[i].contact_radius_m),
                     value(loads[i].indentation_m),
                 );
-                let count = own(i).count();
-                let log_mean =
-                    own(i).map(|(_, o)| o.log_modulus).sum::<f64>() / count.max(1) as f64;
-                let worst = own(i)
-                    .map(|(k, _)| mean.standardized_residuals[k])
-                    .max_by(|a, b| a.abs().total_cmp(&b.abs()));
+                let mut count = 0;
+                let mut log_sum = 0.0;
+                let mut worst: Option<f64> = None;
+                while let Some((observation, &residual)) = observed.next_if(|(o, _)| o.load == i) {
+                    count += 1;
+                    log_sum += observation.log_modulus;
+                    worst = Some(worst.map_or(residual, |w| {
+                        if residual.abs() >= w.abs() {
+                            residual
+                        } else {
+                            w
+                        }
+                    }));
+                }
+                let alone = (count > 0).then(|| log_sum / f64::from(count));
                 LoadDiagnostics {
                     used: count > 0,
                     contact_ratio: ratio.map(narrow),
-                    youngs_modulus_pa: if count > 0 {
-                        self.sample_modulus(log_mean).map(narrow)
-                    } else {
-                        None
-                    },
+                    youngs_modulus_pa: alone.and_then(|log| self.sample_modulus(log)).map(narrow),
                     standardized_residual: worst.map(narrow),
                 }
             })

@@ -123,3 +123,43 @@ fn errors_learnt_from_few_repetitions_widen_the_interval() {
         PaperRatio::new().estimate(&load(force.with_degrees_of_freedom(f64::NAN), strain));
     assert!(refused.is_err());
 }
+
+/// A regression of many loads takes time and memory in proportion to them: a matrix of all pairs of these would be 3 GB.
+#[test]
+fn twenty_thousand_loads_are_one_linear_regression() {
+    let forces: Vec<f64> = (0..20_000).map(|i| 1e-3 + 1e-7 * f64::from(i)).collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut normal = || rng.sample::<f64, _>(StandardNormal);
+    let loads: Vec<_> = (hertz_loads(Body::rigid(), &forces).iter())
+        .map(|l| {
+            let (f, a) = (l.force_n.value, l.contact_radius_m.unwrap().value);
+            let d = l.indentation_m.unwrap().value;
+            LoadState::new(Estimate::new(f * (1.0 + 0.005 * normal()), 0.005 * f))
+                .with_contact_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
+                .with_indentation(Estimate::new(d * (1.0 + 0.01 * normal()), 0.01 * d))
+                .with_mean_strain(Estimate::new(
+                    f / (std::f64::consts::PI * a * a) / SAMPLE,
+                    1e-4,
+                ))
+        })
+        .collect();
+    let series = LoadSeries::new(loads)
+        .with_shared_errors(force_scale(1e-4))
+        .unwrap();
+    let hertz = HertzSphere::new(4e-3, NU)
+        .unwrap()
+        .estimate(&series)
+        .unwrap();
+    // The errors of single loads average to 0.005 % (force 0.5 %, three times the radius's 0.4 % and 1.5 times the depth's 1 %, by
+    // √20000): the shared 0.01 % stays.
+    let relative = hertz.standard_error_pa / hertz.youngs_modulus_pa;
+    assert!((1e-4..1.4e-4).contains(&relative), "{relative}");
+    assert!((hertz.youngs_modulus_pa / SAMPLE - 1.0).abs() < 4.0 * relative);
+    assert_eq!(
+        (hertz.loads.len(), hertz.fit.observations),
+        (20_000, 40_000)
+    );
+    let ratio = PaperRatio::new().with_reference(StrainReference::Unloaded);
+    let ratio = ratio.estimate(&series).unwrap();
+    assert_eq!(ratio.fit.observations, 20_000);
+}
