@@ -1,72 +1,25 @@
-//! Contact: gaps of points on one surface from another, and the forces that keep them from closing.
+//! Contact: the points of a surface at which gaps are measured, and the forces that keep them from
+//! closing.
 //!
-//! Gaps g are measured at Gauss points of the first surface and averaged over the hat functions φ of
-//! its nodes (linear on each half of an edge): $g_v = \int \varphi_v g / \int \varphi_v$. The pressure
-//! per reference area is $t = \sum_v \varphi_v t_v$ with $t_v = \langle \lambda_v - \varepsilon g_v
-//! \rangle$: one pressure for each node's displacement, a stable pair (pressures linear on each edge,
-//! but not continuous, oscillate). It derives from a potential, so that the tangent is symmetric; λ is
-//! updated to t between equilibria (augmented Lagrangian, Uzawa).
+//! Gaps g are averaged over the hat functions φ of the first surface's nodes (linear on each half of an
+//! edge): $g_v = \int \varphi_v g / \int \varphi_v$. The pressure per reference area is
+//! $t = \sum_v \varphi_v t_v$ with $t_v = \langle \lambda_v - \varepsilon g_v \rangle$: one pressure for
+//! each node's displacement, a stable pair (pressures linear on each edge, but not continuous,
+//! oscillate). It derives from a potential, so that the tangent is symmetric; λ is updated to t between
+//! equilibria (augmented Lagrangian, Uzawa).
+//!
+//! Opposite a deformable surface the integrals are taken piece by piece between the ends of the other
+//! surface's edges (segment-to-segment). Its normal jumps there: points fixed on the first surface would
+//! carry their whole force from one side of the kink to the other at once, and Newton's method would
+//! cycle; pieces that grow and shrink carry it over continuously.
 
-use super::curve::{BEND, CurvePoint, SurfaceCurve};
+use super::curve::SurfaceCurve;
 use super::element::{GAUSS3, quadratic};
+use super::gap::Placement;
 use super::material::Kinematics;
-
-/// The shape of a rigid body of revolution, with its lowest point at height zero.
-///
-/// ```
-/// use tactile_elasticity::fem::RigidShape;
-///
-/// let ball = RigidShape::Sphere { radius_m: 3e-3 };
-/// let cone = RigidShape::Cone { half_angle_rad: 1.2 };
-/// assert_ne!(ball, cone);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum RigidShape {
-    /// A plane at right angles to the axis.
-    Flat,
-    /// A sphere of this radius.
-    Sphere {
-        /// Its radius, in metres.
-        radius_m: f64,
-    },
-    /// The paraboloid r² / 2R, of which Hertz's theory speaks.
-    Paraboloid {
-        /// Its radius of curvature at the pole, in metres.
-        radius_m: f64,
-    },
-    /// A cone.
-    Cone {
-        /// Between its axis and its surface, in radians.
-        half_angle_rad: f64,
-    },
-}
-
-impl RigidShape {
-    /// Height at radius r, its slope and second derivative; `None` beyond the shape.
-    fn profile(self, r: f64) -> Option<[f64; 3]> {
-        match self {
-            Self::Flat => Some([0.0; 3]),
-            Self::Sphere { radius_m } => {
-                let below = radius_m * radius_m - r * r;
-                if below <= 0.0 {
-                    return None;
-                }
-                let root = below.sqrt();
-                let height = r * r / (radius_m + root);
-                Some([height, r / root, radius_m * radius_m / (below * root)])
-            }
-            Self::Paraboloid { radius_m } => {
-                Some([r * r / (2.0 * radius_m), r / radius_m, 1.0 / radius_m])
-            }
-            Self::Cone { half_angle_rad } => {
-                let slope = 1.0 / half_angle_rad.tan();
-                Some([r * slope, slope, 0.0])
-            }
-        }
-    }
-}
+use super::model::Model;
+use super::rigid::RigidShape;
+use super::system::Fields;
 
 /// What a surface may touch.
 #[derive(Debug, Clone)]
@@ -84,21 +37,32 @@ pub(crate) enum Opposite {
     },
 }
 
-/// A Gauss point of a surface at which gaps are measured.
+/// Half of an edge of a contact surface, between two of its nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct ContactSegment {
+    pub(crate) pair: usize,
+    pub(crate) nodes: [usize; 3],
+    /// Parameters of its ends on the edge.
+    ends: [f64; 2],
+    /// Indices of the contact nodes at its ends.
+    contact_nodes: [usize; 2],
+}
+
+/// A Gauss point of a surface at which a gap is measured.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactPoint {
     pub(crate) pair: usize,
     pub(crate) nodes: [usize; 3],
     pub(crate) shape: [f64; 3],
     pub(crate) derivative: [f64; 3],
+    /// Contact nodes whose hat functions reach here, with the functions times the point's reference area.
+    pub(crate) shares: [(usize, f64); 2],
 }
 
 /// A node of a contact surface, which carries a pressure.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactNode {
     pub(crate) node: usize,
-    /// Gauss points around it with the hat function times their reference area.
-    pub(crate) points: Vec<(usize, f64)>,
     /// Reference area of the hat function.
     pub(crate) weight: f64,
     /// Penalty ε: pressure per penetration, Pa/m.
@@ -107,116 +71,162 @@ pub(crate) struct ContactNode {
     pub(crate) spacing: f64,
 }
 
-/// Stands for the approach among the displacement components of a [`Gap`].
-pub(crate) const DRIVER: usize = usize::MAX;
-
-/// A gap and its derivatives by the displacement components `dofs`.
-#[derive(Debug, Clone)]
-pub(crate) struct Gap {
-    pub(crate) value: f64,
-    pub(crate) dofs: Vec<usize>,
-    pub(crate) first: Vec<f64>,
-    /// Row after row.
-    pub(crate) second: Vec<f64>,
-    /// Axial component of the force by a unit pressure, over the reference area.
-    pub(crate) axial: f64,
-}
-
 /// Penalty of contact over the softer body's modulus and the edge's length: a pressure of a third of
 /// the modulus then leaves a thousandth of an element's penetration before the multipliers' update.
 /// Ten times less needs more updates, ten times more iterations; the Hertz test shows it.
 const PENALTY: f64 = 300.0;
 
-/// Gauss points of the edges, numbered from `first`, and their corner nodes.
-pub(crate) fn contact_points(
+/// Two ends of edges nearer than this part of a segment leave nothing to integrate between them.
+const SLIVER: f64 = 1e-6;
+
+impl ContactSegment {
+    /// Gauss points between the cuts, which are parameters on the edge in ascending order.
+    fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<ContactPoint> {
+        let [start, end] = self.ends;
+        let mut bounds = vec![start];
+        bounds.extend(cuts);
+        bounds.push(end);
+        let mut points = Vec::with_capacity(3 * (bounds.len() - 1));
+        for piece in bounds.windows(2) {
+            let (middle, half) = (0.5 * (piece[0] + piece[1]), 0.5 * (piece[1] - piece[0]));
+            for (x, gauss) in GAUSS3 {
+                let parameter = middle + half * x;
+                let (shape, derivative) = quadratic(parameter);
+                let [r, _] = combine(&shape, self.nodes, |n| nodes[n]);
+                let [dr, dz] = combine(&derivative, self.nodes, |n| nodes[n]);
+                let area = core::f64::consts::TAU * r * half * gauss * dr.hypot(dz);
+                let hat = (parameter - start) / (end - start);
+                points.push(ContactPoint {
+                    pair: self.pair,
+                    nodes: self.nodes,
+                    shape,
+                    derivative,
+                    shares: [
+                        (self.contact_nodes[0], (1.0 - hat) * area),
+                        (self.contact_nodes[1], hat * area),
+                    ],
+                });
+            }
+        }
+        points
+    }
+
+    /// Parameters at which the ends of the opposite edges lie closest.
+    fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
+        let at = |parameter: f64| {
+            let (shape, derivative) = quadratic(parameter);
+            let position = combine(&shape, self.nodes, |n| placement.current(n));
+            (
+                position,
+                combine(&derivative, self.nodes, |n| placement.current(n)),
+            )
+        };
+        let [start, end] = self.ends;
+        let (a, b) = (at(start).0, at(end).0);
+        let chord = [b[0] - a[0], b[1] - a[1]];
+        let square = chord[0] * chord[0] + chord[1] * chord[1];
+        let margin = SLIVER * (end - start);
+        let mut cuts = Vec::new();
+        for edge in &curve.edges()[1..] {
+            let corner = placement.current(edge[0]);
+            let offset = [corner[0] - a[0], corner[1] - a[1]];
+            let along = (offset[0] * chord[0] + offset[1] * chord[1]) / square;
+            let across = (offset[1] * chord[0] - offset[0] * chord[1]) / square;
+            // What is farther than the segment is long presses on nothing here.
+            if !(-0.5..1.5).contains(&along) || across.abs() > 1.0 {
+                continue;
+            }
+            let mut parameter = start + along * (end - start);
+            // Newton's method without the curve's bend: the segment is nearly straight.
+            for _ in 0..8 {
+                let (position, slope) = at(parameter);
+                let metric = slope[0] * slope[0] + slope[1] * slope[1];
+                parameter += ((corner[0] - position[0]) * slope[0]
+                    + (corner[1] - position[1]) * slope[1])
+                    / metric;
+            }
+            if parameter > start + margin && parameter < end - margin {
+                cuts.push(parameter);
+            }
+        }
+        cuts.sort_by(f64::total_cmp);
+        cuts.dedup_by(|next, kept| *next - *kept < margin);
+        cuts
+    }
+}
+
+/// The segments of a surface's edges and their nodes, numbered from `first_node`.
+pub(crate) fn contact_segments(
     pair: usize,
-    first: usize,
+    first_node: usize,
     edges: &[[usize; 3]],
     nodes: &[[f64; 2]],
     modulus: f64,
-) -> (Vec<ContactPoint>, Vec<ContactNode>) {
-    let mut points = Vec::new();
+) -> (Vec<ContactSegment>, Vec<ContactNode>) {
+    let mut segments = Vec::new();
     let mut corners: Vec<ContactNode> = Vec::new();
     for &edge in edges {
         for half in [0, 1] {
-            let middle = half as f64 - 0.5;
-            let mut length = 0.0;
-            let mut shares = [Vec::new(), Vec::new()];
-            for (x, gauss) in GAUSS3 {
-                let (shape, derivative) = quadratic(middle + 0.5 * x);
-                let [r, _] = combine(&shape, edge, |n| nodes[n]);
-                let [dr, dz] = combine(&derivative, edge, |n| nodes[n]);
-                let line = 0.5 * gauss * dr.hypot(dz);
-                length += line;
-                let weight = core::f64::consts::TAU * r * line;
-                for (share, hat) in shares.iter_mut().zip([0.5 * (1.0 - x), 0.5 * (1.0 + x)]) {
-                    share.push((first + points.len(), weight * hat));
-                }
-                points.push(ContactPoint {
-                    pair,
-                    nodes: edge,
-                    shape,
-                    derivative,
-                });
-            }
-            for (node, share) in [edge[half], edge[half + 1]].into_iter().zip(shares) {
-                let index = corners.iter().position(|corner| corner.node == node);
-                let index = index.unwrap_or_else(|| {
+            let contact_nodes = [edge[half], edge[half + 1]].map(|node| {
+                let known = corners.iter().position(|corner| corner.node == node);
+                let index = known.unwrap_or_else(|| {
                     corners.push(ContactNode {
                         node,
-                        points: Vec::new(),
                         weight: 0.0,
                         penalty: f64::INFINITY,
                         spacing: 0.0,
                     });
                     corners.len() - 1
                 });
-                let corner = &mut corners[index];
-                corner.weight += share.iter().map(|(_, weight)| weight).sum::<f64>();
-                corner.points.extend(share);
+                first_node + index
+            });
+            let start = half as f64 - 1.0;
+            let segment = ContactSegment {
+                pair,
+                nodes: edge,
+                ends: [start, start + 1.0],
+                contact_nodes,
+            };
+            let [a, b] = [edge[half], edge[half + 1]].map(|node| nodes[node]);
+            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+            for point in segment.points(&[], nodes) {
+                for (index, weight) in point.shares {
+                    corners[index - first_node].weight += weight;
+                }
+            }
+            for index in contact_nodes {
+                let corner = &mut corners[index - first_node];
                 corner.spacing = length.max(corner.spacing);
                 corner.penalty = corner.penalty.min(0.5 * PENALTY * modulus / length);
             }
+            segments.push(segment);
         }
     }
-    (points, corners)
+    (segments, corners)
 }
 
-/// The average of gaps with weights that sum to `total`.
-pub(crate) fn averaged<'a>(gaps: impl Iterator<Item = (&'a Gap, f64)> + Clone, total: f64) -> Gap {
-    let mut dofs: Vec<usize> = Vec::with_capacity(24);
-    for (gap, _) in gaps.clone() {
-        for dof in &gap.dofs {
-            if !dofs.contains(dof) {
-                dofs.push(*dof);
-            }
+impl Model {
+    /// The points at which gaps are measured at a state.
+    pub(crate) fn contact_points(&self, fields: &Fields) -> Vec<ContactPoint> {
+        let placement = self.placement(fields);
+        let mut points = Vec::with_capacity(3 * self.segments.len());
+        for segment in &self.segments {
+            let cuts = match (&self.opposites[segment.pair], self.kinematics) {
+                (Opposite::Surface(curve), Kinematics::Finite) => segment.cuts(curve, &placement),
+                _ => Vec::new(),
+            };
+            points.extend(segment.points(&cuts, &self.nodes));
         }
+        points
     }
-    let count = dofs.len();
-    let mut average = Gap {
-        value: 0.0,
-        first: vec![0.0; count],
-        second: vec![0.0; count * count],
-        dofs,
-        axial: 0.0,
-    };
-    for (gap, weight) in gaps {
-        let share = weight / total;
-        average.value += share * gap.value;
-        average.axial += share * gap.axial;
-        let place = |dof: &usize| average.dofs.iter().position(|d| d == dof).unwrap_or(0);
-        let places: Vec<usize> = gap.dofs.iter().map(place).collect();
-        for (i, &a) in places.iter().enumerate() {
-            average.first[a] += share * gap.first[i];
-            for (j, &b) in places.iter().enumerate() {
-                average.second[count * a + b] += share * gap.second[places.len() * i + j];
-            }
-        }
-    }
-    average
 }
 
-fn combine(shape: &[f64; 3], nodes: [usize; 3], at: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+/// Weighted sum over an edge's nodes.
+pub(crate) fn combine(
+    shape: &[f64; 3],
+    nodes: [usize; 3],
+    at: impl Fn(usize) -> [f64; 2],
+) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for (n, node) in shape.iter().zip(nodes) {
         let point = at(node);
@@ -224,269 +234,6 @@ fn combine(shape: &[f64; 3], nodes: [usize; 3], at: impl Fn(usize) -> [f64; 2]) 
         sum[1] += n * point[1];
     }
     sum
-}
-
-/// Where contact is judged: reference coordinates and displacements.
-#[derive(Clone, Copy)]
-pub(crate) struct Placement<'a> {
-    pub(crate) kinematics: Kinematics,
-    pub(crate) nodes: &'a [[f64; 2]],
-    pub(crate) displacement: &'a [f64],
-    pub(crate) approach: f64,
-}
-
-impl Placement<'_> {
-    pub(crate) fn current(&self, node: usize) -> [f64; 2] {
-        let [r, z] = self.nodes[node];
-        [
-            r + self.displacement[2 * node],
-            z + self.displacement[2 * node + 1],
-        ]
-    }
-
-    fn moved(&self, node: usize) -> [f64; 2] {
-        [self.displacement[2 * node], self.displacement[2 * node + 1]]
-    }
-
-    /// The gap of a point, `None` where there is nothing opposite to it.
-    pub(crate) fn gap(&self, point: &ContactPoint, opposite: &Opposite) -> Option<Gap> {
-        match opposite {
-            Opposite::Rigid {
-                shape,
-                side,
-                height,
-                driven,
-            } => self.rigid_gap(point, *shape, *side, *height, *driven),
-            Opposite::Surface(curve) => match self.kinematics {
-                Kinematics::Finite => self.surface_gap(point, curve),
-                Kinematics::Linear => self.vertical_gap(point, curve),
-            },
-        }
-    }
-
-    fn rigid_gap(
-        &self,
-        point: &ContactPoint,
-        shape: RigidShape,
-        side: f64,
-        height: f64,
-        driven: bool,
-    ) -> Option<Gap> {
-        let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
-        let position = combine(&point.shape, point.nodes, |n| self.current(n));
-        let linear = self.kinematics == Kinematics::Linear;
-        let [profile, slope, bend] =
-            shape.profile(if linear { reference[0] } else { position[0] })?;
-        let (slope, bend) = if linear { (0.0, 0.0) } else { (slope, bend) };
-        let moved = if driven { self.approach } else { 0.0 };
-        // Above the surface (side +1) the shape's pole is its lowest point; below, its highest.
-        let value = side * (height + moved - position[1]) + profile;
-        let mut dofs = Vec::with_capacity(7);
-        let mut first = Vec::with_capacity(7);
-        for (node, n) in point.nodes.iter().zip(&point.shape) {
-            dofs.extend([2 * node, 2 * node + 1]);
-            first.extend([n * slope, -side * n]);
-        }
-        if driven {
-            dofs.push(DRIVER);
-            first.push(side);
-        }
-        let count = dofs.len();
-        let mut second = vec![0.0; count * count];
-        for (i, a) in point.shape.iter().enumerate() {
-            for (j, b) in point.shape.iter().enumerate() {
-                second[2 * i * count + 2 * j] = a * b * bend;
-            }
-        }
-        Some(Gap {
-            value,
-            dofs,
-            first,
-            second,
-            axial: 1.0,
-        })
-    }
-
-    /// Distance to the closest point of the deformed surface, along its normal.
-    fn surface_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
-        let position = combine(&point.shape, point.nodes, |n| self.current(n));
-        let mut best: Option<(f64, CurvePoint, f64, bool)> = None;
-        for (index, edge) in curve.edges().iter().enumerate() {
-            let [a, _, b] = edge.map(|node| self.current(node));
-            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-            let to_a = (position[0] - a[0]).hypot(position[1] - a[1]);
-            // No point of the edge is nearer than this: edges bulge less than a fifth.
-            if best
-                .as_ref()
-                .is_some_and(|(distance, ..)| to_a - 1.2 * length > *distance)
-            {
-                continue;
-            }
-            let xi = self.closest(curve, index, position);
-            let at = curve.at(index, xi);
-            let [r, z] = at.sum(&at.position, |n| self.current(n));
-            let distance = (position[0] - r).hypot(position[1] - z);
-            if best.as_ref().is_none_or(|(least, ..)| distance < *least) {
-                let beyond = index + 1 == curve.edges().len() && xi >= 1.0;
-                best = Some((distance, at, xi, beyond));
-            }
-        }
-        let (_, at, xi, beyond) = best?;
-        if beyond {
-            return None;
-        }
-        let on_curve = at.sum(&at.position, |n| self.current(n));
-        let along = at.sum(&at.first, |n| self.current(n));
-        let bend = at.sum(&BEND, |n| self.current(n));
-        let offset = [position[0] - on_curve[0], position[1] - on_curve[1]];
-        let metric = along[0] * along[0] + along[1] * along[1];
-        let scale = curve.side / metric.sqrt();
-        let normal = [along[1] * scale, -along[0] * scale];
-        let value = offset[0] * normal[0] + offset[1] * normal[1];
-        let curvature = bend[0] * normal[0] + bend[1] * normal[1];
-        let denominator = metric - value * curvature;
-        let mut relative = Relative::new(point, &at, normal, along);
-        // At a kink between edges, or deep within a strongly bent surface, the closest point does not
-        // slide or is not unique: no second derivative.
-        if xi.abs() < 1.0 && denominator > 0.1 * metric {
-            let bent = curvature / metric;
-            relative.fill_second(|slip_i, turn_i, slip_j, turn_j| {
-                -(slip_i * turn_j
-                    + turn_i * slip_j
-                    + value * turn_i * turn_j
-                    + bent * slip_i * slip_j)
-                    / denominator
-            });
-        }
-        Some(relative.gap(value, normal))
-    }
-
-    /// Parameter of an edge's closest point, within [−1, 1].
-    fn closest(&self, curve: &SurfaceCurve, edge: usize, point: [f64; 2]) -> f64 {
-        let [a, _, b] = curve.edges()[edge].map(|node| self.current(node));
-        let chord = [b[0] - a[0], b[1] - a[1]];
-        let square = chord[0] * chord[0] + chord[1] * chord[1];
-        let along = (point[0] - a[0]) * chord[0] + (point[1] - a[1]) * chord[1];
-        let mut xi = (2.0 * along / square - 1.0).clamp(-1.0, 1.0);
-        // Newton's method on (x − x(ξ)) · x'(ξ) = 0: edges are nearly straight, few steps do.
-        for _ in 0..20 {
-            let at = curve.at(edge, xi);
-            let position = at.sum(&at.position, |n| self.current(n));
-            let slope = at.sum(&at.first, |n| self.current(n));
-            let bend = at.sum(&BEND, |n| self.current(n));
-            let offset = [point[0] - position[0], point[1] - position[1]];
-            let metric = slope[0] * slope[0] + slope[1] * slope[1];
-            let curved = metric - offset[0] * bend[0] - offset[1] * bend[1];
-            // Far from a strongly bent edge the derivative may vanish: the metric alone then.
-            let divisor = if curved > 0.1 * metric {
-                curved
-            } else {
-                metric
-            };
-            let step = (offset[0] * slope[0] + offset[1] * slope[1]) / divisor;
-            let next = (xi + step).clamp(-1.0, 1.0);
-            if (next - xi).abs() < 1e-15 {
-                return next;
-            }
-            xi = next;
-        }
-        xi
-    }
-
-    /// Edge and parameter of a surface's point at a reference radius.
-    fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
-        let edge = curve.edges().iter().position(|edge| {
-            let [a, _, b] = edge.map(|node| self.nodes[node][0]);
-            a <= radius && radius <= b
-        })?;
-        let [a, _, b] = curve.edges()[edge].map(|node| self.nodes[node][0]);
-        let mut xi = 2.0 * (radius - a) / (b - a) - 1.0;
-        for _ in 0..5 {
-            let at = curve.at(edge, xi);
-            let [r, _] = at.sum(&at.position, |n| self.nodes[n]);
-            let [slope, _] = at.sum(&at.first, |n| self.nodes[n]);
-            xi += (radius - r) / slope;
-        }
-        Some((edge, xi))
-    }
-
-    /// Height over the undeformed surface at the same radius, both displaced along z.
-    fn vertical_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
-        let reference = combine(&point.shape, point.nodes, |n| self.nodes[n]);
-        let moved = combine(&point.shape, point.nodes, |n| self.moved(n));
-        let (edge, xi) = self.opposite(curve, reference[0])?;
-        let at = curve.at(edge, xi);
-        let [_, z] = at.sum(&at.position, |n| self.nodes[n]);
-        let [_, w] = at.sum(&at.position, |n| self.moved(n));
-        // The outward normal of a surface above points down.
-        let up = -curve.side;
-        let value = up * (reference[1] + moved[1] - z - w);
-        Some(Relative::new(point, &at, [0.0, up], [0.0; 2]).gap(value, [0.0, up]))
-    }
-}
-
-/// Components of the displacement of a point relative to one of a curve, by their nodes'.
-struct Relative {
-    dofs: Vec<usize>,
-    /// Along the normal.
-    first: Vec<f64>,
-    /// Along the curve.
-    slip: Vec<f64>,
-    /// The curve's turning.
-    turn: Vec<f64>,
-    second: Vec<f64>,
-}
-
-impl Relative {
-    fn new(point: &ContactPoint, at: &CurvePoint, normal: [f64; 2], along: [f64; 2]) -> Self {
-        let mut relative = Self {
-            dofs: Vec::with_capacity(12),
-            first: Vec::with_capacity(12),
-            slip: Vec::with_capacity(12),
-            turn: Vec::with_capacity(12),
-            second: vec![0.0; 144],
-        };
-        let own = point
-            .nodes
-            .iter()
-            .zip(point.shape)
-            .map(|(node, n)| (*node, n, 0.0));
-        let weights = at.position.iter().zip(&at.first);
-        let other = at
-            .nodes
-            .iter()
-            .zip(weights)
-            .map(|(node, (n, dn))| (*node, -n, *dn));
-        for (node, n, dn) in own.chain(other) {
-            for k in 0..2 {
-                relative.dofs.push(2 * node + k);
-                relative.first.push(n * normal[k]);
-                relative.slip.push(n * along[k]);
-                relative.turn.push(dn * normal[k]);
-            }
-        }
-        relative
-    }
-
-    fn fill_second(&mut self, value: impl Fn(f64, f64, f64, f64) -> f64) {
-        let count = self.dofs.len();
-        for i in 0..count {
-            for j in 0..count {
-                self.second[count * i + j] =
-                    value(self.slip[i], self.turn[i], self.slip[j], self.turn[j]);
-            }
-        }
-    }
-
-    fn gap(self, value: f64, normal: [f64; 2]) -> Gap {
-        Gap {
-            value,
-            dofs: self.dofs,
-            first: self.first,
-            second: self.second,
-            axial: normal[1].abs(),
-        }
-    }
 }
 
 impl Placement<'_> {

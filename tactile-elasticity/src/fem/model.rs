@@ -1,11 +1,12 @@
 //! Bodies, materials, supports and contacts: what is to be solved.
 
-use super::contact::{ContactNode, ContactPoint, Opposite, RigidShape, contact_points};
+use super::contact::{ContactNode, ContactSegment, Opposite, contact_segments};
 use super::curve::SurfaceCurve;
 use super::element::Geometry;
 use super::interface::BondedInterface;
 use super::material::{Kinematics, Material};
 use super::mesh::{Boundary, Mesh};
+use super::rigid::RigidShape;
 use crate::ElasticityError;
 use crate::error::Quantity;
 use std::collections::BTreeMap;
@@ -85,7 +86,7 @@ pub struct Model {
     /// Of each displacement component, 2 node + (0 for r, 1 for z).
     pub(crate) motion: Vec<Motion>,
     pub(crate) opposites: Vec<Opposite>,
-    pub(crate) points: Vec<ContactPoint>,
+    pub(crate) segments: Vec<ContactSegment>,
     pub(crate) contact_nodes: Vec<ContactNode>,
     /// A bonded interface whose pressure is wanted.
     pub(crate) interface: Option<BondedInterface>,
@@ -108,7 +109,7 @@ impl Model {
             parts: Vec::new(),
             motion: Vec::new(),
             opposites: Vec::new(),
-            points: Vec::new(),
+            segments: Vec::new(),
             contact_nodes: Vec::new(),
             interface: None,
             partners: Vec::new(),
@@ -293,10 +294,10 @@ impl Model {
         let edges = self.edges(body, Boundary::Contact).to_vec();
         let pair = self.opposites.len();
         self.opposites.push(opposite);
-        let first = self.points.len();
-        let (points, corners) = contact_points(pair, first, &edges, &self.nodes, softer);
-        self.points.extend(points);
-        self.contact_nodes.extend(corners);
+        let first = self.contact_nodes.len();
+        let (segments, nodes) = contact_segments(pair, first, &edges, &self.nodes, softer);
+        self.segments.extend(segments);
+        self.contact_nodes.extend(nodes);
     }
 
     fn softest(&self, body: Body) -> f64 {

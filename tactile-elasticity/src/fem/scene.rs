@@ -2,11 +2,11 @@
 
 use super::block::BlockMesh;
 use super::bodies::{ContactMesh, Inclusion, contact_lines};
-use super::contact::RigidShape;
 use super::material::{Kinematics, Material};
 use super::mesh::{Boundary, Mesh};
 use super::model::{Model, Support};
 use super::newton::{Load, Solution};
+use super::rigid::RigidShape;
 use crate::ElasticityError;
 use crate::error::{Quantity, positive};
 
@@ -165,8 +165,24 @@ impl Scene {
     /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
     /// height, the glass moves by the approach.
     ///
-    /// Newton's method settles up to a contact radius of about 0.6 ball radii; beyond that the solution
-    /// ends with [`Outcome::Stopped`](super::Outcome::Stopped).
+    /// Contact radii reach 1.3 ball radii and more, until the ball's equator or the guide's thickness ends
+    /// what the bodies take: the solution then ends with [`Outcome::Stopped`](super::Outcome::Stopped).
+    ///
+    /// ```
+    /// use tactile_elasticity::fem::{Guide, Layer, Load, Material, Scene};
+    ///
+    /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+    /// let layer = Layer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
+    /// let guide = Guide::new(vec![layer], 25e-3)?;
+    /// let scene = Scene::ball_on_guide(3e-3, Material::new(103e3, 0.495)?, &guide)?;
+    /// let solution = scene.solve(&[Load::Approach(1e-3)]);
+    /// let state = &solution.states[0];
+    /// // Softer than a rigid flat: less force, at the same approach, than half of Hertz's.
+    /// let hertz = 4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
+    /// assert!(state.force_n() > 0.0 && state.force_n() < 0.5 * hertz);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// A radius that is not positive; a guide that is not wider than the ball.

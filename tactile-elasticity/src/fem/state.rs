@@ -112,20 +112,24 @@ impl Model {
     pub(crate) fn contact_pressure(&self, fields: &Fields) -> (Vec<PressurePoint>, Vec<f64>) {
         let placement = self.placement(fields);
         let candidates = self.candidates(fields, 0.0);
+        let mut deformed = vec![0.0; self.contact_nodes.len()];
+        for point in self.contact_points(fields) {
+            let stretch = placement.stretch(&point);
+            for (node, weight) in point.shares {
+                deformed[node] += weight * stretch;
+            }
+        }
         let mut points: Vec<(PressurePoint, f64)> = candidates
             .iter()
             .filter(|candidate| candidate.pressure > 0.0)
             .map(|candidate| {
                 let node = &self.contact_nodes[candidate.index];
-                let deformed: f64 = (node.points.iter())
-                    .map(|&(point, weight)| weight * placement.stretch(&self.points[point]))
-                    .sum();
                 let [r_m, z_m] = placement.current(node.node);
                 let force = candidate.pressure * node.weight;
                 let point = PressurePoint {
                     r_m,
                     z_m,
-                    pressure_pa: force / deformed,
+                    pressure_pa: force / deformed[candidate.index],
                 };
                 (point, force * candidate.gap.axial)
             })

@@ -1,7 +1,7 @@
 //! The linear system of one Newton iteration.
 
-use super::contact::{DRIVER, Gap, Placement, averaged};
 use super::element::{ALL, Elimination, OUTER};
+use super::gap::{DRIVER, Gap, Placement, averaged};
 use super::model::{Model, Motion};
 use super::sparse::{Envelope, Singular, reverse_cuthill_mckee};
 
@@ -113,24 +113,24 @@ impl Model {
     /// Contact nodes that touch or are nearer than two spacings and `margin`.
     pub(crate) fn candidates(&self, fields: &Fields, margin: f64) -> Vec<Candidate> {
         let placement = self.placement(fields);
-        let gaps: Vec<Option<Gap>> = (self.points.iter())
-            .map(|point| placement.gap(point, &self.opposites[point.pair]))
-            .collect();
-        let mut candidates = Vec::new();
-        for (index, node) in self.contact_nodes.iter().enumerate() {
+        let points = self.contact_points(fields);
+        let mut around: Vec<Vec<(Gap, f64)>> = vec![Vec::new(); self.contact_nodes.len()];
+        for point in &points {
             // Points with nothing opposite to them are open.
-            let around = node.points.iter();
-            let around =
-                around.filter_map(|&(point, weight)| Some((gaps[point].as_ref()?, weight)));
-            let total: f64 = around.clone().map(|(_, weight)| weight).sum();
+            if let Some(gap) = placement.gap(point, &self.opposites[point.pair]) {
+                let [(first, weight), (second, other)] = point.shares;
+                around[first].push((gap.clone(), weight));
+                around[second].push((gap, other));
+            }
+        }
+        let mut candidates = Vec::new();
+        for (index, (node, around)) in self.contact_nodes.iter().zip(&around).enumerate() {
+            let total: f64 = around.iter().map(|(_, weight)| weight).sum();
             if total < 0.5 * node.weight {
                 continue;
             }
-            let value = around
-                .clone()
-                .map(|(gap, weight)| gap.value * weight)
-                .sum::<f64>()
-                / total;
+            let weighted = around.iter().map(|(gap, weight)| gap.value * weight);
+            let value = weighted.sum::<f64>() / total;
             if value < 2.0 * node.spacing + margin {
                 candidates.push(Candidate {
                     index,
