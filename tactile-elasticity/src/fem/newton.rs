@@ -1,6 +1,7 @@
 //! Newton's method with load steps chosen by what converges.
 
 use super::contact::Opposite;
+use super::layout::Layout;
 use super::material::Kinematics;
 use super::model::Model;
 use super::state::State;
@@ -120,6 +121,7 @@ pub(crate) struct Equilibrium {
 
 struct Solver<'a> {
     model: &'a Model,
+    layout: Layout,
     report: Report,
     /// The equilibrium before the last one, for extrapolation.
     before: Option<Equilibrium>,
@@ -134,6 +136,7 @@ impl Model {
     pub fn solve(&self, loads: &[Load]) -> Solution {
         let mut solver = Solver {
             model: self,
+            layout: Layout::new(self),
             report: Report {
                 outcome: Outcome::Solved,
                 steps: 0,
@@ -333,7 +336,7 @@ impl Solver<'_> {
             Goal::Approach(target) => target - fields.approach,
             Goal::Force(_) => 0.0,
         };
-        let mut system = model.assemble(&fields, margin(goal, &fields))?;
+        let mut system = model.assemble(&mut self.layout, &fields, margin(goal, &fields))?;
         let mut worst = f64::INFINITY;
         for iteration in 0..MAX_ITERATIONS {
             let there = match goal {
@@ -369,7 +372,7 @@ impl Solver<'_> {
                     // Free of the rounding of the sum.
                     trial.approach = target;
                 }
-                if let Some(next) = model.assemble(&trial, margin(goal, &trial)) {
+                if let Some(next) = model.assemble(&mut self.layout, &trial, margin(goal, &trial)) {
                     break (trial, next);
                 }
                 length *= 0.5;

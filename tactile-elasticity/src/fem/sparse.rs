@@ -1,199 +1,157 @@
-//! Symmetric systems in envelope storage: ordering, LDLᵀ factorisation, solution.
+//! Sparse symmetric systems: pattern, LDLᵀ factorisation, solution.
 //!
-//! A cross-section meshed with some twenty elements across has a narrow profile. There an envelope
-//! factorisation costs about what a general sparse one does (the whole envelope fills anyway) and
-//! needs no dependency.
+//! The analysis (fill-reducing order, elimination tree, supernodes) is made once a pattern and serves
+//! every matrix that has it.
 
-use std::collections::VecDeque;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+use std::sync::Arc;
 
-/// Numbers nodes by reverse Cuthill–McKee, so that neighbours get close numbers.
-///
-/// `groups` are lists of nodes that are all coupled with each other. Returns the position of each
-/// node. O(coupled pairs).
-pub(crate) fn reverse_cuthill_mckee(count: usize, groups: &[Vec<usize>]) -> Vec<usize> {
-    let mut neighbours = vec![Vec::new(); count];
-    for group in groups {
-        for &a in group {
-            neighbours[a].extend(group.iter().copied().filter(|&b| b != a));
-        }
-    }
-    for list in &mut neighbours {
-        list.sort_unstable();
-        list.dedup();
-    }
-    let degree: Vec<usize> = neighbours.iter().map(Vec::len).collect();
-    let mut order = Vec::with_capacity(count);
-    let mut placed = vec![false; count];
-    for seed in 0..count {
-        if placed[seed] {
-            continue;
-        }
-        let start = peripheral(seed, &neighbours, &degree);
-        let mut queue = VecDeque::from([start]);
-        placed[start] = true;
-        while let Some(node) = queue.pop_front() {
-            order.push(node);
-            let mut next: Vec<usize> = neighbours[node]
-                .iter()
-                .copied()
-                .filter(|&n| !placed[n])
-                .collect();
-            next.sort_unstable_by_key(|&n| (degree[n], n));
-            for node in next {
-                placed[node] = true;
-                queue.push_back(node);
-            }
-        }
-    }
-    let mut position = vec![0; count];
-    for (place, &node) in order.iter().rev().enumerate() {
-        position[node] = place;
-    }
-    position
-}
-
-/// A node of about the greatest distance from the others of its component.
-fn peripheral(seed: usize, neighbours: &[Vec<usize>], degree: &[usize]) -> usize {
-    let (mut node, mut depth) = (seed, 0);
-    loop {
-        let mut level = vec![usize::MAX; neighbours.len()];
-        level[node] = 0;
-        let mut queue = VecDeque::from([node]);
-        let mut last = node;
-        while let Some(n) = queue.pop_front() {
-            let farther = level[n] > level[last];
-            if farther || (level[n] == level[last] && degree[n] < degree[last]) {
-                last = n;
-            }
-            for &m in &neighbours[n] {
-                if level[m] == usize::MAX {
-                    level[m] = level[n] + 1;
-                    queue.push_back(m);
-                }
-            }
-        }
-        if level[last] <= depth {
-            return node;
-        }
-        depth = level[last];
-        node = last;
-    }
-}
-
-/// A symmetric matrix: each row's entries from its first non-zero to the diagonal.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Envelope {
-    first: Vec<usize>,
-    /// Where each row's entries begin, and where the last ends.
-    start: Vec<usize>,
-    values: Vec<f64>,
-    factorised: bool,
-}
-
-/// A pivot vanished: the system is singular.
+/// The system cannot be solved: a pivot vanished, or there is no memory for the factors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Singular;
 
-impl Envelope {
-    /// Zeros in the envelope that couples each group's equations.
-    pub(crate) fn new<'a>(size: usize, groups: impl Iterator<Item = &'a [usize]>) -> Self {
-        let mut first: Vec<usize> = (0..size).collect();
+/// Where a symmetric matrix has entries, and how it is factorised.
+#[derive(Debug)]
+pub(crate) struct Pattern {
+    /// Lower half: rows of each column, ascending from the diagonal.
+    entries: SymbolicSparseColMat<usize>,
+    analysis: SymbolicCholesky<usize>,
+}
+
+impl Pattern {
+    /// The pattern of `size` equations that couples each group's with each other.
+    pub(crate) fn new<'a>(
+        size: usize,
+        groups: impl Iterator<Item = &'a [usize]>,
+    ) -> Result<Self, Singular> {
+        let mut columns: Vec<Vec<usize>> = (0..size).map(|diagonal| vec![diagonal]).collect();
         for group in groups {
-            let Some(&lowest) = group.iter().min() else {
-                continue;
-            };
-            for &equation in group {
-                first[equation] = first[equation].min(lowest);
+            for &column in group {
+                columns[column].extend(group.iter().filter(|&&row| row > column));
             }
         }
-        let mut start = vec![0];
-        for (row, &column) in first.iter().enumerate() {
-            start.push(start[row] + row + 1 - column);
+        let mut starts = vec![0];
+        let mut rows = Vec::new();
+        for column in &mut columns {
+            column.sort_unstable();
+            column.dedup();
+            rows.append(column);
+            starts.push(rows.len());
         }
-        Self {
-            values: vec![0.0; start[size]],
-            first,
-            start,
-            factorised: false,
-        }
+        let entries = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
+        let analysis = factorize_symbolic_cholesky(
+            entries.as_ref(),
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams::default(),
+        );
+        Ok(Self {
+            analysis: analysis.map_err(|_| Singular)?,
+            entries,
+        })
     }
 
-    /// Adds to the entry (i, j) and so to (j, i).
-    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
-        let (row, column) = if i >= j { (i, j) } else { (j, i) };
-        self.values[self.start[row] + column - self.first[row]] += value;
+    /// Place of the entry (i, j), which is that of (j, i) too.
+    fn place(&self, i: usize, j: usize) -> Option<usize> {
+        let (row, column) = (i.max(j), i.min(j));
+        let range = self.entries.col_range(column);
+        let rows = &self.entries.row_idx()[range.clone()];
+        rows.binary_search(&row).ok().map(|at| range.start + at)
     }
 
-    /// Replaces the matrix by its factors L and D, in O(Σ row length²).
-    ///
-    /// Without pivoting: a stable equilibrium's tangent is positive definite; where it is not, the
-    /// step that Newton's method then takes is judged by its residual.
-    pub(crate) fn factorise(&mut self) -> Result<(), Singular> {
-        let size = self.first.len();
-        let largest = (0..size).fold(0.0_f64, |m, i| {
-            m.max(self.values[self.start[i + 1] - 1].abs())
-        });
-        for i in 0..size {
-            let (done, rest) = self.values.split_at_mut(self.start[i]);
-            let row = &mut rest[..i + 1 - self.first[i]];
-            let first_i = self.first[i];
-            for j in first_i..i {
-                let first = first_i.max(self.first[j]);
-                let other = &done[self.start[j] + first - self.first[j]..self.start[j + 1] - 1];
-                row[j - first_i] -= dot(&row[first - first_i..j - first_i], other);
-            }
-            let mut pivot = row[i - first_i];
-            for j in first_i..i {
-                let reduced = row[j - first_i];
-                let scaled = reduced / done[self.start[j + 1] - 1];
-                pivot -= reduced * scaled;
-                row[j - first_i] = scaled;
-            }
-            // Rounding alone is left of a zero pivot after cancellation.
-            if pivot.is_nan() || pivot.abs() <= 1e-15 * largest {
-                return Err(Singular);
-            }
-            row[i - first_i] = pivot;
-        }
-        self.factorised = true;
-        Ok(())
-    }
-
-    /// Solves in place with the factors.
-    pub(crate) fn solve(&self, x: &mut [f64]) {
-        debug_assert!(self.factorised);
-        let size = self.first.len();
-        let row = |i: usize| &self.values[self.start[i]..self.start[i + 1] - 1];
-        for i in 0..size {
-            x[i] -= dot(row(i), &x[self.first[i]..i]);
-        }
-        for (value, end) in x.iter_mut().zip(&self.start[1..]) {
-            *value /= self.values[end - 1];
-        }
-        for i in (0..size).rev() {
-            let known = x[i];
-            for (value, l) in x[self.first[i]..i].iter_mut().zip(row(i)) {
-                *value -= l * known;
-            }
-        }
+    /// Whether the pattern couples all equations of a group.
+    pub(crate) fn couples(&self, group: &[usize]) -> bool {
+        let mut pairs =
+            (group.iter().enumerate()).flat_map(|(k, &i)| group[..k].iter().map(move |&j| (i, j)));
+        pairs.all(|(i, j)| self.place(i, j).is_some())
     }
 }
 
-/// Scalar product in eight partial sums, which compilers turn into vector instructions.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let length = a.len().min(b.len());
-    let (a, b) = (&a[..length], &b[..length]);
-    let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = (chunks_a.remainder().iter().zip(chunks_b.remainder()))
-        .map(|(x, y)| x * y)
-        .sum();
-    let mut sums = [0.0; 8];
-    for (x, y) in chunks_a.zip(chunks_b) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
+/// A symmetric matrix.
+#[derive(Debug, Clone)]
+pub(crate) struct Symmetric {
+    pattern: Arc<Pattern>,
+    values: Vec<f64>,
+}
+
+impl Symmetric {
+    pub(crate) fn zero(pattern: Arc<Pattern>) -> Self {
+        Self {
+            values: vec![0.0; pattern.entries.row_idx().len()],
+            pattern,
         }
     }
-    rest + ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
+
+    /// Adds to the entry (i, j) and so to (j, i), which the pattern must have.
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
+        let place = self.pattern.place(i, j);
+        debug_assert!(place.is_some(), "no entry ({i}, {j})");
+        if let Some(place) = place {
+            self.values[place] += value;
+        }
+    }
+
+    /// LDLᵀ factors.
+    ///
+    /// Without pivoting: a stable equilibrium's tangent is positive definite; where it is not, the
+    /// step that Newton's method then takes is judged by its residual.
+    pub(crate) fn factorise(&self) -> Result<Factors, Singular> {
+        let analysis = &self.pattern.analysis;
+        let mut values = vec![0.0; analysis.len_val()];
+        let scratch = analysis.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| Singular)?;
+        let factorised = analysis.factorize_numeric_ldlt(
+            &mut values,
+            SparseColMatRef::new(self.pattern.entries.as_ref(), &self.values),
+            Side::Lower,
+            LdltRegularization::default(),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        );
+        factorised.map_err(|_| Singular)?;
+        Ok(Factors {
+            pattern: Arc::clone(&self.pattern),
+            values,
+        })
+    }
+}
+
+/// LDLᵀ factors of a [`Symmetric`] matrix.
+#[derive(Debug)]
+pub(crate) struct Factors {
+    pattern: Arc<Pattern>,
+    values: Vec<f64>,
+}
+
+impl Factors {
+    /// Solves in place for right-hand sides that follow each other in `x`.
+    pub(crate) fn solve(&self, x: &mut [f64]) -> Result<(), Singular> {
+        let analysis = &self.pattern.analysis;
+        let size = analysis.nrows();
+        let count = x.len().checked_div(size).unwrap_or(0);
+        let scratch = analysis.solve_in_place_scratch::<f64>(count, Par::Seq);
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| Singular)?;
+        LdltRef::<'_, usize, f64>::new(analysis, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(x, size, count),
+            Par::Seq,
+            MemStack::new(&mut memory),
+        );
+        // A pivot that is rounding alone passes the factorisation and shows here.
+        if x.iter().all(|value| value.is_finite()) {
+            Ok(())
+        } else {
+            Err(Singular)
+        }
+    }
 }
 
 #[cfg(test)]
@@ -201,18 +159,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn solves_an_indefinite_system_in_any_order() {
-        let groups = [vec![0, 3], vec![3, 1], vec![1, 4], vec![4, 2]];
-        let position = reverse_cuthill_mckee(5, &groups);
-        let mapped: Vec<Vec<usize>> = groups
-            .iter()
-            .map(|g| g.iter().map(|&n| position[n]).collect())
-            .collect();
-        let mut matrix = Envelope::new(5, mapped.iter().map(Vec::as_slice));
-        // A chain numbered by Cuthill–McKee is tridiagonal: five diagonals, four neighbours.
-        assert_eq!(matrix.values.len(), 9);
+    fn solves_an_indefinite_system() {
+        let groups: [&[usize]; 4] = [&[0, 3], &[3, 1], &[1, 4], &[4, 2]];
+        let pattern = Pattern::new(5, groups.into_iter()).unwrap();
+        assert!(pattern.couples(&[1, 3]) && !pattern.couples(&[0, 1, 3]));
+        let mut matrix = Symmetric::zero(Arc::new(pattern));
         let mut dense = nalgebra::DMatrix::<f64>::zeros(5, 5);
-        for (k, group) in mapped.iter().enumerate() {
+        for (k, group) in groups.iter().enumerate() {
             let (i, j) = (group[0], group[1]);
             for (r, c, v) in [(i, i, 3.0), (j, j, -2.0), (i, j, 0.5 + k as f64)] {
                 matrix.add(r, c, v);
@@ -222,10 +175,9 @@ mod tests {
                 }
             }
         }
-        let truth = nalgebra::DVector::from_fn(5, |i, _| 1.0 + i as f64);
+        let truth = nalgebra::DMatrix::from_fn(5, 2, |i, j| 1.0 + i as f64 - 3.0 * j as f64);
         let mut x: Vec<f64> = (&dense * &truth).iter().copied().collect();
-        matrix.factorise().unwrap();
-        matrix.solve(&mut x);
+        matrix.factorise().unwrap().solve(&mut x).unwrap();
         for (found, expected) in x.iter().zip(&truth) {
             // Five unknowns of order one: some rounding units.
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
@@ -235,10 +187,14 @@ mod tests {
     #[test]
     fn a_singular_system_is_reported() {
         let groups: [&[usize]; 1] = [&[0, 1]];
-        let mut matrix = Envelope::new(2, groups.into_iter());
+        let pattern = Pattern::new(2, groups.into_iter()).unwrap();
+        let mut matrix = Symmetric::zero(Arc::new(pattern));
         for (i, j, v) in [(0, 0, 1.0), (0, 1, 1.0), (1, 1, 1.0)] {
             matrix.add(i, j, v);
         }
-        assert_eq!(matrix.factorise(), Err(Singular));
+        let solved = matrix
+            .factorise()
+            .and_then(|factors| factors.solve(&mut [1.0, 0.0]));
+        assert_eq!(solved, Err(Singular));
     }
 }

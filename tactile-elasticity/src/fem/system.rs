@@ -2,8 +2,10 @@
 
 use super::element::{ALL, Elimination, OUTER};
 use super::gap::{DRIVER, Gap, Placement, averaged};
-use super::model::{Model, Motion};
-use super::sparse::{Envelope, Singular, reverse_cuthill_mckee};
+use super::layout::{Layout, Slot, slot};
+use super::model::Model;
+use super::sparse::{Singular, Symmetric};
+use std::sync::Arc;
 
 /// The unknowns: displacements, element pressures and the approach.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,14 +46,6 @@ pub(crate) struct Candidate {
     pub(crate) pressure: f64,
 }
 
-/// Where a displacement component's share of the system goes.
-#[derive(Debug, Clone, Copy)]
-enum Slot {
-    Nowhere,
-    Driver(f64),
-    Equation(usize),
-}
-
 /// Residual and tangent at one state.
 ///
 /// Contact enters each Newton iteration as a linear complementarity problem: gaps are linear in the
@@ -59,7 +53,7 @@ enum Slot {
 /// the state before it.
 pub(crate) struct System<'a> {
     model: &'a Model,
-    slots: Vec<Slot>,
+    slots: Arc<[Slot]>,
     /// Elements' share and the turning of surfaces under their present pressure.
     base: Tangent,
     /// Force out of balance at the state itself, with the contacts there.
@@ -75,7 +69,7 @@ pub(crate) struct System<'a> {
 /// A symmetric linear system with one more unknown, the approach.
 #[derive(Debug, Clone)]
 struct Tangent {
-    matrix: Envelope,
+    matrix: Symmetric,
     /// Negative residual.
     right: Vec<f64>,
     driver_column: Vec<f64>,
@@ -144,7 +138,12 @@ impl Model {
 
     /// The system at a state from which the approach may change by `margin`; `None` where an element
     /// is turned inside out.
-    pub(crate) fn assemble(&self, fields: &Fields, margin: f64) -> Option<System<'_>> {
+    pub(crate) fn assemble(
+        &self,
+        layout: &mut Layout,
+        fields: &Fields,
+        margin: f64,
+    ) -> Option<System<'_>> {
         let mut condensed = Vec::with_capacity(self.elements.len());
         for (index, nodes) in self.elements.iter().enumerate() {
             let material = &self.materials[self.regions[index]];
@@ -157,11 +156,11 @@ impl Model {
             )?);
         }
         let candidates = self.candidates(fields, 2.0 * margin.abs());
-        let (slots, matrix) = self.layout(&candidates);
-        let equations = slots
+        let gaps = candidates
             .iter()
-            .filter(|slot| matches!(slot, Slot::Equation(_)))
-            .count();
+            .map(|candidate| candidate.gap.dofs.as_slice());
+        let matrix = Symmetric::zero(layout.pattern(gaps).ok()?);
+        let (slots, equations) = (layout.slots(), layout.equations);
         let mut base = Tangent {
             matrix,
             right: vec![0.0; equations],
@@ -215,92 +214,6 @@ impl Model {
             candidates,
         })
     }
-
-    /// Numbers the equations and reserves the tangent's envelope.
-    fn layout(&self, candidates: &[Candidate]) -> (Vec<Slot>, Envelope) {
-        let mut groups: Vec<Vec<usize>> = self
-            .elements
-            .iter()
-            .map(|nodes| nodes[..OUTER / 2].to_vec())
-            .collect();
-        for candidate in candidates {
-            let dofs = candidate.gap.dofs.iter().filter(|&&dof| dof != DRIVER);
-            groups.push(dofs.map(|dof| dof / 2).collect());
-        }
-        // Partners get neighbouring numbers: they are one node to the ordering.
-        let mut followers: Vec<Option<usize>> = vec![None; self.nodes.len()];
-        for (node, partner) in self.partners.iter().enumerate() {
-            if let Some(partner) = *partner {
-                followers[partner] = Some(node);
-            }
-        }
-        let one: Vec<Vec<usize>> = groups
-            .iter()
-            .map(|group| {
-                group
-                    .iter()
-                    .map(|&node| self.partners[node].unwrap_or(node))
-                    .collect()
-            })
-            .collect();
-        let position = reverse_cuthill_mckee(self.nodes.len(), &one);
-        let mut order = vec![0; self.nodes.len()];
-        for (node, &place) in position.iter().enumerate() {
-            order[place] = node;
-        }
-        // The centres, eliminated within their elements, have no equation.
-        let mut is_outer = vec![false; self.nodes.len()];
-        for nodes in &self.elements {
-            for &node in &nodes[..OUTER / 2] {
-                is_outer[node] = true;
-            }
-        }
-        let mut slots = vec![Slot::Nowhere; 2 * self.nodes.len()];
-        let mut equations = 0;
-        let partnered = |node: &usize| self.partners[*node].is_none();
-        let order = order.into_iter().filter(partnered);
-        for node in order
-            .flat_map(|node| [Some(node), followers[node]])
-            .flatten()
-        {
-            for dof in [2 * node, 2 * node + 1] {
-                if let (Some(partner), 1) = (self.partners[node], dof % 2) {
-                    slots[dof] = slots[2 * partner + 1];
-                    continue;
-                }
-                slots[dof] = match self.motion[dof] {
-                    Motion::Zero => Slot::Nowhere,
-                    Motion::Driven(factor) => Slot::Driver(factor),
-                    Motion::Free if is_outer[node] => {
-                        equations += 1;
-                        Slot::Equation(equations - 1)
-                    }
-                    Motion::Free => Slot::Nowhere,
-                };
-            }
-        }
-        let coupled: Vec<Vec<usize>> = groups
-            .iter()
-            .map(|group| {
-                let dofs = group.iter().flat_map(|node| [2 * node, 2 * node + 1]);
-                dofs.filter_map(|dof| match slots[dof] {
-                    Slot::Equation(equation) => Some(equation),
-                    _ => None,
-                })
-                .collect()
-            })
-            .collect();
-        let matrix = Envelope::new(equations, coupled.iter().map(Vec::as_slice));
-        (slots, matrix)
-    }
-}
-
-fn slot(slots: &[Slot], dof: usize) -> Slot {
-    if dof == DRIVER {
-        Slot::Driver(1.0)
-    } else {
-        slots[dof]
-    }
 }
 
 impl Tangent {
@@ -333,12 +246,13 @@ impl Tangent {
     }
 
     /// Solution for a goal: the equations' unknowns and the approach's step.
-    fn solve(&mut self, goal: Goal, present: f64) -> Result<(Vec<f64>, f64), Singular> {
-        self.matrix.factorise()?;
-        let mut solution = self.right.clone();
-        self.matrix.solve(&mut solution);
-        let mut by_approach = self.driver_column.clone();
-        self.matrix.solve(&mut by_approach);
+    fn solve(&self, goal: Goal, present: f64) -> Result<(Vec<f64>, f64), Singular> {
+        // Two right-hand sides: the residual's, and that of a unit approach.
+        let size = self.right.len();
+        let mut columns = [self.right.as_slice(), &self.driver_column].concat();
+        self.matrix.factorise()?.solve(&mut columns)?;
+        let by_approach = columns.split_off(size);
+        let mut solution = columns;
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         let approach = match goal {
             Goal::Approach(target) => target - present,
