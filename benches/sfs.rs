@@ -172,7 +172,7 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
     }
     for (name, method, domain, alignment) in methods {
         let id = format!("{name}/{}/{:?}", case.name, light.map(|v| v as i32)).replace(' ', "");
-        let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
         let frame = Frame::Real(image.view());
         method
             .reconstruct_with(&mut workspace, frame, domain, &mut surface)
@@ -241,7 +241,7 @@ fn contact_share(criterion: &mut Criterion) {
             .with_mask(mask.view())
             .with_known_heights(known.view());
         let method = Eikonal::new(lighting).with_branch(Branch::Concave);
-        let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
         group.bench_function(
             BenchmarkId::new("eikonal", format!("{percent}%/{columns}x{rows}")),
             |bencher| {
@@ -292,7 +292,7 @@ fn depth_table(criterion: &mut Criterion) {
     let table = DepthTable::new(&entries).unwrap();
     let image = Array2::from_shape_fn((1042, 1392), |(r, c)| ((r * 7 + c * 3) % 61) as u8);
     let domain = Domain::new([5e-5, 5e-5]).unwrap();
-    let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+    let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
     group.throughput(Throughput::Elements(1042 * 1392));
     group.bench_function(BenchmarkId::new("depth-table", "1392x1042"), |bencher| {
         bencher.iter(|| {
@@ -348,10 +348,14 @@ fn integrate_as<T: Scalar>(criterion: &mut Criterion, scalar: &str, rows: usize,
     let methods: [(&str, Box<dyn SlopeIntegrator<T>>, f64); 3] = [
         ("cosine-poisson", Box::new(CosinePoisson), 1e-3),
         ("frankot-chellappa", Box::new(FrankotChellappa), 0.2),
-        ("least-squares", Box::new(MaskedLeastSquares::new()), 1e-3),
+        (
+            "least-squares",
+            Box::new(MaskedLeastSquares::default()),
+            1e-3,
+        ),
     ];
     for (name, method, bound) in methods {
-        let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
         let domain = Domain::pixels();
         method
             .integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)

@@ -126,7 +126,7 @@ impl Bench for Refit {
         let expected = solved(problem, kernel.clone(), name);
         let factorization = Factorization::new(&problem.sources, &FitOptions::new(kernel.clone()))
             .expect("a factor");
-        let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(kernel));
+        let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(kernel));
         factorization
             .fit_with(&mut workspace, &problem.targets, &mut spline)
             .expect("a fit");

@@ -1,4 +1,4 @@
-//! A contact law of one's own: the pipeline measures force and contact, the law makes a modulus of them.
+//! A user-defined contact law: the pipeline measures force and contact, the law turns them into a modulus.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use tactile_imaging::pipeline::Trial;

@@ -1,4 +1,4 @@
-//! A matcher of one's own in place of the default: one line changes, the rest of the pipeline stays.
+//! A user-defined matcher in place of the default: one line changes, the rest of the pipeline stays.
 #![allow(clippy::print_stdout)]
 use nalgebra::Point3;
 use std::error::Error;

@@ -137,7 +137,7 @@ pub(crate) fn slopes(study: &mut Study) {
             &FrankotChellappa,
         );
         for tolerance in [1e-2, 1e-4, 1e-8] {
-            let method = MaskedLeastSquares::new()
+            let method = MaskedLeastSquares::default()
                 .with_tolerance(tolerance)
                 .expect("valid");
             integral::<f64>(

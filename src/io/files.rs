@@ -4,13 +4,8 @@ use std::fs::{self, FileType, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Largest file that is read, in bytes: a table of this size holds over 10⁷ points. What is larger was given by mistake,
-/// and would be in the way of the memory that its numbers need.
-///
-/// ```
-/// assert_eq!(tactile_imaging::io::LARGEST_FILE, 512 * 1024 * 1024);
-/// ```
-pub const LARGEST_FILE: u64 = 512 << 20;
+/// Largest file that is read, in bytes: more is not a measurement.
+pub(crate) const LARGEST_FILE: u64 = 512 << 20;
 
 /// Reads a whole file of at most [`LARGEST_FILE`] bytes; the error names it.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {

@@ -13,37 +13,14 @@ use ndarray::{Array2, ArrayView2};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Weights of red, green and blue in grey: the luma of Rec. 601.
-///
-/// ```
-/// use tactile_imaging::io::image::REC_601;
-/// let grey = |rgb: [f64; 3]| (0..3).map(|i| REC_601[i] * rgb[i]).sum::<f64>();
-/// assert!((grey([255.0; 3]) - 255.0).abs() < 1e-12, "white stays white");
-/// assert!(grey([0.0, 255.0, 0.0]) > grey([255.0, 0.0, 255.0]), "green weighs most");
-/// ```
-pub const REC_601: [f64; 3] = [0.299, 0.587, 0.114];
+/// Weights of red, green and blue in the luma of Rec. 601.
+pub(crate) const REC_601: [f64; 3] = [0.299, 0.587, 0.114];
 
-/// Largest width and height that is read, px: beyond it a file is taken for broken.
-///
-/// ```
-/// use tactile_imaging::io::image::{LARGEST_SIDE, parse_grey_image};
-/// let line = |width: u32| {
-///     let header = format!("P5\n{width} 1\n255\n").into_bytes();
-///     [header, vec![0; width as usize]].concat()
-/// };
-/// assert!(parse_grey_image(&line(LARGEST_SIDE), "line.pgm").is_ok());
-/// assert!(parse_grey_image(&line(LARGEST_SIDE + 1), "line.pgm").is_err());
-/// ```
-pub const LARGEST_SIDE: u32 = 30_000;
+/// Longest side of an image in pixels.
+pub(crate) const LARGEST_SIDE: u32 = 30_000;
 
-/// Most pixels that are read: the largest sensors have 50 to 60 million, and an image of more needs gigabytes.
-///
-/// ```
-/// use tactile_imaging::io::{ReadError, image::{LARGEST_IMAGE, parse_grey_image}};
-/// let bomb = parse_grey_image(b"P5\n20000 20000\n255\n", "bomb.pgm").unwrap_err();
-/// assert!(matches!(bomb, ReadError::TooManyPixels { limit: LARGEST_IMAGE, .. }));
-/// ```
-pub const LARGEST_IMAGE: u64 = 64_000_000;
+/// Most pixels of an image: 64 million.
+pub(crate) const LARGEST_IMAGE: u64 = 64_000_000;
 
 /// Samples of 16 bits that do not go beyond this may be those of a camera with 12.
 const TWELVE_BITS: u16 = 4095;

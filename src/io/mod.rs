@@ -23,7 +23,7 @@ mod units;
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
 pub use error::{Expected, ReadError};
 pub(crate) use files::read_bytes;
-pub use files::{LARGEST_FILE, write_file};
+pub use files::write_file;
 pub use grid::{read_grid, write_grid};
 pub use image::{GreyImage, read_grey_image, read_grey_image_of_bits, write_grey_image};
 pub use points::{PointTable, read_point_table, read_points, write_points};

@@ -42,17 +42,15 @@ macro_rules! choice {
             /// The names, as a sentence says them.
             pub const EXPECTED: &str = concat!("one of \"", $text, "\"", $(", \"", $other, "\""),+);
 
-            /// The name in configurations.
-            ///
-            /// ```
-            #[doc = concat!("use tactile_imaging::pipeline::", stringify!($name), ";")]
-            #[doc = concat!("let choice: ", stringify!($name), " = \"", $text, "\".parse()?;")]
-            #[doc = concat!("assert_eq!(choice.name(), \"", $text, "\");")]
-            /// # Ok::<(), tactile_imaging::pipeline::UnknownStage>(())
-            /// ```
-            #[must_use]
-            pub fn name(self) -> &'static str {
+            /// The name in configurations; [`Display`](fmt::Display) writes it.
+            pub(crate) fn name(self) -> &'static str {
                 match self { Self::$first => $text, $(Self::$variant => $other),+ }
+            }
+        }
+
+        impl From<$name> for &'static str {
+            fn from(choice: $name) -> Self {
+                choice.name()
             }
         }
 
@@ -93,11 +91,29 @@ choice! {
 }
 
 choice! {
+    /// Slopes to heights, inside a reconstruction that goes through slopes.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::IntegratorChoice;
+    /// assert_eq!("masked-least-squares".parse(), Ok(IntegratorChoice::MaskedLeastSquares));
+    /// ```
+    IntegratorChoice, "integrator":
+    /// The reconstruction's own.
+    OfReconstruction = "of-reconstruction",
+    /// [`FrankotChellappa`](crate::sfs::FrankotChellappa).
+    FrankotChellappa = "frankot-chellappa",
+    /// [`CosinePoisson`](crate::sfs::CosinePoisson).
+    CosinePoisson = "cosine-poisson",
+    /// [`MaskedLeastSquares`](crate::sfs::MaskedLeastSquares) with equal weights.
+    MaskedLeastSquares = "masked-least-squares",
+}
+
+choice! {
     /// Surface to control points.
     ///
     /// ```
     /// use tactile_imaging::pipeline::SamplerChoice;
-    /// assert_eq!(SamplerChoice::default().name(), "contact");
+    /// assert_eq!(SamplerChoice::default().to_string(), "contact");
     /// ```
     SamplerChoice, "sampler":
     /// [`ContactSampler`](crate::sfs::ContactSampler): equally spaced up to the sub-pixel contour of the contact.
@@ -115,7 +131,7 @@ choice! {
     ///
     /// ```
     /// use tactile_imaging::pipeline::MatcherChoice;
-    /// assert!(MatcherChoice::ALL.iter().all(|m| m.name().parse() == Ok(*m)));
+    /// assert!(MatcherChoice::ALL.iter().all(|m| m.to_string().parse() == Ok(*m)));
     /// ```
     MatcherChoice, "matcher":
     /// [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by.
@@ -174,7 +190,7 @@ choice! {
     /// ```
     /// use tactile_imaging::pipeline::EstimatorChoice;
     /// assert_eq!("paper-ratio".parse(), Ok(EstimatorChoice::PaperRatio));
-    /// assert_eq!(EstimatorChoice::default().name(), "best");
+    /// assert_eq!(EstimatorChoice::default().to_string(), "best");
     /// ```
     EstimatorChoice, "estimator":
     /// The default for the object: [`HertzSphere`](crate::elasticity::modulus::HertzSphere) for a ball, the law of its shape for a layer and a

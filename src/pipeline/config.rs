@@ -1,6 +1,7 @@
 //! Stages by name, as a configuration gives them.
 use super::choice::{
-    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice,
+    EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
+    StrainChoice, WarpChoice,
 };
 
 /// Which stage to take for each step, by name; what is not said is the default. With the feature `serde` a table such as
@@ -20,6 +21,8 @@ use super::choice::{
 pub struct StagesConfig {
     /// Image to surface.
     pub reconstruction: ReconstructionChoice,
+    /// Slopes to heights; only a reconstruction that goes through slopes takes another than its own.
+    pub integrator: IntegratorChoice,
     /// Surface to control points.
     pub sampler: SamplerChoice,
     /// Points to matches.

@@ -24,7 +24,6 @@ use crate::tps::TpsError;
 /// assert_eq!(error, PipelineError::NoContact { frame: 0 });
 /// assert!(error.to_string().starts_with("frame 1 shows no contact"));
 /// let error = press.contact(7).unwrap_err();
-/// assert_eq!(error.frame(), Some(7));
 /// assert_eq!(error.to_string(), "there is no frame 8: the press has 1");
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
@@ -43,6 +42,11 @@ pub enum PipelineError {
     /// The options of the warp are not usable.
     #[error("the options of the warp are not usable: {0}")]
     WarpOptions(#[source] TpsError),
+    /// An integrator was chosen, but the reconstruction has no slopes to integrate.
+    #[error(
+        "the reconstruction goes from the image to heights without slopes: it takes no integrator (Brooks and Horn's does)"
+    )]
+    NoSlopes,
     /// The depth table is not usable.
     #[error("the depth table is not usable: {0}")]
     DepthTable(#[source] SfsError),
@@ -163,7 +167,7 @@ pub enum PipelineError {
 
 impl PipelineError {
     /// The frame that the trouble comes from, counted from 0, where there is one.
-    pub fn frame(&self) -> Option<usize> {
+    pub(crate) fn frame(&self) -> Option<usize> {
         match self {
             Self::NoSuchFrame { frame, .. }
             | Self::Contact { frame, .. }

@@ -61,7 +61,7 @@ pub(super) fn that_fit(
             }
             Object::Unknown { .. } => {}
         }
-        estimators.push(shared(StressStrainRegression::new())?);
+        estimators.push(shared(StressStrainRegression::default())?);
         Ok(estimators)
     };
     build().map_err(PipelineError::Material)
@@ -88,7 +88,7 @@ fn named(
     let built = match choice {
         EstimatorChoice::Best => default_of(object, waveguide),
         EstimatorChoice::PaperRatio => paper_ratio(object).and_then(shared),
-        EstimatorChoice::Regression => shared(StressStrainRegression::new()),
+        EstimatorChoice::Regression => shared(StressStrainRegression::default()),
         EstimatorChoice::Sphere => {
             let (radius_m, poisson_ratio) = ball()?;
             HertzSphere::new(radius_m, poisson_ratio)
@@ -187,7 +187,7 @@ fn layer(
 
 /// Stress over strain, counted from the first load, as the paper matches two pressed frames.
 fn paper_ratio(object: Object) -> Result<PaperRatio, ElasticityError> {
-    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     match object.sphere_radius_m() {
         Some(radius_m) => ratio.with_sphere_radius(radius_m),
         None => Ok(ratio),

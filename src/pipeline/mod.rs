@@ -55,8 +55,8 @@ pub use ball::BallFit;
 pub use batch::contacts;
 pub use binning::Binning;
 pub use choice::{
-    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice,
-    UnknownStage, WarpChoice,
+    EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
+    StrainChoice, UnknownStage, WarpChoice,
 };
 pub use composition::Pipeline;
 pub use config::StagesConfig;
@@ -67,11 +67,11 @@ pub use error::PipelineError;
 pub use flag::Flag;
 pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 pub use object::Object;
-pub use pair::{LEAST_MATCHES, PairStrain};
+pub use pair::PairStrain;
 pub use press::Press;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
-pub use session::{DRIFT_LIMIT_GREY, DriftWatch, SESSION_LOADS, Session, SessionStrain, Update};
-pub use settings::{DEFAULT_CONTROL_POINTS, Settings, Skips, SurfaceInput};
+pub use session::{DriftWatch, SESSION_LOADS, Session, SessionStrain, Update};
+pub use settings::{Settings, Skips, SurfaceInput};
 pub use source::FrameSource;
 #[cfg(feature = "scene")]
 pub use source::ImageFolder;

@@ -7,9 +7,6 @@ use crate::elasticity::modulus::{Cone, HertzSphere};
 /// ```
 /// use tactile_imaging::Object;
 /// let ball = Object::sphere(3e-3);
-/// assert_eq!(ball.sphere_radius_m(), Some(3e-3));
-/// let punch = Object::FlatPunch { radius_m: 2e-3, poisson_ratio: 0.48 };
-/// assert_eq!(punch.sphere_radius_m(), None);
 /// assert_eq!(ball, Object::Sphere { radius_m: 3e-3, poisson_ratio: Object::DEFAULT_POISSON_RATIO });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +67,7 @@ impl Object {
     }
 
     /// The radius of a ball.
-    pub fn sphere_radius_m(&self) -> Option<f64> {
+    pub(crate) fn sphere_radius_m(&self) -> Option<f64> {
         if let Self::Sphere { radius_m, .. } = self {
             Some(*radius_m)
         } else {

@@ -8,20 +8,8 @@ use crate::elasticity::modulus::Estimate;
 use crate::matching::Matching;
 use nalgebra::{Matrix3, Point3};
 
-/// Fewest matches from which a three-dimensional strain can be told.
-///
-/// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
-/// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-/// use tactile_imaging::pipeline::{LEAST_MATCHES, PipelineError};
-/// let pipeline = trial.pipeline()?.with_control_points(LEAST_MATCHES - 1);
-/// let mut press = trial.press(&pipeline)?;
-/// assert!(matches!(press.strain(1), Err(PipelineError::TooFewMatches { expected: LEAST_MATCHES, .. })));
-/// assert!(press.modulus().is_ok(), "a ball's modulus does without strain");
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub const LEAST_MATCHES: usize = 8;
+/// Fewest matches from which a strain is worked out: twice the four affine terms of a spline in space.
+pub(crate) const LEAST_MATCHES: usize = 8;
 
 /// The strain between two frames.
 ///

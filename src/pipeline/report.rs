@@ -173,7 +173,6 @@ pub struct Work {
 /// let mut report = press.report().clone();
 /// // The second surface has the grid of the first, which needs both contacts.
 /// assert_eq!((report.work(Stage::Contact).runs, report.work(Stage::Surface).runs), (2, 1));
-/// assert!(report.total_time() >= report.work(Stage::Surface).time);
 /// assert!(report.to_string().contains("in 2 runs"));
 /// report.clear();
 /// assert_eq!(report, Report::default());
@@ -190,11 +189,6 @@ impl Report {
     /// How often a stage ran, and for how long.
     pub fn work(&self, stage: Stage) -> Work {
         self.work[stage as usize]
-    }
-
-    /// The time of all stages together.
-    pub fn total_time(&self) -> Duration {
-        self.work.iter().map(|w| w.time).sum()
     }
 
     /// Forgets everything, keeping the memory.

@@ -4,16 +4,7 @@ use super::object::Object;
 use crate::elasticity::contact::Waveguide;
 
 /// Control points on each surface where nothing else is asked for: the paper's number.
-///
-/// ```
-/// use tactile_imaging::{Object, Pipeline, pipeline::DEFAULT_CONTROL_POINTS};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// assert_eq!(pipeline.settings().control_points, DEFAULT_CONTROL_POINTS);
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
-pub const DEFAULT_CONTROL_POINTS: usize = 200;
+pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
 
 /// What the pipeline may leave out. Each skip leaves the results the same; each can be turned off.
 ///

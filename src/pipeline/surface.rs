@@ -71,7 +71,7 @@ pub(super) struct SurfaceWorkspace {
 impl Default for SurfaceWorkspace {
     fn default() -> Self {
         Self {
-            sfs: Mutex::new(Workspace::new()),
+            sfs: Mutex::new(Workspace::default()),
             signal: Array2::default((0, 0)),
             smoothed: Array2::default((0, 0)),
             mask: Array2::default((0, 0)),
@@ -147,7 +147,7 @@ pub(super) fn reconstruct(
         .pixel_size_m()
         .map(|size| size * side as f64);
     let domain = Domain::new(pixel_size_m)?.with_mask(workspace.mask.view());
-    let mut surface = Surface::new();
+    let mut surface = Surface::default();
     let frame = Frame::Real(workspace.signal.view());
     let sfs = workspace
         .sfs

@@ -36,6 +36,7 @@
 //!
 //! [stages]                               # each by name; these are the defaults
 //! reconstruction = "eikonal"             # or "tsai-shah", "brooks-horn"; not with a depth table
+//! integrator = "of-reconstruction"       # for "brooks-horn" also "frankot-chellappa", "cosine-poisson", "masked-least-squares"
 //! sampler = "contact"                    # or "equally-spaced", "curvature", "random"
 //! matcher = "annealed-softassign"        # or "relaxation-labelling", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
 //! warp = "thin-plate-spline"             # or "cubic-spline", "affine", "rigid"

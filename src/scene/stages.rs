@@ -2,8 +2,8 @@
 use super::SceneError;
 use super::fields::Fields;
 use crate::pipeline::{
-    EstimatorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StagesConfig,
-    StrainChoice, UnknownStage, WarpChoice,
+    EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
+    StagesConfig, StrainChoice, UnknownStage, WarpChoice,
 };
 use std::str::FromStr;
 
@@ -14,6 +14,7 @@ pub(super) fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
     let fields = scene.table("stages", "a table of stages by name")?;
     fields.only(&[
         "reconstruction",
+        "integrator",
         "sampler",
         "matcher",
         "warp",
@@ -22,20 +23,28 @@ pub(super) fn read(scene: &Fields<'_>) -> Result<StagesConfig, SceneError> {
     ])?;
     let depth_table =
         scene.has("calibration") && scene.table("calibration", "a table")?.has("depth_table");
-    if fields.has("reconstruction") && depth_table {
-        let given = toml::Value::String(
-            fields
-                .string("reconstruction", ReconstructionChoice::EXPECTED)?
-                .into(),
-        );
-        return Err(fields.wrong(
-            "reconstruction",
-            "absent: the depth table makes the surface",
-            &given,
-        ));
+    for (name, expected) in [
+        ("reconstruction", ReconstructionChoice::EXPECTED),
+        ("integrator", IntegratorChoice::EXPECTED),
+    ] {
+        if depth_table && fields.has(name) {
+            let given = toml::Value::String(fields.string(name, expected)?.into());
+            let absent = "absent: the depth table makes the surface";
+            return Err(fields.wrong(name, absent, &given));
+        }
+    }
+    let reconstruction = choice(&fields, "reconstruction", ReconstructionChoice::EXPECTED)?;
+    let integrator: IntegratorChoice = choice(&fields, "integrator", IntegratorChoice::EXPECTED)?;
+    if integrator != IntegratorChoice::default()
+        && reconstruction != ReconstructionChoice::BrooksHorn
+    {
+        let given = toml::Value::String(integrator.name().into());
+        let absent = "absent: of the reconstructions \"brooks-horn\" alone has slopes to integrate";
+        return Err(fields.wrong("integrator", absent, &given));
     }
     Ok(StagesConfig {
-        reconstruction: choice(&fields, "reconstruction", ReconstructionChoice::EXPECTED)?,
+        reconstruction,
+        integrator,
         sampler: choice(&fields, "sampler", SamplerChoice::EXPECTED)?,
         matcher: choice(&fields, "matcher", MatcherChoice::EXPECTED)?,
         warp: choice(&fields, "warp", WarpChoice::EXPECTED)?,

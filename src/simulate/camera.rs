@@ -27,7 +27,6 @@ struct NoiseLaw {
 /// ```
 /// use tactile_imaging::simulate::Camera;
 /// let camera = Camera { shape: [200, 300], ..Camera::default() };
-/// assert_eq!(camera.middle_px(), [149.5, 99.5]); // x, y
 /// assert!((camera.pixel_area_m2() - 4.644e-10).abs() < 1e-13, "21.55 µm square");
 /// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5.
 /// assert!((camera.noise_sd_grey(200.0) - 1.911).abs() < 1e-3);
@@ -94,7 +93,7 @@ impl Camera {
     }
 
     /// The coordinates (x, y) of the frame's middle in pixels.
-    pub fn middle_px(&self) -> [f64; 2] {
+    pub(super) fn middle_px(&self) -> [f64; 2] {
         [
             (self.shape[1] as f64 - 1.0) / 2.0,
             (self.shape[0] as f64 - 1.0) / 2.0,
@@ -199,8 +198,12 @@ impl Camera {
         }
     }
 
-    /// Expected grey levels: background plus the patches of leaked light, times lamps and lens.
-    pub(super) fn compose(&self, leaked_grey: &[Patch], lamps: &Illumination) -> Array2<f64> {
+    /// Expected grey levels: background plus the patches of leaked light, times illumination and lens.
+    pub(super) fn compose(
+        &self,
+        leaked_grey: &[Patch],
+        illumination: &Illumination,
+    ) -> Array2<f64> {
         let [rows, cols] = self.shape;
         let mut frame = Array2::from_elem((rows, cols), self.background_grey);
         for patch in leaked_grey {
@@ -209,15 +212,15 @@ impl Camera {
         let [cx, cy] = self.middle_px();
         let fall = self.vignetting / (cx * cx + cy * cy).max(f64::MIN_POSITIVE);
         let tilt = [
-            lamps.tilt[0] / (2.0 * cx).max(1.0),
-            lamps.tilt[1] / (2.0 * cy).max(1.0),
+            illumination.tilt[0] / (2.0 * cx).max(1.0),
+            illumination.tilt[1] / (2.0 * cy).max(1.0),
         ];
         for (r, mut line) in frame.rows_mut().into_iter().enumerate() {
             let dy = r as f64 - cy;
             for (c, value) in line.iter_mut().enumerate() {
                 let dx = c as f64 - cx;
                 let lens = 1.0 - fall * (dx * dx + dy * dy);
-                *value *= lens * (lamps.level + tilt[0] * dx + tilt[1] * dy).max(0.0);
+                *value *= lens * (illumination.level + tilt[0] * dx + tilt[1] * dy).max(0.0);
             }
         }
         frame

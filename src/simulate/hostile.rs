@@ -45,9 +45,9 @@ pub enum Hostile {
     SubPixelContact,
     /// The contact is larger than the frame.
     FillsFrame,
-    /// The lamps have grown 5 % brighter since the reference.
+    /// The light has grown 5 % brighter since the reference.
     BrighterLamps,
-    /// The lamps have moved: 10 % brighter on one side, darker on the other.
+    /// The LEDs have moved: 10 % brighter on one side, darker on the other.
     MovedLamps,
     /// The object already touched when the reference was taken, and has gone since.
     PressedReference,

@@ -69,7 +69,7 @@ impl Response {
     }
 }
 
-/// The lamps' state during one frame, relative to the reference frame. It scales background and leaked light alike.
+/// Illumination of one frame, relative to the reference frame: it scales background and leaked light alike.
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, Illumination, Load, PressOptions, PressScene};

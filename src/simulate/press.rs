@@ -72,6 +72,17 @@ impl PressScene {
     }
 
     /// Grey levels per pascal.
+    ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() }.ideal();
+    /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+    /// // The light above the background, over the grey levels of a pascal, times the area of a pixel: 0.7 N.
+    /// let (light, dark) = (scene.expected_frame(0), scene.reference(0).mapv(f64::from));
+    /// let seen_n = (&light - &dark).sum() / scene.grey_per_pascal() * camera.pixel_area_m2();
+    /// assert!((seen_n / 0.7 - 1.0).abs() < 1e-9);
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
     pub fn grey_per_pascal(&self) -> f64 {
         self.light.grey_per_pascal
     }

@@ -68,12 +68,12 @@ pub struct Load {
     pub force_n: f64,
     /// Shear force (x, y) in newton; it moves the contact by force over [`PressOptions::shear_stiffness_n_per_m`].
     pub shear_n: [f64; 2],
-    /// State of the lamps.
+    /// Illumination, relative to the reference frame.
     pub illumination: Illumination,
 }
 
 impl Load {
-    /// A normal force without shear, lamps unchanged.
+    /// A normal force without shear, the illumination unchanged.
     pub fn normal(force_n: f64) -> Self {
         Self {
             force_n,

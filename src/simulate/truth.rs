@@ -17,9 +17,6 @@ use super::press_options::Load;
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let (truth, later) = (scene.truth(0), scene.truth(1));
 /// assert!((truth.pressure_pa().sum() * camera.pixel_area_m2() - 0.7).abs() < 1e-9, "the force");
-/// let pixels = truth.contact_mask().iter().filter(|&&inside| inside).count() as f64;
-/// let circle = std::f64::consts::PI * truth.contact.contact_radius_m.powi(2) / camera.pixel_area_m2();
-/// assert!((pixels / circle - 1.0).abs() < 0.05);
 /// let middle = [32, 43];
 /// assert_eq!(truth.apparent_height_m()[middle], truth.contact.contact_radius_m);
 /// assert!(later.waveguide_height_m()[middle] < truth.waveguide_height_m()[middle], "pressed deeper");
@@ -109,14 +106,6 @@ impl PressTruth {
         })
     }
 
-    /// Whether a pixel's centre lies in the contact.
-    pub fn contact_mask(&self) -> Array2<bool> {
-        Array2::from_shape_fn(self.shape, |(row, col)| {
-            let [x, y] = self.offset_m(row, col);
-            x.hypot(y) < self.contact.contact_radius_m
-        })
-    }
-
     /// How the apparent surface moves from this load to a `later` one.
     pub fn scaling_to(&self, later: &Self) -> SurfaceScaling {
         SurfaceScaling {
@@ -171,10 +160,10 @@ impl PressTruth {
 
 /// Pixels whose expected grey level exceeds 255; the frame is made only where one can.
 fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
-    let (options, lamps) = (scene.options(), scene.options().loads[load].illumination);
+    let (options, illumination) = (scene.options(), scene.options().loads[load].illumination);
     let peak = scene.contact(load).peak_pressure_pa;
     let brightest = options.camera.background_grey + scene.light().grey_at(peak);
-    let lit = lamps.level + 0.5 * (lamps.tilt[0].abs() + lamps.tilt[1].abs());
+    let lit = illumination.level + 0.5 * (illumination.tilt[0].abs() + illumination.tilt[1].abs());
     if brightest * lit <= 255.0 {
         return 0;
     }

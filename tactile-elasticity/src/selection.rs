@@ -3,7 +3,7 @@
 /// Why a law was chosen.
 ///
 /// ```
-/// use tactile_elasticity::modulus::SelectionReason;
+/// use tactile_elasticity::curve::SelectionReason;
 ///
 /// let says = |reason| match reason {
 ///     SelectionReason::BetterFit { margin } if margin > 10.0 => "decisive",

@@ -108,7 +108,7 @@ impl<T: Scalar> Lighting<T> {
     /// ```
     /// use tactile_sfs::Lighting;
     /// let light = Lighting::new([0.0, 0.0, 5.0])?.with_normal_intensity(255.0)?.with_albedo(0.8)?.with_ambient(10.0)?;
-    /// assert_eq!((light.direction(), light.is_frontal()), ([0.0, 0.0, 1.0], true));
+    /// assert_eq!((light.direction(), light.is_frontal(), light.albedo()), ([0.0, 0.0, 1.0], true, 0.8));
     /// let grey = light.shade(1.0, 0.0); // 45° from the light: 10 + 204/√2
     /// assert!((light.reflectance(grey) - 0.5_f64.sqrt()).abs() < 1e-12);
     /// # Ok::<(), tactile_sfs::SfsError>(())

@@ -19,8 +19,8 @@ use crate::{BoundingBox, Domain, Scalar, SfsError};
 /// let stop = |method: MaskedLeastSquares<f64>| {
 ///     method.integrate(p.view(), q.view(), &domain).map(|surface| surface.report.stop)
 /// };
-/// assert_eq!(stop(MaskedLeastSquares::new())?, StopReason::Converged);
-/// assert_eq!(stop(MaskedLeastSquares::new().with_max_iterations(1)?)?, StopReason::IterationLimit);
+/// assert_eq!(stop(MaskedLeastSquares::default())?, StopReason::Converged);
+/// assert_eq!(stop(MaskedLeastSquares::default().with_max_iterations(1)?)?, StopReason::IterationLimit);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -113,7 +113,7 @@ impl BitOrAssign for PixelFlags {
 /// let mask = array![[true, true, false, true], [true, true, false, true]]; // two contacts
 /// let slopes = Array2::<f64>::zeros((2, 4));
 /// let domain = Domain::pixels().with_mask(mask.view());
-/// let report = MaskedLeastSquares::new().integrate(slopes.view(), slopes.view(), &domain)?.report;
+/// let report = MaskedLeastSquares::default().integrate(slopes.view(), slopes.view(), &domain)?.report;
 /// assert_eq!(report.components.len(), 2);
 /// assert_eq!(report.components[1], Component { pixels: 2, first: [0, 3], mean_height: 0.0 });
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -165,7 +165,7 @@ pub struct Report<T> {
 /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator, Surface, Workspace};
 /// let mask = array![[true, true, true, false], [true, true, true, false]];
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::zeros((2, 4)));
-/// let (mut workspace, mut surface) = (Workspace::new(), Surface::<f64>::new()); // used again for every frame
+/// let (mut workspace, mut surface) = (Workspace::default(), Surface::<f64>::default()); // used again for every frame
 /// let domain = Domain::pixels().with_mask(mask.view());
 /// CosinePoisson.integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
 /// assert!(surface.heights[[0, 3]].is_nan() && surface.filled(0.0)[[0, 3]] == 0.0);
@@ -187,11 +187,6 @@ pub struct Surface<T> {
 }
 
 impl<T: Scalar> Surface<T> {
-    /// An empty surface, to be filled by one of the `*_with` calls.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Heights with `value` where there is none.
     pub fn filled(&self, value: T) -> Array2<T> {
         self.heights

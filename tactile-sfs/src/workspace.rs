@@ -11,14 +11,14 @@ use crate::{Scalar, StopReason};
 /// use ndarray::Array2;
 /// use tactile_sfs::{BrooksHorn, Domain, Frame, Lighting, Progress, Surface, SurfaceReconstruction, Workspace};
 /// let (send, receive) = std::sync::mpsc::channel();
-/// let mut workspace = Workspace::new();
+/// let mut workspace = Workspace::default();
 /// workspace.on_progress(move |progress: Progress| match send.send(progress) {
 ///     Ok(()) => ControlFlow::Continue(()),
 ///     Err(_) => ControlFlow::Break(()), // nobody listens any more
 /// });
 /// let image = Array2::from_elem((8, 8), 0.9);
 /// let method = BrooksHorn::new(Lighting::frontal()).with_iterations(20, 5)?;
-/// method.reconstruct_with(&mut workspace, Frame::Real(image.view()), &Domain::pixels(), &mut Surface::new())?;
+/// method.reconstruct_with(&mut workspace, Frame::Real(image.view()), &Domain::pixels(), &mut Surface::default())?;
 /// let heard: Vec<Progress> = receive.try_iter().collect();
 /// assert!(!heard.is_empty() && heard.iter().all(|p| p.iterations <= p.limit && p.limit == 20));
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -43,7 +43,7 @@ type Callback = Box<dyn FnMut(Progress) -> ControlFlow<()> + Send>;
 /// ```
 /// use core::ops::ControlFlow;
 /// use tactile_sfs::Workspace;
-/// let mut workspace = Workspace::<f32>::new();
+/// let mut workspace = Workspace::<f32>::default();
 /// workspace.on_progress(|progress| {
 ///     eprintln!("{} of at most {}", progress.iterations, progress.limit);
 ///     ControlFlow::Continue(())
@@ -55,6 +55,7 @@ pub struct Workspace<T> {
     pub(crate) profile: crate::reconstruct::ProfileBuffers<T>,
     pub(crate) poisson: crate::integrate::PoissonBuffers<T>,
     pub(crate) field: crate::reconstruct::FieldBuffers<T>,
+    pub(crate) slopes: crate::reconstruct::SlopeBuffers<T>,
     pub(crate) fourier: crate::integrate::FourierBuffers<T>,
     pub(crate) masked: crate::integrate::MaskedBuffers<T>,
     pub(crate) points: crate::sample::SampleBuffers,
@@ -68,11 +69,6 @@ impl<T> core::fmt::Debug for Workspace<T> {
 }
 
 impl<T: Scalar> Workspace<T> {
-    /// An empty workspace; buffers grow at the first call.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Calls `callback` from time to time during iterative solves; `Break` ends the solve with
     /// [`StopReason::Cancelled`] and the best answer so far.
     pub fn on_progress(

@@ -54,7 +54,7 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
-/// let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(R2LogR));
+/// let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(R2LogR));
 /// for step in 1..=3 {
 ///     // No allocation from the second round on.
 ///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
@@ -70,19 +70,6 @@ pub struct Workspace<const D: usize> {
     pub(crate) system: System<D>,
     pub(crate) iterative: Iterative<D>,
     pub(crate) centre_weights: Vec<f64>,
-}
-
-impl<const D: usize> Workspace<D> {
-    /// An empty workspace; it grows at its first use.
-    ///
-    /// ```
-    /// # use tactile_tps::Workspace;
-    /// let workspace = Workspace::<3>::new();
-    /// # let _ = workspace;
-    /// ```
-    pub fn new() -> Self {
-        Self::default()
-    }
 }
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {

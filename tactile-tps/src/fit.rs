@@ -92,7 +92,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
     /// let mut spline = Spline::empty(R2LogR);
-    /// factorization.fit_with(&mut Workspace::new(), &targets, &mut spline)?;
+    /// factorization.fit_with(&mut Workspace::default(), &targets, &mut spline)?;
     /// assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
     /// # Ok(())
     /// # }

@@ -42,7 +42,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     pub fn influence(&self, point: &Point<T, D>) -> Result<Vec<T>, TpsError> {
         let mut influence = vec![T::zero(); self.len()];
         self.influence_into(
-            &mut Workspace::new(),
+            &mut Workspace::default(),
             core::slice::from_ref(point),
             &mut influence,
         )?;
@@ -73,7 +73,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     pub fn jacobian_influence(&self, point: &Point<T, D>) -> Result<Vec<SVector<T, D>>, TpsError> {
         let mut influence = vec![SVector::zeros(); self.len()];
         self.jacobian_influence_into(
-            &mut Workspace::new(),
+            &mut Workspace::default(),
             core::slice::from_ref(point),
             &mut influence,
         )?;
@@ -91,7 +91,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
     /// let queries = [Point2::new(0.5, 0.5), sources[1]];
     /// let mut influence = [0.0; 2 * 5];
-    /// factorization.influence_into(&mut Workspace::new(), &queries, &mut influence)?;
+    /// factorization.influence_into(&mut Workspace::default(), &queries, &mut influence)?;
     /// // At a source point the spline follows its target alone.
     /// assert!((influence[5 + 1] - 1.0).abs() < 1e-14 && influence[5 + 2].abs() < 1e-14);
     /// # Ok(())
@@ -141,7 +141,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
     /// let mut influence = [Vector2::zeros(); 5];
-    /// factorization.jacobian_influence_into(&mut Workspace::new(), &[Point2::new(0.5, 0.5)], &mut influence)?;
+    /// factorization.jacobian_influence_into(&mut Workspace::default(), &[Point2::new(0.5, 0.5)], &mut influence)?;
     /// // Targets moved together leave the Jacobian as it is.
     /// assert!(influence.iter().sum::<Vector2<f64>>().norm() < 1e-14);
     /// # Ok(())

@@ -29,7 +29,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let factorization = Factorization::new(&sources, &FitOptions::default().with_smoothing(Smoothing::Lambda(0.01))?)?;
-    /// let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(R2LogR));
+    /// let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(R2LogR));
     /// let mut miss = |weight: f64| {
     ///     let weights = [1.0, 1.0, 1.0, 1.0, weight];
     ///     factorization

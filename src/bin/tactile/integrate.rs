@@ -71,7 +71,7 @@ impl Method {
         match self {
             Self::Poisson => Box::new(CosinePoisson),
             Self::FrankotChellappa => Box::new(FrankotChellappa),
-            Self::LeastSquares => Box::new(MaskedLeastSquares::new()),
+            Self::LeastSquares => Box::new(MaskedLeastSquares::default()),
         }
     }
 }
@@ -118,7 +118,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
         domain = domain.with_known_heights(known.view());
     }
     let integrator = method.integrator();
-    let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+    let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
     images::watch(&mut workspace, context, "integrating");
     let mut times = Vec::new();
     for _ in 0..arguments.repeat {

@@ -141,7 +141,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     let reconstruction =
         reconstruction(arguments, method, lighting, mask.is_some(), known.is_some())
             .map_err(in_image)?;
-    let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+    let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
     images::watch(&mut workspace, context, "reconstructing");
     let mut times = Vec::new();
     for _ in 0..arguments.repeat {

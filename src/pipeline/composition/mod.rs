@@ -25,6 +25,7 @@ use std::sync::Arc;
 /// |---|---|---|
 /// | frame to contact and force | [`with_contact`](Self::with_contact) | [`LightContact`] with a linear calibration |
 /// | image to surface | [`with_surface`](Self::with_surface) | [`Eikonal`](crate::sfs::Eikonal), frontal light, zero height at the rim |
+/// | slopes to heights, inside a reconstruction that has slopes | [`with_slope_integrator`](Self::with_slope_integrator) | the reconstruction's own |
 /// | surface to control points | [`with_sampler`](Self::with_sampler) | [`ContactSampler`]; [`EquallySpaced`] where the surface is read from a signal |
 /// | points to matches | [`with_matcher`](Self::with_matcher) | [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by |
 /// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation |

@@ -7,13 +7,14 @@ use crate::matching::{
     RelaxationLabelling, Search, SoftassignOptions,
 };
 use crate::pipeline::choice::{
-    MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice,
+    IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice,
 };
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::strain_spline::StrainSpline;
 use crate::sfs::{
-    BoundaryCondition, BrooksHorn, ContactSampler, ControlPointSampler, CurvatureAdaptive, Eikonal,
-    EquallySpaced, Lighting, Random, SurfaceReconstruction, TsaiShah,
+    BoundaryCondition, BrooksHorn, ContactSampler, ControlPointSampler, CosinePoisson,
+    CurvatureAdaptive, Eikonal, EquallySpaced, FrankotChellappa, Lighting, MaskedLeastSquares,
+    Random, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
 };
 use crate::tps::{AffineModel, FitOptions, R3, RigidModel, Smoothing, WarpModel};
 use std::sync::Arc;
@@ -40,6 +41,18 @@ pub(super) fn reconstruction(
             Arc::new(BrooksHorn::new(light).with_occluding_boundary(true))
         }
     })
+}
+
+/// The integrator of a name; `None` for the reconstruction's own.
+pub(super) fn integrator(
+    choice: IntegratorChoice,
+) -> Option<Arc<dyn SlopeIntegrator<f64> + Send + Sync>> {
+    match choice {
+        IntegratorChoice::OfReconstruction => None,
+        IntegratorChoice::FrankotChellappa => Some(Arc::new(FrankotChellappa)),
+        IntegratorChoice::CosinePoisson => Some(Arc::new(CosinePoisson)),
+        IntegratorChoice::MaskedLeastSquares => Some(Arc::new(MaskedLeastSquares::default())),
+    }
 }
 
 pub(super) fn sampler(

@@ -9,7 +9,7 @@ use crate::pipeline::contact::ContactStage;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::estimators::EstimatorStage;
 use crate::pipeline::settings::SurfaceInput;
-use crate::sfs::{ControlPointSampler, SurfaceReconstruction};
+use crate::sfs::{ControlPointSampler, SlopeIntegrator, SurfaceReconstruction};
 use crate::tps::WarpModel;
 use std::sync::Arc;
 
@@ -28,10 +28,14 @@ impl Pipeline {
     /// ```
     ///
     /// # Errors
-    /// [`PipelineError::SurfaceOptions`], [`PipelineError::WarpOptions`] where a stage refuses its options.
+    /// [`PipelineError::SurfaceOptions`], [`PipelineError::WarpOptions`] where a stage refuses its options;
+    /// [`PipelineError::NoSlopes`] for an integrator beside a reconstruction without slopes.
     pub fn with_stages(mut self, config: &StagesConfig) -> Result<Self, PipelineError> {
         self.surface = named::reconstruction(config.reconstruction)?;
         self.settings.surface_input = SurfaceInput::Shading;
+        if let Some(integrator) = named::integrator(config.integrator) {
+            self = self.with_slope_integrator(integrator)?;
+        }
         self.sampler = Some(named::sampler(config.sampler)?);
         self.matcher = named::matcher(config.matcher);
         self.warp = named::warp(config.warp)?;
@@ -90,6 +94,45 @@ impl Pipeline {
             self.settings.binning = Binning::Blocks(1);
         }
         self
+    }
+
+    /// Takes another way from slopes to heights, inside the reconstruction that the pipeline has by now.
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use tactile_imaging::pipeline::{PipelineError, SurfaceInput};
+    /// use tactile_imaging::sfs::{BrooksHorn, Lighting, MaskedLeastSquares};
+    /// // The default reconstruction solves for heights: it has no slopes.
+    /// let eikonal = trial.pipeline()?;
+    /// let refused = eikonal.clone().with_slope_integrator(MaskedLeastSquares::default());
+    /// assert_eq!(refused.unwrap_err(), PipelineError::NoSlopes);
+    /// // Brooks and Horn's has; least squares over the contact alone need not take the frame as periodic.
+    /// let variational = BrooksHorn::new(Lighting::frontal()).with_occluding_boundary(true);
+    /// let fourier = eikonal.with_surface(variational, SurfaceInput::Shading);
+    /// let masked = fourier.clone().with_slope_integrator(MaskedLeastSquares::default())?;
+    /// let truth = trial.truth().frames[0].surface_height_m;
+    /// for pipeline in [fourier, masked] {
+    ///     let mut press = trial.press(&pipeline)?;
+    ///     let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
+    ///     let (low, high) = heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
+    ///     assert!(((high - low) / truth - 1.0).abs() < 0.1);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::NoSlopes`] where the reconstruction goes from the image to heights without slopes.
+    pub fn with_slope_integrator(
+        mut self,
+        integrator: impl SlopeIntegrator<f64> + Send + Sync + 'static,
+    ) -> Result<Self, PipelineError> {
+        self.surface = self
+            .surface
+            .with_slope_integrator(Arc::new(integrator))
+            .ok_or(PipelineError::NoSlopes)?;
+        Ok(self)
     }
 
     /// Takes another estimator of the modulus. Strains of the loads are counted from the first.

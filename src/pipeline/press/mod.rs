@@ -142,7 +142,6 @@ impl<'a> Press<'a> {
     /// let mut press = pipeline.press(reference.view())?;
     /// let gauge = Estimate { value: 0.9, standard_error: 2e-3 };
     /// assert_eq!(press.add_gauged_frame(frame.view(), Some(gauge)), 0);
-    /// assert_eq!((press.gauge(0), press.image(0)), (Some(gauge), Some(frame.view())));
     /// assert!(press.modulus().is_ok());
     /// press.add_frame(frame.view());
     /// assert_eq!(press.modulus().unwrap_err(), PipelineError::NoForce { frame: 1 });
@@ -184,7 +183,7 @@ impl<'a> Press<'a> {
     }
 
     /// The image of a frame.
-    pub fn image(&self, frame: usize) -> Option<ArrayView2<'a, u8>> {
+    pub(crate) fn image(&self, frame: usize) -> Option<ArrayView2<'a, u8>> {
         Some(self.frames.get(frame)?.image)
     }
 
@@ -199,7 +198,7 @@ impl<'a> Press<'a> {
     }
 
     /// The gauge's reading of a frame's force, if there was one.
-    pub fn gauge(&self, frame: usize) -> Option<Estimate<f64>> {
+    pub(crate) fn gauge(&self, frame: usize) -> Option<Estimate<f64>> {
         self.frames.get(frame)?.gauge
     }
 

@@ -1,29 +1,8 @@
 //! Drift of the light, seen in frames without contact.
 use crate::pipeline::flag::Flag;
 
-/// Grey levels by which frames without contact may differ from the reference in the mean before a session speaks of drift:
-/// half the camera's step.
-///
-/// ```
-/// use std::sync::Arc;
-/// use tactile_imaging::pipeline::{DRIFT_LIMIT_GREY, Object, Pipeline, Session};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
-/// // The lamp loses a grey level in one row out of four, then everywhere.
-/// let fading = ndarray::Array2::from_shape_fn((64, 64), |(r, _)| if r % 4 == 0 { 9 } else { 10 });
-/// session.push(fading.view())?;
-/// assert!(session.drift().last_grey.abs() < DRIFT_LIMIT_GREY && session.drift_flag().is_none());
-/// session.push(hertz(0.0).mapv(|v| v - 1).view())?;
-/// assert!(session.drift().last_grey.abs() > DRIFT_LIMIT_GREY && session.drift_flag().is_some());
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
-pub const DRIFT_LIMIT_GREY: f64 = 0.5;
+/// Drift of the light in grey levels beyond which the reference should be taken anew.
+pub(crate) const DRIFT_LIMIT_GREY: f64 = 0.5;
 
 /// What frames without contact say of the light since the reference was taken, in grey levels: the mean of frame minus
 /// reference.
@@ -39,7 +18,7 @@ pub const DRIFT_LIMIT_GREY: f64 = 0.5;
 /// # });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
 /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
-/// // The lamp fades by two grey levels and recovers by one.
+/// // The light fades by two grey levels and recovers by one.
 /// for loss in [0, 2, 1] {
 ///     session.push(hertz(0.0).mapv(|v| v - loss).view())?;
 /// }
@@ -66,7 +45,7 @@ impl DriftWatch {
         }
     }
 
-    /// A caution if the light had drifted by more than [`DRIFT_LIMIT_GREY`] when the sensor was last free.
+    /// A caution if the light had drifted by more than half a grey level when the sensor was last free.
     pub(super) fn flag(&self) -> Option<Flag> {
         let grey = self.last_grey;
         (grey.abs() > DRIFT_LIMIT_GREY).then_some(Flag::LightDrifted { grey })

@@ -18,7 +18,7 @@ use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
 use super::runner::{SkipRecords, StageRunner};
 use crate::force::{ShearCalibration, ShearTracker};
-pub use drift::{DRIFT_LIMIT_GREY, DriftWatch};
+pub use drift::DriftWatch;
 pub use loads::SESSION_LOADS;
 use loads::SeenLoads;
 use ndarray::{Array2, ArrayView2};
@@ -239,7 +239,7 @@ impl Session {
         self.drift
     }
 
-    /// A caution if the light has drifted by more than [`DRIFT_LIMIT_GREY`] when the sensor was last free: the reference
+    /// A caution if the light has drifted by more than half a grey level when the sensor was last free: the reference
     /// should be taken anew, or the contact stage told to correct drift.
     ///
     /// ```
@@ -257,7 +257,7 @@ impl Session {
     /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
     /// assert_eq!(session.drift_flag(), Some(Flag::LightDrifted { grey: -2.0 }));
     /// session.push(hertz(0.0).view())?;
-    /// assert_eq!(session.drift_flag(), None, "the lamp is back");
+    /// assert_eq!(session.drift_flag(), None, "the light is back");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     pub fn drift_flag(&self) -> Option<Flag> {

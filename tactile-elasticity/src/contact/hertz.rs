@@ -91,26 +91,6 @@ impl<T: RealField + Copy> HertzContact<T> {
             T::zero()
         }
     }
-
-    /// Normal displacement of the surface at distance r (m), for the modulus E* taken as this body's own.
-    ///
-    /// ```
-    /// use tactile_elasticity::contact::HertzContact;
-    ///
-    /// // Under a rigid sphere the rim has sunk half as deep as the centre.
-    /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
-    /// assert!((contact.surface_displacement_m(0.0) / contact.indentation_m - 1.0).abs() < 1e-14);
-    /// assert!((contact.surface_displacement_m(contact.contact_radius_m) / contact.indentation_m - 0.5).abs() < 1e-14);
-    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
-    /// ```
-    pub fn surface_displacement_m(&self, r: T) -> T {
-        hertz_surface_displacement_m(
-            r,
-            self.contact_radius_m,
-            self.peak_pressure_pa,
-            self.reduced_modulus_pa,
-        )
-    }
 }
 
 /// Normal displacement (m) at distance r of a half-space under p₀√(1 − r²/a²) (Johnson 1985, eq. 3.42).
@@ -123,6 +103,11 @@ impl<T: RealField + Copy> HertzContact<T> {
 /// // A distant point sees a point force: F/(π E* r), with F = ⅔ π a² p₀.
 /// let far = hertz_surface_displacement_m(1e8, 1.0, 1.0, 1.0);
 /// assert!((far * 1e8 - 2.0f64 / 3.0).abs() < 1e-15);
+/// // Under a rigid sphere the rim has sunk half as deep as the centre.
+/// let c = tactile_elasticity::contact::HertzContact::from_force(1e-3_f64, 5e-3, 50e3)?;
+/// let depth = |r| hertz_surface_displacement_m(r, c.contact_radius_m, c.peak_pressure_pa, 50e3) / c.indentation_m;
+/// assert!((depth(0.0) - 1.0).abs() < 1e-14 && (depth(c.contact_radius_m) - 0.5).abs() < 1e-14);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 pub fn hertz_surface_displacement_m<T: RealField + Copy>(
     r: T,

@@ -1,11 +1,9 @@
-//! Strain over points, grids and contacts.
+//! Strain at many points: its mean, spread and error.
 
 mod propagation;
 mod robust;
-mod source;
 mod summary;
 
 pub use propagation::{mean_strain_covariance, strain_covariance};
 pub use robust::Averaging;
-pub use source::{DisplacementGradient, JacobianOf, Samples};
 pub use summary::{StrainField, StrainSummary};

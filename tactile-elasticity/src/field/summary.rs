@@ -1,7 +1,6 @@
 //! Mean, spread and standard error of a strain field.
 
 use super::robust::{Averaging, centre_and_spread};
-use super::source::{DisplacementGradient, Samples};
 use crate::error::{ElasticityError, Quantity};
 use crate::strain::{Deformation, StrainMeasure};
 use nalgebra::{Matrix3, RealField};
@@ -85,37 +84,6 @@ impl<T: RealField + Copy> StrainField<T> {
             }
         }
         Ok(field)
-    }
-
-    /// Strain of a field of gradients at sample points, weighted by what each stands for.
-    ///
-    /// # Errors
-    /// As [`from_gradients`](Self::from_gradients).
-    ///
-    /// ```
-    /// use nalgebra::{Matrix3, Point3};
-    /// use tactile_elasticity::field::{Samples, StrainField};
-    /// use tactile_elasticity::strain::Infinitesimal;
-    /// // u_z = -0.02 z (1 + x): the mean over x in [-1, 1] is -0.02.
-    /// let bend = |p: &Point3<f64>| {
-    ///     Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.02 * p.z, 0.0, -0.02 * (1.0 + p.x))
-    /// };
-    /// let block = Samples::grid(Point3::new(-1.0, -1.0, 0.0), Point3::new(1.0, 1.0, 1.0), [8, 8, 4])?;
-    /// let mean = StrainField::sample(&bend, &block, &Infinitesimal)?.summary().mean;
-    /// assert!((mean[(2, 2)] + 0.02).abs() < 1e-15);
-    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
-    /// ```
-    pub fn sample(
-        field: &impl DisplacementGradient<T>,
-        samples: &Samples<T>,
-        measure: &dyn StrainMeasure<T>,
-    ) -> Result<Self, ElasticityError> {
-        let gradients: Vec<_> = samples
-            .points
-            .iter()
-            .map(|p| field.displacement_gradient(p))
-            .collect();
-        Self::from_gradients(&gradients, Some(&samples.weights), measure)
     }
 
     /// Mean, spread and standard error, robust if asked for.

@@ -39,7 +39,7 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     /// ```
     /// use tactile_elasticity::modulus::{EstimatorKind, ModulusEstimator, PaperRatio};
     ///
-    /// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(PaperRatio::new());
+    /// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(PaperRatio::default());
     /// assert_eq!(estimator.kind(), EstimatorKind::PaperRatio);
     /// ```
     fn kind(&self) -> EstimatorKind;
@@ -49,7 +49,7 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     /// ```
     /// use tactile_elasticity::modulus::{HertzSphere, ModulusEstimator, PaperRatio};
     ///
-    /// let estimators: [Box<dyn ModulusEstimator<f64>>; 2] = [Box::new(PaperRatio::new()), Box::new(HertzSphere::new(3e-3, 0.5)?)];
+    /// let estimators: [Box<dyn ModulusEstimator<f64>>; 2] = [Box::new(PaperRatio::default()), Box::new(HertzSphere::new(3e-3, 0.5)?)];
     /// assert_eq!(estimators.map(|e| e.needs_strain()), [true, false]);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```

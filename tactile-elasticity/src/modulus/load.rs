@@ -35,8 +35,8 @@ impl<T: RealField + Copy> Estimate<T> {
     ///     LoadState::new(force).with_contact_area(Estimate::exact(1e-4)).with_mean_strain(Estimate::exact(0.02))
     /// };
     /// let force = Estimate::new(0.12, 0.001);
-    /// let known = PaperRatio::new().estimate(&LoadSeries::new([load(force)]))?;
-    /// let estimated = PaperRatio::new().estimate(&LoadSeries::new([load(force.with_degrees_of_freedom(5.0))]))?;
+    /// let known = PaperRatio::default().estimate(&LoadSeries::new([load(force)]))?;
+    /// let estimated = PaperRatio::default().estimate(&LoadSeries::new([load(force.with_degrees_of_freedom(5.0))]))?;
     /// assert_eq!(known.standard_error_pa, estimated.standard_error_pa);
     /// assert!(estimated.interval_95.lower < known.interval_95.lower); // Student's t instead of the normal distribution
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())

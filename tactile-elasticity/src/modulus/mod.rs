@@ -15,7 +15,6 @@ mod statistics;
 mod tabulated;
 mod warning;
 
-pub use crate::selection::SelectionReason;
 pub use bootstrap::{Bootstrap, BootstrapSummary};
 pub use contact::{
     BondedLayer, Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere, SphereBetweenPlates,

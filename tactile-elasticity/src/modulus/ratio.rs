@@ -28,7 +28,7 @@ pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 ///         .with_mean_strain(Estimate::exact(strain))
 /// };
 /// let loads = LoadSeries::new([load(0.7, 0.0), load(1.2, 0.05)]);
-/// let modulus = PaperRatio::new().with_reference(StrainReference::FirstLoad).estimate(&loads)?;
+/// let modulus = PaperRatio::default().with_reference(StrainReference::FirstLoad).estimate(&loads)?;
 /// assert!((modulus.youngs_modulus_pa - (1.2 - 0.7) / 1e-4 / 0.05_f64).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -61,12 +61,12 @@ pub enum StrainReference {
 ///     .with_contact_radius(Estimate::exact(5.64e-3))
 ///     .with_mean_strain(Estimate::new(0.02, 1e-4));
 /// let series = LoadSeries::new([load]);
-/// let plain = PaperRatio::new().with_reference(StrainReference::Unloaded).estimate(&series)?;
+/// let plain = PaperRatio::default().with_reference(StrainReference::Unloaded).estimate(&series)?;
 /// assert!((plain.youngs_modulus_pa - 60e3_f64).abs() < 1e-6);
 ///
 /// // Errors that loads share come with the series; on a sphere the ratio is biased, and says so.
 /// let series = series.with_shared_errors(SharedErrors { force_scale: 0.01, ..SharedErrors::default() })?;
-/// let careful = PaperRatio::new().with_sphere_radius(3e-3)?.estimate(&series)?;
+/// let careful = PaperRatio::default().with_sphere_radius(3e-3)?.estimate(&series)?;
 /// assert!(careful.standard_error_pa > plain.standard_error_pa);
 /// assert!(careful.warnings.iter().any(|w| matches!(w, Warning::RatioOnSphere { .. })));
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -78,12 +78,7 @@ pub struct PaperRatio {
 }
 
 impl PaperRatio {
-    /// With strain counted from the unloaded state.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// With strain counted from `reference`.
+    /// With strain counted from `reference`; by default from the unloaded state.
     pub fn with_reference(mut self, reference: StrainReference) -> Self {
         self.reference = reference;
         self

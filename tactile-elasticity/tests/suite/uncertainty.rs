@@ -36,7 +36,7 @@ fn displacements_through_strain_to_the_modulus() {
         let load = LoadState::new(force)
             .with_contact_area(Estimate::exact(area))
             .with_mean_strain(strain);
-        PaperRatio::new().estimate(&LoadSeries::new([load]))
+        PaperRatio::default().estimate(&LoadSeries::new([load]))
     };
     let gradient = |u: &dyn Fn(usize) -> Vector3<f64>| {
         (0..60).fold(Matrix3::zeros(), |h, j| h + u(j) * influence[j].transpose())

@@ -1,9 +1,10 @@
 //! Answers of an earlier state of this crate, so that a change of its form changes no number.
 //!
-//! `tests/recorded/answers.txt` holds a name and a number a line. After a change that is meant to alter answers, write it
-//! anew with `TACTILE_RECORD=1 cargo test -p tactile-force --test suite recorded` and read the difference before committing.
+//! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter answers, write it
+//! anew with `RECORD_ANSWERS=1 cargo test -p tactile-force --test suite recorded` and read the difference before committing.
 
-use std::fmt::Write as _;
+#[path = "../../../tests/support/recorded.rs"]
+mod record;
 
 use ndarray::{Array2, array};
 use tactile_force::{
@@ -19,13 +20,12 @@ const RECORDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded/answ
 /// Named numbers, in the order in which they were computed.
 #[derive(Default)]
 struct Answers {
-    lines: String,
+    all: record::Answers,
 }
 
 impl Answers {
     fn add<T: Real>(&mut self, name: &str, value: T) {
-        // Two digits more than are compared.
-        writeln!(self.lines, "{name} {:.13e}", value.as_f64()).unwrap();
+        self.all.add(name, [value.as_f64()]);
     }
 
     fn estimate<T: Real>(&mut self, name: &str, e: Estimate<T>) {
@@ -386,23 +386,10 @@ fn answers_are_those_recorded() {
     frames::<f64>(&mut answers, "f64");
     frames::<f32>(&mut answers, "f32");
     others(&mut answers);
-    if std::env::var_os("TACTILE_RECORD").is_some() {
-        std::fs::write(RECORDED, &answers.lines).unwrap();
-    }
-    let recorded = std::fs::read_to_string(RECORDED).unwrap();
-    assert_eq!(recorded.lines().count(), answers.lines.lines().count());
-    for (expected, found) in recorded.lines().zip(answers.lines.lines()) {
-        let (name, expected) = expected.rsplit_once(' ').unwrap();
-        let (now, found) = found.rsplit_once(' ').unwrap();
-        assert_eq!(name, now);
-        let (expected, found): (f64, f64) = (expected.parse().unwrap(), found.parse().unwrap());
+    answers.all.check(RECORDED, |name, recorded, _| {
         // A sum taken in another order moves the last digits of a double; a single must not move by more than one unit.
         let tolerance = if name.contains("f32") { 1.2e-7 } else { 1e-12 };
-        let same = expected == found || (expected - found).abs() <= tolerance * expected.abs();
         // Differences of nearly equal numbers: errors of a perfect fit, sums over a quiet frame.
-        assert!(
-            same || (expected - found).abs() < 1e-25,
-            "{name}: {found:e} where {expected:e} was recorded"
-        );
-    }
+        (tolerance * recorded.abs()).max(1e-25)
+    });
 }

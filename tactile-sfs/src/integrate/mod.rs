@@ -43,7 +43,7 @@ pub trait SlopeIntegrator<T: Scalar> {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{Domain, FrankotChellappa, CosinePoisson, SlopeIntegrator, Surface, Workspace};
-    /// let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+    /// let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
     /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson, &FrankotChellappa];
     /// let flat = Array2::zeros((16, 16));
     /// for method in methods {
@@ -74,8 +74,8 @@ pub trait SlopeIntegrator<T: Scalar> {
         q: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::new();
-        self.integrate_with(&mut Workspace::new(), p, q, domain, &mut surface)?;
+        let mut surface = Surface::default();
+        self.integrate_with(&mut Workspace::default(), p, q, domain, &mut surface)?;
         Ok(surface)
     }
 }

@@ -27,7 +27,7 @@ pub(crate) fn write_levelled<T: Scalar>(
             .zip(inside.iter_mut())
             .zip(mask.row(r))
         {
-            if wanted {
+            if wanted && !z.is_nan() {
                 (*to, *inside) = (z + shift, true);
             }
         }
@@ -46,7 +46,7 @@ fn shift<T: Scalar>(grid: &[T], domain: &Domain<'_, T>, surface: &Surface<T>) ->
         }
         for (c, &z) in line.iter().enumerate() {
             let (row, column) = (area.top + r, area.left + c);
-            if domain.contains(row, column) {
+            if domain.contains(row, column) && !z.is_nan() {
                 sum += z.as_f64();
                 count += 1;
                 if let Some(height) = domain.known(row, column) {

@@ -15,6 +15,7 @@ use ndarray::ArrayView2;
 
 pub use ball_calibration::BallCalibration;
 pub use brooks_horn::BrooksHorn;
+pub(crate) use brooks_horn::SlopeBuffers;
 pub use depth_table::DepthTable;
 pub use eikonal::{BoundaryCondition, Branch, Eikonal};
 pub(crate) use eikonal::{EikonalBuffers, ProfileBuffers};
@@ -23,7 +24,7 @@ pub(crate) use reflectance::FieldBuffers;
 pub use signal::Signal;
 pub use tsai_shah::TsaiShah;
 
-use crate::{Domain, Frame, Scalar, SfsError, Surface, Workspace};
+use crate::{Domain, Frame, Scalar, SfsError, SlopeIntegrator, Surface, Workspace};
 
 /// A way from one image to a surface.
 ///
@@ -66,9 +67,9 @@ pub trait SurfaceReconstruction<T: Scalar> {
         image: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::new();
+        let mut surface = Surface::default();
         self.reconstruct_with(
-            &mut Workspace::new(),
+            &mut Workspace::default(),
             Frame::Real(image),
             domain,
             &mut surface,
@@ -86,7 +87,7 @@ pub trait SurfaceReconstruction<T: Scalar> {
     /// let once = table.reconstruct_u8(image.view(), &domain)?;
     /// assert_eq!(once.heights, array![[0.0, 0.25e-3, 0.5e-3]]);
     /// // The same for a stream of frames: no allocation after the first.
-    /// let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+    /// let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
     /// table.reconstruct_with(&mut workspace, Frame::Bytes(image.view()), &domain, &mut surface)?;
     /// assert_eq!(surface, once);
     /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -99,14 +100,48 @@ pub trait SurfaceReconstruction<T: Scalar> {
         image: ArrayView2<'_, u8>,
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::new();
+        let mut surface = Surface::default();
         self.reconstruct_with(
-            &mut Workspace::new(),
+            &mut Workspace::default(),
             Frame::Bytes(image),
             domain,
             &mut surface,
         )?;
         Ok(surface)
+    }
+
+    /// The same method with its slopes made into heights by `integrator`; `None`, the default, for a method that goes from the image to
+    /// heights without slopes. Of the methods here [`BrooksHorn`] has slopes.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{BrooksHorn, Domain, Eikonal, Lighting, MaskedLeastSquares, SurfaceReconstruction};
+    /// // A hemisphere of radius 10 px; least squares over the mask alone do not take its surroundings as flat.
+    /// let z = Array2::from_shape_fn((25, 25), |(r, c)| {
+    ///     (100.0 - (r as f64 - 12.0).powi(2) - (c as f64 - 12.0).powi(2)).max(0.0).sqrt()
+    /// });
+    /// let (image, mask) = (z.mapv(|z| z / 10.0), z.mapv(|z| z > 0.0));
+    /// let domain = Domain::pixels().with_mask(mask.view());
+    /// let fourier = BrooksHorn::new(Lighting::frontal()).with_occluding_boundary(true);
+    /// let masked = fourier.with_slope_integrator(Arc::new(MaskedLeastSquares::default())).expect("slopes");
+    /// let error = |heights: &Array2<f64>| ((heights[[12, 12]] - heights[[12, 5]]) / (z[[12, 12]] - z[[12, 5]]) - 1.0).abs();
+    /// let [periodic, least_squares] = [
+    ///     fourier.reconstruct(image.view(), &domain)?.heights,
+    ///     masked.reconstruct(image.view(), &domain)?.heights,
+    /// ];
+    /// assert!(error(&least_squares) < 0.1 && error(&least_squares) < error(&periodic));
+    /// // The eikonal equation is solved for heights: there are no slopes to integrate.
+    /// let eikonal = Eikonal::<f64>::new(Lighting::frontal());
+    /// assert!(eikonal.with_slope_integrator(Arc::new(MaskedLeastSquares::default())).is_none());
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    fn with_slope_integrator(
+        &self,
+        integrator: Arc<dyn SlopeIntegrator<T> + Send + Sync>,
+    ) -> Option<Arc<dyn SurfaceReconstruction<T> + Send + Sync>> {
+        let _ = integrator;
+        None
     }
 }
 
@@ -124,6 +159,13 @@ macro_rules! forward {
                 surface: &mut Surface<T>,
             ) -> Result<(), SfsError> {
                 (**self).reconstruct_with(workspace, frame, domain, surface)
+            }
+
+            fn with_slope_integrator(
+                &self,
+                integrator: Arc<dyn SlopeIntegrator<T> + Send + Sync>,
+            ) -> Option<Arc<dyn SurfaceReconstruction<T> + Send + Sync>> {
+                (**self).with_slope_integrator(integrator)
             }
         }
     };

@@ -43,7 +43,7 @@ pub trait ControlPointSampler<T: Scalar> {
     /// ```
     /// use ndarray::Array2;
     /// use tactile_sfs::{ControlPointSampler, Random, Workspace};
-    /// let (z, mut workspace, mut points) = (Array2::<f64>::zeros((9, 9)), Workspace::new(), Vec::new());
+    /// let (z, mut workspace, mut points) = (Array2::<f64>::zeros((9, 9)), Workspace::default(), Vec::new());
     /// for count in [20, 5] {
     ///     Random::new(1).sample_with(&mut workspace, z.view(), None, [1.0, 1.0], count, &mut points)?;
     ///     assert_eq!(points.len(), count);
@@ -87,7 +87,7 @@ pub trait ControlPointSampler<T: Scalar> {
     ) -> Result<Vec<Point3<T>>, SfsError> {
         let mut points = Vec::with_capacity(count);
         self.sample_with(
-            &mut Workspace::new(),
+            &mut Workspace::default(),
             surface,
             mask,
             pixel_size_m,

@@ -41,7 +41,7 @@ fn integrators() -> Vec<(&'static str, Box<dyn SlopeIntegrator<f64>>)> {
     vec![
         ("poisson", Box::new(CosinePoisson)),
         ("frankot-chellappa", Box::new(FrankotChellappa)),
-        ("least squares", Box::new(MaskedLeastSquares::new())),
+        ("least squares", Box::new(MaskedLeastSquares::default())),
     ]
 }
 
@@ -59,7 +59,7 @@ fn same(a: &Surface<f64>, b: &Surface<f64>) -> bool {
 fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
     let (small, large) = (Sampled::new(24, sphere), Sampled::new(48, sphere));
     for (name, method) in reconstructions() {
-        let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
         for case in [&large, &small, &large] {
             let domain = Domain::pixels().with_mask(case.mask.view());
             method
@@ -92,7 +92,7 @@ fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
         assert_eq!(counted.count_total, 0, "{name}");
     }
     for (name, method) in integrators() {
-        let (mut workspace, mut surface) = (Workspace::new(), Surface::new());
+        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
         let domain = Domain::pixels().with_mask(large.mask.view());
         let mut run = |surface: &mut Surface<f64>| {
             method
@@ -248,8 +248,8 @@ fn single_precision_agrees() {
         ),
         (
             "least squares",
-            Box::new(MaskedLeastSquares::new()),
-            Box::new(MaskedLeastSquares::new()),
+            Box::new(MaskedLeastSquares::default()),
+            Box::new(MaskedLeastSquares::default()),
         ),
     ] {
         let a = method
@@ -328,7 +328,7 @@ fn narrow_domains_are_right() {
         Array2::from_elem((20, 20), 2.0),
     );
     let domain = Domain::pixels().with_mask(mask.view());
-    let surface = MaskedLeastSquares::new()
+    let surface = MaskedLeastSquares::default()
         .integrate(p.view(), q.view(), &domain)
         .unwrap();
     assert!((surface.heights[[19, 19]] - surface.heights[[0, 0]] - 57.0_f64).abs() < 1e-5);
@@ -389,7 +389,7 @@ fn nonsense_is_refused() {
         assert!(TsaiShah::new(frontal()).with_noise(bad).is_err());
         assert!(BrooksHorn::new(frontal()).with_smoothness(bad).is_err());
         assert!(Pentland::new(frontal()).with_regularisation(bad).is_err());
-        assert!(MaskedLeastSquares::new().with_tolerance(bad).is_err());
+        assert!(MaskedLeastSquares::default().with_tolerance(bad).is_err());
     }
     assert!(CurvatureAdaptive::new(f64::NAN).is_err());
     assert!(DepthTable::new(&[(0.0, 0.0), (0.0, 1.0)]).is_err());
@@ -399,12 +399,12 @@ fn nonsense_is_refused() {
 #[test]
 fn progress_can_stop_a_solve() {
     let case = Sampled::new(48, sphere);
-    let mut workspace = Workspace::new();
+    let mut workspace = Workspace::default();
     workspace.on_progress(|_| core::ops::ControlFlow::Break(()));
-    let mut surface = Surface::new();
+    let mut surface = Surface::default();
     // A rectangle would be solved directly.
     let domain = Domain::pixels().with_mask(case.mask.view());
-    MaskedLeastSquares::new()
+    MaskedLeastSquares::default()
         .integrate_with(
             &mut workspace,
             case.p.view(),

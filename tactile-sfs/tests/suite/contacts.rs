@@ -165,7 +165,7 @@ fn contact_points_lie_inside_the_contour() {
     });
     let mask = z.mapv(|z| z > 0.0);
     let pixels = mask.iter().filter(|inside| **inside).count();
-    let (mut workspace, mut points) = (Workspace::new(), Vec::new());
+    let (mut workspace, mut points) = (Workspace::default(), Vec::new());
     for count in [0, 1, 30, 200] {
         ContactSampler
             .sample_with(

@@ -66,7 +66,7 @@ impl Placed {
         let integrators: [(_, Box<dyn SlopeIntegrator<f64>>); 3] = [
             ("poisson", Box::new(CosinePoisson)),
             ("frankot-chellappa", Box::new(FrankotChellappa)),
-            ("least squares", Box::new(MaskedLeastSquares::new())),
+            ("least squares", Box::new(MaskedLeastSquares::default())),
         ];
         let patch = |surface: Surface<f64>| {
             assert_eq!(surface.mask, self.mask);

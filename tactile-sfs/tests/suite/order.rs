@@ -118,7 +118,7 @@ fn integrators_are_of_fourth_order() {
     for shape in [gaussian as Shape, waves] {
         for method in [
             &CosinePoisson as &dyn SlopeIntegrator<f64>,
-            &MaskedLeastSquares::new(),
+            &MaskedLeastSquares::default(),
         ] {
             let errors = SIZES.map(|n| solve(n, method, shape));
             println!("{errors:.5?}, orders {:.2?}", orders(&errors));
@@ -165,7 +165,7 @@ fn pixels_need_not_be_square() {
     let domain = Domain::new([wide, high]).unwrap();
     for method in [
         &CosinePoisson as &dyn SlopeIntegrator<f64>,
-        &MaskedLeastSquares::new(),
+        &MaskedLeastSquares::default(),
     ] {
         let surface = method.integrate(p.view(), q.view(), &domain).unwrap();
         let error = height_error(
@@ -185,8 +185,10 @@ fn least_squares_by_steps_is_the_direct_solution() {
     let sampled = Sampled::new(48, waves);
     let domain = Domain::new([sampled.pixel, 0.7 * sampled.pixel]).unwrap();
     let (p, q, weights) = (sampled.p.view(), sampled.q.view(), Array2::ones((48, 48)));
-    let direct = MaskedLeastSquares::new().integrate(p, q, &domain).unwrap();
-    let steps = MaskedLeastSquares::new()
+    let direct = MaskedLeastSquares::default()
+        .integrate(p, q, &domain)
+        .unwrap();
+    let steps = MaskedLeastSquares::default()
         .with_weights(weights.view())
         .integrate(p, q, &domain)
         .unwrap();

@@ -2,7 +2,8 @@
 //!
 //! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` writes the record anew; the commit says why numbers moved.
 
-use std::fmt::Write as _;
+#[path = "../../../tests/support/recorded.rs"]
+mod record;
 
 use ndarray::Array2;
 use tactile_sfs::{
@@ -12,6 +13,7 @@ use tactile_sfs::{
     SurfaceReconstruction, TsaiShah, estimate_lighting, height_error, render, reprojection, slopes,
 };
 
+use self::record::Answers;
 use super::common::{Sampled, ellipsoid, gaussian, paraboloid, sphere, waves};
 
 /// Relative to the largest number of a line: the last bits of square roots and sums in another order, times the few
@@ -20,43 +22,13 @@ const TOLERANCE: f64 = 1e-12;
 
 const SIDE: usize = 48;
 
-#[derive(Default)]
-struct Answers(Vec<(String, Vec<f64>)>);
-
-impl Answers {
-    fn add(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
-        self.0.push((name.to_owned(), values.into_iter().collect()));
-    }
-
-    /// Some of the solved heights, and the counts of the report.
-    fn add_surface(&mut self, name: &str, surface: &Surface<f64>) {
-        let solved = surface.heights.iter().filter(|z| z.is_finite());
-        self.add(name, solved.copied().step_by(47));
-        let report = &surface.report;
-        let counts = [report.iterations, report.solved, report.flagged];
-        self.add(&format!("{name}/counts"), counts.map(|n| n as f64));
-    }
-
-    fn to_text(&self) -> String {
-        let mut text = String::new();
-        for (name, values) in &self.0 {
-            text.push_str(name);
-            for value in values {
-                write!(text, " {value:e}").expect("a string takes all");
-            }
-            text.push('\n');
-        }
-        text
-    }
-
-    fn parse(text: &str) -> Self {
-        let line = |line: &str| {
-            let mut words = line.split(' ');
-            let name = words.next().expect("a name").to_owned();
-            (name, words.map(|w| w.parse().expect("a number")).collect())
-        };
-        Self(text.lines().map(line).collect())
-    }
+/// Some of the solved heights, and the counts of the report.
+fn add_surface(answers: &mut Answers, name: &str, surface: &Surface<f64>) {
+    let solved = surface.heights.iter().filter(|z| z.is_finite());
+    answers.add(name, solved.copied().step_by(47));
+    let report = &surface.report;
+    let counts = [report.iterations, report.solved, report.flagged];
+    answers.add(format!("{name}/counts"), counts.map(|n| n as f64));
 }
 
 fn reconstructions(answers: &mut Answers) {
@@ -78,33 +50,41 @@ fn reconstructions(answers: &mut Answers) {
                 .reconstruct(image.view(), &domain)
                 .expect("a surface")
         };
-        answers.add_surface(&format!("eikonal/{name}"), &solve(&steep, &scene.image));
+        add_surface(
+            answers,
+            &format!("eikonal/{name}"),
+            &solve(&steep, &scene.image),
+        );
         let lit = render(scene.z.view(), [scene.pixel; 2], &oblique);
         let oblique_steep = Eikonal::new(oblique)
             .with_boundary(BoundaryCondition::Height(0.0))
             .expect("a height");
-        answers.add_surface(
+        add_surface(
+            answers,
             &format!("eikonal_oblique/{name}"),
             &solve(&oblique_steep, &lit),
         );
-        answers.add_surface(
+        add_surface(
+            answers,
             &format!("tsai_shah/{name}"),
             &solve(&TsaiShah::new(frontal), &scene.image),
         );
-        answers.add_surface(
+        add_surface(
+            answers,
             &format!("brooks_horn/{name}"),
             &solve(
                 &BrooksHorn::new(frontal).with_occluding_boundary(true),
                 &scene.image,
             ),
         );
-        answers.add_surface(
+        add_surface(
+            answers,
             &format!("pentland/{name}"),
             &solve(&Pentland::new(oblique), &lit),
         );
         let found = estimate_lighting(Frame::Real(lit.view()), &domain).expect("a light");
         answers.add(
-            &format!("estimate/{name}"),
+            format!("estimate/{name}"),
             found.direction().into_iter().chain([found.albedo()]),
         );
     }
@@ -126,7 +106,7 @@ fn both_branches(answers: &mut Answers, frontal: Lighting<f64>) {
     for (name, light, image) in [("frontal", frontal, &scene.image), ("oblique", lit, &image)] {
         let method = Eikonal::new(light).with_branch(Branch::Auto);
         let surface = method.reconstruct(image.view(), &domain).expect("heights");
-        answers.add_surface(&format!("eikonal_known/{name}"), &surface);
+        add_surface(answers, &format!("eikonal_known/{name}"), &surface);
     }
 }
 
@@ -148,7 +128,7 @@ fn depth_table(answers: &mut Answers) {
         .table
         .reconstruct(image.view(), &domain)
         .expect("depths");
-    answers.add_surface("depth_table", &surface);
+    add_surface(answers, "depth_table", &surface);
 }
 
 fn integrators(answers: &mut Answers) {
@@ -161,7 +141,7 @@ fn integrators(answers: &mut Answers) {
     let masked = whole.with_mask(disc.view());
     let poisson = CosinePoisson;
     let fourier = FrankotChellappa;
-    let squares = MaskedLeastSquares::new();
+    let squares = MaskedLeastSquares::default();
     let methods: [(&str, &dyn SlopeIntegrator<f64>); 3] = [
         ("poisson", &poisson),
         ("frankot_chellappa", &fourier),
@@ -176,7 +156,7 @@ fn integrators(answers: &mut Answers) {
             let surface = method
                 .integrate(scene.p.view(), scene.q.view(), &domain)
                 .expect("heights");
-            answers.add_surface(&format!("{name}/{case}"), &surface);
+            add_surface(answers, &format!("{name}/{case}"), &surface);
         }
     }
 }
@@ -203,7 +183,7 @@ fn samplers(answers: &mut Answers) {
                 .expect("points");
             let shown = points.iter().step_by(1 + count / 20);
             answers.add(
-                &format!("{name}/{count}"),
+                format!("{name}/{count}"),
                 shown.flat_map(|p| [p.x, p.y, p.z]),
             );
         }
@@ -217,7 +197,7 @@ fn quality(answers: &mut Answers) {
         let error = height_error(other.z.view(), scene.z.view(), None, alignment).expect("errors");
         let summary = &error.error;
         answers.add(
-            &format!("height_error/{alignment:?}"),
+            format!("height_error/{alignment:?}"),
             [summary.rms, summary.mean_absolute, summary.max],
         );
     }
@@ -242,20 +222,5 @@ fn answers_are_the_recorded_ones() {
     samplers(&mut found);
     quality(&mut found);
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/recorded.txt");
-    if std::env::var_os("RECORD_ANSWERS").is_some() {
-        std::fs::write(path, found.to_text()).expect("a writable file");
-    }
-    let recorded = std::fs::read_to_string(path).expect("the record");
-    let recorded = Answers::parse(&recorded);
-    assert_eq!(recorded.0.len(), found.0.len());
-    for ((name, expected), (found_name, found)) in recorded.0.iter().zip(&found.0) {
-        assert_eq!((name, expected.len()), (found_name, found.len()));
-        let largest = expected.iter().fold(0.0, |m, x| f64::max(m, x.abs()));
-        for (e, f) in expected.iter().zip(found) {
-            assert!(
-                (e - f).abs() <= TOLERANCE * largest,
-                "{name}: {f:e} instead of {e:e}"
-            );
-        }
-    }
+    found.check(path, |_, _, largest| TOLERANCE * largest);
 }

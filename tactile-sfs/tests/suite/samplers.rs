@@ -20,7 +20,7 @@ fn samplers_with_a_workspace_do_not_allocate() {
         .flat_map(|sampler| [(sampler, 40), (sampler, 900)])
     {
         let (z, mask, step) = (case.z.view(), Some(case.mask.view()), [case.pixel; 2]);
-        let (mut workspace, mut points) = (Workspace::new(), Vec::new());
+        let (mut workspace, mut points) = (Workspace::default(), Vec::new());
         let mut run = || {
             sampler
                 .sample_with(&mut workspace, z, mask, step, count, &mut points)

@@ -13,7 +13,7 @@ fn refits_and_evaluation_allocate_nothing() {
     let weights: Vec<f64> = (0..105).map(|i| f64::from(i % 5)).collect();
     let near: Vec<f64> = (0..105).map(|i| 1.0 + 1e-4 * f64::from(i % 5)).collect();
     let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
-    let (mut workspace, mut spline) = (Workspace::new(), Spline::<_, 3, 3, _>::empty(NegR));
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::<_, 3, 3, _>::empty(NegR));
     let (mut values, mut jacobians) = (vec![Point::origin(); 333], vec![Matrix3::zeros(); 333]);
     let mut hessians = vec![[Matrix3::zeros(); 3]; 333];
     let (mut influence, mut slopes) = (vec![0.0; 7 * 105], vec![SVector::zeros(); 7 * 105]);

@@ -19,7 +19,7 @@ fn against_unit_targets<const D: usize, K: Kernel>(
     let sources = random.points::<D>(n);
     let queries: [Point<f64, D>; 7] = core::array::from_fn(|_| random.point::<D>() * 1.3);
     let factorization = Factorization::new(&sources, &options).expect("a factor");
-    let (mut workspace, mut unit) = (Workspace::new(), Spline::empty(kernel));
+    let (mut workspace, mut unit) = (Workspace::default(), Spline::empty(kernel));
     let mut values = vec![0.0; 7 * n];
     let mut slopes = vec![SVector::zeros(); 7 * n];
     factorization
@@ -144,7 +144,7 @@ fn what_is_no_linear_map_is_refused() {
     );
     let factorization =
         Factorization::<f64, 2>::new(&sources, &FitOptions::default()).expect("a factor");
-    let (mut workspace, mut short) = (Workspace::new(), vec![0.0; 11]);
+    let (mut workspace, mut short) = (Workspace::default(), vec![0.0; 11]);
     let found = factorization.influence_into(&mut workspace, &[x], &mut short);
     assert_eq!(
         found,

@@ -105,7 +105,7 @@ fn refits_are_fits() {
     let weights: Vec<f64> = (0..POINTS).map(|i| 0.5 + f64::from(i as u32 % 3)).collect();
     let iterative = FitOptions::new(NegR).with_solver(Solver::Iterative);
     let factorization = Factorization::new(&sources, &iterative).expect("a preconditioner");
-    let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(NegR));
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(NegR));
     let query = Point3::new(0.1, 0.2, 0.3);
     for (weights, smoothing) in [
         (None, Smoothing::None),

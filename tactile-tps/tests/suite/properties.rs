@@ -116,7 +116,7 @@ fn refits_to_the_same<const D: usize, K: Kernel>(kernel: K, seed: u64) {
         .collect();
     let factorization =
         Factorization::new(&sources, &FitOptions::new(kernel.clone())).expect("a factor");
-    let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel.clone()));
+    let (mut workspace, mut refitted) = (Workspace::default(), Spline::empty(kernel.clone()));
     let query = random.point::<D>();
     for smoothing in [Smoothing::None, Smoothing::Lambda(0.3), Smoothing::Gcv] {
         for weights in [None, Some(&weights[..])] {

@@ -2,7 +2,8 @@
 //!
 //! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` writes the record anew; the commit says why numbers moved.
 
-use std::fmt::Write as _;
+#[path = "../../../tests/support/recorded.rs"]
+mod record;
 
 use nalgebra::{Point, Point1};
 use tactile_tps::{
@@ -10,41 +11,12 @@ use tactile_tps::{
     ThinPlateSpline, Warp, Workspace,
 };
 
+use self::record::Answers;
 use super::common::{Uniform, bend, options};
 
 /// Relative to the largest number of a line: sums of 40 terms in another order differ by 1e-15, times condition numbers
 /// of at most 1e3.
 const TOLERANCE: f64 = 1e-12;
-
-#[derive(Default)]
-struct Answers(Vec<(String, Vec<f64>)>);
-
-impl Answers {
-    fn add(&mut self, name: impl Into<String>, values: impl IntoIterator<Item = f64>) {
-        self.0.push((name.into(), values.into_iter().collect()));
-    }
-
-    fn to_text(&self) -> String {
-        let mut text = String::new();
-        for (name, values) in &self.0 {
-            text.push_str(name);
-            for value in values {
-                write!(text, " {value:e}").expect("a string takes all");
-            }
-            text.push('\n');
-        }
-        text
-    }
-
-    fn parse(text: &str) -> Self {
-        let line = |line: &str| {
-            let mut words = line.split(' ');
-            let name = words.next().expect("a name").to_owned();
-            (name, words.map(|w| w.parse().expect("a number")).collect())
-        };
-        Self(text.lines().map(line).collect())
-    }
-}
 
 fn spline<const D: usize, const M: usize, K: Kernel>(
     answers: &mut Answers,
@@ -98,7 +70,7 @@ fn fits<const D: usize, K: Kernel>(answers: &mut Answers, kernel: K, name: &str)
     let heights: Vec<_> = targets.iter().map(|p| Point1::new(p[0] * p[1])).collect();
     let surface = factorization.fit(&heights).expect("a spline");
     spline(answers, &format!("{name}/height"), &surface);
-    let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel));
+    let (mut workspace, mut refitted) = (Workspace::default(), Spline::empty(kernel));
     for (case, lambda) in [("refit", 0.02), ("refit_lambda", 0.3)] {
         factorization
             .refit_with(
@@ -154,20 +126,5 @@ fn all() -> Answers {
 fn answers_are_the_recorded_ones() {
     let found = all();
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/recorded.txt");
-    if std::env::var_os("RECORD_ANSWERS").is_some() {
-        std::fs::write(path, found.to_text()).expect("a writable file");
-    }
-    let recorded = std::fs::read_to_string(path).expect("the record");
-    let recorded = Answers::parse(&recorded);
-    assert_eq!(recorded.0.len(), found.0.len());
-    for ((name, expected), (found_name, found)) in recorded.0.iter().zip(&found.0) {
-        assert_eq!((name, expected.len()), (found_name, found.len()));
-        let largest = expected.iter().fold(0.0, |m, x| f64::max(m, x.abs()));
-        for (e, f) in expected.iter().zip(found) {
-            assert!(
-                (e - f).abs() <= TOLERANCE * largest,
-                "{name}: {f:e} instead of {e:e}"
-            );
-        }
-    }
+    found.check(path, |_, _, largest| TOLERANCE * largest);
 }

@@ -20,7 +20,7 @@ fn compare<const D: usize, K: Kernel>(
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let options = FitOptions::new(kernel.clone());
     let factorization = Factorization::new(&sources, &options).expect("a factor");
-    let (mut workspace, mut refitted) = (Workspace::new(), Spline::empty(kernel.clone()));
+    let (mut workspace, mut refitted) = (Workspace::default(), Spline::empty(kernel.clone()));
     factorization
         .refit_with(
             &mut workspace,
@@ -117,7 +117,7 @@ fn conflicts_are_found_whatever_the_weights() {
     sources.push(sources[4]);
     targets.push(Point3::origin());
     let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
-    let (mut workspace, mut spline) = (Workspace::new(), Spline::empty(NegR));
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(NegR));
     let mut refit = |weight: f64| {
         let weights: Vec<f64> = (0..21)
             .map(|i| if i == 20 { weight } else { 2.0 })

@@ -103,7 +103,7 @@ fn ratio(
     covariance: &DMatrix<f64>,
     lateral: Estimate<f64>,
 ) -> ModulusEstimate<f64> {
-    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     let from_first_strain = |strain: f64| {
         let series = LoadSeries::new(loads(strain, forces, lateral));
         let series = series.with_force_covariance(covariance).unwrap();

@@ -48,7 +48,7 @@ impl Presses {
             youngs_modulus_pa: modulus,
             poisson_ratio: NU,
         };
-        let compliance = waveguide().compliance_per_pa();
+        let compliance = waveguide().as_body().compliance_per_pa();
         let reduced = 1.0 / (compliance + soft.plane_strain_compliance());
         let force_at = |ratio: f64| 4.0 / 3.0 * reduced * radius * radius * ratio.powi(3);
         let ratio = |k: u32| 0.1 + 0.2 * f64::from(k) / 11.0;

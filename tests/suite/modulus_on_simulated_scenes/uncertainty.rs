@@ -157,7 +157,7 @@ impl Experiment {
 }
 
 fn ratio() -> PaperRatio {
-    PaperRatio::new().with_reference(StrainReference::FirstLoad)
+    PaperRatio::default().with_reference(StrainReference::FirstLoad)
 }
 
 fn loads(forces: [f64; 2], squeeze: Estimate<f64>) -> LoadSeries<f64> {

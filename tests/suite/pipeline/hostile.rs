@@ -1,6 +1,6 @@
 //! Hostile presses: a typed error or a flagged answer, never a panic, never a silent NaN.
 //!
-//! 1,500 presses are some nine of every pair of troubles; `HOSTILE=10000` takes more, as `.ci/run studies` does in an optimised build.
+//! 500 presses are some three of every pair of troubles; `HOSTILE=10000` takes more, as `.ci/run studies` does in an optimised build.
 use ndarray::{Array2, s};
 use proptest::prelude::*;
 use std::sync::OnceLock;
@@ -198,7 +198,7 @@ fn check(kinds: [usize; 2], seed: usize, spoilt: [u8; 2], object: u8) {
 
 fn cases() -> u32 {
     let given = std::env::var("HOSTILE").ok().and_then(|n| n.parse().ok());
-    given.unwrap_or(1_500)
+    given.unwrap_or(500)
 }
 
 proptest! {

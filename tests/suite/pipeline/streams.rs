@@ -128,9 +128,9 @@ fn drift_of_the_light_is_seen_in_frames_without_contact() {
     assert!(session.drift_flag().is_some());
 }
 
-/// An hour of camera in small: the answer after 20 000 frames is that after the first cycles, and the truth.
+/// The answer after 4 000 frames is that after the first cycles, and the truth: the loads kept apart are full after a few hundred.
 #[test]
-fn twenty_thousand_frames_leave_memory_and_answer_alone() {
+fn four_thousand_frames_leave_memory_and_answer_alone() {
     let camera = Camera {
         shape: [65, 87],
         pixel_size_m: [344.8e-6; 2],
@@ -150,7 +150,7 @@ fn twenty_thousand_frames_leave_memory_and_answer_alone() {
     let mut session = Session::from_frames(&trial.pipeline().unwrap(), &views).unwrap();
     let cycle = LoadCycle {
         largest_force_n: 1.5,
-        cycles: 249,
+        cycles: 49,
         rest_s: 1.0,
         ..LoadCycle::default()
     };
@@ -168,7 +168,7 @@ fn twenty_thousand_frames_leave_memory_and_answer_alone() {
             early = Some(session.modulus().unwrap());
         }
     }
-    assert_eq!(session.frames(), 20_000);
+    assert_eq!(session.frames(), 4_000);
     let (early, late) = (early.unwrap(), session.modulus().unwrap());
     let drift = late.youngs_modulus_pa / early.youngs_modulus_pa - 1.0;
     let error = late.youngs_modulus_pa / trial.truth().youngs_modulus_pa - 1.0;

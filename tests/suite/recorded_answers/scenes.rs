@@ -267,13 +267,13 @@ fn stages_by_name() -> Vec<Answer> {
     let mut answers = Answers::of("by name");
     let trial = trial(&[0.7, 1.2], 2);
     let default = StagesConfig::default();
-    let mut configs = Vec::new();
+    let mut configs: Vec<(&str, StagesConfig)> = Vec::new();
     for reconstruction in [
         ReconstructionChoice::TsaiShah,
         ReconstructionChoice::BrooksHorn,
     ] {
         configs.push((
-            reconstruction.name(),
+            reconstruction.into(),
             StagesConfig {
                 reconstruction,
                 ..default
@@ -281,7 +281,7 @@ fn stages_by_name() -> Vec<Answer> {
         ));
     }
     for sampler in [SamplerChoice::Curvature, SamplerChoice::Random] {
-        configs.push((sampler.name(), StagesConfig { sampler, ..default }));
+        configs.push((sampler.into(), StagesConfig { sampler, ..default }));
     }
     for matcher in [
         MatcherChoice::RelaxationLabelling,
@@ -289,14 +289,14 @@ fn stages_by_name() -> Vec<Answer> {
         MatcherChoice::LinearAssignment,
         MatcherChoice::NearestNeighbour,
     ] {
-        configs.push((matcher.name(), StagesConfig { matcher, ..default }));
+        configs.push((matcher.into(), StagesConfig { matcher, ..default }));
     }
     for warp in [
         WarpChoice::CubicSpline,
         WarpChoice::Affine,
         WarpChoice::Rigid,
     ] {
-        configs.push((warp.name(), StagesConfig { warp, ..default }));
+        configs.push((warp.into(), StagesConfig { warp, ..default }));
     }
     for strain in [
         StrainChoice::EulerAlmansi,
@@ -304,11 +304,11 @@ fn stages_by_name() -> Vec<Answer> {
         StrainChoice::Biot,
         StrainChoice::Infinitesimal,
     ] {
-        configs.push((strain.name(), StagesConfig { strain, ..default }));
+        configs.push((strain.into(), StagesConfig { strain, ..default }));
     }
     let estimator = EstimatorChoice::PaperRatio;
     configs.push((
-        estimator.name(),
+        estimator.into(),
         StagesConfig {
             estimator,
             ..default
@@ -353,7 +353,7 @@ fn stream() -> Vec<Answer> {
         .pipeline()
         .expect("a pipeline")
         .with_control_points(60);
-    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     let ratio = ratio.with_sphere_radius(3e-3).expect("a ball");
     let ratio = pipeline.clone().with_estimator(ratio);
     let reference = || trial.simulation.reference.view();

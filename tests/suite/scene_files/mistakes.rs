@@ -222,4 +222,9 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "depth_table = \"depth.csv\"\n[stages]\nreconstruction = \"eikonal\"",
         &["`stages.reconstruction` must be absent"],
     ),
+    (
+        "[object]",
+        "[stages]\nintegrator = \"cosine-poisson\"\n[object]",
+        &["`stages.integrator` must be absent", "\"brooks-horn\""],
+    ),
 ];

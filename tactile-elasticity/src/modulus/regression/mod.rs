@@ -30,9 +30,9 @@ use nalgebra::RealField;
 ///             .with_mean_strain(Estimate::exact(strain))
 ///     });
 /// let loads = LoadSeries::new(loads);
-/// let tested = StressStrainRegression::new().estimate(&loads)?;
+/// let tested = StressStrainRegression::default().estimate(&loads)?;
 /// assert!(tested.warnings.iter().any(|w| matches!(w, Warning::Intercept { .. })));
-/// let forced = StressStrainRegression::new().with_intercept(Intercept::Zero).estimate(&loads)?;
+/// let forced = StressStrainRegression::default().with_intercept(Intercept::Zero).estimate(&loads)?;
 /// assert!(forced.youngs_modulus_pa > tested.youngs_modulus_pa);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -60,7 +60,7 @@ pub enum Intercept {
 ///         .with_mean_strain(Estimate::new(strain, 1e-4))
 /// };
 /// let loads = LoadSeries::new([load(600.0, 0.01), load(1200.0, 0.02), load(2400.0, 0.04)]);
-/// let modulus = StressStrainRegression::new().estimate(&loads)?;
+/// let modulus = StressStrainRegression::default().estimate(&loads)?;
 /// assert!((modulus.youngs_modulus_pa - 60e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
@@ -70,12 +70,7 @@ pub struct StressStrainRegression {
 }
 
 impl StressStrainRegression {
-    /// With a tested intercept.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// How the intercept is treated.
+    /// How the intercept is treated; by default it is tested.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, Intercept, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression};
@@ -85,7 +80,7 @@ impl StressStrainRegression {
     ///         .with_contact_area(Estimate::exact(1e-4))
     ///         .with_mean_strain(Estimate::exact(strain))
     /// };
-    /// let line = StressStrainRegression::new().with_intercept(Intercept::Zero);
+    /// let line = StressStrainRegression::default().with_intercept(Intercept::Zero);
     /// assert!((line.estimate(&LoadSeries::new([load(0.01), load(0.02)]))?.youngs_modulus_pa - 60e3).abs() < 1e-6);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```

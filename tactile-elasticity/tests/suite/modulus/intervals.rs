@@ -72,7 +72,7 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
             .with_mean_strain(exact(strain))
     };
     let loads = LoadSeries::new([load(0.02, 0.0), load(0.08, 0.01)]);
-    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     let shared = DMatrix::from_fn(2, 2, |i, j| {
         (0.01f64).powi(2) * [0.02, 0.08][i] * [0.02, 0.08][j]
     });
@@ -107,7 +107,7 @@ fn errors_learnt_from_few_repetitions_widen_the_interval() {
             .with_mean_strain(strain)])
     };
     let half_width = |loads: &LoadSeries<f64>| {
-        let found = PaperRatio::new().estimate(loads).unwrap();
+        let found = PaperRatio::default().estimate(loads).unwrap();
         (found.interval_95.upper.unwrap() / found.interval_95.lower).ln() / 2.0
             * found.youngs_modulus_pa
             / found.standard_error_pa
@@ -120,7 +120,7 @@ fn errors_learnt_from_few_repetitions_widen_the_interval() {
     // Half of the variance with five degrees of freedom, half known: 5/0.5² = 20.
     assert!((half_width(&load(learnt, strain)) - 2.085_963).abs() < 1e-5);
     let refused =
-        PaperRatio::new().estimate(&load(force.with_degrees_of_freedom(f64::NAN), strain));
+        PaperRatio::default().estimate(&load(force.with_degrees_of_freedom(f64::NAN), strain));
     assert!(refused.is_err());
 }
 
@@ -159,7 +159,7 @@ fn twenty_thousand_loads_are_one_linear_regression() {
         (hertz.loads.len(), hertz.fit.observations),
         (20_000, 40_000)
     );
-    let ratio = PaperRatio::new().with_reference(StrainReference::Unloaded);
+    let ratio = PaperRatio::default().with_reference(StrainReference::Unloaded);
     let ratio = ratio.estimate(&series).unwrap();
     assert_eq!(ratio.fit.observations, 20_000);
 }

@@ -12,6 +12,7 @@ use tactile_elasticity::contact::{
     Body, Bond, HertzContact, Layer, LayerEquation, Waveguide, cone, flat_punch,
     reduced_modulus_pa, tatara_indentation_m,
 };
+use tactile_elasticity::curve::SelectionReason;
 use tactile_elasticity::modulus::*;
 use tactile_elasticity::{ElasticityError, Quantity};
 

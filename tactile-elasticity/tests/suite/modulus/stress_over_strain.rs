@@ -11,10 +11,10 @@ fn strained(stress: f64, strain: f64) -> LoadState<f64> {
 #[test]
 fn stress_over_strain() {
     let line = [0.01, 0.03, 0.05].map(|e| strained(SAMPLE * e, e));
-    finds(&PaperRatio::new(), &line);
-    finds(&StressStrainRegression::new(), &line);
+    finds(&PaperRatio::default(), &line);
+    finds(&StressStrainRegression::default(), &line);
     finds(
-        &StressStrainRegression::new().with_intercept(Intercept::Zero),
+        &StressStrainRegression::default().with_intercept(Intercept::Zero),
         &line,
     );
     // An offset biases the ratio, not the slope, and is found.
@@ -24,7 +24,7 @@ fn stress_over_strain() {
         .zip(wobble)
         .map(|(&e, w)| strained(300.0 + SAMPLE * e + w, e))
         .collect();
-    let slope = StressStrainRegression::new()
+    let slope = StressStrainRegression::default()
         .estimate(&LoadSeries::new(offset.as_slice()))
         .unwrap();
     assert!((slope.youngs_modulus_pa / SAMPLE - 1.0).abs() < 1e-9);
@@ -35,7 +35,7 @@ fn stress_over_strain() {
             .any(|w| matches!(w, Warning::Intercept { .. }))
     );
     assert!(
-        PaperRatio::new()
+        PaperRatio::default()
             .estimate(&LoadSeries::new(offset.as_slice()))
             .unwrap()
             .youngs_modulus_pa
@@ -49,7 +49,7 @@ fn strain_counted_from_the_first_load() {
         strained(1000.0, 0.0),
         strained(1000.0 + SAMPLE * 0.02, 0.02),
     );
-    let ratio = PaperRatio::new().with_reference(StrainReference::FirstLoad);
+    let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     finds(&ratio, &[first, second]);
     assert_eq!(
         ratio.estimate(&LoadSeries::new([second])).unwrap_err(),
@@ -69,7 +69,7 @@ fn strain_counted_from_the_first_load() {
 #[test]
 fn bad_input_is_named() {
     use ElasticityError as E;
-    let ratio = PaperRatio::new();
+    let ratio = PaperRatio::default();
     let fail = |load: LoadState<f64>| ratio.estimate(&LoadSeries::new([load])).unwrap_err();
     assert_eq!(fail(strained(100.0, 0.0)), E::ZeroStrain);
     assert_eq!(
@@ -116,7 +116,7 @@ fn bad_input_is_named() {
             quantity: Quantity::ContactArea
         }
     );
-    let line = StressStrainRegression::new();
+    let line = StressStrainRegression::default();
     assert_eq!(
         line.estimate(&LoadSeries::new([strained(10.0, 0.1); 3]))
             .unwrap_err(),

@@ -37,7 +37,7 @@ use system::System;
 /// let mask = array![[true, true, false, true], [false, true, false, true]];
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::from_elem((2, 4), 2.0));
 /// let domain = Domain::pixels().with_mask(mask.view());
-/// let surface = MaskedLeastSquares::new().integrate(p.view(), q.view(), &domain)?;
+/// let surface = MaskedLeastSquares::default().integrate(p.view(), q.view(), &domain)?;
 /// assert_eq!(surface.report.components.len(), 2);
 /// assert!((surface.heights[[1, 3]] - surface.heights[[0, 3]] - 2.0_f64).abs() < 1e-9);
 /// assert!(surface.heights[[0, 2]].is_nan());
@@ -50,6 +50,7 @@ pub struct MaskedLeastSquares<'a, T> {
     weights: Option<ArrayView2<'a, T>>,
 }
 
+/// Equal weights, a relative residual of 10⁻⁹ (10⁻⁶ in `f32`), at most 500 steps.
 impl<T: Scalar> Default for MaskedLeastSquares<'_, T> {
     fn default() -> Self {
         let tolerance = T::of(1e-9).max(T::epsilon() * T::of(10.0));
@@ -62,11 +63,6 @@ impl<T: Scalar> Default for MaskedLeastSquares<'_, T> {
 }
 
 impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
-    /// Equal weights, a relative residual of 10⁻⁹ (10⁻⁶ in `f32`), at most 500 steps.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Relative residual at which the solve ends.
     ///
     /// # Errors
@@ -108,7 +104,7 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
     /// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator};
     /// let (mut p, mut weights) = (Array2::from_elem((6, 6), 0.5), Array2::from_elem((6, 6), 1.0));
     /// (p[[2, 3]], weights[[2, 3]]) = (40.0, 0.0); // a false slope, known to be one
-    /// let method = MaskedLeastSquares::new().with_weights(weights.view()).with_tolerance(1e-10)?.with_max_iterations(100)?;
+    /// let method = MaskedLeastSquares::default().with_weights(weights.view()).with_tolerance(1e-10)?.with_max_iterations(100)?;
     /// let surface = method.integrate(p.view(), Array2::zeros((6, 6)).view(), &Domain::pixels())?;
     /// let z = &surface.heights;
     /// assert!((z[[2, 5]] - z[[2, 0]] - 2.5_f64).abs() < 0.1 && surface.report.iterations <= 100);

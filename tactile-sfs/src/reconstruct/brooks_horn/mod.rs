@@ -1,17 +1,23 @@
 //! Brooks & Horn 1985 with the integrability of Frankot & Chellappa 1988.
 //!
 //! Minimises ∫ (R − n·s)² + λ |∇n|² over unit normals by the iteration n ← normalise(n̄ + (R − n̄·s) s/(1 + 4 λ)), n̄ the
-//! mean of the neighbours (the pixel's own equation solved exactly; the printed explicit form diverges for small λ); every few steps the slopes are projected on the integrable ones (in the Fourier domain), and the
-//! heights are those of the last projection. Normals have no infinite slopes, so the occluding boundary is an ordinary
+//! mean of the neighbours (the pixel's own equation solved exactly; the printed explicit form diverges for small λ); every few steps
+//! the slopes are projected on the integrable ones (in the Fourier domain, or by another integrator), and the heights are
+//! those of the last projection. Normals have no infinite slopes, so the occluding boundary is an ordinary
 //! boundary condition: there n lies in the image plane and points outwards.
 
-use rustfft::num_complex::Complex;
+mod project;
+
+use std::sync::Arc;
+
+pub(crate) use project::SlopeBuffers;
+use project::{Integrated, follow};
 
 use super::FieldBuffers;
 use crate::error::{non_negative, positive};
 use crate::integrate::shift::write_levelled;
 use crate::{BoundingBox, Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface};
-use crate::{SurfaceReconstruction, Workspace};
+use crate::{SlopeIntegrator, SurfaceReconstruction, Workspace};
 
 /// Variational shape from shading with integrability.
 ///
@@ -121,6 +127,30 @@ impl<T: Scalar> SurfaceReconstruction<T> for BrooksHorn<T> {
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
+        self.run(None, workspace, frame, domain, surface)
+    }
+
+    fn with_slope_integrator(
+        &self,
+        integrator: Arc<dyn SlopeIntegrator<T> + Send + Sync>,
+    ) -> Option<Arc<dyn SurfaceReconstruction<T> + Send + Sync>> {
+        Some(Arc::new(Integrated {
+            method: *self,
+            integrator,
+        }))
+    }
+}
+
+impl<T: Scalar> BrooksHorn<T> {
+    /// Steps and projections: by `integrator`, or in the Fourier domain.
+    fn run(
+        &self,
+        integrator: Option<&dyn SlopeIntegrator<T>>,
+        workspace: &mut Workspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
         let area = surface.enter(frame.dim(), domain)?;
         workspace
             .field
@@ -130,22 +160,21 @@ impl<T: Scalar> SurfaceReconstruction<T> for BrooksHorn<T> {
             normals.clear();
             normals.resize(area.area(), start);
         }
-        self.solve(workspace, frame.dim(), domain, surface);
-        write_levelled(workspace.fourier.heights(), domain, surface);
+        self.solve(integrator, workspace, frame.dim(), domain, surface)?;
+        write_levelled(&workspace.slopes.heights, domain, surface);
         surface.finish(domain);
         Ok(())
     }
-}
 
-impl<T: Scalar> BrooksHorn<T> {
-    /// Steps and projections; the heights of the last one are left in the Fourier buffers.
+    /// Steps and projections; the heights of the last one are left in the buffers of the slopes.
     fn solve(
         &self,
+        integrator: Option<&dyn SlopeIntegrator<T>>,
         workspace: &mut Workspace<T>,
         frame: (usize, usize),
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
-    ) {
+    ) -> Result<(), SfsError> {
         let area = surface.bounding_box;
         let report = &mut surface.report;
         report.stop = StopReason::IterationLimit;
@@ -153,7 +182,12 @@ impl<T: Scalar> BrooksHorn<T> {
             report.iterations = step;
             report.residual = self.relax(&mut workspace.field, area, frame);
             if step % self.project_every == 0 || step == self.iterations {
-                self.project(workspace, domain, area);
+                match integrator {
+                    None => self.project(workspace, domain, area),
+                    Some(integrator) => {
+                        self.integrate(integrator, workspace, frame, domain, area)?;
+                    }
+                }
                 if let Some(stop) = workspace.report(step, self.iterations, report.residual) {
                     report.stop = stop;
                     break;
@@ -163,6 +197,7 @@ impl<T: Scalar> BrooksHorn<T> {
                 }
             }
         }
+        Ok(())
     }
 
     /// One Jacobi step on the normals; returns the misfit before it.
@@ -214,55 +249,6 @@ impl<T: Scalar> BrooksHorn<T> {
             mean = [mean[0] + out[0], mean[1] + out[1], mean[2]];
         }
         unit(mean)
-    }
-
-    /// Projects the slopes on the integrable ones.
-    fn project(&self, workspace: &mut Workspace<T>, domain: &Domain<'_, T>, area: BoundingBox) {
-        let (field, fourier) = (&mut workspace.field, &mut workspace.fourier);
-        let least = T::one() / (T::one() + self.max_slope * self.max_slope).sqrt();
-        let cut = |slope: T| slope.max(-self.max_slope).min(self.max_slope);
-        let slope = |(n, reflectance): (&[T; 3], &T)| {
-            if reflectance.is_nan() {
-                return Complex::new(T::zero(), T::zero());
-            }
-            let z = n[2].max(least);
-            Complex::new(cut(-n[0] / z), cut(-n[1] / z))
-        };
-        fourier.fill(
-            area.rows,
-            area.columns,
-            field.normals.iter().zip(&field.reflectance).map(slope),
-        );
-        fourier.integrate(domain.pixel_size_m);
-    }
-}
-
-/// Takes the normals of the heights of the last projection.
-fn follow<T: Scalar>(workspace: &mut Workspace<T>, [hx, hy]: [T; 2], area: BoundingBox) {
-    let (field, z) = (&mut workspace.field, workspace.fourier.heights());
-    let two = T::of(2.0);
-    for r in 0..area.rows {
-        for c in 0..area.columns {
-            let i = r * area.columns + c;
-            if field.reflectance[i].is_nan() {
-                continue;
-            }
-            let (left, right) = (
-                i - usize::from(c > 0),
-                i + usize::from(c + 1 < area.columns),
-            );
-            let up = if r > 0 { i - area.columns } else { i };
-            let down = if r + 1 < area.rows {
-                i + area.columns
-            } else {
-                i
-            };
-            let (p, q) = (
-                (z[right] - z[left]) / (two * hx),
-                (z[down] - z[up]) / (two * hy),
-            );
-            field.normals[i] = unit([-p, -q, T::one()]);
-        }
     }
 }
 
