@@ -34,12 +34,40 @@ use crate::error::{ForceError, Requirement};
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Unchecked")
+)]
 pub struct LensGeometry {
     pixel_size_m: [f64; 2],
     centre_px: [f64; 2],
     radius_px: f64,
     distortion: [f64; 2],
+}
+
+/// A geometry as a file has it.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Unchecked {
+    pixel_size_m: [f64; 2],
+    centre_px: [f64; 2],
+    radius_px: f64,
+    distortion: [f64; 2],
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for LensGeometry {
+    type Error = ForceError;
+
+    fn try_from(given: Unchecked) -> Result<Self, ForceError> {
+        Self::new(given.pixel_size_m)?.with_distortion(
+            given.centre_px,
+            given.radius_px,
+            given.distortion,
+        )
+    }
 }
 
 /// Points of a contour that is undistorted.

@@ -2,11 +2,17 @@
 
 use super::basis::{Basis, KNOTS, Knots};
 use super::nonnegative::Normal;
+#[cfg(feature = "serde")]
+use crate::error::{ForceError, Requirement};
 use crate::estimate::Estimate;
 
 /// Slopes at the knots in Pa per grey level, and their covariance.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 pub(super) struct Coefficients {
     pub(super) basis: Basis,
     pub(super) slopes: [f64; KNOTS],
@@ -16,6 +22,23 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
+    /// Refuses what no fit gives: a curve that falls, or numbers that are not finite.
+    #[cfg(feature = "serde")]
+    pub(super) fn checked(self) -> Result<Self, ForceError> {
+        Requirement::Positive.check("basis.top", self.basis.top)?;
+        Requirement::Positive.check("degrees_of_freedom", self.degrees_of_freedom)?;
+        for slope in self.slopes {
+            Requirement::NonNegative.check("slopes", slope)?;
+        }
+        Requirement::Positive.check("the greatest of slopes", self.slopes().max())?;
+        for (j, row) in self.covariance.iter().enumerate() {
+            row.iter()
+                .try_for_each(|c| Requirement::Finite.check("covariance", *c).map(drop))?;
+            Requirement::NonNegative.check("the diagonal of covariance", row[j])?;
+        }
+        Ok(self)
+    }
+
     pub(super) fn pressure_pa(&self, grey: f64) -> Estimate<f64> {
         let row = self.basis.integrals(grey);
         Estimate::nearest(row.dot(&self.slopes()), self.variance(&row))

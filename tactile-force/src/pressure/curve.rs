@@ -45,12 +45,39 @@ use crate::frame::DifferenceNoise;
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Unchecked")
+)]
 pub struct PressureCurve {
     coefficients: Coefficients,
     report: PressureCurveReport,
     /// F(V) of the same frames.
     sums: MonotoneCalibration<f64>,
+}
+
+/// A curve as a file has it.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Unchecked {
+    coefficients: Coefficients,
+    report: PressureCurveReport,
+    sums: MonotoneCalibration<f64>,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for PressureCurve {
+    type Error = ForceError;
+
+    fn try_from(given: Unchecked) -> Result<Self, ForceError> {
+        Ok(Self {
+            coefficients: given.coefficients.checked()?,
+            report: given.report,
+            sums: given.sums,
+        })
+    }
 }
 
 impl PressureCurve {
