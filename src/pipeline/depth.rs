@@ -164,6 +164,7 @@ impl DarkContact {
             // Specks of noise are patches too: they are not counted.
             other_contacts: 0,
             converged: true,
+            profile_misfit: None,
         }
     }
 }

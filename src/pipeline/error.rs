@@ -59,6 +59,20 @@ pub enum PipelineError {
         /// What was given.
         found: f64,
     },
+    /// The standard error of an input is negative or not finite.
+    #[error("the standard error of an input must be finite and not negative, found {found}")]
+    InputError {
+        /// What was given.
+        found: f64,
+    },
+    /// The covariance of the waveguide's layers has another size than they have parameters.
+    #[error("the covariance of the layers must have {expected} rows and columns, three a layer, found {} × {}", found.0, found.1)]
+    LayerCovariance {
+        /// Parameters of all layers.
+        expected: usize,
+        /// Rows and columns.
+        found: (usize, usize),
+    },
     /// The smoothing has no middle pixel.
     #[error("the smoothing must be an odd number of pixels wide, found {found}")]
     EvenSmoothing {

@@ -67,6 +67,13 @@ pub enum Flag {
         /// The frame.
         frame: usize,
     },
+    /// The profile of the contact's pressure is not that of a ball: the contact radius is that of the best ball.
+    NotABall {
+        /// The frame.
+        frame: usize,
+        /// Misfit as a share of the peak.
+        misfit: f64,
+    },
     /// The calibration and the gauge disagree by more than three standard errors and two per cent.
     GaugeDisagrees {
         /// The frame.
@@ -108,7 +115,10 @@ impl ContactReading {
         let others = self.other_contacts;
         let several = (others > 0).then_some(Flag::SeveralContacts { frame, others });
         let fit = (!self.converged).then_some(Flag::ProfileNotConverged { frame });
-        [saturated, outside, edge, several, fit]
+        let shape = self
+            .profile_misfit
+            .map(|misfit| Flag::NotABall { frame, misfit });
+        [saturated, outside, edge, several, fit, shape]
             .into_iter()
             .flatten()
     }
@@ -161,6 +171,14 @@ impl fmt::Display for Flag {
             }
             Self::ProfileNotConverged { frame } => {
                 write!(f, "frame {}: the profile's fit did not converge", frame + 1)
+            }
+            Self::NotABall { frame, misfit } => {
+                write!(
+                    f,
+                    "frame {}: the pressure is not that of a ball, by {:.1} % of its peak",
+                    frame + 1,
+                    100.0 * misfit
+                )
             }
             Self::GaugeDisagrees {
                 frame,

@@ -1,6 +1,8 @@
 //! What each load says, and the errors that all loads share.
 use super::contact::ContactReading;
 use super::error::PipelineError;
+use super::guide_error;
+use super::object::Object;
 use super::settings::Settings;
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 
@@ -75,9 +77,36 @@ pub(super) fn series(
     let shared = SharedErrors {
         force_scale: common.hypot(settings.force_scale_error),
         length_scale: settings.length_scale_error,
-        ..SharedErrors::default()
+        size: relative_size_error(settings),
+        poisson_ratio: settings.poisson_ratio_error,
+        other_body: guide_error_at(readings.clone(), settings),
     };
     LoadSeries::new(readings.map(load).collect::<Vec<_>>())
         .with_shared_errors(shared)
         .map_err(PipelineError::Modulus)
+}
+
+/// Relative error of the object's size.
+fn relative_size_error(settings: &Settings) -> f64 {
+    let radius = match settings.object {
+        Object::Sphere { radius_m, .. } | Object::FlatPunch { radius_m, .. } => radius_m,
+        Object::Layer {
+            indenter_radius_m, ..
+        } => indenter_radius_m,
+        Object::Cone { .. } | Object::Unknown { .. } => return 0.0,
+    };
+    settings.object_radius_error_m / radius
+}
+
+/// Relative error of the guide's compliance under contacts of the mean radius.
+fn guide_error_at(readings: impl Iterator<Item = LoadReading>, settings: &Settings) -> f64 {
+    let (Some(guide), Some(covariance)) = (&settings.waveguide, &settings.layer_covariance) else {
+        return 0.0;
+    };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for reading in readings {
+        sum += reading.radius_m.value;
+        count += 1.0;
+    }
+    guide_error::relative_error(guide.layers(), covariance, sum / count).unwrap_or(0.0)
 }

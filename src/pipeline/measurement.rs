@@ -1,5 +1,6 @@
 //! All results of a press as plain data: for people ([`Display`](std::fmt::Display)) and programs (feature `serde`).
 use super::error::PipelineError;
+use super::error_budget::ErrorShare;
 use super::flag::Flag;
 use super::report::Report;
 use crate::elasticity::modulus::{EstimatorKind, ModulusEstimate, Warning};
@@ -180,6 +181,8 @@ pub struct Measurement {
     /// Young's modulus by the pipeline's estimator.
     #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
     pub youngs_modulus_pa: Result<ModulusResult, PipelineError>,
+    /// Which inputs the modulus' error comes from, the largest first; empty without a modulus.
+    pub error_budget: Vec<ErrorShare>,
     /// By every estimator that the frames allow, the paper's ratio first.
     pub estimators: Vec<ModulusResult>,
     /// What every frame says.

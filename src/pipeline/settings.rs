@@ -2,6 +2,7 @@
 use super::binning::Binning;
 use super::object::Object;
 use crate::elasticity::contact::Waveguide;
+use nalgebra::DMatrix;
 
 /// Control points on each surface where nothing else is asked for: the paper's number.
 pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
@@ -102,6 +103,12 @@ pub struct Settings {
     pub force_scale_error: f64,
     /// Relative error common to all lengths: that of the pixel size.
     pub length_scale_error: f64,
+    /// Standard error of the object's radius in metres.
+    pub object_radius_error_m: f64,
+    /// Standard error of the object's Poisson ratio.
+    pub poisson_ratio_error: f64,
+    /// Covariance of ln E of all layers of the waveguide, then of ln h, then of ν; `None`: the layers are exact.
+    pub layer_covariance: Option<DMatrix<f64>>,
     /// What may be left out.
     pub skips: Skips,
 }
@@ -119,6 +126,9 @@ impl Settings {
             flat_field: false,
             force_scale_error: 1e-3,
             length_scale_error: 0.0,
+            object_radius_error_m: 0.0,
+            poisson_ratio_error: 0.0,
+            layer_covariance: None,
             skips: Skips::default(),
         }
     }

@@ -3,7 +3,7 @@ use super::binning;
 use super::composition::Pipeline;
 use super::contact::FrameContact;
 use super::settings::{Settings, SurfaceInput};
-use crate::force::{BoundingBox, Polarity};
+use crate::force::{BoundingBox, LensGeometry, LocalCalibration, Polarity};
 use crate::sfs::{Domain, Frame, SfsError, Surface, Workspace};
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2, Axis};
@@ -81,17 +81,22 @@ impl Default for SurfaceWorkspace {
 }
 
 impl SurfaceWorkspace {
-    /// The signal and the mask on the grid; returns the grid's box.
+    /// The signal and the mask on the grid; returns the grid's box. With a curve the signal is the pressure over its peak.
     fn load(
         &mut self,
         settings: &Settings,
         images: [ArrayView2<'_, u8>; 2],
         contact: &FrameContact,
         (region, scale, side): (BoundingBox, f64, usize),
+        pressure: Option<(&dyn LocalCalibration, f64)>,
     ) -> BoundingBox {
         let [frame, reference] = images;
         let whole = binning::whole_blocks(region, side, frame.dim());
         binning::mean_difference(frame, reference, whole, side, scale, &mut self.signal);
+        if let Some((curve, peak_pa)) = pressure {
+            self.signal
+                .mapv_inplace(|grey| curve.value_pa(grey) / peak_pa);
+        }
         binning::block_mask(contact.mask.view(), region, whole, side, &mut self.mask);
         if side == 1 && settings.surface_input == SurfaceInput::Shading {
             binning::trim_rim(&mut self.mask, &self.signal);
@@ -131,17 +136,22 @@ pub(super) fn reconstruct(
         return Err(SfsError::EmptyMask);
     };
     let settings = pipeline.settings();
-    let scale = match settings.surface_input {
-        SurfaceInput::Shading => 1.0 / reading.peak_grey,
-        SurfaceInput::Signal => 1.0,
+    let curve = pipeline
+        .contact()
+        .pressure_curve()
+        .filter(|_| settings.surface_input == SurfaceInput::Shading);
+    let scale = match (settings.surface_input, curve) {
+        (SurfaceInput::Shading, None) => 1.0 / reading.peak_grey,
+        (SurfaceInput::Shading, Some(_)) | (SurfaceInput::Signal, _) => 1.0,
     };
+    let peak = curve.map(|curve| (curve, curve.value_pa(reading.peak_grey)));
     let scale = if pipeline.contact().polarity() == Polarity::Darker {
         -scale
     } else {
         scale
     };
     let side = settings.binning.side(pixels, settings.control_points);
-    let region = workspace.load(settings, images, contact, (region, scale, side));
+    let region = workspace.load(settings, images, contact, (region, scale, side), peak);
     let pixel_size_m = pipeline
         .contact()
         .pixel_size_m()
@@ -189,11 +199,24 @@ pub(super) fn sample(
     for p in &mut points {
         p.x += x;
         p.y += y;
+        if let Some(lens) = pipeline.contact().lens() {
+            *p = undistorted(lens, *p);
+        }
     }
     Ok(ControlPoints {
         points,
         grid_m: size[0].max(size[1]),
     })
+}
+
+/// A point of a surface that was made as if all pixels were of the size at the centre of distortion. Its height grows as the pixels
+/// around it do.
+fn undistorted(lens: &LensGeometry, p: Point3<f64>) -> Point3<f64> {
+    let [hx, hy] = lens.pixel_size_m();
+    let pixel = [p.x / hx, p.y / hy];
+    let [x, y] = lens.to_metres(pixel);
+    let growth = (lens.pixel_area_m2(pixel) / (hx * hy)).sqrt();
+    Point3::new(x, y, p.z * growth)
 }
 
 /// How far a pixel is to be smoothed: not at all on slopes above 60°, where smoothing would round off the rim and noise does

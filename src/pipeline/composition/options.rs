@@ -3,8 +3,10 @@ use super::Pipeline;
 use crate::elasticity::contact::Waveguide;
 use crate::pipeline::binning::Binning;
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::guide_error::LAYER_PARAMETERS;
 use crate::pipeline::object::Object;
 use crate::pipeline::settings::Skips;
+use nalgebra::DMatrix;
 
 impl Pipeline {
     /// Sets the sensor's layers: the waveguide yields beside the object. Without, it is rigid.
@@ -35,6 +37,7 @@ impl Pipeline {
     #[must_use]
     pub fn with_waveguide(mut self, waveguide: Waveguide<f64>) -> Self {
         self.settings.waveguide = Some(waveguide);
+        self.settings.layer_covariance = None;
         self.estimator.renew();
         self
     }
@@ -176,6 +179,85 @@ impl Pipeline {
         }
         self.settings.force_scale_error = force;
         self.settings.length_scale_error = length;
+        Ok(self)
+    }
+
+    /// Says how well the object is known: standard errors of its radius in metres and of its Poisson ratio (default: exact).
+    ///
+    /// ```
+    /// use tactile_imaging::{Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let press = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// # let (reference, frame) = (press(0.0), press(120.0));
+    /// let exact = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let known_to_3_percent = exact.clone().with_object_errors(0.09e-3, 0.0)?;
+    /// let relative_error = |pipeline: &Pipeline| {
+    ///     let mut press = pipeline.press(reference.view())?;
+    ///     press.add_frame(frame.view());
+    ///     let modulus = press.modulus()?;
+    ///     Ok::<_, tactile_imaging::pipeline::PipelineError>(modulus.standard_error_pa / modulus.youngs_modulus_pa)
+    /// };
+    /// // E is proportional to the radius.
+    /// assert!((relative_error(&known_to_3_percent)?.powi(2) - relative_error(&exact)?.powi(2) - 9e-4).abs() < 1e-6);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::InputError`] for a negative or not finite one.
+    pub fn with_object_errors(
+        mut self,
+        radius_error_m: f64,
+        poisson_ratio_error: f64,
+    ) -> Result<Self, PipelineError> {
+        for found in [radius_error_m, poisson_ratio_error] {
+            if !(found >= 0.0 && found.is_finite()) {
+                return Err(PipelineError::InputError { found });
+            }
+        }
+        self.settings.object_radius_error_m = radius_error_m;
+        self.settings.poisson_ratio_error = poisson_ratio_error;
+        Ok(self)
+    }
+
+    /// Says how well the waveguide's layers are known: the covariance of ln E of all layers, then of ln h, then of ν (default: exact).
+    ///
+    /// ```
+    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+    /// use nalgebra::DMatrix;
+    /// // Three layers, their moduli known to 5 % each.
+    /// let covariance = DMatrix::from_fn(9, 9, |i, j| if i == j && i < 3 { 0.05 * 0.05 } else { 0.0 });
+    /// let (exact, pipeline) = (trial.pipeline()?, trial.pipeline()?.with_layer_covariance(covariance)?);
+    /// let error = |pipeline| trial.press(pipeline)?.modulus().map(|m| m.standard_error_pa);
+    /// assert!(error(&pipeline)? > error(&exact)?);
+    /// assert!(exact.with_layer_covariance(DMatrix::zeros(2, 2)).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::LayerCovariance`] unless it has three rows and columns for each layer of the waveguide, and
+    /// [`PipelineError::InputError`] for an entry that is not finite or a negative variance.
+    pub fn with_layer_covariance(
+        mut self,
+        covariance: DMatrix<f64>,
+    ) -> Result<Self, PipelineError> {
+        let layers = self.settings.waveguide.as_ref();
+        let expected = LAYER_PARAMETERS * layers.map_or(0, |guide| guide.layers().len());
+        let found = covariance.shape();
+        if found != (expected, expected) {
+            return Err(PipelineError::LayerCovariance { expected, found });
+        }
+        let broken = |c: &&f64| !c.is_finite();
+        let negative = covariance.diagonal().iter().copied().find(|v| *v < 0.0);
+        if let Some(found) = covariance.iter().find(broken).copied().or(negative) {
+            return Err(PipelineError::InputError { found });
+        }
+        self.settings.layer_covariance = Some(covariance);
         Ok(self)
     }
 

@@ -2,7 +2,8 @@
 use super::{ContactReading, ContactStage, FrameContact, resize};
 use crate::force::{
     CalibrationOptions, CalibrationPair, Estimate, ForceError, ForceMeter, ForceOptions,
-    ForceWorkspace, LinearCalibration, Polarity, ReferenceFrame, StressCalibration,
+    ForceWorkspace, LensGeometry, LinearCalibration, LocalCalibration, Polarity, ReferenceFrame,
+    StressCalibration,
 };
 use crate::pipeline::error::PipelineError;
 use ndarray::ArrayView2;
@@ -43,6 +44,7 @@ pub struct LightContact {
     force_from: ForceFrom,
     pixel_size_m: [f64; 2],
     polarity: Polarity,
+    lens: Option<LensGeometry>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -81,7 +83,27 @@ impl LightContact {
             force_from: ForceFrom::Calibration,
             pixel_size_m,
             polarity: options.polarity(),
+            lens: None,
         })
+    }
+
+    /// Behind a lens that distorts: contours and coordinates are undistorted, areas are those that the pixels cover.
+    ///
+    /// ```
+    /// use tactile_imaging::force::LensGeometry;
+    /// use tactile_imaging::pipeline::{ContactStage, LightContact};
+    /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
+    /// let contact = LightContact::gauged([21e-6; 2], &Default::default())?.with_lens(lens);
+    /// assert_eq!(contact.pixel_size_m(), [21.6e-6, 22e-6]);
+    /// assert_eq!(contact.lens(), Some(&lens));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_lens(mut self, lens: LensGeometry) -> Self {
+        self.meter = self.meter.with_lens(lens);
+        self.pixel_size_m = lens.pixel_size_m();
+        self.lens = Some(lens);
+        self
     }
 
     /// Without a calibration: the contact from the light, its force from the gauge
@@ -143,5 +165,13 @@ impl ContactStage for LightContact {
 
     fn pixel_size_m(&self) -> [f64; 2] {
         self.pixel_size_m
+    }
+
+    fn lens(&self) -> Option<&LensGeometry> {
+        self.lens.as_ref()
+    }
+
+    fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
+        self.calibration.local()
     }
 }

@@ -5,7 +5,9 @@ mod reading;
 pub use light::LightContact;
 pub use reading::{ContactReading, FrameContact};
 
-use crate::force::{Estimate, ForceError, ForceWorkspace, Polarity, ReferenceFrame};
+use crate::force::{
+    Estimate, ForceError, ForceWorkspace, LensGeometry, LocalCalibration, Polarity, ReferenceFrame,
+};
 use ndarray::{Array2, ArrayView2};
 use std::sync::Arc;
 
@@ -61,8 +63,18 @@ pub trait ContactStage: Send + Sync {
     /// Whether contact makes the frame brighter or darker.
     fn polarity(&self) -> Polarity;
 
-    /// The size of a pixel in metres, x and y.
+    /// The size of a pixel in metres, x and y; that at the centre of distortion where there is a [`lens`](Self::lens).
     fn pixel_size_m(&self) -> [f64; 2];
+
+    /// The lens that distorts, if there is one: control points are undistorted by it.
+    fn lens(&self) -> Option<&LensGeometry> {
+        None
+    }
+
+    /// The local curve from grey level to pressure, if there is one: shading is taken from pressures instead of light.
+    fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
+        None
+    }
 }
 
 /// A stage behind a pointer is one.
@@ -86,6 +98,14 @@ macro_rules! forward {
 
             fn pixel_size_m(&self) -> [f64; 2] {
                 (**self).pixel_size_m()
+            }
+
+            fn lens(&self) -> Option<&LensGeometry> {
+                (**self).lens()
+            }
+
+            fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
+                (**self).pressure_curve()
             }
         }
     };

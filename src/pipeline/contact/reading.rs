@@ -1,5 +1,5 @@
 //! What a frame says of its contact, and where in the frame the contact is.
-use crate::force::{BoundingBox, Estimate, ForceMeasurement, StopReason};
+use crate::force::{BoundingBox, Estimate, ForceMeasurement, ProfileShape, StopReason};
 use ndarray::Array2;
 
 /// What a frame says of its contact.
@@ -53,6 +53,8 @@ pub struct ContactReading {
     pub other_contacts: usize,
     /// Whether the fit of the contact's profile converged (no fit counts as converged).
     pub converged: bool,
+    /// Misfit of the pressure's profile as a share of its peak, where it is not that of a ball's contact.
+    pub profile_misfit: Option<f64>,
 }
 
 impl ContactReading {
@@ -94,6 +96,10 @@ impl ContactReading {
             converged: force
                 .profile
                 .is_none_or(|p| p.stop == StopReason::Converged),
+            profile_misfit: force
+                .profile
+                .filter(|p| p.shape == ProfileShape::NotHertz)
+                .map(|p| p.radial_misfit.hypot(p.azimuthal_misfit)),
         })
     }
 }

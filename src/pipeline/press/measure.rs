@@ -6,6 +6,7 @@ use crate::pipeline::flag::Flag;
 use crate::pipeline::measurement::{
     FrameResult, MatchResult, Measurement, ModulusResult, StrainResult,
 };
+use crate::pipeline::object::Object;
 use nalgebra::Matrix3;
 
 impl Press<'_> {
@@ -37,8 +38,13 @@ impl Press<'_> {
             let warnings = modulus.warnings.iter().copied();
             flags.extend(warnings.map(|warning| Flag::Assumption { warning }));
         }
+        let error_budget = match youngs_modulus_pa {
+            Ok(_) => self.error_budget().unwrap_or_default(),
+            Err(_) => Vec::new(),
+        };
         Measurement {
             youngs_modulus_pa,
+            error_budget,
             estimators: estimates.iter().map(ModulusResult::from).collect(),
             frames,
             strain,
@@ -55,7 +61,13 @@ impl Press<'_> {
     ) -> Result<FrameResult, PipelineError> {
         let reading = self.reading(frame)?;
         let gauge_force_n = self.gauge(frame).map(|gauge| gauge.value);
-        flags.extend(reading.flags(frame));
+        // What is said to be no ball need not look like one.
+        let ball = matches!(
+            self.pipeline().settings().object,
+            Object::Sphere { .. } | Object::Layer { .. }
+        );
+        let cautions = reading.flags(frame);
+        flags.extend(cautions.filter(|flag| ball || !matches!(flag, Flag::NotABall { .. })));
         if let (Some(gauge_n), Some(force_n)) = (gauge_force_n, reading.force_n) {
             let apart = (gauge_n - force_n.value).abs();
             if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {

@@ -2,6 +2,7 @@
 use super::Press;
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::error_budget::{self, ErrorShare};
 use crate::pipeline::estimators::that_fit;
 use crate::pipeline::load_reading::LoadReading;
 
@@ -37,6 +38,16 @@ impl Press<'_> {
     /// [`PipelineError::NoForce`], and those of the contacts and of [`strain`](Self::strain).
     pub fn load_series(&mut self) -> Result<LoadSeries<f64>, PipelineError> {
         self.loads(true)
+    }
+
+    /// What each input's error has in the standard error of [`modulus`](Self::modulus), the largest first.
+    ///
+    /// # Errors
+    /// Those of [`modulus`](Self::modulus).
+    pub fn error_budget(&mut self) -> Result<Vec<ErrorShare>, PipelineError> {
+        let estimator = self.pipeline().estimator()?;
+        let loads = self.loads(estimator.needs_strain())?;
+        Ok(error_budget::of(&estimator, &loads))
     }
 
     /// Young's modulus by every estimator that the frames allow, the paper's ratio first.

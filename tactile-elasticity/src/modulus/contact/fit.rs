@@ -41,6 +41,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
                         load,
                         force,
                         length,
+                        contact_radius: (quantity == Quantity::ContactRadius)
+                            .then_some(length.value),
                         log_force,
                         log_modulus,
                         model_error,
@@ -122,16 +124,23 @@ impl<L: ContactLaw> ContactEstimator<L> {
 
     /// Standard error of ln E*: that of the mean, and what the errors of the other body's compliance C and of ν add to it.
     ///
-    /// ln E = ln(1 − ν²) + ln E* − ln(1 − C E*), so that an error of ln C counts C E* times, one of ν
-    /// (1 − C E*)·2ν/(1 − ν²) times as one of ln E* does.
-    fn standard_error(&self, series: &LoadSeries<f64>, mean: &CommonMean) -> f64 {
+    /// With p the sample's part of the compliance, 1 − C E* on a deep body, ln E moves by 1/p of ln F, by 1 − 1/p of ln C and by
+    /// 2ν/(1 − ν²) of ν: beside ln E* an error of ln C counts 1 − p times, one of ν p·2ν/(1 − ν²) times.
+    fn standard_error(&self, series: &LoadSeries<f64>, mean: &CommonMean, sample_part: f64) -> f64 {
         let shared = series.shared_errors();
-        let share = (self.other_compliance_per_pa * mean.mean.exp()).min(1.0);
         let nu_slope = 2.0 * self.poisson_ratio / (1.0 - self.poisson_ratio.powi(2));
-        let of_other_body = share * shared.other_body;
-        let of_poisson_ratio = (1.0 - share) * nu_slope * shared.poisson_ratio;
+        let of_other_body = (1.0 - sample_part) * shared.other_body;
+        let of_poisson_ratio = sample_part * nu_slope * shared.poisson_ratio;
         mean.standard_error
             .hypot(of_other_body.hypot(of_poisson_ratio))
+    }
+
+    /// The sample's part of the compliance under the mean of the contacts.
+    fn sample_part(&self, all: &[Observation], share: f64) -> f64 {
+        let radii = || all.iter().filter_map(|o| o.contact_radius);
+        let count = radii().count() as f64;
+        let mean = (count > 0.0).then(|| radii().sum::<f64>() / count);
+        self.law.sample_part(mean, share)
     }
 
     /// The mean at a given share of the other body.
@@ -164,7 +173,8 @@ impl<L: ContactLaw> ContactEstimator<L> {
             let steps = if reach == 0.0 {
                 0.0
             } else {
-                reach * quantile_95(mean.degrees) * self.standard_error(series, &mean)
+                let part = self.sample_part(&observations, share);
+                reach * quantile_95(mean.degrees) * self.standard_error(series, &mean, part)
             };
             let log_reduced = mean.mean + steps;
             let next = share_at(log_reduced);
@@ -205,8 +215,9 @@ impl<L: ContactLaw> ContactEstimator<L> {
             return Err(ElasticityError::StifferThanResolvable { lower_bound_pa });
         };
         let upper = if known { limit(1.0) } else { None };
-        let left = 1.0 - self.other_compliance_per_pa * centre.log_reduced.exp();
-        let error = modulus / left * self.standard_error(series, &centre.mean);
+        let share = (self.other_compliance_per_pa * centre.log_reduced.exp()).clamp(0.0, 1.0);
+        let part = self.sample_part(&centre.observations, share);
+        let error = modulus / part * self.standard_error(series, &centre.mean, part);
         Ok((
             modulus,
             error,
@@ -315,6 +326,8 @@ struct Observation {
     load: usize,
     force: Estimate<f64>,
     length: Estimate<f64>,
+    /// The length, where it is a contact radius.
+    contact_radius: Option<f64>,
     log_force: LogForce,
     log_modulus: f64,
     /// Standard error of ln F that is the law's.

@@ -66,6 +66,11 @@ pub trait ContactLaw {
         0.0
     }
 
+    /// The sample's part of the compliance of a contact of radius a: what the other body's depth leaves of 1 − share.
+    fn sample_part(&self, _contact_radius: Option<f64>, share: f64) -> f64 {
+        1.0 - share
+    }
+
     /// Standard error of ln F that is the law's own, the same at every load of one size.
     fn model_error(&self, _contact_radius: Option<f64>, _indentation: Option<f64>) -> f64 {
         0.0
@@ -107,6 +112,10 @@ impl<L: ContactLaw + ?Sized> ContactLaw for Box<L> {
 
     fn first_share(&self) -> f64 {
         (**self).first_share()
+    }
+
+    fn sample_part(&self, contact_radius: Option<f64>, share: f64) -> f64 {
+        (**self).sample_part(contact_radius, share)
     }
 
     fn model_error(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> f64 {

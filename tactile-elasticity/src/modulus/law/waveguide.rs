@@ -174,6 +174,12 @@ impl ContactLaw for WaveguideLaw {
         if self.layers.is_some() { 0.5 } else { 0.0 }
     }
 
+    fn sample_part(&self, contact_radius: Option<f64>, share: f64) -> f64 {
+        contact_radius
+            .and_then(|a| self.contact(a, share))
+            .map_or(1.0 - share, |contact| contact.ball_part)
+    }
+
     fn model_error(&self, contact_radius: Option<f64>, indentation: Option<f64>) -> f64 {
         let Some(strain) = &self.finite_strain else {
             return 0.0;
