@@ -24,6 +24,8 @@ pub mod pipeline;
 pub mod plot;
 #[cfg(feature = "scene")]
 pub mod scene;
+#[cfg(feature = "scene")]
+pub mod sensor;
 #[cfg(feature = "simulate")]
 pub mod simulate;
 

@@ -34,7 +34,7 @@ mod error;
 mod error_budget;
 mod estimators;
 mod flag;
-mod guide_error;
+pub(crate) mod guide_error;
 mod load_reading;
 mod measurement;
 mod object;

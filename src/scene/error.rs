@@ -50,6 +50,16 @@ pub enum SceneError {
         /// What is there.
         found: String,
     },
+    /// A field has a value that cannot be used.
+    #[error("{}: field `{field}`: {message}", file.display())]
+    Value {
+        /// The file.
+        file: PathBuf,
+        /// The field, with its path inside the file.
+        field: String,
+        /// What is wrong with it, and what was expected.
+        message: String,
+    },
     /// A field that no scene has: most likely a misspelling.
     #[error("{}: unknown field `{field}`, expected one of `{}`", file.display(), known.join("`, `"))]
     Unknown {

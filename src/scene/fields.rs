@@ -4,14 +4,14 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// A table inside the scene file.
-pub(super) struct Fields<'a> {
+pub(crate) struct Fields<'a> {
     file: &'a Path,
     prefix: String,
     table: &'a Table,
 }
 
 impl<'a> Fields<'a> {
-    pub(super) fn new(file: &'a Path, table: &'a Table) -> Self {
+    pub(crate) fn new(file: &'a Path, table: &'a Table) -> Self {
         Self {
             file,
             prefix: String::new(),
@@ -20,7 +20,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The field's name with its path: `waveguide.layers[2].thickness_m`.
-    pub(super) fn path(&self, name: &str) -> String {
+    pub(crate) fn path(&self, name: &str) -> String {
         if self.prefix.is_empty() {
             name.into()
         } else {
@@ -29,7 +29,7 @@ impl<'a> Fields<'a> {
     }
 
     /// Refuses fields that are not in `known`.
-    pub(super) fn only(&self, known: &[&'static str]) -> Result<(), SceneError> {
+    pub(crate) fn only(&self, known: &[&'static str]) -> Result<(), SceneError> {
         match self.table.keys().find(|key| !known.contains(&key.as_str())) {
             None => Ok(()),
             Some(key) => Err(SceneError::Unknown {
@@ -40,11 +40,11 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.table.contains_key(name)
     }
 
-    pub(super) fn missing(&self, name: &str, expected: &'static str) -> SceneError {
+    pub(crate) fn missing(&self, name: &str, expected: &'static str) -> SceneError {
         SceneError::Missing {
             file: self.file.into(),
             field: self.path(name),
@@ -52,7 +52,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(super) fn wrong(&self, name: &str, expected: &'static str, found: &Value) -> SceneError {
+    pub(crate) fn wrong(&self, name: &str, expected: &'static str, found: &Value) -> SceneError {
         let found = match found {
             Value::String(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => {
                 found.to_string()
@@ -75,7 +75,7 @@ impl<'a> Fields<'a> {
             .ok_or_else(|| self.missing(name, expected))
     }
 
-    pub(super) fn string(&self, name: &str, expected: &'static str) -> Result<&'a str, SceneError> {
+    pub(crate) fn string(&self, name: &str, expected: &'static str) -> Result<&'a str, SceneError> {
         let value = self.value(name, expected)?;
         value
             .as_str()
@@ -84,7 +84,7 @@ impl<'a> Fields<'a> {
     }
 
     /// A number for which `accept` holds.
-    pub(super) fn number(
+    pub(crate) fn number(
         &self,
         name: &str,
         expected: &'static str,
@@ -96,7 +96,7 @@ impl<'a> Fields<'a> {
             .ok_or_else(|| self.wrong(name, expected, value))
     }
 
-    pub(super) fn optional_number(
+    pub(crate) fn optional_number(
         &self,
         name: &str,
         expected: &'static str,
@@ -109,8 +109,33 @@ impl<'a> Fields<'a> {
         }
     }
 
+    pub(crate) fn optional_flag(&self, name: &str) -> Result<Option<bool>, SceneError> {
+        const EXPECTED: &str = "true or false";
+        if !self.has(name) {
+            return Ok(None);
+        }
+        let value = self.value(name, EXPECTED)?;
+        let flag = value
+            .as_bool()
+            .ok_or_else(|| self.wrong(name, EXPECTED, value))?;
+        Ok(Some(flag))
+    }
+
+    /// At least one text.
+    pub(crate) fn strings(
+        &self,
+        name: &str,
+        expected: &'static str,
+    ) -> Result<Vec<&'a str>, SceneError> {
+        let value = self.value(name, expected)?;
+        let texts = value.as_array().filter(|a| !a.is_empty());
+        texts
+            .and_then(|a| a.iter().map(Value::as_str).collect())
+            .ok_or_else(|| self.wrong(name, expected, value))
+    }
+
     /// Two positive numbers.
-    pub(super) fn positive_pair(
+    pub(crate) fn positive_pair(
         &self,
         name: &str,
         expected: &'static str,
@@ -125,7 +150,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub(super) fn table(&self, name: &str, expected: &'static str) -> Result<Self, SceneError> {
+    pub(crate) fn table(&self, name: &str, expected: &'static str) -> Result<Self, SceneError> {
         let value = self.value(name, expected)?;
         let table = value
             .as_table()
@@ -138,7 +163,7 @@ impl<'a> Fields<'a> {
     }
 
     /// At least one table in an array.
-    pub(super) fn tables(
+    pub(crate) fn tables(
         &self,
         name: &str,
         expected: &'static str,
@@ -164,12 +189,12 @@ impl<'a> Fields<'a> {
 }
 
 /// Greater than zero and finite.
-pub(super) fn positive(v: f64) -> bool {
+pub(crate) fn positive(v: f64) -> bool {
     v > 0.0 && v.is_finite()
 }
 
 /// A Poisson ratio at which an isotropic solid is stable.
-pub(super) fn poisson(v: f64) -> bool {
+pub(crate) fn poisson(v: f64) -> bool {
     v > -1.0 && v <= 0.5
 }
 

@@ -48,7 +48,7 @@
 //! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`io::image`](crate::io::image)).
 //! Relative paths are relative to the scene file. Fields counted in errors (`frames[2]`) start at 1.
 mod error;
-mod fields;
+pub(crate) mod fields;
 mod load;
 mod measure;
 mod stages;
@@ -143,7 +143,8 @@ pub struct SceneFrame {
 /// assert_eq!((layers[1].thickness_m, layers[1].poisson_ratio), (3e-3, 0.5), "incompressible if not said");
 /// # Ok::<(), tactile_imaging::scene::SceneError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SceneLayer {
     /// Refractive index.
     pub refractive_index: f64,
@@ -234,15 +235,7 @@ impl Scene {
     /// As [`read`](Self::read).
     pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
         let file = file.as_ref();
-        let table: toml::Table = text
-            .parse()
-            .map_err(|e: toml::de::Error| SceneError::Syntax {
-                file: file.into(),
-                line: e.span().map_or(1, |s| {
-                    1 + text[..s.start.min(text.len())].matches('\n').count()
-                }),
-                message: e.message().lines().next().unwrap_or("not TOML").into(),
-            })?;
+        let table = parse_table(text, file)?;
         let fields = Fields::new(file, &table);
         fields.only(&tables::FIELDS)?;
         let folder = file.parent().unwrap_or(Path::new(""));
@@ -265,4 +258,16 @@ impl Scene {
             stages: stages::read(&fields)?,
         })
     }
+}
+
+/// The text of a file as TOML.
+pub(crate) fn parse_table(text: &str, file: &Path) -> Result<toml::Table, SceneError> {
+    text.parse()
+        .map_err(|e: toml::de::Error| SceneError::Syntax {
+            file: file.into(),
+            line: e.span().map_or(1, |s| {
+                1 + text[..s.start.min(text.len())].matches('\n').count()
+            }),
+            message: e.message().lines().next().unwrap_or("not TOML").into(),
+        })
 }

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, Poisson, StandardNormal};
 
 use super::error::{SimulateError, at_least, not_negative, positive, within};
 use super::light::Illumination;
-use super::pixel_average::Patch;
+use super::pixel_average::{Patch, Plane};
 use super::random::{Purpose, row_stream};
 
 /// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 = 0.06).
@@ -44,6 +44,9 @@ pub struct Camera {
     pub pixel_size_m: [f64; 2],
     /// Stray light without contact, in grey levels.
     pub background_grey: f64,
+    /// Barrel distortion about the frame's middle: the share by which the corners appear too close to it. A place at the distance
+    /// d from the middle is seen at the distance e with d = e (1 + barrel (e/e_corner)²); below 0 a pincushion.
+    pub barrel: f64,
     /// Share of the light lost in the frame's corners; it grows with the squared distance from the middle.
     pub vignetting: f64,
     /// Standard deviation of the Gaussian point-spread function in pixels; 0 for none.
@@ -62,6 +65,7 @@ impl Default for Camera {
             shape: [1042, 1392],
             pixel_size_m: [30e-3 / 1392.0; 2],
             background_grey: 15.0,
+            barrel: 0.0,
             vignetting: 0.03,
             blur_sigma_px: 0.8,
             full_well_electrons: 15e3,
@@ -98,6 +102,18 @@ impl Camera {
             (self.shape[1] as f64 - 1.0) / 2.0,
             (self.shape[0] as f64 - 1.0) / 2.0,
         ]
+    }
+
+    /// Lens and pixels, as the image plane of a contact.
+    pub(super) fn plane(&self) -> Plane {
+        let middle = self.middle_px();
+        let [width, height] = self.pixel_size_m;
+        let corner = (middle[0] * width).hypot(middle[1] * height);
+        Plane {
+            middle_px: middle,
+            pixel_size_m: self.pixel_size_m,
+            bend: self.barrel / (corner * corner).max(f64::MIN_POSITIVE),
+        }
     }
 
     /// The centre asked for, or the frame's middle.
@@ -226,6 +242,43 @@ impl Camera {
         frame
     }
 
+    /// An exposure of a target instead of the sensing surface: bright dots of a third of the pitch (in metres) in diameter on a
+    /// square grid, 180 grey levels above the background, through the same lens, blur, vignetting and noise.
+    ///
+    /// ```
+    /// use tactile_imaging::simulate::Camera;
+    /// let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+    /// let target = camera.dot_target(2e-3, 7);
+    /// let bright = target.iter().filter(|v| **v > 100).count() as f64 / target.len() as f64;
+    /// // π/4 of a ninth of the area.
+    /// assert!((bright - 0.0873).abs() < 0.01, "{bright}");
+    /// ```
+    pub fn dot_target(&self, pitch_m: f64, seed: u64) -> Array2<u8> {
+        const LIGHT_GREY: f64 = 180.0;
+        const STEPS: i32 = 4;
+        let plane = self.plane();
+        let lit = |pixel: [f64; 2]| {
+            // The middle of the frame lies between dots, as it would by chance.
+            let place = plane.to_metres(pixel).map(|p| p / pitch_m + 0.3);
+            let from_dot = place.map(|p| p - p.round());
+            f64::from(from_dot[0].hypot(from_dot[1]) < 1.0 / 6.0)
+        };
+        let [rows, cols] = self.shape;
+        let offset = |k: i32| (f64::from(k) + 0.5) / f64::from(STEPS) - 0.5;
+        let share = |(r, c): (usize, usize)| {
+            let parts = (0..STEPS * STEPS)
+                .map(|k| lit([c as f64 + offset(k % STEPS), r as f64 + offset(k / STEPS)]));
+            parts.sum::<f64>() / f64::from(STEPS * STEPS)
+        };
+        let mut patch = Patch {
+            origin: [0, 0],
+            values: Array2::from_shape_fn((rows, cols), |at| LIGHT_GREY * share(at)),
+        };
+        self.blur(&mut patch);
+        let light = self.compose(&[patch], &Illumination::default());
+        self.expose_for(Purpose::CalibrationFrames, light.view(), seed, 1 << 40)
+    }
+
     /// An exposure without contact; each `repeat` has its own noise.
     pub(super) fn expose_reference(&self, seed: u64, repeat: u32) -> Array2<u8> {
         let dark = self.compose(&[], &Illumination::default());
@@ -254,6 +307,8 @@ impl Camera {
         positive("pixel_size_m", self.pixel_size_m[0])?;
         positive("pixel_size_m", self.pixel_size_m[1])?;
         not_negative("background_grey", self.background_grey)?;
+        // Beyond, the image folds over in the corners.
+        within("barrel", self.barrel, -0.3, 0.3)?;
         within("vignetting", self.vignetting, 0.0, 1.0)?;
         within("blur_sigma_px", self.blur_sigma_px, 0.0, 1000.0)?;
         within(

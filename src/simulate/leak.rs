@@ -2,7 +2,7 @@
 
 use super::contact::Contact;
 use super::light::Response;
-use super::pixel_average::{Disc, Patch, Profile, Window};
+use super::pixel_average::{Disc, Patch, Plane, Profile, Window};
 
 /// From pressure to light in one scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +22,17 @@ impl LightLaw {
         }
         let share = pressure_pa / self.largest_pressure_pa;
         self.grey_per_pascal * self.largest_pressure_pa * self.response.light(share)
+    }
+
+    /// Unblurred light of a contact as a lens that distorts shows it.
+    pub(super) fn bent_patch(
+        &self,
+        contact: &Contact,
+        disc: &Disc,
+        plane: Plane,
+        window: Window,
+    ) -> Patch {
+        disc.average_bent(plane, window, |r_m| self.grey_at(contact.pressure_pa(r_m)))
     }
 
     /// Unblurred light of a contact over `window`, in grey levels above the background.

@@ -9,11 +9,14 @@
 //!
 //! inside; outside the disc, G is the quarter disc's integral less the two caps beyond x and beyond y.
 
+mod plane;
 mod radial;
 
 use std::f64::consts::PI;
 
 use ndarray::Array2;
+
+pub(super) use plane::Plane;
 
 /// Rows and columns of the image plane: the first and one past the last of each.
 pub(super) type Window = [[isize; 2]; 2];

@@ -131,23 +131,62 @@ impl PressScene {
             .compose(leaked.as_slice(), &self.options.loads[load].illumination)
     }
 
-    /// The same waveguide, camera, light and centre with another object, contact law and load.
+    /// The same sensor with another object under one load.
     pub(super) fn with_press(
         &self,
         object: Sphere,
         law: ContactLaw,
         load: Load,
     ) -> Result<Self, SimulateError> {
+        self.with_object(object, law, vec![load])
+    }
+
+    /// Another object on the same sensor, with the same light, camera and centre: a calibration's balls, for instance.
+    ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, ContactLaw, Elastic, Load, PressOptions, PressScene, Sphere};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+    /// let ball = Sphere { radius_m: 10e-3, material: Elastic::RIGID };
+    /// let other = scene.with_object(ball, ContactLaw::Hertz, vec![Load::normal(0.5)])?;
+    /// assert_eq!(other.grey_per_pascal(), scene.grey_per_pascal());
+    /// assert_eq!(other.truth(0).contact.sphere_radius_m, 10e-3);
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SimulateError`] for an object or loads without meaning.
+    pub fn with_object(
+        &self,
+        object: Sphere,
+        law: ContactLaw,
+        loads: Vec<Load>,
+    ) -> Result<Self, SimulateError> {
         let changed = Self::new(PressOptions {
             object,
             law,
-            loads: vec![load],
+            loads,
             ..self.options.clone()
         })?;
         Ok(Self {
             light: self.light,
             ..changed
         })
+    }
+
+    /// The same sensor, light and object with the contact centred elsewhere, in pixels (where it would be seen without distortion).
+    ///
+    /// ```
+    /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
+    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?.with_centre([40.0, 30.0]);
+    /// assert_eq!(scene.truth(0).centre_px, [40.0, 30.0]);
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
+    #[must_use]
+    pub fn with_centre(mut self, centre_px: [f64; 2]) -> Self {
+        self.options.centre_px = Some(centre_px);
+        self
     }
 
     /// From pressure to light.
@@ -182,8 +221,14 @@ impl PressScene {
         if disc.radius_m == 0.0 {
             return None;
         }
-        let window = disc.window(camera.shape, camera.blur_reach());
-        let mut patch = self.light.patch(&self.contacts[load], &disc, window);
+        let (plane, contact) = (camera.plane(), &self.contacts[load]);
+        let mut patch = if plane.is_flat() {
+            let window = disc.window(camera.shape, camera.blur_reach());
+            self.light.patch(contact, &disc, window)
+        } else {
+            let window = disc.bent_window(plane, camera.shape, camera.blur_reach());
+            self.light.bent_patch(contact, &disc, plane, window)
+        };
         camera.blur(&mut patch);
         Some(patch)
     }

@@ -15,6 +15,7 @@ mod recorded_answers;
 #[allow(unreachable_pub, dead_code)]
 mod robust_spline;
 mod scene_files;
+mod sensor_calibration;
 mod serialtrack_strain;
 mod session_allocations;
 mod simulator;

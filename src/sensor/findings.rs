@@ -1,0 +1,79 @@
+//! What a calibration found.
+use super::file::Sensor;
+use super::input::Indenter;
+use crate::force::{Branch, Estimate, LensFit};
+
+/// What one press was found to be.
+///
+/// ```
+/// use tactile_imaging::force::{Branch, Estimate};
+/// use tactile_imaging::sensor::{Indenter, PressFinding};
+/// let finding = PressFinding {
+///     indenter: Indenter::Punch { radius_m: 2e-3 },
+///     branch: Branch::Loading,
+///     force_n: 0.5,
+///     read_force_n: Some(0.503),
+///     contact_radius_m: Some(Estimate { value: 2.01e-3, standard_error: 2e-6 }),
+///     layers_force_n: None,
+/// };
+/// assert!(finding.read_force_n.is_some_and(|read| (read / finding.force_n - 1.0).abs() < 0.01));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PressFinding {
+    /// What was pressed.
+    pub indenter: Indenter,
+    /// Rising or falling force.
+    pub branch: Branch,
+    /// The gauge's force in newtons.
+    pub force_n: f64,
+    /// The force read from the frame with the fitted curve; `None` where no contact is seen, and the press was not used.
+    pub read_force_n: Option<f64>,
+    /// The fitted contact radius.
+    pub contact_radius_m: Option<Estimate<f64>>,
+    /// The force that the fitted layers have at that radius; `None` for presses that the layers were not fitted to.
+    pub layers_force_n: Option<f64>,
+}
+
+/// One parameter of a layer before and after the calibration.
+///
+/// ```
+/// use tactile_imaging::{force::Estimate, sensor::LayerFinding};
+/// let modulus = LayerFinding {
+///     layer: 0,
+///     parameter: "youngs_modulus_pa",
+///     stated: Estimate { value: 120e3, standard_error: 15e3 },
+///     fitted: Estimate { value: 135e3, standard_error: 3e3 },
+/// };
+/// assert!(modulus.is_identified());
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LayerFinding {
+    /// The layer, counted from the object's side from 0.
+    pub layer: usize,
+    /// The field of the sensor file.
+    pub parameter: &'static str,
+    /// What the user stated.
+    pub stated: Estimate<f64>,
+    /// What the presses and the statement say together.
+    pub fitted: Estimate<f64>,
+}
+
+impl LayerFinding {
+    /// Whether the presses told of it: its error fell below 0.7 times the stated one. What was not identified is the statement.
+    pub fn is_identified(&self) -> bool {
+        self.fitted.standard_error < 0.7 * self.stated.standard_error
+    }
+}
+
+/// A calibrated sensor and how it was found; made by [`SensorCalibration::run`](super::SensorCalibration::run).
+#[derive(Clone, Debug)]
+pub struct CalibratedSensor {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The lens as the target showed it; `None` without a target.
+    pub lens: Option<LensFit>,
+    /// Every press.
+    pub presses: Vec<PressFinding>,
+    /// Every parameter of the layers.
+    pub layers: Vec<LayerFinding>,
+}

@@ -1,0 +1,46 @@
+//! A sensor: its lens, light, layers and what is known of their errors, calibrated once and kept in one TOML file.
+//!
+//! ```toml
+//! date = "2026-11-22"
+//! temperature_c = 22.5                   # may be left out
+//! flat_field = true                      # frames are divided by the reference's own brightness
+//! gauge_error = 1e-3                     # relative standard error of the gauge that all forces were read from
+//!
+//! [geometry]
+//! frame_px = [1392, 1042]                # columns and rows
+//! covariance = [[…], …]                  # of the pixel's sizes in metres and of k₁, k₂
+//! target_error = 5e-4                    # relative standard error of the target's own size
+//! lens = { pixel_size_m = […], centre_px = […], radius_px = …, distortion = [k₁, k₂] }
+//!
+//! [noise]                                # of one pixel, in grey levels
+//! read_variance = 0.34
+//! gain = 0.017
+//!
+//! [[layers]]                             # from the object's side to the glass
+//! refractive_index = 1.41
+//! thickness_m = 2e-3
+//! youngs_modulus_pa = 1.36e5
+//! poisson_ratio = 0.5
+//!
+//! # layer_covariance = [[…], …]          # of ln E of all layers, then of ln h, then of ν
+//! # [curve]                              # the local light-to-pressure curve: written by the calibration
+//! # [shear]                              # springs K_x and K_y, where they are known
+//! ```
+//!
+//! [`SensorCalibration`] makes the file from presses of balls and punches of known radius; a scene names it with
+//! `sensor = "sensor.toml"`.
+mod calibration;
+mod error;
+mod file;
+mod findings;
+mod input;
+mod layers;
+mod target;
+mod toml_error;
+
+pub use calibration::{SensorCalibration, SensorPress};
+pub use error::SensorError;
+pub use file::{Sensor, SensorGeometry};
+pub use findings::{CalibratedSensor, LayerFinding, PressFinding};
+pub use input::{Indenter, LayerInput};
+pub use target::find_dots;

@@ -1,0 +1,181 @@
+//! The dots of a target: found in its frame, and given their places on the grid.
+use super::error::SensorError;
+use crate::force::DotPair;
+use ndarray::ArrayView2;
+
+/// Fewest dots on the grid.
+const FEWEST_DOTS: usize = 20;
+/// Least area of a dot in pixels: smaller blobs are noise.
+const LEAST_AREA: f64 = 9.0;
+/// How far from where the grid continues a dot may lie, as a share of the pitch: distortion bends the grid by less from dot to dot.
+const CAPTURE: f64 = 0.25;
+
+/// Finds the dots of a target, dark on bright or bright on dark, and pairs them with their places on a square grid.
+///
+/// The frame is cut at the mean of its two levels (Otsu's threshold); dots are its connected regions of the rarer level, those that
+/// touch the edge left out, and their centres weighted with the level. The grid is followed from dot to dot out of the middle, each
+/// next place from its neighbours', so that distortion does no harm. O(pixels).
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_imaging::sensor::find_dots;
+/// // Dots of 6 px, 20 px apart, dark on bright.
+/// let target = Array2::from_shape_fn((200, 300), |(r, c)| {
+///     let near = |v: usize| (v as f64 - 10.0).rem_euclid(20.0).min(20.0 - (v as f64 - 10.0).rem_euclid(20.0));
+///     if near(r).hypot(near(c)) < 6.0 { 40 } else { 200 }
+/// });
+/// let dots = find_dots(target.view(), 1e-3)?;
+/// assert_eq!(dots.len(), 10 * 15);
+/// let (first, second) = (dots[0], dots[1]);
+/// let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+/// assert!((apart(first.pixel, second.pixel) - 20.0).abs() < 1e-6);
+/// assert!((apart(first.target_m, second.target_m) - 1e-3).abs() < 1e-12);
+/// # Ok::<(), tactile_imaging::sensor::SensorError>(())
+/// ```
+///
+/// # Errors
+/// [`SensorError::Target`] for fewer than twenty dots on the grid.
+pub fn find_dots(frame: ArrayView2<'_, u8>, pitch_m: f64) -> Result<Vec<DotPair>, SensorError> {
+    let dots = centres(frame);
+    let placed = on_grid(&dots, frame.dim());
+    if placed.len() < FEWEST_DOTS {
+        return Err(SensorError::Target {
+            found: placed.len(),
+            expected: FEWEST_DOTS,
+        });
+    }
+    let pair = |(dot, place): &(usize, [i32; 2])| DotPair {
+        pixel: dots[*dot],
+        target_m: place.map(|k| f64::from(k) * pitch_m),
+    };
+    Ok(placed.iter().map(pair).collect())
+}
+
+/// Otsu's threshold: it parts the frame into two classes of the least variance.
+fn threshold(frame: ArrayView2<'_, u8>) -> f64 {
+    let mut histogram = [0.0; 256];
+    frame.iter().for_each(|v| histogram[usize::from(*v)] += 1.0);
+    let total: f64 = histogram.iter().sum();
+    let sum: f64 = histogram
+        .iter()
+        .enumerate()
+        .map(|(k, n)| k as f64 * n)
+        .sum();
+    let (mut below, mut sum_below, mut best) = (0.0, 0.0, (f64::NEG_INFINITY, 0.0, 0.0));
+    for (level, count) in histogram.iter().enumerate() {
+        below += count;
+        sum_below += level as f64 * count;
+        if below == 0.0 || below == total {
+            continue;
+        }
+        let [low, high] = [sum_below / below, (sum - sum_below) / (total - below)];
+        let between = below * (total - below) * (high - low).powi(2);
+        if between > best.0 {
+            best = (between, low, high);
+        }
+    }
+    0.5 * (best.1 + best.2)
+}
+
+/// Centres (x, y) of the connected regions of the rarer level.
+fn centres(frame: ArrayView2<'_, u8>) -> Vec<[f64; 2]> {
+    let cut = threshold(frame);
+    let above = frame.iter().filter(|v| f64::from(**v) > cut).count();
+    let sign = if 2 * above < frame.len() { 1.0 } else { -1.0 };
+    let (rows, columns) = frame.dim();
+    let weight = |r: usize, c: usize| sign * (f64::from(frame[[r, c]]) - cut);
+    let mut seen = vec![false; rows * columns];
+    let (mut stack, mut found) = (Vec::new(), Vec::new());
+    for start in 0..rows * columns {
+        if seen[start] || weight(start / columns, start % columns) <= 0.0 {
+            continue;
+        }
+        let (mut sums, mut area, mut inside) = ([0.0; 3], 0.0, true);
+        seen[start] = true;
+        stack.push(start);
+        while let Some(at) = stack.pop() {
+            let (r, c) = (at / columns, at % columns);
+            let w = weight(r, c);
+            sums[0] += w;
+            sums[1] += w * c as f64;
+            sums[2] += w * r as f64;
+            area += 1.0;
+            inside &= r > 0 && c > 0 && r + 1 < rows && c + 1 < columns;
+            let beside = [
+                (c > 0).then(|| at - 1),
+                (c + 1 < columns).then_some(at + 1),
+                (r > 0).then(|| at - columns),
+                (r + 1 < rows).then_some(at + columns),
+            ];
+            for next in beside.into_iter().flatten() {
+                if !seen[next] && weight(next / columns, next % columns) > 0.0 {
+                    seen[next] = true;
+                    stack.push(next);
+                }
+            }
+        }
+        if inside && area >= LEAST_AREA {
+            found.push([sums[1] / sums[0], sums[2] / sums[0]]);
+        }
+    }
+    found
+}
+
+/// Dots with their places on the grid, followed from the dot nearest to the frame's middle.
+fn on_grid(dots: &[[f64; 2]], (rows, columns): (usize, usize)) -> Vec<(usize, [i32; 2])> {
+    let middle = [0.5 * columns as f64, 0.5 * rows as f64];
+    let Some(first) = nearest(dots, middle, f64::INFINITY) else {
+        return Vec::new();
+    };
+    let Some(along) = first_step(dots, first) else {
+        return Vec::new();
+    };
+    // The other axis of a square grid; pixels are nearly square.
+    let steps = [along, [-along[1], along[0]]];
+    let mut placed = vec![(first, [0, 0], steps)];
+    let mut taken = vec![false; dots.len()];
+    taken[first] = true;
+    let mut next = 0;
+    while let Some(&(from, place, steps)) = placed.get(next) {
+        next += 1;
+        for (axis, sign) in [(0, 1), (0, -1), (1, 1), (1, -1)] {
+            let step = steps[axis].map(|s| s * f64::from(sign));
+            let expected = [dots[from][0] + step[0], dots[from][1] + step[1]];
+            let reach = CAPTURE * step[0].hypot(step[1]);
+            let Some(dot) = nearest(dots, expected, reach).filter(|dot| !taken[*dot]) else {
+                continue;
+            };
+            taken[dot] = true;
+            let mut there = place;
+            there[axis] += sign;
+            // The step that was made is the better guess for the next one.
+            let mut guess = steps;
+            guess[axis] = [
+                f64::from(sign) * (dots[dot][0] - dots[from][0]),
+                f64::from(sign) * (dots[dot][1] - dots[from][1]),
+            ];
+            placed.push((dot, there, guess));
+        }
+    }
+    placed
+        .into_iter()
+        .map(|(dot, place, _)| (dot, place))
+        .collect()
+}
+
+/// The step to the nearest neighbour of a dot.
+fn first_step(dots: &[[f64; 2]], from: usize) -> Option<[f64; 2]> {
+    let distance = |dot: &[f64; 2]| (dot[0] - dots[from][0]).hypot(dot[1] - dots[from][1]);
+    let others = dots.iter().enumerate().filter(|(k, _)| *k != from);
+    let (_, dot) = others.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+    Some([dot[0] - dots[from][0], dot[1] - dots[from][1]])
+}
+
+fn nearest(dots: &[[f64; 2]], place: [f64; 2], within: f64) -> Option<usize> {
+    let distance = |dot: &[f64; 2]| (dot[0] - place[0]).hypot(dot[1] - place[1]);
+    let (k, dot) = dots
+        .iter()
+        .enumerate()
+        .min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+    (distance(dot) <= within).then_some(k)
+}
