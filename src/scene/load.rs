@@ -4,6 +4,7 @@ use crate::force::CalibrationPair;
 use crate::io::{
     Column, Quantity, ReadError, read_grey_image, read_grey_image_of_bits, read_table,
 };
+use crate::sensor::Sensor;
 use ndarray::Array2;
 use std::path::Path;
 
@@ -15,6 +16,7 @@ use std::path::Path;
 /// let name = |calibration: &LoadedCalibration| match calibration {
 ///     LoadedCalibration::Pairs(pairs) => format!("{} readings, the last of {} N", pairs.len(), pairs[1].force_n),
 ///     LoadedCalibration::Gauge => "a gauge's forces".into(),
+///     LoadedCalibration::Sensor(sensor) => format!("of {}", sensor.date),
 ///     LoadedCalibration::DepthTable(rows) => format!("down to {} m", rows[1].1),
 /// };
 /// let pairs = [0.0, 1.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
@@ -29,6 +31,8 @@ pub enum LoadedCalibration {
     DepthTable(Vec<(f64, f64)>),
     /// None: the forces are a gauge's.
     Gauge,
+    /// A sensor with its curve, lens and layers.
+    Sensor(Box<Sensor>),
 }
 
 /// A scene's images and calibration.
@@ -107,6 +111,9 @@ impl Scene {
         };
         match &self.calibration {
             CalibrationSource::Gauge => Ok(LoadedCalibration::Gauge),
+            CalibrationSource::Sensor(path) => {
+                Ok(LoadedCalibration::Sensor(Box::new(Sensor::read(path)?)))
+            }
             CalibrationSource::Pairs(path) => {
                 let value = Column {
                     names: &["integrated_pixel_value"],

@@ -1,7 +1,7 @@
 //! A scene as a pipeline with its frames.
 use super::{LoadedCalibration, Scene, SceneData, SceneError};
 use crate::elasticity::contact::{Layer, Waveguide};
-use crate::force::{Estimate, ForceOptions};
+use crate::force::{ContactOptions, DriftCorrection, Estimate, ForceOptions};
 use crate::pipeline::{
     DarkContact, LightContact, Measurement, Pipeline, PipelineError, Press, SurfaceInput,
 };
@@ -91,6 +91,14 @@ impl Scene {
         Ok(press)
     }
 
+    fn force_options(&self) -> ForceOptions {
+        let drift = match self.corrects_drift {
+            true => DriftCorrection::Automatic,
+            false => DriftCorrection::None,
+        };
+        ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift))
+    }
+
     fn build(&self, data: &SceneData) -> Result<Pipeline, PipelineError> {
         let layer = |l: &super::SceneLayer| Layer {
             thickness_m: l.thickness_m,
@@ -99,12 +107,20 @@ impl Scene {
         };
         let pipeline = match &data.calibration {
             LoadedCalibration::Pairs(pairs) => {
-                let contact = LightContact::from_pairs(pairs, self.pixel_size_m)?;
+                let contact =
+                    LightContact::from_pairs_with(pairs, self.pixel_size_m, &self.force_options())?;
                 Pipeline::new(contact, self.object)?.with_stages(&self.stages)?
             }
             LoadedCalibration::Gauge => {
-                let contact = LightContact::gauged(self.pixel_size_m, &ForceOptions::default())?;
+                let contact = LightContact::gauged(self.pixel_size_m, &self.force_options())?;
                 Pipeline::new(contact, self.object)?.with_stages(&self.stages)?
+            }
+            LoadedCalibration::Sensor(sensor) => {
+                let contact = sensor.contact(&self.force_options())?;
+                let pipeline = Pipeline::new(contact, self.object)?.with_stages(&self.stages)?;
+                return sensor
+                    .configured(pipeline)?
+                    .with_object_errors(self.radius_error_m, self.poisson_ratio_error);
             }
             LoadedCalibration::DepthTable(table) => {
                 let contact = DarkContact::new(table, self.pixel_size_m)?;
@@ -113,7 +129,9 @@ impl Scene {
                     .with_surface(DarkContact::depth_table(table)?, SurfaceInput::Signal)
             }
         };
-        let pipeline = pipeline.with_flat_field(self.flat_field);
+        let pipeline = pipeline
+            .with_flat_field(self.flat_field)
+            .with_object_errors(self.radius_error_m, self.poisson_ratio_error)?;
         if self.layers.is_empty() {
             return Ok(pipeline);
         }

@@ -28,10 +28,21 @@
 //! ]
 //! ```
 //!
-//! More may stand there (`flat_field` and `bits` above the first table):
+//! A calibrated [`Sensor`](crate::sensor::Sensor) stands for `pixel_size_m`, `[calibration]`, `flat_field` and `[waveguide]`, with
+//! the errors of them all:
+//!
+//! ```toml
+//! reference = "reference.png"
+//! sensor = "sensor.toml"                 # written by a calibration, see `sensor`
+//! frames = [{ image = "frame_1.png" }]
+//! object = { shape = "sphere", radius_m = 3e-3, radius_error_m = 5e-6, poisson_ratio = 0.5, poisson_ratio_error = 0.002 }
+//! ```
+//!
+//! More may stand there (`flat_field`, `illumination_drift` and `bits` above the first table):
 //!
 //! ```toml
 //! bits = 12                              # of the camera, where its samples stand in files of 16 bits that do not say so
+//! illumination_drift = "none"            # "automatic", the default with a sensor: changes of the lamps are divided out where they can be told
 //! flat_field = "reference"               # divides by the reference's own brightness: corrects vignetting; not by default
 //!
 //! [stages]                               # each by name; these are the defaults
@@ -89,6 +100,8 @@ pub enum CalibrationSource {
     DepthTable(PathBuf),
     /// None: every frame has a gauge's reading of its force.
     Gauge,
+    /// The path of a sensor file: curve, lens and layers.
+    Sensor(PathBuf),
 }
 
 /// A frame with contact.
@@ -183,12 +196,18 @@ pub struct Scene {
     pub file: PathBuf,
     /// The image without contact.
     pub reference: PathBuf,
-    /// Size of a pixel on the sensing surface in metres, x and y.
+    /// Size of a pixel on the sensing surface in metres, x and y; zero where a sensor file has it.
     pub pixel_size_m: [f64; 2],
     /// Whether vignetting is corrected by the reference's own brightness.
     pub flat_field: bool,
     /// Bits of the camera, for images of 16 bits; told from the file where not given.
     pub bits: Option<u8>,
+    /// Whether changes of the lamps since the reference are divided out where they can be told.
+    pub corrects_drift: bool,
+    /// Standard error of the object's radius in metres.
+    pub radius_error_m: f64,
+    /// Standard error of the object's Poisson ratio.
+    pub poisson_ratio_error: f64,
     /// How grey levels become force or depth.
     pub calibration: CalibrationSource,
     /// The frames, in the order of the file.
@@ -242,16 +261,27 @@ impl Scene {
         let reference = fields.string("reference", "the path of the image without contact")?;
         let frames = tables::frames(&fields, folder)?;
         let gauged = frames.iter().all(|frame| frame.force_n.is_some());
+        let sensor = tables::sensor(&fields)?;
+        let [radius_error_m, poisson_ratio_error] = tables::object_errors(&fields)?;
         Ok(Self {
             file: file.into(),
             reference: folder.join(reference),
-            pixel_size_m: fields.positive_pair(
-                "pixel_size_m",
-                "two positive numbers [x, y] (metres per pixel)",
-            )?,
+            pixel_size_m: match sensor {
+                Some(_) => [0.0; 2],
+                None => fields.positive_pair(
+                    "pixel_size_m",
+                    "two positive numbers [x, y] (metres per pixel)",
+                )?,
+            },
+            corrects_drift: tables::corrects_drift(&fields)?.unwrap_or(sensor.is_some()),
+            radius_error_m,
+            poisson_ratio_error,
             flat_field: tables::flat_field(&fields)?,
             bits: tables::bits(&fields)?,
-            calibration: tables::calibration(&fields, folder, gauged)?,
+            calibration: match sensor {
+                Some(path) => CalibrationSource::Sensor(folder.join(path)),
+                None => tables::calibration(&fields, folder, gauged)?,
+            },
             frames,
             object: tables::object(&fields)?,
             layers: tables::layers(&fields)?,

@@ -5,10 +5,12 @@ use crate::pipeline::Object;
 use std::path::Path;
 
 /// What may stand at the top of a scene file.
-pub(super) const FIELDS: [&str; 9] = [
+pub(super) const FIELDS: [&str; 11] = [
     "reference",
+    "sensor",
     "pixel_size_m",
     "flat_field",
+    "illumination_drift",
     "bits",
     "calibration",
     "frames",
@@ -16,6 +18,49 @@ pub(super) const FIELDS: [&str; 9] = [
     "waveguide",
     "stages",
 ];
+
+/// The name of the sensor file; what it stands for must not be there beside it.
+pub(super) fn sensor<'a>(fields: &Fields<'a>) -> Result<Option<&'a str>, SceneError> {
+    if !fields.has("sensor") {
+        return Ok(None);
+    }
+    let name = fields.string("sensor", "the path of a sensor file")?;
+    for field in ["pixel_size_m", "flat_field", "calibration", "waveguide"] {
+        if fields.has(field) {
+            let given = toml::Value::String("a value beside `sensor`".into());
+            return Err(fields.wrong(field, "absent: the sensor file has it", &given));
+        }
+    }
+    Ok(Some(name))
+}
+
+/// Whether changes of the lamps are divided out, where the scene says so.
+pub(super) fn corrects_drift(fields: &Fields<'_>) -> Result<Option<bool>, SceneError> {
+    const FIELD: &str = "illumination_drift";
+    const EXPECTED: &str = "\"automatic\" or \"none\"";
+    if !fields.has(FIELD) {
+        return Ok(None);
+    }
+    match fields.string(FIELD, EXPECTED)? {
+        "automatic" => Ok(Some(true)),
+        "none" => Ok(Some(false)),
+        other => Err(fields.wrong(FIELD, EXPECTED, &toml::Value::String(other.into()))),
+    }
+}
+
+/// Standard errors of the object's radius and Poisson ratio.
+pub(super) fn object_errors(fields: &Fields<'_>) -> Result<[f64; 2], SceneError> {
+    let fields = fields.table("object", "a table with `shape`")?;
+    let not_negative = |v: f64| v >= 0.0 && v.is_finite();
+    let error = |name: &str, expected| {
+        let error = fields.optional_number(name, expected, not_negative)?;
+        Ok(error.unwrap_or(0.0))
+    };
+    Ok([
+        error("radius_error_m", "zero or a positive number (metres)")?,
+        error("poisson_ratio_error", "zero or a positive number")?,
+    ])
+}
 
 pub(super) fn flat_field(fields: &Fields<'_>) -> Result<bool, SceneError> {
     const EXPECTED: &str = "\"reference\", or absent for no correction";
@@ -101,6 +146,8 @@ pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
         "thickness_m",
         "half_angle_rad",
         "poisson_ratio",
+        "radius_error_m",
+        "poisson_ratio_error",
     ])?;
     let shape = fields.string("shape", SHAPE)?;
     let poisson_ratio = fields

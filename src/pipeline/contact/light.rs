@@ -62,9 +62,18 @@ impl LightContact {
         pairs: &[CalibrationPair<f64>],
         pixel_size_m: [f64; 2],
     ) -> Result<Self, PipelineError> {
+        Self::from_pairs_with(pairs, pixel_size_m, &ForceOptions::default())
+    }
+
+    /// [`from_pairs`](Self::from_pairs) with options of the contact.
+    pub(crate) fn from_pairs_with(
+        pairs: &[CalibrationPair<f64>],
+        pixel_size_m: [f64; 2],
+        options: &ForceOptions,
+    ) -> Result<Self, PipelineError> {
         let calibration = LinearCalibration::fit(pairs, &CalibrationOptions::default())
             .map_err(PipelineError::Calibration)?;
-        Self::new(calibration, pixel_size_m, &ForceOptions::default())
+        Self::new(calibration, pixel_size_m, options)
     }
 
     /// With any calibration and options.

@@ -42,14 +42,6 @@ impl Effects {
         lamps: 0.05,
         moduli: 0.1,
     };
-    pub(super) const NONE: Self = Self {
-        exponent: 1.0,
-        vignetting: 0.0,
-        barrel: 0.0,
-        aspect: 1.0,
-        lamps: 0.0,
-        moduli: 0.0,
-    };
 }
 
 /// Relative standard errors that are stated, and drawn from.
