@@ -125,6 +125,7 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
             starts: 1,
             residual: (residual / count).sqrt(),
             sigma: T::zero(),
+            doubt: None,
         },
     }
 }

@@ -49,7 +49,7 @@ pub use assignment_matcher::LinearAssignment;
 pub use cpd::{CoherentPointDrift, DriftOptions, DriftWarp, DriftWorkspace, Motion, Normalization};
 pub use error::{MatchError, PointSet};
 pub use labelling::{LabellingOptions, RelaxationLabelling, SparseRelaxationLabelling};
-pub use matching::{MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
+pub use matching::{Doubt, MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
 pub use nearest::NearestNeighbour;
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;

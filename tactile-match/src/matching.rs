@@ -120,7 +120,8 @@ pub enum StopReason {
     /// The warp and the assignment stand still.
     #[default]
     Converged,
-    /// Every pair fits exactly (to rounding) before the schedule ended.
+    /// The temperature fell to its floor, a thousandth of the model's radius, with nearly all points matched: what noise there is cannot
+    /// be told from none.
     Exact,
     /// The iteration limit was reached.
     IterationLimit,
@@ -128,6 +129,39 @@ pub enum StopReason {
     Callback,
     /// Too few distinct points for more than a rigid or affine answer.
     Degenerate,
+}
+
+/// Why the pairs of an answer are not to be relied on.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{AnnealedSoftassign, Doubt, PointMatcher};
+/// let scattered = |seed: f64| -> Vec<Point2<f64>> {
+///     let place = |i: i32, k: f64| (f64::from(i * i) * k + seed * f64::from(i)).fract();
+///     (0..60).map(|i| Point2::new(place(i, 0.618), place(i, 0.755))).collect()
+/// };
+/// let matcher = AnnealedSoftassign::default();
+/// let same = matcher.match_points(&scattered(0.1), &scattered(0.1))?;
+/// assert_eq!(same.report.doubt, None);
+/// // Two sets that have nothing to do with each other: some points coincide by chance.
+/// let other = matcher.match_points(&scattered(0.1), &scattered(0.37))?;
+/// assert!(matches!(other.report.doubt, Some(Doubt::FewPairs | Doubt::LargeResiduals | Doubt::Undecided)));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
+pub enum Doubt {
+    /// So few points of the smaller set have a partner that the pairs may have met by chance.
+    FewPairs,
+    /// The residuals are so large beside the distance from a target to the next that a point's neighbour could be its partner.
+    LargeResiduals,
+    /// The pairs have rivals that are nearly as likely.
+    Undecided,
 }
 
 /// How a match went.
@@ -156,6 +190,9 @@ pub struct MatchReport<T> {
     pub residual: T,
     /// Estimated standard deviation of the position noise along one axis, in the units of the points.
     pub sigma: T,
+    /// Why the pairs are not to be relied on, where the matcher can tell.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub doubt: Option<Doubt>,
 }
 
 /// The answer of a [`PointMatcher`].

@@ -136,5 +136,6 @@ fn report<T: Scalar, const D: usize>(
         starts: 1,
         residual: nalgebra::convert(scale * (sum / count.max(1.0)).sqrt()),
         sigma: nalgebra::convert(scale * workspace.sigma2.sqrt()),
+        doubt: None,
     }
 }

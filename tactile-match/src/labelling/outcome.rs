@@ -149,6 +149,7 @@ impl<T: Scalar, const D: usize> Run<T, D> {
             starts: 1,
             residual,
             sigma: residual / nalgebra::convert((D as f64).sqrt()),
+            doubt: None,
         };
         let energy = self.energy;
         Matching {

@@ -17,6 +17,8 @@ const DECIDED_RATE: f64 = 0.3;
 const FAINTER: f64 = 1e-3;
 /// Least share of outliers an estimate may come to.
 const LEAST_SHARE: f64 = 0.02;
+/// Temperatures (variances) below this are cold: a tenth of the model's radius.
+const COLD: f64 = 0.01;
 /// Fixed-point rounds for the share of outliers.
 const SHARE_ROUNDS: usize = 8;
 
@@ -45,6 +47,8 @@ pub(crate) struct Schedule {
     pub(crate) patience: usize,
     /// Sinkhorn sweeps an iteration.
     pub(crate) sweeps: usize,
+    /// A cold run that matches fewer points has collapsed and ends.
+    pub(crate) collapse: f64,
     /// What is expected of points without a partner.
     pub(crate) slack: Slack,
 }
@@ -80,6 +84,13 @@ impl<const D: usize> State<D> {
     }
 }
 
+/// Displacements that the model points should have, and how much each counts; both padded with zeros.
+#[derive(Clone, Copy)]
+pub(crate) struct Request<'a, const D: usize> {
+    pub(crate) weights: &'a [f64],
+    pub(crate) displacements: &'a Axes<D>,
+}
+
 /// Shared machinery of the runs: targets, prior, scratch.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Annealer<const D: usize> {
@@ -97,6 +108,14 @@ pub(crate) struct Annealer<const D: usize> {
 }
 
 impl<const D: usize> Annealer<D> {
+    /// What the soft matches of the last fit ask of the warp.
+    pub(crate) fn request(&self) -> Request<'_, D> {
+        Request {
+            weights: &self.weights,
+            displacements: &self.residuals,
+        }
+    }
+
     /// Soft matches of `warped` at this temperature, with their moments.
     ///
     /// The slack weighs `(2πσ²)^{D/2}` times the density of outliers, beside Gaussian affinities.
@@ -134,6 +153,9 @@ impl<const D: usize> Annealer<D> {
             state.trace.push(self.free_energy(state, variance));
             observe(state.iterations, *state.trace.last().unwrap_or(&0.0))?;
             let floor = schedule.floor * schedule.floor;
+            if variance < COLD && state.matched < schedule.collapse {
+                break; // the temperature fell below the noise: points lose their partners, and none comes back
+            }
             let decided = self.ambiguity < DECIDED;
             let fall = |rate: f64| variance * rate * rate;
             let lowest = fall(if decided { DECIDED_RATE } else { schedule.rate }).max(floor);
@@ -181,10 +203,6 @@ impl<const D: usize> Annealer<D> {
             let open = spread / self.soft.weight.iter().sum::<f64>().max(1e-9);
             state.sigma = (residual + open).sqrt().max(schedule.floor);
             self.predicted.clone_from(&state.warped);
-            state.iterations += 1;
-            state
-                .trace
-                .push(self.free_energy(state, state.sigma * state.sigma));
         }
     }
 

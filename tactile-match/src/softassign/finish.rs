@@ -2,11 +2,23 @@
 
 use super::anneal::{Annealer, Slack, State};
 use super::soft_assign::SoftAssignment;
+use crate::Doubt;
 
 /// Residuals below this (radii of the model) are what the prior's factor leaves out: the data are clean.
 pub(crate) const CLEAN: f64 = 3e-3;
+/// The lowest temperature of a run.
+pub(crate) const FLOOR: f64 = 1e-3;
 /// The answer is read at no lower temperature.
 const READ: f64 = 1.4e-3;
+/// An answer with fewer pairs, relative to the smaller set, may be one of chance: wrong basins of sets that were stretched or turned matched up
+/// to two fifths.
+const ENOUGH: f64 = 0.55;
+/// The same where the caller expects most points to have no partner.
+const FEWEST: f64 = 0.1;
+/// Residuals above this many spacings: wrong basins leave 0.3 and more.
+const INDISTINCT: f64 = 0.35;
+/// Least mean confidence of pairs.
+const DECIDED: f64 = 0.7;
 /// Soft matches below this are not reported.
 const FAINT: f64 = 1e-3;
 
@@ -22,6 +34,26 @@ pub(crate) struct Answer<const D: usize> {
 }
 
 impl<const D: usize> Answer<D> {
+    /// Why the pairs are not to be relied on: `smaller` points could have a partner, `share` of them are expected to have none, and `noise` is
+    /// the standard deviation of the residuals over the distance from a target to the next.
+    pub(crate) fn doubt(&self, smaller: usize, share: f64, noise: f64) -> Option<Doubt> {
+        let pairs = self.assignment.iter().flatten().count() as f64;
+        let sure: f64 = self
+            .assignment
+            .iter()
+            .zip(&self.confidence)
+            .filter(|(partner, _)| partner.is_some())
+            .map(|(_, confidence)| confidence)
+            .sum();
+        let enough = ENOUGH.min(1.0 - 1.5 * share).max(FEWEST);
+        match () {
+            () if pairs < enough * smaller as f64 => Some(Doubt::FewPairs),
+            () if noise > INDISTINCT => Some(Doubt::LargeResiduals),
+            () if sure < DECIDED * pairs => Some(Doubt::Undecided),
+            () => None,
+        }
+    }
+
     /// Reads the answer from the run's final state.
     pub(crate) fn read(
         &mut self,

@@ -62,6 +62,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             starts: workspace.starts,
             residual: workspace.answer.residual * scale,
             sigma: workspace.best.sigma * scale,
+            doubt: workspace.doubt(),
         }
     }
 
@@ -112,7 +113,12 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         let workspace = self.workspace;
         match () {
             () if workspace.stopped => StopReason::Callback,
-            () if workspace.best.sigma <= finish::CLEAN => StopReason::Exact,
+            // The floor is reached to rounding.
+            () if workspace.best.sigma <= 1.000_001 * finish::FLOOR
+                && workspace.doubt().is_none() =>
+            {
+                StopReason::Exact
+            }
             () if workspace.best.settled => StopReason::Converged,
             () => StopReason::IterationLimit,
         }
@@ -126,6 +132,7 @@ fn narrow<T: Scalar>(report: &MatchReport<f64>) -> MatchReport<T> {
         starts: report.starts,
         residual: T::narrow(report.residual),
         sigma: T::narrow(report.sigma),
+        doubt: report.doubt,
     }
 }
 

@@ -8,11 +8,12 @@
 //! - Distances are taken from the *leave-one-out* prediction of the warp, so that a wrong match does not confirm itself.
 //! - The field's covariance has few modes: a fit costs `O(I r²)` with r near 30, and its leverages come with it.
 //! - Most scenes are easy and end with the first run (`search`). Others get further starts: local patterns of dense sets (`patterns`),
-//!   relaxation labelling (19), (20) over the candidates that shape contexts propose (`correspond`), and the moments.
+//!   relaxation labelling (19), (20) over the candidates that shape contexts propose (`correspond`), the moments, and the affine map that
+//!   local tuples of points agree on (`tuples`).
 //!   The start of least energy wins: minus the logarithm of the targets' likelihood and of the warp's prior.
 //!
 //! Where the residuals are rounding the data are clean, and matched points go exactly onto their partners. Where they are
-//! noise the scales of the field are averaged over by their evidence, unless the matches themselves are undecided. The
+//! noise the warp is averaged over the scales of the prior by their evidence (`scales`), unless the matches themselves are undecided. The
 //! final warp is the thin-plate spline through the estimated positions.
 //!
 //! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, and memory of one `I × J` matrix in single
@@ -35,16 +36,18 @@ mod options;
 mod patterns;
 mod prior;
 mod regression;
+mod scales;
 mod search;
 mod series;
 mod soft_assign;
 mod starts;
+mod tuples;
 
 pub use batch::PointSets;
 pub use found::SoftassignMatch;
 pub use options::{Outliers, Rotation, Search, SoftassignOptions};
 
-use crate::{MatchError, Matching, PointMatcher, WarmStart, validate};
+use crate::{Doubt, MatchError, Matching, PointMatcher, WarmStart, validate};
 use anneal::{Annealer, State};
 use consensus::Consensus;
 use correspond::Correspondence;
@@ -52,8 +55,10 @@ use finish::Answer;
 use frame::Frame;
 use nalgebra::Point;
 use patterns::LocalPatterns;
+use scales::ScaleAverage;
 use std::ops::ControlFlow;
 use tactile_tps::Scalar;
+use tuples::Tuples;
 
 /// The default matcher: annealed softassign, with a Gaussian-process prior on the warp and leave-one-out prediction.
 ///
@@ -106,8 +111,12 @@ pub struct SoftassignWorkspace<const D: usize> {
     correspondence: Correspondence,
     patterns: LocalPatterns<D>,
     consensus: Consensus<D>,
-    start: State<D>,
-    mean: Vec<[f64; D]>,
+    tuples: Tuples<D>,
+    scales: ScaleAverage<D>,
+    /// Typical distance of a target from the next, once the search asks for it.
+    spacing: f64,
+    /// Share of points without a partner that the caller expects.
+    expected_share: f64,
     starts: usize,
     stopped: bool,
 }
@@ -117,6 +126,17 @@ impl<const D: usize> SoftassignWorkspace<D> {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Why the answer is not to be relied on.
+    fn doubt(&self) -> Option<Doubt> {
+        let noise = if self.spacing > 0.0 {
+            self.best.sigma / self.spacing
+        } else {
+            0.0
+        };
+        let smaller = self.model.len().min(self.target.len());
+        self.answer.doubt(smaller, self.expected_share, noise)
     }
 
     /// Takes two sets, in the frame's units.

@@ -88,7 +88,8 @@ pub enum Outliers {
     serde(rename_all = "snake_case")
 )]
 pub enum Search {
-    /// Until an answer is exact, or every start is tried and the scales of the prior are fitted to the data: any scene.
+    /// Start after start, until an answer is exact or noise explains its residuals; noisy answers are averaged over the scales of the
+    /// prior: any scene.
     #[default]
     Thorough,
     /// One annealing run from the sets as they lie, centred: for sets known to be near each other, such as those of one

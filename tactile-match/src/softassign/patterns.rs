@@ -61,7 +61,7 @@ impl<const D: usize> LocalPatterns<D> {
     }
 
     /// Median distance from a target to the next, over a sample.
-    fn typical_spacing(&mut self, target: &[[f64; D]]) -> f64 {
+    pub(crate) fn typical_spacing(&mut self, target: &[[f64; D]]) -> f64 {
         let step = target.len().div_ceil(SAMPLE);
         self.distances.clear();
         for i in (0..target.len()).step_by(step) {

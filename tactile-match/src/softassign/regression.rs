@@ -101,7 +101,7 @@ impl<const D: usize> Regression<D> {
 }
 
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
     for (x, y) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
         for l in 0..LANES {
@@ -114,7 +114,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Cholesky factor in place of the lower triangle. The diagonal carries σ², so that pivots stay positive; rounding is
 /// caught by a floor.
 #[inline(always)]
-fn cholesky(a: &mut [f64], n: usize) {
+pub(super) fn cholesky(a: &mut [f64], n: usize) {
     for i in 0..n {
         let (above, current) = a.split_at_mut(i * n);
         for j in 0..i {
@@ -147,7 +147,7 @@ fn short_dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[inline(always)]
-fn solve<const D: usize>(factor: &[f64], n: usize, b: &mut [[f64; D]]) {
+pub(super) fn solve<const D: usize>(factor: &[f64], n: usize, b: &mut [[f64; D]]) {
     for i in 0..n {
         let mut value = b[i];
         for (f, earlier) in factor[i * n..i * n + i].iter().zip(&*b) {

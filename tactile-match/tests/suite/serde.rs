@@ -1,5 +1,5 @@
 //! What can be written can be read again, under stable names.
-use tactile_match::{MatchReport, Outliers, Rotation, Search, SoftMatches, StopReason};
+use tactile_match::{Doubt, MatchReport, Outliers, Rotation, Search, SoftMatches, StopReason};
 
 #[test]
 fn a_report_comes_back_as_it_was() {
@@ -9,6 +9,7 @@ fn a_report_comes_back_as_it_was() {
         starts: 2,
         residual: 0.1,
         sigma: 0.3_f64,
+        doubt: Some(Doubt::FewPairs),
     };
     let text = serde_json::to_string(&report).unwrap();
     assert!(text.contains(r#""stop":"iteration_limit""#), "{text}");

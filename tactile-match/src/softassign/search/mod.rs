@@ -1,14 +1,16 @@
-//! The search: which starts are tried, and in which order.
+//! The search: a list of starts, each run on its own schedule, until an answer leaves no doubt.
 //!
-//! Most scenes are easy and end with the first, fast run. Where the answer is not exact and complete, further starts
-//! follow: from the patterns of a dense set, warmer and slower, from shape contexts and relaxation labelling, from the
-//! moments. The start with the least energy wins; noisy scenes then choose the scales of the prior by their evidence.
-mod complete;
-mod refine;
+//! A run is determined by its start and its schedule: [`place`](AnnealedSoftassign::place) sets all that it reads. Most scenes are
+//! easy and end with the first, fast run. Where its answer neither fits exactly nor leaves residuals that noise explains, the further
+//! starts follow, from what costs least to what costs most. The answer of least energy wins; noisy scenes then average over the
+//! scales of the prior.
+mod progress;
 
 use super::anneal::Schedule;
 use super::prior::PriorScales;
 use super::{AnnealedSoftassign, Rotation, Search, SoftassignWorkspace, finish, starts};
+use nalgebra::SMatrix;
+use progress::{COMPLETE, MANY};
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
@@ -17,9 +19,11 @@ const SCALES: PriorScales = PriorScales {
     bending: 0.35,
     affine: 0.5,
 };
-/// Where a run starts and how fast it cools.
+
+/// How a run cools: the part of a [`Schedule`] that differs between starts.
 #[derive(Clone, Copy, Debug)]
-struct Pace {
+struct Cooling {
+    /// First temperature, in radii of the model.
     sigma: f64,
     rate: f64,
     least: f64,
@@ -27,8 +31,8 @@ struct Pace {
     sweeps: usize,
 }
 
-/// The first try: most scenes are easy.
-const FAST: Pace = Pace {
+/// The first run: most scenes are easy.
+const FAST: Cooling = Cooling {
     sigma: 0.3,
     rate: 0.75,
     least: 0.9,
@@ -36,15 +40,15 @@ const FAST: Pace = Pace {
     sweeps: 3,
 };
 /// From the best answer so far.
-const REHEAT: Pace = Pace {
+const REHEAT: Cooling = Cooling {
     sigma: 0.1,
     rate: 0.9,
     least: 1.0,
     patience: usize::MAX,
     sweeps: 5,
 };
-/// The only try between sets that lie near each other. Residuals that stay above the temperature, whatever else moves, end it.
-const NEAR: Pace = Pace {
+/// The only run between sets that lie near each other. Residuals that stay above the temperature, whatever else moves, end it.
+const NEAR: Cooling = Cooling {
     sigma: 0.2,
     rate: 0.8,
     least: 1.0,
@@ -53,33 +57,67 @@ const NEAR: Pace = Pace {
 };
 /// Least first temperature of a run from the last answer of a series.
 const COOLEST: f64 = 0.03;
-/// Further tries.
-const SLOW: Pace = Pace {
+/// Further runs.
+const SLOW: Cooling = Cooling {
     sigma: 0.3,
     rate: 0.93,
     least: 1.0,
     patience: usize::MAX,
     sweeps: 5,
 };
-/// Residuals are judged no finer than this.
+/// After relaxation labelling, whose pairs are trusted more than a first guess.
+const LABELLED: Cooling = Cooling {
+    sigma: 0.15,
+    ..SLOW
+};
+/// After an affine map of local tuples: right to a spacing or so where it was found, less far from there.
+const SEEDED: Cooling = Cooling {
+    sigma: 0.1,
+    ..REHEAT
+};
+/// A cold run with partners for less than this share of the smaller set has collapsed.
+const COLLAPSED: f64 = 0.5;
+/// Residuals are compared no finer than this.
 const RESOLUTION: f64 = 0.01;
-
 /// Soft partners spread more than this: the evidence of a warp cannot be told from that of its matches.
 const UNDECIDED: f64 = 0.3;
+/// Rounds in which matches and noise level follow the averaged warp; a third one moves it by a hundredth of the noise.
+const SETTLING: usize = 2;
+/// In sets of so many points a part may lie one point aside though the residuals are small; fewer have too few inner points for patterns.
+const PATTERNED: usize = 150;
+/// Most runs from local patterns, and their first temperature in spacings.
+const PATTERN_RUNS: usize = 3;
+const PATTERN_SIGMA: f64 = 0.3;
+
+/// Where a run starts.
+#[derive(Clone, Copy, Debug)]
+enum Start<const D: usize> {
+    /// The centroids on each other.
+    Centred,
+    /// The best answer so far.
+    Best,
+    /// The best answer so far, put right by the local patterns of a dense set.
+    Patterns,
+    /// The pairs of relaxation labelling.
+    Labelling,
+    /// The second moments on each other, after a rotation.
+    Moments(SMatrix<f64, D, D>),
+    /// The affine map that local tuples of points agree on.
+    Tuples,
+}
+
+type Observer<'a> = &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>;
 
 impl AnnealedSoftassign {
     pub(super) fn solve<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+        observe: Observer<'_>,
     ) {
         begin(ws);
         let flow = match self.options.search {
-            Search::Near => self.attempt(ws, NEAR, observe),
-            Search::Thorough => {
-                let flow = self.attempt(ws, FAST, observe);
-                self.try_further(ws, flow, observe)
-            }
+            Search::Near => self.run(ws, Start::Centred, NEAR, observe),
+            Search::Thorough => self.search(ws, observe),
         };
         ws.stopped = flow.is_break();
         self.conclude(ws);
@@ -94,22 +132,24 @@ impl AnnealedSoftassign {
         sigma: f64,
     ) {
         begin(ws);
+        starts::centred(&ws.model, &ws.target, &mut ws.state.base);
         ws.state.warped.clear();
         ws.state.warped.extend_from_slice(start);
-        let pace = Pace {
+        let cooling = Cooling {
             sigma: sigma.clamp(COOLEST, NEAR.sigma),
             ..NEAR
         };
         // Nobody listens, so nobody breaks off.
-        let _ = self.refine(ws, pace, &mut |_, _| ControlFlow::Continue(()));
+        let _ = self.anneal(ws, cooling, &mut |_, _| ControlFlow::Continue(()));
         self.conclude(ws);
     }
 
     /// Reads the answer from the best run.
     fn conclude<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        ws.expected_share = self.options.share;
         if ws.starts > 1 || !self.is_exact(ws) {
             // Later runs have left their own fit behind.
-            let schedule = self.schedule(Pace {
+            let schedule = self.schedule(Cooling {
                 sigma: ws.best.sigma,
                 ..SLOW
             });
@@ -119,147 +159,162 @@ impl AnnealedSoftassign {
             .read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
     }
 
-    /// What follows the first run where its answer is not exact and complete.
+    /// All starts in turn, as long as the best answer leaves doubt; then the scales of the prior.
+    fn search<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
+        self.run(ws, Start::Centred, FAST, observe)?;
+        if !self.is_exact(ws) {
+            ws.spacing = ws.patterns.typical_spacing(&ws.target);
+        }
+        self.try_further(ws, observe)?;
+        let smaller = ws.model.len().min(ws.target.len());
+        if smaller >= PATTERNED
+            && ws.best.matched >= COLLAPSED * smaller as f64
+            && !self.is_certain(ws)
+        {
+            self.follow_patterns(ws, observe)?;
+        }
+        if ws.best.sigma > finish::CLEAN {
+            self.average_scales(ws);
+        }
+        ControlFlow::Continue(())
+    }
+
     fn try_further<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
-        mut flow: ControlFlow<()>,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+        observe: Observer<'_>,
     ) -> ControlFlow<()> {
-        if flow.is_continue() && !self.is_done(ws) {
-            flow = self.mend(ws, observe);
+        let dense = ws.model.len().min(ws.target.len()) >= MANY;
+        if dense && !self.is_done(ws) {
+            self.follow_patterns(ws, observe)?;
         }
-        if flow.is_continue() && !self.is_done(ws) {
-            starts::centred(&ws.model, &ws.target, &mut ws.state.base);
-            flow = self.attempt(ws, SLOW, observe);
-        }
-        if self.options.rotation == Rotation::Limited && flow.is_continue() && !self.is_done(ws) {
-            starts::centred(&ws.model, &ws.target, &mut ws.state.base);
-            ws.state.warped.clone_from(&ws.state.base);
-            ws.correspondence.find(&ws.state.base, &ws.target);
-            let sets = (&*ws.model, &*ws.target);
-            ws.consensus.fit(
-                &mut ws.annealer,
-                SCALES,
-                sets,
-                &ws.correspondence.pairs,
-                &mut ws.state,
-            );
-            flow = self.refine(
-                ws,
-                Pace {
-                    sigma: 0.15,
-                    ..SLOW
-                },
-                observe,
-            );
-        }
-        let rotations = match self.options.rotation {
-            Rotation::Any => starts::ANY,
-            Rotation::Limited => starts::LIMITED,
+        let limited = self.options.rotation == Rotation::Limited;
+        let rotations = if limited {
+            starts::LIMITED
+        } else {
+            starts::ANY
         };
-        for rotation in starts::rotations::<D>(rotations) {
-            if flow.is_break() || self.is_done(ws) {
+        let first = [
+            Some((Start::Best, REHEAT)),
+            dense.then_some((Start::Tuples, SEEDED)),
+            Some((Start::Centred, SLOW)),
+            limited.then_some((Start::Labelling, LABELLED)),
+        ];
+        let moments = starts::rotations::<D>(rotations).map(|r| (Start::Moments(r), SLOW));
+        let last = [(!dense).then_some((Start::Tuples, SEEDED))];
+        let list = first.into_iter().flatten().chain(moments);
+        for (start, cooling) in list.chain(last.into_iter().flatten()) {
+            if self.is_done(ws) {
+                return ControlFlow::Continue(());
+            }
+            self.run(ws, start, cooling, observe)?;
+        }
+        if !self.is_done(ws) {
+            self.run(ws, Start::Best, REHEAT, observe)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Short runs from where the patterns of a dense set put it, as long as each matches more points.
+    fn follow_patterns<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
+        let points = ws.model.len().min(ws.target.len()) as f64;
+        for _ in 0..PATTERN_RUNS {
+            let before = (ws.best.matched, ws.best.sigma);
+            // The temperature follows from the spacing, which the patterns measure.
+            let sigma = PATTERN_SIGMA * ws.spacing;
+            let cooling = Cooling { sigma, ..REHEAT };
+            if !self.place(ws, Start::Patterns) {
                 break;
             }
-            starts::moments(&ws.model, &ws.target, &rotation, &mut ws.state.base);
-            flow = self.attempt(ws, SLOW, observe);
-        }
-        if flow.is_continue() && !self.is_done(ws) && ws.starts > 2 {
-            flow = self.reheat(ws, REHEAT.sigma, observe);
-        }
-        if flow.is_continue() && ws.best.sigma > finish::CLEAN {
-            self.fit_scales(ws);
-        }
-        flow
-    }
-
-    /// The last stage on noisy data: the prior's scales by their evidence, each with the noise level that fits it.
-    fn fit_scales<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
-        let schedule = self.schedule(Pace {
-            sigma: ws.best.sigma,
-            ..SLOW
-        });
-        if ws.annealer.restore(&ws.best, &mut ws.state, &schedule) > UNDECIDED {
-            return;
-        }
-        ws.best.energy = f64::INFINITY;
-        let mut winner = SCALES;
-        ws.start.copy_from(&ws.best);
-        ws.mean.clear();
-        ws.mean.resize(ws.model.len(), [0.0; D]);
-        let mut total = 0.0;
-        for length in [1.2, 1.7, 2.4, 3.4] {
-            for bending in [0.35, 0.2, 0.1, 0.05, 0.025] {
-                let scales = PriorScales {
-                    length,
-                    bending: bending * length / 1.2,
-                    ..SCALES
-                };
-                ws.annealer.prior.build(&ws.model, scales);
-                ws.state.copy_from(&ws.start);
-                ws.annealer.settle(&mut ws.state, &schedule, 4);
-                ws.annealer
-                    .evaluate(&mut ws.state, self.options.share, RESOLUTION);
-                let old = if total > 0.0 {
-                    ws.best.energy
-                } else {
-                    ws.state.energy
-                };
-                if ws.state.energy < ws.best.energy {
-                    let f = (ws.state.energy - old).exp();
-                    total *= f;
-                    ws.mean.iter_mut().for_each(|p| *p = p.map(|v| v * f));
-                    winner = scales;
-                    ws.best.copy_from(&ws.state);
-                }
-                let w = (ws.best.energy - ws.state.energy).exp();
-                total += w;
-                for (p, q) in ws.mean.iter_mut().zip(&ws.state.warped) {
-                    (0..D).for_each(|k| p[k] += w * q[k]);
-                }
+            self.anneal(ws, cooling, observe)?;
+            let (matched, sigma) = (ws.best.matched, ws.best.sigma);
+            if matched >= COMPLETE * points
+                || (matched < 1.01 * before.0 && sigma > 0.99 * before.1)
+            {
+                break;
             }
         }
-        ws.annealer.prior.build(&ws.model, winner);
-        ws.best
-            .warped
-            .iter_mut()
-            .zip(&ws.mean)
-            .for_each(|(p, s)| *p = s.map(|v| v / total));
+        ControlFlow::Continue(())
     }
 
-    fn schedule(&self, pace: Pace) -> Schedule {
-        Schedule {
-            sigma: pace.sigma,
-            floor: 1e-3,
-            rate: pace.rate,
-            least: pace.least,
-            patience: pace.patience,
-            limit: self.options.max_iterations,
-            sweeps: pace.sweeps,
-            slack: self.options.slack(),
+    /// A run from a start; skipped where the sets do not have such a start.
+    fn run<const D: usize>(
+        &self,
+        ws: &mut SoftassignWorkspace<D>,
+        start: Start<D>,
+        cooling: Cooling,
+        observe: Observer<'_>,
+    ) -> ControlFlow<()> {
+        if self.place(ws, start) {
+            self.anneal(ws, cooling, observe)
+        } else {
+            ControlFlow::Continue(())
         }
     }
 
-    /// A run from `ws.state.base` itself.
-    fn attempt<const D: usize>(
-        &self,
-        ws: &mut SoftassignWorkspace<D>,
-        pace: Pace,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        ws.state.warped.clone_from(&ws.state.base);
-        self.refine(ws, pace, observe)
+    /// Puts `ws.state` to a start: base and warped positions. False where the sets do not have such a start.
+    fn place<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, start: Start<D>) -> bool {
+        let (model, target) = (&*ws.model, &*ws.target);
+        let state = &mut ws.state;
+        match start {
+            Start::Best => {
+                state.copy_from(&ws.best);
+                return true;
+            }
+            Start::Patterns => {
+                state.copy_from(&ws.best);
+                if !ws.patterns.propose(&state.warped, target) {
+                    return false;
+                }
+                let pairs = &ws.patterns.pairs;
+                ws.consensus
+                    .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
+                return true;
+            }
+            Start::Centred | Start::Labelling => starts::centred(model, target, &mut state.base),
+            Start::Moments(rotation) => {
+                starts::moments(model, target, &rotation, &mut state.base);
+            }
+            Start::Tuples => {
+                let limited = self.options.rotation == Rotation::Limited;
+                if !ws.tuples.find(model, target, ws.spacing, limited) {
+                    return false;
+                }
+                ws.tuples.apply(model, &mut state.base);
+            }
+        }
+        state.warped.clone_from(&state.base);
+        if matches!(start, Start::Labelling) {
+            ws.correspondence.find(&state.base, target);
+            let pairs = &ws.correspondence.pairs;
+            ws.consensus
+                .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
+        }
+        true
     }
 
-    /// A run from `ws.state.warped`; kept if it is the best so far.
-    fn refine<const D: usize>(
+    /// Anneals `ws.state` from where it was put; kept if it is the best so far.
+    fn anneal<const D: usize>(
         &self,
         ws: &mut SoftassignWorkspace<D>,
-        pace: Pace,
-        observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+        cooling: Cooling,
+        observe: Observer<'_>,
     ) -> ControlFlow<()> {
-        let schedule = self.schedule(pace);
+        let schedule = self.schedule(cooling);
+        let smaller = ws.model.len().min(ws.target.len());
+        let collapse = COLLAPSED * smaller as f64;
+        let schedule = Schedule {
+            collapse,
+            ..schedule
+        };
         ws.starts += 1;
         ws.state.trace.clear();
         ws.state.iterations = 0;
@@ -277,17 +332,55 @@ impl AnnealedSoftassign {
         }
         flow
     }
+
+    /// The last stage on noisy data: the mean over the prior's scales, by their evidence, twice: the first changes matches and noise.
+    fn average_scales<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        let schedule = self.schedule(Cooling {
+            sigma: ws.best.sigma,
+            ..SLOW
+        });
+        if ws.annealer.restore(&ws.best, &mut ws.state, &schedule) > UNDECIDED {
+            return;
+        }
+        let average = |ws: &mut SoftassignWorkspace<D>| {
+            let variance = ws.best.sigma * ws.best.sigma;
+            let request = ws.annealer.request();
+            ws.scales
+                .average(request, &ws.model, &mut ws.best, variance, SCALES.affine)
+        };
+        // The first average improves the matches and the noise level that the second one starts from.
+        let likeliest = average(ws);
+        ws.annealer.prior.build(&ws.model, likeliest);
+        ws.state.copy_from(&ws.best);
+        ws.annealer.settle(&mut ws.state, &schedule, SETTLING);
+        ws.best.sigma = ws.state.sigma;
+        average(ws);
+    }
+
+    fn schedule(&self, cooling: Cooling) -> Schedule {
+        Schedule {
+            sigma: cooling.sigma,
+            floor: finish::FLOOR,
+            rate: cooling.rate,
+            least: cooling.least,
+            patience: cooling.patience,
+            limit: self.options.max_iterations,
+            sweeps: cooling.sweeps,
+            collapse: 0.0,
+            slack: self.options.slack(),
+        }
+    }
 }
 
-/// Prepares a search: nothing is found yet, the sets lie with their centroids on each other.
+/// Prepares a search: nothing is found yet.
 fn begin<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
     ws.annealer.volume = bounding_volume(&ws.target);
     ws.annealer.prior.build(&ws.model, SCALES);
     ws.annealer.soft.set_targets(&ws.target);
     ws.patterns.spacing = 0.0;
+    ws.spacing = 0.0;
     (ws.starts, ws.stopped) = (0, false);
     ws.best.energy = f64::INFINITY;
-    starts::centred(&ws.model, &ws.target, &mut ws.state.base);
 }
 
 /// Volume of the bounding box; thin sides count as a tenth of the model's radius.

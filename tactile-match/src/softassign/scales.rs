@@ -1,0 +1,300 @@
+//! The scales of the prior, averaged over by their evidence.
+//!
+//! With the soft matches fixed (weights `wᵢ`, targets `zᵢ`, noise σ²) the model is linear, `z = A c + noise`, with `A = [τ Lₛ, τₐ X]`: the factor
+//! of the unit Gaussian kernel of length ℓ, and the affine functions. For one ℓ the factor and the Gram matrix `G = [Lₛ X]ᵀ W [Lₛ X]` are
+//! computed once; every amplitude τ then costs one Cholesky factorisation of `D G D + σ² 1`, `D` the diagonal of amplitudes. Its evidence is
+//!
+//! `−ln p = (Σ wᵢ|zᵢ|² − cᵀ D b)/2σ² + (d/2) ln det(1 + D G D/σ²)`, `b = [Lₛ X]ᵀ W z`.
+
+use super::anneal::{Request, State};
+use super::axes::Axes;
+use super::prior::{Prior, PriorScales};
+use super::regression::{cholesky, dot, solve};
+use pulp::Arch;
+
+/// Lengths ℓ over which the warp may bend, in radii of the model, and amplitudes τ at the first of them: a factor √2 and 2 apart, about what
+/// the evidence of a hundred points tells apart.
+const LENGTHS: [f64; 4] = [1.2, 1.7, 2.4, 3.4];
+const AMPLITUDES: [f64; 5] = [0.35, 0.2, 0.1, 0.05, 0.025];
+
+/// Memory of the average.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ScaleAverage<const D: usize> {
+    smooth: Prior,
+    /// The affine functions 1, x, y, …, column by column.
+    affine: Vec<f64>,
+    gram: Vec<f64>,
+    factor: Vec<f64>,
+    moments: Vec<[f64; D]>,
+    solution: Vec<[f64; D]>,
+    weighted: Vec<f64>,
+    displacement: Axes<D>,
+    mean: Axes<D>,
+    /// Sum of the squared displacements under all scales, by their evidence.
+    square: Vec<f64>,
+    /// Variance of the displacements between the scales, along one axis.
+    pub(crate) spread: Vec<f64>,
+}
+
+impl<const D: usize> ScaleAverage<D> {
+    /// Replaces `state.warped` by the mean over all scales of the warps that the soft matches ask for, each weighted by its
+    /// evidence; returns the scales of most evidence. `O(I r²)` for every length.
+    pub(crate) fn average(
+        &mut self,
+        request: Request<'_, D>,
+        model: &[[f64; D]],
+        state: &mut State<D>,
+        variance: f64,
+        affine: f64,
+    ) -> PriorScales {
+        let mut best = (f64::INFINITY, PriorScales::default());
+        let mut total = 0.0;
+        for axis in &mut self.mean.0 {
+            axis.clear();
+        }
+        for length in LENGTHS {
+            self.prepare(request, model, length, variance);
+            for amplitude in AMPLITUDES {
+                let bending = amplitude * length / LENGTHS[0];
+                let energy = self.fit(request, bending, affine, variance);
+                if energy < best.0 {
+                    // What was summed so far is counted relative to the new best.
+                    let fade = if best.0.is_finite() {
+                        (energy - best.0).exp()
+                    } else {
+                        0.0
+                    };
+                    total *= fade;
+                    self.fade(fade);
+                    best = (
+                        energy,
+                        PriorScales {
+                            length,
+                            bending,
+                            affine,
+                        },
+                    );
+                }
+                let weight = (best.0 - energy).exp();
+                total += weight;
+                // Below this the mean does not change by a thousandth of the noise.
+                if weight > 1e-4 {
+                    self.add(bending, affine, weight);
+                }
+            }
+        }
+        self.spread.clear();
+        for (i, warped) in state.warped.iter_mut().enumerate() {
+            let mut square = self.square[i] / total;
+            for k in 0..D {
+                let mean = self.mean.0[k][i] / total;
+                warped[k] = state.base[i][k] + mean;
+                square -= mean * mean;
+            }
+            self.spread.push((square / D as f64).max(0.0));
+        }
+        best.1
+    }
+
+    /// Factor and Gram matrix of one length.
+    fn prepare(&mut self, request: Request<'_, D>, model: &[[f64; D]], length: f64, noise: f64) {
+        let unit = PriorScales {
+            length,
+            bending: 1.0,
+            affine: 0.0,
+        };
+        self.smooth.build(model, unit);
+        let stride = self.smooth.stride;
+        self.affine.clear();
+        self.affine
+            .extend((0..stride).map(|i| f64::from(i < model.len())));
+        for k in 0..D {
+            self.affine.extend(model.iter().map(|p| p[k]));
+            self.affine.resize((k + 2) * stride, 0.0);
+        }
+        // Modes that the noise hides at the largest amplitude are hidden at all.
+        let largest = AMPLITUDES[0] * length / LENGTHS[0];
+        let columns = self.smooth.rank_beside(noise / (largest * largest)) + D + 1;
+        self.gram.resize(columns * columns, 0.0);
+        self.weighted.resize(stride, 0.0);
+        self.moments.clear();
+        let Self {
+            smooth,
+            affine,
+            gram,
+            moments,
+            weighted,
+            ..
+        } = self;
+        let column = |p: usize| {
+            let smooth_columns = columns - D - 1;
+            if p < smooth_columns {
+                smooth.column(p)
+            } else {
+                &affine[(p - smooth_columns) * stride..][..stride]
+            }
+        };
+        Arch::new().dispatch(|| {
+            for p in 0..columns {
+                for ((v, l), w) in weighted.iter_mut().zip(column(p)).zip(request.weights) {
+                    *v = l * w;
+                }
+                for q in 0..=p {
+                    gram[p * columns + q] = dot(weighted, column(q));
+                }
+                moments.push(std::array::from_fn(|k| {
+                    dot(weighted, &request.displacements.0[k])
+                }));
+            }
+        });
+        if self.mean.0[0].is_empty() {
+            self.mean
+                .0
+                .iter_mut()
+                .for_each(|axis| axis.resize(stride, 0.0));
+            self.square.clear();
+            self.square.resize(stride, 0.0);
+        }
+    }
+
+    /// The energy of one amplitude; leaves the coefficients in `solution`.
+    fn fit(&mut self, request: Request<'_, D>, bending: f64, affine: f64, noise: f64) -> f64 {
+        let columns = self.moments.len();
+        let smooth = columns - D - 1;
+        let amplitude = |p: usize| if p < smooth { bending } else { affine };
+        self.factor.clone_from(&self.gram);
+        for p in 0..columns {
+            for q in 0..=p {
+                self.factor[p * columns + q] *= amplitude(p) * amplitude(q);
+            }
+            self.factor[p * columns + p] += noise;
+        }
+        self.solution.clear();
+        let scaled = self.moments.iter().enumerate();
+        self.solution
+            .extend(scaled.map(|(p, m)| m.map(|v| v * amplitude(p))));
+        let Self {
+            factor, solution, ..
+        } = self;
+        Arch::new().dispatch(|| {
+            cholesky(factor, columns);
+            solve(factor, columns, solution);
+        });
+        let explained: f64 = (0..columns)
+            .map(|p| {
+                (0..D)
+                    .map(|k| solution[p][k] * self.moments[p][k])
+                    .sum::<f64>()
+                    * amplitude(p)
+            })
+            .sum();
+        let log_det: f64 = (0..columns)
+            .map(|p| 2.0 * factor[p * columns + p].ln() - noise.ln())
+            .sum();
+        let squares: f64 = request
+            .displacements
+            .0
+            .iter()
+            .map(|z| {
+                z.iter()
+                    .zip(request.weights)
+                    .map(|(z, w)| w * z * z)
+                    .sum::<f64>()
+            })
+            .sum();
+        0.5 * ((squares - explained) / noise + D as f64 * log_det)
+    }
+
+    fn fade(&mut self, factor: f64) {
+        for axis in self.mean.0.iter_mut().chain([&mut self.square]) {
+            axis.iter_mut().for_each(|v| *v *= factor);
+        }
+    }
+
+    /// Adds the displacements of the present coefficients to the mean.
+    fn add(&mut self, bending: f64, affine: f64, weight: f64) {
+        let stride = self.smooth.stride;
+        let smooth = self.moments.len() - D - 1;
+        let Self {
+            smooth: prior,
+            affine: functions,
+            solution,
+            displacement,
+            mean,
+            square,
+            ..
+        } = self;
+        Arch::new().dispatch(|| {
+            for k in 0..D {
+                let axis = &mut displacement.0[k];
+                axis.clear();
+                axis.resize(stride, 0.0);
+                for (p, c) in solution.iter().enumerate() {
+                    let (column, factor) = if p < smooth {
+                        (prior.column(p), bending * c[k])
+                    } else {
+                        (&functions[(p - smooth) * stride..][..stride], affine * c[k])
+                    };
+                    axis.iter_mut()
+                        .zip(column)
+                        .for_each(|(u, l)| *u += factor * l);
+                }
+                for ((sum, squares), u) in mean.0[k].iter_mut().zip(square.iter_mut()).zip(&*axis) {
+                    *sum += weight * u;
+                    *squares += weight * u * u;
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// The energy from the low-rank factors is that of the dense covariance: `½ zᵀ(K + σ²W⁻¹)⁻¹z + ½ ln det(1 + K W/σ²)` an axis.
+    #[test]
+    fn the_evidence_is_that_of_the_dense_covariance() {
+        const N: usize = 24; // a multiple of the padding
+        let points: Vec<[f64; 2]> = (0..N)
+            .map(|i| [(i % 5) as f64 * 0.5 - 1.0, (i / 5) as f64 * 0.4 - 0.8])
+            .collect();
+        let weights: Vec<f64> = (0..N).map(|i| 0.3 + 0.02 * i as f64).collect();
+        let wanted = Axes([
+            (0..N).map(|i| 0.1 * (0.7 * i as f64).sin()).collect(),
+            (0..N).map(|i| 0.02 * (i % 4) as f64).collect::<Vec<f64>>(),
+        ]);
+        let request = Request {
+            weights: &weights,
+            displacements: &wanted,
+        };
+        let (length, bending, affine, noise) = (1.7, 0.1, 0.5, 4e-4);
+        let mut scales = ScaleAverage::default();
+        scales.prepare(request, &points, length, noise);
+        let found = scales.fit(request, bending, affine, noise);
+
+        let kernel = DMatrix::from_fn(N, N, |a, b| {
+            let (p, q) = (points[a], points[b]);
+            let square = (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
+            bending * bending * (-0.5 * square / (length * length)).exp()
+                + affine * affine * (1.0 + p[0] * q[0] + p[1] * q[1])
+        });
+        let noises = DMatrix::from_diagonal(&DVector::from_fn(N, |i, _| noise / weights[i]));
+        let covariance = kernel + noises;
+        let factor = covariance.cholesky().expect("positive definite");
+        let log_det: f64 = (0..N)
+            .map(|i| 2.0 * factor.l()[(i, i)].ln() - (noise / weights[i]).ln())
+            .sum();
+        let square = |z: &[f64]| {
+            let z = DVector::from_column_slice(z);
+            z.dot(&factor.solve(&z))
+        };
+        let expected = 0.5 * (square(&wanted.0[0]) + square(&wanted.0[1])) + log_det;
+        // The modes left out are a hundredth of the noise each.
+        assert!(
+            (found - expected).abs() < 0.02 * expected.abs(),
+            "{found} {expected}"
+        );
+    }
+}
