@@ -19,6 +19,8 @@ const FAINTER: f64 = 1e-3;
 const LEAST_SHARE: f64 = 0.02;
 /// Temperatures (variances) below this are cold: a tenth of the model's radius.
 const COLD: f64 = 0.01;
+/// Squared residuals beyond so many variances are not the noise's: one in a thousand Gaussian ones is, in the plane and in space.
+const TAIL: f64 = 16.0;
 /// Fixed-point rounds for the share of outliers.
 const SHARE_ROUNDS: usize = 8;
 
@@ -72,6 +74,8 @@ pub(crate) struct State<const D: usize> {
     pub(crate) energy: f64,
     /// Whether the temperature stopped falling before the limit.
     pub(crate) settled: bool,
+    /// Share of the matched points whose residual the noise of the others does not explain, see [`Annealer::tail`].
+    pub(crate) tail: f64,
 }
 
 impl<const D: usize> State<D> {
@@ -81,6 +85,7 @@ impl<const D: usize> State<D> {
         self.trace.clone_from(&other.trace);
         (self.sigma, self.iterations) = (other.sigma, other.iterations);
         (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
+        self.tail = other.tail;
     }
 }
 
@@ -172,6 +177,25 @@ impl<const D: usize> Annealer<D> {
         }
         state.sigma = variance.sqrt();
         ControlFlow::Continue(())
+    }
+
+    /// Share of the matched points of the last step whose distance from the leave-one-out prediction is larger than `least` and than
+    /// Gaussian noise explains, whose variance the median of all squared distances gives. Where a part of a set lies one point aside, its
+    /// points have such residuals, though the root mean square of all is small.
+    pub(crate) fn tail(&mut self, least: f64) -> f64 {
+        self.sums.clear();
+        let rows = self.soft.weight.iter().zip(&self.soft.spread);
+        let matched = rows.filter(|&(&weight, _)| weight > 0.5);
+        self.sums
+            .extend(matched.map(|(weight, spread)| spread / weight));
+        if self.sums.is_empty() {
+            return 0.0;
+        }
+        let middle = self.sums.len() / 2;
+        let median = *self.sums.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let limit = (TAIL * median / median_of_chi_squared(D)).max(least * least);
+        let beyond = self.sums.iter().filter(|&&square| square > limit);
+        beyond.count() as f64 / self.sums.len() as f64
     }
 
     /// One step from `state` in `scratch`: sets soft matches and regression to those of `state`; how undecided they are,
@@ -302,4 +326,10 @@ impl<const D: usize> Annealer<D> {
         state.energy =
             data + 0.5 * (self.regression.penalty() + D as f64 * self.regression.log_det);
     }
+}
+
+/// Median of the sum of `dimension` squared standard normal deviates, by the approximation of Wilson and Hilferty (to 1 % from 2 on).
+fn median_of_chi_squared(dimension: usize) -> f64 {
+    let n = dimension as f64;
+    n * (1.0 - 2.0 / (9.0 * n)).powi(3)
 }

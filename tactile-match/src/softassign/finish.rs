@@ -15,8 +15,8 @@ const READ: f64 = 1.4e-3;
 const ENOUGH: f64 = 0.55;
 /// The same where the caller expects most points to have no partner.
 const FEWEST: f64 = 0.1;
-/// Residuals above this many spacings: wrong basins leave 0.3 and more.
-const INDISTINCT: f64 = 0.35;
+/// Least logarithm, a point, of how much more likely an answer makes the targets than chance does: wrong basins come to less than nothing.
+pub(crate) const TELLING: f64 = 0.2;
 /// Least mean confidence of pairs.
 const DECIDED: f64 = 0.7;
 /// Soft matches below this are not reported.
@@ -34,9 +34,8 @@ pub(crate) struct Answer<const D: usize> {
 }
 
 impl<const D: usize> Answer<D> {
-    /// Why the pairs are not to be relied on: `smaller` points could have a partner, `share` of them are expected to have none, and `noise` is
-    /// the standard deviation of the residuals over the distance from a target to the next.
-    pub(crate) fn doubt(&self, smaller: usize, share: f64, noise: f64) -> Option<Doubt> {
+    /// Why the pairs are not to be relied on: `smaller` points could have a partner, `share` of them are expected to have none.
+    pub(crate) fn doubt(&self, smaller: usize, share: f64) -> Option<Doubt> {
         let pairs = self.assignment.iter().flatten().count() as f64;
         let sure: f64 = self
             .assignment
@@ -48,7 +47,6 @@ impl<const D: usize> Answer<D> {
         let enough = ENOUGH.min(1.0 - 1.5 * share).max(FEWEST);
         match () {
             () if pairs < enough * smaller as f64 => Some(Doubt::FewPairs),
-            () if noise > INDISTINCT => Some(Doubt::LargeResiduals),
             () if sure < DECIDED * pairs => Some(Doubt::Undecided),
             () => None,
         }

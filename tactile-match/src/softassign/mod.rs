@@ -115,11 +115,15 @@ pub struct SoftassignWorkspace<const D: usize> {
     scales: ScaleAverage<D>,
     /// Typical distance of a target from the next, once the search asks for it.
     spacing: f64,
+    room: f64,
     /// Share of points without a partner that the caller expects.
     expected_share: f64,
     starts: usize,
     stopped: bool,
 }
+
+/// A larger share of residuals that the noise of the others does not explain is that of a part of the set that lies aside.
+const PART_ASIDE: f64 = 0.08;
 
 impl<const D: usize> SoftassignWorkspace<D> {
     /// An empty workspace; it grows at its first use.
@@ -130,13 +134,19 @@ impl<const D: usize> SoftassignWorkspace<D> {
 
     /// Why the answer is not to be relied on.
     fn doubt(&self) -> Option<Doubt> {
-        let noise = if self.spacing > 0.0 {
-            self.best.sigma / self.spacing
-        } else {
-            0.0
-        };
         let smaller = self.model.len().min(self.target.len());
-        self.answer.doubt(smaller, self.expected_share, noise)
+        let doubt = self.answer.doubt(smaller, self.expected_share);
+        let by_chance = self.gain().is_some_and(|gain| gain < finish::TELLING);
+        doubt.or((by_chance || self.best.tail > PART_ASIDE).then_some(Doubt::LargeResiduals))
+    }
+
+    /// How much more likely the best answer makes the targets than points strewn over their bounding box, warp and all, as a logarithm
+    /// a point of the smaller set; `None` where an exact first run had nothing to be compared with.
+    fn gain(&self) -> Option<f64> {
+        let smaller = self.model.len().min(self.target.len()) as f64;
+        let strewn = self.target.len() as f64 * self.annealer.volume.ln();
+        let energy = self.best.energy;
+        energy.is_finite().then(|| (strewn - energy) / smaller)
     }
 
     /// Takes two sets, in the frame's units.

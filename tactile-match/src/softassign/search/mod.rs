@@ -70,17 +70,14 @@ const LABELLED: Cooling = Cooling {
     sigma: 0.15,
     ..SLOW
 };
-/// After an affine map of local tuples: right to a spacing or so where it was found, less far from there.
-const SEEDED: Cooling = Cooling {
-    sigma: 0.1,
-    ..REHEAT
-};
 /// A cold run with partners for less than this share of the smaller set has collapsed.
 const COLLAPSED: f64 = 0.5;
 /// Residuals are compared no finer than this.
 const RESOLUTION: f64 = 0.01;
 /// Soft partners spread more than this: the evidence of a warp cannot be told from that of its matches.
 const UNDECIDED: f64 = 0.3;
+/// Residuals below so many spacings are no sign that a part lies aside.
+const NOTICED: f64 = 0.1;
 /// Rounds in which matches and noise level follow the averaged warp; a third one moves it by a hundredth of the noise.
 const SETTLING: usize = 2;
 /// In sets of so many points a part may lie one point aside though the residuals are small; fewer have too few inner points for patterns.
@@ -166,9 +163,6 @@ impl AnnealedSoftassign {
         observe: Observer<'_>,
     ) -> ControlFlow<()> {
         self.run(ws, Start::Centred, FAST, observe)?;
-        if !self.is_exact(ws) {
-            ws.spacing = ws.patterns.typical_spacing(&ws.target);
-        }
         self.try_further(ws, observe)?;
         let smaller = ws.model.len().min(ws.target.len());
         if smaller >= PATTERNED
@@ -198,16 +192,20 @@ impl AnnealedSoftassign {
         } else {
             starts::ANY
         };
+        // Warmer, the edges of a cropped set would draw it together again.
+        let seeded = Cooling {
+            sigma: PATTERN_SIGMA * ws.spacing,
+            ..REHEAT
+        };
         let first = [
+            dense.then_some((Start::Tuples, seeded)),
             Some((Start::Best, REHEAT)),
-            dense.then_some((Start::Tuples, SEEDED)),
+            (!dense).then_some((Start::Tuples, seeded)),
             Some((Start::Centred, SLOW)),
             limited.then_some((Start::Labelling, LABELLED)),
         ];
         let moments = starts::rotations::<D>(rotations).map(|r| (Start::Moments(r), SLOW));
-        let last = [(!dense).then_some((Start::Tuples, SEEDED))];
-        let list = first.into_iter().flatten().chain(moments);
-        for (start, cooling) in list.chain(last.into_iter().flatten()) {
+        for (start, cooling) in first.into_iter().flatten().chain(moments) {
             if self.is_done(ws) {
                 return ControlFlow::Continue(());
             }
@@ -318,13 +316,17 @@ impl AnnealedSoftassign {
         ws.starts += 1;
         ws.state.trace.clear();
         ws.state.iterations = 0;
+        (ws.state.energy, ws.state.tail) = (f64::INFINITY, 0.0);
         let flow = ws.annealer.run(&mut ws.state, &schedule, observe);
         if ws.starts == 1 {
             ws.best.copy_from(&ws.state);
             if self.is_exact(ws) {
                 return flow; // there will be nothing to compare it with
             }
+            ws.spacing = ws.patterns.typical_spacing(&ws.target, 1);
+            ws.room = ws.patterns.typical_spacing(&ws.target, 2 * D);
         }
+        ws.state.tail = ws.annealer.tail(NOTICED * ws.spacing);
         ws.annealer
             .evaluate(&mut ws.state, self.options.share, RESOLUTION);
         if ws.state.energy < ws.best.energy || ws.starts == 1 {
@@ -378,7 +380,7 @@ fn begin<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
     ws.annealer.prior.build(&ws.model, SCALES);
     ws.annealer.soft.set_targets(&ws.target);
     ws.patterns.spacing = 0.0;
-    ws.spacing = 0.0;
+    (ws.spacing, ws.room) = (0.0, 0.0);
     (ws.starts, ws.stopped) = (0, false);
     ws.best.energy = f64::INFINITY;
 }

@@ -7,11 +7,14 @@ pub(super) const MANY: usize = 500;
 const PLAIN: f64 = 0.15;
 /// Share of the smaller set that an exact answer should match.
 pub(super) const COMPLETE: f64 = 0.98;
-/// Noise below this many spacings, with nearly all points matched, tells the right basin: on held-out scenes right ones left 0.13 to 0.15 and
-/// matched all, wrong ones 0.26 and matched 0.88.
-const NOISE: f64 = 0.2;
 /// Share of the smaller set that a noisy answer should match.
 const EXPLAINED: f64 = 0.9;
+
+/// Share of residuals that may be larger than the noise of the others explains: single outliers, but no part of the set.
+const STRAGGLERS: f64 = 0.03;
+
+/// The same where the data are clean and the set is dense: the points at the edge of a part that lies one point aside.
+const CLEAN_STRAGGLERS: f64 = 0.01;
 
 impl AnnealedSoftassign {
     /// Whether no further start can do better.
@@ -30,14 +33,16 @@ impl AnnealedSoftassign {
         points >= MANY
             && ws.best.sigma <= PLAIN * ws.patterns.spacing
             && ws.best.matched >= 0.8 * points as f64
+            && ws.best.tail <= CLEAN_STRAGGLERS
     }
 
     /// Whether noise explains the residuals: they are clearly below the spacing of the targets, for nearly all points.
     fn is_explained<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
         points < MANY
-            && ws.best.sigma <= NOISE * ws.spacing
+            && ws.gain().is_some_and(|gain| gain >= finish::TELLING)
             && ws.best.matched >= EXPLAINED * points as f64
+            && ws.best.tail <= STRAGGLERS
     }
 
     /// Whether the best run so far explains nearly every point of the smaller set to rounding.
@@ -48,6 +53,8 @@ impl AnnealedSoftassign {
         } else {
             0.8
         };
-        ws.best.sigma <= finish::CLEAN && ws.best.matched >= wanted * points as f64
+        ws.best.sigma <= finish::CLEAN
+            && ws.best.matched >= wanted * points as f64
+            && (ws.best.tail <= CLEAN_STRAGGLERS || points < MANY)
     }
 }
