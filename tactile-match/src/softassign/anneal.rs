@@ -123,20 +123,25 @@ impl<const D: usize> Annealer<D> {
 
     /// Soft matches of `warped` at this temperature, with their moments.
     ///
-    /// The slack weighs `(2πσ²)^{D/2}` times the density of outliers, beside Gaussian affinities.
+    /// The slack weighs `(2πσ²)^{D/2}` times the density of outliers, beside Gaussian affinities. All weights are raised to the power
+    /// `sharpness`.
     pub(crate) fn assign(
         &mut self,
         warped: &[[f64; D]],
         variance: f64,
         slack: Slack,
         sweeps: usize,
+        sharpness: f64,
     ) {
         let density = slack.share / (1.0 - slack.share) * warped.len() as f64 / self.volume;
         let weight = (TAU * variance).powf(0.5 * D as f64) * density;
-        let [rows, columns] =
-            [slack.model, slack.target].map(|side| (side * weight).max(1e-30) as f32);
-        self.soft
-            .affinities(warped, variance, FAINTER * f64::from(rows.min(columns)));
+        let [rows, columns] = [slack.model, slack.target]
+            .map(|side| (side * weight).powf(sharpness).max(1e-30) as f32);
+        self.soft.affinities(
+            warped,
+            variance / sharpness,
+            FAINTER * f64::from(rows.min(columns)),
+        );
         self.soft.normalise(sweeps, rows, columns);
         self.soft.moments(warped);
     }
@@ -235,7 +240,7 @@ impl<const D: usize> Annealer<D> {
     /// Distances are taken from where the *other* points' matches put a point: a wrong match does not confirm itself.
     fn step(&mut self, state: &mut State<D>, schedule: &Schedule, variance: f64) -> f64 {
         let predicted = std::mem::take(&mut self.predicted);
-        self.assign(&predicted, variance, schedule.slack, schedule.sweeps);
+        self.assign(&predicted, variance, schedule.slack, schedule.sweeps, 1.0);
         self.predicted = predicted;
         self.fit(state, variance);
         let (mut total, mut squares, mut within) = (0.0, 0.0, 0.0);

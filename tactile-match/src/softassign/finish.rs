@@ -18,7 +18,10 @@ const FEWEST: f64 = 0.1;
 /// Least logarithm, a point, of how much more likely an answer makes the targets than chance does: wrong basins come to less than nothing.
 pub(crate) const TELLING: f64 = 0.2;
 /// Least mean confidence of pairs.
-const DECIDED: f64 = 0.7;
+const DECIDED: f64 = 0.92;
+/// Soft matches are read with weights raised to this power. Scaling rows and columns tells two points that may be swapped apart by half the
+/// logarithm of the odds that the whole permutations have; the power makes up for it, and confidences are the shares of right pairs.
+const SHARPNESS: f64 = 1.55;
 /// Soft matches below this are not reported.
 const FAINT: f64 = 1e-3;
 
@@ -28,7 +31,8 @@ pub(crate) struct Answer<const D: usize> {
     pub(crate) warped: Vec<[f64; D]>,
     pub(crate) assignment: Vec<Option<usize>>,
     pub(crate) confidence: Vec<f64>,
-    pub(crate) covariance: Vec<[[f64; D]; D]>,
+    /// Posterior variance of the positions, along one axis.
+    pub(crate) variance: Vec<f64>,
     pub(crate) residual: f64,
     column_best: Vec<(f64, usize)>,
 }
@@ -52,37 +56,32 @@ impl<const D: usize> Answer<D> {
         }
     }
 
-    /// Reads the answer from the run's final state.
+    /// Reads the answer from the run's final state; `spread` is the variance of the positions between the scales of the prior, empty where
+    /// there is one scale.
     pub(crate) fn read(
         &mut self,
         annealer: &mut Annealer<D>,
         state: &State<D>,
         targets: &[[f64; D]],
         slack: Slack,
+        spread: &[f64],
     ) {
         let n = state.warped.len();
+        let noisy = state.sigma > CLEAN;
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
-        annealer.assign(
-            &state.warped,
-            variance,
-            slack,
-            if state.sigma <= CLEAN { 3 } else { 8 },
-        );
+        let (sweeps, sharpness) = if noisy { (8, SHARPNESS) } else { (3, 1.0) };
+        annealer.assign(&state.warped, variance, slack, sweeps, sharpness);
         annealer.soft.cap_rows();
         self.assign(&annealer.soft, n, targets.len());
-        self.place(state, targets);
-        self.covariance.clear();
+        let fit = self.place(state, targets);
         annealer.regression.variances(&annealer.prior);
+        self.variance.clear();
         for i in 0..n {
-            let variance = annealer.regression.variance[i];
-            self.covariance.push(covariance(
-                &annealer.soft,
-                targets,
-                &self.warped[i],
-                i,
-                variance,
-            ));
+            let of_warp = annealer.regression.variance[i] + spread.get(i).copied().unwrap_or(0.0);
+            // A point that was put onto its target shares the target's error.
+            let on_target = !noisy && self.assignment[i].is_some();
+            self.variance.push(if on_target { fit } else { of_warp });
         }
     }
 
@@ -113,28 +112,24 @@ impl<const D: usize> Answer<D> {
         }
     }
 
-    fn place(&mut self, state: &State<D>, targets: &[[f64; D]]) {
+    /// The positions, clean ones on their targets; the variance, along one axis, of what the warp alone leaves to the targets.
+    fn place(&mut self, state: &State<D>, targets: &[[f64; D]]) -> f64 {
+        let square =
+            |a: &[f64; D], b: &[f64; D]| (0..D).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
         self.warped.clone_from(&state.warped);
-        let (mut squares, mut pairs) = (0.0, 0);
-        for (i, j) in self
-            .assignment
-            .iter()
-            .enumerate()
-            .filter_map(|(i, j)| j.map(|j| (i, j)))
-        {
+        let (mut left, mut squares, mut pairs) = (0.0, 0.0, 0);
+        for (i, partner) in self.assignment.iter().enumerate() {
+            let &Some(j) = partner else { continue };
+            left += square(&self.warped[i], &targets[j]);
             if state.sigma <= CLEAN {
                 self.warped[i] = targets[j];
             }
-            squares += (0..D)
-                .map(|k| (self.warped[i][k] - targets[j][k]).powi(2))
-                .sum::<f64>();
+            squares += square(&self.warped[i], &targets[j]);
             pairs += 1;
         }
-        self.residual = if pairs > 0 {
-            (squares / f64::from(pairs)).sqrt()
-        } else {
-            0.0
-        };
+        let count = f64::from(pairs.max(1));
+        self.residual = (squares / count).sqrt();
+        left / (D as f64 * count)
     }
 }
 
@@ -144,22 +139,4 @@ pub(crate) fn soft_row<const D: usize>(
     i: usize,
 ) -> impl Iterator<Item = (usize, f64)> + '_ {
     soft.entries(i).filter(|&(_, p)| p > FAINT)
-}
-
-/// Spread of the soft partners about the answer, and what the warp itself leaves open.
-fn covariance<const D: usize>(
-    soft: &SoftAssignment<D>,
-    targets: &[[f64; D]],
-    warped: &[f64; D],
-    i: usize,
-    variance: f64,
-) -> [[f64; D]; D] {
-    let mut sum = [[0.0; D]; D];
-    let weight = soft.weight[i].max(FAINT);
-    for (j, p) in soft_row(soft, i) {
-        let d: [f64; D] = std::array::from_fn(|k| targets[j][k] - warped[k]);
-        (0..D).for_each(|a| (0..D).for_each(|b| sum[a][b] += p / weight * d[a] * d[b]));
-    }
-    (0..D).for_each(|k| sum[k][k] += variance);
-    sum
 }

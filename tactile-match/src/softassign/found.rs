@@ -92,7 +92,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             soft.push_row(row.iter().copied());
         }
         let square = frame.scale * frame.scale;
-        let covariance = |c: &[[f64; D]; D]| SMatrix::from_fn(|a, b| T::narrow(c[a][b] * square));
+        let covariance = |v: &f64| SMatrix::from_diagonal_element(T::narrow(v * square));
         let (unmatched_model, unmatched_target) =
             unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
@@ -103,7 +103,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             soft,
             unmatched_model,
             unmatched_target,
-            displacement_covariance: answer.covariance.iter().map(covariance).collect(),
+            displacement_covariance: answer.variance.iter().map(covariance).collect(),
             energy: workspace.best.trace.iter().map(|&e| T::narrow(e)).collect(),
             report: narrow(&self.report()),
         }

@@ -115,7 +115,6 @@ pub struct SoftassignWorkspace<const D: usize> {
     scales: ScaleAverage<D>,
     /// Typical distance of a target from the next, once the search asks for it.
     spacing: f64,
-    room: f64,
     /// Share of points without a partner that the caller expects.
     expected_share: f64,
     starts: usize,

@@ -33,8 +33,6 @@ pub(crate) struct LocalPatterns<const D: usize> {
     model: Cells<D>,
     offsets: Vec<[f64; D]>,
     distances: Vec<(f64, usize)>,
-    /// Squared distances of the nearest targets, least first.
-    nearest: Vec<f64>,
     candidates: Vec<usize>,
     /// Target, misfit, and that of the next best candidate, for every model point.
     best: Vec<(usize, f64, f64)>,
@@ -46,7 +44,7 @@ pub(crate) struct LocalPatterns<const D: usize> {
 impl<const D: usize> LocalPatterns<D> {
     /// Finds `pairs` for model points that a first warp has put at `warped`; false where the sets have no spacing to speak of.
     pub(crate) fn propose(&mut self, warped: &[[f64; D]], target: &[[f64; D]]) -> bool {
-        self.spacing = self.typical_spacing(target, 1);
+        self.spacing = self.typical_spacing(target);
         if !(self.spacing > 0.0 && self.spacing < REACH) {
             return false;
         }
@@ -62,25 +60,16 @@ impl<const D: usize> LocalPatterns<D> {
         true
     }
 
-    /// Median distance from a target to its `neighbour`-th nearest, over a sample.
-    pub(crate) fn typical_spacing(&mut self, target: &[[f64; D]], neighbour: usize) -> f64 {
+    /// Median distance from a target to the next, over a sample.
+    pub(crate) fn typical_spacing(&mut self, target: &[[f64; D]]) -> f64 {
         let step = target.len().div_ceil(SAMPLE);
         self.distances.clear();
         for i in (0..target.len()).step_by(step) {
-            self.nearest.clear();
-            self.nearest.resize(neighbour, f64::INFINITY);
-            for (j, t) in target.iter().enumerate() {
-                let mut square = squared(&difference(t, &target[i]));
-                if j == i || square >= self.nearest[neighbour - 1] {
-                    continue;
-                }
-                for kept in &mut self.nearest {
-                    if square < *kept {
-                        std::mem::swap(kept, &mut square);
-                    }
-                }
-            }
-            self.distances.push((self.nearest[neighbour - 1], i));
+            let others = target.iter().enumerate().filter(|&(j, _)| j != i);
+            let nearest = others
+                .map(|(_, t)| squared(&difference(t, &target[i])))
+                .fold(f64::INFINITY, f64::min);
+            self.distances.push((nearest, i));
         }
         let middle = self.distances.len() / 2;
         self.distances

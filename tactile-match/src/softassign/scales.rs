@@ -17,10 +17,16 @@ use pulp::Arch;
 const LENGTHS: [f64; 4] = [1.2, 1.7, 2.4, 3.4];
 const AMPLITUDES: [f64; 5] = [0.35, 0.2, 0.1, 0.05, 0.025];
 
+/// Scales whose evidence is so many units of the logarithm below the best do not count: together less than a hundredth.
+const UNLIKELY: f64 = 8.0;
+
 /// Memory of the average.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ScaleAverage<const D: usize> {
-    smooth: Prior,
+    /// The smooth part of every length.
+    smooth: [Prior; LENGTHS.len()],
+    /// The energy of every scale in the last average.
+    energies: Vec<f64>,
     /// The affine functions 1, x, y, …, column by column.
     affine: Vec<f64>,
     gram: Vec<f64>,
@@ -38,7 +44,8 @@ pub(crate) struct ScaleAverage<const D: usize> {
 
 impl<const D: usize> ScaleAverage<D> {
     /// Replaces `state.warped` by the mean over all scales of the warps that the soft matches ask for, each weighted by its
-    /// evidence; returns the scales of most evidence. `O(I r²)` for every length.
+    /// evidence; returns the scales of most evidence. `O(I r²)` for every length. Where `likely`, only scales that had some evidence in
+    /// the last average.
     pub(crate) fn average(
         &mut self,
         request: Request<'_, D>,
@@ -46,17 +53,32 @@ impl<const D: usize> ScaleAverage<D> {
         state: &mut State<D>,
         variance: f64,
         affine: f64,
+        likely: bool,
     ) -> PriorScales {
+        if !likely {
+            self.energies.clear();
+            self.energies.resize(LENGTHS.len() * AMPLITUDES.len(), 0.0);
+        }
+        let limit = self.energies.iter().copied().fold(f64::INFINITY, f64::min) + UNLIKELY;
         let mut best = (f64::INFINITY, PriorScales::default());
         let mut total = 0.0;
         for axis in &mut self.mean.0 {
             axis.clear();
         }
-        for length in LENGTHS {
-            self.prepare(request, model, length, variance);
-            for amplitude in AMPLITUDES {
+        for (l, length) in LENGTHS.into_iter().enumerate() {
+            let scales = l * AMPLITUDES.len();
+            let of_length = &self.energies[scales..scales + AMPLITUDES.len()];
+            if of_length.iter().all(|&energy| energy > limit) {
+                continue;
+            }
+            self.prepare(request, model, l, variance);
+            for (a, amplitude) in AMPLITUDES.into_iter().enumerate() {
+                if self.energies[scales + a] > limit {
+                    continue;
+                }
                 let bending = amplitude * length / LENGTHS[0];
                 let energy = self.fit(request, bending, affine, variance);
+                self.energies[scales + a] = energy;
                 if energy < best.0 {
                     // What was summed so far is counted relative to the new best.
                     let fade = if best.0.is_finite() {
@@ -79,7 +101,7 @@ impl<const D: usize> ScaleAverage<D> {
                 total += weight;
                 // Below this the mean does not change by a thousandth of the noise.
                 if weight > 1e-4 {
-                    self.add(bending, affine, weight);
+                    self.add(l, bending, affine, weight);
                 }
             }
         }
@@ -97,14 +119,15 @@ impl<const D: usize> ScaleAverage<D> {
     }
 
     /// Factor and Gram matrix of one length.
-    fn prepare(&mut self, request: Request<'_, D>, model: &[[f64; D]], length: f64, noise: f64) {
+    fn prepare(&mut self, request: Request<'_, D>, model: &[[f64; D]], l: usize, noise: f64) {
+        let length = LENGTHS[l];
         let unit = PriorScales {
             length,
             bending: 1.0,
             affine: 0.0,
         };
-        self.smooth.build(model, unit);
-        let stride = self.smooth.stride;
+        self.smooth[l].build(model, unit);
+        let stride = self.smooth[l].stride;
         self.affine.clear();
         self.affine
             .extend((0..stride).map(|i| f64::from(i < model.len())));
@@ -114,18 +137,19 @@ impl<const D: usize> ScaleAverage<D> {
         }
         // Modes that the noise hides at the largest amplitude are hidden at all.
         let largest = AMPLITUDES[0] * length / LENGTHS[0];
-        let columns = self.smooth.rank_beside(noise / (largest * largest)) + D + 1;
+        let columns = self.smooth[l].rank_beside(noise / (largest * largest)) + D + 1;
         self.gram.resize(columns * columns, 0.0);
         self.weighted.resize(stride, 0.0);
         self.moments.clear();
         let Self {
-            smooth,
+            smooth: priors,
             affine,
             gram,
             moments,
             weighted,
             ..
         } = self;
+        let smooth = &priors[l];
         let column = |p: usize| {
             let smooth_columns = columns - D - 1;
             if p < smooth_columns {
@@ -212,11 +236,11 @@ impl<const D: usize> ScaleAverage<D> {
     }
 
     /// Adds the displacements of the present coefficients to the mean.
-    fn add(&mut self, bending: f64, affine: f64, weight: f64) {
-        let stride = self.smooth.stride;
+    fn add(&mut self, l: usize, bending: f64, affine: f64, weight: f64) {
+        let stride = self.smooth[l].stride;
         let smooth = self.moments.len() - D - 1;
         let Self {
-            smooth: prior,
+            smooth: priors,
             affine: functions,
             solution,
             displacement,
@@ -224,6 +248,7 @@ impl<const D: usize> ScaleAverage<D> {
             square,
             ..
         } = self;
+        let prior = &priors[l];
         Arch::new().dispatch(|| {
             for k in 0..D {
                 let axis = &mut displacement.0[k];
@@ -269,9 +294,10 @@ mod tests {
             weights: &weights,
             displacements: &wanted,
         };
-        let (length, bending, affine, noise) = (1.7, 0.1, 0.5, 4e-4);
+        let (bending, affine, noise) = (0.1, 0.5, 4e-4);
+        let length = LENGTHS[1];
         let mut scales = ScaleAverage::default();
-        scales.prepare(request, &points, length, noise);
+        scales.prepare(request, &points, 1, noise);
         let found = scales.fit(request, bending, affine, noise);
 
         let kernel = DMatrix::from_fn(N, N, |a, b| {

@@ -14,3 +14,4 @@ mod serialtrack;
 mod series;
 mod softassign;
 mod stability;
+mod trust;

@@ -31,6 +31,9 @@ struct Cooling {
     sweeps: usize,
 }
 
+/// Further runs end when the temperature has stood still for so many iterations: matches that have not settled by then wander for hundreds.
+const PATIENCE: usize = 20;
+
 /// The first run: most scenes are easy.
 const FAST: Cooling = Cooling {
     sigma: 0.3,
@@ -44,7 +47,7 @@ const REHEAT: Cooling = Cooling {
     sigma: 0.1,
     rate: 0.9,
     least: 1.0,
-    patience: usize::MAX,
+    patience: PATIENCE,
     sweeps: 5,
 };
 /// The only run between sets that lie near each other. Residuals that stay above the temperature, whatever else moves, end it.
@@ -62,7 +65,7 @@ const SLOW: Cooling = Cooling {
     sigma: 0.3,
     rate: 0.93,
     least: 1.0,
-    patience: usize::MAX,
+    patience: PATIENCE,
     sweeps: 5,
 };
 /// After relaxation labelling, whose pairs are trusted more than a first guess.
@@ -152,8 +155,10 @@ impl AnnealedSoftassign {
             });
             ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
         }
+        let slack = self.options.slack();
+        let spread = &ws.scales.spread;
         ws.answer
-            .read(&mut ws.annealer, &ws.best, &ws.target, self.options.slack());
+            .read(&mut ws.annealer, &ws.best, &ws.target, slack, spread);
     }
 
     /// All starts in turn, as long as the best answer leaves doubt; then the scales of the prior.
@@ -323,8 +328,7 @@ impl AnnealedSoftassign {
             if self.is_exact(ws) {
                 return flow; // there will be nothing to compare it with
             }
-            ws.spacing = ws.patterns.typical_spacing(&ws.target, 1);
-            ws.room = ws.patterns.typical_spacing(&ws.target, 2 * D);
+            ws.spacing = ws.patterns.typical_spacing(&ws.target);
         }
         ws.state.tail = ws.annealer.tail(NOTICED * ws.spacing);
         ws.annealer
@@ -344,19 +348,25 @@ impl AnnealedSoftassign {
         if ws.annealer.restore(&ws.best, &mut ws.state, &schedule) > UNDECIDED {
             return;
         }
-        let average = |ws: &mut SoftassignWorkspace<D>| {
+        let average = |ws: &mut SoftassignWorkspace<D>, likely: bool| {
             let variance = ws.best.sigma * ws.best.sigma;
             let request = ws.annealer.request();
-            ws.scales
-                .average(request, &ws.model, &mut ws.best, variance, SCALES.affine)
+            ws.scales.average(
+                request,
+                &ws.model,
+                &mut ws.best,
+                variance,
+                SCALES.affine,
+                likely,
+            )
         };
         // The first average improves the matches and the noise level that the second one starts from.
-        let likeliest = average(ws);
+        let likeliest = average(ws, false);
         ws.annealer.prior.build(&ws.model, likeliest);
         ws.state.copy_from(&ws.best);
         ws.annealer.settle(&mut ws.state, &schedule, SETTLING);
         ws.best.sigma = ws.state.sigma;
-        average(ws);
+        average(ws, true);
     }
 
     fn schedule(&self, cooling: Cooling) -> Schedule {
@@ -380,7 +390,8 @@ fn begin<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
     ws.annealer.prior.build(&ws.model, SCALES);
     ws.annealer.soft.set_targets(&ws.target);
     ws.patterns.spacing = 0.0;
-    (ws.spacing, ws.room) = (0.0, 0.0);
+    ws.spacing = 0.0;
+    ws.scales.spread.clear();
     (ws.starts, ws.stopped) = (0, false);
     ws.best.energy = f64::INFINITY;
 }

@@ -1,0 +1,202 @@
+//! What the default matcher says about its own answers: standard deviations, confidences, doubts.
+
+use crate::common::{Stream, bend, reordered, rotation, scattered};
+use nalgebra::{Point, SVector};
+use tactile_match::{AnnealedSoftassign, Doubt, Matching, PointMatcher, StopReason};
+
+/// A model, its true positions, and targets with noise: `order[j]` is the model point of target `j`, rows beyond are outliers.
+struct Scene<const D: usize> {
+    model: Vec<Point<f64, D>>,
+    truth: Vec<Point<f64, D>>,
+    target: Vec<Point<f64, D>>,
+    order: Vec<usize>,
+}
+
+impl<const D: usize> Scene<D> {
+    /// Adds Gaussian noise and uniform outliers to the true positions of the points that are `seen`, and shuffles them.
+    fn new(
+        model: Vec<Point<f64, D>>,
+        truth: Vec<Point<f64, D>>,
+        seen: impl Fn(&Point<f64, D>) -> bool,
+        (noise, outliers): (f64, f64),
+        seed: u64,
+    ) -> Self {
+        let mut stream = Stream::new(seed);
+        let mut order = stream.permutation(model.len());
+        order.retain(|&i| seen(&truth[i]));
+        let mut target: Vec<_> = reordered(&truth, &order)
+            .iter()
+            .map(|p| p + SVector::from_fn(|_, _| noise * deviate(&mut stream)))
+            .collect();
+        let count = (outliers * order.len() as f64) as usize;
+        target.extend((0..count).map(|_| Point::from(SVector::from_fn(|_, _| stream.next()))));
+        Self {
+            model,
+            truth,
+            target,
+            order,
+        }
+    }
+
+    fn matched(&self) -> Matching<f64, D> {
+        AnnealedSoftassign::default()
+            .match_points(&self.model, &self.target)
+            .expect("good points")
+    }
+
+    fn is_right(&self, i: usize, j: usize) -> bool {
+        self.order.get(j) == Some(&i)
+    }
+
+    /// Share of the points in sight that have their own partner.
+    fn right(&self, found: &Matching<f64, D>) -> f64 {
+        let right = (0..self.model.len())
+            .filter(|&i| found.assignment[i].is_some_and(|j| self.is_right(i, j)));
+        right.count() as f64 / self.order.len() as f64
+    }
+}
+
+/// A normal deviate, nearly: the sum of twelve uniform ones.
+fn deviate(stream: &mut Stream) -> f64 {
+    (0..12).map(|_| stream.next()).sum::<f64>() - 6.0
+}
+
+/// 105 points, bent, with noise of a fifth of their distance.
+fn noisy<const D: usize>(seed: u64, outliers: f64) -> Scene<D> {
+    let model = scattered::<f64, D>(105, seed);
+    let truth = bend(&model, 0.06);
+    let noise = 0.15 * 105_f64.powf(-1.0 / D as f64);
+    Scene::new(model, truth, |_| true, (noise, outliers), seed + 1000)
+}
+
+/// Share of the coordinates within one standard deviation of the truth, and the calibration of the confidences: for every tenth, how
+/// many pairs, the sum of their confidences, how many are right.
+fn trust<const D: usize>(outliers: f64) -> (f64, [[f64; 3]; 10]) {
+    let (mut within, mut all) = (0, 0);
+    let mut tenths = [[0.0; 3]; 10];
+    for seed in 0..16 {
+        let scene = noisy::<D>(seed, outliers);
+        let found = scene.matched();
+        for &i in &scene.order {
+            for k in 0..D {
+                let deviation = found.displacement_covariance[i][(k, k)].sqrt();
+                within += usize::from((found.warped[i][k] - scene.truth[i][k]).abs() < deviation);
+                all += 1;
+            }
+        }
+        for (i, partner) in found.assignment.iter().enumerate() {
+            let &Some(j) = partner else { continue };
+            let tenth = &mut tenths[((10.0 * found.confidence[i]) as usize).min(9)];
+            tenth[0] += 1.0;
+            tenth[1] += found.confidence[i];
+            tenth[2] += f64::from(u8::from(scene.is_right(i, j)));
+        }
+    }
+    (f64::from(within as u32) / f64::from(all as u32), tenths)
+}
+
+fn check_trust<const D: usize>(outliers: f64) {
+    let (within, tenths) = trust::<D>(outliers);
+    // Sixteen smooth fields of some twenty modes each: their share varies by 3 % about the 68 % of a normal distribution.
+    assert!(
+        (0.60..0.76).contains(&within),
+        "{D}-D: {within} within one standard deviation"
+    );
+    let total = |column: usize| tenths.iter().map(|tenth| tenth[column]).sum::<f64>();
+    // One pair in fifty: what the confidences of sixteen scenes sum up to.
+    assert!(
+        (total(1) - total(2)).abs() < 0.02 * total(0),
+        "{D}-D: confidence {} in all, {} of {} pairs are right",
+        total(1),
+        total(2),
+        total(0)
+    );
+    for [count, confidence, right] in tenths {
+        // Fewer pairs say little: of these the share itself varies by a thirtieth.
+        if count > 200.0 {
+            assert!(
+                (confidence - right).abs() < 0.1 * count,
+                "{D}-D: of {count} pairs of confidence {} {} are right",
+                confidence / count,
+                right / count
+            );
+        }
+    }
+}
+
+#[test]
+fn standard_deviations_and_confidences_are_honest_in_the_plane() {
+    check_trust::<2>(0.0);
+    check_trust::<2>(0.2);
+}
+
+#[test]
+fn standard_deviations_and_confidences_are_honest_in_space() {
+    check_trust::<3>(0.0);
+    check_trust::<3>(0.2);
+}
+
+/// A set stretched along x and seen through its old window.
+fn stretched<const D: usize>(n: usize, stretch: f64, outliers: f64, seed: u64) -> Scene<D> {
+    let model = scattered::<f64, D>(n, seed);
+    let truth: Vec<_> = model
+        .iter()
+        .map(|p| {
+            let mut q = *p;
+            q[0] = 0.5 + stretch * (p[0] - 0.5);
+            q
+        })
+        .collect();
+    let noise = 0.02 * (n as f64).powf(-1.0 / D as f64);
+    let in_window = |p: &Point<f64, D>| (0.0..1.0).contains(&p[0]);
+    Scene::new(model, truth, in_window, (noise, outliers), seed + 7)
+}
+
+/// Of 24 scenes at most one has less than 98 % of its pairs: in a plane stretched by a quarter a part may stay one point aside.
+#[test]
+fn stretched_and_cropped_sets_are_matched() {
+    let mut short = Vec::new();
+    for stretch in [1.25, 1.5, 2.0] {
+        for outliers in [0.0, 0.1] {
+            for seed in [3, 4] {
+                let plane = stretched::<2>(300, stretch, outliers, seed);
+                let space = stretched::<3>(300, stretch, outliers, seed);
+                let right = [plane.right(&plane.matched()), space.right(&space.matched())];
+                let missed = right.into_iter().filter(|&right| right < 0.98);
+                short.extend(missed.map(|right| (stretch, outliers, seed, right)));
+            }
+        }
+    }
+    assert!(
+        short.len() <= 1,
+        "stretch, outliers, seed, right: {short:?}"
+    );
+}
+
+/// An answer that is wrong says so: sets turned by a right angle, which the default excludes, and sets that are not related.
+#[test]
+fn wrong_answers_are_doubted() {
+    for seed in [5, 6] {
+        let model = scattered::<f64, 2>(150, seed);
+        let turn = rotation::<f64, 2>(std::f64::consts::FRAC_PI_2);
+        let truth: Vec<_> = model.iter().map(|p| turn * p).collect();
+        let scene = Scene::new(model, truth, |_| true, (0.001, 0.0), seed);
+        let other = Scene {
+            target: scattered(150, seed + 50),
+            ..noisy::<2>(seed, 0.0)
+        };
+        for scene in [scene, other] {
+            let found = scene.matched();
+            let report = &found.report;
+            assert!(
+                scene.right(&found) > 0.9
+                    || matches!(
+                        report.doubt,
+                        Some(Doubt::FewPairs | Doubt::LargeResiduals | Doubt::Undecided)
+                    ),
+                "{report:?}"
+            );
+            assert!(scene.right(&found) > 0.9 || report.stop != StopReason::Exact);
+        }
+    }
+}
