@@ -193,17 +193,19 @@ choice! {
     /// assert_eq!(EstimatorChoice::default().to_string(), "best");
     /// ```
     EstimatorChoice, "estimator":
-    /// The default for the object: [`HertzSphere`](crate::elasticity::modulus::HertzSphere) for a ball, the law of its shape for a layer and a
-    /// cone, else [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
+    /// The default for the object: [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide) for a ball, on a rigid flat where no layers are
+    /// known, the law of its shape for a layer and a cone, else [`PaperRatio`](crate::elasticity::modulus::PaperRatio).
     Best = "best",
     /// [`PaperRatio`](crate::elasticity::modulus::PaperRatio): stress over strain, equation (31).
     PaperRatio = "paper-ratio",
     /// [`StressStrainRegression`](crate::elasticity::modulus::StressStrainRegression) over three loads or more.
     Regression = "regression",
-    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere); a ball alone.
+    /// [`HertzSphere`](crate::elasticity::modulus::HertzSphere), the waveguide's layers in series: small contacts on deep layers; a ball alone.
     Sphere = "sphere",
-    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide); a ball alone, on a waveguide whose layers are known.
+    /// [`SphereOnWaveguide`](crate::elasticity::modulus::SphereOnWaveguide); a ball alone, on the waveguide's layers or a rigid flat.
     SphereOnWaveguide = "sphere-on-waveguide",
+    /// [`TabulatedContact`](crate::elasticity::modulus::TabulatedContact); a ball alone, and with a table of its contacts.
+    TabulatedContact = "tabulated-contact",
     /// [`SphereBetweenPlates`](crate::elasticity::modulus::SphereBetweenPlates); a ball alone.
     SphereBetweenPlates = "sphere-between-plates",
     /// [`TataraSphere`](crate::elasticity::modulus::TataraSphere); a ball alone.

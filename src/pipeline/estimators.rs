@@ -15,7 +15,7 @@ pub(super) type SharedEstimator = Arc<dyn ModulusEstimator<f64> + Send + Sync>;
 
 /// The estimator where none is chosen. This is the place to change the default.
 ///
-/// A ball: Hertz's law, both bodies yielding, the waveguide's layers in series. A sample on a rigid base, a cone: their own laws. Else
+/// A ball: the linear contact with the waveguide's layers, or with a rigid flat, corrected for finite strain. A sample on a rigid base, a cone: their own laws. Else
 /// stress over strain, equation (31).
 fn default_of(
     object: Object,
@@ -25,9 +25,7 @@ fn default_of(
         Object::Sphere {
             radius_m,
             poisson_ratio,
-        } => shared(
-            HertzSphere::new(radius_m, poisson_ratio)?.with_other_body(pressed_on(waveguide)),
-        ),
+        } => shared(on_waveguide(radius_m, poisson_ratio, waveguide)?),
         Object::Layer {
             indenter_radius_m,
             thickness_m,
@@ -41,7 +39,7 @@ fn default_of(
     }
 }
 
-/// Every estimator that fits the object, the paper's ratio first.
+/// Estimators to lay beside the chosen one, the paper's ratio first; for a ball Hertz with the layers in series.
 pub(super) fn that_fit(
     object: Object,
     waveguide: Option<&Waveguide<f64>>,
@@ -56,7 +54,14 @@ pub(super) fn that_fit(
                 let punch = FlatPunch::new(radius_m, poisson_ratio)?;
                 estimators.push(shared(punch.with_other_body(pressed_on(waveguide)))?);
             }
-            Object::Sphere { .. } | Object::Layer { .. } | Object::Cone { .. } => {
+            Object::Sphere {
+                radius_m,
+                poisson_ratio,
+            } => {
+                let ball = HertzSphere::new(radius_m, poisson_ratio)?;
+                estimators.push(shared(ball.with_other_body(pressed_on(waveguide)))?);
+            }
+            Object::Layer { .. } | Object::Cone { .. } => {
                 estimators.push(default_of(object, waveguide)?);
             }
             Object::Unknown { .. } => {}
@@ -96,8 +101,10 @@ fn named(
         }
         EstimatorChoice::SphereOnWaveguide => {
             let (radius_m, poisson_ratio) = ball()?;
-            let layers = waveguide.ok_or(needs("the layers of the waveguide"))?;
-            SphereOnWaveguide::new(radius_m, poisson_ratio, layers, Bond::Bonded).and_then(shared)
+            on_waveguide(radius_m, poisson_ratio, waveguide).and_then(shared)
+        }
+        EstimatorChoice::TabulatedContact => {
+            return Err(needs("a table of the ball's contacts"));
         }
         EstimatorChoice::SphereBetweenPlates => {
             let (radius_m, poisson_ratio) = ball()?;
@@ -183,6 +190,17 @@ fn layer(
         Bond::Bonded,
         theory,
     )
+}
+
+/// A ball on the layers of a waveguide; on a rigid flat where they are not known.
+fn on_waveguide(
+    radius_m: f64,
+    poisson_ratio: f64,
+    waveguide: Option<&Waveguide<f64>>,
+) -> Result<SphereOnWaveguide, ElasticityError> {
+    let rigid = Waveguide::rigid();
+    let guide = waveguide.unwrap_or(&rigid);
+    SphereOnWaveguide::new(radius_m, poisson_ratio, guide, Bond::Bonded)
 }
 
 /// Stress over strain, counted from the first load, as the paper matches two pressed frames.

@@ -1,13 +1,15 @@
 //! A simulated press, measured blindly and laid beside its truth.
+use super::choice::EstimatorChoice;
 use super::composition::Pipeline;
+use super::config::StagesConfig;
 use super::error::PipelineError;
 use super::object::Object;
 use super::press::Press;
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::force::CalibrationPair;
 use crate::simulate::{
-    Branch, CalibrationOptions, PressOptions, PressScene, PressSimulation, SimulateError,
-    WaveguideLayer,
+    Branch, CalibrationOptions, ContactLaw, PressOptions, PressScene, PressSimulation,
+    SimulateError, WaveguideLayer,
 };
 
 /// The truth of one simulated frame.
@@ -115,7 +117,8 @@ impl Trial {
     }
 
     /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the ball's radius and the
-    /// waveguide, and nothing of the truth.
+    /// waveguide, and nothing of the truth. Where the scene obeys a closed form (Hertz, Tatara), the estimator is Hertz's with the layers in series
+    /// ([`EstimatorChoice::Sphere`]), whose law the truth shares; where its contacts come from elsewhere, the default.
     ///
     /// # Errors
     /// [`PipelineError`].
@@ -134,7 +137,14 @@ impl Trial {
             poisson_ratio: ball.material.poisson_ratio,
         };
         let pipeline = Pipeline::from_pairs(&self.pairs, self.simulation.pixel_size_m, object)?;
-        Ok(pipeline.with_waveguide(waveguide))
+        let config = StagesConfig {
+            estimator: match options.law {
+                ContactLaw::Hertz | ContactLaw::Tatara => EstimatorChoice::Sphere,
+                _ => EstimatorChoice::default(),
+            },
+            ..StagesConfig::default()
+        };
+        pipeline.with_waveguide(waveguide).with_stages(&config)
     }
 
     /// The frames on a pipeline.

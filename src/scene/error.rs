@@ -83,6 +83,14 @@ pub enum SceneError {
     /// The scene file itself cannot be read.
     #[error(transparent)]
     Open(Box<ReadError>),
+    /// A contact table whose contacts make no table, or of another version.
+    #[error("{}: {message}", file.display())]
+    ContactTable {
+        /// The table's file.
+        file: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
     /// A frame differs in size from the reference.
     #[error(
         "{}: field `{field}`: the image {} is {} × {} pixels, but the reference {} is {} × {}",

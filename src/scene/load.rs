@@ -1,5 +1,6 @@
 //! The files of a scene, read and checked against each other.
-use super::{CalibrationSource, Scene, SceneError};
+use super::{CalibrationSource, Scene, SceneError, read_contact_table};
+use crate::elasticity::contact::ContactTable;
 use crate::force::CalibrationPair;
 use crate::io::{
     Column, Quantity, ReadError, read_grey_image, read_grey_image_of_bits, read_table,
@@ -60,6 +61,8 @@ pub struct SceneData {
     pub frames: Vec<Array2<u8>>,
     /// The calibration.
     pub calibration: LoadedCalibration,
+    /// The table of contacts, where the scene names one.
+    pub contact_table: Option<ContactTable>,
 }
 
 impl Scene {
@@ -89,6 +92,9 @@ impl Scene {
             reference,
             frames,
             calibration: self.load_calibration()?,
+            contact_table: (self.contact_table.as_ref())
+                .map(read_contact_table)
+                .transpose()?,
         })
     }
 

@@ -1,9 +1,12 @@
 //! A scene as a pipeline with its frames.
+use super::contact_table::guide;
 use super::{LoadedCalibration, Scene, SceneData, SceneError};
-use crate::elasticity::contact::{Layer, Waveguide};
+use crate::elasticity::ElasticityError;
+use crate::elasticity::modulus::TabulatedContact;
 use crate::force::{ContactOptions, DriftCorrection, Estimate, ForceOptions};
 use crate::pipeline::{
-    DarkContact, LightContact, Measurement, Pipeline, PipelineError, Press, SurfaceInput,
+    DarkContact, EstimatorChoice, LightContact, Measurement, Object, Pipeline, PipelineError,
+    Press, SurfaceInput,
 };
 
 impl Scene {
@@ -56,7 +59,7 @@ impl Scene {
     /// # let pairs = [0.0, 1.0, 2.0].map(|f| CalibrationPair::loading(1e5 * f, f)).to_vec();
     /// # let frame = ndarray::Array2::from_elem((20, 30), 10);
     /// # let calibration = LoadedCalibration::Pairs(pairs);
-    /// # let data = SceneData { reference: frame.clone(), frames: vec![frame], calibration };
+    /// # let data = SceneData { reference: frame.clone(), frames: vec![frame], calibration, contact_table: None };
     /// let pipeline = scene.pipeline(&data)?.with_control_points(60); // the scene says: strain = "hencky"
     /// let mut press = scene.press(&pipeline, &data)?;
     /// assert!(press.contact(0)?.is_none(), "as grey as the reference");
@@ -100,11 +103,6 @@ impl Scene {
     }
 
     fn build(&self, data: &SceneData) -> Result<Pipeline, PipelineError> {
-        let layer = |l: &super::SceneLayer| Layer {
-            thickness_m: l.thickness_m,
-            youngs_modulus_pa: l.youngs_modulus_pa,
-            poisson_ratio: l.poisson_ratio,
-        };
         let pipeline = match &data.calibration {
             LoadedCalibration::Pairs(pairs) => {
                 let contact =
@@ -132,12 +130,29 @@ impl Scene {
         let pipeline = pipeline
             .with_flat_field(self.flat_field)
             .with_object_errors(self.radius_error_m, self.poisson_ratio_error)?;
+        let guide = guide(&self.layers).map_err(PipelineError::Material)?;
+        let pipeline = match (&data.contact_table, self.stages.estimator) {
+            (Some(table), EstimatorChoice::Best | EstimatorChoice::TabulatedContact) => {
+                let Object::Sphere {
+                    radius_m,
+                    poisson_ratio,
+                } = self.object
+                else {
+                    return Err(PipelineError::WrongEstimator {
+                        estimator: EstimatorChoice::TabulatedContact,
+                        needs: "a ball as the object",
+                    });
+                };
+                let tabulated =
+                    TabulatedContact::new(table.clone(), radius_m, poisson_ratio, &guide);
+                pipeline.with_estimator(tabulated.map_err(PipelineError::Material)?)
+            }
+            _ => pipeline,
+        };
         if self.layers.is_empty() {
             return Ok(pipeline);
         }
-        let layers = self.layers.iter().map(layer).collect();
-        let waveguide = Waveguide::new(layers).map_err(PipelineError::Material)?;
-        Ok(pipeline.with_waveguide(waveguide))
+        Ok(pipeline.with_waveguide(guide))
     }
 
     /// The pipeline's error with the field that it comes from.
@@ -150,6 +165,9 @@ impl Scene {
             },
             (PipelineError::Calibration(_), _) => "calibration.pairs".into(),
             (PipelineError::DepthTable(_), _) => "calibration.depth_table".into(),
+            (PipelineError::Material(ElasticityError::TableMismatch { .. }), _) => {
+                "contact_table".into()
+            }
             (PipelineError::Material(_), _) => "waveguide.layers".into(),
             (PipelineError::WrongEstimator { .. }, _) => "stages.estimator".into(),
             (PipelineError::Sensor(_), _) => "reference".into(),

@@ -38,9 +38,10 @@
 //! object = { shape = "sphere", radius_m = 3e-3, radius_error_m = 5e-6, poisson_ratio = 0.5, poisson_ratio_error = 0.002 }
 //! ```
 //!
-//! More may stand there (`flat_field`, `illumination_drift` and `bits` above the first table):
+//! More may stand there (`flat_field`, `illumination_drift`, `bits` and `contact_table` above the first table):
 //!
 //! ```toml
+//! contact_table = "table.toml"           # of this ball and waveguide, as `tactile table` makes it: the estimator is then "tabulated-contact"
 //! bits = 12                              # of the camera, where its samples stand in files of 16 bits that do not say so
 //! illumination_drift = "none"            # "automatic", the default with a sensor: changes of the lamps are divided out where they can be told
 //! flat_field = "reference"               # divides by the reference's own brightness: corrects vignetting; not by default
@@ -52,12 +53,13 @@
 //! matcher = "annealed-softassign"        # or "relaxation-labelling", "coherent-point-drift", "linear-assignment", "nearest-neighbour"
 //! warp = "thin-plate-spline"             # or "cubic-spline", "affine", "rigid"
 //! strain = "green-lagrange"              # or "euler-almansi", "hencky", "biot", "infinitesimal"
-//! estimator = "best"                     # or "paper-ratio", "regression"; of a ball "sphere", "sphere-on-waveguide", "sphere-between-plates",
-//!                                        # "tatara-sphere"; "bonded-layer", "cone", "flat-punch"; "least-akaike" of a ball's or a layer's laws
+//! estimator = "best"                     # or "paper-ratio", "regression"; of a ball "sphere", "sphere-on-waveguide", "tabulated-contact",
+//!                                        # "sphere-between-plates", "tatara-sphere"; "bonded-layer", "cone", "flat-punch"; "least-akaike" of a ball's or a layer's laws
 //! ```
 //!
 //! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`io::image`](crate::io::image)).
 //! Relative paths are relative to the scene file. Fields counted in errors (`frames[2]`) start at 1.
+mod contact_table;
 mod error;
 pub(crate) mod fields;
 mod load;
@@ -65,6 +67,9 @@ mod measure;
 mod stages;
 mod tables;
 
+#[cfg(feature = "fem")]
+pub use contact_table::solve_contact_table;
+pub use contact_table::{read_contact_table, write_contact_table};
 pub use error::SceneError;
 pub use load::{LoadedCalibration, SceneData};
 
@@ -216,6 +221,8 @@ pub struct Scene {
     pub object: Object,
     /// The waveguide's layers from the object's side; empty: taken as rigid.
     pub layers: Vec<SceneLayer>,
+    /// A table of the ball's contacts with the waveguide, which then tells the modulus unless `stages` names another estimator.
+    pub contact_table: Option<PathBuf>,
     /// The stages, by name.
     pub stages: StagesConfig,
 }
@@ -285,6 +292,7 @@ impl Scene {
             frames,
             object: tables::object(&fields)?,
             layers: tables::layers(&fields)?,
+            contact_table: tables::contact_table(&fields, folder)?,
             stages: stages::read(&fields)?,
         })
     }

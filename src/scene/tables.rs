@@ -2,10 +2,10 @@
 use super::fields::{Fields, poisson, positive};
 use super::{CalibrationSource, SceneError, SceneFrame, SceneLayer};
 use crate::pipeline::Object;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What may stand at the top of a scene file.
-pub(super) const FIELDS: [&str; 11] = [
+pub(super) const FIELDS: [&str; 12] = [
     "reference",
     "sensor",
     "pixel_size_m",
@@ -16,6 +16,7 @@ pub(super) const FIELDS: [&str; 11] = [
     "frames",
     "object",
     "waveguide",
+    "contact_table",
     "stages",
 ];
 
@@ -135,6 +136,17 @@ pub(super) fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFram
         })
     };
     tables.iter().map(frame).collect()
+}
+
+pub(super) fn contact_table(
+    fields: &Fields<'_>,
+    folder: &Path,
+) -> Result<Option<PathBuf>, SceneError> {
+    if !fields.has("contact_table") {
+        return Ok(None);
+    }
+    let path = fields.string("contact_table", "the path of a contact table (TOML)")?;
+    Ok(Some(folder.join(path)))
 }
 
 pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {

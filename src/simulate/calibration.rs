@@ -172,7 +172,7 @@ impl PressScene {
         let reference = exposure(dark.view(), 0);
         // A table belongs to the scene's own object.
         let law = match &self.options().law {
-            ContactLaw::Tabulated(_) => ContactLaw::Hertz,
+            ContactLaw::Tabulated(_) | ContactLaw::FiniteElements => ContactLaw::Hertz,
             closed_form => closed_form.clone(),
         };
         let mut gauge = row_stream(seed, Purpose::Gauge, 0, 0);

@@ -55,20 +55,23 @@ impl Contact {
         law: &ContactLaw,
         force_n: f64,
     ) -> Result<Self, SimulateError> {
-        within("force_n", force_n, 0.0, law.largest_force_n())?;
+        let largest = law.largest_force_n(sphere, waveguide)?;
+        within("force_n", force_n, 0.0, largest)?;
         let hertz = Self::hertz(sphere, waveguide, force_n);
+        if let Some(states) = law.states(sphere, waveguide)? {
+            let state = (force_n > 0.0).then(|| ContactState::at_force(&states, force_n));
+            return Ok(match state.flatten() {
+                Some(state) => hertz.with_state(state),
+                None => hertz,
+            });
+        }
         Ok(match law {
-            ContactLaw::Hertz => hertz,
             ContactLaw::Tatara => Self {
                 indentation_m: hertz.indentation_m
                     - far_side_m(sphere, force_n, hertz.contact_radius_m),
                 ..hertz
             },
-            ContactLaw::Tabulated(_) if force_n == 0.0 => hertz,
-            ContactLaw::Tabulated(states) => match ContactState::at_force(states, force_n) {
-                Some(state) => hertz.with_state(state),
-                None => hertz,
-            },
+            _ => hertz,
         })
     }
 

@@ -1,10 +1,12 @@
 //! Where the contact at a force comes from: a closed form or states computed elsewhere.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use super::contact_state::ContactState;
 use super::error::{SimulateError, at_least, within};
-use super::material::Sphere;
+use super::finite_elements;
+use super::material::{Sphere, Waveguide};
 
 /// Where pressure, contact radius and indentation at a force come from.
 ///
@@ -35,6 +37,11 @@ pub enum ContactLaw {
     ///
     /// Y. Tatara, J. Eng. Mater. Technol. 113 (1991) 285–291.
     Tatara,
+    /// Finite elements at finite strain: the contacts of a ball of 3 mm of [`CL2000X`](super::Elastic::CL2000X) or
+    /// [`CL2003X`](super::Elastic::CL2003X) on the [default waveguide](super::Waveguide::default) up to 1.3 N, neo-Hookean and without friction, as
+    /// `examples/contact_states.rs` computes them. Another ball or waveguide is refused: give its contacts as
+    /// [`Tabulated`](Self::Tabulated). Between the states as there.
+    FiniteElements,
     /// States computed elsewhere, with growing force. A load at a state's force is that state; between two states radius, pressure
     /// over its mean, and height over F^⅔ at equal r/a are linear in F^⅓; below the first, that one shrinks as Hertz's contact does. A
     /// load beyond the last state is refused. [`PressScene::calibrate`](super::PressScene::calibrate), which presses another
@@ -61,10 +68,36 @@ impl ContactLaw {
     }
 
     /// The largest force with a contact.
-    pub(super) fn largest_force_n(&self) -> f64 {
+    ///
+    /// # Errors
+    /// [`SimulateError::NoFiniteElements`].
+    pub(super) fn largest_force_n(
+        &self,
+        sphere: &Sphere,
+        waveguide: &Waveguide,
+    ) -> Result<f64, SimulateError> {
+        let states = self.states(sphere, waveguide)?;
+        Ok(states.map_or(f64::MAX, |s| s.last().map_or(0.0, |last| last.force_n)))
+    }
+
+    /// The states of a contact computed elsewhere; none for a closed form.
+    ///
+    /// # Errors
+    /// [`SimulateError::NoFiniteElements`].
+    pub(super) fn states(
+        &self,
+        sphere: &Sphere,
+        waveguide: &Waveguide,
+    ) -> Result<Option<Cow<'_, [ContactState]>>, SimulateError> {
         match self {
-            Self::Hertz | Self::Tatara => f64::MAX,
-            Self::Tabulated(states) => states.last().map_or(0.0, |s| s.force_n),
+            Self::Hertz | Self::Tatara => Ok(None),
+            Self::FiniteElements => {
+                let states = finite_elements::states(sphere, waveguide);
+                states
+                    .map(|s| Some(Cow::Owned(s)))
+                    .ok_or(SimulateError::NoFiniteElements)
+            }
+            Self::Tabulated(states) => Ok(Some(Cow::Borrowed(states))),
         }
     }
 }

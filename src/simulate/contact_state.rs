@@ -111,7 +111,7 @@ impl ContactState {
 
     /// ∫ p dS as interpolated: with q = p² linear in s = r², π ∫ √q ds over a stretch from q₀ to q₁ is
     /// (2π/3)·Δs·(q₀ + √(q₀q₁) + q₁)/(√q₀ + √q₁).
-    fn carried_force_n(&self) -> f64 {
+    pub(super) fn carried_force_n(&self) -> f64 {
         let rim = self.contact_radius_m;
         let mut force = 0.0;
         for pair in self.radius_m.windows(2) {

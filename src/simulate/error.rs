@@ -25,6 +25,11 @@ pub enum SimulateError {
         /// The value given.
         found: f64,
     },
+    /// Finite-element contacts of a ball or a waveguide that the crate has none of.
+    #[error(
+        "finite-element contacts are there for balls of 3 mm radius of CL2000X or CL2003X on the default waveguide: give others as tabulated states"
+    )]
+    NoFiniteElements,
     /// A list has fewer entries than needed.
     #[error("{field} has {found} entries, expected at least {expected}")]
     TooFew {

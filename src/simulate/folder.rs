@@ -7,6 +7,7 @@ use ndarray::ArrayView2;
 use toml::{Table, Value};
 
 use super::calibration::CalibrationOptions;
+use super::contact_law::ContactLaw;
 use super::error::SimulateError;
 use super::press::PressScene;
 
@@ -131,6 +132,12 @@ fn description(scene: &PressScene) -> Table {
         ),
     ]);
     let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
+    // A closed form is read by its own law; contacts from elsewhere by the default one.
+    let estimator = match options.law {
+        ContactLaw::Hertz | ContactLaw::Tatara => "sphere",
+        _ => "best",
+    };
+    let stages = table([("estimator", Value::String(estimator.to_owned()))]);
     table([
         ("reference", Value::String("reference.png".to_owned())),
         ("pixel_size_m", size),
@@ -147,6 +154,7 @@ fn description(scene: &PressScene) -> Table {
         ),
         ("object", Value::Table(object)),
         ("waveguide", Value::Table(table([("layers", layers)]))),
+        ("stages", Value::Table(stages)),
     ])
 }
 

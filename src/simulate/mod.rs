@@ -39,6 +39,7 @@ mod contact;
 mod contact_law;
 mod contact_state;
 mod error;
+mod finite_elements;
 #[cfg(feature = "scene")]
 mod folder;
 mod hostile;

@@ -120,12 +120,12 @@ impl PressScene {
     /// # Errors
     /// [`SimulateError::OutOfRange`] for a cycle without meaning.
     pub fn stream(&self, cycle: LoadCycle) -> Result<FrameStream, SimulateError> {
-        let law = &self.options().law;
+        let options = self.options();
         within(
             "largest_force_n",
             cycle.largest_force_n,
             0.0,
-            law.largest_force_n(),
+            (options.law).largest_force_n(&options.object, &options.waveguide)?,
         )?;
         positive("period_s", cycle.period_s)?;
         not_negative("rest_s", cycle.rest_s)?;

@@ -3,7 +3,7 @@ use crate::context::Context;
 use crate::failure::{Exit, Failure};
 use crate::{
     calibrate, depth, force, indent, integrate, light, match_points, measure, numbers, reconstruct,
-    strain, stream, warp,
+    strain, stream, table, warp,
 };
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -41,6 +41,7 @@ Examples, one for each subcommand:
   tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile light --rays 2000
+  tactile table examples/data/press/scene.toml --moduli 4
 
 Exit codes:
   0    all that was asked for is there
@@ -63,6 +64,7 @@ pub enum Command {
     Indent(indent::Arguments),
     Stream(stream::Arguments),
     Light(light::Arguments),
+    Table(table::Arguments),
 }
 
 impl Command {
@@ -80,6 +82,7 @@ impl Command {
             Self::Indent(arguments) => indent::run(arguments, context),
             Self::Stream(arguments) => stream::run(arguments, context),
             Self::Light(arguments) => light::run(arguments, context),
+            Self::Table(arguments) => table::run(arguments, context),
         }
     }
 }

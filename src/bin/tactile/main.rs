@@ -26,6 +26,7 @@ mod progress;
 mod reconstruct;
 mod strain;
 mod stream;
+mod table;
 mod warp;
 
 use arguments::Program;

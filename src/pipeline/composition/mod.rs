@@ -30,7 +30,7 @@ use std::sync::Arc;
 /// | points to matches | [`with_matcher`](Self::with_matcher) | [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by |
 /// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation |
 /// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
-/// | loads to the modulus | [`with_estimator`](Self::with_estimator) | Hertz's law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
+/// | loads to the modulus | [`with_estimator`](Self::with_estimator) | the layered law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
 ///
 /// A setter takes any value that implements the stage's trait, a `Box` or an `Arc` of one too, so that a program can choose at run time;
 /// [`with_stages`](Self::with_stages) takes stages by the names of a configuration. The stages are shared: a clone copies

@@ -162,7 +162,7 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
     };
     assert_eq!(
         modulus(EstimatorChoice::Best),
-        modulus(EstimatorChoice::Sphere)
+        modulus(EstimatorChoice::SphereOnWaveguide)
     );
     assert_eq!(
         modulus(EstimatorChoice::Sphere).1,
@@ -197,7 +197,11 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
         assert_eq!(modulus(choice), (Ok(kind), 0), "{choice}");
     }
     assert!(modulus(EstimatorChoice::LeastAkaike).0.is_ok());
-    for choice in [EstimatorChoice::BondedLayer, EstimatorChoice::Cone] {
+    for choice in [
+        EstimatorChoice::BondedLayer,
+        EstimatorChoice::Cone,
+        EstimatorChoice::TabulatedContact,
+    ] {
         let error = modulus(choice).0.unwrap_err();
         assert!(
             matches!(error, PipelineError::WrongEstimator { .. }),

@@ -3,7 +3,7 @@ use super::{Answer, Answers};
 use nalgebra::Matrix3;
 use ndarray::Array2;
 use tactile_imaging::elasticity::modulus::{
-    FlatPunch, ModulusEstimate, PaperRatio, StrainReference,
+    FlatPunch, HertzSphere, ModulusEstimate, PaperRatio, StrainReference,
 };
 use tactile_imaging::force::{CalibrationPair, Estimate};
 use tactile_imaging::pipeline::{
@@ -248,9 +248,11 @@ fn dark() -> Vec<Answer> {
             .with_scale_errors(0.01, 0.002)
             .expect("errors")
             .with_control_points(80);
-        if name == "punch/" {
-            pipeline = pipeline.with_estimator(FlatPunch::new(2e-3, 0.45).expect("a punch"));
-        }
+        pipeline = if name == "punch/" {
+            pipeline.with_estimator(FlatPunch::new(2e-3, 0.45).expect("a punch"))
+        } else {
+            pipeline.with_estimator(HertzSphere::new(4e-3, 0.5).expect("a ball"))
+        };
         let (reference, frames) = (frame(0.0), [frame(0.4e-3), frame(0.6e-3)]);
         let mut measured = pipeline.press(reference.view()).expect("a press");
         measured.add_gauged_frame(frames[0].view(), Some(exactly(0.4)));
@@ -266,7 +268,11 @@ fn dark() -> Vec<Answer> {
 fn stages_by_name() -> Vec<Answer> {
     let mut answers = Answers::of("by name");
     let trial = trial(&[0.7, 1.2], 2);
-    let default = StagesConfig::default();
+    let default = StagesConfig {
+        // The law that the simulated contacts obey.
+        estimator: EstimatorChoice::Sphere,
+        ..StagesConfig::default()
+    };
     let mut configs: Vec<(&str, StagesConfig)> = Vec::new();
     for reconstruction in [
         ReconstructionChoice::TsaiShah,

@@ -220,6 +220,9 @@ fn stages_by_name_are_those_given_as_values() {
     .unwrap();
     let path = write_folder(&made, &CalibrationOptions::default(), folder.path()).unwrap();
     let text = fs::read_to_string(&path).unwrap();
+    // Without the simulator's own choice of an estimator.
+    let text = text.replace("[stages]\nestimator = \"sphere\"\n", "");
+    fs::write(&path, &text).unwrap();
     let by_name = |table: &str| {
         let scene = Scene::parse(&format!("{text}\n[stages]\n{table}"), &path).unwrap();
         measured(&scene, &scene.pipeline(&scene.load().unwrap()).unwrap())

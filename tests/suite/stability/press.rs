@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
-use tactile_imaging::pipeline::{Object, Trial};
+use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
 
 /// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
@@ -84,6 +84,12 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     Pipeline::from_pairs(&pairs, size, object)
         .expect("a calibration")
         .with_waveguide(waveguide)
+        .with_stages(&StagesConfig {
+            // The law that the simulated contacts obey.
+            estimator: EstimatorChoice::Sphere,
+            ..StagesConfig::default()
+        })
+        .expect("stages")
 }
 
 /// Exposures without contact, from which the noise of all pixels is measured, and the frames of a press.

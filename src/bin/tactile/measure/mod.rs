@@ -54,12 +54,24 @@ struct Simulation {
     /// Simulation: the loads in newtons.
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', default_values_t = [0.7, 1.2], value_parser = positive, conflicts_with = "scene")]
     forces: Vec<f64>,
+    /// Simulation: where the contacts come from. Finite elements are there for the two polymers, 3 mm, up to 1.3 N.
+    #[arg(long, value_enum, default_value_t = Physics::FiniteElements, conflicts_with = "scene")]
+    physics: Physics,
     /// Simulation: seed of the camera's noise.
     #[arg(long, default_value_t = 1, conflicts_with = "scene")]
     seed: u64,
     /// Simulation: no noise, blur, vignetting or background.
     #[arg(long, conflicts_with = "scene")]
     ideal_camera: bool,
+}
+
+/// What the simulated contacts obey.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Physics {
+    /// Finite elements at finite strain, on the layers; read by the default estimator.
+    FiniteElements,
+    /// Hertz with the layers in series; read by the same law.
+    Hertz,
 }
 
 /// The paper's two polymers.
@@ -76,6 +88,7 @@ Examples:
   tactile measure
   tactile measure examples/data/press/scene.toml --out target/measure
   tactile measure --polymer cl2003x --seed 7 --json
+  tactile measure --physics hertz --radius-mm 20
 
 SCENE.toml (paths are relative to it; PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601):
 

@@ -1,5 +1,5 @@
 //! Where the frames come from: the simulator or a scene file.
-use super::{Arguments, Polymer, Simulation};
+use super::{Arguments, Physics, Polymer, Simulation};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::progress::waiting;
@@ -30,7 +30,13 @@ impl Source {
         let options = options(&arguments.simulation);
         let trial = waiting(job, || Trial::new(options, &CalibrationOptions::default()));
         let trial = trial
-            .map_err(|error| Failure::input(format!("the press cannot be simulated: {error}")))?;
+            .map_err(|error| {
+                let hint = match arguments.simulation.physics {
+                    Physics::FiniteElements => ", or try --physics hertz",
+                    Physics::Hertz => "",
+                };
+                Failure::input(format!("the press cannot be simulated: {error}{hint}"))
+            })?;
         Ok(Self::Simulated(Box::new(trial)))
     }
 
@@ -119,6 +125,9 @@ fn options(simulation: &Simulation) -> PressOptions {
         loads: simulation.forces.iter().map(|&f| Load::normal(f)).collect(),
         camera,
         seed: simulation.seed,
-        ..PressOptions::default()
+        ..match simulation.physics {
+            Physics::FiniteElements => PressOptions::finite_elements(),
+            Physics::Hertz => PressOptions::default(),
+        }
     }
 }

@@ -105,6 +105,9 @@ pub(crate) struct TabulatedForce {
 /// Limits are met by numbers that rounding moved by this.
 const ROUNDING: f64 = 1e-12;
 
+/// How much smaller than its smallest a contact may be: ln(F/F_Hertz) is some −0.1 a/R there, and is taken on along its tangent.
+const SMALLER: f64 = 0.6;
+
 /// Fewest contacts of a curve.
 const FEWEST_CONTACTS: usize = 4;
 
@@ -145,7 +148,7 @@ impl ContactTable {
         let last = |c: &ContactCurve| c.contact_radius_m[c.contact_radius_m.len() - 1] / radius_m;
         let moduli = |k: usize| curves[k].youngs_modulus_pa.ln();
         let limits = Limits {
-            smallest_ratio: curves.iter().map(first).fold(0.0, f64::max),
+            smallest_ratio: SMALLER * curves.iter().map(first).fold(0.0, f64::max),
             largest_ratio: (curves.iter())
                 .map(|c| (c.youngs_modulus_pa.ln(), last(c)))
                 .collect(),
@@ -182,6 +185,11 @@ impl ContactTable {
         &self.layers
     }
 
+    /// The contacts that the table is made of, a curve a modulus.
+    pub fn curves(&self) -> &[ContactCurve] {
+        &self.curves
+    }
+
     /// Root mean square relative error of the interpolated force: what each contact of the table misses when it is left out.
     pub fn interpolation_error(&self) -> f64 {
         self.surface.error()
@@ -204,11 +212,11 @@ impl ContactTable {
         ratio >= smallest * (1.0 - ROUNDING) && ratio <= largest * (1.0 + ROUNDING)
     }
 
-    /// The force; beyond the contact radii at this ln E continued along the tangent.
+    /// The force; beyond the computed contact radii at this ln E continued along the tangent.
     pub(crate) fn at(&self, a: f64, log_modulus: f64) -> TabulatedForce {
         let [smallest, largest] = self.contact_ratios(log_modulus);
         let ratio = a / self.radius_m;
-        let inside = ratio.clamp(smallest, largest);
+        let inside = ratio.clamp(smallest / SMALLER, largest);
         let rest = self.surface.at(inside, log_modulus);
         let beyond = rest.ratio_slope * (ratio / inside).ln();
         TabulatedForce {
@@ -284,7 +292,9 @@ impl ContactTable {
             let log_modulus = between(soft, stiff, j);
             let [low, high] = self.contact_ratios(log_modulus);
             for i in 0..=Self::CHECKED {
-                let value = self.surface.at(between(low, high, i), log_modulus);
+                let value = self
+                    .surface
+                    .at(between(low / SMALLER, high, i), log_modulus);
                 let grows = 3.0 + value.ratio_slope > 0.0 && 1.0 + value.modulus_slope > 0.0;
                 if !grows || low >= high {
                     return Err(ElasticityError::NotMonotone);

@@ -26,13 +26,13 @@ pub struct TableOptions {
 }
 
 impl Default for TableOptions {
-    /// Seven moduli from 20 to 400 kPa, contact radii up to 1.25 ball radii.
+    /// Seven moduli from 25 to 400 kPa, contact radii up to 1.25 ball radii.
     ///
     /// Seven moduli leave less in the interpolation than the elements' own scatter of the contact radius does
     /// (`a_table_of_the_papers_guide` prints both).
     fn default() -> Self {
         Self {
-            lowest_pa: 20e3,
+            lowest_pa: 25e3,
             highest_pa: 400e3,
             moduli: 7,
             largest_ratio: 1.25,
@@ -106,8 +106,8 @@ pub struct TableProgress {
 
 /// Contacts a modulus.
 const CONTACTS: usize = 16;
-/// The smallest a/R: with fewer elements in the contact its radius is not known to 0.3 %.
-const SMALLEST_RATIO: f64 = 0.1;
+/// The smallest a/R that is computed: at 0.1 the elements leave 0.5 % of the contact radius.
+const SMALLEST_RATIO: f64 = 0.15;
 /// A contact radius less certain than this is left out: it would miss the force by three times as much.
 const LARGEST_UNCERTAINTY: f64 = 5e-3;
 /// Radius of the guide over the ball's and over its own thickness: beyond, its rim is not felt at the contact

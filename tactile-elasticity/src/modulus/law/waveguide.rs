@@ -1,6 +1,6 @@
 //! A soft sphere, the sample, on the layers of a waveguide.
 
-use super::finite_strain::FiniteStrain;
+use super::finite_strain::{FiniteStrain, LinearContact};
 use super::{ContactLaw, LogForce, Sphere};
 use crate::contact::{Bond, LayerKernel, SharedLayerTable, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson, positive};
@@ -69,6 +69,13 @@ impl WaveguideLaw {
             indentation_slope: 2.0,
             ball_part: 1.0,
         };
+        let mut linear = LinearContact {
+            ratio: x,
+            ball: 1.0,
+            layer_ratio: 0.0,
+            log_force: [0.0; 2],
+            log_indentation: [0.0; 2],
+        };
         if let Some(table) = &self.layers {
             let layers = table.at(a / self.thickness_m, share)?;
             contact.log_force.value += layers.force;
@@ -76,16 +83,20 @@ impl WaveguideLaw {
             contact.log_indentation += layers.indentation;
             contact.indentation_slope += layers.indentation_slope;
             // The ball's compliance (1 − s)/E* times the stiffness that the contact has, F/F_Hertz times E*.
-            contact.ball_part = ((1.0 - share) * layers.force.exp()).clamp(0.0, 1.0);
+            linear.ball = ((1.0 - share) * layers.force.exp()).clamp(0.0, 1.0);
+            contact.ball_part = linear.ball;
+            linear.layer_ratio = a / self.thickness_m;
+            linear.log_force = [layers.force, layers.force_slope];
+            linear.log_indentation = [layers.indentation, layers.indentation_slope];
         }
         if let Some(strain) = &self.finite_strain {
-            let force = strain.force(x, contact.ball_part);
-            contact.log_force.value += force.0;
-            contact.log_force.slope += force.1;
-            contact.log_force.size_slope -= force.1;
-            let indentation = strain.indentation(x, contact.ball_part);
-            contact.log_indentation += indentation.0;
-            contact.indentation_slope += indentation.1;
+            let force = strain.force(&linear);
+            contact.log_force.value += force.value;
+            contact.log_force.slope += force.slope;
+            contact.log_force.size_slope -= force.ratio_slope;
+            let indentation = strain.indentation(&linear);
+            contact.log_indentation += indentation.value;
+            contact.indentation_slope += indentation.slope;
         }
         Some(contact)
     }

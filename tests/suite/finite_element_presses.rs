@@ -1,0 +1,214 @@
+//! Frames rendered from finite-element contacts, measured blindly: the modulus and its interval.
+//!
+//! `tests/data/finite_element_presses.csv` holds contacts computed by the crate's own finite elements (neo-Hookean, ν = 0.4999, no friction), of moduli,
+//! radii, guides and loads that the layered law was not fitted to and that no table holds.
+use std::path::{Path, PathBuf};
+use tactile_imaging::elasticity::contact::{Layer, Waveguide as Guide};
+use tactile_imaging::elasticity::modulus::{
+    HertzSphere, ModulusEstimate, ModulusEstimator, TabulatedContact,
+};
+use tactile_imaging::pipeline::{Object, Pipeline, Trial};
+use tactile_imaging::scene::read_contact_table;
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, Sphere,
+    Waveguide, WaveguideLayer,
+};
+
+struct Ball {
+    name: String,
+    youngs_modulus_pa: f64,
+    radius_m: f64,
+    /// Thickness and modulus of each layer; none on a rigid flat.
+    layers: Vec<(f64, f64)>,
+    states: Vec<ContactState>,
+}
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+fn balls() -> Vec<Ball> {
+    let text = std::fs::read_to_string(data("finite_element_presses.csv")).unwrap();
+    let mut balls: Vec<Ball> = Vec::new();
+    for line in text.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |k: usize| cells[k].parse::<f64>().unwrap();
+        if balls.last().is_none_or(|b| b.name != cells[0]) {
+            let layer = |l: &str| {
+                let (thickness, modulus) = l.split_once(':').unwrap();
+                (thickness.parse().unwrap(), modulus.parse().unwrap())
+            };
+            let layers = cells[3].split(';').filter(|l| !l.is_empty());
+            balls.push(Ball {
+                name: cells[0].to_owned(),
+                youngs_modulus_pa: number(1),
+                radius_m: number(2),
+                layers: layers.map(layer).collect(),
+                states: Vec::new(),
+            });
+        }
+        let states = &mut balls.last_mut().unwrap().states;
+        if states.last().is_none_or(|s| s.force_n != number(4)) {
+            states.push(ContactState {
+                force_n: number(4),
+                contact_radius_m: number(5),
+                indentation_m: number(6),
+                radius_m: Vec::new(),
+                pressure_pa: Vec::new(),
+                height_m: Vec::new(),
+            });
+        }
+        let state = states.last_mut().unwrap();
+        state.radius_m.push(number(7));
+        state.pressure_pa.push(number(8));
+        state.height_m.push(number(9));
+    }
+    balls
+}
+
+/// What one pair of loads of a ball is read as.
+struct Reading {
+    ball: String,
+    largest_ratio: f64,
+    truth_pa: f64,
+    layered: ModulusEstimate<f64>,
+    tabulated: Option<ModulusEstimate<f64>>,
+    series: Option<f64>,
+}
+
+impl Ball {
+    fn layers(&self) -> Vec<WaveguideLayer> {
+        let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| WaveguideLayer {
+            refractive_index: 1.4,
+            thickness_m,
+            material: Elastic {
+                youngs_modulus_pa,
+                poisson_ratio: 0.5,
+            },
+        };
+        self.layers.iter().map(layer).collect()
+    }
+
+    /// Two neighbouring loads, drawn with the camera's noise and measured.
+    fn read(&self, first: usize, seed: u64) -> Reading {
+        let pair = &self.states[first..first + 2];
+        let rigid = vec![WaveguideLayer {
+            refractive_index: 1.4,
+            thickness_m: 1e-2,
+            material: Elastic::RIGID,
+        }];
+        let layers = self.layers();
+        let options = PressOptions {
+            object: Sphere {
+                radius_m: self.radius_m,
+                material: Elastic {
+                    youngs_modulus_pa: self.youngs_modulus_pa,
+                    poisson_ratio: 0.5,
+                },
+            },
+            waveguide: Waveguide {
+                layers: if layers.is_empty() { rigid } else { layers },
+            },
+            law: ContactLaw::Tabulated(self.states.clone()),
+            loads: pair.iter().map(|s| Load::normal(s.force_n)).collect(),
+            camera: Camera {
+                shape: [520, 696],
+                pixel_size_m: [43.1e-6; 2],
+                ..Camera::default()
+            },
+            seed,
+            ..PressOptions::default()
+        };
+        let calibration = CalibrationOptions {
+            largest_force_n: 1.2 * pair[1].force_n,
+            ..CalibrationOptions::default()
+        };
+        let trial = Trial::new(options, &calibration).unwrap();
+        let size = trial.simulation.pixel_size_m;
+        let pipeline =
+            Pipeline::from_pairs(&trial.pairs, size, Object::sphere(self.radius_m)).unwrap();
+        let guide = self.guide();
+        let pipeline = match self.layers.is_empty() {
+            true => pipeline,
+            false => pipeline.with_waveguide(guide.clone()),
+        };
+        let mut press = trial.press(&pipeline).unwrap();
+        let layered = press.modulus().unwrap();
+        let loads = press.load_series().unwrap();
+        let table = read_contact_table(data("paper_guide_3mm.toml")).unwrap();
+        let table = TabulatedContact::new(table, self.radius_m, 0.5, &guide).ok();
+        let series = HertzSphere::new(self.radius_m, 0.5).unwrap();
+        let series = series.with_other_body(guide.as_body()).estimate(&loads).ok();
+        Reading {
+            ball: self.name.clone(),
+            largest_ratio: pair[1].contact_radius_m / self.radius_m,
+            truth_pa: self.youngs_modulus_pa,
+            layered,
+            tabulated: table.map(|t| t.estimate(&loads).unwrap()),
+            series: series.map(|m| m.youngs_modulus_pa),
+        }
+    }
+
+    fn guide(&self) -> Guide<f64> {
+        if self.layers.is_empty() {
+            return Guide::rigid();
+        }
+        let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
+            thickness_m,
+            youngs_modulus_pa,
+            poisson_ratio: 0.5,
+        };
+        Guide::new(self.layers.iter().map(layer).collect()).unwrap()
+    }
+}
+
+fn error(estimate: &ModulusEstimate<f64>, truth_pa: f64) -> f64 {
+    estimate.youngs_modulus_pa / truth_pa - 1.0
+}
+
+/// Median and largest of the errors' sizes, and the part of the intervals that hold the truth.
+fn summary<'a>(
+    all: impl Iterator<Item = (&'a ModulusEstimate<f64>, f64)>,
+) -> (f64, f64, f64) {
+    let all: Vec<_> = all.collect();
+    let mut sizes: Vec<f64> = all.iter().map(|(m, truth)| error(m, *truth).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let held = all.iter().filter(|(m, truth)| m.interval_95.contains(*truth));
+    let part = held.count() as f64 / all.len() as f64;
+    (sizes[sizes.len() / 2], sizes[sizes.len() - 1], part)
+}
+
+/// `--nocapture` prints every reading beside what layers in series give.
+#[allow(clippy::print_stdout)]
+#[test]
+fn balls_are_measured_within_their_intervals() {
+    let mut readings = Vec::new();
+    for (k, ball) in balls().iter().enumerate() {
+        for first in 0..ball.states.len() - 1 {
+            readings.push(ball.read(first, 1 + 10 * k as u64 + first as u64));
+        }
+    }
+    for r in &readings {
+        let interval = |m: &ModulusEstimate<f64>| {
+            let held = m.interval_95.contains(r.truth_pa);
+            format!("{:+.2} % {}", 100.0 * error(m, r.truth_pa), if held { "held" } else { "missed" })
+        };
+        println!(
+            "{} a/R {:.2}: layered {}, table {}, series {:?} %",
+            r.ball,
+            r.largest_ratio,
+            interval(&r.layered),
+            r.tabulated.as_ref().map_or("none".to_owned(), interval),
+            r.series.map(|e| (100.0 * (e / r.truth_pa - 1.0)).round()),
+        );
+    }
+    let layered = summary(readings.iter().map(|r| (&r.layered, r.truth_pa)));
+    let tabulated = readings.iter().filter_map(|r| Some((r.tabulated.as_ref()?, r.truth_pa)));
+    let tabulated = summary(tabulated);
+    println!("median, worst, held: layered {layered:?}, tabulated {tabulated:?}");
+    assert!(layered.0 < 0.03 && layered.1 < 0.10, "{layered:?}");
+    // Some forty readings: a true 95 % leaves fewer than four fifths once in 10⁴ sets.
+    assert!(layered.2 > 0.8, "{layered:?}");
+    assert!(tabulated.0 < 0.01 && tabulated.1 < 0.04, "{tabulated:?}");
+    assert!(tabulated.2 > 0.7, "{tabulated:?}");
+}
