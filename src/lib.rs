@@ -22,6 +22,8 @@ pub mod io;
 pub mod pipeline;
 #[cfg(feature = "plot")]
 pub mod plot;
+#[cfg(any(feature = "plot", feature = "scene"))]
+mod replace_file;
 #[cfg(feature = "scene")]
 pub mod scene;
 #[cfg(feature = "scene")]

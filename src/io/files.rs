@@ -1,8 +1,9 @@
 //! Whole files in and out: what is no file is refused before it is opened, and a file is replaced only by a complete one.
 use super::error::ReadError;
-use std::fs::{self, FileType, OpenOptions};
-use std::io::{Error, ErrorKind, Read, Write};
-use std::path::{Path, PathBuf};
+use crate::replace_file::replace_file;
+use std::fs::{self, FileType};
+use std::io::Read;
+use std::path::Path;
 
 /// Largest file that is read, in bytes: more is not a measurement.
 pub(crate) const LARGEST_FILE: u64 = 512 << 20;
@@ -64,56 +65,10 @@ pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), ReadError>
 
 /// As [`write_file`].
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
-    let write = || match fs::metadata(path) {
-        Ok(metadata) if metadata.is_dir() => {
-            Err(Error::new(ErrorKind::IsADirectory, "it is a folder"))
-        }
-        Ok(metadata) if !metadata.is_file() => {
-            let mut device = OpenOptions::new().write(true).open(path)?;
-            device.write_all(bytes)
-        }
-        Ok(_) => replace(&fs::canonicalize(path)?, bytes),
-        Err(_) => {
-            if let Some(folder) = path.parent() {
-                fs::create_dir_all(folder)?;
-            }
-            replace(path, bytes)
-        }
-    };
-    write().map_err(|source| ReadError::Write {
+    replace_file(path, bytes).map_err(|source| ReadError::Write {
         path: path.into(),
         source,
     })
-}
-
-/// Writes beside `path` and renames; nothing is left behind where that fails.
-fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    if path.file_name().is_none() {
-        return Err(Error::new(ErrorKind::InvalidInput, "it has no file name"));
-    }
-    let temporary = beside(path);
-    // A new file only: one that is there belongs to somebody else.
-    let mut file = OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(&temporary)?;
-    let written = file.write_all(bytes).and_then(|()| file.flush());
-    drop(file);
-    let done = written.and_then(|()| fs::rename(&temporary, path));
-    if done.is_err() {
-        let _ = fs::remove_file(&temporary);
-    }
-    done
-}
-
-/// A name in the folder of `path` that nothing else has, and that is short whatever the name of `path`.
-fn beside(path: &Path) -> PathBuf {
-    let process = std::process::id();
-    let candidate = |k: u32| path.with_file_name(format!(".{process}-{k}.part"));
-    (0..u32::MAX)
-        .map(candidate)
-        .find(|p| fs::symlink_metadata(p).is_err())
-        .unwrap_or_else(|| candidate(u32::MAX))
 }
 
 fn kind(file_type: FileType) -> &'static str {

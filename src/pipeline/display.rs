@@ -1,5 +1,6 @@
 //! What a person at a bench wants to read.
 use super::error::PipelineError;
+use super::flag::Flag;
 use super::measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 use crate::force::Estimate;
 use crate::matching::StopReason;
@@ -37,7 +38,8 @@ impl Display for ModulusResult {
         )?;
         match self.interval_95 {
             (low, Some(high)) => write!(f, "   95 %: {:.2} to {:.2} kPa", k(low), k(high))?,
-            (low, None) => write!(f, "   95 %: above {:.2} kPa", k(low))?,
+            (low, None) if low > 0.0 => write!(f, "   95 %: above {:.2} kPa", k(low))?,
+            (_, None) => f.write_str("   no interval: the errors are not known")?,
         }
         write!(f, "   ({})", self.estimator)
     }
@@ -83,7 +85,9 @@ impl Display for MatchResult {
 
 impl Display for StrainResult {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let e = |i: usize, j: usize| with_error(self.mean[i][j], self.standard_error[i][j], 1.0);
+        // The strain between equal frames is zero to rounding: digits beyond the sixth are never known.
+        let error = |i: usize, j: usize| self.standard_error[i][j].max(1e-6);
+        let e = |i: usize, j: usize| with_error(self.mean[i][j], error(i, j), 1.0);
         write!(
             f,
             "{}: e_xx {}  e_yy {}  e_zz {}",
@@ -93,6 +97,36 @@ impl Display for StrainResult {
             e(2, 2)
         )
     }
+}
+
+/// Cautions of one kind that are printed; of a press with thousands of frames each may carry the same one.
+const PRINTED_OF_A_KIND: usize = 3;
+
+/// The first cautions of every kind, and how many more there are.
+fn cautions(f: &mut Formatter<'_>, flags: &[Flag]) -> fmt::Result {
+    let kind = |flag: &Flag| {
+        let warning = match flag {
+            Flag::Assumption { warning } => Some(std::mem::discriminant(warning)),
+            _ => None,
+        };
+        (std::mem::discriminant(flag), warning)
+    };
+    let mut printed = Vec::new();
+    for flag in flags {
+        if printed.contains(&kind(flag)) {
+            continue;
+        }
+        printed.push(kind(flag));
+        let alike = || flags.iter().filter(|other| kind(other) == kind(flag));
+        for flag in alike().take(PRINTED_OF_A_KIND) {
+            writeln!(f, "  {flag}")?;
+        }
+        let more = alike().count().saturating_sub(PRINTED_OF_A_KIND);
+        if more > 0 {
+            writeln!(f, "  … and {more} more like it")?;
+        }
+    }
+    Ok(())
 }
 
 /// A result under its heading, or why there is none.
@@ -132,9 +166,7 @@ impl Display for Measurement {
         }
         if !self.flags.is_empty() {
             writeln!(f, "cautions:")?;
-            for flag in &self.flags {
-                writeln!(f, "  {flag}")?;
-            }
+            cautions(f, &self.flags)?;
         }
         Ok(())
     }

@@ -104,6 +104,19 @@ pub enum PipelineError {
         /// The frame.
         frame: usize,
     },
+    /// A frame shows no contact, but differs from the reference, the other way than a contact does.
+    #[error(
+        "frame {} shows no contact, though it is up to {:.0} grey levels {} than the reference: were the two swapped, or has the light changed?",
+        frame + 1,
+        .grey.abs(),
+        if *.grey < 0.0 { "darker" } else { "brighter" }
+    )]
+    OppositeSignal {
+        /// The frame.
+        frame: usize,
+        /// Frame minus reference where they differ most, in grey levels.
+        grey: f64,
+    },
     /// The force of a frame is not known: no calibration and no gauge reading.
     #[error("the force of frame {} is not known: without a calibration it takes a gauge reading (`force_N`)", frame + 1)]
     NoForce {
@@ -186,6 +199,7 @@ impl PipelineError {
             Self::NoSuchFrame { frame, .. }
             | Self::Contact { frame, .. }
             | Self::NoContact { frame }
+            | Self::OppositeSignal { frame, .. }
             | Self::NoForce { frame }
             | Self::Surface { frame, .. } => Some(*frame),
             Self::Match { to, .. }

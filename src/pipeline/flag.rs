@@ -90,6 +90,11 @@ pub enum Flag {
         /// How many.
         points: usize,
     },
+    /// The first contact is so small, in pixels, that its surface and the strain counted from it may be off by more than their errors say.
+    CoarseStrain {
+        /// Radius of the smaller contact in pixels.
+        radius_px: f64,
+    },
     /// The warp folds over at some control points; they are left out of the strain.
     Folded {
         /// How many.
@@ -194,6 +199,10 @@ impl fmt::Display for Flag {
             Self::MatchNotConverged => write!(f, "the match did not converge"),
             Self::Unmatched { points: 1 } => write!(f, "1 control point has no partner"),
             Self::Unmatched { points } => write!(f, "{points} control points have no partner"),
+            Self::CoarseStrain { radius_px } => write!(
+                f,
+                "the contact has a radius of {radius_px:.1} pixels: too few for the strain's error to be sure"
+            ),
             Self::Folded { points: 1 } => write!(f, "the warp folds over at 1 control point"),
             Self::Folded { points } => write!(f, "the warp folds over at {points} control points"),
             Self::Assumption { warning } => write!(f, "{warning}"),

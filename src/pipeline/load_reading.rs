@@ -14,7 +14,7 @@ pub(super) struct LoadReading {
     pub noise_n: f64,
     /// Error of the force from the calibration.
     pub calibration_n: f64,
-    pub radius_m: Estimate<f64>,
+    pub radius_m: Option<Estimate<f64>>,
     pub indentation_m: Option<Estimate<f64>>,
     /// Strain since the first load.
     pub mean_strain: Option<Estimate<f64>>,
@@ -32,12 +32,22 @@ impl LoadReading {
             force_n: contact.force_n?.value,
             noise_n: contact.force_noise_n,
             calibration_n: contact.force_calibration_n,
-            radius_m: radius_with_floor(radius.value, radius.standard_error, pixel_size_m),
+            radius_m: Some(radius_with_floor(
+                radius.value,
+                radius.standard_error,
+                pixel_size_m,
+            )),
             indentation_m: contact
                 .indentation_m
                 .map(|depth| Estimate::new(depth.value, depth.standard_error)),
             mean_strain,
         })
+    }
+
+    /// Keeps the force alone, so that no estimator uses the load: it repeats an earlier one (what is counted twice is not better known), or
+    /// the contact is not whole.
+    pub(super) fn forget_contact(&mut self) {
+        (self.radius_m, self.indentation_m, self.mean_strain) = (None, None, None);
     }
 }
 
@@ -69,7 +79,8 @@ pub(super) fn series(
             .max(0.0)
             .sqrt();
         let force = Estimate::new(r.force_n, r.noise_n.hypot(rest));
-        let mut load = LoadState::new(force).with_contact_radius(r.radius_m);
+        let mut load = LoadState::new(force);
+        load.contact_radius_m = r.radius_m;
         load.indentation_m = r.indentation_m;
         load.mean_strain = r.mean_strain;
         load

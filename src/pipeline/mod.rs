@@ -20,6 +20,7 @@
 //! strain, equation (31), is therefore reported (first among [`Measurement::estimators`]) but not believed: the modulus comes
 //! from a³ = 3FR/(4E*), both bodies yielding, the waveguide's layers in series. a/R is in every report, and beyond 0.3 the
 //! result carries a flag. For other objects the paper's ratio is the estimate.
+mod background;
 mod ball;
 mod batch;
 mod binning;

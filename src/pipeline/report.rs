@@ -243,9 +243,29 @@ impl fmt::Display for Report {
                 )?;
             }
         }
-        self.skips
-            .iter()
-            .try_for_each(|skip| writeln!(f, "  skipped: {skip}"))
+        let mut kinds: Vec<(Skip, usize)> = Vec::new();
+        for skip in &self.skips {
+            let same = |(kind, _): &&mut (Skip, usize)| {
+                (kind.stage, kind.reason) == (skip.stage, skip.reason)
+            };
+            match kinds.iter_mut().find(same) {
+                Some((kind, frames)) => {
+                    kind.saved += skip.saved;
+                    *frames += 1;
+                }
+                None => kinds.push((*skip, 1)),
+            }
+        }
+        kinds.iter().try_for_each(|(kind, frames)| match frames {
+            1 => writeln!(f, "  skipped: {kind}"),
+            _ => {
+                let all = Skip {
+                    frame: None,
+                    ..*kind
+                };
+                writeln!(f, "  skipped in {frames} frames: {all}")
+            }
+        })
     }
 }
 

@@ -4,6 +4,7 @@ use super::draw::style::black;
 use super::panel::Panel;
 use super::svg::{Anchor, Svg};
 use crate::pipeline::PipelineError;
+use crate::replace_file::replace_file;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -109,19 +110,13 @@ impl Page {
         })
     }
 
-    /// Writes the page to a file, creating its folder where needed.
+    /// Writes the page to a file, creating its folder where needed: whole or not at all.
     ///
     /// # Errors
     /// [`PlotError`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
-        let (path, svg) = (path.as_ref(), self.to_svg()?);
-        let write = || {
-            if let Some(folder) = path.parent() {
-                std::fs::create_dir_all(folder)?;
-            }
-            std::fs::write(path, svg)
-        };
-        write().map_err(|source| PlotError::Write {
+        let path = path.as_ref();
+        replace_file(path, self.to_svg()?.as_bytes()).map_err(|source| PlotError::Write {
             path: path.into(),
             source,
         })

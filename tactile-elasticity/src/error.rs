@@ -58,11 +58,13 @@ pub enum ElasticityError {
     },
     /// The contact is no softer than the other body alone: no compliance is left for the sample.
     #[error(
-        "the sample is stiffer than can be resolved through this waveguide or indenter (above {lower_bound_pa} Pa with 95 % confidence)"
+        "the sample is stiffer than can be resolved through this waveguide or indenter{}",
+        bounded_below(*.lower_bound_pa)
     )]
     StifferThanResolvable {
-        /// The 95 % lower limit of the modulus (zero where the errors are unknown).
-        lower_bound_pa: f64,
+        /// The 95 % lower limit of the modulus; None where the errors are unknown, and where the contact is stiffer than any sample could make
+        /// it.
+        lower_bound_pa: Option<f64>,
     },
     /// Fewer usable loads than the estimator needs.
     #[error("{found} usable loads, at least {expected} are needed")]
@@ -268,5 +270,17 @@ pub(crate) fn poisson(value: f64) -> Result<f64, ElasticityError> {
         Ok(value)
     } else {
         Err(ElasticityError::PoissonRatio { found: value })
+    }
+}
+
+/// The end of a sentence: above what the modulus lies, or what to look at where no sample would do.
+fn bounded_below(lower_bound_pa: Option<f64>) -> String {
+    match lower_bound_pa {
+        Some(bound) => format!(
+            ": it has more than {:.3} kPa with 95 % confidence",
+            bound * 1e-3
+        ),
+        None => ": the contact is no larger than a rigid one would be; check forces, pixel size, radius and the moduli of the layers"
+            .into(),
     }
 }

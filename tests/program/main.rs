@@ -3,6 +3,8 @@
 
 mod bad_calls;
 mod bad_files;
+mod frames;
 mod harness;
 mod help;
+mod interrupt;
 mod outputs;

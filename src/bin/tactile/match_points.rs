@@ -3,7 +3,7 @@ use crate::context::Context;
 use crate::failure::{Exit, Failure};
 use crate::numbers::{count, four_digits, median_ms};
 use crate::outputs::Outputs;
-use crate::progress::waiting;
+use crate::progress::waiting_or_interrupted;
 use clap::{Args, ValueEnum};
 use nalgebra::Point;
 use serde_json::{Value, json};
@@ -108,15 +108,24 @@ impl Expectations {
     }
 }
 
-impl Arguments {
-    fn matcher<const D: usize>(&self) -> Box<dyn PointMatcher<f64, D>> {
-        match self.method {
-            Method::Softassign => Box::new(self.expectations.matcher()),
-            Method::Labelling => Box::new(RelaxationLabelling::default()),
-            Method::SparseLabelling => Box::new(SparseRelaxationLabelling::default()),
-            Method::Drift => Box::new(CoherentPointDrift::default()),
-            Method::Nearest => Box::new(NearestNeighbour::default()),
-            Method::Assignment => Box::new(LinearAssignment::default()),
+/// What is done with one case.
+#[derive(Clone, Copy)]
+struct Job<'a> {
+    name: &'a str,
+    method: Method,
+    expectations: Expectations,
+    repeat: u32,
+}
+
+impl Method {
+    fn matcher<const D: usize>(self, expectations: Expectations) -> Box<dyn PointMatcher<f64, D>> {
+        match self {
+            Self::Softassign => Box::new(expectations.matcher()),
+            Self::Labelling => Box::new(RelaxationLabelling::default()),
+            Self::SparseLabelling => Box::new(SparseRelaxationLabelling::default()),
+            Self::Drift => Box::new(CoherentPointDrift::default()),
+            Self::Nearest => Box::new(NearestNeighbour::default()),
+            Self::Assignment => Box::new(LinearAssignment::default()),
         }
     }
 }
@@ -156,16 +165,23 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     }
     let mut exit = Exit::Complete;
     let mut answers = Vec::new();
-    for (name, cases) in names.iter().zip(&files) {
+    'files: for (name, cases) in names.iter().zip(files) {
         let mut text = Vec::new();
         for case in cases {
-            let (answer, complete) = match &case.points {
-                CasePoints::Plane { model, target } => {
-                    solve(arguments, context, &case.name, model, target, &mut text)
-                }
-                CasePoints::Space { model, target } => {
-                    solve(arguments, context, &case.name, model, target, &mut text)
-                }
+            let job = Job {
+                name: &case.name,
+                method: arguments.method,
+                expectations: arguments.expectations,
+                repeat: arguments.repeat,
+            };
+            let solved = match case.points {
+                CasePoints::Plane { model, target } => job.solve(context, model, target, &mut text),
+                CasePoints::Space { model, target } => job.solve(context, model, target, &mut text),
+            };
+            let Some((answer, complete)) = solved else {
+                exit = Exit::Interrupted;
+                outputs.write(name, &text)?;
+                break 'files;
             };
             answers.push(answer);
             if !complete {
@@ -188,62 +204,69 @@ fn sizes(case: &MatchCase) -> (usize, usize) {
     }
 }
 
-/// Matches one case, prints a line about it, appends its answer to `text`; whether there is one.
-fn solve<const D: usize>(
-    arguments: &Arguments,
-    context: &mut Context,
-    name: &str,
-    model: &[Point<f64, D>],
-    target: &[Point<f64, D>],
-    text: &mut Vec<u8>,
-) -> (Value, bool) {
-    let job = format!(
-        "matching {name}: {} points to {}",
-        model.len(),
-        target.len()
-    );
-    match waiting(job, || repeated(arguments, model, target)) {
-        Ok((matching, ms)) => {
-            let report = &matching.report;
-            let matched = matching.assignment.iter().flatten().count();
-            let stop = stop_reason(report.stop);
-            context.console.line(format!(
-                "{name}: {matched} of {} points matched, residual {}, {stop} after {} and {}, {ms:.1} ms",
-                model.len(),
-                four_digits(report.residual),
-                count(report.iterations, "iteration"),
-                count(report.starts, "start")
-            ));
-            // Writing into memory does not fail.
-            let _ = writeln!(
-                text,
-                "# {name}: {stop} after {} iterations, starts: {}, residual {:.3e}",
-                report.iterations, report.starts, report.residual
-            );
-            let _ = write_case_result(text, name, ms, &matching.warped, &matching.assignment);
-            let value = json!({
-                "model_points": model.len(), "target_points": target.len(), "matched": matched,
-                "assignment": matching.assignment, "confidence": matching.confidence,
-                "residual": report.residual, "noise": report.sigma, "stop": stop,
-                "iterations": report.iterations, "starts": report.starts, "time_ms": ms,
-            });
-            (json!({ "case": name, "value": value }), true)
-        }
-        Err(error) => {
-            context.console.line(format!("{name}: no answer: {error}"));
-            let _ = writeln!(text, "# {name}: no answer: {error}");
-            (json!({ "case": name, "error": error.to_string() }), false)
-        }
+impl Job<'_> {
+    /// Matches one case, prints a line about it, appends its answer to `text`; whether there is one. None after Ctrl-C.
+    fn solve<const D: usize>(
+        self,
+        context: &mut Context,
+        model: Vec<Point<f64, D>>,
+        target: Vec<Point<f64, D>>,
+        text: &mut Vec<u8>,
+    ) -> Option<(Value, bool)> {
+        let name = self.name;
+        let (points, targets) = (model.len(), target.len());
+        let job = format!("matching {name}: {points} points to {targets}");
+        let Self {
+            method,
+            expectations,
+            repeat,
+            ..
+        } = self;
+        let answer = waiting_or_interrupted(job, &context.interrupt, move || {
+            repeated(&*method.matcher(expectations), repeat, &model, &target)
+        })?;
+        Some(match answer {
+            Ok((matching, ms)) => {
+                let report = &matching.report;
+                let matched = matching.assignment.iter().flatten().count();
+                let stop = stop_reason(report.stop);
+                context.console.line(format!(
+                    "{name}: {matched} of {points} points matched, residual {}, {stop} after {} and {}, {ms:.1} ms",
+                    four_digits(report.residual),
+                    count(report.iterations, "iteration"),
+                    count(report.starts, "start")
+                ));
+                // Writing into memory does not fail.
+                let _ = writeln!(
+                    text,
+                    "# {name}: {stop} after {} iterations, starts: {}, residual {:.3e}",
+                    report.iterations, report.starts, report.residual
+                );
+                let _ = write_case_result(text, name, ms, &matching.warped, &matching.assignment);
+                let value = json!({
+                    "model_points": points, "target_points": targets, "matched": matched,
+                    "assignment": matching.assignment, "confidence": matching.confidence,
+                    "residual": report.residual, "noise": report.sigma, "stop": stop,
+                    "iterations": report.iterations, "starts": report.starts, "time_ms": ms,
+                });
+                (json!({ "case": name, "value": value }), true)
+            }
+            Err(error) => {
+                context.console.line(format!("{name}: no answer: {error}"));
+                let _ = writeln!(text, "# {name}: no answer: {error}");
+                (json!({ "case": name, "error": error.to_string() }), false)
+            }
+        })
     }
 }
 
 /// The answer, and the median time of the calls in milliseconds.
 fn repeated<const D: usize>(
-    arguments: &Arguments,
+    matcher: &dyn PointMatcher<f64, D>,
+    repeat: u32,
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
 ) -> Result<(Matching<f64, D>, f64), MatchError> {
-    let matcher = arguments.matcher::<D>();
     let timed = || -> Result<(Matching<f64, D>, Duration), MatchError> {
         let start = Instant::now();
         let matching = matcher.match_points(model, target)?;
@@ -251,7 +274,7 @@ fn repeated<const D: usize>(
     };
     let (mut matching, first) = timed()?;
     let mut times = vec![first];
-    for _ in 1..arguments.repeat {
+    for _ in 1..repeat {
         let (again, time) = timed()?;
         matching = again;
         times.push(time);

@@ -157,6 +157,13 @@ impl Csv {
         self.text.push('\n');
     }
 
+    /// A row of numbers of which some are not known: their cells are empty.
+    pub fn cells<const N: usize>(&mut self, values: [Option<f64>; N]) {
+        let cell = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
+        self.text += &values.map(cell).join(",");
+        self.text.push('\n');
+    }
+
     pub fn into_bytes(self) -> Vec<u8> {
         self.text.into_bytes()
     }

@@ -13,6 +13,8 @@ use super::surface::{ContactSurface, ControlPoints};
 use crate::force::{Estimate, ReferenceFrame};
 use crate::matching::Matching;
 use ndarray::ArrayView2;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 /// A frame and what is known of it so far.
@@ -50,8 +52,10 @@ struct Loaded<'a> {
 pub struct Press<'a> {
     runner: StageRunner,
     frames: Vec<Loaded<'a>>,
-    /// The frame whose results a frame shares: itself, or an equal one before it.
+    /// The frame that a frame equals: itself, or the first equal one before it.
     twins: Vec<usize>,
+    /// Frames that may be equal, by a hash of some of their pixels.
+    by_fingerprint: HashMap<u64, Vec<usize>>,
 }
 
 impl Pipeline {
@@ -90,6 +94,7 @@ impl Pipeline {
             runner: StageRunner::new(self.clone(), reference, SkipRecords::EachFrame),
             frames: Vec::new(),
             twins: Vec::new(),
+            by_fingerprint: HashMap::new(),
         }
     }
 }
@@ -153,14 +158,15 @@ impl<'a> Press<'a> {
         gauge: Option<Estimate<f64>>,
     ) -> usize {
         let index = self.frames.len();
-        let equal = |f: &Loaded<'_>| f.gauge == gauge && f.image == image;
-        let skip = self.pipeline().settings().skips.equal_frames;
-        let twin = if skip {
-            self.frames.iter().position(equal)
-        } else {
-            None
+        let equal = |&&at: &&usize| {
+            let earlier = &self.frames[at];
+            earlier.gauge == gauge && earlier.image == image
         };
-        if twin.is_some() {
+        let alike = self.by_fingerprint.entry(fingerprint(image)).or_default();
+        let twin = alike.iter().find(equal).copied();
+        if twin.is_none() {
+            alike.push(index);
+        } else if self.pipeline().settings().skips.equal_frames {
             self.runner
                 .skip(Stage::Contact, index, SkipReason::EqualFrame, image.len());
         }
@@ -202,11 +208,29 @@ impl<'a> Press<'a> {
         self.frames.get(frame)?.gauge
     }
 
+    /// The frame whose results a frame shares: itself, or an equal one before it.
     fn twin(&self, frame: usize) -> Result<usize, PipelineError> {
         let frames = self.frames.len();
-        self.twins
-            .get(frame)
-            .copied()
-            .ok_or(PipelineError::NoSuchFrame { frame, frames })
+        let twin = self.twins.get(frame);
+        let twin = *twin.ok_or(PipelineError::NoSuchFrame { frame, frames })?;
+        let share = self.pipeline().settings().skips.equal_frames;
+        Ok(if share { twin } else { frame })
     }
+
+    /// Whether a frame equals an earlier one, bit for bit: what it says has been said.
+    fn is_repeated(&self, frame: usize) -> bool {
+        self.twins[frame] != frame
+    }
+}
+
+/// A hash of some sixty rows' pixels: the same for equal images, another for nearly all others, so that a frame is compared with few.
+fn fingerprint(image: ArrayView2<'_, u8>) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    image.dim().hash(&mut hasher);
+    for row in image.rows().into_iter().step_by(image.nrows() / 64 + 1) {
+        row.iter()
+            .step_by(7)
+            .for_each(|pixel| hasher.write_u8(*pixel));
+    }
+    hasher.finish()
 }

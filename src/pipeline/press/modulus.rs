@@ -6,6 +6,10 @@ use crate::pipeline::error_budget::{self, ErrorShare};
 use crate::pipeline::estimators::that_fit;
 use crate::pipeline::load_reading::LoadReading;
 
+/// Frames of a press whose strain is worked out for the modulus. A match takes milliseconds, so that thousands would take minutes; the error
+/// of the mean strain is that of the first surface, which all share, and does not fall with more.
+const STRAINED_FRAMES: usize = 32;
+
 impl Press<'_> {
     /// Young's modulus by the estimator of the pipeline. For a
     /// ball that takes the contacts alone: no surface is reconstructed.
@@ -18,7 +22,9 @@ impl Press<'_> {
         self.runner.modulus(estimator.as_ref(), &loads)
     }
 
-    /// What every frame says of its load, with the strain since the first and the errors that all share: what
+    /// What every frame says of its load, with the strain since the first (of at most 32 frames, evenly chosen) and the errors that all
+    /// share. A frame that equals an earlier one says nothing new, and a contact that the frame's edge cuts says something wrong: their loads
+    /// have a force alone (where all are cut, there is nothing better). This is what
     /// [estimators](crate::elasticity::modulus::ModulusEstimator) take.
     ///
     /// ```
@@ -89,20 +95,38 @@ impl Press<'_> {
     /// What every frame says of its load, and the relative errors that all share.
     fn loads(&mut self, with_strain: bool) -> Result<LoadSeries<f64>, PipelineError> {
         let mut readings: Vec<LoadReading> = Vec::with_capacity(self.frames.len());
+        // Contacts that the frame's edge cuts.
+        let mut cut = Vec::with_capacity(self.frames.len());
         let size = self.pipeline().contact().pixel_size_m();
         for frame in 0..self.frames.len() {
             let contact = self.reading(frame)?;
             let reading = LoadReading::of(&contact, None, size);
             readings.push(reading.ok_or(PipelineError::NoForce { frame })?);
+            cut.push(contact.touches_edge);
         }
-        let strained = if with_strain { readings.len() } else { 0 };
-        for frame in 1..strained {
-            // A frame that equals the first has no strain.
-            if self.twins[frame] != 0 {
+        if with_strain {
+            for frame in self.strained_frames() {
                 let step = readings[frame].force_n - readings[0].force_n;
                 readings[frame].mean_strain = Some(self.strain(frame)?.of_load(step));
             }
         }
+        let all_cut = cut.iter().all(|&cut| cut);
+        for (frame, reading) in readings.iter_mut().enumerate() {
+            if self.is_repeated(frame) || cut[frame] && !all_cut {
+                reading.forget_contact();
+            }
+        }
         self.runner.load_series(readings.iter().copied())
+    }
+
+    /// The frames whose strain enters the modulus: those that equal no earlier one, thinned evenly where there are many.
+    fn strained_frames(&self) -> Vec<usize> {
+        let new: Vec<usize> = (1..self.frames.len())
+            .filter(|&frame| !self.is_repeated(frame))
+            .collect();
+        let last = new.len().saturating_sub(1);
+        let kept = new.len().min(STRAINED_FRAMES);
+        // The last frame is always one of them.
+        (1..=kept).map(|k| new[k * (last + 1) / kept - 1]).collect()
     }
 }

@@ -1,6 +1,7 @@
 //! What a press says of its frames, one stage after the other: contact, surface, control points, match, strain.
 use super::{Loaded, Press};
 use crate::matching::Matching;
+use crate::pipeline::background;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::pair::PairStrain;
@@ -29,9 +30,16 @@ impl Press<'_> {
 
     /// The contact of a frame that must have one.
     pub(super) fn reading(&mut self, frame: usize) -> Result<ContactReading, PipelineError> {
-        self.contact(frame)?
-            .copied()
-            .ok_or(PipelineError::NoContact { frame })
+        if let Some(reading) = self.contact(frame)? {
+            return Ok(*reading);
+        }
+        let image = self.frames[self.twin(frame)?].image;
+        let grey = background::greatest_step(image, self.runner.reference().image());
+        Err(if grey.abs() > background::CLEAR_STEP_GREY {
+            PipelineError::OppositeSignal { frame, grey }
+        } else {
+            PipelineError::NoContact { frame }
+        })
     }
 
     /// The surface of a frame's contact.
@@ -72,6 +80,13 @@ impl Press<'_> {
             .surface
             .as_ref()
             .ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// Frees the memory of a frame's surface; it is reconstructed again when it is asked for.
+    pub(super) fn forget_surface(&mut self, frame: usize) -> Result<(), PipelineError> {
+        let at = self.twin(frame)?;
+        self.frames[at].surface = None;
+        Ok(())
     }
 
     /// Control points on a frame's surface, in metres from the frame's first pixel.

@@ -81,7 +81,11 @@ impl MergedLoad {
             force_n: self.force_n,
             noise_n: self.force_variance.sqrt(),
             calibration_n: self.calibration * self.force_n,
-            radius_m: radius_with_floor(self.radius_m, self.radius_variance.sqrt(), pixel_size_m),
+            radius_m: Some(radius_with_floor(
+                self.radius_m,
+                self.radius_variance.sqrt(),
+                pixel_size_m,
+            )),
             indentation_m: self.indentation_m,
             mean_strain: self.mean_strain,
         }

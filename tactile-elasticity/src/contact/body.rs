@@ -148,7 +148,7 @@ pub fn sample_modulus_pa<T: RealField + Copy>(
     let left = (-other.compliance_per_pa).mul_add(reduced_modulus_pa, T::one());
     if left <= T::zero() {
         return Err(ElasticityError::StifferThanResolvable {
-            lower_bound_pa: 0.0,
+            lower_bound_pa: None,
         });
     }
     Ok((T::one() - poisson_ratio) * (T::one() + poisson_ratio) * reduced_modulus_pa / left)

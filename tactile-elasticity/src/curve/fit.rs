@@ -94,6 +94,8 @@ pub struct CurveFit {
     pub standard_error_pa: f64,
     /// 95 % interval by profile likelihood, and by the error that finite strain makes in the law.
     pub interval_95: Interval<f64>,
+    /// Relative standard error of the law itself, which is part of the interval.
+    pub model_error: f64,
     /// Position where contact begins.
     pub contact_point_m: f64,
     /// Force before contact.
@@ -231,6 +233,7 @@ fn report(
             lower,
             upper: Some(upper),
         },
+        model_error,
         contact_point_m: best.contact_m,
         offset_n: best.offset,
         residual_sd_n: (best.squares / degrees as f64).sqrt(),

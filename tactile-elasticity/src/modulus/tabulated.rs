@@ -331,7 +331,7 @@ impl<T: RealField + Copy> ModulusEstimator<T> for TabulatedContact {
         };
         if fit.above {
             return Err(ElasticityError::StifferThanResolvable {
-                lower_bound_pa: lower.map_or(0.0, f64::exp),
+                lower_bound_pa: lower.map(f64::exp),
             });
         }
         if fit.below {

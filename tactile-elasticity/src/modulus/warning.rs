@@ -70,13 +70,15 @@ impl<T: core::fmt::Display> core::fmt::Display for Warning<T> {
             Self::LargeContact { load, ratio, limit } => {
                 write!(
                     f,
-                    "load {load}: a/R = {ratio:.3} is beyond {limit:.2}, small-contact theory does not hold"
+                    "load {}: a/R = {ratio:.3} is beyond {limit:.2}, small-contact theory does not hold",
+                    load + 1
                 )
             }
             Self::ThinLayer { load, ratio, limit } => {
                 write!(
                     f,
-                    "load {load}: contact over layer thickness = {ratio:.3} is beyond {limit:.2} for this law"
+                    "load {}: contact over layer thickness = {ratio:.3} is beyond {limit:.2} for this law",
+                    load + 1
                 )
             }
             Self::LargeStrain {
@@ -86,7 +88,8 @@ impl<T: core::fmt::Display> core::fmt::Display for Warning<T> {
             } => {
                 write!(
                     f,
-                    "load {load}: strain {strain:.3} is beyond {limit:.2}, the linear law does not hold"
+                    "load {}: strain {strain:.3} is beyond {limit:.2}, the linear law does not hold",
+                    load + 1
                 )
             }
             Self::ExcessScatter {
@@ -116,7 +119,8 @@ impl<T: core::fmt::Display> core::fmt::Display for Warning<T> {
             Self::RatioOnSphere { load, ratio } => {
                 write!(
                     f,
-                    "load {load}: stress over strain is biased on a sphere (a/R = {ratio:.3})"
+                    "load {}: stress over strain is biased on a sphere (a/R = {ratio:.3})",
+                    load + 1
                 )
             }
         }

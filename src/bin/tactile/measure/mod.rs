@@ -7,11 +7,12 @@ use crate::context::Context;
 use crate::failure::{Exit, Failure};
 use crate::numbers::positive;
 use crate::outputs::Outputs;
-use crate::progress::waiting;
+use crate::progress::{Progress, waiting_or_interrupted};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use source::Source;
 use std::path::PathBuf;
+use tactile_imaging::pipeline::{ContactReading, PipelineError, Press};
 use tactile_imaging::plot::{save_press_pages, summary_lines};
 
 /// Measure the Young's modulus of an object from frames at two or more loads
@@ -118,15 +119,47 @@ const PAGES: [&str; 6] = [
     "summary.svg",
 ];
 
+/// The contact of every frame, which needs nothing of the others; after Ctrl-C those that are there are printed and there is nothing more
+/// to do.
+fn contacts(press: &mut Press<'_>, context: &mut Context) -> Option<Vec<Contact>> {
+    let mut bar = Progress::of(press.frames(), "measuring contacts");
+    context.interrupt.hear(true);
+    let mut contacts = Vec::with_capacity(press.frames());
+    for frame in 0..press.frames() {
+        if context.interrupt.requested() {
+            drop(bar);
+            report::print_contacts(&contacts, &mut context.console);
+            return None;
+        }
+        contacts.push(press.contact(frame).map(|contact| contact.copied()));
+        bar.done(frame + 1);
+    }
+    Some(contacts)
+}
+
+/// What the first stage says of a frame; None without contact.
+type Contact = Result<Option<ContactReading>, PipelineError>;
+
 pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure> {
     let inputs: Vec<_> = arguments.scene.iter().map(PathBuf::as_path).collect();
     let outputs = Outputs::plan(arguments.out.as_deref(), &PAGES, &inputs)?;
-    let source = Source::open(arguments, context)?;
+    // It lives as long as the program, so that Ctrl-C can leave work on it undone.
+    let source: &'static Source = Box::leak(Box::new(Source::open(arguments, context)?));
     outputs.check(&source.files())?;
     let pipeline = source.pipeline(arguments.points as usize)?;
     let mut press = source.press(&pipeline)?;
+    let Some(contacts) = contacts(&mut press, context) else {
+        return Ok(Exit::Interrupted);
+    };
     let job = format!("measuring {} frames", press.frames());
-    let measurement = waiting(job, || press.measure());
+    let measured = waiting_or_interrupted(job, &context.interrupt, move || {
+        let measurement = press.measure();
+        (press, measurement)
+    });
+    let Some((mut press, measurement)) = measured else {
+        report::print_contacts(&contacts, &mut context.console);
+        return Ok(Exit::Interrupted);
+    };
     let timing = timing::repeated(&press, arguments.repeat, context);
     let truth = source.truth();
     report::print(&measurement, truth.as_ref(), &timing, &mut context.console);

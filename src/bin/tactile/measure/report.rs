@@ -1,7 +1,9 @@
 //! What is known of a press, as text and JSON, and beside the truth.
+use super::Contact;
 use super::timing::Timing;
 use crate::console::Console;
-use tactile_imaging::pipeline::{Measurement, Truth};
+use serde_json::json;
+use tactile_imaging::pipeline::{Measurement, Truth, with_error};
 
 pub fn percent(found: f64, truth: f64) -> f64 {
     100.0 * (found / truth - 1.0)
@@ -12,6 +14,35 @@ pub fn is_complete(measurement: &Measurement) -> bool {
     measurement.youngs_modulus_pa.is_ok()
         && measurement.strain.is_ok()
         && (measurement.frames.iter()).all(|f| f.as_ref().is_ok_and(|f| f.force_n.is_ok()))
+}
+
+/// The contacts alone, of a measurement that Ctrl-C stopped.
+pub fn print_contacts(contacts: &[Contact], console: &mut Console) {
+    let mut values = Vec::new();
+    for (k, contact) in contacts.iter().enumerate() {
+        let name = format!("frame {}", k + 1);
+        match contact {
+            Ok(Some(contact)) => {
+                let radius = contact.contact_radius_m;
+                let force = contact.force_n.map_or("force unknown".to_owned(), |f| {
+                    format!("force {} N", with_error(f.value, f.standard_error, 1.0))
+                });
+                let radius = with_error(radius.value, radius.standard_error, 1e3);
+                console.line(format!("{name:<16} {force}   contact radius {radius} mm"));
+                values.push(json!({ "value": contact }));
+            }
+            Ok(None) => {
+                console.line(format!("{name:<16} no contact"));
+                values.push(json!({ "value": null }));
+            }
+            Err(error) => {
+                console.line(format!("{name:<16} none: {error}"));
+                values.push(json!({ "error": error.to_string() }));
+            }
+        }
+    }
+    console.line("stopped by Ctrl-C before surfaces, strain and modulus");
+    console.value(&json!({ "interrupted": true, "contacts": values }));
 }
 
 pub fn print(

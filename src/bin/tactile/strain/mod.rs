@@ -7,7 +7,7 @@ use crate::context::Context;
 use crate::failure::{Exit, Failure};
 use crate::match_points::{self, Expectations};
 use crate::outputs::Outputs;
-use crate::progress::waiting;
+use crate::progress::waiting_or_interrupted;
 use clap::{Args, ValueEnum};
 use measure::{assigned, strain_of};
 use nalgebra::Point;
@@ -109,7 +109,14 @@ fn measured<const D: usize>(
     match_points::allow(context, before.len(), after.len(), remedy)?;
     let matcher = arguments.expectations.matcher();
     let job = format!("matching {} to {} points", before.len(), after.len());
-    let matching = waiting(job, || matcher.match_points(before, after)).map_err(|error| {
+    let (from, to) = (before.to_vec(), after.to_vec());
+    let matching = waiting_or_interrupted(job, &context.interrupt, move || {
+        matcher.match_points(&from, &to)
+    });
+    let Some(matching) = matching else {
+        return Ok(Exit::Interrupted);
+    };
+    let matching = matching.map_err(|error| {
         Failure::input(format!(
             "{} and {} cannot be matched: {error}",
             arguments.before.display(),
@@ -118,14 +125,20 @@ fn measured<const D: usize>(
     })?;
     let rows = assigned(&matching.assignment);
     let job = format!("fitting {} pairs", rows.len());
-    let found = waiting(job, || {
-        strain_of(before, after, &rows, arguments.measure.strain())
+    let (from, to, pairs, measure) = (
+        before.to_vec(),
+        after.to_vec(),
+        rows.clone(),
+        arguments.measure,
+    );
+    let found = waiting_or_interrupted(job, &context.interrupt, move || {
+        strain_of(&from, &to, &pairs, measure.strain()).map_err(|error| error.to_string())
     });
     let report = Report {
         before,
         after,
         matched: &rows,
-        strain: found.map_err(|error| error.to_string()),
+        strain: found.unwrap_or_else(|| Err("stopped by Ctrl-C".to_owned())),
         measure: arguments.measure.strain().name(),
         unit,
     };

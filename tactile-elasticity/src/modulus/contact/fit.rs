@@ -211,7 +211,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
             0.0
         };
         let Some(modulus) = self.sample_modulus(centre.log_reduced) else {
-            let lower_bound_pa = if lower.is_finite() { lower } else { 0.0 };
+            let lower_bound_pa = Some(lower).filter(|bound| *bound > 0.0 && bound.is_finite());
             return Err(ElasticityError::StifferThanResolvable { lower_bound_pa });
         };
         let upper = if known { limit(1.0) } else { None };

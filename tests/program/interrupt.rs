@@ -1,0 +1,108 @@
+//! Ctrl-C ends every long subcommand soon, with what there is.
+use super::harness::{folder_with_examples, tactile, text, words};
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Longest time from Ctrl-C to the end, on a busy machine: the work itself would go on for minutes.
+const SOON: Duration = Duration::from_secs(30);
+
+/// Starts the program, sends it Ctrl-C a moment after it has printed its first line, and returns what it printed and its exit code.
+fn interrupted(folder: &Path, arguments: &str, lines_before: usize) -> (String, Option<i32>) {
+    let mut child = tactile(folder, &words(arguments))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut reader = BufReader::new(child.stdout.take().unwrap());
+    let mut printed = String::new();
+    for _ in 0..lines_before {
+        assert!(
+            reader.read_line(&mut printed).unwrap() > 0,
+            "tactile {arguments}: {printed}"
+        );
+    }
+    // The handler is there before anything is printed; without a line to wait for it takes a moment.
+    std::thread::sleep(Duration::from_millis(700));
+    let sent = Instant::now();
+    let id = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &id])
+            .status()
+            .unwrap()
+            .success()
+    );
+    reader.read_to_string(&mut printed).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(
+        sent.elapsed() < SOON,
+        "tactile {arguments} went on for {:?}",
+        sent.elapsed()
+    );
+    let errors = text(&output.stderr);
+    assert!(
+        !errors.contains("panicked"),
+        "tactile {arguments}: {errors}"
+    );
+    (printed, output.status.code())
+}
+
+/// A ring of points that nothing simplifies: matching two of these takes minutes.
+fn points(n: usize, row: &str) -> String {
+    let point = |k: usize| {
+        let angle = 2.4 * k as f64;
+        let radius = (k as f64).sqrt();
+        format!(
+            "{row}{},{}\n",
+            radius * angle.cos(),
+            1.1 * radius * angle.sin()
+        )
+    };
+    (0..n).map(point).collect()
+}
+
+#[test]
+fn matching_leaves_the_cases_that_are_done() {
+    let folder = folder_with_examples();
+    let rows = |n: usize, kind: &str| points(n, &format!("{kind} ")).replace(',', " ");
+    let case =
+        |name: &str, n: usize| format!("case {name} 2 {n} {n}\n{}{}", rows(n, "m"), rows(n, "t"));
+    let cases = case("small", 40) + &case("large", 8000);
+    fs::write(folder.path().join("both.txt"), cases).unwrap();
+    let (printed, code) = interrupted(folder.path(), "match both.txt --out results", 1);
+    assert_eq!(code, Some(130), "{printed}");
+    assert!(printed.starts_with("small: 40 of 40"), "{printed}");
+    let answers = fs::read_to_string(folder.path().join("results/both.txt")).unwrap();
+    assert!(answers.contains("case small") && !answers.contains("case large"));
+}
+
+#[test]
+fn a_stream_ends_with_what_it_has_measured() {
+    let folder = folder_with_examples();
+    let call = "stream --rate 20 --period 60 --allowed-late 100 --out results";
+    // Making the frames is interrupted, then the frames that are there are not played.
+    let (printed, code) = interrupted(folder.path(), call, 0);
+    assert_eq!(code, Some(130), "{printed}");
+}
+
+#[test]
+fn work_that_has_nothing_yet_ends_at_once() {
+    let folder = folder_with_examples();
+    fs::write(
+        folder.path().join("many.csv"),
+        "x,y\n".to_owned() + &points(8000, ""),
+    )
+    .unwrap();
+    for (call, lines) in [
+        ("strain many.csv many.csv --out results", 0),
+        ("light --rays 9000000", 1),
+        ("measure --repeat 4000", 0),
+    ] {
+        let (printed, code) = interrupted(folder.path(), call, lines);
+        assert_eq!(code, Some(130), "tactile {call}: {printed}");
+    }
+    assert!(!folder.path().join("results").exists());
+}

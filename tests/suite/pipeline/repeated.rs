@@ -1,0 +1,110 @@
+//! What frames say that repeat others, are cut, or do not belong to their reference.
+use super::trial;
+use ndarray::s;
+use tactile_imaging::elasticity::modulus::ModulusEstimator;
+use tactile_imaging::pipeline::{Flag, PipelineError};
+
+#[test]
+fn a_frame_that_is_given_twice_counts_once() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let once = trial.press(&pipeline).unwrap().modulus().unwrap();
+    let mut press = trial.press(&pipeline).unwrap();
+    for frame in trial.simulation.frames.iter().cycle().take(100) {
+        press.add_frame(frame.view());
+    }
+    let often = press.modulus().unwrap();
+    assert_eq!(often.youngs_modulus_pa, once.youngs_modulus_pa);
+    assert_eq!(often.standard_error_pa, once.standard_error_pa);
+    assert_eq!(often.loads.len(), 102);
+    assert_eq!(often.loads.iter().filter(|load| load.used).count(), 2);
+    // The estimators that use strain count it once as well.
+    let series = press.load_series().unwrap();
+    let strained = series
+        .loads()
+        .iter()
+        .filter(|load| load.mean_strain.is_some());
+    assert_eq!(strained.count(), 1);
+    let ratio = tactile_imaging::elasticity::modulus::PaperRatio::new();
+    assert_eq!(ratio.estimate(&series).unwrap().fit.observations, 1);
+}
+
+#[test]
+fn a_swapped_reference_is_told_from_a_frame_without_contact() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let pressed = &trial.simulation.frames[1];
+    let mut press = pipeline.press(pressed.view()).unwrap();
+    press.add_frame(trial.simulation.reference.view());
+    let error = press.modulus().unwrap_err();
+    assert!(
+        matches!(error, PipelineError::OppositeSignal { frame: 0, grey } if grey < -20.0),
+        "{error}"
+    );
+    assert!(error.to_string().contains("were the two swapped"));
+}
+
+#[test]
+fn darker_frames_are_flagged() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let drift = |step: u8| {
+        let frames = &trial.simulation.frames;
+        let darker: Vec<_> = frames
+            .iter()
+            .map(|f| f.mapv(|v| v.saturating_sub(step)))
+            .collect();
+        let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
+        darker.iter().for_each(|frame| {
+            press.add_frame(frame.view());
+        });
+        let measurement = press.measure();
+        let found = measurement.flags.iter().find_map(|flag| match flag {
+            Flag::LightDrifted { grey } => Some(*grey),
+            _ => None,
+        });
+        (found, measurement.to_string())
+    };
+    let (none, text) = drift(0);
+    assert_eq!(none, None, "{text}");
+    let (found, text) = drift(3);
+    assert_eq!(found, Some(-3.0), "{text}");
+}
+
+/// One contact of two is cut by the border: its force and radius are wrong, and the modulus is the other's.
+#[test]
+fn a_contact_that_the_border_cuts_is_left_out() {
+    let trial = trial(&[0.7, 1.2], 6);
+    let pipeline = trial.pipeline().unwrap();
+    let frames = &trial.simulation.frames;
+    // The contacts' middle is (174, 130); their radii are some 38 and 45 pixels.
+    let cut = |image: &ndarray::Array2<u8>, left: usize| image.slice(s![.., left..]).to_owned();
+    let (reference, small, large) = (
+        cut(&trial.simulation.reference, 130),
+        cut(&frames[0], 130),
+        cut(&frames[1], 130),
+    );
+    let mut press = pipeline.press(reference.view()).unwrap();
+    press.add_frame(small.view());
+    press.add_frame(large.view());
+    let measurement = press.measure();
+    assert!(
+        measurement.flags.contains(&Flag::TouchesEdge { frame: 1 }),
+        "{measurement}"
+    );
+    let alone = {
+        let mut press = pipeline.press(reference.view()).unwrap();
+        press.add_frame(small.view());
+        press.modulus().unwrap()
+    };
+    let modulus = measurement.youngs_modulus_pa.unwrap();
+    assert_eq!(modulus.value, alone.youngs_modulus_pa);
+    // Where every contact is cut there is no better answer, but the caution.
+    let half = [150, 150].map(|left| cut(&frames[1], left));
+    let reference = cut(&trial.simulation.reference, 150);
+    let mut press = pipeline.press(reference.view()).unwrap();
+    press.add_frame(half[0].view());
+    let measurement = press.measure();
+    assert!(measurement.flags.contains(&Flag::TouchesEdge { frame: 0 }));
+    assert!(measurement.youngs_modulus_pa.is_ok());
+}

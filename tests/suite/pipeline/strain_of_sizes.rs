@@ -1,0 +1,83 @@
+//! The strain's stated error holds in frames of every size, or the result is flagged.
+use std::collections::BTreeMap;
+use tactile_imaging::pipeline::{Flag, Trial};
+use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+
+/// Widths and heights of frames that show the same 30 mm × 22.5 mm.
+const SIZES: [[usize; 2]; 5] = [[174, 130], [348, 260], [464, 347], [696, 521], [1392, 1042]];
+
+/// Seeds of each size: `STRAIN_SEEDS`, or a few.
+fn seeds() -> u64 {
+    let given = std::env::var("STRAIN_SEEDS").ok();
+    given.and_then(|n| n.parse().ok()).unwrap_or(2)
+}
+
+/// The paper's press in a camera of this size; every seed has its own noise and its own place between the pixels.
+fn trial([width, height]: [usize; 2], seed: u64) -> Trial {
+    let fraction = |step: f64| (step * seed as f64).fract() - 0.5;
+    let camera = Camera {
+        shape: [height, width],
+        pixel_size_m: [30e-3 / width as f64; 2],
+        ..Camera::default()
+    };
+    let options = PressOptions {
+        camera,
+        seed,
+        centre_px: Some([
+            0.5 * width as f64 + fraction(0.618),
+            0.5 * height as f64 + fraction(0.414),
+        ]),
+        ..PressOptions::default()
+    };
+    Trial::new(options, &CalibrationOptions::default()).unwrap()
+}
+
+/// Whether the measurement itself says that its strain may be wrong.
+fn cautions(flags: &[Flag]) -> bool {
+    flags.iter().any(|flag| {
+        matches!(
+            flag,
+            Flag::CoarseStrain { .. } | Flag::MatchNotConverged | Flag::Folded { .. }
+        )
+    })
+}
+
+/// Every mean strain lies within three stated standard errors of the truth, or a caution says that it may not: 3 is what one normal
+/// number in 370 exceeds, and the errors are stated for the worst size.
+#[test]
+fn strains_are_within_their_errors_at_every_size_or_flagged() {
+    let mut failures = Vec::new();
+    for size in SIZES {
+        let mut worst: BTreeMap<&str, f64> = BTreeMap::new();
+        let mut flagged = 0;
+        for seed in 0..seeds() {
+            let trial = trial(size, seed);
+            let pipeline = trial.pipeline().unwrap();
+            let measurement = trial.press(&pipeline).unwrap().measure();
+            let Ok(strain) = &measurement.strain else {
+                continue;
+            };
+            let truth = trial.truth().strain.unwrap();
+            let caution = cautions(&measurement.flags);
+            flagged += usize::from(caution);
+            for (k, name) in ["e_xx", "e_yy", "e_zz"].into_iter().enumerate() {
+                let z = (strain.mean[k][k] - truth[k][k]) / strain.standard_error[k][k];
+                let entry = worst.entry(name).or_default();
+                if z.abs() > entry.abs() {
+                    *entry = z;
+                }
+                if !(z.abs() <= 3.0 || caution) {
+                    failures.push(format!(
+                        "{size:?}, seed {seed}: {name} {:.4} ± {:.4}, true {:.4}",
+                        strain.mean[k][k], strain.standard_error[k][k], truth[k][k]
+                    ));
+                }
+            }
+        }
+        println!(
+            "{size:?}: {flagged} of {} flagged, greatest z {worst:.2?}",
+            seeds()
+        );
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
