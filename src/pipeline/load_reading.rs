@@ -115,9 +115,10 @@ fn guide_error_at(readings: impl Iterator<Item = LoadReading>, settings: &Settin
         return 0.0;
     };
     let (mut sum, mut count) = (0.0, 0.0);
-    for reading in readings {
-        sum += reading.radius_m.value;
+    for radius in readings.filter_map(|reading| reading.radius_m) {
+        sum += radius.value;
         count += 1.0;
     }
+    // Without a radius the mean is NaN, which the compliance refuses.
     guide_error::relative_error(guide.layers(), covariance, sum / count).unwrap_or(0.0)
 }

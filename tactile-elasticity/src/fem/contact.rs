@@ -15,11 +15,8 @@
 
 use super::curve::SurfaceCurve;
 use super::element::{GAUSS3, quadratic};
-use super::gap::Placement;
-use super::material::Kinematics;
-use super::model::Model;
+use super::placement::{Placement, combine};
 use super::rigid::RigidShape;
-use super::system::Fields;
 
 /// What a surface may touch.
 #[derive(Debug, Clone)]
@@ -81,7 +78,7 @@ const SLIVER: f64 = 1e-6;
 
 impl ContactSegment {
     /// Gauss points between the cuts, which are parameters on the edge in ascending order.
-    fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<ContactPoint> {
+    pub(crate) fn points(&self, cuts: &[f64], nodes: &[[f64; 2]]) -> Vec<ContactPoint> {
         let [start, end] = self.ends;
         let mut bounds = vec![start];
         bounds.extend(cuts);
@@ -112,7 +109,7 @@ impl ContactSegment {
     }
 
     /// Parameters at which the ends of the opposite edges lie closest.
-    fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
+    pub(crate) fn cuts(&self, curve: &SurfaceCurve, placement: &Placement<'_>) -> Vec<f64> {
         let at = |parameter: f64| {
             let (shape, derivative) = quadratic(parameter);
             let position = combine(&shape, self.nodes, |n| placement.current(n));
@@ -203,50 +200,4 @@ pub(crate) fn contact_segments(
         }
     }
     (segments, corners)
-}
-
-impl Model {
-    /// The points at which gaps are measured at a state.
-    pub(crate) fn contact_points(&self, fields: &Fields) -> Vec<ContactPoint> {
-        let placement = self.placement(fields);
-        let mut points = Vec::with_capacity(3 * self.segments.len());
-        for segment in &self.segments {
-            let cuts = match (&self.opposites[segment.pair], self.kinematics) {
-                (Opposite::Surface(curve), Kinematics::Finite) => segment.cuts(curve, &placement),
-                _ => Vec::new(),
-            };
-            points.extend(segment.points(&cuts, &self.nodes));
-        }
-        points
-    }
-}
-
-/// Weighted sum over an edge's nodes.
-pub(crate) fn combine(
-    shape: &[f64; 3],
-    nodes: [usize; 3],
-    at: impl Fn(usize) -> [f64; 2],
-) -> [f64; 2] {
-    let mut sum = [0.0; 2];
-    for (n, node) in shape.iter().zip(nodes) {
-        let point = at(node);
-        sum[0] += n * point[0];
-        sum[1] += n * point[1];
-    }
-    sum
-}
-
-impl Placement<'_> {
-    /// Deformed area over reference area at a Gauss point (one in linear kinematics).
-    pub(crate) fn stretch(&self, point: &ContactPoint) -> f64 {
-        if self.kinematics == Kinematics::Linear {
-            return 1.0;
-        }
-        let area = |at: &dyn Fn(usize) -> [f64; 2]| {
-            let [r, _] = combine(&point.shape, point.nodes, at);
-            let [dr, dz] = combine(&point.derivative, point.nodes, at);
-            r * dr.hypot(dz)
-        };
-        area(&|n| self.current(n)) / area(&|n| self.nodes[n])
-    }
 }

@@ -88,11 +88,20 @@ pub(crate) fn map(nodes: &[[f64; 2]; 9], xi: f64, eta: f64) -> ([f64; 2], [[f64;
     (position, gradients, determinant)
 }
 
+/// Pressure shape functions 1, (r − r₀)/h, (z − z₀)/h of an element at a reference position.
+pub(crate) fn pressure_functions(nodes: &[[f64; 2]; 9], position: [f64; 2]) -> [f64; 3] {
+    let centre = nodes[8];
+    let size = (nodes[0][0] - nodes[2][0]).hypot(nodes[0][1] - nodes[2][1]);
+    [
+        1.0,
+        (position[0] - centre[0]) / size,
+        (position[1] - centre[1]) / size,
+    ]
+}
+
 impl Geometry {
     /// `None` where the element is turned inside out or degenerate at a Gauss point.
     pub(crate) fn new(nodes: &[[f64; 2]; 9]) -> Option<Self> {
-        let centre = nodes[8];
-        let size = (nodes[0][0] - nodes[2][0]).hypot(nodes[0][1] - nodes[2][1]);
         let mut points = Vec::with_capacity(9);
         let mut mass = nalgebra::Matrix3::<f64>::zeros();
         for (eta, eta_weight) in GAUSS3 {
@@ -103,11 +112,7 @@ impl Geometry {
                 }
                 let weight =
                     core::f64::consts::TAU * position[0] * determinant * xi_weight * eta_weight;
-                let pressure = [
-                    1.0,
-                    (position[0] - centre[0]) / size,
-                    (position[1] - centre[1]) / size,
-                ];
+                let pressure = pressure_functions(nodes, position);
                 let functions = nalgebra::Vector3::from(pressure);
                 mass += weight * functions * functions.transpose();
                 points.push(GaussPoint {

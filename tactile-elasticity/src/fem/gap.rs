@@ -1,8 +1,9 @@
 //! Gaps between a point of a surface and what lies opposite, with their derivatives.
 
-use super::contact::{ContactPoint, Opposite, combine};
+use super::contact::{ContactPoint, Opposite};
 use super::curve::{BEND, CurvePoint, SurfaceCurve};
 use super::material::Kinematics;
+use super::placement::{Placement, combine};
 use super::rigid::RigidShape;
 
 /// Stands for the approach among the displacement components of a [`Gap`].
@@ -54,28 +55,7 @@ pub(crate) fn averaged(gaps: &[(Gap, f64)], total: f64) -> Gap {
     average
 }
 
-/// Where contact is judged: reference coordinates and displacements.
-#[derive(Clone, Copy)]
-pub(crate) struct Placement<'a> {
-    pub(crate) kinematics: Kinematics,
-    pub(crate) nodes: &'a [[f64; 2]],
-    pub(crate) displacement: &'a [f64],
-    pub(crate) approach: f64,
-}
-
 impl Placement<'_> {
-    pub(crate) fn current(&self, node: usize) -> [f64; 2] {
-        let [r, z] = self.nodes[node];
-        [
-            r + self.displacement[2 * node],
-            z + self.displacement[2 * node + 1],
-        ]
-    }
-
-    fn moved(&self, node: usize) -> [f64; 2] {
-        [self.displacement[2 * node], self.displacement[2 * node + 1]]
-    }
-
     /// The gap of a point, `None` where there is nothing opposite to it.
     pub(crate) fn gap(&self, point: &ContactPoint, opposite: &Opposite) -> Option<Gap> {
         match opposite {

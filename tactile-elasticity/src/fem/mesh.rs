@@ -63,17 +63,21 @@ impl Mesh {
         &self.elements
     }
 
-    /// Region of each element.
-    pub fn regions(&self) -> &[usize] {
-        &self.regions
-    }
-
     /// Number of regions.
-    pub fn region_count(&self) -> usize {
+    pub(crate) fn region_count(&self) -> usize {
         self.regions.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// Edges (start, middle, end) of a boundary, empty where the body has no such boundary.
+    /// Edges of a boundary as their nodes (start, middle, end), with the body on their left; empty where
+    /// the body has no such boundary.
+    ///
+    /// ```
+    /// use tactile_elasticity::fem::{Boundary, Mesh};
+    ///
+    /// let mesh = Mesh::rectangle(&[0.0, 1.0, 2.0], &[-1.0, 0.0]);
+    /// let heights = mesh.edges(Boundary::Contact).iter().map(|edge| mesh.nodes()[edge[1]][1]);
+    /// assert!(heights.into_iter().all(|z| z == 0.0));
+    /// ```
     pub fn edges(&self, boundary: Boundary) -> &[[usize; 3]] {
         self.boundaries.get(&boundary).map_or(&[], Vec::as_slice)
     }

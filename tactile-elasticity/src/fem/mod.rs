@@ -58,29 +58,39 @@
 //! X. Meng, Int. J. Numer. Meth. Eng. 62 (2005) 1183.
 mod block;
 mod bodies;
+mod candidates;
 mod contact;
 mod curve;
 mod element;
+mod fields;
 mod gap;
 mod interface;
 mod layout;
+mod load;
 mod material;
 mod mesh;
 mod model;
 mod newton;
+mod placement;
+mod pressure;
 mod radius;
+mod recovery;
 mod rigid;
 mod scene;
 mod sparse;
 mod state;
+mod stress;
 mod system;
+mod tangent;
 
+pub use load::{Load, Outcome, Report, Solution};
 pub use material::{Kinematics, Material};
 pub use mesh::{Boundary, Mesh};
 pub use model::{Body, Model, Support};
-pub use newton::{Load, Outcome, Report, Solution};
+pub use pressure::{ContactRadius, PressurePoint};
 pub use rigid::RigidShape;
 pub use scene::{Block, Guide, Interface, Layer, Lump, Scene};
-pub use state::{ContactRadius, PressurePoint, State};
+pub use state::State;
+pub use stress::Stress;
 #[cfg(test)]
 mod tests;

@@ -168,11 +168,17 @@ impl Model {
     }
 
     /// Number of elements of all bodies.
+    ///
+    /// ```
+    /// # use tactile_elasticity::fem::{Material, Scene};
+    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// assert!(scene.model().element_count() > 100);
+    /// ```
     pub fn element_count(&self) -> usize {
         self.elements.len()
     }
 
-    /// Materials of a body, by region.
+    /// Materials of a body, by region; [`Body`] shows them.
     pub fn materials(&self, body: Body) -> &[Material] {
         &self.materials[self.parts[body.0].regions.clone()]
     }
@@ -211,7 +217,8 @@ impl Model {
         }
     }
 
-    /// Lets two bodies' [`Boundary::Contact`] touch without friction.
+    /// Lets two bodies' [`Boundary::Contact`] touch without friction, as
+    /// [`Scene::ball_on_guide`](super::Scene::ball_on_guide) does.
     ///
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
@@ -257,6 +264,21 @@ impl Model {
 
     /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole is
     /// at `height_m` and does not move.
+    ///
+    /// ```
+    /// use tactile_elasticity::fem::*;
+    ///
+    /// // A rigid ball of 20 mm on a gel of 4 mm whose base rises by 0.1 mm.
+    /// let radii: Vec<f64> = (0..=16).map(|k| f64::from(k) * 0.5e-3).collect();
+    /// let heights: Vec<f64> = (0..=8).map(|k| f64::from(k) * 0.5e-3 - 4e-3).collect();
+    /// let mut model = Model::new(Kinematics::Finite);
+    /// let material = Material::new(30e3, 0.49).unwrap();
+    /// let gel = model.add(&Mesh::rectangle(&radii, &heights), &[material]).unwrap();
+    /// model.drive(gel, Boundary::Base, Support::Bonded);
+    /// model.contact_rigid_above(gel, RigidShape::Sphere { radius_m: 20e-3 }, 0.0);
+    /// let solution = model.solve(&[Load::Approach(0.1e-3)]);
+    /// assert!(solution.states[0].force_n() > 0.0);
+    /// ```
     pub fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,
@@ -269,7 +291,8 @@ impl Model {
     }
 
     /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
-    /// starts at `height_m` and moves by the approach.
+    /// starts at `height_m` and moves by the approach, as
+    /// [`Scene::ball_on_flat`](super::Scene::ball_on_flat) does.
     pub fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,

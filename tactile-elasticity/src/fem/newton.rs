@@ -1,96 +1,13 @@
 //! Newton's method with load steps chosen by what converges.
 
 use super::contact::Opposite;
+use super::fields::{Equilibrium, Fields};
 use super::layout::Layout;
+use super::load::{Load, Outcome, Report, Solution};
 use super::material::Kinematics;
 use super::model::Model;
 use super::state::State;
-use super::system::{Fields, Goal};
-
-/// One load: how far the driven boundaries have moved, or with what force.
-///
-/// ```
-/// use tactile_elasticity::fem::Load;
-///
-/// let loads = [0.2, 0.7, 1.2].map(Load::Force);
-/// assert_eq!(loads[1], Load::Force(0.7));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Load {
-    /// The approach δ, in metres.
-    Approach(f64),
-    /// The force on the driven boundaries, in newtons; positive presses.
-    Force(f64),
-}
-
-/// How a solution ended.
-///
-/// ```
-/// use tactile_elasticity::fem::Outcome;
-///
-/// assert_ne!(Outcome::Solved, Outcome::Stopped { load: 1, approach_m: 1e-3, force_n: 0.2 });
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[non_exhaustive]
-pub enum Outcome {
-    /// Every load has its state.
-    Solved,
-    /// This load was not reached; the states of those before it are given.
-    Stopped {
-        /// Index of the load.
-        load: usize,
-        /// The last approach in equilibrium, in metres.
-        approach_m: f64,
-        /// The force there, in newtons.
-        force_n: f64,
-    },
-}
-
-/// What the solver did.
-///
-/// ```
-/// # use tactile_elasticity::fem::*;
-/// # let mesh = Mesh::rectangle(&[0.0, 1e-3], &[0.0, 1e-3]);
-/// # let mut model = Model::new(Kinematics::Finite);
-/// # let body = model.add(&mesh, &[Material::new(1e5, 0.45).unwrap()]).unwrap();
-/// # model.drive(body, Boundary::Base, Support::Sliding);
-/// # model.hold(body, Boundary::Contact, Support::Sliding);
-/// let report = model.solve(&[Load::Approach(1e-4)]).report;
-/// assert_eq!(report.outcome, Outcome::Solved);
-/// assert!(report.iterations < 10);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Report {
-    /// Whether all loads were reached.
-    pub outcome: Outcome,
-    /// Load steps that converged.
-    pub steps: usize,
-    /// Load steps given up and taken again in halves.
-    pub rejected_steps: usize,
-    /// Newton iterations, of rejected steps too.
-    pub iterations: usize,
-}
-
-/// States at the loads that were reached, in order, and a report.
-///
-/// ```
-/// use tactile_elasticity::fem::{Load, Material, Outcome, Scene};
-///
-/// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
-/// let solution = scene.solve(&[Load::Approach(0.3e-3), Load::Approach(f64::NAN)]);
-/// assert_eq!(solution.states.len(), 1);
-/// assert!(matches!(solution.report.outcome, Outcome::Stopped { load: 1, .. }));
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solution {
-    /// One state a load.
-    pub states: Vec<State>,
-    /// What the solver did.
-    pub report: Report,
-}
+use super::tangent::Goal;
 
 /// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
 /// below what the forces are wanted to, and well above rounding.
@@ -113,12 +30,6 @@ const FIRST_STEP: f64 = 1e-3;
 const LARGEST_GROWTH: f64 = 3.0;
 /// Largest step of the approach there, over the bodies' height.
 const LARGEST_STEP: f64 = 0.08;
-/// An equilibrium.
-pub(crate) struct Equilibrium {
-    pub(crate) fields: Fields,
-    pub(crate) force: f64,
-}
-
 struct Solver<'a> {
     model: &'a Model,
     layout: Layout,

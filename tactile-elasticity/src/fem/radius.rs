@@ -1,6 +1,6 @@
 //! The contact radius from the pressure.
 
-use super::state::{ContactRadius, PressurePoint};
+use super::pressure::{ContactRadius, PressurePoint};
 
 /// Outermost nodes left out of the fit: the contact's edge lies somewhere within the last element,
 /// whose pressures and half of its neighbour's are bent by it.

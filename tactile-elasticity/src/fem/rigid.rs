@@ -25,6 +25,11 @@ pub enum RigidShape {
         /// Its radius of curvature at the pole, in metres.
         radius_m: f64,
     },
+    /// The flat end of a cylinder.
+    Punch {
+        /// Its radius, in metres.
+        radius_m: f64,
+    },
     /// A cone.
     Cone {
         /// Between its axis and its surface, in radians.
@@ -37,6 +42,7 @@ impl RigidShape {
     pub(crate) fn profile(self, r: f64) -> Option<[f64; 3]> {
         match self {
             Self::Flat => Some([0.0; 3]),
+            Self::Punch { radius_m } => (r <= radius_m).then_some([0.0; 3]),
             Self::Sphere { radius_m } => {
                 let below = radius_m * radius_m - r * r;
                 if below <= 0.0 {

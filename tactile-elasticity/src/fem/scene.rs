@@ -2,10 +2,10 @@
 
 use super::block::BlockMesh;
 use super::bodies::{ContactMesh, Inclusion, contact_lines};
+use super::load::{Load, Solution};
 use super::material::{Kinematics, Material};
 use super::mesh::{Boundary, Mesh};
 use super::model::{Model, Support};
-use super::newton::{Load, Solution};
 use super::rigid::RigidShape;
 use crate::ElasticityError;
 use crate::error::{Quantity, positive};
@@ -78,7 +78,20 @@ impl Guide {
     }
 }
 
-/// What lies between a guide's face and a block's surface, of [`Block`]'s example.
+/// What lies between a guide's face and a block's surface.
+///
+/// ```
+/// use tactile_elasticity::fem::{Block, Guide, Interface, Layer, Load, Material, Scene};
+///
+/// let material = Material::new(1e4, 0.49).unwrap();
+/// let block = Block { height_m: 20e-3, radius_m: 30e-3, material, lump: None };
+/// let guide = Guide::new(vec![Layer { thickness_m: 5e-3, material }], 10e-3).unwrap();
+/// let force = |interface| {
+///     let scene = Scene::block_under_guide(&block, &guide, interface).unwrap();
+///     scene.solve(&[Load::Approach(0.2e-3)]).states[0].force_n()
+/// };
+/// assert!(force(Interface::Bonded) > force(Interface::Frictionless));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Interface {
@@ -88,7 +101,16 @@ pub enum Interface {
     Frictionless,
 }
 
-/// A sphere of another material within a block, on its axis, of [`Block`]'s example.
+/// A sphere of another material within a block, on its axis.
+///
+/// ```
+/// use tactile_elasticity::fem::{Block, Lump, Material};
+///
+/// let material = |modulus| Material::new(modulus, 0.495).unwrap();
+/// let lump = Lump { diameter_m: 8e-3, depth_m: 5e-3, material: material(40e3) };
+/// let block = Block { height_m: 30e-3, radius_m: 40e-3, material: material(4e3), lump: Some(lump) };
+/// assert!(block.lump.is_some_and(|lump| lump.depth_m + lump.diameter_m < block.height_m));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Lump {
@@ -230,7 +252,7 @@ impl Scene {
     }
 
     /// A block with or without an inclusion under a guide's face; the block's far side is held, the
-    /// guide's glass moves by the approach.
+    /// guide's glass moves by the approach. [`Block`] and [`Interface`] have examples.
     ///
     /// # Errors
     /// Lengths that are not positive; a block no wider than the guide; an inclusion that is not
@@ -310,7 +332,15 @@ impl Scene {
         self.model.solve(loads)
     }
 
-    /// The model, for what the scene does not offer.
+    /// The model, for what the scene does not offer: its size, a point's stress.
+    ///
+    /// ```
+    /// # use tactile_elasticity::fem::{Load, Material, Scene};
+    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+    /// // Pressed along the axis.
+    /// assert!(scene.model().stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);
+    /// ```
     pub fn model(&self) -> &Model {
         &self.model
     }

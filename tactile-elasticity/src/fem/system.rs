@@ -1,50 +1,14 @@
 //! The linear system of one Newton iteration.
 
-use super::element::{ALL, Elimination, OUTER};
-use super::gap::{DRIVER, Gap, Placement, averaged};
+use super::candidates::Candidate;
+use super::element::{Elimination, OUTER};
+use super::fields::Fields;
+use super::gap::DRIVER;
 use super::layout::{Layout, Slot, slot};
 use super::model::Model;
 use super::sparse::{Singular, Symmetric};
+use super::tangent::{Goal, Tangent};
 use std::sync::Arc;
-
-/// The unknowns: displacements, element pressures and the approach.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fields {
-    /// Component 2 node + (0 for r, 1 for z).
-    pub(crate) displacement: Vec<f64>,
-    pub(crate) pressures: Vec<[f64; 3]>,
-    pub(crate) approach: f64,
-    /// Contact pressures per reference area kept by the augmented Lagrangian.
-    pub(crate) multipliers: Vec<f64>,
-    /// Contact pressures per reference area, unknowns of their own as element pressures are.
-    pub(crate) contact: Vec<f64>,
-}
-
-impl Fields {
-    pub(crate) fn zero(model: &Model) -> Self {
-        Self {
-            displacement: vec![0.0; 2 * model.nodes.len()],
-            pressures: vec![[0.0; 3]; model.elements.len()],
-            approach: 0.0,
-            multipliers: vec![0.0; model.contact_nodes.len()],
-            contact: vec![0.0; model.contact_nodes.len()],
-        }
-    }
-
-    pub(crate) fn element(&self, nodes: &[usize; 9]) -> [f64; ALL] {
-        core::array::from_fn(|k| self.displacement[2 * nodes[k / 2] + k % 2])
-    }
-}
-
-/// A node of a contact surface that is in contact or may come into it.
-#[derive(Debug, Clone)]
-pub(crate) struct Candidate {
-    /// Index of the contact node.
-    pub(crate) index: usize,
-    pub(crate) gap: Gap,
-    /// λ − ε g: the pressure per reference area if positive.
-    pub(crate) pressure: f64,
-}
 
 /// Residual and tangent at one state.
 ///
@@ -66,18 +30,6 @@ pub(crate) struct System<'a> {
     candidates: Vec<Candidate>,
 }
 
-/// A symmetric linear system with one more unknown, the approach.
-#[derive(Debug, Clone)]
-struct Tangent {
-    matrix: Symmetric,
-    /// Negative residual.
-    right: Vec<f64>,
-    driver_column: Vec<f64>,
-    driver_stiffness: f64,
-    /// Residual of the approach.
-    force: f64,
-}
-
 /// Increments of a Newton step.
 pub(crate) struct Step {
     displacement: Vec<f64>,
@@ -86,56 +38,7 @@ pub(crate) struct Step {
     contact: Vec<f64>,
 }
 
-/// What a step is to reach.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Goal {
-    Approach(f64),
-    Force(f64),
-}
-
 impl Model {
-    /// Where contact is judged at a state.
-    pub(crate) fn placement<'a>(&'a self, fields: &'a Fields) -> Placement<'a> {
-        Placement {
-            kinematics: self.kinematics,
-            nodes: &self.nodes,
-            displacement: &fields.displacement,
-            approach: fields.approach,
-        }
-    }
-
-    /// Contact nodes that touch or are nearer than two spacings and `margin`.
-    pub(crate) fn candidates(&self, fields: &Fields, margin: f64) -> Vec<Candidate> {
-        let placement = self.placement(fields);
-        let points = self.contact_points(fields);
-        let mut around: Vec<Vec<(Gap, f64)>> = vec![Vec::new(); self.contact_nodes.len()];
-        for point in &points {
-            // Points with nothing opposite to them are open.
-            if let Some(gap) = placement.gap(point, &self.opposites[point.pair]) {
-                let [(first, weight), (second, other)] = point.shares;
-                around[first].push((gap.clone(), weight));
-                around[second].push((gap, other));
-            }
-        }
-        let mut candidates = Vec::new();
-        for (index, (node, around)) in self.contact_nodes.iter().zip(&around).enumerate() {
-            let total: f64 = around.iter().map(|(_, weight)| weight).sum();
-            if total < 0.5 * node.weight {
-                continue;
-            }
-            let weighted = around.iter().map(|(gap, weight)| gap.value * weight);
-            let value = weighted.sum::<f64>() / total;
-            if value < 2.0 * node.spacing + margin {
-                candidates.push(Candidate {
-                    index,
-                    gap: averaged(around, total),
-                    pressure: fields.multipliers[index] - node.penalty * value,
-                });
-            }
-        }
-        candidates
-    }
-
     /// The system at a state from which the approach may change by `margin`; `None` where an element
     /// is turned inside out.
     pub(crate) fn assemble(
@@ -213,58 +116,6 @@ impl Model {
             eliminations,
             candidates,
         })
-    }
-}
-
-impl Tangent {
-    /// Adds a symmetric contribution of which the lower half is asked.
-    fn scatter(&mut self, slots: &[Slot], residual: &[f64], value: impl Fn(usize, usize) -> f64) {
-        for (i, &slot) in slots.iter().enumerate() {
-            match slot {
-                Slot::Nowhere => continue,
-                Slot::Equation(row) => self.right[row] -= residual[i],
-                Slot::Driver(factor) => self.force += factor * residual[i],
-            }
-            for (j, &other) in slots[..=i].iter().enumerate() {
-                let value = value(i, j);
-                match (slot, other) {
-                    (Slot::Equation(row), Slot::Equation(column)) => {
-                        self.matrix.add(row, column, value);
-                    }
-                    (Slot::Equation(row), Slot::Driver(factor))
-                    | (Slot::Driver(factor), Slot::Equation(row)) => {
-                        self.driver_column[row] += factor * value;
-                    }
-                    (Slot::Driver(a), Slot::Driver(b)) => {
-                        let times = if i == j { 1.0 } else { 2.0 };
-                        self.driver_stiffness += times * a * b * value;
-                    }
-                    _ => {}
-                }
-            }
-        }
-    }
-
-    /// Solution for a goal: the equations' unknowns and the approach's step.
-    fn solve(&self, goal: Goal, present: f64) -> Result<(Vec<f64>, f64), Singular> {
-        // Two right-hand sides: the residual's, and that of a unit approach.
-        let size = self.right.len();
-        let mut columns = [self.right.as_slice(), &self.driver_column].concat();
-        self.matrix.factorise()?.solve(&mut columns)?;
-        let by_approach = columns.split_off(size);
-        let mut solution = columns;
-        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        let approach = match goal {
-            Goal::Approach(target) => target - present,
-            Goal::Force(target) => {
-                let stiffness = self.driver_stiffness - dot(&self.driver_column, &by_approach);
-                (target - self.force - dot(&self.driver_column, &solution)) / stiffness
-            }
-        };
-        for (x, by) in solution.iter_mut().zip(&by_approach) {
-            *x -= approach * by;
-        }
-        Ok((solution, approach))
     }
 }
 

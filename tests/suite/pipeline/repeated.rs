@@ -25,7 +25,7 @@ fn a_frame_that_is_given_twice_counts_once() {
         .iter()
         .filter(|load| load.mean_strain.is_some());
     assert_eq!(strained.count(), 1);
-    let ratio = tactile_imaging::elasticity::modulus::PaperRatio::new();
+    let ratio = tactile_imaging::elasticity::modulus::PaperRatio::default();
     assert_eq!(ratio.estimate(&series).unwrap().fit.observations, 1);
 }
 

@@ -1,10 +1,10 @@
 //! Patch test, manufactured solutions.
 
 use crate::fem::element::{GAUSS3, map, shape};
+use crate::fem::load::{Load, Outcome};
 use crate::fem::material::{Gradient, Kinematics, Material, respond};
 use crate::fem::mesh::Mesh;
 use crate::fem::model::{Model, Motion};
-use crate::fem::newton::{Load, Outcome};
 
 /// An annulus (0 ≤ r ≤ 1, 0 ≤ z ≤ 1) of n × n elements with its inner nodes displaced.
 fn distorted(n: usize, amplitude: f64) -> Mesh {
