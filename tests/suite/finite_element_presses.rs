@@ -24,7 +24,9 @@ struct Ball {
 }
 
 fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name)
 }
 
 fn balls() -> Vec<Ball> {
@@ -138,7 +140,10 @@ impl Ball {
         let table = read_contact_table(data("paper_guide_3mm.toml")).unwrap();
         let table = TabulatedContact::new(table, self.radius_m, 0.5, &guide).ok();
         let series = HertzSphere::new(self.radius_m, 0.5).unwrap();
-        let series = series.with_other_body(guide.as_body()).estimate(&loads).ok();
+        let series = series
+            .with_other_body(guide.as_body())
+            .estimate(&loads)
+            .ok();
         Reading {
             ball: self.name.clone(),
             largest_ratio: pair[1].contact_radius_m / self.radius_m,
@@ -167,13 +172,16 @@ fn error(estimate: &ModulusEstimate<f64>, truth_pa: f64) -> f64 {
 }
 
 /// Median and largest of the errors' sizes, and the part of the intervals that hold the truth.
-fn summary<'a>(
-    all: impl Iterator<Item = (&'a ModulusEstimate<f64>, f64)>,
-) -> (f64, f64, f64) {
+fn summary<'a>(all: impl Iterator<Item = (&'a ModulusEstimate<f64>, f64)>) -> (f64, f64, f64) {
     let all: Vec<_> = all.collect();
-    let mut sizes: Vec<f64> = all.iter().map(|(m, truth)| error(m, *truth).abs()).collect();
+    let mut sizes: Vec<f64> = all
+        .iter()
+        .map(|(m, truth)| error(m, *truth).abs())
+        .collect();
     sizes.sort_by(f64::total_cmp);
-    let held = all.iter().filter(|(m, truth)| m.interval_95.contains(*truth));
+    let held = all
+        .iter()
+        .filter(|(m, truth)| m.interval_95.contains(*truth));
     let part = held.count() as f64 / all.len() as f64;
     (sizes[sizes.len() / 2], sizes[sizes.len() - 1], part)
 }
@@ -191,7 +199,11 @@ fn balls_are_measured_within_their_intervals() {
     for r in &readings {
         let interval = |m: &ModulusEstimate<f64>| {
             let held = m.interval_95.contains(r.truth_pa);
-            format!("{:+.2} % {}", 100.0 * error(m, r.truth_pa), if held { "held" } else { "missed" })
+            format!(
+                "{:+.2} % {}",
+                100.0 * error(m, r.truth_pa),
+                if held { "held" } else { "missed" }
+            )
         };
         println!(
             "{} a/R {:.2}: layered {}, table {}, series {:?} %",
@@ -203,7 +215,9 @@ fn balls_are_measured_within_their_intervals() {
         );
     }
     let layered = summary(readings.iter().map(|r| (&r.layered, r.truth_pa)));
-    let tabulated = readings.iter().filter_map(|r| Some((r.tabulated.as_ref()?, r.truth_pa)));
+    let tabulated = readings
+        .iter()
+        .filter_map(|r| Some((r.tabulated.as_ref()?, r.truth_pa)));
     let tabulated = summary(tabulated);
     println!("median, worst, held: layered {layered:?}, tabulated {tabulated:?}");
     assert!(layered.0 < 0.03 && layered.1 < 0.10, "{layered:?}");

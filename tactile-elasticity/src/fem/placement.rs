@@ -12,12 +12,14 @@ pub(crate) struct Placement<'a> {
 }
 
 impl Placement<'_> {
+    /// Where a node is: in linear kinematics at its undeformed radius, as gaps are.
     pub(crate) fn current(&self, node: usize) -> [f64; 2] {
         let [r, z] = self.nodes[node];
-        [
-            r + self.displacement[2 * node],
-            z + self.displacement[2 * node + 1],
-        ]
+        let [u, w] = self.moved(node);
+        match self.kinematics {
+            Kinematics::Finite => [r + u, z + w],
+            Kinematics::Linear => [r, z + w],
+        }
     }
 
     pub(crate) fn moved(&self, node: usize) -> [f64; 2] {

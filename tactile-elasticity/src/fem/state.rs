@@ -3,7 +3,7 @@
 use super::fields::{Equilibrium, Fields};
 use super::model::Model;
 use super::pressure::{ContactRadius, PressurePoint};
-use super::radius::contact_radius;
+use super::radius::ContactProfile;
 
 /// The deformed bodies at one load.
 ///
@@ -25,8 +25,11 @@ pub struct State {
 
 impl State {
     pub(crate) fn new(model: &Model, equilibrium: &Equilibrium) -> Self {
-        let (mut pressure, forces) = model.contact_pressure(&equilibrium.fields);
-        let radius = contact_radius(&pressure, &forces);
+        let (nodes, forces) = model.contact_pressure(&equilibrium.fields);
+        let ContactProfile {
+            points: mut pressure,
+            radius,
+        } = ContactProfile::new(nodes, forces.iter().sum());
         if let Some(interface) = &model.interface {
             pressure = model.interface_pressure(interface, &equilibrium.fields);
         }
@@ -62,8 +65,8 @@ impl State {
         pairs.map(|pair| [pair[0], pair[1]]).collect()
     }
 
-    /// Pressure at the nodes in contact or on the bonded interface, from the axis outwards; of
-    /// [`PressurePoint`]'s example.
+    /// Pressure at the elements' ends in contact, or at the nodes of a bonded interface, from the axis outwards; of
+    /// [`PressurePoint`]'s example. Within a contact's outermost two elements it is that of a smooth edge which carries the elements' force.
     pub fn pressure(&self) -> &[PressurePoint] {
         &self.pressure
     }

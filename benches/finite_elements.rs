@@ -1,0 +1,217 @@
+//! Finite elements: time of a ball on the paper's guide, of its contact table and of an inversion; agreement with another program.
+//!
+//! ```console
+//! cargo bench -p tactile-benches --features fem --bench finite_elements              # some two minutes; the table alone, once: -- table
+//! ```
+//! Times are seconds of processor where the system tells them (a busy machine counts for nothing), else of the clock.
+#![allow(clippy::print_stdout, missing_docs)]
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::time::Instant;
+use tactile_imaging::elasticity::contact::{ContactTable, Layer, TableOptions, Waveguide};
+use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Outcome, Press, Scene};
+use tactile_imaging::elasticity::modulus::{
+    Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact,
+};
+
+const NU: f64 = 0.495;
+const PAPER_LAYERS: [(f64, f64); 3] = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)];
+
+fn material(youngs_modulus_pa: f64) -> Material {
+    Material::new(youngs_modulus_pa, NU).expect("a material")
+}
+
+fn paper_guide() -> fem::Guide {
+    let layers = PAPER_LAYERS.map(|(thickness_m, modulus)| fem::Layer {
+        thickness_m,
+        material: material(modulus),
+    });
+    fem::Guide::new(layers.to_vec(), 25e-3).expect("a guide")
+}
+
+/// Seconds of processor that this process has taken, by the clock where the system does not tell.
+fn processor_seconds(clock: Instant) -> f64 {
+    let ticks = std::fs::read_to_string("/proc/self/stat")
+        .ok()
+        .and_then(|text| {
+            // After the command's closing bracket: utime and stime are the 12th and 13th fields, in hundredths of a second.
+            let fields: Vec<&str> = text.rsplit(')').next()?.split_whitespace().collect();
+            Some(fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?)
+        });
+    ticks.map_or_else(|| clock.elapsed().as_secs_f64(), |ticks| 0.01 * ticks)
+}
+
+fn timed<R>(job: impl FnOnce() -> R) -> (R, f64) {
+    let clock = Instant::now();
+    let start = processor_seconds(clock);
+    let answer = job();
+    (answer, processor_seconds(clock) - start)
+}
+
+/// A ball of 3 mm on the paper's guide up to 1.2 N, on three meshes.
+fn ball_on_guide(is_test: bool) {
+    let ball = Object::Ball { radius_m: 3e-3 };
+    let press = Press::new(ball, material(103e3)).expect("a press");
+    let press = press
+        .on_guide(paper_guide())
+        .expect("a guide wider than the ball");
+    let finest = if is_test { 3 } else { 10 };
+    let loads = [0.2, 0.7, 1.2].map(Load::Force);
+    let solve = |fineness| {
+        let scene = press
+            .clone()
+            .with_fineness(fineness)
+            .and_then(|p| p.scene())
+            .expect("a scene");
+        let (solution, seconds) = timed(|| scene.solve(&loads));
+        assert_eq!(solution.report.outcome, Outcome::Solved);
+        let radii: Vec<f64> = (solution.states.iter())
+            .map(|s| s.contact_radius().expect("a contact").radius_m)
+            .collect();
+        (
+            radii,
+            seconds,
+            scene.model().element_count(),
+            solution.report,
+        )
+    };
+    let (fine, ..) = solve(finest);
+    for fineness in [3, 4, 5, 7] {
+        let (radii, seconds, elements, report) = solve(fineness);
+        let off = radii.iter().zip(&fine).map(|(a, b)| (a / b - 1.0).abs());
+        let worst = off.fold(0.0, f64::max);
+        println!(
+            "ball on the paper's guide to 1.2 N, fineness {fineness}: {elements} elements, {} steps, {} iterations, {seconds:.2} s; \
+             contact radii within {:.3} % of fineness {finest}",
+            report.steps,
+            report.iterations,
+            100.0 * worst
+        );
+        if is_test {
+            return;
+        }
+        assert!(fineness != 5 || worst < 2e-3, "{worst}");
+    }
+}
+
+/// Forces at the contact radii of another program's presses.
+fn another_program() {
+    let folder = std::env::var_os("TACTILE_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
+        PathBuf::from,
+    );
+    let path = folder.join("fem_press/scenes.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        println!("skipped: no {} (set TACTILE_DATA)", path.display());
+        return;
+    };
+    let mut presses: Vec<(String, f64, f64, bool, Vec<[f64; 2]>)> = Vec::new();
+    for line in text.lines().skip(1) {
+        let before: Vec<&str> = line.split(',').take(4).collect();
+        let after: Vec<&str> = line[line.find(']').expect("layers") + 1..]
+            .split(',')
+            .collect();
+        let number = |text: &str| text.parse::<f64>().expect("a number");
+        let load = [number(after[1]), number(after[3])];
+        match presses.last_mut().filter(|p| p.0 == before[0]) {
+            Some(press) => press.4.push(load),
+            None => presses.push((
+                before[0].to_owned(),
+                number(before[1]),
+                number(before[3]),
+                line.contains("[]"),
+                vec![load],
+            )),
+        }
+    }
+    for (name, modulus, radius, on_flat, loads) in presses {
+        let scene = if on_flat {
+            Scene::ball_on_flat(radius, material(modulus))
+        } else {
+            Scene::ball_on_guide(radius, material(modulus), &paper_guide())
+        };
+        let forces: Vec<Load> = loads.iter().map(|l| Load::Force(l[0])).collect();
+        let states = scene.expect("a scene").solve(&forces).states;
+        assert_eq!(states.len(), loads.len());
+        for (state, [force_n, contact_radius_m]) in states.iter().zip(&loads) {
+            let found = state.contact_radius().expect("a contact");
+            // At the other program's radius, by the exponent between its loads: some 3.2.
+            let off = (contact_radius_m / found.radius_m).powf(3.2) - 1.0;
+            println!(
+                "{name} at {force_n} N, a/R {:.2}: force at the same contact radius {:+.2} %",
+                contact_radius_m / radius,
+                100.0 * off
+            );
+            assert!(off.abs() < 1e-2, "{name} {force_n}: {off}");
+        }
+    }
+}
+
+/// The contact table of the paper's guide, and the inversion of two loads.
+fn table(is_test: bool) {
+    let layer = |(thickness_m, youngs_modulus_pa)| Layer {
+        thickness_m,
+        youngs_modulus_pa,
+        poisson_ratio: NU,
+    };
+    let (guide, options) = if is_test {
+        let short = TableOptions::default()
+            .with_largest_ratio(0.4)
+            .expect("a ratio");
+        (Waveguide::rigid(), short)
+    } else {
+        let layers = PAPER_LAYERS.map(layer).to_vec();
+        (
+            Waveguide::new(layers).expect("a guide"),
+            TableOptions::default(),
+        )
+    };
+    let (table, seconds) =
+        timed(|| ContactTable::solve(3e-3, NU, &guide, &options, |_| ControlFlow::Continue(())));
+    let table = table.expect("a table");
+    let contacts: usize = table.curves().iter().map(|c| c.force_n.len()).sum();
+    println!(
+        "contact table: {} moduli, {contacts} contacts, {seconds:.1} s; interpolation error {:.3} % of the force",
+        table.curves().len(),
+        100.0 * table.interpolation_error()
+    );
+    let load = |a: f64| {
+        let force = table.force_n(a, 103e3).expect("a force");
+        LoadState::new(Estimate::new(force, 2e-3 * force))
+            .with_contact_radius(Estimate::new(a, 2e-6))
+    };
+    let loads = LoadSeries::new([load(0.6e-3), load(1.1e-3)]);
+    let estimator =
+        TabulatedContact::new(table.clone(), 3e-3, NU, &guide).expect("the table's guide");
+    let runs = if is_test { 1 } else { 20_000 };
+    let (_, seconds) = timed(|| {
+        for _ in 0..runs {
+            let found = std::hint::black_box(&estimator).estimate(std::hint::black_box(&loads));
+            let off = found.expect("a modulus").youngs_modulus_pa / 103e3 - 1.0;
+            assert!(off.abs() < 1e-9);
+        }
+    });
+    println!(
+        "inversion of two loads: {:.1} µs",
+        1e6 * seconds / f64::from(runs)
+    );
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let is_test = arguments.iter().any(|a| a == "--test");
+    let named: Vec<&str> = (arguments.iter().map(String::as_str))
+        .filter(|a| !a.starts_with("--"))
+        .collect();
+    let wanted = |name: &str| named.is_empty() || named.contains(&name);
+    if wanted("ball") {
+        ball_on_guide(is_test);
+    }
+    if wanted("presses") && !is_test {
+        another_program();
+    }
+    if wanted("table") {
+        table(is_test);
+    }
+}
