@@ -211,7 +211,7 @@ pub struct MatchReport<T> {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 pub struct Matching<T: Scalar, const D: usize> {
-    /// The warp; it takes the model points to [`warped`](Self::warped).
+    /// The warp; it takes the model points to [`warped`](Self::warped), of a model of four thousand points and more a sample of them.
     pub warp: Box<dyn Warp<T, D> + Send + Sync>,
     /// The warped model points.
     pub warped: Vec<Point<T, D>>,

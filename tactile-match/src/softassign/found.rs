@@ -1,10 +1,10 @@
 //! What a run of the matcher has found, read from its workspace.
 
+use super::spline::ModelSpline;
 use super::{SoftassignWorkspace, finish};
-use crate::hard::{self, Interpolation};
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{Point, SMatrix};
-use tactile_tps::{Scalar, Smoothing, Warp};
+use tactile_tps::Scalar;
 
 /// The answer in a workspace.
 ///
@@ -69,19 +69,19 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
     /// The answer with its warp, soft matches and covariances; `model` are the points that were matched.
     #[must_use]
     pub fn to_matching<T: Scalar>(&self, model: &[Point<T, D>]) -> Matching<T, D> {
-        self.interpolated(model, &Interpolation::new(model, None, Smoothing::None))
+        self.interpolated(model, &ModelSpline::new(model))
     }
 
-    /// As [`to_matching`](Self::to_matching), with the factorised system of the model's interpolating spline.
+    /// As [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
     pub(super) fn interpolated<T: Scalar>(
         &self,
         model: &[Point<T, D>],
-        interpolation: &Interpolation<T, D>,
+        spline: &ModelSpline<T, D>,
     ) -> Matching<T, D> {
         let workspace = self.workspace;
         let (answer, frame) = (&workspace.answer, &workspace.frame);
         let mut warped: Vec<Point<T, D>> = self.warped().collect();
-        let warp = warp_through(interpolation, model, &mut warped);
+        let warp = spline.through(model, &mut warped);
         let (mut soft, mut row) = (SoftMatches::new(), Vec::new());
         for i in 0..model.len() {
             row.clear();
@@ -134,42 +134,4 @@ fn narrow<T: Scalar>(report: &MatchReport<f64>) -> MatchReport<T> {
         sigma: T::narrow(report.sigma),
         doubt: report.doubt,
     }
-}
-
-/// Smoothing of the spline where none goes through all positions.
-const SMOOTHING: f64 = 1e-6;
-
-/// The interpolating spline through the estimated positions. Where there is none (model points that coincide and go different
-/// ways) a smoothed one, and `warped` becomes what that gives.
-fn warp_through<T: Scalar, const D: usize>(
-    interpolation: &Interpolation<T, D>,
-    model: &[Point<T, D>],
-    warped: &mut [Point<T, D>],
-) -> Box<dyn Warp<T, D> + Send + Sync> {
-    let exact = interpolation.through(model, warped);
-    if agrees(&*exact, model, warped) {
-        return exact;
-    }
-    let warp = hard::spline(model, warped, None, Smoothing::Lambda(T::narrow(SMOOTHING)));
-    model
-        .iter()
-        .zip(warped)
-        .for_each(|(p, w)| *w = warp.apply(p));
-    warp
-}
-
-/// Whether a warp takes the model to these positions, to half the digits.
-fn agrees<T: Scalar, const D: usize>(
-    warp: &(dyn Warp<T, D> + Send + Sync),
-    model: &[Point<T, D>],
-    warped: &[Point<T, D>],
-) -> bool {
-    let size = warped
-        .iter()
-        .fold(T::zero(), |size, p| size.max(p.coords.amax()));
-    let tolerance = size * T::narrow(T::UNIT_ROUNDOFF.sqrt());
-    model
-        .iter()
-        .zip(warped)
-        .all(|(p, w)| (warp.apply(p) - w).amax() <= tolerance)
 }

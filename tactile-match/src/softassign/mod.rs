@@ -16,8 +16,8 @@
 //! noise the warp is averaged over the scales of the prior by their evidence (`scales`), unless the matches themselves are undecided. The
 //! final warp is the thin-plate spline through the estimated positions.
 //!
-//! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, and memory of one `I × J` matrix in single
-//! precision. Everything else is computed in double precision, whatever the type of the points.
+//! An iteration costs the pairs within reach of the temperature, at most `O(I J)`, in time and in memory. Sets of four thousand points and
+//! more are matched coarse to fine (`large`), where those pairs are a few hundred a point. Everything else is computed in double precision, whatever the type of the points.
 
 mod anneal;
 mod axes;
@@ -31,6 +31,8 @@ mod finish;
 mod found;
 mod frame;
 mod lanes;
+mod large;
+mod levels;
 mod next;
 mod options;
 mod patterns;
@@ -40,6 +42,7 @@ mod scales;
 mod search;
 mod series;
 mod soft_assign;
+mod spline;
 mod starts;
 mod tuples;
 
@@ -53,6 +56,7 @@ use consensus::Consensus;
 use correspond::Correspondence;
 use finish::Answer;
 use frame::Frame;
+use levels::Levels;
 use nalgebra::Point;
 use patterns::LocalPatterns;
 use scales::ScaleAverage;
@@ -113,6 +117,7 @@ pub struct SoftassignWorkspace<const D: usize> {
     consensus: Consensus<D>,
     tuples: Tuples<D>,
     scales: ScaleAverage<D>,
+    levels: Levels<D>,
     /// Typical distance of a target from the next, once the search asks for it.
     spacing: f64,
     /// Share of points without a partner that the caller expects.

@@ -30,9 +30,9 @@ impl AnnealedSoftassign {
         let found = match self.go_on(series, model, target)? {
             Some(found) => found,
             None => {
-                let (interpolation, workspace) = series.parts(model);
+                let (spline, workspace) = series.parts(model);
                 self.match_points_with(workspace, model, target, go)?
-                    .interpolated(model, interpolation)
+                    .interpolated(model, spline)
             }
         };
         series.keep(model, &found);
@@ -50,7 +50,7 @@ impl AnnealedSoftassign {
             return Ok(None);
         };
         let last = last.to_vec();
-        let (interpolation, workspace) = series.parts(model);
+        let (spline, workspace) = series.parts(model);
         workspace.take(model, target)?;
         let frame = workspace.frame;
         let start: Vec<[f64; D]> = last.iter().map(|p| frame.target(p)).collect();
@@ -62,7 +62,7 @@ impl AnnealedSoftassign {
         let noise = (WORSE * sigma.widen() / frame.scale).max(finish::CLEAN);
         let kept = found.assignment().iter().flatten().count() as f64 >= LOST * matched
             && workspace.best.sigma <= noise;
-        Ok(kept.then(|| found.interpolated(model, interpolation)))
+        Ok(kept.then(|| found.interpolated(model, spline)))
     }
 }
 

@@ -89,7 +89,7 @@ pub enum Outliers {
 )]
 pub enum Search {
     /// Start after start, until an answer is exact or noise explains its residuals; noisy answers are averaged over the scales of the
-    /// prior: any scene.
+    /// prior: any scene. Sets of four thousand points and more are matched coarse to fine, from one start, whichever search is asked for.
     #[default]
     Thorough,
     /// One annealing run from the sets as they lie, centred: for sets known to be near each other, such as those of one

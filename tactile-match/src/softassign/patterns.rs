@@ -44,16 +44,28 @@ pub(crate) struct LocalPatterns<const D: usize> {
 impl<const D: usize> LocalPatterns<D> {
     /// Finds `pairs` for model points that a first warp has put at `warped`; false where the sets have no spacing to speak of.
     pub(crate) fn propose(&mut self, warped: &[[f64; D]], target: &[[f64; D]]) -> bool {
+        let all = 0..warped.len();
+        self.propose_for(all, warped, target, REACH)
+    }
+
+    /// As [`propose`](Self::propose) for some model rows, with candidates up to `reach` away; `pairs` are in the order of the rows.
+    pub(crate) fn propose_for(
+        &mut self,
+        rows: impl Iterator<Item = usize>,
+        warped: &[[f64; D]],
+        target: &[[f64; D]],
+        reach: f64,
+    ) -> bool {
         self.spacing = self.typical_spacing(target);
-        if !(self.spacing > 0.0 && self.spacing < REACH) {
+        if !(self.spacing > 0.0 && self.spacing < reach) {
             return false;
         }
         self.targets.build(target, 2.0 * GATE * self.spacing);
         self.model.build(warped, 2.0 * self.spacing);
         self.best.clear();
-        for i in 0..warped.len() {
+        for i in rows {
             self.look_around(warped, i);
-            let best = self.best_candidate(warped, target, i);
+            let best = self.best_candidate(warped, target, i, reach);
             self.best.push(best);
         }
         self.weigh();
@@ -111,11 +123,12 @@ impl<const D: usize> LocalPatterns<D> {
         warped: &[[f64; D]],
         target: &[[f64; D]],
         i: usize,
+        reach: f64,
     ) -> (usize, f64, f64) {
         let candidates = &mut self.candidates;
         candidates.clear();
         self.targets
-            .within(&warped[i], REACH, |j, _| candidates.push(j));
+            .within(&warped[i], reach, |j, _| candidates.push(j));
         candidates.sort_unstable();
         candidates.dedup();
         let mut best = (0, f64::INFINITY, f64::INFINITY);

@@ -1,10 +1,10 @@
 //! What the matcher keeps of one model along a series of targets.
 
 use super::SoftassignWorkspace;
+use super::spline::ModelSpline;
 use crate::Matching;
-use crate::hard::Interpolation;
 use nalgebra::Point;
-use tactile_tps::{Scalar, Smoothing};
+use tactile_tps::Scalar;
 
 /// Where the last match put the model, the factorisation of the spline between its points, the matcher's memory. Given another model it
 /// forgets the old one.
@@ -17,7 +17,7 @@ pub(super) struct Series<T: Scalar, const D: usize> {
     /// The noise that was found.
     pub(super) sigma: T,
     workspace: SoftassignWorkspace<D>,
-    interpolation: Option<Interpolation<T, D>>,
+    spline: Option<ModelSpline<T, D>>,
 }
 
 impl<T: Scalar, const D: usize> Default for Series<T, D> {
@@ -28,7 +28,7 @@ impl<T: Scalar, const D: usize> Default for Series<T, D> {
             matched: 0,
             sigma: T::zero(),
             workspace: SoftassignWorkspace::new(),
-            interpolation: None,
+            spline: None,
         }
     }
 }
@@ -53,23 +53,20 @@ impl<T: Scalar, const D: usize> Series<T, D> {
             self.model.clear();
             self.model.extend_from_slice(model);
             self.last.clear();
-            self.interpolation = None;
+            self.spline = None;
         }
     }
 
-    /// The factorised system of the model's interpolating spline, and the workspace.
+    /// The factorised system of the model's spline, and the workspace.
     pub(super) fn parts(
         &mut self,
         model: &[Point<T, D>],
-    ) -> (&Interpolation<T, D>, &mut SoftassignWorkspace<D>) {
+    ) -> (&ModelSpline<T, D>, &mut SoftassignWorkspace<D>) {
         self.switch_to(model);
         let Self {
-            interpolation,
-            workspace,
-            ..
+            spline, workspace, ..
         } = self;
-        let interpolation =
-            interpolation.get_or_insert_with(|| Interpolation::new(model, None, Smoothing::None));
-        (interpolation, workspace)
+        let spline = spline.get_or_insert_with(|| ModelSpline::new(model));
+        (spline, workspace)
     }
 }

@@ -11,10 +11,15 @@ use super::blocks::{Blocks, LANES};
 use super::lanes::{Moments, gaussians};
 use pulp::Arch;
 
+/// Match matrices of so many entries (16 MB) are kept as if they were dense.
+const SMALL: usize = 1 << 22;
+
 /// The match matrix in factored form, with the moments of its rows. Columns stand in the order of the blocks.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct SoftAssignment<const D: usize> {
     blocks: Blocks<D>,
+    /// Affinities so much fainter than the largest there can be are left out.
+    pub(crate) faintest: f64,
     /// Where the blocks of every row begin in `active`, and one past the last.
     starts: Vec<usize>,
     active: Vec<u32>,
@@ -31,6 +36,25 @@ pub(crate) struct SoftAssignment<const D: usize> {
     pub(crate) spread: Vec<f64>,
 }
 
+impl<const D: usize> Default for SoftAssignment<D> {
+    fn default() -> Self {
+        Self {
+            blocks: Blocks::default(),
+            faintest: 1e-6,
+            starts: Vec::new(),
+            active: Vec::new(),
+            reach: Vec::new(),
+            kernel: Vec::new(),
+            row_scale: Vec::new(),
+            column_scale: Vec::new(),
+            column_sum: Vec::new(),
+            weight: Vec::new(),
+            shift: Vec::new(),
+            spread: Vec::new(),
+        }
+    }
+}
+
 impl<const D: usize> SoftAssignment<D> {
     /// Takes the target points.
     pub(crate) fn set_targets(&mut self, targets: &[[f64; D]]) {
@@ -43,33 +67,34 @@ impl<const D: usize> SoftAssignment<D> {
     }
 
     /// The Gaussian affinities of `warped` at variance `variance`; blocks in which all are below `least`, or
-    /// below a millionth, are left out.
+    /// below [`faintest`](Self::faintest), are left out.
     pub(crate) fn affinities(&mut self, warped: &[[f64; D]], variance: f64, least: f64) {
         let blocks = &self.blocks;
         let (scale, cut) = (
             (-0.5 / variance) as f32,
-            (-2.0 * variance * least.min(1e-6).ln()) as f32,
+            (-2.0 * variance * least.min(self.faintest).ln()) as f32,
         );
         self.starts.clear();
         self.starts.push(0);
         self.active.clear();
-        // Taken whole and cut at the end: the largest there can be, once.
-        self.kernel.resize(warped.len() * blocks.width(), 0.0);
+        let kernel = &mut self.kernel;
         Arch::new().dispatch(|| {
             for y in warped {
-                let (y, from) = (y.map(|v| v as f32), self.active.len());
-                blocks.squared_distances(&y, &mut self.reach);
-                self.active.extend(
-                    (0..)
-                        .zip(&self.reach)
-                        .filter(|(_, r)| **r <= cut)
-                        .map(|(b, _)| b),
-                );
-                let kernel = self.kernel[from * LANES..].as_chunks_mut::<LANES>().0;
-                for (row, &block) in kernel.iter_mut().zip(&self.active[from..]) {
+                let y = y.map(|v| v as f32);
+                blocks.within(&y, cut, &mut self.reach, &mut self.active);
+                self.starts.push(self.active.len());
+            }
+            let dense = warped.len() * blocks.width();
+            let sparse = self.active.len() * LANES;
+            // Of small sets all the memory there can be is taken at once: no later match of sets of this size needs more.
+            kernel.resize(if dense <= SMALL { dense } else { sparse }, 0.0);
+            let rows = kernel.as_chunks_mut::<LANES>().0;
+            for (y, range) in warped.iter().zip(self.starts.windows(2)) {
+                let y = y.map(|v| v as f32);
+                let range = range[0]..range[1];
+                for (row, &block) in rows[range.clone()].iter_mut().zip(&self.active[range]) {
                     gaussians(row, blocks.at(block), &y, scale);
                 }
-                self.starts.push(self.active.len());
             }
         });
     }

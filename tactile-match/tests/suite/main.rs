@@ -7,6 +7,7 @@ mod conformance;
 mod dense_sets;
 mod drift;
 mod hostile;
+mod large_sets;
 mod recorded;
 #[cfg(feature = "serde")]
 mod serde;

@@ -14,7 +14,7 @@ use progress::{COMPLETE, MANY};
 use std::ops::ControlFlow;
 
 /// Scales of the prior in the search.
-const SCALES: PriorScales = PriorScales {
+pub(super) const SCALES: PriorScales = PriorScales {
     length: 1.2,
     bending: 0.35,
     affine: 0.5,
@@ -22,9 +22,9 @@ const SCALES: PriorScales = PriorScales {
 
 /// How a run cools: the part of a [`Schedule`] that differs between starts.
 #[derive(Clone, Copy, Debug)]
-struct Cooling {
+pub(super) struct Cooling {
     /// First temperature, in radii of the model.
-    sigma: f64,
+    pub(super) sigma: f64,
     rate: f64,
     least: f64,
     patience: usize,
@@ -35,7 +35,7 @@ struct Cooling {
 const PATIENCE: usize = 20;
 
 /// The first run: most scenes are easy.
-const FAST: Cooling = Cooling {
+pub(super) const FAST: Cooling = Cooling {
     sigma: 0.3,
     rate: 0.75,
     least: 0.9,
@@ -76,11 +76,13 @@ const LABELLED: Cooling = Cooling {
 /// A cold run with partners for less than this share of the smaller set has collapsed.
 const COLLAPSED: f64 = 0.5;
 /// Residuals are compared no finer than this.
-const RESOLUTION: f64 = 0.01;
+pub(super) const RESOLUTION: f64 = 0.01;
 /// Soft partners spread more than this: the evidence of a warp cannot be told from that of its matches.
 const UNDECIDED: f64 = 0.3;
 /// Residuals below so many spacings are no sign that a part lies aside.
-const NOTICED: f64 = 0.1;
+pub(super) const NOTICED: f64 = 0.1;
+/// Gaussians fainter than this are left out.
+const FAINTEST: f64 = 1e-6;
 /// Rounds in which matches and noise level follow the averaged warp; a third one moves it by a hundredth of the noise.
 const SETTLING: usize = 2;
 /// In sets of so many points a part may lie one point aside though the residuals are small; fewer have too few inner points for patterns.
@@ -114,10 +116,15 @@ impl AnnealedSoftassign {
         ws: &mut SoftassignWorkspace<D>,
         observe: Observer<'_>,
     ) {
-        begin(ws);
-        let flow = match self.options.search {
-            Search::Near => self.run(ws, Start::Centred, NEAR, observe),
-            Search::Thorough => self.search(ws, observe),
+        let flow = if Self::is_large(ws) {
+            reset(ws);
+            self.solve_coarse_to_fine(ws, observe)
+        } else {
+            begin(ws);
+            match self.options.search {
+                Search::Near => self.run(ws, Start::Centred, NEAR, observe),
+                Search::Thorough => self.search(ws, observe),
+            }
         };
         ws.stopped = flow.is_break();
         self.conclude(ws);
@@ -369,7 +376,7 @@ impl AnnealedSoftassign {
         average(ws, true);
     }
 
-    fn schedule(&self, cooling: Cooling) -> Schedule {
+    pub(super) fn schedule(&self, cooling: Cooling) -> Schedule {
         Schedule {
             sigma: cooling.sigma,
             floor: finish::FLOOR,
@@ -384,11 +391,17 @@ impl AnnealedSoftassign {
     }
 }
 
-/// Prepares a search: nothing is found yet.
+/// Prepares a search over all points.
 fn begin<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
+    reset(ws);
     ws.annealer.volume = bounding_volume(&ws.target);
     ws.annealer.prior.build(&ws.model, SCALES);
     ws.annealer.soft.set_targets(&ws.target);
+}
+
+/// Nothing is found yet.
+fn reset<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
+    ws.annealer.soft.faintest = FAINTEST;
     ws.patterns.spacing = 0.0;
     ws.spacing = 0.0;
     ws.scales.spread.clear();
@@ -397,7 +410,7 @@ fn begin<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
 }
 
 /// Volume of the bounding box; thin sides count as a tenth of the model's radius.
-fn bounding_volume<const D: usize>(points: &[[f64; D]]) -> f64 {
+pub(super) fn bounding_volume<const D: usize>(points: &[[f64; D]]) -> f64 {
     let side = |k: usize| {
         let (low, high) = points
             .iter()

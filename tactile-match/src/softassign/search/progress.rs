@@ -46,7 +46,7 @@ impl AnnealedSoftassign {
     }
 
     /// Whether the best run so far explains nearly every point of the smaller set to rounding.
-    pub(super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
+    pub(in super::super) fn is_exact<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
         let wanted = if ws.starts == 1 || points < MANY {
             COMPLETE

@@ -1,0 +1,153 @@
+//! Matches the cases of a file with the default matcher, writes the answers in the same kind of file, and prints one line a level.
+//!
+//! ```text
+//! cargo run --release -p tactile-match --example peer_cases -- CASES.txt [RESULTS.txt]
+//! ```
+//!
+//! A case is `case NAME D n_model n_target`, then rows `m` (model), `t` (target), `g` (true position of each model row) and `p` (row of
+//! its true partner, −1 for none). A result is `case NAME milliseconds`, then for each model row `w` (warped) and `a` (target row or −1).
+//! The time is the least of five calls through a warm workspace.
+use nalgebra::Point;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+use tactile_match::{AnnealedSoftassign, MatchError, SoftassignWorkspace};
+
+/// One case as it stands in the file.
+#[derive(Default)]
+struct Case {
+    name: String,
+    dimension: usize,
+    model: Vec<Vec<f64>>,
+    target: Vec<Vec<f64>>,
+    truth: Vec<Vec<f64>>,
+    partner: Vec<i64>,
+}
+
+/// What is printed of one case.
+struct Score {
+    error: f64,
+    right: f64,
+    milliseconds: f64,
+    starts: usize,
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let path = arguments
+        .next()
+        .ok_or("usage: peer_cases CASES.txt [RESULTS.txt]")?;
+    let cases = read(&std::fs::read_to_string(path)?)?;
+    let mut results = String::new();
+    let mut levels: BTreeMap<String, Vec<Score>> = BTreeMap::new();
+    for case in &cases {
+        let score = match case.dimension {
+            2 => solve::<2>(case, &mut results)?,
+            3 => solve::<3>(case, &mut results)?,
+            other => return Err(format!("{}: dimension {other}", case.name).into()),
+        };
+        let level = case
+            .name
+            .rsplit_once('_')
+            .map_or(case.name.as_str(), |(level, _)| level);
+        levels.entry(level.to_owned()).or_default().push(score);
+    }
+    println!(
+        "{:<24} {:>10} {:>7} {:>9} {:>7}",
+        "level", "error", "right", "ms", "starts"
+    );
+    for (level, scores) in &levels {
+        let mean = |f: fn(&Score) -> f64| scores.iter().map(f).sum::<f64>() / scores.len() as f64;
+        let mut times: Vec<f64> = scores.iter().map(|score| score.milliseconds).collect();
+        times.sort_by(f64::total_cmp);
+        println!(
+            "{level:<24} {:>10.5} {:>7.3} {:>9.2} {:>7.1}",
+            mean(|score| score.error),
+            mean(|score| score.right),
+            times[times.len() / 2],
+            mean(|score| score.starts as f64),
+        );
+    }
+    if let Some(path) = arguments.next() {
+        std::fs::write(path, results)?;
+    }
+    Ok(())
+}
+
+fn read(text: &str) -> Result<Vec<Case>, Box<dyn std::error::Error>> {
+    let mut cases: Vec<Case> = Vec::new();
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        let tag = words.next().unwrap_or_default();
+        if tag == "case" {
+            let name = words.next().ok_or("a case without a name")?.to_owned();
+            let dimension = words.next().ok_or("a case without a dimension")?.parse()?;
+            cases.push(Case {
+                name,
+                dimension,
+                ..Case::default()
+            });
+            continue;
+        }
+        let case = cases.last_mut().ok_or("a row before the first case")?;
+        if tag == "p" {
+            case.partner
+                .push(words.next().ok_or("a partner without a row")?.parse()?);
+            continue;
+        }
+        let row = words.map(str::parse).collect::<Result<Vec<f64>, _>>()?;
+        match tag {
+            "m" => case.model.push(row),
+            "t" => case.target.push(row),
+            "g" => case.truth.push(row),
+            _ => {}
+        }
+    }
+    Ok(cases)
+}
+
+fn solve<const D: usize>(case: &Case, results: &mut String) -> Result<Score, MatchError> {
+    let points = |rows: &[Vec<f64>]| -> Vec<Point<f64, D>> {
+        rows.iter().map(|row| Point::from_slice(row)).collect()
+    };
+    let (model, target, truth) = (
+        points(&case.model),
+        points(&case.target),
+        points(&case.truth),
+    );
+    let matcher = AnnealedSoftassign::default();
+    let mut workspace = SoftassignWorkspace::new();
+    let mut least = Duration::MAX;
+    for _ in 0..5 {
+        let start = Instant::now();
+        matcher.match_points_with(&mut workspace, &model, &target, |_, _| {
+            ControlFlow::Continue(())
+        })?;
+        least = least.min(start.elapsed());
+    }
+    let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| {
+        ControlFlow::Continue(())
+    })?;
+    let warped: Vec<Point<f64, D>> = found.warped().collect();
+    let milliseconds = 1e3 * least.as_secs_f64();
+    // Writing to a string cannot fail.
+    let _ = writeln!(results, "case {} {milliseconds:.6}", case.name);
+    let (mut error, mut right, mut paired) = (0.0, 0.0, 0.0);
+    for (i, (place, assigned)) in warped.iter().zip(found.assignment()).enumerate() {
+        let coordinates: Vec<String> = place.iter().map(|c| format!("{c:?}")).collect();
+        let row = assigned.map_or(-1, |j| i64::try_from(j).unwrap_or(-1));
+        let _ = writeln!(results, "w {}\na {row}", coordinates.join(" "));
+        if case.partner[i] >= 0 {
+            paired += 1.0;
+            error += (place - truth[i]).norm();
+            right += f64::from(u8::from(row == case.partner[i]));
+        }
+    }
+    Ok(Score {
+        error: error / paired,
+        right: right / paired,
+        milliseconds,
+        starts: found.report().starts,
+    })
+}

@@ -1,0 +1,122 @@
+//! Sets of thousands of points, which are matched coarse to fine.
+
+use crate::common::{Stream, bend, reordered, scattered};
+use nalgebra::{Point, SVector};
+use std::ops::ControlFlow;
+use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignWorkspace, StopReason};
+
+/// Enough for two levels, and few enough for a debug build.
+const POINTS: usize = 4500;
+
+/// A bent set, shuffled, with outliers: model, true positions, targets, and the model row of every target but the outliers.
+struct Scene<const D: usize> {
+    model: Vec<Point<f64, D>>,
+    truth: Vec<Point<f64, D>>,
+    target: Vec<Point<f64, D>>,
+    order: Vec<usize>,
+}
+
+impl<const D: usize> Scene<D> {
+    fn new(noise: f64, outliers: usize) -> Self {
+        let mut stream = Stream::new(31);
+        let model = scattered::<f64, D>(POINTS, 32);
+        let truth = bend(&model, 0.08);
+        let order = stream.permutation(POINTS);
+        let mut deviate = || (0..12).map(|_| stream.next()).sum::<f64>() - 6.0;
+        let mut target: Vec<_> = reordered(&truth, &order)
+            .iter()
+            .map(|p| p + SVector::from_fn(|_, _| noise * deviate()))
+            .collect();
+        target.extend((0..outliers).map(|_| Point::from(SVector::from_fn(|_, _| stream.next()))));
+        Self {
+            model,
+            truth,
+            target,
+            order,
+        }
+    }
+
+    /// Share of the model points whose partner is their own.
+    fn right(&self, assignment: &[Option<usize>]) -> f64 {
+        let own = |(i, j): &(usize, &Option<usize>)| j.and_then(|j| self.order.get(j)) == Some(i);
+        let right = assignment.iter().enumerate().filter(own).count();
+        right as f64 / POINTS as f64
+    }
+}
+
+fn check_clean<const D: usize>() {
+    for outliers in [0, POINTS / 10] {
+        let scene = Scene::<D>::new(0.0, outliers);
+        let found = AnnealedSoftassign::default()
+            .match_points(&scene.model, &scene.target)
+            .expect("good points");
+        let right = scene.right(&found.assignment);
+        // An outlier may take the place of a point that it nearly coincides with.
+        assert!(right > 0.99, "{D}-D, {outliers} outliers: {right} right");
+        assert_eq!(found.report.doubt, None, "{D}-D, {outliers} outliers");
+        // The spline goes through one point in three; between them the field is smooth on the scale of their spacing.
+        let between = scene.model.iter().zip(&scene.truth);
+        let close = between.filter(|(p, t)| (found.warp.apply(p) - *t).norm() < 2e-3);
+        assert!(close.count() as f64 > 0.99 * POINTS as f64, "{D}-D");
+    }
+}
+
+#[test]
+fn clean_sets_are_matched_in_the_plane() {
+    check_clean::<2>();
+}
+
+#[test]
+fn clean_sets_are_matched_in_space() {
+    check_clean::<3>();
+}
+
+/// Noise of a spacing hides the pairs, and their density alone tells the field: what moves points along without crowding them does not
+/// show, so that not all points lie within three noise widths.
+#[test]
+fn noise_of_a_spacing_leaves_the_field() {
+    let noise = 0.015;
+    let scene = Scene::<2>::new(noise, POINTS / 10);
+    let found = AnnealedSoftassign::default()
+        .match_points(&scene.model, &scene.target)
+        .expect("good points");
+    let rows = found.warped.iter().zip(&scene.truth);
+    let within = rows.filter(|(w, t)| (*w - *t).norm() < 3.0 * noise).count();
+    assert!(within as f64 > 0.85 * POINTS as f64, "{within} within");
+    // Pairs cannot be told, and the report says so.
+    assert!(found.report.doubt.is_some());
+}
+
+#[test]
+fn a_caller_who_stops_has_an_answer_for_every_point() {
+    let scene = Scene::<2>::new(0.0, 0);
+    let mut workspace = SoftassignWorkspace::new();
+    let found = AnnealedSoftassign::default()
+        .match_points_with(&mut workspace, &scene.model, &scene.target, |_, _| {
+            ControlFlow::Break(())
+        })
+        .expect("good points");
+    assert_eq!(found.report().stop, StopReason::Callback);
+    assert_eq!(found.assignment().len(), POINTS);
+    assert!(found.warped::<f64>().all(|p| p.coords.norm() < 10.0));
+}
+
+#[test]
+fn a_grown_workspace_allocates_nothing_and_gives_the_same_bits() {
+    let scene = Scene::<3>::new(0.0, 0);
+    let mut workspace = SoftassignWorkspace::new();
+    let matcher = AnnealedSoftassign::default();
+    let go = |_, _| ControlFlow::Continue(());
+    let first: Vec<Point<f64, 3>> = matcher
+        .match_points_with(&mut workspace, &scene.model, &scene.target, go)
+        .expect("good points")
+        .warped()
+        .collect();
+    let allocated = allocation_counter::measure(|| {
+        let found = matcher
+            .match_points_with(&mut workspace, &scene.model, &scene.target, go)
+            .expect("good points");
+        assert!(found.warped().eq(first.iter().copied()));
+    });
+    assert_eq!(allocated.count_total, 0);
+}
