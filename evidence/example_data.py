@@ -149,7 +149,65 @@ layers = [{{ refractive_index = 1.40, thickness_m = 10e-3, youngs_modulus_pa = 1
 """
 
 
+# Calibration of the same kind of sensor: two rigid balls on one guide of 100 kPa, up and down again, in frames of 72 by 72 pixels.
+# (radius in metres, forces in newtons with the number of those while loading)
+BALLS = [(3e-3, [0.003, 0.006, 0.012, 0.02, 0.012, 0.006], 4), (6e-3, [0.005, 0.01, 0.02, 0.01], 3)]
+GUIDE_PA, SMALL = 100e3, 72
+
+
+def sensor_frame(ball_m, force, seed):
+    """Hertz's pressure of a rigid ball on the guide, incompressible and deep against the contact."""
+    a = (3 * force * ball_m / (4 * GUIDE_PA / 0.75)) ** (1 / 3) if force else 1.0
+    peak = GREY_PER_PA * 3 * force / (2 * math.pi * a * a)
+
+    def level(r, c):
+        share = PIXEL_M**2 * ((r - 35.2) ** 2 + (c - 35.8) ** 2) / (a * a)
+        noise = 2 * error(SMALL * r + c + seed, 0.7548776662)
+        return round(10 + noise + peak * math.sqrt(max(1 - share, 0.0)))
+    return png([[level(r, c) for c in range(SMALL)] for r in range(SMALL)])
+
+
+def sensor_presses():
+    """Ball, force, branch and number of every press."""
+    rows = [(ball, force, "loading" if k < rising else "unloading") for ball, forces, rising in BALLS for k, force in enumerate(forces)]
+    return [(k + 1, *row) for k, row in enumerate(rows)]
+
+
+def sensor_calibration():
+    presses = "".join(f"""
+[[presses]]
+image = "press_{k:02}.png"
+force_N = {force + 2e-5 * error(k, 0.618034):.6f}
+branch = "{branch}"
+indenter = {{ shape = "ball", radius_m = {ball}, radius_error_m = 1e-6 }}
+""" for k, ball, force, branch in sensor_presses())
+    return f"""# Two steel balls on a soft sensor of one layer: the layer has 100 kPa, its maker states 95 kPa.
+date = "2026-11-22"
+temperature_c = 22.5
+references = ["reference.png"]
+pixel_size_m = [{PIXEL_M}, {PIXEL_M}]
+pixel_size_error = 1e-3
+flat_field = false
+gauge_error = 1e-3
+gauge_noise_N = 2e-5
+covers_N = [0.003, 0.02]
+{presses}
+[[layers]]
+refractive_index = 1.40
+thickness_m = 10e-3
+thickness_error_m = 0.1e-3
+youngs_modulus_pa = 95e3
+youngs_modulus_error_pa = 10e3
+poisson_ratio = 0.5
+poisson_ratio_error = 0.0
+"""
+
+
 FILES = {
+    "sensor/reference.png": lambda: sensor_frame(3e-3, 0.0, 0),
+    **{f"sensor/press_{k:02}.png": lambda k=k, ball=ball, force=force: sensor_frame(ball, force, 40_000 * k)
+       for k, ball, force, _ in sensor_presses()},
+    "sensor/calibration.toml": sensor_calibration,
     "press/reference.png": lambda: frame(0.0, 0),
     "press/frame_1.png": lambda: frame(LOADS_N[0], 40_000),
     "press/frame_2.png": lambda: frame(LOADS_N[1], 80_000),

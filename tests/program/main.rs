@@ -8,3 +8,4 @@ mod harness;
 mod help;
 mod interrupt;
 mod outputs;
+mod sensor;

@@ -31,7 +31,7 @@ const AFTER_HELP: &str = "\
 Examples, one for each subcommand:
   tactile measure examples/data/press/scene.toml
   tactile force --reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 examples/data/press/frame_1.png
-  tactile calibrate examples/data/press/calibration.csv
+  tactile calibrate examples/data/sensor/calibration.toml
   tactile match examples/data/cases.txt
   tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv
   tactile strain examples/data/before.csv examples/data/after.csv

@@ -1,12 +1,11 @@
-//! `tactile calibrate`: the line from integrated pixel value to force, and how good it is.
+//! The line from integrated pixel value to force, and how good it is.
 use crate::console::Console;
 use crate::context::Context;
 use crate::failure::{Exit, Failure};
 use crate::numbers::{digits, four_digits};
 use crate::outputs::Outputs;
-use clap::Args;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tactile_imaging::force::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, LinearCalibration,
     StressCalibration,
@@ -15,38 +14,16 @@ use tactile_imaging::io::{Column, Quantity, read_table};
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::plot::{Colour, Legend, Page, Panel};
 
-/// Fit the force calibration of a sensor and report its quality
-///
-/// PAIRS.csv has the columns integrated_pixel_value (grey levels above the reference, summed over the contact) and force
-/// (N, mN, … by its heading), at least three rows. --out gets calibration.svg.
-#[derive(Args)]
-#[command(after_help = "\
-Examples:
-  tactile calibrate examples/data/press/calibration.csv
-  tactile calibrate examples/data/press/calibration.csv --there-and-back --out target/calibrate")]
-pub struct Arguments {
-    #[command(flatten)]
-    pub pairs: PairsArguments,
-    /// Folder for calibration.svg.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-}
-
-#[derive(Args)]
-pub struct PairsArguments {
-    /// Table of integrated pixel values and forces.
-    pub pairs: PathBuf,
-    /// The rows after the one of largest force were taken while unloading: hysteresis is reported.
-    #[arg(long)]
-    there_and_back: bool,
-}
-
 pub const FILE: &str = "calibration.svg";
 
-pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure> {
-    let path = arguments.pairs.pairs.as_path();
-    let mut outputs = Outputs::plan(arguments.out.as_deref(), &[FILE], &[path])?;
-    let pairs = read_pairs(path, arguments.pairs.there_and_back)?;
+pub fn run(
+    path: &Path,
+    there_and_back: bool,
+    out: Option<&Path>,
+    context: &mut Context,
+) -> Result<Exit, Failure> {
+    let mut outputs = Outputs::plan(out, &[FILE], &[path])?;
+    let pairs = read_pairs(path, there_and_back)?;
     let line = fit(path, &pairs)?;
     outputs.page(FILE, || page(&pairs, &line))?;
     print(&line, &mut context.console);
