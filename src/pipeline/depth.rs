@@ -165,6 +165,7 @@ impl DarkContact {
             other_contacts: 0,
             converged: true,
             profile_misfit: None,
+            face: None,
         }
     }
 }

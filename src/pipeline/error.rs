@@ -1,5 +1,6 @@
 //! Why a measurement could not be made.
 use super::choice::EstimatorChoice;
+use super::face::ShapeProblem;
 use crate::elasticity::ElasticityError;
 use crate::force::ForceError;
 use crate::matching::MatchError;
@@ -179,6 +180,22 @@ pub enum PipelineError {
         /// Why.
         source: ElasticityError,
     },
+    /// A contact is not that of one flat face under uniaxial load, from which a modulus could be read.
+    #[error("frame {}: {problem}", frame + 1)]
+    NotUniaxial {
+        /// The frame.
+        frame: usize,
+        /// Why.
+        problem: ShapeProblem,
+    },
+    /// A face shows no texture whose points could be matched.
+    #[error("frames {} and {}: the face has no texture to match, its strain is that of its outline", from + 1, to + 1)]
+    NoTexture {
+        /// The first frame.
+        from: usize,
+        /// The second frame.
+        to: usize,
+    },
     /// The estimator that was chosen is for another object.
     #[error("the estimator \"{estimator}\" needs {needs}")]
     WrongEstimator {
@@ -201,8 +218,10 @@ impl PipelineError {
             | Self::NoContact { frame }
             | Self::OppositeSignal { frame, .. }
             | Self::NoForce { frame }
+            | Self::NotUniaxial { frame, .. }
             | Self::Surface { frame, .. } => Some(*frame),
             Self::Match { to, .. }
+            | Self::NoTexture { to, .. }
             | Self::TooFewMatches { to, .. }
             | Self::Warp { to, .. }
             | Self::Strain { to, .. } => Some(*to),

@@ -16,7 +16,7 @@ pub(super) type SharedEstimator = Arc<dyn ModulusEstimator<f64> + Send + Sync>;
 /// The estimator where none is chosen. This is the place to change the default.
 ///
 /// A ball: the linear contact with the waveguide's layers, or with a rigid flat, corrected for finite strain. A sample on a rigid base, a cone: their own laws. Else
-/// stress over strain, equation (31).
+/// stress over strain, equation (31); of a flat face regressed over all loads.
 fn default_of(
     object: Object,
     waveguide: Option<&Waveguide<f64>>,
@@ -35,7 +35,10 @@ fn default_of(
             half_angle_rad,
             poisson_ratio,
         } => shared(Cone::new(half_angle_rad, poisson_ratio)?),
-        Object::FlatPunch { .. } | Object::Unknown { .. } => shared(paper_ratio(object)?),
+        Object::Block { .. } | Object::Cylinder { .. } | Object::Unknown { .. } => {
+            shared(StressStrainRegression::default())
+        }
+        Object::FlatPunch { .. } => shared(paper_ratio(object)?),
     }
 }
 
@@ -64,7 +67,7 @@ pub(super) fn that_fit(
             Object::Layer { .. } | Object::Cone { .. } => {
                 estimators.push(default_of(object, waveguide)?);
             }
-            Object::Unknown { .. } => {}
+            Object::Block { .. } | Object::Cylinder { .. } | Object::Unknown { .. } => {}
         }
         estimators.push(shared(StressStrainRegression::default())?);
         Ok(estimators)

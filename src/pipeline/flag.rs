@@ -83,6 +83,15 @@ pub enum Flag {
         /// What the gauge said, in newtons.
         gauge_n: f64,
     },
+    /// The material points of a face and its outline stretch differently: the face slips, sticks or bulges, and the modulus is off by as much as the strain.
+    Slip {
+        /// The frame.
+        frame: usize,
+        /// Lateral strain of the outline since the first frame.
+        outline_strain: f64,
+        /// Lateral strain of the points.
+        texture_strain: f64,
+    },
     /// The matcher stopped before it converged.
     MatchNotConverged,
     /// Some control points have no partner.
@@ -194,6 +203,19 @@ impl fmt::Display for Flag {
                     f,
                     "frame {}: {measured_n:.4} N measured, but the gauge read {gauge_n:.4} N",
                     frame + 1
+                )
+            }
+            Self::Slip {
+                frame,
+                outline_strain,
+                texture_strain,
+            } => {
+                write!(
+                    f,
+                    "frame {}: the outline has stretched by {:.3} % since the first frame, the texture by {:.3} %: the face slips or sticks",
+                    frame + 1,
+                    100.0 * outline_strain,
+                    100.0 * texture_strain
                 )
             }
             Self::MatchNotConverged => write!(f, "the match did not converge"),

@@ -16,6 +16,8 @@ pub(super) struct LoadReading {
     pub calibration_n: f64,
     pub radius_m: Option<Estimate<f64>>,
     pub indentation_m: Option<Estimate<f64>>,
+    /// Area of a flat face.
+    pub face_m2: Option<Estimate<f64>>,
     /// Strain since the first load.
     pub mean_strain: Option<Estimate<f64>>,
 }
@@ -40,6 +42,9 @@ impl LoadReading {
             indentation_m: contact
                 .indentation_m
                 .map(|depth| Estimate::new(depth.value, depth.standard_error)),
+            face_m2: contact
+                .face
+                .map(|face| Estimate::new(face.area_m2.value, face.area_m2.standard_error)),
             mean_strain,
         })
     }
@@ -47,7 +52,8 @@ impl LoadReading {
     /// Keeps the force alone, so that no estimator uses the load: it repeats an earlier one (what is counted twice is not better known), or
     /// the contact is not whole.
     pub(super) fn forget_contact(&mut self) {
-        (self.radius_m, self.indentation_m, self.mean_strain) = (None, None, None);
+        (self.radius_m, self.indentation_m) = (None, None);
+        (self.face_m2, self.mean_strain) = (None, None);
     }
 }
 
@@ -83,6 +89,7 @@ pub(super) fn series(
         load.contact_radius_m = r.radius_m;
         load.indentation_m = r.indentation_m;
         load.mean_strain = r.mean_strain;
+        load.contact_area_m2 = r.face_m2;
         load
     };
     let shared = SharedErrors {
@@ -104,7 +111,10 @@ fn relative_size_error(settings: &Settings) -> f64 {
         Object::Layer {
             indenter_radius_m, ..
         } => indenter_radius_m,
-        Object::Cone { .. } | Object::Unknown { .. } => return 0.0,
+        Object::Cone { .. }
+        | Object::Block { .. }
+        | Object::Cylinder { .. }
+        | Object::Unknown { .. } => return 0.0,
     };
     settings.object_radius_error_m / radius
 }

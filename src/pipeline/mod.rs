@@ -19,7 +19,9 @@
 //! as (F R/E*)^⅓; between two loads that surface scales by (F₂/F₁)^⅓ whatever the modulus is. The ratio of stress to
 //! strain, equation (31), is therefore reported (first among [`Measurement::estimators`]) but not believed: the modulus comes
 //! from a³ = 3FR/(4E*), both bodies yielding, the waveguide's layers in series. a/R is in every report, and beyond 0.3 the
-//! result carries a flag. For other objects the paper's ratio is the estimate.
+//! result carries a flag. Specimens with a flat face are what (31) is exact for: stress over strain, regressed over all loads, the strain from the growth of the
+//! face's area. An object of unknown shape is read so if its contacts are those of a flat face, and refused with what to tell the program if not
+//! ([`PipelineError::NotUniaxial`]).
 mod background;
 mod ball;
 mod batch;
@@ -34,6 +36,7 @@ mod display_stream;
 mod error;
 mod error_budget;
 mod estimators;
+mod face;
 mod flag;
 pub(crate) mod guide_error;
 mod load_reading;
@@ -68,6 +71,7 @@ pub use depth::DarkContact;
 pub use display::with_error;
 pub use error::PipelineError;
 pub use error_budget::{ErrorShare, ErrorSource};
+pub use face::{FaceReading, ShapeProblem};
 pub use flag::Flag;
 pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 pub use object::Object;

@@ -31,6 +31,16 @@ pub enum Object {
         /// Its Poisson ratio.
         poisson_ratio: f64,
     },
+    /// A block with a flat face of any outline, squeezed between the sensor and a plate: loaded uniaxially.
+    Block {
+        /// Its Poisson ratio.
+        poisson_ratio: f64,
+    },
+    /// A cylinder standing on its flat face, squeezed between the sensor and a plate: loaded uniaxially.
+    Cylinder {
+        /// Its Poisson ratio.
+        poisson_ratio: f64,
+    },
     /// A thin flat sample, bonded to a rigid base and pressed by a rigid ball: the sensor's own gel, for instance.
     Layer {
         /// The ball's radius in metres.
@@ -47,7 +57,7 @@ pub enum Object {
         /// The sample's Poisson ratio.
         poisson_ratio: f64,
     },
-    /// Nothing is known of its shape: stress over strain is all there is.
+    /// Nothing is known of its shape: it is read as a block where its contacts are those of a flat face, and refused where not.
     Unknown {
         /// Its Poisson ratio.
         poisson_ratio: f64,
@@ -75,6 +85,16 @@ impl Object {
         }
     }
 
+    /// Poisson's ratio of what is read as a specimen with a flat face, whose strain is that of its area.
+    pub(super) fn flat_face(&self) -> Option<f64> {
+        match *self {
+            Self::Block { poisson_ratio }
+            | Self::Cylinder { poisson_ratio }
+            | Self::Unknown { poisson_ratio } => Some(poisson_ratio),
+            _ => None,
+        }
+    }
+
     /// Refuses what is not physical.
     pub(super) fn checked(self) -> Result<Self, PipelineError> {
         let length_and_ratio =
@@ -98,7 +118,9 @@ impl Object {
                 half_angle_rad,
                 poisson_ratio,
             } => Cone::new(half_angle_rad, poisson_ratio).map(drop),
-            Self::Unknown { poisson_ratio } => length_and_ratio(1.0, poisson_ratio),
+            Self::Block { poisson_ratio }
+            | Self::Cylinder { poisson_ratio }
+            | Self::Unknown { poisson_ratio } => length_and_ratio(1.0, poisson_ratio),
         };
         checked.map(|()| self).map_err(PipelineError::Material)
     }

@@ -1,10 +1,12 @@
 //! From two sets of control points to match, displacement and strain.
 use super::composition::Pipeline;
+use super::contact::ContactReading;
 use super::error::PipelineError;
+use super::face;
 use super::strain_error::mean_strain_error;
 use super::surface::ControlPoints;
 use crate::elasticity::field::{StrainField, StrainSummary};
-use crate::elasticity::modulus::Estimate;
+use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, UniaxialLoads};
 use crate::matching::Matching;
 use nalgebra::{Matrix3, Point3};
 
@@ -37,13 +39,57 @@ pub struct PairStrain {
 }
 
 impl PairStrain {
-    /// The strain of a load for equation (31), which takes the size of the mean e_zz: the sign says whether the load rose from the first
-    /// frame to the second, by `force_step_n`.
+    /// The apparent strain of a ball's load for equation (31). The surface that its pressure is read as swells where the load rises, in all directions,
+    /// so that (31) takes the size of the mean e_zz, with the sign of `force_step_n`, the step of the load from the first frame to the second.
+    /// (Specimens with a flat face have signed strains, from [`of_faces`].)
     pub(super) fn of_load(&self, force_step_n: f64) -> Estimate<f64> {
         let size = self.summary.mean[(2, 2)].abs();
         let error = self.summary.standard_error[(2, 2)];
         Estimate::new(size.copysign(force_step_n), error)
     }
+}
+
+/// The strain between two loads of a specimen with a flat face: the same everywhere, from the growth of its area.
+pub(super) fn of_faces(
+    pipeline: &Pipeline,
+    [from, to]: [usize; 2],
+    readings: [&ContactReading; 2],
+    poisson_ratio: f64,
+) -> Result<PairStrain, PipelineError> {
+    let numbered = [from, to].into_iter().zip(readings);
+    face::check(numbered, pipeline.settings().object)?;
+    let mut loads = [LoadState::new(Estimate::exact(0.0)); 2];
+    for ((load, reading), frame) in loads.iter_mut().zip(readings).zip([from, to]) {
+        let force = reading.force_n.ok_or(PipelineError::NoForce { frame })?;
+        load.force_n = Estimate::new(force.value, force.standard_error);
+        load.contact_area_m2 = reading
+            .face
+            .map(|face| Estimate::new(face.area_m2.value, face.area_m2.standard_error));
+    }
+    let failed = |source| PipelineError::Strain { from, to, source };
+    let measure = pipeline.strain();
+    let series = LoadSeries::new(loads);
+    let uniaxial = UniaxialLoads::new(&series, poisson_ratio, measure).map_err(failed)?;
+    let [first, last] = [0, 1].map(|k| uniaxial.stretches()[k]);
+    let [lateral, axial] = [0, 1].map(|k| last[k] / first[k] - 1.0);
+    let gradient = Matrix3::from_diagonal(&[lateral, lateral, axial].into());
+    let field = StrainField::from_gradients(&[gradient], None, measure).map_err(failed)?;
+    let mut summary = field.summary();
+    let strains = uniaxial
+        .series()
+        .loads()
+        .iter()
+        .map(|load| load.mean_strain);
+    let error = strains
+        .flatten()
+        .fold(0.0, |sum: f64, strain| sum.hypot(strain.standard_error));
+    let errors = [poisson_ratio * error, poisson_ratio * error, error];
+    summary.standard_error = Matrix3::from_diagonal(&errors.into());
+    Ok(PairStrain {
+        measure: measure.name(),
+        field,
+        summary,
+    })
 }
 
 /// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.

@@ -1,15 +1,16 @@
 //! Runs the stages of a pipeline one at a time, for a press and a session alike: times every run, and records what was skipped.
 use super::composition::Pipeline;
-use super::contact::FrameContact;
+use super::contact::{ContactReading, FrameContact};
 use super::error::PipelineError;
+use super::face::{self, FaceWorkspace, TextureStretch};
 use super::load_reading::{self, LoadReading};
 use super::pair::{self, PairStrain};
 use super::report::{Report, SkipReason, Stage};
 use super::surface::{self, ContactSurface, ControlPoints, SurfaceWorkspace};
-use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator};
-use crate::force::{Estimate, ForceWorkspace, ReferenceFrame};
+use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator, UniaxialLoads};
+use crate::force::{Estimate, ForceWorkspace, Polarity, ReferenceFrame};
 use crate::matching::{MatchError, Matching, WarmStart};
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 use std::time::Instant;
@@ -36,6 +37,7 @@ pub(super) struct StageRunner {
     pipeline: Pipeline,
     reference: Arc<ReferenceFrame>,
     force: ForceWorkspace,
+    face: FaceWorkspace,
     surface: SurfaceWorkspace,
     skip_records: SkipRecords,
     report: Report,
@@ -51,6 +53,7 @@ impl StageRunner {
             pipeline,
             reference,
             force: ForceWorkspace::default(),
+            face: FaceWorkspace::default(),
             surface: SurfaceWorkspace::default(),
             skip_records,
             report: Report::default(),
@@ -90,6 +93,7 @@ impl StageRunner {
             .contact()
             .measure(&mut self.force, image, &self.reference, gauge, contact)
             .map_err(|source| PipelineError::Contact { frame, source })?;
+        self.face(image, contact);
         self.report.ran(Stage::Contact, start.elapsed());
         let pixels = image.len();
         match contact.region {
@@ -101,6 +105,36 @@ impl StageRunner {
             Some(_) => {}
         }
         Ok(())
+    }
+
+    /// Reads a contact as a flat face, where the object may have one.
+    fn face(&mut self, image: ArrayView2<'_, u8>, contact: &mut FrameContact) {
+        let stage = self.pipeline.contact();
+        let may_be_flat = self.pipeline.settings().object.flat_face().is_some();
+        if !may_be_flat || contact.reading.is_none() {
+            return;
+        }
+        let sign = if stage.polarity() == Polarity::Darker {
+            -1.0
+        } else {
+            1.0
+        };
+        let images = [image, self.reference.image()];
+        let mut face = self
+            .face
+            .measure(images, contact, sign, stage.pixel_size_m());
+        if let (Some(face), Some(lens), Some(reading)) = (&mut face, stage.lens(), &contact.reading)
+        {
+            // Pixels of a lens that distorts differ in size.
+            let [hx, hy] = stage.pixel_size_m();
+            let place = reading.centroid_px.map(|c| c.value);
+            let radius_px = (face.area_m2.value / (std::f64::consts::PI * hx * hy)).sqrt();
+            let growth = lens.mean_pixel_area_m2(place, radius_px) / (hx * hy);
+            face.area_m2 = face.area_m2.scaled(growth);
+        }
+        if let Some(reading) = &mut contact.reading {
+            reading.face = face;
+        }
     }
 
     /// Reconstructs the surface of a contact. All surfaces that are compared have one grid, so that what the grid does to them leaves no
@@ -201,6 +235,74 @@ impl StageRunner {
         let strain = pair::strain(&self.pipeline, frames, model, target, matching)?;
         self.report.ran(Stage::Strain, start.elapsed());
         Ok(strain)
+    }
+
+    /// Works out the strain between two loads of a specimen with a flat face.
+    pub(super) fn strain_of_faces(
+        &mut self,
+        frames: [usize; 2],
+        readings: [&ContactReading; 2],
+        poisson_ratio: f64,
+    ) -> Result<PairStrain, PipelineError> {
+        let start = Instant::now();
+        let strain = pair::of_faces(&self.pipeline, frames, readings, poisson_ratio)?;
+        self.report.ran(Stage::Strain, start.elapsed());
+        Ok(strain)
+    }
+
+    /// The stretch of a face between two frames by the material points of its texture.
+    pub(super) fn texture(
+        &mut self,
+        [from, to]: [usize; 2],
+        images: [ArrayView2<'_, u8>; 2],
+        contacts: [&FrameContact; 2],
+    ) -> Result<TextureStretch, PipelineError> {
+        let start = Instant::now();
+        let stage = self.pipeline.contact();
+        let [hx, hy] = stage.pixel_size_m();
+        let sign = if stage.polarity() == Polarity::Darker {
+            -1.0
+        } else {
+            1.0
+        };
+        let none = PipelineError::NoTexture { from, to };
+        let mut points = [Vec::new(), Vec::new()];
+        let mut faces = Vec::with_capacity(2);
+        let mut centres = Vec::with_capacity(2);
+        for ((image, contact), points) in images.into_iter().zip(contacts).zip(&mut points) {
+            let (Some(region), Some(reading)) = (contact.region, contact.reading) else {
+                return Err(none);
+            };
+            let pair = [image, self.reference.image()];
+            *points = face::spots(pair, region, &contact.mask, sign, [hx, hy]);
+            let [x, y] = reading.centroid_px.map(|c| c.value);
+            centres.push(Point2::new(x * hx, y * hy));
+            faces.push(reading.face.ok_or_else(|| none.clone())?);
+        }
+        let pixel_m = (hx * hy).sqrt();
+        let [one, two] = &points;
+        let stretch = face::stretch(
+            [one, two],
+            [&faces[0], &faces[1]],
+            [centres[0], centres[1]],
+            pixel_m,
+        );
+        self.report.ran(Stage::Match, start.elapsed());
+        stretch
+            .map_err(|source| PipelineError::Match { from, to, source })?
+            .ok_or(none)
+    }
+
+    /// The loads of a specimen with a flat face: its areas turned into strains.
+    pub(super) fn uniaxial_series(
+        &self,
+        readings: impl Iterator<Item = LoadReading> + Clone,
+        poisson_ratio: f64,
+    ) -> Result<LoadSeries<f64>, PipelineError> {
+        let series = self.load_series(readings)?;
+        let measure = self.pipeline.strain();
+        let uniaxial = UniaxialLoads::new(&series, poisson_ratio, measure);
+        Ok(uniaxial.map_err(PipelineError::Modulus)?.series().clone())
     }
 
     /// What estimators take: the loads, and the errors that all share.

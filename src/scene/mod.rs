@@ -17,7 +17,8 @@
 //! image = "frame_2.png"
 //!
 //! [object]
-//! shape = "sphere"                       # or "flat_punch", "unknown"; "layer" (radius_m of the ball on it, thickness_m); "cone" (half_angle_rad)
+//! shape = "sphere"                       # or "block", "cylinder" (a flat face, squeezed; no size), "flat_punch", "layer" (radius_m of the ball on it,
+//!                                        # thickness_m), "cone" (half_angle_rad), "unknown"
 //! radius_m = 3e-3
 //! poisson_ratio = 0.5
 //!

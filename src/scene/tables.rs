@@ -150,7 +150,8 @@ pub(super) fn contact_table(
 }
 
 pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
-    const SHAPE: &str = "\"sphere\", \"flat_punch\", \"layer\", \"cone\" or \"unknown\"";
+    const SHAPE: &str =
+        "\"sphere\", \"block\", \"cylinder\", \"flat_punch\", \"layer\", \"cone\" or \"unknown\"";
     let fields = fields.table("object", "a table with `shape`")?;
     fields.only(&[
         "shape",
@@ -188,6 +189,8 @@ pub(super) fn object(fields: &Fields<'_>) -> Result<Object, SceneError> {
             )?,
             poisson_ratio,
         }),
+        "block" => Ok(Object::Block { poisson_ratio }),
+        "cylinder" => Ok(Object::Cylinder { poisson_ratio }),
         "unknown" => {
             let _ = fields.optional_number("radius_m", "a positive number (metres)", positive)?;
             Ok(Object::Unknown { poisson_ratio })

@@ -71,7 +71,7 @@ pub use light::{Illumination, Response};
 pub use material::{Elastic, Sphere, Waveguide, WaveguideLayer};
 pub use press::PressScene;
 pub use press_options::{Gain, Load, PressOptions};
-pub use relief::SurfacePattern;
+pub use relief::{FaceOutline, SurfacePattern};
 pub use simulation::PressSimulation;
 pub use stream::{FrameStream, LoadCycle, StreamedFrame};
 pub use truth::{PressTruth, SurfaceScaling};

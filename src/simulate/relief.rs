@@ -6,10 +6,54 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use ndarray::Array2;
 use rand_distr::{Distribution, Uniform};
 
 use super::error::{SimulateError, at_least, not_negative, positive};
 use super::random::{Purpose, row_stream};
+
+/// The outline of a squeezed face.
+///
+/// ```
+/// use tactile_imaging::simulate::{Camera, FaceOutline, UniaxialOptions, UniaxialScene};
+/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let disc = UniaxialOptions { outline: FaceOutline::Ellipse, face_m: [12e-3; 2], camera, ..UniaxialOptions::default() };
+/// let scene = UniaxialScene::new(disc)?;
+/// let state = scene.states()[0];
+/// let undeformed = state.area_m2 / state.stretch_lateral.powi(2);
+/// assert!((undeformed / (std::f64::consts::PI * 36e-6) - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum FaceOutline {
+    /// A rectangle of the face's sides: a block.
+    #[default]
+    Rectangle,
+    /// The ellipse in it: a cylinder. Bumps that do not lie wholly on it are left out.
+    Ellipse,
+}
+
+impl FaceOutline {
+    /// Area of a face of these sides.
+    pub(super) fn area_m2(self, size_m: [f64; 2]) -> f64 {
+        let rectangle = size_m[0] * size_m[1];
+        match self {
+            Self::Rectangle => rectangle,
+            Self::Ellipse => 0.25 * PI * rectangle,
+        }
+    }
+
+    /// Whether the box around a point lies on a face of these sides.
+    fn holds(self, at: [f64; 2], half_width_m: f64, size_m: [f64; 2]) -> bool {
+        let reach: [f64; 2] =
+            std::array::from_fn(|k| (at[k].abs() + half_width_m) / (0.5 * size_m[k]));
+        match self {
+            Self::Rectangle => true,
+            Self::Ellipse => reach[0].hypot(reach[1]) <= 1.0,
+        }
+    }
+}
 
 /// Bumps on a plain face.
 ///
@@ -69,7 +113,7 @@ impl SurfacePattern {
     }
 
     /// Places the bumps on a face of `size_m` centred on the origin.
-    pub(super) fn place(&self, size_m: [f64; 2], seed: u64) -> Relief {
+    pub(super) fn place(&self, outline: FaceOutline, size_m: [f64; 2], seed: u64) -> Relief {
         let mut rng = row_stream(seed, Purpose::Pattern, 0, 0);
         let cell: [f64; 2] = std::array::from_fn(|k| size_m[k] / self.bumps[k] as f64);
         let half_width_m = self.bump_share * cell[0].min(cell[1]);
@@ -91,7 +135,9 @@ impl SurfacePattern {
                 });
             }
         }
+        bumps.retain(|bump: &Bump| outline.holds(bump.centre_m, half_width_m, size_m));
         Relief {
+            outline,
             size_m,
             base_height_m: self.base_height_m,
             half_width_m,
@@ -110,6 +156,7 @@ pub(super) struct Bump {
 /// A pattern in its place: heights over the material coordinates (X, Y) of the undeformed face.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Relief {
+    pub(super) outline: FaceOutline,
     pub(super) size_m: [f64; 2],
     pub(super) base_height_m: f64,
     pub(super) half_width_m: f64,
@@ -119,7 +166,9 @@ pub(super) struct Relief {
 impl Relief {
     /// Height at a material point; 0 off the face.
     pub(super) fn height_m(&self, at: [f64; 2]) -> f64 {
-        if (0..2).any(|k| at[k].abs() > 0.5 * self.size_m[k]) {
+        if (0..2).any(|k| at[k].abs() > 0.5 * self.size_m[k])
+            || !self.outline.holds(at, 0.0, self.size_m)
+        {
             return 0.0;
         }
         let factor = |b: &Bump, k: usize| {
@@ -141,8 +190,24 @@ impl Relief {
     /// Volume between the face's plane and its heights, in cubic metres.
     pub(super) fn volume_m3(&self) -> f64 {
         let bumps: f64 = self.bumps.iter().map(|b| b.height_m).sum();
-        self.base_height_m * self.size_m[0] * self.size_m[1]
+        self.base_height_m * self.outline.area_m2(self.size_m)
             + bumps * self.half_width_m * self.half_width_m
+    }
+
+    /// Shares of the cells between `rows` (y) and `columns` (x), edges in material coordinates, that an elliptic face covers: differences of the area of the
+    /// unit disc to the lower left of the cells' corners.
+    pub(super) fn covered_by_ellipse(&self, rows: &[f64], columns: &[f64]) -> Array2<f64> {
+        let half = self.size_m.map(|side| 0.5 * side);
+        let corner = |row: usize, column: usize| {
+            disc_below(columns[column] / half[0], rows[row] / half[1]) * half[0] * half[1]
+        };
+        let corners = Array2::from_shape_fn((rows.len(), columns.len()), |(r, c)| corner(r, c));
+        Array2::from_shape_fn((rows.len() - 1, columns.len() - 1), |(r, c)| {
+            let covered = corners[[r + 1, c + 1]] - corners[[r + 1, c]] - corners[[r, c + 1]]
+                + corners[[r, c]];
+            let cell = (rows[r + 1] - rows[r]) * (columns[c + 1] - columns[c]);
+            (covered / cell).clamp(0.0, 1.0)
+        })
     }
 
     /// ∫ of the plain face's indicator from −∞ to `x` along axis `k`, in metres.
@@ -155,5 +220,48 @@ impl Relief {
     pub(super) fn bump_integral(&self, bump: &Bump, k: usize, x: f64) -> f64 {
         let t = ((x - bump.centre_m[k]) / self.half_width_m).clamp(-1.0, 1.0);
         0.5 * self.half_width_m * (1.0 + t + (PI * t).sin() / PI)
+    }
+}
+
+/// Area of the unit disc where X ≤ x and Y ≤ y: ∫ (min(y, h) + h) dt over t from −1 to x with h = √(1 − t²), where y ≥ −h.
+fn disc_below(x: f64, y: f64) -> f64 {
+    let (x, y) = (x.clamp(-1.0, 1.0), y.clamp(-1.0, 1.0));
+    // ∫ h from 0 to t.
+    let half_disc = |t: f64| 0.5 * (t * (1.0 - t * t).max(0.0).sqrt() + t.asin());
+    // Between −c and c the line Y = y lies inside the disc.
+    let c = (1.0 - y * y).max(0.0).sqrt();
+    let inside = |to: f64| to.clamp(-c, c) + c;
+    let whole = half_disc(x) - half_disc(-1.0);
+    let chord = half_disc(x.clamp(-c, c)) - half_disc(-c);
+    // Where the line is inside: y + h; outside the chord: 2 h above the disc's middle, nothing below it.
+    let beside = whole - chord;
+    y * inside(x) + chord + if y >= 0.0 { 2.0 * beside } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_area_of_a_part_of_a_disc_is_that_of_a_fine_grid() {
+        let n = 2000;
+        let at = |k: usize| (k as f64 + 0.5) / f64::from(n) * 2.0 - 1.0;
+        for (x, y) in [
+            (1.0, 1.0),
+            (0.3, 0.6),
+            (-0.4, 0.7),
+            (0.9, -0.8),
+            (-0.2, -0.1),
+            (2.0, 0.0),
+        ] {
+            let mut count = 0_u32;
+            for (i, j) in ndarray::indices((n as usize, n as usize)) {
+                let (u, v) = (at(i), at(j));
+                count += u32::from(u <= x && v <= y && u * u + v * v <= 1.0);
+            }
+            let counted = f64::from(count) * 4.0 / f64::from(n).powi(2);
+            // A grid of 2000² counts areas to some 1e-3 of its boundary's cells.
+            assert!((disc_below(x, y) - counted).abs() < 2e-3, "{x} {y}");
+        }
     }
 }

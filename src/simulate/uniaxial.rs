@@ -1,4 +1,4 @@
-//! A patterned block squeezed between two plates without friction: the case for which the paper's ratio (31),
+//! A plain or patterned block or cylinder squeezed between two plates without friction: the case for which the paper's ratio (31),
 //! E = S_zz / mean e_zz, is exact.
 //!
 //! The deformation is homogeneous, x = λ_t X, y = λ_t Y, z = λ_z Z, and the material obeys S = E·e in uniaxial stress, with
@@ -20,7 +20,7 @@ use ndarray::Array2;
 use super::error::SimulateError;
 use super::light::Illumination;
 use super::pixel_average::{Patch, touched};
-use super::relief::Relief;
+use super::relief::{FaceOutline, Relief};
 use super::uniaxial_options::UniaxialOptions;
 use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
 
@@ -53,14 +53,16 @@ impl UniaxialScene {
     /// E A₀/(3√3).
     pub fn new(options: UniaxialOptions) -> Result<Self, SimulateError> {
         options.validate()?;
-        let area0 = options.face_m[0] * options.face_m[1];
+        let area0 = options.outline.area_m2(options.face_m);
         let solve = |&f: &f64| UniaxialState::new(&options.material, area0, f);
         let states = options
             .forces_n
             .iter()
             .map(solve)
             .collect::<Result<Vec<_>, _>>()?;
-        let relief = options.pattern.place(options.face_m, options.seed);
+        let relief = options
+            .pattern
+            .place(options.outline, options.face_m, options.seed);
         let mut scene = Self {
             options,
             states,
@@ -259,8 +261,16 @@ impl UniaxialScene {
                 .collect()
         };
         let mut values = Array2::zeros((spans[1].1.len() - 1, spans[0].1.len() - 1));
-        let face = |k: usize| means(k, &|x| relief.face_integral(k, x));
-        add_product(&mut values, relief.base_height_m, &face(1), &face(0));
+        match relief.outline {
+            FaceOutline::Rectangle => {
+                let face = |k: usize| means(k, &|x| relief.face_integral(k, x));
+                add_product(&mut values, relief.base_height_m, &face(1), &face(0));
+            }
+            FaceOutline::Ellipse => {
+                values = relief.covered_by_ellipse(&spans[1].1, &spans[0].1);
+                values *= relief.base_height_m;
+            }
+        }
         for bump in &relief.bumps {
             let profile = |k: usize| means(k, &|x| relief.bump_integral(bump, k, x));
             add_product(&mut values, bump.height_m, &profile(1), &profile(0));

@@ -4,7 +4,7 @@ use super::camera::Camera;
 use super::error::{SimulateError, at_least, finite, not_negative, positive};
 use super::material::Elastic;
 use super::press_options::Gain;
-use super::relief::SurfacePattern;
+use super::relief::{FaceOutline, SurfacePattern};
 
 /// Everything that describes the squeezed block; [`UniaxialScene::new`](super::UniaxialScene::new) checks it.
 ///
@@ -26,7 +26,10 @@ use super::relief::SurfacePattern;
 pub struct UniaxialOptions {
     /// What the block is made of.
     pub material: Elastic,
-    /// Sides of the undeformed face (x, y) in metres.
+    /// Outline of the face.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub outline: FaceOutline,
+    /// Sides of the undeformed face (x, y), or axes of its ellipse, in metres.
     pub face_m: [f64; 2],
     /// What its surface looks like.
     pub pattern: SurfacePattern,
@@ -47,6 +50,7 @@ impl Default for UniaxialOptions {
     fn default() -> Self {
         Self {
             material: Elastic::CL2000X,
+            outline: FaceOutline::default(),
             face_m: [12e-3; 2],
             pattern: SurfacePattern::default(),
             forces_n: vec![0.2, 0.7, 1.2],

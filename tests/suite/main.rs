@@ -23,3 +23,4 @@ mod simulator;
 mod simulator_families;
 mod simulator_recorded;
 mod stability;
+mod uniaxial;

@@ -1,5 +1,6 @@
 //! What a frame says of its contact, and where in the frame the contact is.
 use crate::force::{BoundingBox, Estimate, ForceMeasurement, ProfileShape, StopReason};
+use crate::pipeline::face::FaceReading;
 use ndarray::Array2;
 
 /// What a frame says of its contact.
@@ -55,6 +56,8 @@ pub struct ContactReading {
     pub converged: bool,
     /// Misfit of the pressure's profile as a share of its peak, where it is not that of a ball's contact.
     pub profile_misfit: Option<f64>,
+    /// The contact as a flat face, where the object may have one and the contact is large enough to tell.
+    pub face: Option<FaceReading>,
 }
 
 impl ContactReading {
@@ -100,6 +103,7 @@ impl ContactReading {
                 .profile
                 .filter(|p| p.shape == ProfileShape::NotHertz)
                 .map(|p| p.radial_misfit.hypot(p.azimuthal_misfit)),
+            face: None,
         })
     }
 }

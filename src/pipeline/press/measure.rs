@@ -1,5 +1,6 @@
 //! Everything that the frames of a press say, in one go.
 use super::Press;
+use crate::force::Estimate;
 use crate::matching::StopReason;
 use crate::pipeline::background;
 use crate::pipeline::error::PipelineError;
@@ -17,6 +18,11 @@ const KEPT_SURFACES: usize = 64;
 /// Radius in pixels of a contact below which the strain's stated error has been seen to be too small: over 40 presses the largest deviation is
 /// 3.05 of e_zz's standard errors at 38 pixels and 2.1 at 51 (`STRAIN_SEEDS=40 cargo test --test suite strain_of_sizes -- --nocapture`).
 const COARSE_RADIUS_PX: f64 = 40.0;
+
+/// Standard errors by which the stretches of a face's outline and of its texture may differ: with one comparison a press, one in some 10⁴ is flagged in vain.
+const SLIP_ERRORS: f64 = 4.0;
+/// Share of the strain below which their difference does no harm.
+const SLIP_SHARE: f64 = 0.02;
 
 impl Press<'_> {
     /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error stands in its place.
@@ -133,6 +139,9 @@ impl Press<'_> {
 
     fn match_result(&mut self, flags: &mut Vec<Flag>) -> Result<MatchResult, PipelineError> {
         let last = self.last()?;
+        if self.pipeline().settings().object.flat_face().is_some() {
+            return self.texture_result(last, flags);
+        }
         let model = self.control_points(0)?.to_vec();
         let matching = self.matching(last)?;
         let count = model.len() as f64;
@@ -156,6 +165,39 @@ impl Press<'_> {
             });
         }
         Ok(result)
+    }
+
+    /// The match of a face's texture, and a caution where its points stretch otherwise than the outline.
+    fn texture_result(
+        &mut self,
+        last: usize,
+        flags: &mut Vec<Flag>,
+    ) -> Result<MatchResult, PipelineError> {
+        let texture = self.texture(last)?;
+        let areas = [0, last].map(|frame| Some(self.reading(frame).ok()?.face?.area_m2));
+        if let [Some(first), Some(second)] = areas {
+            let outline = (second.value / first.value).sqrt();
+            let relative = |area: Estimate<f64>| area.standard_error / area.value;
+            let error = 0.5 * outline * relative(first).hypot(relative(second));
+            let apart = (outline - texture.stretch.value).abs();
+            let allowed = SLIP_ERRORS * error.hypot(texture.stretch.standard_error);
+            if apart > allowed && apart > SLIP_SHARE * (outline - 1.0).abs() {
+                flags.push(Flag::Slip {
+                    frame: last,
+                    outline_strain: outline - 1.0,
+                    texture_strain: texture.stretch.value - 1.0,
+                });
+            }
+        }
+        Ok(MatchResult {
+            points: texture.points,
+            matched: texture.pairs,
+            mean_confidence: texture.pairs as f64 / texture.points as f64,
+            residual_m: texture.residual_m,
+            mean_displacement_m: texture.displacement_m,
+            iterations: 1,
+            stop: StopReason::Converged,
+        })
     }
 
     /// The contact's radius in pixels.

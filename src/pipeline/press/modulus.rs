@@ -4,6 +4,7 @@ use crate::elasticity::modulus::{LoadSeries, ModulusEstimate};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::error_budget::{self, ErrorShare};
 use crate::pipeline::estimators::that_fit;
+use crate::pipeline::face;
 use crate::pipeline::load_reading::LoadReading;
 
 /// Frames of a press whose strain is worked out for the modulus. A match takes milliseconds, so that thousands would take minutes; the error
@@ -22,8 +23,8 @@ impl Press<'_> {
         self.runner.modulus(estimator.as_ref(), &loads)
     }
 
-    /// What every frame says of its load, with the strain since the first (of at most 32 frames, evenly chosen) and the errors that all
-    /// share. A frame that equals an earlier one says nothing new, and a contact that the frame's edge cuts says something wrong: their loads
+    /// What every frame says of its load, with the strain since the first (of at most 32 frames, evenly chosen; of a flat face, of all frames and
+    /// since the unloaded state) and the errors that all share. A frame that equals an earlier one says nothing new, and a contact that the frame's edge cuts says something wrong: their loads
     /// have a force alone (where all are cut, there is nothing better). This is what
     /// [estimators](crate::elasticity::modulus::ModulusEstimator) take.
     ///
@@ -104,7 +105,8 @@ impl Press<'_> {
             readings.push(reading.ok_or(PipelineError::NoForce { frame })?);
             cut.push(contact.touches_edge);
         }
-        if with_strain {
+        let flat = self.pipeline().settings().object.flat_face();
+        if with_strain && flat.is_none() {
             for frame in self.strained_frames() {
                 let step = readings[frame].force_n - readings[0].force_n;
                 readings[frame].mean_strain = Some(self.strain(frame)?.of_load(step));
@@ -116,7 +118,25 @@ impl Press<'_> {
                 reading.forget_contact();
             }
         }
-        self.runner.load_series(readings.iter().copied())
+        match flat.filter(|_| with_strain) {
+            Some(poisson_ratio) => {
+                self.check_faces(&cut)?;
+                self.runner
+                    .uniaxial_series(readings.iter().copied(), poisson_ratio)
+            }
+            None => self.runner.load_series(readings.iter().copied()),
+        }
+    }
+
+    /// Refuses contacts that are not those of one flat face. Frames whose contact is `cut` by their edge do not count unless all are.
+    fn check_faces(&mut self, cut: &[bool]) -> Result<(), PipelineError> {
+        let all_cut = cut.iter().all(|&cut| cut);
+        let mut contacts = Vec::with_capacity(cut.len());
+        for frame in (0..cut.len()).filter(|&frame| all_cut || !cut[frame]) {
+            contacts.push((frame, self.reading(frame)?));
+        }
+        let numbered = contacts.iter().map(|(frame, contact)| (*frame, contact));
+        face::check(numbered, self.pipeline().settings().object)
     }
 
     /// The frames whose strain enters the modulus: those that equal no earlier one, thinned evenly where there are many.

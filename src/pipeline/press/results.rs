@@ -4,6 +4,7 @@ use crate::matching::Matching;
 use crate::pipeline::background;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::face::TextureStretch;
 use crate::pipeline::pair::PairStrain;
 use crate::pipeline::surface::{ContactSurface, ControlPoints};
 use nalgebra::Point3;
@@ -158,14 +159,34 @@ impl Press<'_> {
             .ok_or(PipelineError::NoContact { frame })
     }
 
-    /// The strain between the first frame and a later one.
+    /// The stretch of a face's material points from the first frame to a later one.
+    pub(super) fn texture(&mut self, frame: usize) -> Result<TextureStretch, PipelineError> {
+        self.reading(0)?;
+        self.reading(frame)?;
+        let (first, at) = (self.twin(0)?, self.twin(frame)?);
+        let (Some(one), Some(two)) = (&self.frames[first].contact, &self.frames[at].contact) else {
+            return Err(PipelineError::NoContact { frame });
+        };
+        let images = [self.frames[first].image, self.frames[at].image];
+        self.runner.texture([0, frame], images, [one, two])
+    }
+
+    /// The strain between the first frame and a later one; of an object with a flat face by the growth of its area, the same at all points.
     ///
     /// # Errors
     /// [`PipelineError::TooFewMatches`], [`PipelineError::Warp`], [`PipelineError::Strain`] and those of
     /// [`matching`](Self::matching).
     pub fn strain(&mut self, frame: usize) -> Result<&PairStrain, PipelineError> {
-        self.matching(frame)?;
         let at = self.twin(frame)?;
+        if let Some(poisson_ratio) = self.pipeline().settings().object.flat_face() {
+            let readings = [self.reading(0)?, self.reading(frame)?];
+            let frames = [0, frame];
+            let strain = self
+                .runner
+                .strain_of_faces(frames, readings.each_ref(), poisson_ratio)?;
+            return Ok(self.frames[at].strain.insert(strain));
+        }
+        self.matching(frame)?;
         if self.frames[at].strain.is_none() {
             let (model, target) = (
                 known_points(&self.frames, 0)?,

@@ -34,6 +34,7 @@ struct MergedLoad {
     radius_variance: f64,
     calibration: f64,
     indentation_m: Option<Estimate<f64>>,
+    face_m2: Option<Estimate<f64>>,
     mean_strain: Option<Estimate<f64>>,
 }
 
@@ -50,6 +51,9 @@ impl MergedLoad {
             indentation_m: reading
                 .indentation_m
                 .map(|depth| Estimate::new(depth.value, depth.standard_error)),
+            face_m2: reading
+                .face
+                .map(|face| Estimate::new(face.area_m2.value, face.area_m2.standard_error)),
             mean_strain,
         })
     }
@@ -72,6 +76,7 @@ impl MergedLoad {
             radius_variance: a * a * self.radius_variance + b * b * other.radius_variance,
             calibration: a * self.calibration + b * other.calibration,
             indentation_m: mean(self.indentation_m, other.indentation_m),
+            face_m2: mean(self.face_m2, other.face_m2),
             mean_strain: mean(self.mean_strain, other.mean_strain),
         }
     }
@@ -87,6 +92,7 @@ impl MergedLoad {
                 pixel_size_m,
             )),
             indentation_m: self.indentation_m,
+            face_m2: self.face_m2,
             mean_strain: self.mean_strain,
         }
     }
@@ -116,7 +122,9 @@ impl SeenLoads {
     /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its profile fitted.
     pub(super) fn learn(&mut self, reading: &ContactReading, strain: Option<Estimate<f64>>) {
         let whole = !reading.touches_edge && reading.other_contacts == 0;
-        let trusted = whole && !reading.out_of_calibration && reading.converged;
+        // A flat face is not read by the fit of a profile.
+        let read = reading.converged || reading.face.is_some();
+        let trusted = whole && !reading.out_of_calibration && read;
         let trusted = trusted && reading.saturated_share == 0.0;
         let Some(load) = MergedLoad::of(reading, strain).filter(|l| trusted && l.force_n > 0.0)
         else {

@@ -12,8 +12,9 @@ mod strain;
 mod update;
 
 use super::composition::Pipeline;
-use super::contact::{FrameContact, resize};
+use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
+use super::face;
 use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
 use super::runner::{SkipRecords, StageRunner};
@@ -54,6 +55,8 @@ pub struct Session {
     loads: SeenLoads,
     shear: Option<ShearTracker<f64>>,
     strain: FollowedStrain,
+    /// The first contact that a flat face's loads are compared with.
+    first_contact: Option<ContactReading>,
     drift: DriftWatch,
 }
 
@@ -102,6 +105,7 @@ impl Session {
             loads: SeenLoads::new(),
             shear: None,
             strain: FollowedStrain::default(),
+            first_contact: None,
             drift: DriftWatch::default(),
         })
     }
@@ -179,12 +183,27 @@ impl Session {
         self.measured = true;
         self.measured_frame = number;
         if let Some(reading) = &self.contact.reading {
-            self.loads.learn(reading, None);
+            let object = self.runner.pipeline().settings().object;
+            let flat = object.flat_face().is_some();
+            if !flat || self.check_face(reading).is_ok() {
+                self.first_contact.get_or_insert(*reading);
+                self.loads.learn(reading, None);
+            }
         }
         if let Some(grey) = self.contact.background_step_grey {
             self.drift.watch(grey);
         }
         Ok(())
+    }
+
+    /// Refuses a contact that is not that of one flat face, the same as in the first frame.
+    fn check_face(&self, contact: &ContactReading) -> Result<(), PipelineError> {
+        let object = self.runner.pipeline().settings().object;
+        let both = self.first_contact.iter().chain([contact]);
+        face::check(
+            both.map(|contact| (self.measured_frame as usize, contact)),
+            object,
+        )
     }
 
     /// Frames seen so far.

@@ -67,14 +67,22 @@ impl Session {
         self.strain = FollowedStrain::default();
     }
 
-    /// Young's modulus from all loads so far, by the estimator of the pipeline. Where that needs strain the loads are those whose [`strain`](Self::strain) was asked for.
+    /// Young's modulus from all loads so far, by the estimator of the pipeline. Where that needs strain the loads are those whose [`strain`](Self::strain) was asked for;
+    /// of a flat face all.
     ///
     /// # Errors
-    /// [`PipelineError::Modulus`].
+    /// [`PipelineError::Modulus`]; [`PipelineError::NotUniaxial`] where the last contact is not that of a flat face.
     pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
         let estimator = self.runner.pipeline().estimator()?;
         let size = self.runner.pipeline().contact().pixel_size_m();
-        let loads = if estimator.needs_strain() {
+        let flat = self.runner.pipeline().settings().object.flat_face();
+        let loads = if let Some(poisson_ratio) = flat.filter(|_| estimator.needs_strain()) {
+            if let Some(contact) = &self.contact.reading {
+                self.check_face(contact)?;
+            }
+            self.runner
+                .uniaxial_series(self.loads.readings(size), poisson_ratio)?
+        } else if estimator.needs_strain() {
             self.runner.load_series(self.strain.loads(size))?
         } else {
             self.runner.load_series(self.loads.readings(size))?

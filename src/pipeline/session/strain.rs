@@ -4,6 +4,7 @@ use crate::matching::MatchReport;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::load_reading::LoadReading;
+use crate::pipeline::object::Object;
 use crate::pipeline::pair::PairStrain;
 use crate::pipeline::report::{SkipReason, Stage};
 use crate::pipeline::runner::{MatchHistory, StageRunner};
@@ -34,7 +35,7 @@ pub struct SessionStrain {
     pub from: u64,
     /// The strained frame.
     pub to: u64,
-    /// Control points with a partner on the strained surface.
+    /// Control points with a partner on the strained surface; 0 of a flat face, whose strain is that of its area.
     pub matched: usize,
     /// How the match went.
     pub report: MatchReport<f64>,
@@ -56,7 +57,8 @@ struct Anchor {
     reading: ContactReading,
     /// Pixels of its contact: all surfaces have its grid.
     pixels: usize,
-    points: ControlPoints,
+    /// None of a flat face, whose strain is that of its area.
+    points: Option<ControlPoints>,
 }
 
 /// What is kept from frame to frame.
@@ -81,7 +83,10 @@ impl FollowedStrain {
                 frame: frame.number,
                 reading: frame.reading,
                 pixels,
-                points: control_points(runner, frame, pixels)?,
+                points: match runner.pipeline().settings().object.flat_face() {
+                    Some(_) => None,
+                    None => Some(control_points(runner, frame, pixels)?),
+                },
             });
             return Ok(None);
         };
@@ -133,16 +138,28 @@ fn strain_since(
     runner: &mut StageRunner,
     frame: &Frame<'_>,
 ) -> Result<SessionStrain, PipelineError> {
-    let target = control_points(runner, frame, anchor.pixels)?.points;
     let frames = [anchor.frame as usize, frame.number as usize];
+    let Some(points) = &anchor.points else {
+        let readings = [&anchor.reading, &frame.reading];
+        let object = runner.pipeline().settings().object;
+        let poisson_ratio = object.flat_face().unwrap_or(Object::DEFAULT_POISSON_RATIO);
+        return Ok(SessionStrain {
+            from: anchor.frame,
+            to: frame.number,
+            matched: 0,
+            report: MatchReport::default(),
+            strain: runner.strain_of_faces(frames, readings, poisson_ratio)?,
+        });
+    };
+    let target = control_points(runner, frame, anchor.pixels)?.points;
     runner.skip(
         Stage::Surface,
         frames[1],
         SkipReason::KeptFromBefore,
         anchor.pixels,
     );
-    let found = runner.next_matching(frames, history, &anchor.points.points, &target)?;
-    let strain = runner.strain(frames, &anchor.points, &target, &found)?;
+    let found = runner.next_matching(frames, history, &points.points, &target)?;
+    let strain = runner.strain(frames, points, &target, &found)?;
     Ok(SessionStrain {
         from: anchor.frame,
         to: frame.number,

@@ -13,6 +13,7 @@ mod series;
 mod source;
 mod statistics;
 mod tabulated;
+mod uniaxial;
 mod warning;
 
 pub use bootstrap::{Bootstrap, BootstrapSummary};
@@ -34,4 +35,5 @@ pub use select::{BestOf, ModulusSelection};
 pub use series::{LoadSeries, SharedErrors};
 pub(crate) use statistics::quantile_95;
 pub use tabulated::TabulatedContact;
+pub use uniaxial::UniaxialLoads;
 pub use warning::Warning;

@@ -38,7 +38,8 @@ pub enum StrainReference {
     /// The unloaded object: stress is counted from zero.
     #[default]
     Unloaded,
-    /// The first load, as when two pressed frames are matched: stress is counted from there.
+    /// The first load, as when two pressed frames are matched: stress is counted from there, and its own strain, where it has one, is taken
+    /// from all others.
     FirstLoad,
 }
 
@@ -96,6 +97,14 @@ impl PaperRatio {
         Ok(self)
     }
 
+    /// The first load's own strain, where strains are counted from an earlier state but the ratio from the first load.
+    fn first_strain(&self, loads: &[LoadState<f64>]) -> Estimate<f64> {
+        let first = loads.first().and_then(|load| load.mean_strain);
+        first
+            .filter(|_| self.reference == StrainReference::FirstLoad)
+            .unwrap_or(Estimate::exact(0.0))
+    }
+
     fn ratios(&self, loads: &[LoadState<f64>]) -> Result<Vec<Ratio>, ElasticityError> {
         let mut ratios = Vec::new();
         let from_first = self.reference == StrainReference::FirstLoad;
@@ -104,11 +113,12 @@ impl PaperRatio {
         } else {
             None
         };
+        let first_strain = self.first_strain(loads);
         for (load, state) in loads.iter().enumerate().skip(usize::from(from_first)) {
             let Some(strain) = state.mean_strain else {
                 continue;
             };
-            let strain = strain.validated(Quantity::Strain)?.value;
+            let strain = strain.validated(Quantity::Strain)?.value - first_strain.value;
             let stress_pa = stress(load, state)?.value - base.map_or(0.0, |b| b.value);
             if stress_pa == 0.0 && from_first {
                 return Err(ElasticityError::EqualLoads);
@@ -185,9 +195,13 @@ impl PaperRatio {
         let strains = match series.strain_covariance() {
             Some(given) => none
                 .with_given(|i, j| given[(own(i), own(j))] / (ratios[i].strain * ratios[j].strain)),
-            None => none.with_own(|i| {
-                loads[own(i)].mean_strain.map_or(0.0, |e| e.standard_error) / ratios[i].strain
-            }),
+            None => {
+                let first = self.first_strain(loads).standard_error;
+                none.with_own(|i| {
+                    loads[own(i)].mean_strain.map_or(0.0, |e| e.standard_error) / ratios[i].strain
+                })
+                .with_shared(|i| first / ratios[i].strain)
+            }
         };
         let degrees = |of: &dyn Fn(usize) -> Option<Estimate<f64>>| {
             let estimates = (0..loads.len()).filter_map(of);

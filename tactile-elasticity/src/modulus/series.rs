@@ -85,6 +85,8 @@ pub struct LoadSeries<T: RealField> {
     shared: SharedErrors<T>,
     force_covariance: Option<DMatrix<T>>,
     strain_covariance: Option<DMatrix<T>>,
+    /// Poisson's ratio, where the strains were derived from lateral stretches by it: all are in inverse proportion to it.
+    strained_by: Option<T>,
 }
 
 impl<T: RealField + Copy> LoadSeries<T> {
@@ -101,6 +103,7 @@ impl<T: RealField + Copy> LoadSeries<T> {
             },
             force_covariance: None,
             strain_covariance: None,
+            strained_by: None,
         }
     }
 
@@ -186,6 +189,16 @@ impl<T: RealField + Copy> LoadSeries<T> {
             shared: self.shared.map(widen),
             force_covariance: self.force_covariance.as_ref().map(matrix),
             strain_covariance: self.strain_covariance.as_ref().map(matrix),
+            strained_by: self.strained_by.map(widen),
+        }
+    }
+
+    /// The series with loads whose strains were derived by a Poisson ratio.
+    pub(crate) fn uniaxial(&self, loads: Vec<LoadState<T>>, poisson_ratio: T) -> Self {
+        Self {
+            loads,
+            strained_by: Some(poisson_ratio),
+            ..self.clone()
         }
     }
 
@@ -199,10 +212,13 @@ impl<T: RealField + Copy> LoadSeries<T> {
 }
 
 impl LoadSeries<f64> {
-    /// Relative error that all stresses F/A share; areas go as the square of lengths.
+    /// Relative error that all ratios of stress to strain share: areas go as the square of lengths, strains derived from lateral stretches
+    /// as one over Poisson's ratio.
     pub(crate) fn stress_scale_error(&self) -> f64 {
+        let of_strains = (self.strained_by).map_or(0.0, |ratio| self.shared.poisson_ratio / ratio);
         self.shared
             .force_scale
             .hypot(2.0 * self.shared.length_scale)
+            .hypot(of_strains)
     }
 }

@@ -7,8 +7,8 @@ use tactile_imaging::elasticity::modulus::{
     EstimatorKind, HertzSphere, LoadSeries, ModulusEstimate, ModulusEstimator,
 };
 use tactile_imaging::pipeline::{
-    EstimatorChoice, Object, Pipeline, PipelineError, Session, SkipReason, Skips, Stage,
-    StagesConfig, Trial,
+    EstimatorChoice, Pipeline, PipelineError, Session, SkipReason, Skips, Stage, StagesConfig,
+    Trial,
 };
 
 fn session(trial: &Trial, pipeline: &Pipeline) -> Session {
@@ -90,11 +90,13 @@ fn matches_that_go_on_from_the_last_one_strain_as_those_made_anew() {
 }
 
 #[test]
-fn an_object_that_needs_strain_gets_its_modulus_from_the_stream() {
+fn an_estimator_that_needs_strain_gets_its_modulus_from_the_stream() {
     let trial = trial(&[0.7, 0.9, 1.2], 6);
-    let object = Object::Unknown { poisson_ratio: 0.5 };
-    let mut pipeline = trial.pipeline().unwrap();
-    pipeline = pipeline.with_object(object).unwrap();
+    let config = StagesConfig {
+        estimator: EstimatorChoice::PaperRatio,
+        ..StagesConfig::default()
+    };
+    let pipeline = trial.pipeline().unwrap().with_stages(&config).unwrap();
     let mut press = trial.press(&pipeline).unwrap();
     let expected = press.modulus().unwrap();
     let mut session = session(&trial, &pipeline);

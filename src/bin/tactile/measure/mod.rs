@@ -104,7 +104,7 @@ SCENE.toml (paths are relative to it; PNG, PGM or JPEG; colour becomes grey by t
   [[frames]]
   image = \"frame_2.png\"
   [object]
-  shape = \"sphere\"                       # or \"flat_punch\", \"unknown\"
+  shape = \"sphere\"                       # or \"block\", \"cylinder\" (flat faces, no size), \"flat_punch\", \"unknown\"
   radius_m = 3e-3
   poisson_ratio = 0.5
   [waveguide]                            # from the object's side to the glass

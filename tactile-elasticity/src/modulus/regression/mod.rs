@@ -103,6 +103,39 @@ impl StressStrainRegression {
         Ok(points)
     }
 
+    /// Slope and intercept of the line through all loads that have a strain.
+    pub(crate) fn line_through(
+        &self,
+        series: &LoadSeries<f64>,
+    ) -> Result<(f64, f64), ElasticityError> {
+        let line = self.line(&Self::points(series.loads())?)?;
+        Ok((line.slope, line.intercept))
+    }
+
+    /// The line with a slope above zero.
+    fn line(&self, points: &[Point]) -> Result<Line, ElasticityError> {
+        let known = Self::known(points);
+        self.check(points, known)?;
+        let line = Line::fit(points, self.intercept == Intercept::Tested, known);
+        if line.slope <= 0.0 || !line.slope.is_finite() {
+            let p = points
+                .last()
+                .map_or((0.0, 0.0), |p| (p.stress.value, p.strain.value));
+            return Err(ElasticityError::OppositeSigns {
+                stress_pa: p.0,
+                strain: p.1,
+            });
+        }
+        Ok(line)
+    }
+
+    /// Whether any point has an error.
+    fn known(points: &[Point]) -> bool {
+        points
+            .iter()
+            .any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0)
+    }
+
     fn check(&self, points: &[Point], known: bool) -> Result<(), ElasticityError> {
         let through_origin = self.intercept == Intercept::Zero;
         let expected = match (through_origin, known) {
@@ -235,20 +268,8 @@ impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
         let series = series.widened();
         let loads = series.loads();
         let points = Self::points(loads)?;
-        let known = points
-            .iter()
-            .any(|p| p.stress.standard_error > 0.0 || p.strain.standard_error > 0.0);
-        self.check(&points, known)?;
-        let line = Line::fit(&points, self.intercept == Intercept::Tested, known);
-        if line.slope <= 0.0 || !line.slope.is_finite() {
-            let p = points
-                .last()
-                .map_or((0.0, 0.0), |p| (p.stress.value, p.strain.value));
-            return Err(ElasticityError::OppositeSigns {
-                stress_pa: p.0,
-                strain: p.1,
-            });
-        }
+        let known = Self::known(&points);
+        let line = self.line(&points)?;
         let scale_error = series.stress_scale_error();
         let error = line.slope_error.hypot(line.slope * scale_error);
         let reach = error * quantile_95(Self::degrees(&points, &line, scale_error));

@@ -1,0 +1,116 @@
+//! The paper's two samples, balls of 3 mm radius of 103 and 62 kPa at 0.7 and 1.2 N, by every estimator: a table and a plot beside the truth.
+//!
+//! `cargo run --release --features scene,simulate,plot --example paper_samples -- docs/paper_samples` simulates the presses by finite elements,
+//! writes each as a scene file with its frames, and measures those files. Without an argument it writes to `target/paper_samples`.
+use std::error::Error;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig};
+use tactile_imaging::plot::{Colour, Page, Panel};
+use tactile_imaging::scene::Scene;
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene, Sphere, write_folder,
+};
+
+const ESTIMATORS: [(EstimatorChoice, &str); 5] = [
+    (
+        EstimatorChoice::PaperRatio,
+        "the paper's ratio (31), apparent",
+    ),
+    (EstimatorChoice::Sphere, "Hertz, layers in series"),
+    (
+        EstimatorChoice::SphereOnWaveguide,
+        "ball on layers, large strain (default)",
+    ),
+    (EstimatorChoice::SphereBetweenPlates, "ball between plates"),
+    (EstimatorChoice::TataraSphere, "Tatara"),
+];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args().nth(1);
+    let folder = PathBuf::from(folder.unwrap_or_else(|| "target/paper_samples".into()));
+    let mut table = String::from(
+        "| sample | estimator | modulus | 95 % interval | error |\n|---|---|---|---|---|\n",
+    );
+    let mut page = Page::new("The paper's samples by every estimator").columns(2);
+    for (name, material) in [("cl2000x", Elastic::CL2000X), ("cl2003x", Elastic::CL2003X)] {
+        let truth_kpa = material.youngs_modulus_pa * 1e-3;
+        let scene = write_sample(&folder.join(name), material)?;
+        let found = moduli(&scene)?;
+        let mut points = Vec::new();
+        for (k, (label, modulus)) in found.iter().enumerate() {
+            let row = match modulus {
+                Ok((kpa, interval)) => {
+                    points.push([k as f64 + 1.0, *kpa]);
+                    format!(
+                        "{kpa:.1} kPa | {interval} | {:+.1} %",
+                        100.0 * (kpa / truth_kpa - 1.0)
+                    )
+                }
+                Err(error) => format!("none: {error} | |"),
+            };
+            writeln!(table, "| {name}, {truth_kpa:.0} kPa | {label} | {row} |")?;
+        }
+        let last = found.len() as f64 + 0.5;
+        let panel = Panel::new(format!("{name}: {truth_kpa:.0} kPa"))
+            .x_label("estimator, in the order of the table")
+            .y_label("Young's modulus (kPa)")
+            .line(
+                [[0.5, truth_kpa], [last, truth_kpa]],
+                Colour::ORANGE,
+                "truth",
+            )
+            .points(points, Colour::BLUE, "measured");
+        page = page.panel(panel);
+    }
+    print!("{table}");
+    std::fs::write(folder.join("table.md"), &table)?;
+    page.save(folder.join("estimators.svg"))?;
+    Ok(())
+}
+
+/// Simulates the press of a sample and writes its scene file.
+fn write_sample(folder: &Path, material: Elastic) -> Result<Scene, Box<dyn Error>> {
+    let camera = Camera {
+        shape: [200, 260],
+        pixel_size_m: [100e-6; 2],
+        ..Camera::default()
+    };
+    let press = PressScene::new(PressOptions {
+        object: Sphere {
+            radius_m: 3e-3,
+            material,
+        },
+        loads: [0.7, 1.2].map(Load::normal).to_vec(),
+        camera,
+        ..PressOptions::finite_elements()
+    })?;
+    let path = write_folder(&press, &CalibrationOptions::default(), folder)?;
+    Ok(Scene::read(path)?)
+}
+
+/// A modulus in kPa with its 95 % interval in words, or why there is none.
+type Modulus = Result<(f64, String), String>;
+
+fn moduli(scene: &Scene) -> Result<Vec<(&'static str, Modulus)>, Box<dyn Error>> {
+    let data = scene.load()?;
+    let mut rows = Vec::new();
+    for (estimator, label) in ESTIMATORS {
+        let stages = StagesConfig {
+            estimator,
+            ..StagesConfig::default()
+        };
+        let pipeline = scene.pipeline(&data)?.with_stages(&stages)?;
+        let mut press = scene.press(&pipeline, &data)?;
+        let modulus = press.modulus().map(|found| {
+            let [lower, upper] = [Some(found.interval_95.lower), found.interval_95.upper]
+                .map(|end| end.map_or("∞".into(), |pa| format!("{:.1}", pa * 1e-3)));
+            (
+                found.youngs_modulus_pa * 1e-3,
+                format!("{lower} to {upper}"),
+            )
+        });
+        rows.push((label, modulus.map_err(|error| error.to_string())));
+    }
+    Ok(rows)
+}

@@ -1,0 +1,228 @@
+//! Specimens with a flat face, pressed without friction: strain and conjugate stress from the face's area.
+//!
+//! Under uniaxial load a block or a cylinder of any outline deforms homogeneously: the face stretches by λ_t in its plane and by λ_z
+//! across it, and its area is A = A₀ λ_t². With a measure of strain f (Green–Lagrange: f(λ) = ½(λ² − 1)) and Poisson's ratio defined
+//! by the same measure, f(λ_t) = −ν f(λ_z), which for Hencky's measure and ν = ½ is incompressibility, λ_z λ_t² = 1.
+//! The stress conjugate to the measure does the work of the force: S df = (F/A₀) dλ_z, hence
+//!
+//! S = F / (A₀ f′(λ_z)),
+//!
+//! the second Piola–Kirchhoff stress for Green–Lagrange, F/A₀ (engineering stress) for Biot's measure and J times the true stress F/A for
+//! Hencky's. Material law: S = E f(λ_z), equation (31).
+//!
+//! Frames show pressed faces only, so that A₀ is not measured. It is the area for which the line S over e passes through the origin:
+//! n loads determine the two unknowns E and A₀ from n ≥ 2. To first order E = 2ν ΔF/ΔA, which does not hold A₀ at all; the error of A₀ is of
+//! the order of that of E times the strain and is neglected.
+//!
+//! Range: no friction. A face that sticks to the plate stretches less than the material above it, and E comes out too large.
+
+use super::load::{Estimate, LoadState};
+use super::ratio::LINEAR_STRAIN;
+use super::regression::StressStrainRegression;
+use super::series::LoadSeries;
+use crate::error::{ElasticityError, Quantity, positive};
+use crate::scalar::{narrow, widen};
+use crate::strain::StrainMeasure;
+use nalgebra::{Matrix3, RealField};
+
+/// Steps to the unloaded area: the error falls by about the strain each time, to rounding for strains up to a third.
+const AREA_STEPS: usize = 60;
+/// Axial stretches that are considered: beyond them no law with one modulus holds.
+const STRETCHES: [f64; 2] = [0.05, 4.0];
+
+/// The loads of a specimen with a flat face, its areas turned into strains and conjugate stresses.
+///
+/// ```
+/// use tactile_elasticity::modulus::{
+///     Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, UniaxialLoads,
+/// };
+/// use tactile_elasticity::strain::GreenLagrange;
+///
+/// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1 + e), F = E e λ_z A₀.
+/// let load = |e: f64| {
+///     LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4))
+///         .with_contact_area(Estimate::new(1e-4 * (1.0 + e), 1e-9))
+/// };
+/// let uniaxial = UniaxialLoads::new(&LoadSeries::new([load(0.02), load(0.05)]), 0.5, &GreenLagrange)?;
+/// assert!((uniaxial.unloaded_area_m2() / 1e-4 - 1.0).abs() < 1e-9);
+/// let [_lateral, axial] = uniaxial.stretches()[1];
+/// assert!((axial - 0.9f64.sqrt()).abs() < 1e-9);
+/// let modulus = StressStrainRegression::default().estimate(uniaxial.series())?;
+/// assert!((modulus.youngs_modulus_pa / 100e3 - 1.0).abs() < 1e-9);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct UniaxialLoads<T: RealField> {
+    series: LoadSeries<T>,
+    stretches: Vec<[T; 2]>,
+    unloaded_area_m2: T,
+}
+
+impl<T: RealField + Copy> UniaxialLoads<T> {
+    /// Finds A₀ and the state of every load that has a contact area; the others have a force alone. O(loads).
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`] for a Poisson ratio, from which there is no way back to the axial strain, or an area;
+    /// [`ElasticityError::TooFewLoads`] for fewer than two areas, [`ElasticityError::EqualLoads`] and [`ElasticityError::ZeroStrain`] where they
+    /// are all one, [`ElasticityError::OppositeSigns`] where the face does not grow with the force.
+    pub fn new(
+        series: &LoadSeries<T>,
+        poisson_ratio: T,
+        measure: &dyn StrainMeasure<f64>,
+    ) -> Result<Self, ElasticityError> {
+        let wide = series.widened();
+        let law = LateralLaw {
+            poisson_ratio: positive(widen(poisson_ratio), Quantity::PoissonRatio)?,
+            measure,
+        };
+        let faces = wide.loads().iter().filter_map(|l| l.contact_area_m2);
+        let mut unloaded = f64::INFINITY;
+        for face in faces {
+            let area = positive(
+                face.validated(Quantity::ContactArea)?.value,
+                Quantity::ContactArea,
+            )?;
+            unloaded = unloaded.min(area);
+        }
+        let regression = StressStrainRegression::default();
+        for _ in 0..AREA_STEPS {
+            let strained = law.strained(&wide, unloaded)?;
+            let (slope, intercept) = regression.line_through(&strained.series)?;
+            // The strain at which the line has no stress is that of the unloaded face.
+            let strain = -intercept / slope;
+            let ratio = (1.0
+                - 2.0 * law.poisson_ratio * strain.clamp(-LINEAR_STRAIN, LINEAR_STRAIN))
+            .recip();
+            unloaded *= ratio;
+            if (ratio - 1.0).abs() < 1e-14 {
+                break;
+            }
+        }
+        let found = law.strained(&wide, unloaded)?;
+        Ok(Self {
+            series: series.uniaxial(
+                found.series.loads().iter().map(narrowed).collect(),
+                poisson_ratio,
+            ),
+            stretches: found.stretches.iter().map(|s| s.map(narrow)).collect(),
+            unloaded_area_m2: narrow(unloaded),
+        })
+    }
+
+    /// The loads with strains counted from the unloaded state, positive where squeezed, and the areas A₀ f′(λ_z) by which forces become
+    /// conjugate stresses. An error of Poisson's ratio is one of all strains: δE/E = δν/ν.
+    pub fn series(&self) -> &LoadSeries<T> {
+        &self.series
+    }
+
+    /// λ_t and λ_z of every load, ones where there is no area.
+    pub fn stretches(&self) -> &[[T; 2]] {
+        &self.stretches
+    }
+
+    /// A₀ in square metres.
+    pub fn unloaded_area_m2(&self) -> T {
+        self.unloaded_area_m2
+    }
+}
+
+struct Strained {
+    series: LoadSeries<f64>,
+    stretches: Vec<[f64; 2]>,
+}
+
+/// f(λ_t) = −ν f(λ_z).
+struct LateralLaw<'a> {
+    poisson_ratio: f64,
+    measure: &'a dyn StrainMeasure<f64>,
+}
+
+impl LateralLaw<'_> {
+    /// f of a stretch.
+    fn strain(&self, stretch: f64) -> Result<f64, ElasticityError> {
+        let gradient = Matrix3::from_diagonal(&[0.0, 0.0, stretch - 1.0].into());
+        Ok(self.measure.strain(&gradient)?[(2, 2)])
+    }
+
+    /// f′ of a stretch, by a central difference: exact to 1e-11, its third derivative times the step squared.
+    fn slope(&self, stretch: f64) -> Result<f64, ElasticityError> {
+        const STEP: f64 = 1e-5;
+        Ok((self.strain(stretch + STEP)? - self.strain(stretch - STEP)?) / (2.0 * STEP))
+    }
+
+    /// λ_z of a face that has stretched by λ_t, by bisection: f rises with the stretch, whatever the measure.
+    fn axial(&self, lateral: f64) -> Result<f64, ElasticityError> {
+        let wanted = -self.strain(lateral)? / self.poisson_ratio;
+        let [mut low, mut high] = STRETCHES;
+        if !(self.strain(low)? < wanted && wanted < self.strain(high)?) {
+            return Err(ElasticityError::SingularDeformation);
+        }
+        while high - low > 4.0 * f64::EPSILON {
+            let middle = 0.5 * (low + high);
+            if self.strain(middle)? < wanted {
+                low = middle;
+            } else {
+                high = middle;
+            }
+            if middle == 0.5 * (low + high) {
+                break;
+            }
+        }
+        Ok(0.5 * (low + high))
+    }
+
+    fn strained(
+        &self,
+        series: &LoadSeries<f64>,
+        unloaded_m2: f64,
+    ) -> Result<Strained, ElasticityError> {
+        let mut loads = Vec::with_capacity(series.loads().len());
+        let mut stretches = Vec::with_capacity(series.loads().len());
+        for state in series.loads() {
+            let Some(face) = state.contact_area_m2 else {
+                loads.push(LoadState {
+                    mean_strain: None,
+                    contact_radius_m: None,
+                    ..*state
+                });
+                stretches.push([1.0; 2]);
+                continue;
+            };
+            let lateral = (face.value / unloaded_m2).sqrt();
+            let axial = self.axial(lateral)?;
+            let axial_slope = self.slope(axial)?;
+            // de_zz/d ln A = −f′(λ_t) λ_t / 2ν.
+            let per_relative_area = self.slope(lateral)? * lateral / (2.0 * self.poisson_ratio);
+            loads.push(LoadState {
+                contact_area_m2: Some(Estimate::exact(unloaded_m2 * axial_slope)),
+                contact_radius_m: None,
+                mean_strain: Some(Estimate {
+                    value: -self.strain(axial)?,
+                    standard_error: per_relative_area * face.relative_error(),
+                    ..face
+                }),
+                ..*state
+            });
+            stretches.push([lateral, axial]);
+        }
+        Ok(Strained {
+            series: series.with_loads(loads),
+            stretches,
+        })
+    }
+}
+
+fn narrowed<T: RealField + Copy>(load: &LoadState<f64>) -> LoadState<T> {
+    let one = |e: Estimate<f64>| Estimate {
+        value: narrow(e.value),
+        standard_error: narrow(e.standard_error),
+        degrees_of_freedom: e.degrees_of_freedom.map(narrow),
+    };
+    LoadState {
+        force_n: one(load.force_n),
+        contact_radius_m: load.contact_radius_m.map(one),
+        contact_area_m2: load.contact_area_m2.map(one),
+        indentation_m: load.indentation_m.map(one),
+        mean_strain: load.mean_strain.map(one),
+    }
+}

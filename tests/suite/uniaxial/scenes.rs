@@ -1,0 +1,106 @@
+//! Simulated faces and the sensor that reads them.
+use ndarray::Array2;
+use tactile_imaging::force::CalibrationPair;
+use tactile_imaging::pipeline::Measurement;
+use tactile_imaging::simulate::{
+    Camera, Elastic, FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene,
+};
+use tactile_imaging::{Object, Pipeline};
+
+/// A face of one brightness.
+pub(super) fn plain() -> SurfacePattern {
+    SurfacePattern {
+        bump_height_m: [0.0; 2],
+        ..SurfacePattern::default()
+    }
+}
+
+/// A face with 8 × 8 bumps.
+pub(super) fn speckled() -> SurfacePattern {
+    SurfacePattern::default()
+}
+
+/// A squeezed specimen and the camera above it.
+#[derive(Clone, Debug)]
+pub(super) struct Face {
+    pub(super) outline: FaceOutline,
+    pub(super) pattern: SurfacePattern,
+    pub(super) modulus_pa: f64,
+    pub(super) poisson_ratio: f64,
+    /// Side, or diameter.
+    pub(super) face_m: [f64; 2],
+    /// Squeezes 1 − λ_z.
+    pub(super) squeezes: Vec<f64>,
+    pub(super) camera: Camera,
+}
+
+impl Default for Face {
+    /// A block of 12 mm and 103 kPa, squeezed by 2, 5 and 9 %, seen by 400 pixels over 16 mm.
+    fn default() -> Self {
+        Self {
+            outline: FaceOutline::Rectangle,
+            pattern: plain(),
+            modulus_pa: 103e3,
+            poisson_ratio: 0.5,
+            face_m: [12e-3; 2],
+            squeezes: vec![0.02, 0.05, 0.09],
+            camera: Camera {
+                shape: [400, 400],
+                pixel_size_m: [16e-3 / 400.0; 2],
+                ..Camera::default()
+            },
+        }
+    }
+}
+
+impl Face {
+    pub(super) fn scene(&self, seed: u64) -> UniaxialScene {
+        let area = match self.outline {
+            FaceOutline::Rectangle => 1.0,
+            FaceOutline::Ellipse => std::f64::consts::FRAC_PI_4,
+        } * self.face_m[0]
+            * self.face_m[1];
+        // F = E A₀ λ(1 − λ²)/2.
+        let force = |squeeze: &f64| {
+            let axial = 1.0 - squeeze;
+            0.5 * self.modulus_pa * area * axial * (1.0 - axial * axial)
+        };
+        UniaxialScene::new(UniaxialOptions {
+            outline: self.outline,
+            pattern: self.pattern,
+            material: Elastic {
+                youngs_modulus_pa: self.modulus_pa,
+                poisson_ratio: self.poisson_ratio,
+            },
+            face_m: self.face_m,
+            forces_n: self.squeezes.iter().map(force).collect(),
+            camera: self.camera,
+            seed,
+            ..UniaxialOptions::default()
+        })
+        .unwrap()
+    }
+
+    /// A pipeline whose calibration is exact.
+    pub(super) fn pipeline(&self, scene: &UniaxialScene, object: Object) -> Pipeline {
+        let per_grey = self.camera.pixel_area_m2() / scene.grey_per_pascal();
+        let pairs =
+            [0.0, 5e6, 10e6, 15e6, 20e6, 25e6].map(|v| CalibrationPair::loading(v, per_grey * v));
+        Pipeline::from_pairs(&pairs, self.camera.pixel_size_m, object).unwrap()
+    }
+}
+
+/// Everything that the frames of a face say.
+pub(super) fn measured(face: &Face, object: Object, seed: u64) -> Measurement {
+    let scene = face.scene(seed);
+    let pipeline = face.pipeline(&scene, object);
+    let reference = scene.reference(0);
+    let frames: Vec<Array2<u8>> = (0..face.squeezes.len())
+        .map(|load| scene.frame(load, 0))
+        .collect();
+    let mut press = pipeline.press(reference.view()).unwrap();
+    for frame in &frames {
+        press.add_frame(frame.view());
+    }
+    press.measure()
+}
