@@ -55,6 +55,6 @@ pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;
 pub use softassign::{
     AnnealedSoftassign, Outliers, PointSets, Rotation, Search, SoftassignMatch, SoftassignOptions,
-    SoftassignWorkspace,
+    SoftassignWorkspace, Transformation,
 };
 pub use warm_start::WarmStart;

@@ -3,6 +3,7 @@
 use super::axes::Axes;
 use super::prior::Prior;
 use super::regression::Regression;
+use super::rigid::RigidFit;
 use super::soft_assign::SoftAssignment;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -102,6 +103,8 @@ pub(crate) struct Annealer<const D: usize> {
     pub(crate) soft: SoftAssignment<D>,
     pub(crate) prior: Prior,
     pub(crate) regression: Regression<D>,
+    /// Takes the regression's place where the warp may not bend.
+    pub(crate) rigid: RigidFit<D>,
     /// Volume of the targets' bounding box.
     pub(crate) volume: f64,
     weights: Vec<f64>,
@@ -279,6 +282,17 @@ impl<const D: usize> Annealer<D> {
         self.residuals.fill(stride, rows.map(target));
         self.weights.clone_from(&self.soft.weight);
         self.weights.resize(stride, 0.0);
+        if self.rigid.is_active() {
+            let (weights, residuals) = (&self.weights, &self.residuals);
+            self.rigid.fit(
+                weights,
+                &state.base,
+                residuals,
+                variance,
+                &mut self.regression,
+            );
+            return;
+        }
         self.regression
             .fit(&self.prior, &self.weights, &self.residuals, variance);
         self.regression.variances(&self.prior);
@@ -316,6 +330,11 @@ impl<const D: usize> Annealer<D> {
         }
         let (gauss, outlier) = ((1.0 - share) * density, share / self.volume);
         let data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
+        if self.rigid.is_active() {
+            // All motions are equally likely, and as precisely known from one start as from another.
+            state.energy = data;
+            return;
+        }
         self.sums
             .iter_mut()
             .for_each(|s| *s = gauss / (gauss * *s + outlier));

@@ -70,17 +70,28 @@ impl<const D: usize> Answer<D> {
         let noisy = state.sigma > CLEAN;
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
-        let (sweeps, sharpness) = if noisy { (8, SHARPNESS) } else { (3, 1.0) };
+        let (sweeps, sharpness) = if noisy {
+            (
+                8,
+                std::env::var("SHARP").map_or(SHARPNESS, |v| v.parse().unwrap()),
+            )
+        } else {
+            (3, 1.0)
+        };
         annealer.assign(&state.warped, variance, slack, sweeps, sharpness);
         annealer.soft.cap_rows();
         self.assign(&annealer.soft, n, targets.len());
-        let fit = self.place(state, targets);
-        annealer.regression.variances(&annealer.prior);
+        // A rigid motion leaves residuals, however small.
+        let snaps = !noisy && !annealer.rigid.is_active();
+        let fit = self.place(state, targets, snaps);
+        if !annealer.rigid.is_active() {
+            annealer.regression.variances(&annealer.prior);
+        }
         self.variance.clear();
         for i in 0..n {
             let of_warp = annealer.regression.variance[i] + spread.get(i).copied().unwrap_or(0.0);
             // A point that was put onto its target shares the target's error.
-            let on_target = !noisy && self.assignment[i].is_some();
+            let on_target = snaps && self.assignment[i].is_some();
             self.variance.push(if on_target { fit } else { of_warp });
         }
     }
@@ -112,8 +123,8 @@ impl<const D: usize> Answer<D> {
         }
     }
 
-    /// The positions, clean ones on their targets; the variance, along one axis, of what the warp alone leaves to the targets.
-    fn place(&mut self, state: &State<D>, targets: &[[f64; D]]) -> f64 {
+    /// The positions, on their targets where it `snaps`; the variance, along one axis, of what the warp alone leaves to the targets.
+    fn place(&mut self, state: &State<D>, targets: &[[f64; D]], snaps: bool) -> f64 {
         let square =
             |a: &[f64; D], b: &[f64; D]| (0..D).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
         self.warped.clone_from(&state.warped);
@@ -121,7 +132,7 @@ impl<const D: usize> Answer<D> {
         for (i, partner) in self.assignment.iter().enumerate() {
             let &Some(j) = partner else { continue };
             left += square(&self.warped[i], &targets[j]);
-            if state.sigma <= CLEAN {
+            if snaps {
                 self.warped[i] = targets[j];
             }
             squares += square(&self.warped[i], &targets[j]);

@@ -133,6 +133,9 @@ impl AnnealedSoftassign {
         levels.sample(&ws.model, &ws.target, stride, &mut ws.state);
         ws.annealer.prior.build(&levels.model, SCALES);
         ws.annealer.soft.set_targets(&levels.target);
+        ws.annealer
+            .rigid
+            .set(self.options.transformation, &levels.model);
         ws.spacing = ws.patterns.typical_spacing(&levels.target);
     }
 

@@ -38,6 +38,7 @@ mod options;
 mod patterns;
 mod prior;
 mod regression;
+mod rigid;
 mod scales;
 mod search;
 mod series;
@@ -48,7 +49,7 @@ mod tuples;
 
 pub use batch::PointSets;
 pub use found::SoftassignMatch;
-pub use options::{Outliers, Rotation, Search, SoftassignOptions};
+pub use options::{Outliers, Rotation, Search, SoftassignOptions, Transformation};
 
 use crate::{Doubt, MatchError, Matching, PointMatcher, WarmStart, validate};
 use anneal::{Annealer, State};

@@ -97,6 +97,37 @@ pub enum Search {
     Near,
 }
 
+/// What the model may do on its way to the target.
+///
+/// ```
+/// use nalgebra::{Point2, Rotation2};
+/// use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignOptions, Transformation};
+/// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
+/// let mut target: Vec<_> = model.iter().map(|p| Rotation2::new(0.3) * p).collect();
+/// target[5].x += 0.1; // a point that has moved against the others
+/// let options = SoftassignOptions::default().with_transformation(Transformation::Rigid);
+/// let matching = AnnealedSoftassign::new(options).match_points(&model, &target)?;
+/// assert!((0..12).filter(|&i| i != 5).all(|i| matching.assignment[i] == Some(i)), "{:?}", matching.assignment);
+/// let distance = |points: &[Point2<f64>]| (points[0] - points[11]).norm();
+/// assert!((distance(&matching.warped) - distance(&model)).abs() < 1e-9);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
+pub enum Transformation {
+    /// Bend smoothly.
+    #[default]
+    NonRigid,
+    /// Turn, move and change its size: `x ↦ s R x + b`.
+    Similarity,
+    /// Turn and move: `x ↦ R x + b`.
+    Rigid,
+}
+
 /// Options of [`AnnealedSoftassign`](crate::AnnealedSoftassign); all of them have defaults that suit every scene tried.
 ///
 /// ```
@@ -116,6 +147,7 @@ pub struct SoftassignOptions {
     pub(crate) rotation: Rotation,
     pub(crate) outliers: Outliers,
     pub(crate) search: Search,
+    pub(crate) transformation: Transformation,
     pub(crate) share: f64,
     pub(crate) max_iterations: usize,
 }
@@ -126,6 +158,7 @@ impl Default for SoftassignOptions {
             rotation: Rotation::Limited,
             outliers: Outliers::Both,
             search: Search::Thorough,
+            transformation: Transformation::NonRigid,
             share: 0.1,
             max_iterations: 200,
         }
@@ -151,6 +184,14 @@ impl SoftassignOptions {
     #[must_use]
     pub fn with_search(mut self, search: Search) -> Self {
         self.search = search;
+        self
+    }
+
+    /// Says what the model may do: bend (the default), or only move rigidly or as a similarity. Those leave residuals where the pairs do
+    /// not fit to rounding, and no warped point is put onto its partner.
+    #[must_use]
+    pub fn with_transformation(mut self, transformation: Transformation) -> Self {
+        self.transformation = transformation;
         self
     }
 

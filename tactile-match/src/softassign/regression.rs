@@ -57,6 +57,21 @@ impl<const D: usize> Regression<D> {
             .sum();
     }
 
+    /// Sets displacement and variance of every padded row; no penalty, no determinant.
+    pub(crate) fn set(&mut self, padded: usize, row: impl Fn(usize) -> ([f64; D], f64)) {
+        self.solution.clear();
+        self.log_det = 0.0;
+        self.variance.clear();
+        self.displacement.0.iter_mut().for_each(Vec::clear);
+        for i in 0..padded {
+            let (displacement, variance) = row(i);
+            self.variance.push(variance);
+            for (axis, value) in self.displacement.0.iter_mut().zip(displacement) {
+                axis.push(value);
+            }
+        }
+    }
+
     #[inline(always)]
     fn displace(&mut self, prior: &Prior) {
         for (k, axis) in self.displacement.0.iter_mut().enumerate() {

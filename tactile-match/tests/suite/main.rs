@@ -9,6 +9,7 @@ mod drift;
 mod hostile;
 mod large_sets;
 mod recorded;
+mod rigid;
 #[cfg(feature = "serde")]
 mod serde;
 mod serialtrack;

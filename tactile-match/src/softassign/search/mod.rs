@@ -120,7 +120,7 @@ impl AnnealedSoftassign {
             reset(ws);
             self.solve_coarse_to_fine(ws, observe)
         } else {
-            begin(ws);
+            self.begin(ws);
             match self.options.search {
                 Search::Near => self.run(ws, Start::Centred, NEAR, observe),
                 Search::Thorough => self.search(ws, observe),
@@ -128,6 +128,17 @@ impl AnnealedSoftassign {
         };
         ws.stopped = flow.is_break();
         self.conclude(ws);
+    }
+
+    /// Prepares a search over all points.
+    fn begin<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        reset(ws);
+        ws.annealer.volume = bounding_volume(&ws.target);
+        ws.annealer.prior.build(&ws.model, SCALES);
+        ws.annealer.soft.set_targets(&ws.target);
+        ws.annealer
+            .rigid
+            .set(self.options.transformation, &ws.model);
     }
 
     /// One short run from `start`, at first as warm as `sigma`, between the coldest that lets points change their partners and
@@ -138,7 +149,7 @@ impl AnnealedSoftassign {
         start: &[[f64; D]],
         sigma: f64,
     ) {
-        begin(ws);
+        self.begin(ws);
         starts::centred(&ws.model, &ws.target, &mut ws.state.base);
         ws.state.warped.clear();
         ws.state.warped.extend_from_slice(start);
@@ -183,7 +194,7 @@ impl AnnealedSoftassign {
         {
             self.follow_patterns(ws, observe)?;
         }
-        if ws.best.sigma > finish::CLEAN {
+        if ws.best.sigma > finish::CLEAN && !ws.annealer.rigid.is_active() {
             self.average_scales(ws);
         }
         ControlFlow::Continue(())
@@ -389,14 +400,6 @@ impl AnnealedSoftassign {
             slack: self.options.slack(),
         }
     }
-}
-
-/// Prepares a search over all points.
-fn begin<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
-    reset(ws);
-    ws.annealer.volume = bounding_volume(&ws.target);
-    ws.annealer.prior.build(&ws.model, SCALES);
-    ws.annealer.soft.set_targets(&ws.target);
 }
 
 /// Nothing is found yet.
