@@ -203,7 +203,82 @@ poisson_ratio_error = 0.0
 """
 
 
+# A block of tissue (5 kPa, 30 mm high, 40 mm in radius) with a lump (12 mm, its top 4 mm deep, 40 kPa) under a face of 16 mm, at three
+# approaches: pressure every 0.25 mm from the axis, by finite elements at finite strain (nu 0.495), and the force.
+LUMP_PIXEL_M, LUMP_GREY_PER_PA = 0.4e-3, 0.1
+LUMP_PRESSES = [
+    (1e-3, 0.38091, [
+        584.4, 583.8, 581.6, 578.0, 573.1, 567.0, 559.7, 551.5, 542.4, 532.6, 522.0, 510.9, 499.4, 487.6, 475.7, 463.7, 451.9,
+        440.2, 428.8, 417.7, 407.2, 397.1, 387.6, 378.7, 370.3, 362.6, 355.6, 349.3, 343.5, 338.3, 333.8, 330.0, 326.7, 323.9,
+        321.7, 320.0, 318.8, 318.1, 317.9, 318.1, 318.8, 319.9, 321.6, 323.7, 326.4, 329.7, 333.3, 337.6, 342.7, 348.7, 355.8,
+        363.1, 371.8, 382.4, 395.3, 410.1, 426.9, 448.8, 477.2, 510.1, 554.8, 520.7, 418.4, 1085.4, 2495.2]),
+    (2e-3, 0.77562, [
+        1191.3, 1190.1, 1185.7, 1178.4, 1168.3, 1155.8, 1141.1, 1124.3, 1105.7, 1085.5, 1063.9, 1041.2, 1017.5, 993.2, 968.5,
+        943.8, 919.4, 895.2, 871.6, 848.6, 826.6, 805.7, 785.9, 767.2, 749.7, 733.7, 719.0, 705.6, 693.5, 682.6, 673.1, 664.9,
+        657.8, 651.9, 647.2, 643.4, 640.7, 639.0, 638.3, 638.6, 639.7, 641.6, 644.6, 648.6, 653.8, 660.1, 666.9, 675.1, 684.8,
+        696.4, 709.9, 724.4, 740.9, 761.1, 785.7, 814.9, 846.3, 887.4, 941.0, 1009.0, 1095.2, 1191.7, 686.4, 1614.8, 5119.8]),
+    (3e-3, 1.18636, [
+        1824.6, 1822.8, 1816.1, 1804.9, 1789.5, 1770.4, 1747.7, 1722.0, 1693.4, 1662.3, 1629.1, 1594.0, 1557.4, 1519.9,
+        1481.6, 1443.2, 1405.3, 1367.7, 1330.9, 1295.0, 1260.5, 1227.9, 1196.9, 1167.6, 1140.1, 1114.7, 1091.6, 1070.5,
+        1051.3, 1034.1, 1019.1, 1005.9, 994.7, 985.2, 977.5, 971.3, 966.7, 963.6, 962.1, 962.1, 963.5, 965.9, 969.9, 975.5,
+        982.7, 991.7, 1001.6, 1013.2, 1027.1, 1043.6, 1063.0, 1084.2, 1107.7, 1136.5, 1171.5, 1214.1, 1258.3, 1315.7, 1391.1,
+        1496.0, 1630.1, 1774.3, 859.1, 1621.7, 6434.8]),
+]
+
+
+def lump_frame(pressures, seed):
+    """The pressure in grey levels above 10, and the noise of the camera."""
+    def level(r, c):
+        at = LUMP_PIXEL_M * math.hypot(r - 47.3, c - 47.8) / 0.25e-3
+        k = min(int(at), len(pressures) - 2) if pressures else 0
+        inside = pressures and at < len(pressures) - 1
+        pressure = pressures[k] + (at - k) * (pressures[k + 1] - pressures[k]) if inside else 0.0
+        # The face's rim, where the pressure has no limit, is overexposed.
+        return min(255, round(10 + 2 * error(96 * r + c + seed, 0.7548776662) + LUMP_GREY_PER_PA * pressure))
+    return png([[level(r, c) for c in range(96)] for r in range(96)])
+
+
+def lump_calibration():
+    rows = ["integrated_pixel_value,force_N"]
+    rows += [f"{LUMP_GREY_PER_PA * force / LUMP_PIXEL_M**2:.0f},{force:.6f}" for force in (0.1 * k for k in range(15))]
+    return "\n".join(rows) + "\n"
+
+
+def lump_scene():
+    frames = "".join(f"""
+[[frames]]
+image = "frame_{k + 1}.png"
+approach_m = {approach}
+force_N = {force}
+""" for k, (approach, force, _) in enumerate(LUMP_PRESSES))
+    return f"""# A block of tissue with a lump, pressed by the sensor's flat guide to three approaches.
+reference = "reference.png"
+pixel_size_m = [{LUMP_PIXEL_M}, {LUMP_PIXEL_M}]
+
+[calibration]
+pairs = "calibration.csv"
+{frames}
+[object]
+shape = "block"
+height_m = 30e-3
+radius_m = 40e-3
+interface = "bonded"
+
+[waveguide]                            # from the block's side to the glass
+radius_m = 16e-3
+layers = [
+    {{ thickness_m = 2e-3, youngs_modulus_pa = 136e3, poisson_ratio = 0.495 }},
+    {{ thickness_m = 3e-3, youngs_modulus_pa = 80e3, poisson_ratio = 0.495 }},
+    {{ thickness_m = 5e-3, youngs_modulus_pa = 34e3, poisson_ratio = 0.495 }},
+]
+"""
+
+
 FILES = {
+    "inclusion/reference.png": lambda: lump_frame([], 0),
+    **{f"inclusion/frame_{k + 1}.png": lambda k=k, p=pressures: lump_frame(p, 40_000 * (k + 1)) for k, (_, _, pressures) in enumerate(LUMP_PRESSES)},
+    "inclusion/calibration.csv": lump_calibration,
+    "inclusion/scene.toml": lump_scene,
     "sensor/reference.png": lambda: sensor_frame(3e-3, 0.0, 0),
     **{f"sensor/press_{k:02}.png": lambda k=k, ball=ball, force=force: sensor_frame(ball, force, 40_000 * k)
        for k, ball, force, _ in sensor_presses()},

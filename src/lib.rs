@@ -17,6 +17,8 @@ pub use tactile_optics as optics;
 pub use tactile_sfs as sfs;
 pub use tactile_tps as tps;
 
+#[cfg(feature = "inclusion")]
+pub mod inclusion;
 #[cfg(feature = "scene")]
 pub mod io;
 pub mod pipeline;

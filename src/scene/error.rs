@@ -80,6 +80,16 @@ pub enum SceneError {
         /// What is wrong with the file it names.
         source: Box<ReadError>,
     },
+    /// What a field names or says can be read, but not used.
+    #[error("{}: field `{field}`: {reason}", file.display())]
+    Unusable {
+        /// The scene file.
+        file: PathBuf,
+        /// The field, with its path inside the file.
+        field: String,
+        /// Why not.
+        reason: String,
+    },
     /// The scene file itself cannot be read.
     #[error(transparent)]
     Open(Box<ReadError>),

@@ -69,6 +69,14 @@ impl<'a> Fields<'a> {
         }
     }
 
+    pub(crate) fn unusable(&self, name: &str, reason: &dyn std::fmt::Display) -> SceneError {
+        SceneError::Unusable {
+            file: self.file.into(),
+            field: self.path(name),
+            reason: reason.to_string(),
+        }
+    }
+
     fn value(&self, name: &str, expected: &'static str) -> Result<&'a Value, SceneError> {
         self.table
             .get(name)

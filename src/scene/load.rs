@@ -121,20 +121,9 @@ impl Scene {
                 Ok(LoadedCalibration::Sensor(Box::new(Sensor::read(path)?)))
             }
             CalibrationSource::Pairs(path) => {
-                let value = Column {
-                    names: &["integrated_pixel_value"],
-                    quantity: Quantity::Number,
-                    unit: "grey_levels",
-                };
-                let force = Column {
-                    names: &["force"],
-                    quantity: Quantity::Force,
-                    unit: "N",
-                };
-                let pairs = columns("calibration.pairs", path, [value, force])?;
-                Ok(LoadedCalibration::Pairs(
-                    pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect(),
-                ))
+                let pairs = read_pairs(path);
+                let pairs = pairs.map_err(|source| self.file_error("calibration.pairs", source))?;
+                Ok(LoadedCalibration::Pairs(pairs))
             }
             CalibrationSource::DepthTable(path) => {
                 let darkness = Column {
@@ -160,6 +149,23 @@ impl Scene {
             source: Box::new(source),
         }
     }
+}
+
+/// Pairs of integrated pixel value and force from a CSV file.
+pub(crate) fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair<f64>>, ReadError> {
+    let value = Column {
+        names: &["integrated_pixel_value"],
+        quantity: Quantity::Number,
+        unit: "grey_levels",
+    };
+    let force = Column {
+        names: &["force"],
+        quantity: Quantity::Force,
+        unit: "N",
+    };
+    let [values, forces] = read_table(path)?.columns([value, force], path)?;
+    let pairs = values.into_iter().zip(forces);
+    Ok(pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect())
 }
 
 fn size(image: &Array2<u8>) -> [u32; 2] {

@@ -64,6 +64,8 @@ mod contact_table;
 mod error;
 pub(crate) mod fields;
 mod load;
+#[cfg(feature = "inclusion")]
+pub(crate) use load::read_pairs;
 mod measure;
 mod stages;
 mod tables;

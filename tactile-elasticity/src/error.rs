@@ -156,6 +156,11 @@ pub enum ElasticityError {
     /// The caller cancelled the computation.
     #[error("cancelled")]
     Cancelled,
+    /// No load could be solved by finite elements.
+    #[error(
+        "the finite elements find no solution: approaches too large for this block or sizes that do not fit"
+    )]
+    NoSolution,
     /// An element of a finite-element mesh is degenerate or turned inside out.
     #[error("element {element} of the mesh is degenerate or turned inside out")]
     DegenerateElement {

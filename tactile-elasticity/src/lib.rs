@@ -31,6 +31,8 @@ mod error;
 #[cfg(feature = "fem")]
 pub mod fem;
 pub mod field;
+#[cfg(feature = "fem")]
+pub mod inclusion;
 pub mod modulus;
 mod scalar;
 mod selection;

@@ -37,6 +37,26 @@ fn state(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
+/// A scene of a block under the guide.
+fn lump_scene() -> String {
+    r#"reference = "reference.png"
+pixel_size_m = [3e-4, 3e-4]
+frames = [
+    { image = "frame_1.png", approach_m = 1e-3, force_N = 0.4 },
+    { image = "frame_2.png", approach_m = 2e-3, force_N = 0.8 },
+]
+[object]
+shape = "block"
+height_m = 30e-3
+radius_m = 40e-3
+interface = "bonded"
+[waveguide]
+radius_m = 16e-3
+layers = [{ thickness_m = 10e-3, youngs_modulus_pa = 60e3, poisson_ratio = 0.495 }]
+"#
+    .to_owned()
+}
+
 /// Places where a file stands that must be an image, `@` for the file.
 const IMAGES: [&str; 7] = [
     "force --reference @ --pairs calibration.csv --pixel-um 40 frame_1.png",
@@ -275,6 +295,17 @@ const CALLS: &[(&str, &str)] = &[
     ("measure no_frames.toml", "frames"),
     ("measure misspelt.toml", "referense"),
     ("measure bits.toml", "bits"),
+    ("inclusion absent.toml", "absent.toml"),
+    ("inclusion scene.toml", "approach_m"),
+    ("inclusion lump_sphere.toml", "object.shape"),
+    ("inclusion lump_backwards.toml", "frames[2].approach_m"),
+    ("inclusion lump_stiff.toml", "youngs_modulus_pa"),
+    ("inclusion lump_narrow.toml", "radius"),
+    ("inclusion lump_dark.toml", "nothing presses"),
+    ("inclusion lump.toml --design --out results", "--out"),
+    ("inclusion lump.toml --diameter-mm 4", "--design"),
+    ("inclusion --design --depth-mm nan", "depth-mm"),
+    ("inclusion lump.toml --seed 2", "--seed"),
     (
         "force --reference reference.png --pairs calibration.csv --pixel-um 40",
         "FRAMES",
@@ -344,6 +375,25 @@ fn more_files(folder: &Path) {
         &scene.replace("reference =", "referense ="),
     );
     put("bits.toml", &format!("bits = 99\n{scene}"));
+    let lump = lump_scene();
+    put("lump.toml", &lump);
+    put("lump_sphere.toml", &lump.replace("\"block\"", "\"sphere\""));
+    put(
+        "lump_backwards.toml",
+        &lump.replace("approach_m = 2e-3", "approach_m = 0.5e-3"),
+    );
+    put(
+        "lump_stiff.toml",
+        &lump.replace("youngs_modulus_pa = 60e3", "youngs_modulus_pa = -1"),
+    );
+    put(
+        "lump_narrow.toml",
+        &lump.replace("radius_m = 40e-3", "radius_m = 10e-3"),
+    );
+    put(
+        "lump_dark.toml",
+        &lump.replace("frame_1.png", "reference.png"),
+    );
     let no_frames = scene.split("[[frames]]").next().unwrap();
     put("no_frames.toml", no_frames);
     put(

@@ -2,8 +2,8 @@
 use crate::context::Context;
 use crate::failure::{Exit, Failure};
 use crate::{
-    calibrate, depth, force, indent, integrate, light, match_points, measure, numbers, reconstruct,
-    strain, stream, table, warp,
+    calibrate, depth, force, inclusion, indent, integrate, light, match_points, measure, numbers,
+    reconstruct, strain, stream, table, warp,
 };
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -38,6 +38,7 @@ Examples, one for each subcommand:
   tactile reconstruct examples/data/ball.pgm --light 0,0,1 --mask examples/data/ball.pgm
   tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
   tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm
+  tactile inclusion --design examples/data/inclusion/scene.toml
   tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile light --rays 2000
@@ -61,6 +62,7 @@ pub enum Command {
     Reconstruct(reconstruct::Arguments),
     Integrate(integrate::Arguments),
     Depth(depth::Arguments),
+    Inclusion(inclusion::Arguments),
     Indent(indent::Arguments),
     Stream(stream::Arguments),
     Light(light::Arguments),
@@ -79,6 +81,7 @@ impl Command {
             Self::Reconstruct(arguments) => reconstruct::run(arguments, context),
             Self::Integrate(arguments) => integrate::run(arguments, context),
             Self::Depth(arguments) => depth::run(arguments, context),
+            Self::Inclusion(arguments) => inclusion::run(arguments, context),
             Self::Indent(arguments) => indent::run(arguments, context),
             Self::Stream(arguments) => stream::run(arguments, context),
             Self::Light(arguments) => light::run(arguments, context),

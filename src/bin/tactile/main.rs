@@ -13,6 +13,7 @@ mod depth;
 mod failure;
 mod force;
 mod images;
+mod inclusion;
 mod indent;
 mod integrate;
 mod interrupt;

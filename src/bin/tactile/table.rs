@@ -19,7 +19,7 @@ use tactile_imaging::scene::{solve_contact_table, write_contact_table};
 /// it. --out gets table.toml. Ctrl-C stops without a table.
 #[derive(Args)]
 #[command(
-    after_help = "Example:\n  tactile table examples/data/press/scene.toml --out target/table"
+    after_help = "Example:\n  tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5 --out target/table"
 )]
 pub struct Arguments {
     /// Scene file, or a file with its tables [object] and [waveguide].

@@ -1,7 +1,7 @@
 //! Mesh of a tissue block with a spherical inclusion under a guide's flat face.
 
 use super::bodies::Inclusion;
-use super::mesh::{Boundary, Mesh, MeshBuilder, graded};
+use super::mesh::{Boundary, Mesh, MeshBuilder, graded, graded_up_to};
 
 /// Lines of the cross-section: where its elements end.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,13 +41,14 @@ impl BlockMesh {
     }
 
     pub(crate) fn build(&self) -> BlockMeshes {
-        let n = self.fineness;
         let cell = self.cell();
         // Elements of the guide's face from the axis to its rim, finest at the rim where the
         // traction is singular.
-        let face = self.disc_radius / (2.5 * n as f64);
+        let face = self.disc_radius / (2.5 * self.fineness as f64);
         let inner = cell.map_or(0.5 * self.disc_radius, |(_, [radius, _, _])| radius);
-        let mut rim = graded(self.disc_radius, inner, 0.25 * face, 1.35);
+        // Above a wide inclusion the pressure wants elements no longer than elsewhere.
+        let n = self.fineness.max((inner / face).ceil() as usize);
+        let mut rim = graded_up_to(self.disc_radius, inner, 0.25 * face, 1.35, face);
         rim.reverse();
         let core: Vec<f64> = (0..=n).map(|k| inner * k as f64 / n as f64).collect();
         let beyond = graded(self.disc_radius, self.block_radius, 0.25 * face, 1.7);

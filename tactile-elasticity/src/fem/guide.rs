@@ -28,7 +28,7 @@ pub struct Layer {
 ///
 /// let layer = |thickness_m, modulus| Layer { thickness_m, material: Material::new(modulus, 0.495).unwrap() };
 /// let guide = Guide::new(vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)], 25e-3).unwrap();
-/// assert_eq!(guide.layers().len(), 3);
+/// assert_eq!((guide.layers().len(), guide.radius_m()), (3, 25e-3));
 /// assert!(Guide::new(vec![], 25e-3).is_err());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -64,7 +64,7 @@ impl Guide {
     }
 
     /// Its radius, in metres.
-    pub(super) fn radius_m(&self) -> f64 {
+    pub fn radius_m(&self) -> f64 {
         self.radius_m
     }
 

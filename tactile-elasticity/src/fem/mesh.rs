@@ -323,3 +323,28 @@ pub(crate) fn graded(start: f64, end: f64, first: f64, growth: f64) -> Vec<f64> 
     lines[count] = end;
     lines
 }
+
+/// As [`graded`], with steps of about `largest` where they would be longer.
+pub(crate) fn graded_up_to(
+    start: f64,
+    end: f64,
+    first: f64,
+    growth: f64,
+    largest: f64,
+) -> Vec<f64> {
+    let length = (end - start).abs();
+    let mut offsets = vec![0.0];
+    let (mut step, mut reached) = (first, 0.0);
+    while reached + 0.5 * step < length {
+        reached += step;
+        offsets.push(reached);
+        step = (growth * step).min(largest);
+    }
+    let mut lines: Vec<f64> = (offsets.iter())
+        .map(|offset| start + (end - start) * offset / reached)
+        .collect();
+    if let Some(last) = lines.last_mut() {
+        *last = end;
+    }
+    lines
+}

@@ -59,6 +59,7 @@
 mod block;
 mod bodies;
 mod candidates;
+mod change;
 mod contact;
 mod curve;
 mod element;
@@ -91,6 +92,7 @@ pub use material::{Kinematics, Material};
 pub use mesh::{Boundary, Mesh};
 pub use model::{Body, Model, Support};
 pub use press::{Object, Press};
+pub(crate) use pressure::pressure_at;
 pub use pressure::{ContactRadius, PressurePoint};
 pub use rigid::RigidShape;
 pub use scene::{Block, Interface, Lump, Scene};

@@ -38,3 +38,27 @@ pub struct ContactRadius {
     /// Numerical uncertainty: the difference between two extrapolations of the pressure to zero.
     pub uncertainty_m: f64,
 }
+
+/// Pressure at a radius, by the cubic through the four nearest points; constant beyond the last.
+pub(crate) fn pressure_at(points: &[PressurePoint], radius: f64) -> f64 {
+    let after = points.partition_point(|point| point.r_m < radius);
+    let Some(last) = points.last() else {
+        return 0.0;
+    };
+    if after == points.len() {
+        return last.pressure_pa;
+    }
+    let first = after.saturating_sub(2).min(points.len().saturating_sub(4));
+    let near = &points[first..points.len().min(first + 4)];
+    let mut sum = 0.0;
+    for (i, point) in near.iter().enumerate() {
+        let mut weight = 1.0;
+        for (j, other) in near.iter().enumerate() {
+            if i != j {
+                weight *= (radius - other.r_m) / (point.r_m - other.r_m);
+            }
+        }
+        sum += weight * point.pressure_pa;
+    }
+    sum
+}

@@ -157,6 +157,18 @@ impl Scene {
         guide: &Guide,
         interface: Interface,
     ) -> Result<Self, ElasticityError> {
+        Self::block_with_mesh(block, guide, interface, BLOCK_FINENESS, Kinematics::Finite)
+    }
+
+    /// [`Self::block_under_guide`] on a mesh with `fineness` elements along an eighth of the
+    /// inclusion's circumference, at finite or small strain.
+    pub(crate) fn block_with_mesh(
+        block: &Block,
+        guide: &Guide,
+        interface: Interface,
+        fineness: usize,
+        kinematics: Kinematics,
+    ) -> Result<Self, ElasticityError> {
         positive(block.height_m, Quantity::Thickness)?;
         positive(block.radius_m, Quantity::Radius)?;
         let out_of_range = |quantity, found, limit| ElasticityError::OutOfRange {
@@ -197,12 +209,12 @@ impl Scene {
                 depth: lump.depth_m,
             }),
             bonded,
-            fineness: BLOCK_FINENESS,
+            fineness,
         }
         .build();
         let mut tissue = vec![block.material];
         tissue.extend(block.lump.map(|lump| lump.material));
-        let mut model = Model::new(Kinematics::Finite);
+        let mut model = Model::new(kinematics);
         match meshes.block {
             None => {
                 let materials = [guide.materials(), tissue].concat();
@@ -225,6 +237,10 @@ impl Scene {
     /// Solves for the loads in order.
     pub fn solve(&self, loads: &[Load]) -> Solution {
         self.model.solve(loads)
+    }
+
+    pub(crate) fn from_model(model: Model) -> Self {
+        Self { model }
     }
 
     /// The model, for what the scene does not offer: its size, a point's stress.

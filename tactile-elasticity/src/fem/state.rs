@@ -2,7 +2,7 @@
 
 use super::fields::{Equilibrium, Fields};
 use super::model::Model;
-use super::pressure::{ContactRadius, PressurePoint};
+use super::pressure::{ContactRadius, PressurePoint, pressure_at};
 use super::radius::ContactProfile;
 
 /// The deformed bodies at one load.
@@ -69,6 +69,19 @@ impl State {
     /// [`PressurePoint`]'s example. Within a contact's outermost two elements it is that of a smooth edge which carries the elements' force.
     pub fn pressure(&self) -> &[PressurePoint] {
         &self.pressure
+    }
+
+    /// Pressure at a radius of the deformed interface in metres, by the cubic through the four nearest
+    /// points of [`Self::pressure`]; constant beyond the last, zero without contact.
+    ///
+    /// ```
+    /// # use tactile_elasticity::fem::{Load, Material, Scene};
+    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+    /// assert!(state.pressure_at(0.1e-3) > state.pressure_at(0.5e-3));
+    /// ```
+    pub fn pressure_at(&self, radius_m: f64) -> f64 {
+        pressure_at(&self.pressure, radius_m)
     }
 
     /// Radius at which the contact pressure falls to zero: near a smooth contact's edge p² is nearly

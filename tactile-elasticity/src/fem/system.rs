@@ -6,7 +6,7 @@ use super::fields::Fields;
 use super::gap::DRIVER;
 use super::layout::{Layout, Slot, slot};
 use super::model::Model;
-use super::sparse::{Singular, Symmetric};
+use super::sparse::{Factors, Singular, Symmetric};
 use super::tangent::{Goal, Tangent};
 use std::sync::Arc;
 
@@ -158,7 +158,8 @@ impl System<'_> {
                     stiffness * gap.first[i] * gap.first[j]
                 });
             }
-            let (solution, approach) = tangent.solve(goal, fields.approach)?;
+            let factors = tangent.matrix.factorise()?;
+            let (solution, approach) = tangent.solve(&factors, goal, fields.approach)?;
             let mut step = self.expand(&solution, approach);
             let mut settled = true;
             for (candidate, active) in self.candidates.iter().zip(&mut active) {
@@ -183,6 +184,24 @@ impl System<'_> {
                 return Ok(step);
             }
         }
+    }
+
+    /// Factors of the tangent, contacts aside.
+    pub(crate) fn factors(&self) -> Result<Factors, Singular> {
+        self.base.matrix.factorise()
+    }
+
+    /// The step from `fields` to an approach by the tangent of a nearby system without contacts: right
+    /// to first order in the difference of the two systems.
+    pub(crate) fn nearby_step(
+        &self,
+        factors: &Factors,
+        fields: &Fields,
+        approach_m: f64,
+    ) -> Result<Step, Singular> {
+        let goal = Goal::Approach(approach_m);
+        let (solution, approach) = self.base.solve(factors, goal, fields.approach)?;
+        Ok(self.expand(&solution, approach))
     }
 
     /// Displacements and new pressures of all elements from the equations' solution.

@@ -1,7 +1,7 @@
 //! The symmetric linear system of a Newton step.
 
 use super::layout::Slot;
-use super::sparse::{Singular, Symmetric};
+use super::sparse::{Factors, Singular, Symmetric};
 
 /// What a step is to reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,11 +57,16 @@ impl Tangent {
     }
 
     /// Solution for a goal: the equations' unknowns and the approach's step.
-    pub(crate) fn solve(&self, goal: Goal, present: f64) -> Result<(Vec<f64>, f64), Singular> {
+    pub(crate) fn solve(
+        &self,
+        factors: &Factors,
+        goal: Goal,
+        present: f64,
+    ) -> Result<(Vec<f64>, f64), Singular> {
         // Two right-hand sides: the residual's, and that of a unit approach.
         let size = self.right.len();
         let mut columns = [self.right.as_slice(), &self.driver_column].concat();
-        self.matrix.factorise()?.solve(&mut columns)?;
+        factors.solve(&mut columns)?;
         let by_approach = columns.split_off(size);
         let mut solution = columns;
         let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };

@@ -29,14 +29,13 @@ impl Source {
         let job = format!("simulating {} frames", arguments.simulation.forces.len());
         let options = options(&arguments.simulation);
         let trial = waiting(job, || Trial::new(options, &CalibrationOptions::default()));
-        let trial = trial
-            .map_err(|error| {
-                let hint = match arguments.simulation.physics {
-                    Physics::FiniteElements => ", or try --physics hertz",
-                    Physics::Hertz => "",
-                };
-                Failure::input(format!("the press cannot be simulated: {error}{hint}"))
-            })?;
+        let trial = trial.map_err(|error| {
+            let hint = match arguments.simulation.physics {
+                Physics::FiniteElements => ", or try --physics hertz",
+                Physics::Hertz => "",
+            };
+            Failure::input(format!("the press cannot be simulated: {error}{hint}"))
+        })?;
         Ok(Self::Simulated(Box::new(trial)))
     }
 

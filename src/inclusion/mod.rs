@@ -1,0 +1,11 @@
+//! An inclusion in a block of tissue, from frames: ring means of pressure images and the scene file that
+//! names them.
+//!
+//! The search itself is [`elasticity::inclusion`](crate::elasticity::inclusion).
+mod rings;
+#[cfg(feature = "scene")]
+mod scene;
+
+pub use rings::{RingError, RingMeans, ring_means};
+#[cfg(feature = "scene")]
+pub use scene::{InclusionScene, LoadedInclusion};

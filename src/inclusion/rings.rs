@@ -1,0 +1,247 @@
+//! Mean pressure over the radius, from an image.
+
+use ndarray::{Array2, ArrayView2};
+
+/// Mean pressure in rings around the face's centre.
+///
+/// ```
+/// use tactile_imaging::inclusion::ring_means;
+/// use ndarray::Array2;
+///
+/// // A disc of 30 pixels radius under even light, at 0.5 mm a pixel; a grey level is 30 Pa.
+/// let image = Array2::from_shape_fn((81, 91), |(y, x)| {
+///     let r = (x as f64 - 45.0).hypot(y as f64 - 40.0);
+///     if r < 30.0 { 100.0 } else { 0.0 }
+/// });
+/// let rings = ring_means(&image.view(), [0.5e-3; 2], 30.0, 15e-3)?;
+/// assert!((rings.centre_px[0] - 45.0).abs() < 0.1 && (rings.centre_px[1] - 40.0).abs() < 0.1);
+/// assert!((rings.pressure_pa[3] / 3e3 - 1.0).abs() < 1e-12);
+/// # Ok::<(), tactile_imaging::inclusion::RingError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct RingMeans {
+    /// Centre of the pressed region (x, y), in pixels.
+    pub centre_px: [f64; 2],
+    /// Radii of the rings' middles, in metres.
+    pub radii_m: Vec<f64>,
+    /// Mean pressure of each ring, in pascals.
+    pub pressure_pa: Vec<f64>,
+    /// Standard error of each mean from the noise of single pixels, in pascals.
+    pub standard_error_pa: Vec<f64>,
+    /// First harmonic of the pressure around the inner three quarters of the face, over its mean: zero
+    /// for what is symmetric about the axis.
+    pub asymmetry: f64,
+}
+
+/// Why an image has no ring means.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RingError {
+    /// Nothing presses on the face.
+    #[error("no part of the frame is brighter than the reference: nothing presses on the face")]
+    NoContact,
+    /// The face is not within the frame.
+    #[error(
+        "the face, {radius_px:.0} pixels in radius around ({x:.0}, {y:.0}), is cut by the frame's border"
+    )]
+    Cut {
+        /// Centre, x.
+        x: f64,
+        /// Centre, y.
+        y: f64,
+        /// The face's radius in pixels.
+        radius_px: f64,
+    },
+}
+
+/// Rings over the face's radius.
+const RINGS: usize = 60;
+/// A pixel belongs to the pressed region where it has this part of the frame's high values.
+const THRESHOLD: f64 = 0.25;
+
+/// Mean pressure in rings around the centre of the pressed region.
+///
+/// Light is taken as proportional to the pressure, p = s I with the frame's brightening I and
+/// `pascals_per_grey` s. `image` is the brightening, [row, column]; `pixel_size_m` is (x, y);
+/// `face_radius_m` the guide's. O(pixels).
+///
+/// # Errors
+/// [`RingError`].
+pub fn ring_means(
+    image: &ArrayView2<'_, f64>,
+    pixel_size_m: [f64; 2],
+    pascals_per_grey: f64,
+    face_radius_m: f64,
+) -> Result<RingMeans, RingError> {
+    let total: f64 = image.iter().filter(|value| value.is_finite()).sum();
+    let high = high_value(image);
+    if !(total > 0.0 && high > 0.0) {
+        return Err(RingError::NoContact);
+    }
+    let [sx, sy] = pixel_size_m;
+    let centre_px = centre(image, THRESHOLD * high).ok_or(RingError::NoContact)?;
+    let (rows, columns) = image.dim();
+    let inside = |centre: f64, size: f64, count: usize| {
+        let reach = 0.8 * face_radius_m / size;
+        centre - reach >= 0.0 && centre + reach <= count as f64 - 1.0
+    };
+    if !(inside(centre_px[0], sx, columns) && inside(centre_px[1], sy, rows)) {
+        return Err(RingError::Cut {
+            x: centre_px[0],
+            y: centre_px[1],
+            radius_px: face_radius_m / sx,
+        });
+    }
+    let width = face_radius_m / RINGS as f64;
+    let mut rings = vec![Ring::default(); RINGS];
+    let mut harmonic = [0.0; 2];
+    let mut mean = 0.0;
+    for ((y, x), &value) in image.indexed_iter() {
+        let dx = (x as f64 - centre_px[0]) * sx;
+        let dy = (y as f64 - centre_px[1]) * sy;
+        let radius = dx.hypot(dy);
+        let index = (radius / width) as usize;
+        if let Some(ring) = rings.get_mut(index) {
+            ring.count += 1.0;
+            ring.sum += value;
+            ring.radius += radius;
+        }
+        if radius < 0.75 * face_radius_m && radius > 0.0 {
+            harmonic[0] += value * dx / radius;
+            harmonic[1] += value * dy / radius;
+            mean += value;
+        }
+    }
+    let noise = pixel_noise(image, THRESHOLD * high);
+    let filled: Vec<Ring> = rings.into_iter().filter(|ring| ring.count > 0.0).collect();
+    Ok(RingMeans {
+        centre_px,
+        radii_m: filled.iter().map(|ring| ring.radius / ring.count).collect(),
+        pressure_pa: filled
+            .iter()
+            .map(|ring| pascals_per_grey * ring.sum / ring.count)
+            .collect(),
+        standard_error_pa: (filled.iter())
+            .map(|ring| pascals_per_grey * noise / ring.count.sqrt())
+            .collect(),
+        asymmetry: 2.0 * harmonic[0].hypot(harmonic[1]) / mean,
+    })
+}
+
+#[derive(Clone, Copy, Default)]
+struct Ring {
+    count: f64,
+    sum: f64,
+    radius: f64,
+}
+
+/// The value that one pixel in a hundred exceeds.
+fn high_value(image: &ArrayView2<'_, f64>) -> f64 {
+    let mut values: Vec<f64> = image.iter().copied().filter(|v| v.is_finite()).collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = values.len() - 1 - values.len() / 100;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// Centre (x, y) of the pixels above a threshold whose four neighbours are, too: single bright pixels
+/// do not count.
+fn centre(image: &ArrayView2<'_, f64>, threshold: f64) -> Option<[f64; 2]> {
+    let above: Array2<bool> = image.mapv(|value| value > threshold);
+    let (rows, columns) = image.dim();
+    let mut sums = [0.0; 3];
+    for y in 1..rows.saturating_sub(1) {
+        for x in 1..columns.saturating_sub(1) {
+            let all = [[y, x], [y - 1, x], [y + 1, x], [y, x - 1], [y, x + 1]];
+            if all.iter().all(|&at| above[at]) {
+                sums[0] += 1.0;
+                sums[1] += x as f64;
+                sums[2] += y as f64;
+            }
+        }
+    }
+    (sums[0] > 0.0).then(|| [sums[1] / sums[0], sums[2] / sums[0]])
+}
+
+/// Standard deviation of a pixel's noise, from second differences along rows within the pressed region
+/// (variance 6σ²): what is smooth cancels. Not below that of rounding to grey levels.
+fn pixel_noise(image: &ArrayView2<'_, f64>, threshold: f64) -> f64 {
+    let (mut squares, mut count) = (0.0, 0.0);
+    for row in image.rows() {
+        for x in 1..row.len().saturating_sub(1) {
+            let three = [row[x - 1], row[x], row[x + 1]];
+            if three.iter().all(|&value| value > threshold) {
+                squares += (three[0] - 2.0 * three[1] + three[2]).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    let rounding = 1.0 / 12f64.sqrt();
+    if count > 0.0 {
+        (squares / (6.0 * count)).sqrt().max(rounding)
+    } else {
+        rounding
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+
+    fn disc(centre: [f64; 2], value: impl Fn(f64) -> f64) -> Array2<f64> {
+        Array2::from_shape_fn((140, 150), |(y, x)| {
+            let r = (x as f64 - centre[0]).hypot(y as f64 - centre[1]) * 0.25e-3;
+            if r < 15e-3 { value(r) } else { 0.0 }
+        })
+    }
+
+    #[test]
+    fn a_profile_is_read_from_its_image() {
+        let light = |r: f64| 100.0 + 40.0 * (-(r / 5e-3).powi(2)).exp();
+        let image = disc([76.3, 70.8], light);
+        let rings = ring_means(&image.view(), [0.25e-3; 2], 7.0, 15e-3).unwrap();
+        // Pixels at the rim count whole or not at all: a hundredth of a pixel over 11,000.
+        assert!((rings.centre_px[0] - 76.3).abs() < 0.1 && (rings.centre_px[1] - 70.8).abs() < 0.1);
+        for (r, p) in rings.radii_m.iter().zip(&rings.pressure_pa) {
+            if *r < 0.9 * 15e-3 {
+                let expected = 7.0 * light(*r);
+                // A ring is as wide as a pixel: curvature within it is below a thousandth.
+                assert!((p / expected - 1.0).abs() < 3e-3, "{r} {p} {expected}");
+            }
+        }
+        assert!(rings.asymmetry < 2e-3);
+    }
+
+    #[test]
+    fn the_stated_error_is_the_scatter_of_the_means() {
+        let clean = disc([74.0, 70.0], |_| 120.0);
+        let truth = ring_means(&clean.view(), [0.25e-3; 2], 1.0, 15e-3).unwrap();
+        let (mut squares, mut count) = (0.0, 0.0);
+        for seed in 0..20 {
+            let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(seed);
+            let noisy = clean.mapv(|value| value + 2.0 * rng.sample::<f64, _>(StandardNormal));
+            let rings = ring_means(&noisy.view(), [0.25e-3; 2], 1.0, 15e-3).unwrap();
+            for k in 3..40 {
+                let z = (rings.pressure_pa[k] - truth.pressure_pa[k]) / rings.standard_error_pa[k];
+                squares += z * z;
+                count += 1.0;
+            }
+        }
+        // 740 values of variance one: 1 ± 0.05.
+        let ratio = squares / count;
+        assert!((ratio - 1.0).abs() < 0.2, "{ratio}");
+    }
+
+    #[test]
+    fn dark_frames_and_cut_faces_are_refused() {
+        let dark = Array2::zeros((50, 50));
+        let found = ring_means(&dark.view(), [0.25e-3; 2], 1.0, 15e-3);
+        assert_eq!(found, Err(RingError::NoContact));
+        let cut = disc([30.0, 70.0], |_| 100.0);
+        let found = ring_means(&cut.view(), [0.25e-3; 2], 1.0, 15e-3);
+        assert!(matches!(found, Err(RingError::Cut { .. })), "{found:?}");
+    }
+}

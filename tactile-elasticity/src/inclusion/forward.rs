@@ -1,0 +1,162 @@
+//! Interface pressure of a block with an inclusion under a guide, and its derivatives.
+
+use super::motion::{Motion, sizes};
+use super::parameters::{Coordinate, Parameters};
+use crate::fem::{
+    Block, Guide, Interface, Kinematics, Load, Lump, Material, Outcome, PressurePoint, Scene,
+    pressure_at,
+};
+
+/// A block of given size under a guide, and where its pressure is wanted.
+#[derive(Debug, Clone)]
+pub(crate) struct Forward {
+    pub(crate) guide: Guide,
+    pub(crate) block_radius_m: f64,
+    pub(crate) interface: Interface,
+    /// Approaches as read, in metres, growing.
+    pub(crate) approaches_m: Vec<f64>,
+    /// Where each frame's pressure is wanted, in metres from the axis.
+    pub(crate) radii_m: Vec<f64>,
+    /// Elements along an eighth of the inclusion's circumference.
+    pub(crate) fineness: usize,
+    /// Small strain is solved in one iteration: good enough to sort starts.
+    pub(crate) kinematics: Kinematics,
+}
+
+/// Pressures of all frames, one frame after the other, then their forces.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Prediction {
+    pub(crate) values: Vec<f64>,
+}
+
+/// A prediction and its derivative by each coordinate.
+#[derive(Debug, Clone)]
+pub(crate) struct Linearised {
+    pub(crate) prediction: Prediction,
+    /// One column a coordinate.
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+/// Relative step of the difference quotients: the truncation error is about as large as the step,
+/// rounding and the unbalanced force of 1e-8 stay a hundred times below.
+const STEP: f64 = 1e-3;
+
+impl Forward {
+    pub(crate) fn observations(&self) -> usize {
+        self.approaches_m.len() * (self.radii_m.len() + 1)
+    }
+
+    fn scene(&self, parameters: &Parameters) -> Option<Scene> {
+        let material = |modulus| Material::new(modulus, parameters.poisson_ratio).ok();
+        let lump = match parameters.lump {
+            None => None,
+            Some(lump) => Some(Lump {
+                diameter_m: lump.diameter_m,
+                depth_m: lump.depth_m,
+                material: material(lump.youngs_modulus_pa)?,
+            }),
+        };
+        let block = Block {
+            height_m: parameters.height_m,
+            radius_m: self.block_radius_m,
+            material: material(parameters.block_modulus_pa)?,
+            lump,
+        };
+        Scene::block_with_mesh(
+            &block,
+            &self.guide,
+            self.interface,
+            self.fineness,
+            self.kinematics,
+        )
+        .ok()
+    }
+
+    /// The frames' pressures and forces; `None` where the block cannot be meshed or solved.
+    pub(crate) fn predict(&self, parameters: &Parameters) -> Option<Prediction> {
+        let scene = self.scene(parameters)?;
+        let states = self.states(&scene, parameters)?;
+        let frames = states
+            .iter()
+            .map(|state| (state.pressure(), state.force_n()));
+        Some(self.collect(frames))
+    }
+
+    fn states(&self, scene: &Scene, parameters: &Parameters) -> Option<Vec<crate::fem::State>> {
+        let loads: Vec<Load> = (self.approaches_m.iter())
+            .map(|approach| Load::Approach(approach + parameters.zero_m))
+            .collect();
+        let solution = scene.solve(&loads);
+        (solution.report.outcome == Outcome::Solved).then_some(solution.states)
+    }
+
+    /// The scene of parameters near those of `scene`, on its mesh.
+    fn changed(&self, scene: &Scene, from: &Parameters, to: &Parameters) -> Option<Scene> {
+        let tissue = self.guide.layers().len();
+        let material = |modulus| Material::new(modulus, to.poisson_ratio).ok();
+        let mut materials = vec![(tissue, material(to.block_modulus_pa)?)];
+        if let Some(lump) = to.lump {
+            materials.push((tissue + 1, material(lump.youngs_modulus_pa)?));
+        }
+        let motion = Motion::new(from, to, self.guide.radius_m());
+        let moved = |node: [f64; 2]| motion.moved(node);
+        let is_moved = (from.lump.map(sizes), from.height_m) != (to.lump.map(sizes), to.height_m);
+        let moved: Option<&dyn Fn([f64; 2]) -> [f64; 2]> =
+            if is_moved { Some(&moved) } else { None };
+        scene.changed(&materials, moved).ok()
+    }
+
+    fn collect<'a>(&self, frames: impl Iterator<Item = (&'a [PressurePoint], f64)>) -> Prediction {
+        let mut values = Vec::with_capacity(self.observations());
+        let mut forces = Vec::with_capacity(self.approaches_m.len());
+        for (points, force) in frames {
+            values.extend(self.radii_m.iter().map(|&r| pressure_at(points, r)));
+            forces.push(force);
+        }
+        values.extend(forces);
+        Prediction { values }
+    }
+
+    /// The prediction and its derivatives by `coordinates`.
+    ///
+    /// A derivative is what one iteration on the slightly changed block, started from the solution with
+    /// its tangent, changes: one factorisation a frame, one assembly for each coordinate and frame.
+    pub(crate) fn linearise(
+        &self,
+        parameters: &Parameters,
+        coordinates: &[Coordinate],
+    ) -> Option<Linearised> {
+        let scene = self.scene(parameters)?;
+        let states = self.states(&scene, parameters)?;
+        let frames = states
+            .iter()
+            .map(|state| (state.pressure(), state.force_n()));
+        let prediction = self.collect(frames);
+        let mut neighbourhoods = Vec::with_capacity(states.len());
+        for state in &states {
+            neighbourhoods.push(scene.neighbourhood(state)?);
+        }
+        let mut columns = Vec::with_capacity(coordinates.len());
+        for &coordinate in coordinates {
+            let step = STEP * coordinate.unit();
+            let moved = parameters.moved(coordinate, step);
+            let changed = self.changed(&scene, parameters, &moved)?;
+            let mut nearby = Vec::with_capacity(states.len());
+            for (neighbourhood, approach) in neighbourhoods.iter_mut().zip(&self.approaches_m) {
+                nearby.push(neighbourhood.solve(&changed, approach + moved.zero_m)?);
+            }
+            let frames = nearby
+                .iter()
+                .map(|(points, force)| (points.as_slice(), *force));
+            let there = self.collect(frames);
+            let column = (there.values.iter().zip(&prediction.values))
+                .map(|(there, here)| (there - here) / step)
+                .collect();
+            columns.push(column);
+        }
+        Some(Linearised {
+            prediction,
+            columns,
+        })
+    }
+}

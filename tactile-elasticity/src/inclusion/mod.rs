@@ -1,0 +1,39 @@
+//! A spherical inclusion in a block of tissue, from the pressure on a guide pressed onto it.
+//!
+//! The unknowns are the diameter D, the depth d of the top, the inclusion's modulus E₁ and the block's
+//! E₀; the block's height, Poisson's ratio and the zero of the approaches are known with errors. The
+//! model is [`Scene::block_under_guide`](crate::fem::Scene::block_under_guide) at finite strain: how the
+//! pressure grows with the approach is what tells size from stiffness, which linear elasticity hardly
+//! can.
+//!
+//! With y the measured ring means and forces, m(φ) the model's, C the covariance of the sensor's and
+//! the model's errors and a Gaussian prior of mean φ₀ and covariance P,
+//!
+//! $$ -2 \ln p(\varphi | y) = (y - m)^T C^{-1} (y - m) + (\varphi - \varphi_0)^T P^{-1} (\varphi - \varphi_0) + c $$
+//!
+//! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there gives
+//! errors and correlations, its determinant the evidence (Laplace), whose ratio with and without
+//! inclusion is the odds that there is one.
+//!
+//! # References
+//! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won, IEEE Sensors
+//! J. 13 (2013). A. Tarantola, *Inverse Problem Theory* (2005). R. E. Kass & A. E. Raftery, J. Am. Stat.
+//! Assoc. 90 (1995) 773.
+mod covariance;
+mod design;
+mod estimate;
+mod fit;
+mod forward;
+mod motion;
+mod parameters;
+mod profiles;
+mod search;
+mod specimen;
+#[cfg(test)]
+mod tests;
+
+pub use design::{AssumedInclusion, ExpectedErrors};
+pub use estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
+pub use profiles::PressureProfile;
+pub use search::{InclusionSearch, SearchProgress};
+pub use specimen::{SensorErrors, Specimen};

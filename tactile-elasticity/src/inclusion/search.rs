@@ -1,0 +1,454 @@
+//! Search for an inclusion.
+
+use super::covariance::Observed;
+use super::estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
+use super::fit::{Fit, Prior, Problem, starts};
+use super::forward::Forward;
+use super::parameters::{Coordinate, Parameters};
+use super::profiles::{PressureProfile, check};
+use super::specimen::{SensorErrors, Specimen};
+use crate::ElasticityError;
+use crate::error::Quantity;
+use crate::fem::{Guide, Interface, Kinematics};
+use core::ops::ControlFlow;
+
+/// Part of the guide's radius within which pressures are used: further out the singular rim rules,
+/// where meshes disagree by percents.
+const REACH: f64 = 0.75;
+/// Fewer rings do not show an inclusion's shape.
+const MIN_RINGS: usize = 8;
+/// Elements along an eighth of the inclusion's circumference: of the starts, of the best start's fit, of
+/// the answer. The last one's pressure is within 0.1 % of twice as many.
+const FINENESS: [usize; 3] = [2, 3, 5];
+/// Starts that are fitted, of the grid's best.
+const FITTED_STARTS: usize = 3;
+/// Least fall of χ² for an inclusion to count as found.
+const LEAST_FALL: f64 = 20.0;
+/// Least probability for that.
+const LEAST_PROBABILITY: f64 = 0.99;
+
+/// What a search is doing.
+///
+/// ```
+/// use tactile_elasticity::inclusion::SearchProgress;
+///
+/// let progress = SearchProgress { done: 3, expected: 30 };
+/// assert!(progress.done < progress.expected);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SearchProgress {
+    /// Solutions so far.
+    pub done: usize,
+    /// About how many there will be.
+    pub expected: usize,
+}
+
+/// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
+///
+/// Maximum a posteriori over ln D, ln d, ln E₁, ln E₀, the block's height, ν and the approaches' zero by
+/// Levenberg–Marquardt on finite-strain finite elements from several starts; errors by Laplace's
+/// approximation; an inclusion's probability from the evidence with and without one.
+///
+/// ```no_run
+/// use tactile_elasticity::fem::{Guide, Layer, Material};
+/// use tactile_elasticity::inclusion::{InclusionSearch, PressureProfile, Specimen};
+///
+/// # fn example(radii_m: Vec<f64>, frames: Vec<PressureProfile>) -> Result<(), tactile_elasticity::ElasticityError> {
+/// let layer = Layer { thickness_m: 10e-3, material: Material::new(60e3, 0.495)? };
+/// let guide = Guide::new(vec![layer], 16e-3)?;
+/// let search = InclusionSearch::new(Specimen::new(30e-3, 40e-3)?, guide)?;
+/// let estimate = search.search(&radii_m, &frames)?;
+/// if let (true, Some(inclusion)) = (estimate.found, &estimate.inclusion) {
+///     println!("{:?}", inclusion.diameter_m);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone)]
+pub struct InclusionSearch {
+    specimen: Specimen,
+    guide: Guide,
+    sensor: SensorErrors,
+}
+
+impl InclusionSearch {
+    /// A block under a guide, with [`SensorErrors::default`].
+    ///
+    /// # Errors
+    /// A block that is no wider than the guide.
+    pub fn new(specimen: Specimen, guide: Guide) -> Result<Self, ElasticityError> {
+        if specimen.radius_m() <= guide.radius_m() {
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::Radius,
+                found: specimen.radius_m(),
+                limit: guide.radius_m(),
+            });
+        }
+        Ok(Self {
+            specimen,
+            guide,
+            sensor: SensorErrors::default(),
+        })
+    }
+
+    /// Sets the sensor's smooth errors.
+    ///
+    /// # Errors
+    /// Negative or NaN; a correlation length or a force error of zero.
+    pub fn with_sensor_errors(mut self, errors: SensorErrors) -> Result<Self, ElasticityError> {
+        self.sensor = errors.checked()?;
+        Ok(self)
+    }
+
+    /// The inclusion that explains ring means at `radii_m` (metres, ascending) best; rings beyond three
+    /// quarters of the guide's radius are not used. Some 100 finite-element solutions.
+    ///
+    /// # Errors
+    /// No frame; approaches that do not grow; lengths that differ; values that are not finite; fewer
+    /// than eight rings within reach; [`ElasticityError::NoSolution`] where the approaches are beyond
+    /// what the block's finite elements bear.
+    pub fn search(
+        &self,
+        radii_m: &[f64],
+        frames: &[PressureProfile],
+    ) -> Result<InclusionEstimate, ElasticityError> {
+        self.search_with_progress(radii_m, frames, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Self::search`]; `progress` hears of every solution and may end the search.
+    ///
+    /// # Errors
+    /// Those of [`Self::search`]; [`ElasticityError::Cancelled`].
+    pub fn search_with_progress(
+        &self,
+        radii_m: &[f64],
+        frames: &[PressureProfile],
+        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    ) -> Result<InclusionEstimate, ElasticityError> {
+        check(radii_m, frames)?;
+        let observed = self.observed(radii_m, frames)?;
+        let approaches_m: Vec<f64> = frames.iter().map(|frame| frame.approach_m).collect();
+        let interfaces = self.specimen.interfaces();
+        let mut counter = Counter {
+            done: 0,
+            // Per interface: a plain fit, the grid, three coarse fits, a fine one.
+            expected: interfaces.len() * 55,
+            progress,
+            cancelled: false,
+        };
+        let mut hypotheses = Vec::new();
+        for interface in interfaces {
+            let found = self.hypothesis(&observed, &approaches_m, interface, &mut counter);
+            if counter.cancelled {
+                return Err(ElasticityError::Cancelled);
+            }
+            hypotheses.extend(found);
+        }
+        hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
+        let mut hypotheses = hypotheses.into_iter();
+        let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
+        let runner_up = hypotheses.next();
+        Ok(best.estimate(&observed, runner_up.as_ref()))
+    }
+
+    fn observed(
+        &self,
+        radii_m: &[f64],
+        frames: &[PressureProfile],
+    ) -> Result<Observed, ElasticityError> {
+        let used = self.rings_within_reach(radii_m)?;
+        let mut values = Vec::new();
+        let mut white = Vec::new();
+        for frame in frames {
+            values.extend(used.iter().map(|&k| frame.pressure_pa[k]));
+            white.extend(used.iter().map(|&k| frame.standard_error_pa[k]));
+        }
+        let area = core::f64::consts::PI * self.guide.radius_m().powi(2);
+        for frame in frames {
+            let mean = frame.pressure_pa.iter().sum::<f64>() / frame.pressure_pa.len() as f64;
+            let expected = mean * area;
+            values.push(frame.force_n.unwrap_or(expected));
+            // A force that is not known weighs nothing.
+            white.push(if frame.force_n.is_some() {
+                0.0
+            } else {
+                1e3 * expected.abs()
+            });
+        }
+        Ok(Observed {
+            radii_m: used.iter().map(|&k| radii_m[k]).collect(),
+            values,
+            white,
+            frames: frames.len(),
+        })
+    }
+
+    pub(crate) fn forward(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        interface: Interface,
+        fineness: usize,
+    ) -> Forward {
+        Forward {
+            guide: self.guide.clone(),
+            block_radius_m: self.specimen.radius_m(),
+            interface,
+            approaches_m: approaches_m.to_vec(),
+            radii_m: observed.radii_m.clone(),
+            fineness,
+            kinematics: Kinematics::Finite,
+        }
+    }
+
+    pub(crate) fn plain_block(&self, block_modulus_pa: f64) -> Parameters {
+        Parameters {
+            block_modulus_pa,
+            lump: None,
+            zero_m: 0.0,
+            height_m: self.specimen.height_m(),
+            poisson_ratio: self.specimen.poisson_ratio(),
+        }
+    }
+
+    /// What is known of the block; `guess` of its modulus counts where nobody has said it.
+    pub(crate) fn block_priors(&self, guess: f64) -> Vec<Prior> {
+        let [height, zero, poisson] = self.specimen.known();
+        // Three decades each way.
+        let modulus = self.specimen.block_modulus().unwrap_or((guess.ln(), 3.5));
+        vec![
+            Prior::new(Coordinate::BlockModulus, modulus),
+            Prior::new(Coordinate::Zero, zero),
+            Prior::new(Coordinate::Height, height),
+            Prior::new(Coordinate::PoissonRatio, poisson),
+        ]
+    }
+
+    /// Sizes, depths and contrasts that a face of this radius can see: D from 0.2 to 2 radii, d from
+    /// 0.06 to 1.5, E₁ from 0.4 to 47 times E₀, as 95 % ranges.
+    pub(crate) fn lump_priors(&self, block_modulus_pa: f64) -> [Prior; 3] {
+        let face = self.guide.radius_m();
+        [
+            Prior::new(Coordinate::Diameter, ((0.65 * face).ln(), 0.6)),
+            Prior::new(Coordinate::Depth, ((0.3 * face).ln(), 0.8)),
+            Prior::new(
+                Coordinate::LumpModulus,
+                ((4.5 * block_modulus_pa).ln(), 1.2),
+            ),
+        ]
+    }
+
+    pub(crate) fn sensor(&self) -> &SensorErrors {
+        &self.sensor
+    }
+
+    pub(crate) fn specimen(&self) -> &Specimen {
+        &self.specimen
+    }
+
+    /// Indices of the rings within reach.
+    pub(crate) fn rings_within_reach(
+        &self,
+        radii_m: &[f64],
+    ) -> Result<Vec<usize>, ElasticityError> {
+        let limit = REACH * self.guide.radius_m();
+        let used: Vec<usize> = (0..radii_m.len())
+            .filter(|&k| radii_m[k] <= limit)
+            .collect();
+        if used.len() < MIN_RINGS {
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::Samples,
+                expected: MIN_RINGS,
+                found: used.len(),
+            });
+        }
+        Ok(used)
+    }
+
+    /// The best plain block and the best one with an inclusion; `None` where none could be solved.
+    fn hypothesis(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        interface: Interface,
+        counter: &mut Counter<'_>,
+    ) -> Option<Hypothesis> {
+        let guess = self.stiffness(observed, approaches_m);
+        let forward = |fineness| self.forward(observed, approaches_m, interface, fineness);
+        let mut problem = Problem {
+            forward: forward(FINENESS[0]),
+            measured: observed.values.clone(),
+            factor: observed.covariance(&self.sensor, interface).cholesky()?,
+            priors: self.block_priors(guess),
+        };
+        let (_, start) = problem.scaled_start(&self.plain_block(guess))?;
+        let coarse = problem.fit(start, || counter.step())?;
+        if counter.cancelled {
+            return None;
+        }
+        problem.forward = forward(FINENESS[2]);
+        let plain = problem.fit(coarse.parameters, || counter.step())?;
+        let lump_priors = self.lump_priors(plain.parameters.block_modulus_pa);
+        problem.priors.extend(lump_priors);
+        problem.forward = Forward {
+            kinematics: Kinematics::Linear,
+            ..forward(FINENESS[0])
+        };
+        let mut grid = Vec::new();
+        for start in starts(&plain.parameters, self.guide.radius_m()) {
+            if !counter.step() {
+                return None;
+            }
+            grid.extend(problem.scaled_start(&start));
+        }
+        grid.sort_by(|a, b| a.0.total_cmp(&b.0));
+        problem.forward = forward(FINENESS[0]);
+        let mut lump = (grid.iter().take(FITTED_STARTS))
+            .filter_map(|(_, start)| problem.fit(*start, || counter.step()))
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
+        for fineness in &FINENESS[1..] {
+            problem.forward = forward(*fineness);
+            lump = lump.and_then(|fit| problem.fit(fit.parameters, || counter.step()));
+        }
+        if counter.cancelled {
+            return None;
+        }
+        Some(Hypothesis {
+            interface,
+            plain,
+            lump,
+        })
+    }
+
+    /// Modulus of a plain block by the mean pressure over the mean strain: right within a factor of
+    /// three, from which the fit of ln E₀ converges.
+    fn stiffness(&self, observed: &Observed, approaches_m: &[f64]) -> f64 {
+        let rings = observed.radii_m.len();
+        let last = observed.frames - 1;
+        let pressures = &observed.values[last * rings..observed.frames * rings];
+        let mean = pressures.iter().sum::<f64>() / rings as f64;
+        let strain = approaches_m[last] / self.specimen.height_m();
+        // Below a pascal there is no contact; the fit will say so by its misfit.
+        (0.5 * mean / strain).max(1.0)
+    }
+}
+
+struct Counter<'a> {
+    done: usize,
+    expected: usize,
+    progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    cancelled: bool,
+}
+
+impl Counter<'_> {
+    /// Reports a solution; `false` where the search is to end.
+    fn step(&mut self) -> bool {
+        if self.cancelled {
+            return false;
+        }
+        self.done += 1;
+        self.expected = self.expected.max(self.done);
+        let progress = SearchProgress {
+            done: self.done,
+            expected: self.expected,
+        };
+        self.cancelled |= (self.progress)(progress).is_break();
+        !self.cancelled
+    }
+}
+
+/// The best fits under one assumption about the face.
+struct Hypothesis {
+    interface: Interface,
+    plain: Fit,
+    lump: Option<Fit>,
+}
+
+/// Probability that a χ² as large comes by chance, below which a fit counts as poor, in standard
+/// deviations of χ².
+const POOR: f64 = 3.1;
+
+impl Hypothesis {
+    fn evidence(&self) -> f64 {
+        let lump = self
+            .lump
+            .as_ref()
+            .map_or(f64::NEG_INFINITY, |fit| fit.evidence);
+        self.plain.evidence.max(lump)
+    }
+
+    fn estimate(self, observed: &Observed, other: Option<&Self>) -> InclusionEstimate {
+        let freedom = observed.values.len() as f64;
+        let rings = observed.radii_m.len();
+        let split = |values: &[f64]| -> Vec<Vec<f64>> {
+            let pressures = values[..observed.frames * rings].chunks(rings);
+            pressures.map(<[f64]>::to_vec).collect()
+        };
+        let gain = self
+            .lump
+            .as_ref()
+            .map_or(f64::NEG_INFINITY, |fit| fit.evidence - self.plain.evidence);
+        let fall = (self.lump.as_ref()).map_or(0.0, |fit| self.plain.misfit - fit.misfit);
+        let probability = 1.0 / (1.0 + (-gain).exp());
+        let found = probability > LEAST_PROBABILITY && fall > LEAST_FALL;
+        let chosen = match &self.lump {
+            Some(lump) if found => lump,
+            _ => &self.plain,
+        };
+        let misfit = chosen.misfit / freedom;
+        let is_poor = misfit > 1.0 + POOR * (2.0 / freedom).sqrt();
+        let widened = if is_poor { misfit.sqrt() } else { 1.0 };
+        let mut warnings = Vec::new();
+        if is_poor {
+            warnings.push(InclusionWarning::PoorFit { excess: misfit });
+        }
+        if observed.frames == 1 {
+            warnings.push(InclusionWarning::OneFrame);
+        }
+        if !chosen.converged {
+            warnings.push(InclusionWarning::NotConverged);
+        }
+        if other.is_some_and(|other| self.evidence() - other.evidence() < CLEAR_EVIDENCE) {
+            warnings.push(InclusionWarning::UncertainInterface);
+        }
+        if chosen.parameters.is_at_boundary() {
+            warnings.push(InclusionWarning::AtBoundary);
+        }
+        let is_reliable = chosen.converged && !chosen.parameters.is_at_boundary();
+        let error = |index: usize| widened * chosen.covariance[(index, index)].sqrt();
+        let logarithm = |coordinate| chosen.parameters.get(coordinate);
+        let told = |index, coordinate| {
+            let estimated = Estimated::from_logarithm(logarithm(coordinate), error(index));
+            Told::new(estimated, is_reliable)
+        };
+        let inclusion = found.then(|| Inclusion {
+            diameter_m: told(4, Coordinate::Diameter),
+            depth_m: told(5, Coordinate::Depth),
+            youngs_modulus_pa: told(6, Coordinate::LumpModulus),
+            correlation: core::array::from_fn(|i| {
+                core::array::from_fn(|k| {
+                    let c = &chosen.covariance;
+                    c[(4 + i, 4 + k)] / (c[(4 + i, 4 + i)] * c[(4 + k, 4 + k)]).sqrt()
+                })
+            }),
+        });
+        InclusionEstimate {
+            probability,
+            found,
+            block_modulus_pa: Estimated::from_logarithm(
+                logarithm(Coordinate::BlockModulus),
+                error(0),
+            ),
+            inclusion,
+            interface: self.interface,
+            misfit,
+            warnings,
+            radii_m: observed.radii_m.clone(),
+            fitted_pa: split(&chosen.predicted),
+            plain_pa: split(&self.plain.predicted),
+        }
+    }
+}
+
+/// Difference of log evidence above which one assumption is clearly better: 20 to 1.
+const CLEAR_EVIDENCE: f64 = 3.0;

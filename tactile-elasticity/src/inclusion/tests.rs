@@ -1,0 +1,302 @@
+//! The forward model and its derivatives, the fit, and what a search refuses.
+
+use super::covariance::Observed;
+use super::fit::{Prior, Problem};
+use super::forward::Forward;
+use super::parameters::{Coordinate, LumpParameters, Parameters};
+use super::{AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen, Told};
+use crate::ElasticityError;
+use crate::fem::{Guide, Interface, Kinematics, Layer, Material};
+use core::ops::ControlFlow;
+
+fn guide(scale: f64) -> Guide {
+    let layer = |thickness_m, modulus: f64| Layer {
+        thickness_m,
+        material: Material::new(scale * modulus, 0.495).unwrap(),
+    };
+    Guide::new(vec![layer(4e-3, 120e3), layer(6e-3, 40e3)], 16e-3).unwrap()
+}
+
+fn forward(fineness: usize, scale: f64) -> Forward {
+    Forward {
+        guide: guide(scale),
+        block_radius_m: 40e-3,
+        interface: Interface::Bonded,
+        approaches_m: vec![1.2e-3, 2.4e-3],
+        radii_m: (0..16).map(|k| (f64::from(k) + 0.5) * 0.75e-3).collect(),
+        fineness,
+        kinematics: Kinematics::Finite,
+    }
+}
+
+fn block(scale: f64) -> Parameters {
+    Parameters {
+        block_modulus_pa: scale * 5e3,
+        lump: Some(LumpParameters {
+            diameter_m: 12e-3,
+            depth_m: 4e-3,
+            youngs_modulus_pa: scale * 30e3,
+        }),
+        zero_m: 0.0,
+        height_m: 30e-3,
+        poisson_ratio: 0.49,
+    }
+}
+
+/// Largest difference over the largest value.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let largest = b.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.fold(0.0, f64::max) / largest
+}
+
+#[test]
+fn pressures_are_proportional_to_all_moduli_together() {
+    let soft = forward(2, 1.0).predict(&block(1.0)).unwrap().values;
+    let stiff = forward(2, 7.0).predict(&block(7.0)).unwrap().values;
+    let scaled: Vec<f64> = soft.iter().map(|p| 7.0 * p).collect();
+    // Newton's method ends with 1e-8 of the forces out of balance.
+    assert!(distance(&stiff, &scaled) < 1e-6);
+}
+
+#[test]
+fn an_inclusion_as_soft_as_the_tissue_is_none() {
+    let mut same = block(1.0);
+    if let Some(lump) = &mut same.lump {
+        lump.youngs_modulus_pa = same.block_modulus_pa;
+    }
+    let plain = Parameters { lump: None, ..same };
+    let with = forward(3, 1.0).predict(&same).unwrap().values;
+    let without = forward(3, 1.0).predict(&plain).unwrap().values;
+    // Two meshes of the same body: what the coarser one leaves.
+    let rings = 32;
+    assert!(distance(&with[..rings], &without[..rings]) < 2e-3);
+}
+
+#[test]
+fn derivatives_are_those_of_solutions_at_changed_parameters() {
+    let model = forward(2, 1.0);
+    let here = block(1.0);
+    let coordinates = [
+        Coordinate::BlockModulus,
+        Coordinate::LumpModulus,
+        Coordinate::Zero,
+        Coordinate::PoissonRatio,
+    ];
+    let linearised = model.linearise(&here, &coordinates).unwrap();
+    for (column, coordinate) in linearised.columns.iter().zip(coordinates) {
+        let step = 0.01 * coordinate.unit().abs();
+        let at = |by| model.predict(&here.moved(coordinate, by)).unwrap().values;
+        let (low, high) = (at(-step), at(step));
+        let quotient: Vec<f64> = (low.iter().zip(&high))
+            .map(|(low, high)| (high - low) / (2.0 * step))
+            .collect();
+        // The columns are one-sided quotients with a step of a thousandth; the compressibility 1 − 2ν is
+        // a fiftieth, and the step in ν a hundredth of that.
+        let tolerance = match coordinate {
+            Coordinate::PoissonRatio => 2e-2,
+            _ => 5e-3,
+        };
+        let rings = 32;
+        let off = distance(&column[..rings], &quotient[..rings]);
+        assert!(off < tolerance, "{coordinate:?}: {off}");
+        let off = distance(&column[rings..], &quotient[rings..]);
+        assert!(off < tolerance, "{coordinate:?}, force: {off}");
+    }
+}
+
+#[test]
+fn derivatives_by_sizes_follow_the_moving_mesh() {
+    let model = forward(3, 1.0);
+    let here = block(1.0);
+    let coordinates = [Coordinate::Diameter, Coordinate::Depth, Coordinate::Height];
+    let linearised = model.linearise(&here, &coordinates).unwrap();
+    for (column, coordinate) in linearised.columns.iter().zip(coordinates) {
+        // Other sizes have other meshes: the step is large against what those differ by.
+        let at = |by| model.predict(&here.moved(coordinate, by)).unwrap().values;
+        let (low, high) = (at(-0.06), at(0.06));
+        let quotient: Vec<f64> = low.iter().zip(&high).map(|(a, b)| (b - a) / 0.12).collect();
+        let off = distance(&column[..32], &quotient[..32]);
+        assert!(off < 0.08, "{coordinate:?}: {off}");
+    }
+}
+
+#[test]
+fn the_answers_mesh_is_fine_enough() {
+    let answers = forward(5, 1.0).predict(&block(1.0)).unwrap().values;
+    let finer = forward(8, 1.0).predict(&block(1.0)).unwrap().values;
+    // The model's error that the fit counts with: 0.2 % of scale, 0.07 % of shape.
+    assert!(distance(&answers[..32], &finer[..32]) < 2e-3);
+    // Half of the force's error: the rim's singular traction.
+    assert!(distance(&answers[32..], &finer[32..]) < 3e-3);
+}
+
+#[test]
+fn small_strain_is_the_limit_of_small_approaches() {
+    let at = |kinematics| {
+        let model = Forward {
+            approaches_m: vec![3e-6],
+            kinematics,
+            ..forward(2, 1.0)
+        };
+        model.predict(&block(1.0)).unwrap().values
+    };
+    let (linear, finite) = (at(Kinematics::Linear), at(Kinematics::Finite));
+    // A strain of 1e-4, of which a second-order effect has a few times as much.
+    assert!(distance(&linear, &finite) < 1e-3);
+}
+
+/// Noise-free values with the covariance of a good sensor, to be fitted on the mesh they come from.
+fn problem() -> (Problem, Parameters) {
+    let truth = block(1.0);
+    let values = forward(2, 1.0).predict(&truth).unwrap().values;
+    let observed = Observed {
+        radii_m: forward(2, 1.0).radii_m,
+        white: values.iter().map(|p| 1e-3 * p).collect(),
+        values,
+        frames: 2,
+    };
+    let covariance = observed.covariance(&SensorErrors::default(), Interface::Bonded);
+    let prior = |coordinate, mean, error| Prior::new(coordinate, (mean, error));
+    let problem = Problem {
+        forward: forward(2, 1.0),
+        measured: observed.values,
+        factor: covariance.cholesky().unwrap(),
+        priors: vec![
+            prior(Coordinate::BlockModulus, 5e3f64.ln(), 1.0),
+            prior(Coordinate::Zero, 0.0, 20e-6),
+            prior(Coordinate::Height, 30e-3f64.ln(), 0.02),
+            prior(Coordinate::PoissonRatio, 0.49, 0.005),
+            prior(Coordinate::Diameter, 10e-3f64.ln(), 0.6),
+            prior(Coordinate::Depth, 5e-3f64.ln(), 0.8),
+            prior(Coordinate::LumpModulus, 20e3f64.ln(), 1.2),
+        ],
+    };
+    (problem, truth)
+}
+
+#[test]
+fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
+    let (problem, truth) = problem();
+    let mut start = truth;
+    start.block_modulus_pa *= 1.2;
+    start.lump = Some(LumpParameters {
+        diameter_m: 9e-3,
+        depth_m: 6e-3,
+        youngs_modulus_pa: 15e3,
+    });
+    let fit = problem.fit(start, || true).unwrap();
+    assert!(fit.converged);
+    for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
+        let error = fit.covariance[(k, k)].sqrt();
+        let z = (fit.parameters.get(coordinate) - truth.get(coordinate)) / error;
+        // Without noise the priors alone pull, whose means are not the truth.
+        assert!(z.abs() < 0.7, "{coordinate:?}: {z}");
+    }
+    assert!(fit.misfit < 1.0, "{}", fit.misfit);
+}
+
+#[test]
+fn a_step_that_may_not_go_on_ends_the_fit() {
+    let (problem, truth) = problem();
+    let fit = problem.fit(truth, || false).unwrap();
+    assert!(!fit.converged);
+}
+
+fn search() -> InclusionSearch {
+    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+    InclusionSearch::new(specimen.with_interface(Interface::Bonded), guide(1.0)).unwrap()
+}
+
+fn frame(approach_m: f64) -> PressureProfile {
+    PressureProfile {
+        approach_m,
+        force_n: Some(0.5),
+        pressure_pa: vec![300.0; 16],
+        standard_error_pa: vec![0.5; 16],
+    }
+}
+
+#[test]
+fn frames_that_cannot_be_searched_are_refused() {
+    let radii = forward(2, 1.0).radii_m;
+    let refused = |frames: &[PressureProfile]| search().search(&radii, frames).unwrap_err();
+    assert!(matches!(refused(&[]), ElasticityError::TooFewLoads { .. }));
+    let backwards = refused(&[frame(2e-3), frame(1e-3)]);
+    assert!(matches!(backwards, ElasticityError::OutOfRange { .. }));
+    let nowhere = refused(&[frame(f64::NAN)]);
+    assert!(matches!(nowhere, ElasticityError::NotPositive { .. }));
+    let mut dark = frame(1e-3);
+    dark.pressure_pa[3] = f64::NAN;
+    assert!(matches!(
+        refused(&[dark]),
+        ElasticityError::NotFinite { .. }
+    ));
+    let mut short = frame(1e-3);
+    short.pressure_pa.pop();
+    let short = refused(&[short]);
+    assert!(matches!(short, ElasticityError::LengthMismatch { .. }));
+    let narrow: Vec<f64> = (1..=16).map(|k| f64::from(k) * 1.6e-3).collect();
+    let few = search().search(&narrow, &[frame(1e-3)]).unwrap_err();
+    // Seven of the rings lie within three quarters of 16 mm.
+    assert_eq!(
+        few,
+        ElasticityError::LengthMismatch {
+            quantity: crate::error::Quantity::Samples,
+            expected: 8,
+            found: 7
+        }
+    );
+}
+
+#[test]
+fn a_search_ends_when_told_to() {
+    let radii = forward(2, 1.0).radii_m;
+    let mut heard = 0;
+    let ended = search().search_with_progress(&radii, &[frame(1e-3)], &mut |_| {
+        heard += 1;
+        ControlFlow::Break(())
+    });
+    assert_eq!((ended, heard), (Err(ElasticityError::Cancelled), 1));
+}
+
+#[test]
+fn more_frames_tell_more_of_an_inclusion() {
+    let radii = forward(2, 1.0).radii_m;
+    let assumed = AssumedInclusion {
+        diameter_m: 12e-3,
+        depth_m: 4e-3,
+        youngs_modulus_pa: 30e3,
+        block_modulus_pa: 5e3,
+    };
+    let expected = |approaches: &[f64]| {
+        let errors = search().expected_errors(&assumed, approaches, &radii, 0.5);
+        errors.unwrap()
+    };
+    let one = expected(&[2.4e-3]);
+    let two = expected(&[1.2e-3, 2.4e-3]);
+    assert!(two.diameter < one.diameter && two.youngs_modulus < one.youngs_modulus);
+    let none = search().expected_errors(&assumed, &[], &radii, 0.5);
+    assert!(matches!(none, Err(ElasticityError::TooFewLoads { .. })));
+}
+
+#[test]
+fn a_covariance_is_one() {
+    let (problem, _) = problem();
+    // Cholesky's factor exists and the values' own errors are not below the stated ones.
+    let white = 1e-3 * problem.measured[0];
+    assert!(problem.factor.l_dirty()[(0, 0)] > white);
+}
+
+#[test]
+fn what_is_not_known_within_thirty_percent_is_not_told() {
+    let estimated = |error| super::Estimated::from_logarithm(2f64.ln(), error);
+    assert!(matches!(Told::new(estimated(0.1), true), Told::Yes(_)));
+    assert!(matches!(Told::new(estimated(0.1), false), Told::No(_)));
+    assert!(matches!(Told::new(estimated(0.31), true), Told::No(_)));
+    let interval = estimated(0.1).interval;
+    assert!(
+        (interval[0] * interval[1] - 4.0).abs() < 1e-12,
+        "symmetric in the logarithm"
+    );
+}
