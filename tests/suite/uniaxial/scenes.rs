@@ -84,10 +84,17 @@ impl Face {
     /// A pipeline whose calibration is exact.
     pub(super) fn pipeline(&self, scene: &UniaxialScene, object: Object) -> Pipeline {
         let per_grey = self.camera.pixel_area_m2() / scene.grey_per_pascal();
-        let pairs =
-            [0.0, 5e6, 10e6, 15e6, 20e6, 25e6].map(|v| CalibrationPair::loading(v, per_grey * v));
+        let pairs = exact_pairs(per_grey);
         Pipeline::from_pairs(&pairs, self.camera.pixel_size_m, object).unwrap()
     }
+}
+
+/// A calibration without errors, `per_grey` newtons a grey level.
+pub(super) fn exact_pairs(per_grey: f64) -> Vec<CalibrationPair<f64>> {
+    let values = [0.0, 5e6, 10e6, 15e6, 20e6, 25e6];
+    values
+        .map(|v| CalibrationPair::loading(v, per_grey * v))
+        .to_vec()
 }
 
 /// Everything that the frames of a face say.
