@@ -50,9 +50,9 @@ use std::sync::Arc;
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_frame(frame.view());
-/// // E = (1 − ν²) 3FR/(4a³), the sensor rigid beside the ball.
-/// let expected = 0.75 * 3.0 * 1.005 * 3e-3 / (4.0 * 1e-9);
-/// assert!((press.modulus()?.youngs_modulus_pa / expected - 1.0).abs() < 0.02);
+/// // Hertz has E = (1 − ν²) 3FR/(4a³) of a ball on a rigid flat; finite strain changes it by some percents at a/R = 1/3.
+/// let hertz = 0.75 * 3.0 * 1.005 * 3e-3 / (4.0 * 1e-9);
+/// assert!((press.modulus()?.youngs_modulus_pa / hertz - 1.0).abs() < 0.1);
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone)]

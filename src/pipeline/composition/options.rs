@@ -30,8 +30,9 @@ impl Pipeline {
     ///     press.add_frame(frame.view());
     ///     modulus.push(press.modulus()?.youngs_modulus_pa);
     /// }
-    /// // The gel takes part of the compliance: the ball is the stiffer for it.
-    /// assert!(modulus[1] > modulus[0] && modulus[1] < 1.05 * modulus[0]);
+    /// // The gel has about a quarter of the compliance: the ball is the stiffer for it.
+    /// let ratio = modulus[1] / modulus[0];
+    /// assert!(ratio > 1.15 && ratio < 1.35, "{ratio}");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
@@ -201,8 +202,9 @@ impl Pipeline {
     ///     let modulus = press.modulus()?;
     ///     Ok::<_, tactile_imaging::pipeline::PipelineError>(modulus.standard_error_pa / modulus.youngs_modulus_pa)
     /// };
-    /// // E is proportional to the radius.
-    /// assert!((relative_error(&known_to_3_percent)?.powi(2) - relative_error(&exact)?.powi(2) - 9e-4).abs() < 1e-6);
+    /// // E is proportional to the radius, but for a/R in the correction for finite strain.
+    /// let of_the_radius = relative_error(&known_to_3_percent)?.powi(2) - relative_error(&exact)?.powi(2);
+    /// assert!((of_the_radius.sqrt() / 0.03 - 1.0).abs() < 0.2, "{of_the_radius}");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     ///

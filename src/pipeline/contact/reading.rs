@@ -149,6 +149,27 @@ impl FrameContact {
         self.mask.iter().filter(|inside| **inside).count()
     }
 
+    /// The smallest box of the frame that holds the contact's pixels: `region` may be wider.
+    pub(in crate::pipeline) fn bounds(&self) -> Option<BoundingBox> {
+        let region = self.region?;
+        let inside = self.mask.indexed_iter().filter(|(_, inside)| **inside);
+        inside.fold(None, |bounds: Option<BoundingBox>, ((row, column), _)| {
+            let (row, column) = (region.row_start + row, region.column_start + column);
+            let pixel = BoundingBox {
+                row_start: row,
+                row_end: row + 1,
+                column_start: column,
+                column_end: column + 1,
+            };
+            Some(bounds.map_or(pixel, |bounds| BoundingBox {
+                row_start: bounds.row_start.min(row),
+                row_end: bounds.row_end.max(row + 1),
+                column_start: bounds.column_start.min(column),
+                column_end: bounds.column_end.max(column + 1),
+            }))
+        })
+    }
+
     /// Gives up the saving of the contact's box: the mask is laid out over the whole frame.
     pub(in crate::pipeline) fn widened(&self, (rows, columns): (usize, usize)) -> Self {
         let Some(region) = self.region else {

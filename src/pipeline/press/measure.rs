@@ -74,8 +74,8 @@ impl Press<'_> {
     fn light_drift(&self) -> Option<Flag> {
         let reference = self.runner.reference().image();
         let steps = self.frames.iter().filter_map(|frame| {
-            let region = frame.contact.as_ref()?.region?;
-            background::median_step_outside(frame.image, reference, region)
+            let contact = frame.contact.as_ref()?.bounds()?;
+            background::median_step_outside(frame.image, reference, contact)
         });
         let greatest = steps.max_by_key(|step| step.abs())?;
         (greatest != 0).then_some(Flag::LightDrifted {
