@@ -166,6 +166,8 @@ impl DarkContact {
             converged: true,
             profile_misfit: None,
             face: None,
+            elongation: None,
+            calibration_bend: None,
         }
     }
 }

@@ -74,6 +74,21 @@ pub enum Flag {
         /// Misfit as a share of the peak.
         misfit: f64,
     },
+    /// The contact's outline is not round: the pixels are not as stated, the lens distorts, or the object is no ball.
+    NotRound {
+        /// The frame.
+        frame: usize,
+        /// Longer over shorter half axis, less one.
+        elongation: f64,
+    },
+    /// The pairs of the calibration do not lie on a line: light is not proportional to pressure, so that the light's profile and its
+    /// radius are not those of the pressure. A sensor calibrated from frames has the local curve.
+    LightNotProportional {
+        /// The frame.
+        frame: usize,
+        /// Departure of the pairs from a line at half scale, as a share of the full scale.
+        departure: f64,
+    },
     /// The calibration and the gauge disagree by more than three standard errors and two per cent.
     GaugeDisagrees {
         /// The frame.
@@ -132,9 +147,17 @@ impl ContactReading {
         let shape = self
             .profile_misfit
             .map(|misfit| Flag::NotABall { frame, misfit });
-        [saturated, outside, edge, several, fit, shape]
-            .into_iter()
-            .flatten()
+        let outline = self
+            .elongation
+            .map(|elongation| Flag::NotRound { frame, elongation });
+        let light = self
+            .calibration_bend
+            .map(|departure| Flag::LightNotProportional { frame, departure });
+        [
+            saturated, outside, edge, several, fit, shape, outline, light,
+        ]
+        .into_iter()
+        .flatten()
     }
 }
 
@@ -192,6 +215,22 @@ impl fmt::Display for Flag {
                     "frame {}: the pressure is not that of a ball, by {:.1} % of its peak",
                     frame + 1,
                     100.0 * misfit
+                )
+            }
+            Self::NotRound { frame, elongation } => {
+                write!(
+                    f,
+                    "frame {}: the contact is longer than wide by {:.1} %",
+                    frame + 1,
+                    100.0 * elongation
+                )
+            }
+            Self::LightNotProportional { frame, departure } => {
+                write!(
+                    f,
+                    "frame {}: the calibration's pairs depart from a line by {:.1} % of the full scale: light is not proportional to pressure",
+                    frame + 1,
+                    100.0 * departure
                 )
             }
             Self::GaugeDisagrees {

@@ -8,7 +8,7 @@ use super::pair::{self, PairStrain};
 use super::report::{Report, SkipReason, Stage};
 use super::surface::{self, ContactSurface, ControlPoints, SurfaceWorkspace};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator, UniaxialLoads};
-use crate::force::{Estimate, ForceWorkspace, Polarity, ReferenceFrame};
+use crate::force::{Estimate, ForceWorkspace, FrameCondition, Polarity, ReferenceFrame};
 use crate::matching::{MatchError, Matching, WarmStart};
 use nalgebra::{Point2, Point3};
 use ndarray::ArrayView2;
@@ -135,6 +135,11 @@ impl StageRunner {
         if let Some(reading) = &mut contact.reading {
             reading.face = face;
         }
+    }
+
+    /// What the last measured frame shows of the sensor outside the contact; `None` where the contact stage does not look there.
+    pub(super) fn condition(&mut self) -> Option<FrameCondition> {
+        self.force.condition(&self.reference)
     }
 
     /// Reconstructs the surface of a contact. All surfaces that are compared have one grid, so that what the grid does to them leaves no

@@ -78,7 +78,7 @@ pub enum SensorError {
     Lens(#[source] ForceError),
     /// The contact radii do not go with the forces of a ball on these layers.
     #[error(
-        "the contact radii under the ball of {radius_m:e} m do not fit layers of the stated errors (off by {deviation:.1} standard errors): check the ball's radius"
+        "the contact radii under the ball of {radius_m:e} m do not fit layers of the stated errors (off by {deviation:.1} standard errors): check the ball's radius and the forces"
     )]
     Radius {
         /// The ball's stated radius.

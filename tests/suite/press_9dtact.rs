@@ -58,20 +58,62 @@ fn the_ball_is_found_and_its_depth_is_right() {
         "contact radius {radius} px"
     );
 
-    // The makers state a mean absolute depth error of 0.0462 mm; against the ball, over its whole contact.
+    // Against the stated cap, over the frame's own contact and all that lies around it. The makers state 0.0462 mm, which their table
+    // does not reach on this press: it is as deep as a cap of 66.8 px, 0.06 mm less than one of 67.6 px, and a pixel of contact radius
+    // is 0.076 mm of depth. The ball fitted to the heights is free of that.
+    let error_m = stated_cap_error_m(surface);
     println!(
-        "mean absolute depth error {:.4} mm",
+        "mean absolute depth error {:.4} mm against the stated cap, {:.4} mm against the fitted ball",
+        error_m * 1e3,
         ball.mean_absolute_error_m * 1e3
     );
+    assert!(error_m < 0.066e-3);
     assert!(ball.mean_absolute_error_m < 0.0462e-3);
 
     check_profile(surface);
+    check_empty(&pipeline, &reference);
+}
+
+/// Height of the cap of the stated ball and contact circle at a distance from its centre in metres.
+fn stated_cap_m(r: f64) -> f64 {
+    let a = 67.6 * PIXEL_M;
+    if r >= a {
+        return 0.0;
+    }
+    (BALL_M * BALL_M - r * r).sqrt() - (BALL_M * BALL_M - a * a).sqrt()
+}
+
+/// Mean absolute error of the heights over the stated contact circle; where no contact was found the height is zero.
+fn stated_cap_error_m(surface: &ContactSurface) -> f64 {
+    let [left, top] = surface.origin_m().map(|m| m / PIXEL_M);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in 0..345 {
+        for column in 0..460 {
+            let r = (f64::from(column) - 243.9).hypot(f64::from(row) - 188.5) * PIXEL_M;
+            if r >= 67.6 * PIXEL_M {
+                continue;
+            }
+            let place = [f64::from(row) - top, f64::from(column) - left].map(f64::round);
+            let inside = place.iter().all(|v| *v >= 0.0);
+            let index = place.map(|v| v.max(0.0) as usize);
+            let seen = surface.surface.heights.get(index).filter(|_| inside);
+            let height = seen.copied().filter(|h| h.is_finite()).unwrap_or(0.0);
+            sum += (height - stated_cap_m(r)).abs();
+            count += 1.0;
+        }
+    }
+    sum / count
+}
+
+/// Where nothing touches there is no contact: the reference against itself.
+fn check_empty(pipeline: &Pipeline, reference: &Array2<u8>) {
+    let mut press = pipeline.press(reference.view()).unwrap();
+    press.add_frame(reference.view());
+    assert!(press.contact(0).unwrap().is_none());
 }
 
 /// The cap's profile, ring by ring of 10 px, against the stated geometry: within 0.1 mm of 1.98 mm everywhere.
 fn check_profile(surface: &ContactSurface) {
-    let a = 67.6 * PIXEL_M;
-    let cap = |r: f64| (BALL_M * BALL_M - r * r).sqrt() - (BALL_M * BALL_M - a * a).sqrt();
     let origin = surface.origin_m();
     let mut rings = [[0.0; 3]; 6];
     for ((row, column), h) in surface.surface.heights.indexed_iter() {
@@ -81,7 +123,11 @@ fn check_profile(surface: &ContactSurface) {
         if let Some(ring) = rings.get_mut((r / 10.0) as usize)
             && h.is_finite()
         {
-            *ring = [ring[0] + 1.0, ring[1] + h, ring[2] + cap(r * PIXEL_M)];
+            *ring = [
+                ring[0] + 1.0,
+                ring[1] + h,
+                ring[2] + stated_cap_m(r * PIXEL_M),
+            ];
         }
     }
     for [n, measured, expected] in rings {

@@ -1,5 +1,5 @@
 //! Contacts that let light out: brightness is force.
-use super::{ContactReading, ContactStage, FrameContact, resize};
+use super::{ContactReading, ContactStage, FrameContact, bend, resize};
 use crate::force::{
     CalibrationOptions, CalibrationPair, Estimate, ForceError, ForceMeter, ForceOptions,
     ForceWorkspace, LensGeometry, LinearCalibration, LocalCalibration, Polarity, ReferenceFrame,
@@ -45,6 +45,8 @@ pub struct LightContact {
     pixel_size_m: [f64; 2],
     polarity: Polarity,
     lens: Option<LensGeometry>,
+    /// Of the pairs that a line was fitted to.
+    calibration_bend: Option<f64>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -73,7 +75,10 @@ impl LightContact {
     ) -> Result<Self, PipelineError> {
         let calibration = LinearCalibration::fit(pairs, &CalibrationOptions::default())
             .map_err(PipelineError::Calibration)?;
-        Self::new(calibration, pixel_size_m, options)
+        Ok(Self {
+            calibration_bend: bend::of(pairs),
+            ..Self::new(calibration, pixel_size_m, options)?
+        })
     }
 
     /// With any calibration and options.
@@ -93,6 +98,7 @@ impl LightContact {
             pixel_size_m,
             polarity: options.polarity(),
             lens: None,
+            calibration_bend: None,
         })
     }
 
@@ -144,7 +150,10 @@ impl ContactStage for LightContact {
         let force =
             self.meter
                 .measure_with(workspace, frame, reference, self.calibration.as_ref())?;
-        contact.reading = ContactReading::of_light(&force);
+        contact.reading = ContactReading::of_light(&force).map(|reading| ContactReading {
+            calibration_bend: self.calibration_bend,
+            ..reading
+        });
         if let Some(reading) = &mut contact.reading
             && self.force_from == ForceFrom::Gauge
         {

@@ -1,4 +1,5 @@
 //! The first stage: one frame to contact, force, centroid and radius.
+mod bend;
 mod light;
 mod reading;
 

@@ -58,6 +58,10 @@ pub struct ContactReading {
     pub profile_misfit: Option<f64>,
     /// The contact as a flat face, where the object may have one and the contact is large enough to tell.
     pub face: Option<FaceReading>,
+    /// Longer over shorter half axis of the outline, less one, where it is not round.
+    pub elongation: Option<f64>,
+    /// Departure of the calibration's pairs from a line at half scale, as a share of the full scale, where the pairs show one.
+    pub calibration_bend: Option<f64>,
 }
 
 impl ContactReading {
@@ -104,6 +108,8 @@ impl ContactReading {
                 .filter(|p| p.shape == ProfileShape::NotHertz)
                 .map(|p| p.radial_misfit.hypot(p.azimuthal_misfit)),
             face: None,
+            elongation: force.elongation,
+            calibration_bend: None,
         })
     }
 }

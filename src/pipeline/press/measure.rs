@@ -96,7 +96,11 @@ impl Press<'_> {
             Object::Sphere { .. } | Object::Layer { .. }
         );
         let cautions = reading.flags(frame);
-        flags.extend(cautions.filter(|flag| ball || !matches!(flag, Flag::NotABall { .. })));
+        flags.extend(
+            cautions.filter(|flag| {
+                ball || !matches!(flag, Flag::NotABall { .. } | Flag::NotRound { .. })
+            }),
+        );
         if let (Some(gauge_n), Some(force_n)) = (gauge_force_n, reading.force_n) {
             let apart = (gauge_n - force_n.value).abs();
             if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {

@@ -6,6 +6,7 @@
 //! spline are kept, and each match begins where the last one ended. Memory is constant: similar loads are merged.
 //! [`Session::push`] allocates nothing once its buffers have their size.
 mod drift;
+mod health;
 mod loads;
 mod results;
 mod strain;
@@ -18,8 +19,9 @@ use super::face;
 use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
 use super::runner::{SkipRecords, StageRunner};
-use crate::force::{ShearCalibration, ShearTracker};
+use crate::force::{HealthOptions, HealthReport, ShearCalibration, ShearTracker};
 pub use drift::DriftWatch;
+use health::SensorHealth;
 pub use loads::SESSION_LOADS;
 use loads::SeenLoads;
 use ndarray::{Array2, ArrayView2};
@@ -58,6 +60,7 @@ pub struct Session {
     /// The first contact that a flat face's loads are compared with.
     first_contact: Option<ContactReading>,
     drift: DriftWatch,
+    health: SensorHealth,
 }
 
 impl Session {
@@ -107,6 +110,7 @@ impl Session {
             strain: FollowedStrain::default(),
             first_contact: None,
             drift: DriftWatch::default(),
+            health: SensorHealth::new(HealthOptions::default()),
         })
     }
 
@@ -136,6 +140,37 @@ impl Session {
     #[must_use]
     pub fn with_shear(mut self, calibration: ShearCalibration<f64>) -> Self {
         self.shear = Some(ShearTracker::new(calibration));
+        self
+    }
+
+    /// Sets what counts as a change of the sensor; [`health`](Self::health) starts anew. The default is a change of the brightness by 2 %
+    /// or of the noise by 20 %.
+    ///
+    /// ```
+    /// use tactile_imaging::force::{ChartState, HealthOptions};
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let frame = |k: usize, grey: usize| ndarray::Array2::from_shape_fn((96, 96), |(r, c)| {
+    ///     (grey + (7 * r + 13 * c + 5 * k) % 4) as u8
+    /// });
+    /// let options = HealthOptions::default().with_baseline_frames(50)?;
+    /// let mut session = Session::new(&pipeline, frame(0, 40).view())?.with_health(options);
+    /// for k in 0..60 {
+    ///     session.push(frame(k, 40).view())?;
+    /// }
+    /// assert_eq!(session.health().map(|h| h.brightness), Some(ChartState::Healthy));
+    /// // The light rises by a fortieth.
+    /// for k in 60..110 {
+    ///     session.push(frame(k, 41).view())?;
+    /// }
+    /// assert_eq!(session.health().map(|h| h.brightness), Some(ChartState::Changed));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_health(mut self, options: HealthOptions) -> Self {
+        self.health = SensorHealth::new(options);
         self
     }
 
@@ -193,6 +228,8 @@ impl Session {
         if let Some(grey) = self.contact.background_step_grey {
             self.drift.watch(grey);
         }
+        let condition = self.runner.condition();
+        self.health.watch(number, frame, condition);
         Ok(())
     }
 
@@ -281,6 +318,34 @@ impl Session {
     /// ```
     pub fn drift_flag(&self) -> Option<Flag> {
         self.drift.flag()
+    }
+
+    /// Gain and noise of the sensor as its background shows them, contacts or not, against the session's first frames
+    /// ([`HealthOptions::with_baseline_frames`]); `None` before a frame, and where the contact stage does not look at the background.
+    pub fn health(&self) -> Option<HealthReport> {
+        self.health.report()
+    }
+
+    /// Pixels (row, column) that have kept one grey level while their neighbours changed; every 64th frame is looked at, and none is
+    /// named before sixteen looks. O(pixels).
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{Object, Pipeline, Session};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let frame = |k: usize| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    ///     if (r, c) == (12, 30) { 44 } else { (40 + (7 * r + 13 * c + k / 64) % 4) as u8 }
+    /// });
+    /// let mut session = Session::new(&pipeline, frame(0).view())?;
+    /// for k in 0..1024 {
+    ///     session.push(frame(k).view())?;
+    /// }
+    /// assert_eq!(session.stuck_pixels(), [(12, 30)]);
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn stuck_pixels(&self) -> Vec<(usize, usize)> {
+        self.health.stuck_pixels()
     }
 
     /// What ran and what was skipped so far; skips of one kind are added up.

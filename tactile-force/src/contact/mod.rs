@@ -21,6 +21,7 @@ pub use options::ContactOptions;
 pub use workspace::DetectorWorkspace;
 
 pub(crate) use region::Region;
+pub(crate) use runs::Run;
 
 use crate::drift::IlluminationDrift;
 use crate::estimate::{Estimate, Real};

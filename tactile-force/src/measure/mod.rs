@@ -3,6 +3,7 @@
 mod local;
 mod options;
 mod outcome;
+mod outline;
 mod workspace;
 
 pub use options::ForceOptions;
@@ -128,7 +129,32 @@ impl<T: Real> ForceMeter<T> {
                     None => fit,
                 });
         }
-        Ok(self.combine(found, contact, profile, stress, pixel))
+        // A part of an outline, or one that noise has frayed, says nothing of its shape.
+        let whole = !contact.touches_edge && contact.other_contacts == 0;
+        let clear = contact.peak.as_f64() > CLEAR * noise.background.sqrt();
+        let elongation = (whole && clear)
+            .then(|| outline::elongation(&workspace.detector.region.mask, self.jacobian(&contact)))
+            .flatten();
+        Ok(ForceMeasurement {
+            elongation: elongation.map(T::nearest),
+            ..self.combine(found, contact, profile, stress, pixel)
+        })
+    }
+
+    /// Metres [x, y] for a step of one pixel along x and along y at a contact, in rows.
+    fn jacobian(&self, contact: &Contact<T>) -> [[f64; 2]; 2] {
+        let Some(lens) = &self.lens else {
+            let [hx, hy] = self.pixel_size_m.map(T::as_f64);
+            return [[hx, 0.0], [0.0, hy]];
+        };
+        let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
+        let step = |from: [f64; 2], to: [f64; 2]| {
+            let (from, to) = (lens.to_metres(from), lens.to_metres(to));
+            [to[0] - from[0], to[1] - from[1]]
+        };
+        let along_x = step([x - 0.5, y], [x + 0.5, y]);
+        let along_y = step([x, y - 0.5], [x, y + 0.5]);
+        [[along_x[0], along_y[0]], [along_x[1], along_y[1]]]
     }
 
     /// The size of a pixel at a contact.
@@ -209,12 +235,16 @@ impl<T: Real> ForceMeter<T> {
             peak_stress_pa: Some(peak.scaled(per_grey_pa)),
             contact: Some(contact),
             profile,
+            elongation: None,
             statistics: found.statistics,
             drift: found.drift,
             noise: found.noise,
         }
     }
 }
+
+/// Peak over the noise of one pixel at which a contact's outline is sharp to a pixel.
+const CLEAR: f64 = 20.0;
 
 /// Steps [x, y] of a pixel in metres, and its area.
 #[derive(Clone, Copy, Debug)]

@@ -34,6 +34,14 @@ pub(super) struct Effects {
 }
 
 impl Effects {
+    pub(super) const NONE: Self = Self {
+        exponent: 1.0,
+        vignetting: 0.0,
+        barrel: 0.0,
+        aspect: 1.0,
+        lamps: 0.0,
+        moduli: 0.0,
+    };
     pub(super) const ALL: Self = Self {
         exponent: 1.2,
         vignetting: 0.1,
@@ -244,6 +252,16 @@ impl Simulated {
 
     pub(super) fn reference(&self) -> Array2<u8> {
         self.scene.reference(0)
+    }
+
+    /// A frame under the first ball at its largest force, in the light of the lamps times a gain.
+    pub(super) fn pressed_frame(&mut self, gain: f64, repeat: u32) -> Array2<u8> {
+        let mut load = self.load(BALLS[0].1);
+        load.illumination.level *= gain;
+        let law = self.scene.options().law.clone();
+        let ball = rigid(self.balls[0]);
+        let scene = self.scene.with_object(ball, law, vec![load]).unwrap();
+        scene.frame(0, repeat)
     }
 
     /// The frames of a calibration, with the forces of a gauge.
