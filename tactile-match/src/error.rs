@@ -89,4 +89,18 @@ pub enum MatchError {
         /// Its column.
         column: usize,
     },
+    /// A landmark belongs to a point that the model does not have.
+    #[error("a landmark of model point {row}, but the model has {points} points")]
+    LandmarkRow {
+        /// The landmark's row.
+        row: usize,
+        /// Points of the model.
+        points: usize,
+    },
+    /// The position of a landmark is not finite.
+    #[error("the position of the landmark of model point {row} is not finite")]
+    LandmarkPosition {
+        /// The landmark's row.
+        row: usize,
+    },
 }

@@ -54,7 +54,7 @@ pub use nearest::NearestNeighbour;
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;
 pub use softassign::{
-    AnnealedSoftassign, Outliers, PointSets, Rotation, Search, SoftassignMatch, SoftassignOptions,
-    SoftassignWorkspace, Transformation,
+    AnnealedSoftassign, Landmark, Outliers, PointSets, Rotation, Search, SoftassignMatch,
+    SoftassignOptions, SoftassignWorkspace, Transformation,
 };
 pub use warm_start::WarmStart;

@@ -1,6 +1,7 @@
 //! The alternation: soft assignment at a falling temperature, then the warp that it asks for.
 
 use super::axes::Axes;
+use super::landmarks::Known;
 use super::prior::Prior;
 use super::regression::Regression;
 use super::rigid::RigidFit;
@@ -105,10 +106,12 @@ pub(crate) struct Annealer<const D: usize> {
     pub(crate) regression: Regression<D>,
     /// Takes the regression's place where the warp may not bend.
     pub(crate) rigid: RigidFit<D>,
+    /// What the caller knows of some model points.
+    pub(super) known: Vec<Known<D>>,
     /// Volume of the targets' bounding box.
     pub(crate) volume: f64,
-    weights: Vec<f64>,
-    residuals: Axes<D>,
+    pub(super) weights: Vec<f64>,
+    pub(super) residuals: Axes<D>,
     predicted: Vec<[f64; D]>,
     sums: Vec<f64>,
     /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0 decided.
@@ -282,6 +285,7 @@ impl<const D: usize> Annealer<D> {
         self.residuals.fill(stride, rows.map(target));
         self.weights.clone_from(&self.soft.weight);
         self.weights.resize(stride, 0.0);
+        self.add_landmarks(&state.base, variance);
         if self.rigid.is_active() {
             let (weights, residuals) = (&self.weights, &self.residuals);
             self.rigid.fit(
@@ -329,7 +333,11 @@ impl<const D: usize> Annealer<D> {
             share = (outliers.sum::<f64>() / m as f64).clamp(LEAST_SHARE, 0.95);
         }
         let (gauss, outlier) = ((1.0 - share) * density, share / self.volume);
-        let data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
+        let mut data: f64 = sums.iter().map(|s| -(gauss * s + outlier).ln()).sum();
+        let known = self.known.iter();
+        data += known
+            .map(|known| known.energy(&state.warped[known.row]))
+            .sum::<f64>();
         if self.rigid.is_active() {
             // All motions are equally likely, and as precisely known from one start as from another.
             state.energy = data;

@@ -136,6 +136,11 @@ impl AnnealedSoftassign {
         ws.annealer
             .rigid
             .set(self.options.transformation, &levels.model);
+        // Rows of samples are others: landmarks count at all points alone.
+        ws.annealer.known.clear();
+        if stride == 1 {
+            ws.annealer.known.extend_from_slice(&ws.known);
+        }
         ws.spacing = ws.patterns.typical_spacing(&levels.target);
     }
 

@@ -30,6 +30,7 @@ mod correspond;
 mod finish;
 mod found;
 mod frame;
+mod landmarks;
 mod lanes;
 mod large;
 mod levels;
@@ -49,6 +50,7 @@ mod tuples;
 
 pub use batch::PointSets;
 pub use found::SoftassignMatch;
+pub use landmarks::Landmark;
 pub use options::{Outliers, Rotation, Search, SoftassignOptions, Transformation};
 
 use crate::{Doubt, MatchError, Matching, PointMatcher, WarmStart, validate};
@@ -57,6 +59,7 @@ use consensus::Consensus;
 use correspond::Correspondence;
 use finish::Answer;
 use frame::Frame;
+use landmarks::Known;
 use levels::Levels;
 use nalgebra::Point;
 use patterns::LocalPatterns;
@@ -119,6 +122,7 @@ pub struct SoftassignWorkspace<const D: usize> {
     tuples: Tuples<D>,
     scales: ScaleAverage<D>,
     levels: Levels<D>,
+    known: Vec<Known<D>>,
     /// Typical distance of a target from the next, once the search asks for it.
     spacing: f64,
     /// Share of points without a partner that the caller expects.
@@ -167,6 +171,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         self.model.extend(model.iter().map(|p| frame.model(p)));
         self.target.clear();
         self.target.extend(target.iter().map(|p| frame.target(p)));
+        self.known.clear();
         Ok(())
     }
 }

@@ -139,6 +139,7 @@ impl AnnealedSoftassign {
         ws.annealer
             .rigid
             .set(self.options.transformation, &ws.model);
+        ws.annealer.known.clone_from(&ws.known);
     }
 
     /// One short run from `start`, at first as warm as `sigma`, between the coldest that lets points change their partners and

@@ -1,0 +1,221 @@
+//! Landmarks: model points whose place in the target is known, exactly or with an error.
+
+use super::anneal::Annealer;
+use super::{AnnealedSoftassign, SoftassignMatch, SoftassignWorkspace, finish};
+use crate::validate::option_within;
+use crate::{MatchError, Matching};
+use nalgebra::Point;
+use std::ops::ControlFlow;
+use tactile_tps::Scalar;
+
+/// Where a model point is known to go, as a normal distribution: the fit counts it beside the soft matches, with the weight σ²/s² of its
+/// standard deviation s at the temperature σ.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{AnnealedSoftassign, Landmark, SoftassignOptions, Transformation};
+/// // Twelve points of a regular ring: only landmarks can tell that it was turned.
+/// let ring = |turn: f64| -> Vec<Point2<f64>> {
+///     (0..12).map(|k| f64::from(k).mul_add(30.0, turn).to_radians()).map(|a| Point2::new(a.cos(), a.sin())).collect()
+/// };
+/// let (model, target) = (ring(0.0), ring(30.0));
+/// let landmarks = [Landmark::new(0, target[0], 0.0)?, Landmark::new(4, target[4], 0.0)?]; // two known pairs
+/// let options = SoftassignOptions::default().with_transformation(Transformation::Rigid);
+/// let found = AnnealedSoftassign::new(options).match_with_landmarks(&model, &target, &landmarks)?;
+/// assert!((0..12).all(|i| found.assignment[i] == Some(i)));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landmark<T: Scalar, const D: usize> {
+    row: usize,
+    position: Point<T, D>,
+    deviation: T,
+}
+
+impl<T: Scalar, const D: usize> Landmark<T, D> {
+    /// Model point `row` goes to `position`, with the standard deviation `deviation` along an axis, in the units of the points; 0 for a hard
+    /// landmark, which is kept to a thousandth of the model's radius, and where its position is a target exactly.
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for a deviation that is negative or not finite, [`MatchError::LandmarkPosition`] for a position
+    /// that is not finite.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{Landmark, MatchError};
+    /// let seen = Landmark::new(7, Point2::new(0.3, 0.1), 0.05); // near there, to 0.05 along each axis
+    /// assert!(seen.is_ok());
+    /// let nowhere = Landmark::new(7, Point2::new(f64::NAN, 0.1), 0.05);
+    /// assert_eq!(nowhere, Err(MatchError::LandmarkPosition { row: 7 }));
+    /// ```
+    pub fn new(row: usize, position: Point<T, D>, deviation: T) -> Result<Self, MatchError> {
+        option_within("deviation", deviation.widen(), 0.0, f64::MAX, "[0, ∞)")?;
+        if !position.iter().all(|c| c.is_finite()) {
+            return Err(MatchError::LandmarkPosition { row });
+        }
+        Ok(Self {
+            row,
+            position,
+            deviation,
+        })
+    }
+}
+
+/// A landmark in the units of the frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known<const D: usize> {
+    pub(crate) row: usize,
+    pub(crate) position: [f64; D],
+    /// Variance along an axis.
+    pub(crate) variance: f64,
+}
+
+impl<const D: usize> Known<D> {
+    /// Energy of a model point that was put there: minus the logarithm of its density, but for a constant.
+    pub(crate) fn energy(&self, warped: &[f64; D]) -> f64 {
+        let square: f64 = (0..D).map(|k| (warped[k] - self.position[k]).powi(2)).sum();
+        0.5 * square / self.variance
+    }
+}
+
+impl AnnealedSoftassign {
+    /// As [`match_points`](crate::PointMatcher::match_points), with what is known of some model points; several landmarks of one point count
+    /// together.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{AnnealedSoftassign, Landmark};
+    /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+    /// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
+    /// let known = Landmark::new(2, target[2], 0.01)?;
+    /// let found = AnnealedSoftassign::default().match_with_landmarks(&model, &target, &[known])?;
+    /// assert_eq!(found.assignment[2], Some(2));
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`match_points`](crate::PointMatcher::match_points), and [`MatchError::LandmarkRow`] for a landmark of a point that the model does not
+    /// have.
+    pub fn match_with_landmarks<T: Scalar, const D: usize>(
+        &self,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+        landmarks: &[Landmark<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
+        if let Some(beyond) = landmarks.iter().find(|known| known.row >= model.len()) {
+            return Err(MatchError::LandmarkRow {
+                row: beyond.row,
+                points: model.len(),
+            });
+        }
+        let mut workspace = SoftassignWorkspace::new();
+        workspace.take(model, target)?;
+        let frame = workspace.frame;
+        workspace.known.extend(landmarks.iter().map(|known| {
+            Known {
+                row: known.row,
+                position: frame.target(&known.position),
+                variance: (known.deviation.widen() / frame.scale)
+                    .max(finish::FLOOR)
+                    .powi(2),
+            }
+        }));
+        self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
+        let found = SoftassignMatch {
+            workspace: &workspace,
+        };
+        Ok(found.to_matching(model))
+    }
+}
+
+impl<const D: usize> Annealer<D> {
+    /// Adds what the landmarks say to the request of the soft matches: precisions add up, displacements are averaged by them.
+    pub(super) fn add_landmarks(&mut self, base: &[[f64; D]], variance: f64) {
+        for known in &self.known {
+            let (row, precision) = (known.row, variance / known.variance);
+            let total = self.weights[row] + precision;
+            for (k, axis) in self.residuals.0.iter_mut().enumerate() {
+                let displacement = known.position[k] - base[row][k];
+                axis[row] = (self.weights[row] * axis[row] + precision * displacement) / total;
+            }
+            self.weights[row] = total;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    fn ring(turn: f64) -> Vec<Point2<f64>> {
+        let angle = |k: i32| (f64::from(k) * 30.0 + turn).to_radians();
+        (0..12)
+            .map(|k| Point2::new(angle(k).cos(), angle(k).sin()))
+            .collect()
+    }
+
+    #[test]
+    fn landmarks_out_of_range_are_typed_errors() {
+        let origin = Point2::new(0.0, 0.0);
+        for deviation in [-1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(
+                Landmark::new(0, origin, deviation),
+                Err(MatchError::InvalidOption {
+                    option: "deviation",
+                    ..
+                })
+            ));
+        }
+        let nowhere = Landmark::new(3, Point2::new(f64::NAN, 0.0), 0.1);
+        assert_eq!(nowhere, Err(MatchError::LandmarkPosition { row: 3 }));
+        let beyond = Landmark::new(12, origin, 0.1).expect("a landmark");
+        let found =
+            AnnealedSoftassign::default().match_with_landmarks(&ring(0.0), &ring(0.0), &[beyond]);
+        let expected = MatchError::LandmarkRow {
+            row: 12,
+            points: 12,
+        };
+        assert_eq!(found.err(), Some(expected));
+    }
+
+    /// Without any the answer is that of a plain match, to the bit.
+    #[test]
+    fn no_landmarks_change_nothing() {
+        use crate::PointMatcher;
+        let (model, target) = (ring(0.0), ring(7.0));
+        let matcher = AnnealedSoftassign::default();
+        let plain = matcher.match_points(&model, &target).expect("good points");
+        let found = matcher
+            .match_with_landmarks(&model, &target, &[])
+            .expect("good points");
+        assert_eq!(plain.warped, found.warped);
+        assert_eq!(plain.confidence, found.confidence);
+    }
+
+    /// A point without a partner goes where its landmark says: the closer the smaller its deviation.
+    #[test]
+    fn softer_landmarks_pull_less() {
+        let model: Vec<Point2<f64>> = (0..40)
+            .map(|i| {
+                Point2::new(
+                    f64::from(i % 8) + 0.3 * f64::from(i * i % 7),
+                    f64::from(i / 8),
+                )
+            })
+            .collect();
+        let target = &model[..39];
+        let away = model[39] + nalgebra::Vector2::new(0.4, 0.0);
+        let distance = |deviation: f64| {
+            let landmark = Landmark::new(39, away, deviation).expect("a landmark");
+            let found = AnnealedSoftassign::default()
+                .match_with_landmarks(&model, target, &[landmark])
+                .expect("good points");
+            (found.warped[39] - away).norm()
+        };
+        let distances = [0.0, 0.3, 10.0].map(distance);
+        assert!(distances.is_sorted(), "{distances:?}");
+        // A hard landmark is met to some thousandths of the radius of 3; one of ten units says next to nothing.
+        assert!(distances[0] < 0.05 && distances[2] > 0.2, "{distances:?}");
+    }
+}
