@@ -1,38 +1,62 @@
-//! The contact states that the simulator's finite-element scene draws from, as the CSV file `src/simulate/finite_elements.csv`.
+//! Contacts by finite elements, as CSV: those that the simulator's finite-element scene draws from, or those of a test.
 //!
 //! ```console
 //! cargo run --release --features fem,simulate --example contact_states > src/simulate/finite_elements.csv
+//! cargo run --release --features fem,simulate --example contact_states -- presses > tests/data/finite_element_presses.csv
 //! ```
 //!
-//! Balls of the paper's two polymers on its waveguide, neo-Hookean, without friction. ν = ½ is computed as 0.4999.
+//! Neo-Hookean balls on neo-Hookean layers or on a rigid flat, without friction. ν = ½ is computed as 0.4999. A row a point: its contact
+//! (modulus, radius, layers as thickness:modulus, force, contact radius, approach), then distance from the axis, pressure and height.
 use std::io::{Result, Write, stdout};
-use tactile_imaging::elasticity::fem::{Guide, Layer, Load, Material, Scene};
+use tactile_imaging::elasticity::ElasticityError;
+use tactile_imaging::elasticity::fem::{Guide, Layer, Load, Material, Object, Press, State};
 use tactile_imaging::simulate::{Elastic, Waveguide};
 
-const RADIUS_M: f64 = 3e-3;
-/// Wide enough that its rim is not felt.
-const GUIDE_RADIUS_M: f64 = 30e-3;
-const FORCES_N: [f64; 11] = [0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.85, 1.0, 1.2, 1.3];
-/// Nodes beyond this part of the contact radius are left out: the element at the rim is only partly in contact.
-const INNER: f64 = 0.97;
+const POISSON_RATIO: f64 = 0.4999;
 
-fn main() -> Result<()> {
-    let mut out = stdout().lock();
-    writeln!(
-        out,
-        "youngs_modulus_pa,force_n,contact_radius_m,indentation_m,radius_m,pressure_pa,height_m"
-    )?;
-    for polymer in [Elastic::CL2000X, Elastic::CL2003X] {
-        let scene = scene(polymer).map_err(std::io::Error::other)?;
-        let solution = scene.solve(&FORCES_N.map(Load::Force));
-        for state in &solution.states {
+struct Ball {
+    youngs_modulus_pa: f64,
+    radius_m: f64,
+    /// Thickness and modulus of each layer; none on a rigid flat.
+    layers: Vec<(f64, f64)>,
+    forces_n: Vec<f64>,
+}
+
+impl Ball {
+    fn states(&self) -> std::result::Result<Vec<State>, ElasticityError> {
+        let material = |modulus| Material::new(modulus, POISSON_RATIO);
+        let ball = Object::Ball {
+            radius_m: self.radius_m,
+        };
+        let mut press = Press::new(ball, material(self.youngs_modulus_pa)?)?;
+        if !self.layers.is_empty() {
+            let thickness_m: f64 = self.layers.iter().map(|layer| layer.0).sum();
+            let mut layers = Vec::with_capacity(self.layers.len());
+            for &(thickness_m, modulus) in &self.layers {
+                layers.push(Layer {
+                    thickness_m,
+                    material: material(modulus)?,
+                });
+            }
+            // Wide enough that its rim is not felt.
+            let guide = Guide::new(layers, (5.0 * self.radius_m).max(2.8 * thickness_m))?;
+            press = press.on_guide(guide)?;
+        }
+        let loads: Vec<Load> = self.forces_n.iter().map(|&f| Load::Force(f)).collect();
+        Ok(press.scene()?.solve(&loads).states)
+    }
+
+    fn write(&self, out: &mut impl Write) -> Result<()> {
+        let layers: Vec<String> = (self.layers.iter())
+            .map(|(thickness_m, modulus)| format!("{thickness_m}:{modulus}"))
+            .collect();
+        for state in self.states().map_err(std::io::Error::other)? {
             let Some(contact) = state.contact_radius() else {
                 continue;
             };
             let a = contact.radius_m;
             // Heights count from the guide's undeformed surface, which the glass has carried up by the approach.
-            let inside = state.pressure().iter().filter(|p| p.r_m < INNER * a);
-            let mut rows: Vec<[f64; 3]> = inside
+            let mut rows: Vec<[f64; 3]> = (state.pressure().iter())
                 .map(|p| [p.r_m, p.pressure_pa, p.z_m - state.approach_m()])
                 .collect();
             let rim = rows.last().map_or(0.0, |row| row[2]);
@@ -40,30 +64,67 @@ fn main() -> Result<()> {
             for [r, p, z] in rows {
                 writeln!(
                     out,
-                    "{},{:.4},{a:.5e},{:.5e},{r:.4e},{p:.4e},{z:.4e}",
-                    polymer.youngs_modulus_pa,
+                    "{},{},{},{:.4},{a:.5e},{:.5e},{r:.4e},{p:.4e},{z:.4e}",
+                    self.youngs_modulus_pa,
+                    self.radius_m,
+                    layers.join(";"),
                     state.force_n(),
                     state.approach_m()
                 )?;
             }
         }
+        Ok(())
     }
-    Ok(())
 }
 
-fn scene(
-    polymer: Elastic,
-) -> std::result::Result<Scene, tactile_imaging::elasticity::ElasticityError> {
-    let material = |e: Elastic| Material::new(e.youngs_modulus_pa, e.poisson_ratio.min(0.4999));
-    let waveguide = Waveguide::default();
-    let layers: std::result::Result<Vec<_>, _> = (waveguide.layers.iter())
-        .map(|l| {
-            material(l.material).map(|material| Layer {
-                thickness_m: l.thickness_m,
-                material,
-            })
+fn main() -> Result<()> {
+    let mut out = stdout().lock();
+    writeln!(
+        out,
+        "youngs_modulus_pa,ball_radius_m,layers,force_n,contact_radius_m,indentation_m,radius_m,pressure_pa,height_m"
+    )?;
+    let balls = match std::env::args().nth(1).as_deref() {
+        Some("presses") => presses(),
+        _ => polymers(),
+    };
+    balls.iter().try_for_each(|ball| ball.write(&mut out))
+}
+
+fn papers_layers() -> Vec<(f64, f64)> {
+    (Waveguide::default().layers.iter())
+        .map(|l| (l.thickness_m, l.material.youngs_modulus_pa))
+        .collect()
+}
+
+/// The paper's two polymers on its waveguide.
+fn polymers() -> Vec<Ball> {
+    [Elastic::CL2000X, Elastic::CL2003X]
+        .map(|polymer| Ball {
+            youngs_modulus_pa: polymer.youngs_modulus_pa,
+            radius_m: 3e-3,
+            layers: papers_layers(),
+            forces_n: vec![0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.7, 0.85, 1.0, 1.2, 1.3],
         })
-        .collect();
-    let guide = Guide::new(layers?, GUIDE_RADIUS_M)?;
-    Scene::ball_on_guide(RADIUS_M, material(polymer)?, &guide)
+        .into()
+}
+
+/// Moduli, radii, guides and loads that no table holds and no law was fitted to.
+fn presses() -> Vec<Ball> {
+    let on = |layers: &[(f64, f64)], modulus, radius_m, forces_n: &[f64]| Ball {
+        youngs_modulus_pa: modulus,
+        radius_m,
+        layers: layers.to_vec(),
+        forces_n: forces_n.to_vec(),
+    };
+    let paper = papers_layers();
+    vec![
+        on(&paper, 45e3, 3e-3, &[0.02, 0.06, 0.15, 0.35, 0.6, 0.8]),
+        on(&paper, 80e3, 3e-3, &[0.02, 0.08, 0.22, 0.5, 0.9, 1.2]),
+        on(&paper, 180e3, 3e-3, &[0.03, 0.1, 0.3, 0.7, 1.1, 1.6]),
+        on(&paper, 60e3, 8e-3, &[0.1, 0.4, 1.0, 2.0, 4.0]),
+        on(&[(7.5e-3, 80e3)], 60e3, 3e-3, &[0.02, 0.08, 0.2, 0.5, 0.9]),
+        on(&[(3e-3, 150e3)], 100e3, 3e-3, &[0.04, 0.15, 0.4, 0.9, 1.6]),
+        on(&[], 30e3, 10e-3, &[0.05, 0.3, 1.0, 2.5, 5.0]),
+        on(&[], 200e3, 4e-3, &[0.03, 0.2, 0.8, 2.0, 3.5]),
+    ]
 }

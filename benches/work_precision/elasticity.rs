@@ -1,7 +1,11 @@
-//! How many repetitions a standard error needs.
+//! How many repetitions a standard error needs; what each law of a ball's contact costs and misses.
 
 use crate::study::Study;
-use tactile_imaging::elasticity::modulus::Bootstrap;
+use tactile_imaging::elasticity::contact::{Bond, Layer, Waveguide};
+use tactile_imaging::elasticity::modulus::{
+    Bootstrap, Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
+};
+use tactile_imaging::simulate::{self, Elastic, PressOptions, PressScene, Sphere};
 
 /// A cube of a normal number, as the modulus is of the contact radius: E ∝ a⁻³ with 1 % in a, whose spread is known by a long run.
 fn cube(normal: &mut dyn FnMut() -> f64) -> Option<f64> {
@@ -41,5 +45,62 @@ pub(crate) fn bootstrap(study: &mut Study) {
                 .sqrt()
         });
         study.entries.last_mut().expect("an entry").seconds /= RUNS as f64;
+    }
+}
+
+/// The paper's two samples at 0.7 and 1.2 N as finite elements give them, force and contact radius without noise. None of the laws is a
+/// default here. The bench `finite_elements` times contact tables.
+pub(crate) fn laws(study: &mut Study) {
+    study.error_label = "rms error of the modulus, relative";
+    const RADIUS_M: f64 = 3e-3;
+    let layers = simulate::Waveguide::default().layers;
+    let layers = layers.iter().map(|l| Layer {
+        thickness_m: l.thickness_m,
+        youngs_modulus_pa: l.material.youngs_modulus_pa,
+        poisson_ratio: l.material.poisson_ratio,
+    });
+    let guide = Waveguide::new(layers.collect()).expect("a guide");
+    let hertz = HertzSphere::new(RADIUS_M, 0.5).expect("a ball");
+    let laws: [(&str, Box<dyn ModulusEstimator<f64>>); 3] = [
+        ("Hertz, rigid guide", Box::new(hertz.clone())),
+        (
+            "Hertz, layers in series",
+            Box::new(hertz.with_other_body(guide.as_body())),
+        ),
+        (
+            "layered, finite strain",
+            Box::new(SphereOnWaveguide::new(RADIUS_M, 0.5, &guide, Bond::Bonded).expect("a ball")),
+        ),
+    ];
+    let samples = [Elastic::CL2000X, Elastic::CL2003X].map(|material| {
+        let object = Sphere {
+            radius_m: RADIUS_M,
+            material,
+        };
+        let options = PressOptions {
+            object,
+            ..PressOptions::finite_elements()
+        };
+        let scene = PressScene::new(options).expect("a scene");
+        let loads = [0, 1].map(|load| {
+            let contact = scene.truth(load).contact;
+            let radius = Estimate::new(contact.contact_radius_m, 1e-3 * contact.contact_radius_m);
+            LoadState::new(Estimate::new(contact.force_n, 1e-3 * contact.force_n))
+                .with_contact_radius(radius)
+        });
+        (material.youngs_modulus_pa, LoadSeries::new(loads))
+    });
+    for (name, law) in laws {
+        let job = || {
+            samples.each_ref().map(|(truth, loads)| {
+                // Layers in series leave nothing for the harder sample: as far off as can be.
+                law.estimate(loads)
+                    .map_or(1.0, |found| found.youngs_modulus_pa / truth - 1.0)
+            })
+        };
+        study.run("law", name, false, job, |errors| {
+            (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+        });
+        study.entries.last_mut().expect("an entry").seconds /= samples.len() as f64;
     }
 }

@@ -33,7 +33,7 @@ const WITHIN: f64 = 1.2;
 /// A name and what fills the study of that name.
 type Filler = (&'static str, fn(&mut Study));
 
-const STUDIES: [Filler; 10] = [
+const STUDIES: [Filler; 11] = [
     ("splines", tps::clean),
     ("splines_noise", tps::noisy),
     ("matching", matching::noisy),
@@ -42,6 +42,7 @@ const STUDIES: [Filler; 10] = [
     ("slopes", sfs::slopes),
     ("force", force::frame),
     ("bootstrap", elasticity::bootstrap),
+    ("ball_laws", elasticity::laws),
     ("rays", optics::rays),
     ("pipeline", pipeline::strain),
 ];

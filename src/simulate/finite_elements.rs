@@ -3,8 +3,8 @@
 use super::contact_state::ContactState;
 use super::material::{Elastic, Sphere, Waveguide};
 
-/// A row a point: modulus, force, contact radius and approach of its state, then distance, pressure and height. Made by
-/// `examples/contact_states.rs`.
+/// A row a point: the ball's modulus and radius, its guide's layers, force, contact radius and approach of its state, then distance,
+/// pressure and height. Made by `examples/contact_states.rs`.
 const POINTS: &str = include_str!("finite_elements.csv");
 
 /// R of the balls.
@@ -25,9 +25,15 @@ pub(super) fn states(sphere: &Sphere, waveguide: &Waveguide) -> Option<Vec<Conta
     }
     let mut states: Vec<ContactState> = Vec::new();
     for row in POINTS.lines().skip(1) {
-        let numbers: Option<Vec<f64>> = row.split(',').map(|cell| cell.parse().ok()).collect();
+        // The layers, the third column, are the default waveguide's.
+        let cells = row
+            .split(',')
+            .enumerate()
+            .filter(|(column, _)| *column != 2);
+        let numbers: Option<Vec<f64>> = cells.map(|(_, cell)| cell.parse().ok()).collect();
         let [
             modulus,
+            _radius,
             force_n,
             contact_radius_m,
             indentation_m,

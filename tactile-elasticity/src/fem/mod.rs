@@ -4,8 +4,9 @@
 //! or bonded: a soft ball on a rigid flat or on a layered guide, a guide's face on a block of tissue
 //! with a stiff inclusion. Loads are forces or approaches; what is not reached ends in a report.
 //!
-//! [`Scene`] has the ready models, [`Model`] puts bodies together freely. For three dimensions take a
-//! general package: CalculiX, FEniCSx or MOOSE.
+//! [`Scene`] has the ready models, [`Press`] balls, half balls, cylinders, plates and cones on a guide or a rigid flat, [`Model`] puts
+//! bodies together freely and [writes](Model::write_vtk) states for ParaView. For three dimensions take a general package: CalculiX,
+//! FEniCSx or MOOSE.
 //!
 //! # Ready scenes
 //! ```
@@ -50,7 +51,8 @@
 //! a/R = 0.9 within 0.2 % in contact radius and 0.1 % in approach at given force; a bonded block with an
 //! inclusion within 0.9 % in force and, with D up to 11 mm, 0.3 % root mean square in pressure over the
 //! inner three quarters of the face; without friction 1.6 % and 0.7 %; a ball on a guide of three layers
-//! up to a/R = 1.07 within 0.2 % in contact radius and 0.3 % in approach at given force.
+//! up to a/R = 1.07 within 0.2 % in contact radius and 0.3 % in approach at given force, 0.6 % in force at
+//! given contact radius (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
 //!
 //! # References
 //! T. J. R. Hughes, *The Finite Element Method* (1987). P. Wriggers, *Computational Contact Mechanics*
@@ -85,6 +87,7 @@ mod state;
 mod stress;
 mod system;
 mod tangent;
+mod vtk;
 
 pub use guide::{Guide, Layer};
 pub use load::{Load, Outcome, Report, Solution};

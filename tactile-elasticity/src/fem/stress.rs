@@ -45,13 +45,24 @@ impl Model {
             return None;
         }
         let (index, [xi, eta]) = self.locate(point)?;
-        let nodes = self.elements[index].map(|node| self.nodes[node]);
         // On the axis u_r / r is ∂u_r/∂r: taken from close by, where the quotient is still exact.
         let xi = if point[0] == 0.0 {
             xi * (1.0 - 1e-7)
         } else {
             xi
         };
+        self.element_stress(state, index, [xi, eta])
+    }
+
+    /// Cauchy stress within an element, off the axis; `None` where it is turned inside out.
+    pub(super) fn element_stress(
+        &self,
+        state: &State,
+        index: usize,
+        [xi, eta]: [f64; 2],
+    ) -> Option<Stress> {
+        let fields = &state.fields;
+        let nodes = self.elements[index].map(|node| self.nodes[node]);
         let (position, gradients, _) = map(&nodes, xi, eta);
         let u: [f64; ALL] = fields.element(&self.elements[index]);
         let mut h: Gradient = [0.0; 5];

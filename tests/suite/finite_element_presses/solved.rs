@@ -1,0 +1,108 @@
+//! Presses and tables solved when asked for.
+
+use super::{Ball, Guide, Layer};
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use tactile_imaging::elasticity::contact::{ContactTable, TableOptions};
+use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Press, State};
+use tactile_imaging::simulate::ContactState;
+
+/// A ball's radius and the layers (thickness, modulus) that it is pressed on; none is a rigid flat.
+type Sensor = (f64, &'static [(f64, f64)]);
+
+const PAPER: &[(f64, f64)] = &[(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)];
+
+/// The paper's guide under balls of 3 and 8 mm, single layers that contacts of 1.2 ball radii take to a/h of 1 and 1.5, rigid flats.
+pub(super) const SENSORS: [Sensor; 6] = [
+    (3e-3, PAPER),
+    (8e-3, PAPER),
+    (5e-3, &[(6e-3, 80e3)]),
+    (5e-3, &[(4e-3, 120e3)]),
+    (4e-3, &[]),
+    (20e-3, &[]),
+];
+
+/// The elements' Poisson ratio where ½ is meant.
+const POISSON_RATIO: f64 = 0.4999;
+
+pub(super) fn table((radius_m, layers): &Sensor) -> Arc<ContactTable> {
+    let layer = |&(thickness_m, youngs_modulus_pa): &(f64, f64)| Layer {
+        thickness_m,
+        youngs_modulus_pa,
+        poisson_ratio: 0.5,
+    };
+    let guide = match layers {
+        [] => Guide::rigid(),
+        layers => Guide::new(layers.iter().map(layer).collect()).unwrap(),
+    };
+    let options = TableOptions::default();
+    let table = ContactTable::solve(*radius_m, 0.5, &guide, &options, |_| {
+        ControlFlow::Continue(())
+    });
+    Arc::new(table.unwrap())
+}
+
+/// A ball of 30 to 250 kPa on one of the sensors at four loads, a/R 0.1 to 1.2, on a coarser or a finer mesh than the tables'.
+pub(super) fn ball(seed: u64) -> Ball {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (radius_m, layers) = SENSORS[seed as usize % SENSORS.len()];
+    let modulus = 30e3 * (250.0_f64 / 30.0).powf(rng.random::<f64>());
+    let fineness = if rng.random::<bool>() { 4 } else { 7 };
+    // Approaches at which a/R is about x: Hertz's a²/R, less what large strain and the ball's far side take off.
+    let part = if layers.is_empty() { 0.75 } else { 0.9 };
+    let ratios = [0.12, 0.45].map(|from: f64| {
+        let smaller = from * (0.85_f64 / 0.45).powf(1.6 * rng.random::<f64>());
+        [smaller, smaller * (1.15 + 0.25 * rng.random::<f64>())]
+    });
+    let mut ratios = ratios.concat();
+    ratios.sort_by(f64::total_cmp);
+    let loads: Vec<Load> = (ratios.iter())
+        .map(|x| Load::Approach(part * x.min(1.15).powi(2) * radius_m))
+        .collect();
+    let states = press(radius_m, layers, modulus, fineness)
+        .solve(&loads)
+        .states;
+    let states: Vec<ContactState> = states.iter().filter_map(contact_state).collect();
+    Ball {
+        name: format!("{seed}: {modulus:.0} Pa, {radius_m} m on {layers:?}"),
+        youngs_modulus_pa: modulus,
+        radius_m,
+        layers: layers.to_vec(),
+        states,
+    }
+}
+
+fn press(radius_m: f64, layers: &[(f64, f64)], modulus: f64, fineness: usize) -> fem::Scene {
+    let material = |modulus| Material::new(modulus, POISSON_RATIO).unwrap();
+    let mut press = Press::new(Object::Ball { radius_m }, material(modulus)).unwrap();
+    if !layers.is_empty() {
+        let thickness: f64 = layers.iter().map(|layer| layer.0).sum();
+        let layers = layers.iter().map(|&(thickness_m, modulus)| fem::Layer {
+            thickness_m,
+            material: material(modulus),
+        });
+        // Another rim than the tables' guides have.
+        let rim = (5.0 * radius_m).max(3.0 * thickness);
+        let guide = fem::Guide::new(layers.collect(), rim).unwrap();
+        press = press.on_guide(guide).unwrap();
+    }
+    press.with_fineness(fineness).unwrap().scene().unwrap()
+}
+
+fn contact_state(state: &State) -> Option<ContactState> {
+    let contact_radius_m = state.contact_radius()?.radius_m;
+    let points = state.pressure().iter();
+    let mut contact = ContactState {
+        force_n: state.force_n(),
+        contact_radius_m,
+        indentation_m: state.approach_m(),
+        radius_m: points.clone().map(|p| p.r_m).collect(),
+        pressure_pa: points.clone().map(|p| p.pressure_pa).collect(),
+        height_m: points.map(|p| p.z_m - state.approach_m()).collect(),
+    };
+    contact.radius_m.push(contact_radius_m);
+    contact.pressure_pa.push(0.0);
+    contact.height_m.push(*contact.height_m.last()?);
+    Some(contact)
+}
