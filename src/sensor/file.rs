@@ -242,8 +242,9 @@ impl Sensor {
             .layer_covariance
             .iter()
             .all(|row| row.len() == self.layer_covariance.len());
-        if !self.layer_covariance.is_empty() && !(square && self.layer_covariance.len() == expected)
-        {
+        let given = !self.layer_covariance.is_empty();
+        let fits = square && self.layer_covariance.len() == expected;
+        if given && !fits {
             let message = format!("expected {expected} rows of {expected} numbers, three a layer");
             return Err(wrong("layer_covariance", &message));
         }
