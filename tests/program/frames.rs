@@ -97,7 +97,7 @@ fn a_sample_too_stiff_to_measure_has_a_bound_or_a_reason() {
     assert!(!printed.contains("above 0"), "{printed}");
 }
 
-/// 20,000 frames in one scene within 200 MB beside their pixels, and no more text than that.
+/// 20,000 frames in one scene within 300 MB beside their pixels, and no more text than that.
 #[test]
 fn twenty_thousand_frames_are_one_measurement() {
     let folder = folder_with_examples();
@@ -106,7 +106,8 @@ fn twenty_thousand_frames_are_one_measurement() {
         .collect();
     scene(folder.path(), "many.toml", "reference.png", &frames);
     let pixels_kib = 20_000 * 22_500 / 1024;
-    let limit = pixels_kib + 200_000;
+    // Beyond the pixels some 10 kB a frame (its contact, its results) and the program itself: a matrix of all loads, 3.2 GB, does not fit.
+    let limit = pixels_kib + 300_000;
     let output = Command::new("sh")
         .arg("-c")
         .arg(format!("ulimit -v {limit}; exec \"$@\""))
