@@ -95,6 +95,16 @@ fn ball_on_guide(is_test: bool) {
     }
 }
 
+/// A ball pressed by another program.
+struct Published {
+    name: String,
+    youngs_modulus_pa: f64,
+    radius_m: f64,
+    on_flat: bool,
+    /// Force and contact radius.
+    loads: Vec<[f64; 2]>,
+}
+
 /// Forces at the contact radii of another program's presses.
 fn another_program() {
     let folder = std::env::var_os("TACTILE_DATA").map_or_else(
@@ -106,7 +116,7 @@ fn another_program() {
         println!("skipped: no {} (set TACTILE_DATA)", path.display());
         return;
     };
-    let mut presses: Vec<(String, f64, f64, bool, Vec<[f64; 2]>)> = Vec::new();
+    let mut presses: Vec<Published> = Vec::new();
     for line in text.lines().skip(1) {
         let before: Vec<&str> = line.split(',').take(4).collect();
         let after: Vec<&str> = line[line.find(']').expect("layers") + 1..]
@@ -114,27 +124,29 @@ fn another_program() {
             .collect();
         let number = |text: &str| text.parse::<f64>().expect("a number");
         let load = [number(after[1]), number(after[3])];
-        match presses.last_mut().filter(|p| p.0 == before[0]) {
-            Some(press) => press.4.push(load),
-            None => presses.push((
-                before[0].to_owned(),
-                number(before[1]),
-                number(before[3]),
-                line.contains("[]"),
-                vec![load],
-            )),
+        match presses.last_mut().filter(|p| p.name == before[0]) {
+            Some(press) => press.loads.push(load),
+            None => presses.push(Published {
+                name: before[0].to_owned(),
+                youngs_modulus_pa: number(before[1]),
+                radius_m: number(before[3]),
+                on_flat: line.contains("[]"),
+                loads: vec![load],
+            }),
         }
     }
-    for (name, modulus, radius, on_flat, loads) in presses {
-        let scene = if on_flat {
-            Scene::ball_on_flat(radius, material(modulus))
+    for press in presses {
+        let Published { name, loads, .. } = &press;
+        let (radius, ball) = (press.radius_m, material(press.youngs_modulus_pa));
+        let scene = if press.on_flat {
+            Scene::ball_on_flat(radius, ball)
         } else {
-            Scene::ball_on_guide(radius, material(modulus), &paper_guide())
+            Scene::ball_on_guide(radius, ball, &paper_guide())
         };
         let forces: Vec<Load> = loads.iter().map(|l| Load::Force(l[0])).collect();
         let states = scene.expect("a scene").solve(&forces).states;
         assert_eq!(states.len(), loads.len());
-        for (state, [force_n, contact_radius_m]) in states.iter().zip(&loads) {
+        for (state, [force_n, contact_radius_m]) in states.iter().zip(loads) {
             let found = state.contact_radius().expect("a contact");
             // At the other program's radius, by the exponent between its loads: some 3.2.
             let off = (contact_radius_m / found.radius_m).powf(3.2) - 1.0;

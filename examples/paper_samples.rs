@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --features scene,simulate,plot --example paper_samples -- docs/paper_samples` simulates the presses by finite elements,
 //! writes each as a scene file with its frames, and measures those files. Without an argument it writes to `target/paper_samples`.
+#![allow(clippy::print_stdout)]
 use std::error::Error;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -6,6 +6,7 @@
 //!
 //! Prints for every tenth of confidence the pairs, their mean confidence and the share that is right, the share of coordinates within one
 //! standard deviation of the truth, and the scenes of stretched and cropped sets with less than 98 % right pairs.
+#![allow(clippy::print_stdout)]
 use nalgebra::{Point, SVector};
 use tactile_match::{AnnealedSoftassign, MatchError, Matching, PointMatcher};
 

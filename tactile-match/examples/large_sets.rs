@@ -6,6 +6,7 @@
 //!
 //! Noise is a standard deviation along an axis in shares of the size (the largest extent), outliers a share of the points. Memory is the
 //! peak of the whole process (Linux).
+#![allow(clippy::print_stdout)]
 use nalgebra::{Point3, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -7,6 +7,7 @@
 //! A case is `case NAME D n_model n_target`, then rows `m` (model), `t` (target), `g` (true position of each model row) and `p` (row of
 //! its true partner, −1 for none). A result is `case NAME milliseconds`, then for each model row `w` (warped) and `a` (target row or −1).
 //! The time is the least of five calls through a warm workspace.
+#![allow(clippy::print_stdout)]
 use nalgebra::Point;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

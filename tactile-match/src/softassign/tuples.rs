@@ -85,7 +85,8 @@ impl<const D: usize> Tuples<D> {
         spacing: f64,
         limited: bool,
     ) -> bool {
-        if !(spacing > 0.0) || model.len().min(target.len()) < 2 * TESTED * D {
+        let is_degenerate = spacing.is_nan() || spacing <= 0.0;
+        if is_degenerate || model.len().min(target.len()) < 2 * TESTED * D {
             return false;
         }
         self.targets.build(target, 2.0 * spacing);

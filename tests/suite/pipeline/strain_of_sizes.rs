@@ -1,4 +1,5 @@
 //! The strain's stated error holds in frames of every size, or the result is flagged.
+#![allow(clippy::print_stdout)]
 use std::collections::BTreeMap;
 use tactile_imaging::pipeline::{Flag, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};

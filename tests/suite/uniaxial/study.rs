@@ -29,12 +29,12 @@ fn trial(seed: u64) -> Outcome {
     let shape = [400, 400];
     let side = uniform(9e-3, 13e-3);
     let face = Face {
-        outline: if seed % 2 == 0 {
+        outline: if seed.is_multiple_of(2) {
             FaceOutline::Rectangle
         } else {
             FaceOutline::Ellipse
         },
-        pattern: if seed / 2 % 2 == 0 {
+        pattern: if (seed / 2).is_multiple_of(2) {
             plain()
         } else {
             speckled()
@@ -43,7 +43,7 @@ fn trial(seed: u64) -> Outcome {
         poisson_ratio: 0.5,
         face_m: [
             side,
-            if seed % 2 == 0 {
+            if seed.is_multiple_of(2) {
                 uniform(9e-3, 13e-3)
             } else {
                 side

@@ -109,7 +109,7 @@ fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
                 path.display()
             )));
         }
-        images.sort_by(|a, b| natural(a).cmp(&natural(b)));
+        images.sort_by_cached_key(|image| natural(image));
         frames.append(&mut images);
     }
     Ok(frames)
