@@ -34,6 +34,12 @@ pub struct RingMeans {
 }
 
 /// Why an image has no ring means.
+///
+/// ```
+/// use tactile_imaging::inclusion::{RingError, ring_means};
+/// let dark = ndarray::Array2::zeros((50, 50));
+/// assert_eq!(ring_means(&dark.view(), [0.25e-3; 2], 30.0, 15e-3), Err(RingError::NoContact));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RingError {
@@ -64,6 +70,17 @@ const THRESHOLD: f64 = 0.25;
 /// Light is taken as proportional to the pressure, p = s I with the frame's brightening I and
 /// `pascals_per_grey` s. `image` is the brightening, [row, column]; `pixel_size_m` is (x, y);
 /// `face_radius_m` the guide's. O(pixels).
+///
+/// ```
+/// use tactile_imaging::inclusion::ring_means;
+/// let image = ndarray::Array2::from_shape_fn((81, 81), |(y, x)| {
+///     let r = (x as f64 - 40.0).hypot(y as f64 - 40.0);
+///     if r < 30.0 { 100.0 - r } else { 0.0 }
+/// });
+/// let rings = ring_means(&image.view(), [0.5e-3; 2], 30.0, 15e-3)?;
+/// assert!(rings.pressure_pa[5] > rings.pressure_pa[25]);
+/// # Ok::<(), tactile_imaging::inclusion::RingError>(())
+/// ```
 ///
 /// # Errors
 /// [`RingError`].

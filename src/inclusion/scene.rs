@@ -34,6 +34,9 @@ use std::path::{Path, PathBuf};
 /// "#;
 /// let scene = InclusionScene::parse(text, "press/scene.toml")?;
 /// assert_eq!(scene.frames().len(), 2);
+/// assert_eq!((scene.specimen().height_m(), scene.guide().radius_m()), (30e-3, 16e-3));
+/// // From a file, with its images; this one is not there.
+/// assert!(InclusionScene::read("press/absent.toml").and_then(|scene| scene.load()).is_err());
 /// # Ok::<(), tactile_imaging::scene::SceneError>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -55,6 +58,13 @@ struct Frame {
 }
 
 /// What a scene's images say.
+///
+/// ```no_run
+/// use tactile_imaging::inclusion::{InclusionScene, LoadedInclusion};
+/// let LoadedInclusion { rings, profiles } = InclusionScene::read("press/scene.toml")?.load()?;
+/// println!("{} frames, the first one's centre at {:?}", profiles.len(), rings[0].centre_px);
+/// # Ok::<(), tactile_imaging::scene::SceneError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct LoadedInclusion {
     /// Ring means of each frame.

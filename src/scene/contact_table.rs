@@ -46,7 +46,15 @@ pub fn read_contact_table(path: impl AsRef<Path>) -> Result<ContactTable, SceneE
     })
 }
 
-/// Writes a contact table as TOML, of [`read_contact_table`]'s example. Numbers keep all their digits.
+/// Writes a contact table as TOML. Numbers keep all their digits.
+///
+/// ```no_run
+/// # use tactile_imaging::elasticity::contact::ContactTable;
+/// # fn keep(table: &ContactTable) -> Result<(), tactile_imaging::io::ReadError> {
+/// use tactile_imaging::scene::write_contact_table;
+/// write_contact_table("table.toml", table)
+/// # }
+/// ```
 ///
 /// # Errors
 /// [`ReadError::Write`].

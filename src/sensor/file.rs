@@ -8,6 +8,7 @@ use crate::force::{
 };
 use crate::io::read_bytes;
 use crate::pipeline::{LightContact, Object, Pipeline, PipelineError};
+use crate::replace_file::replace_file;
 use crate::scene::{SceneError, SceneLayer};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -61,10 +62,15 @@ impl SensorGeometry {
 /// A calibrated sensor.
 ///
 /// ```no_run
-/// use tactile_imaging::{pipeline::Object, sensor::Sensor};
+/// use tactile_imaging::{pipeline::{Object, Pipeline}, sensor::Sensor};
 /// let sensor = Sensor::read("sensor.toml")?;
 /// let pipeline = sensor.pipeline(Object::sphere(3e-3))?.with_object_errors(5e-6, 0.002)?;
-/// # let _ = pipeline;
+/// // Its parts, for a pipeline that is put together by hand.
+/// let (contact, guide) = (sensor.contact(&Sensor::force_options())?, sensor.waveguide()?);
+/// let by_hand = Pipeline::new(contact, Object::sphere(3e-3))?.with_waveguide(guide);
+/// println!("100 grey levels are {} Pa", sensor.pressure_pa(100.0));
+/// sensor.write("copy.toml")?;
+/// # let _ = (pipeline, by_hand);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -138,7 +144,7 @@ impl Sensor {
             source,
         };
         let text = toml::to_string(self).map_err(|error| failed(std::io::Error::other(error)))?;
-        std::fs::write(path, text).map_err(failed)
+        replace_file(path, text.as_bytes()).map_err(failed)
     }
 
     /// The guide; rigid without layers.

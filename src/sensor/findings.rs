@@ -66,6 +66,14 @@ impl LayerFinding {
 }
 
 /// A calibrated sensor and how it was found; made by [`SensorCalibration::run`](super::SensorCalibration::run).
+///
+/// ```no_run
+/// use tactile_imaging::sensor::{CalibratedSensor, SensorCalibration};
+/// let found: CalibratedSensor = SensorCalibration::read("calibration.toml")?.run()?;
+/// println!("{} of {} layers' parameters were identified",
+///     found.layers.iter().filter(|layer| layer.is_identified()).count(), found.layers.len());
+/// # Ok::<(), tactile_imaging::sensor::SensorError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct CalibratedSensor {
     /// The sensor.

@@ -41,7 +41,10 @@ use std::sync::Arc;
 ///     fn pixel_size_m(&self) -> [f64; 2] { self.0.pixel_size_m() }
 /// }
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
-/// let pipeline = Pipeline::new(Gauged(LightContact::from_pairs(&pairs, [50e-6; 2])?), Object::sphere(3e-3))?;
+/// let stage = Gauged(LightContact::from_pairs(&pairs, [50e-6; 2])?);
+/// // Neither a lens nor a local curve: coordinates stand as they are, shading is taken from the light.
+/// assert!(stage.lens().is_none() && stage.pressure_curve().is_none());
+/// let pipeline = Pipeline::new(stage, Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(reference.view())?;
 /// press.add_gauged_frame(frame.view(), Some(Estimate { value: 0.98, standard_error: 1e-3 }));
 /// assert_eq!(press.contact(0)?.and_then(|c| c.force_n).map(|f| f.value), Some(0.98));

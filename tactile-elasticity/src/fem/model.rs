@@ -72,6 +72,7 @@ pub(crate) struct Part {
 /// let solution = model.solve(&[Load::Approach(1e-4)]);
 /// let state = &solution.states[0];
 /// assert!((state.force_n() / (1e5 * 0.1 * 3.1416 * 4e-6) - 1.0).abs() < 0.15);
+/// assert!(model.stress(state, [0.5e-3, 0.5e-3]).unwrap().zz_pa < 0.0);
 /// ```
 #[derive(Debug, Clone)]
 pub struct Model {

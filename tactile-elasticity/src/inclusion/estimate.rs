@@ -9,6 +9,7 @@ use crate::fem::Interface;
 ///
 /// let diameter = Estimated { value: 10e-3, standard_error: 0.5e-3, interval: [9e-3, 11e-3] };
 /// assert!(diameter.interval[0] < diameter.value);
+/// assert_eq!(diameter.relative_error(), 0.05);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -52,6 +53,7 @@ const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 /// let range = Estimated { value: 50e3, standard_error: 60e3, interval: [15e3, 200e3] };
 /// assert_eq!(Told::No(range).value(), None);
 /// assert_eq!(Told::Yes(range).value(), Some(50e3));
+/// assert_eq!(Told::No(range).estimate().interval, [15e3, 200e3]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

@@ -51,13 +51,25 @@ pub struct SearchProgress {
 ///
 /// ```no_run
 /// use tactile_elasticity::fem::{Guide, Layer, Material};
-/// use tactile_elasticity::inclusion::{InclusionSearch, PressureProfile, Specimen};
+/// use core::ops::ControlFlow;
+/// use tactile_elasticity::inclusion::{
+///     AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen,
+/// };
 ///
 /// # fn example(radii_m: Vec<f64>, frames: Vec<PressureProfile>) -> Result<(), tactile_elasticity::ElasticityError> {
 /// let layer = Layer { thickness_m: 10e-3, material: Material::new(60e3, 0.495)? };
 /// let guide = Guide::new(vec![layer], 16e-3)?;
 /// let search = InclusionSearch::new(Specimen::new(30e-3, 40e-3)?, guide)?;
-/// let estimate = search.search(&radii_m, &frames)?;
+/// // A sensor whose calibration is twice as good as usual.
+/// let search = search.with_sensor_errors(SensorErrors { common: 1.5e-3, ..SensorErrors::default() })?;
+/// // Would two frames tell enough of a small lump?
+/// let lump = AssumedInclusion { diameter_m: 8e-3, depth_m: 4e-3, youngs_modulus_pa: 40e3, block_modulus_pa: 5e3 };
+/// let errors = search.expected_errors(&lump, &[1.5e-3, 3e-3], &radii_m, 1.0)?;
+/// println!("its diameter would be known within {:.0} %", 100.0 * errors.diameter);
+/// let estimate = search.search_with_progress(&radii_m, &frames, &mut |progress| {
+///     println!("{} of {}", progress.done, progress.expected);
+///     ControlFlow::Continue(())
+/// })?;
 /// if let (true, Some(inclusion)) = (estimate.found, &estimate.inclusion) {
 ///     println!("{:?}", inclusion.diameter_m);
 /// }

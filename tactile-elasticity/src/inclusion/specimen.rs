@@ -8,10 +8,16 @@ use crate::fem::{Interface, Material};
 /// its standard error.
 ///
 /// ```
+/// use tactile_elasticity::fem::Interface;
 /// use tactile_elasticity::inclusion::Specimen;
 ///
-/// let block = Specimen::new(30e-3, 40e-3)?.with_poisson_ratio(0.49, 0.005)?;
-/// assert_eq!(block.height_m(), 30e-3);
+/// let block = Specimen::new(30e-3, 40e-3)?
+///     .with_height_error_m(0.3e-3)?
+///     .with_poisson_ratio(0.49, 0.005)?
+///     .with_youngs_modulus(5e3, 1e3)?
+///     .with_approach_error_m(10e-6)?
+///     .with_interface(Interface::Bonded);
+/// assert_eq!((block.height_m(), block.radius_m()), (30e-3, 40e-3));
 /// assert!(Specimen::new(f64::NAN, 40e-3).is_err());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```

@@ -131,8 +131,9 @@ pub enum Transformation {
 /// Options of [`AnnealedSoftassign`](crate::AnnealedSoftassign); all of them have defaults that suit every scene tried.
 ///
 /// ```
-/// use tactile_match::{MatchError, Outliers, SoftassignOptions, Rotation, Search};
+/// use tactile_match::{MatchError, Outliers, SoftassignOptions, Rotation, Search, Transformation};
 /// let options = SoftassignOptions::default()
+///     .with_transformation(Transformation::Similarity) // the set only moves, turns and grows
 ///     .with_rotation(Rotation::Any)
 ///     .with_outliers(Outliers::Model)
 ///     .with_search(Search::Thorough)

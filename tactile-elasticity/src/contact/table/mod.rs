@@ -54,6 +54,8 @@ pub struct ContactCurve {
 /// assert!((force_n / (4.0 / 3.0 * 160e3 * 0.55e-3_f64.powi(3) / 3e-3) - 1.0).abs() < 1e-9);
 /// assert!(table.interpolation_error() < 1e-9);
 /// assert_eq!(table.force_n(2e-3, 120e3), None); // larger than any contact of the table
+/// assert_eq!((table.radius_m(), table.poisson_ratio()), (3e-3, 0.5));
+/// assert!(table.layers().is_empty() && table.curves().len() == 1);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]

@@ -95,7 +95,13 @@ impl TableOptions {
     }
 }
 
-/// How far a table is, of [`ContactTable::solve`]'s example.
+/// How far [`ContactTable::solve`] is.
+///
+/// ```
+/// use tactile_elasticity::contact::TableProgress;
+/// let progress = TableProgress { done: 3, total: 7 };
+/// assert!(progress.done < progress.total);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableProgress {
     /// Moduli done.
