@@ -64,7 +64,7 @@ impl Ball {
             for [r, p, z] in rows {
                 writeln!(
                     out,
-                    "{},{},{},{:.4},{a:.5e},{:.5e},{r:.4e},{p:.4e},{z:.4e}",
+                    "{},{},{},{:.4},{a:.5e},{:.5e},{r:.5e},{p:.4e},{z:.4e}",
                     self.youngs_modulus_pa,
                     self.radius_m,
                     layers.join(";"),

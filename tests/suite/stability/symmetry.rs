@@ -20,7 +20,8 @@ fn shifted(image: &Array2<u8>, [x, y]: [isize; 2]) -> Array2<u8> {
 }
 
 pub(crate) fn shifts(table: &mut Table, trial: &Trial, expected: &Answer) {
-    for by in [[1, 0], [0, 1], [-17, 9], [40, -30], [-50, -35]] {
+    // The larger contact, 91 pixels in radius, stays clear of the edge: a contact that the edge cuts is left out of the modulus.
+    for by in [[1, 0], [0, 1], [-17, 9], [40, -25], [-50, -20]] {
         let moved = Images::of(trial).map(|image| shifted(image, by));
         let found = answer(&pipeline(trial, SI), &moved);
         let there = |c: [f64; 2]| [c[0] + by[0] as f64, c[1] + by[1] as f64];
