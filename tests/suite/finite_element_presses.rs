@@ -104,6 +104,12 @@ impl Ball {
             material: Elastic::RIGID,
         }];
         let layers = self.layers();
+        // The camera stands so far away that contacts, the calibration's too, take half of the frame at most.
+        let largest_m = self
+            .states
+            .last()
+            .map_or(0.0, |state| state.contact_radius_m);
+        let pixel_m = 43.1e-6 * (largest_m / 5e-3).max(1.0);
         let options = PressOptions {
             object: Sphere {
                 radius_m: self.radius_m,
@@ -119,7 +125,7 @@ impl Ball {
             loads: pair.iter().map(|s| Load::normal(s.force_n)).collect(),
             camera: Camera {
                 shape: [520, 696],
-                pixel_size_m: [43.1e-6; 2],
+                pixel_size_m: [pixel_m; 2],
                 ..Camera::default()
             },
             seed,
