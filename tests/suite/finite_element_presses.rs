@@ -10,6 +10,7 @@ use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide as Gui
 use tactile_imaging::elasticity::modulus::{
     HertzSphere, ModulusEstimate, ModulusEstimator, TabulatedContact,
 };
+use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, Pipeline, Trial};
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, Sphere,
@@ -137,15 +138,31 @@ impl Ball {
         };
         let trial = Trial::new(options, &calibration).unwrap();
         let size = trial.simulation.pixel_size_m;
-        let pipeline =
-            Pipeline::from_pairs(&trial.pairs, size, Object::sphere(self.radius_m)).unwrap();
+        // The rigid ball that calibrates leaves no contact on a rigid flat: there the light of a pascal is given.
+        let grey_per_newton = trial.scene.grey_per_pascal() / (size[0] * size[1]);
+        let known = |k: u8| {
+            let force_n = 0.15 * f64::from(k) * pair[1].force_n;
+            CalibrationPair::loading(grey_per_newton * force_n, force_n)
+        };
+        let pairs = match self.layers.is_empty() {
+            true => (0..=8).map(known).collect(),
+            false => trial.pairs.clone(),
+        };
+        let pipeline = Pipeline::from_pairs(&pairs, size, Object::sphere(self.radius_m)).unwrap();
         let guide = self.guide();
         let pipeline = match self.layers.is_empty() {
             true => pipeline,
             false => pipeline.with_waveguide(guide.clone()),
         };
         let mut press = trial.press(&pipeline).unwrap();
-        let layered = press.modulus().unwrap();
+        let layered = match press.modulus() {
+            Ok(layered) => layered,
+            Err(error) => panic!(
+                "{}, states {first}: {error}\n{}",
+                self.name,
+                press.measure()
+            ),
+        };
         let loads = press.load_series().unwrap();
         // A table refuses any ball and guide but its own.
         let own_table = tables.iter().find_map(|table| {
