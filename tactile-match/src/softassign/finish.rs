@@ -70,14 +70,7 @@ impl<const D: usize> Answer<D> {
         let noisy = state.sigma > CLEAN;
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
-        let (sweeps, sharpness) = if noisy {
-            (
-                8,
-                std::env::var("SHARP").map_or(SHARPNESS, |v| v.parse().unwrap()),
-            )
-        } else {
-            (3, 1.0)
-        };
+        let (sweeps, sharpness) = if noisy { (8, SHARPNESS) } else { (3, 1.0) };
         annealer.assign(&state.warped, variance, slack, sweeps, sharpness);
         annealer.soft.cap_rows();
         self.assign(&annealer.soft, n, targets.len());
