@@ -20,6 +20,8 @@ pub(super) struct Misfit {
     pub(super) radial: f64,
     pub(super) azimuthal: f64,
     pub(super) shape: ProfileShape,
+    /// Whether the misfit along the radius stands out of the noise, however small it is.
+    pub(super) stands_out: bool,
 }
 
 impl Misfit {
@@ -50,7 +52,8 @@ impl Misfit {
         let azimuthal = share(around_chi2 - (pixels - count));
         let stands_out =
             |chi2: f64, number: f64| chi2 > number + SIGNIFICANT * (2.0 * number).sqrt();
-        let not_radial = radial > RADIAL_LIMIT && stands_out(radial_chi2, count);
+        let radial_stands_out = stands_out(radial_chi2, count);
+        let not_radial = radial > RADIAL_LIMIT && radial_stands_out;
         let not_round = azimuthal > AZIMUTHAL_LIMIT && stands_out(around_chi2, pixels - count);
         Self {
             radial,
@@ -60,6 +63,7 @@ impl Misfit {
             } else {
                 ProfileShape::Hertz
             },
+            stands_out: radial_stands_out,
         }
     }
 }

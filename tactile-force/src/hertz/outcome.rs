@@ -32,7 +32,8 @@ pub enum ProfileShape {
     /// The pressure is Hertz's to within the misfit that the noise and a smooth guide explain.
     Hertz,
     /// Not a ball's profile: the misfit stands out of the noise and exceeds 1 % of the peak along the radius, or 3 % around it.
-    /// The contact radius then is that of the best ball, not of the contact.
+    /// The contact radius is that of the profile with its `bend`: for a ball at finite strain within 0.03 %, for other objects no more than a
+    /// size.
     NotHertz,
 }
 
@@ -71,13 +72,16 @@ pub struct HertzFit<T> {
     pub background: Estimate<T>,
     /// Standard deviation of the blur, in pixels.
     pub blur_px: T,
-    /// Integral of the profile, 2π/3 A a² in grey levels × pixels.
+    /// c of p₀ √(1 − r²/a²) (1 − c r²/a²). Zero where the Hertz profile fits to within the noise; balls of finite strain on soft layers
+    /// press harder at the rim (c < 0, to −0.3), balls flattened on a stiff base less (c > 0, to 0.15).
+    pub bend: Estimate<T>,
+    /// Integral of the profile, 2π/3 A a² (1 − 2c/5) in grey levels × pixels.
     pub integrated_pixel_value: Estimate<T>,
     /// Covariance of [peak, background, radius, blur variance, x, y], in grey levels and pixels.
     pub covariance: [[T; 6]; 6],
-    /// Residual variance over the noise model's: near 1 if the contact is Hertz's.
+    /// Residual variance over the noise model's: near 1 if the contact is that of a ball.
     pub reduced_chi_squared: T,
-    /// Root mean square misfit of the mean level at each radius, the noise's share subtracted, relative to the peak.
+    /// Root mean square misfit of the mean level at each radius to the Hertz profile (c = 0), the noise's share subtracted, relative to the peak.
     pub radial_misfit: T,
     /// Root mean square misfit around the centre, the noise's and the radial share subtracted, relative to the peak.
     pub azimuthal_misfit: T,
