@@ -288,7 +288,8 @@ fn balls_are_measured_within_their_intervals() {
             readings.push(ball.read(first, 1 + 10 * k as u64 + first as u64, &[]));
         }
     }
-    summaries(&readings)[0].check(0.03, 0.10);
+    // As near as a contact table is to come; measured 0.4 and 1.9 %.
+    summaries(&readings)[0].check(0.01, 0.04);
 }
 
 /// Random balls solved anew, on other meshes than the tables', against tables solved here: minutes, for `.ci/run studies`.
