@@ -1,13 +1,17 @@
 //! Scenes near a solved one, on the same mesh: derivatives by parameters.
 
-use super::element::Geometry;
-use super::layout::Layout;
+use super::element::{Elimination, Geometry};
+use super::fields::Fields;
+use super::layout::{Layout, Slot};
 use super::material::Material;
+use super::model::Model;
 use super::pressure::PressurePoint;
 use super::scene::Scene;
 use super::sparse::Factors;
 use super::state::State;
+use super::tangent::Tangent;
 use crate::ElasticityError;
+use std::sync::Arc;
 
 impl Scene {
     /// This scene with other materials and moved nodes.
@@ -27,53 +31,149 @@ impl Scene {
             for node in &mut model.nodes {
                 *node = moved(*node);
             }
-            let elements = model.geometry.iter_mut().zip(&model.elements);
-            for (index, (geometry, element)) in elements.enumerate() {
+            for (index, element) in model.elements.iter().enumerate() {
                 let corners = element.map(|node| model.nodes[node]);
-                *geometry = Geometry::new(&corners)
-                    .ok_or(ElasticityError::DegenerateElement { element: index })?;
+                if corners != element.map(|node| self.model().nodes[node]) {
+                    model.geometry[index] = Geometry::new(&corners)
+                        .ok_or(ElasticityError::DegenerateElement { element: index })?;
+                }
             }
         }
         Ok(Self::from_model(model))
     }
 
+    /// The equations of this scene and of those [changed](Self::changed) from it.
+    pub(crate) fn layout(&self) -> Layout {
+        Layout::new(self.model())
+    }
+
     /// What solutions of nearby scenes start from; `None` where the tangent is singular.
-    pub(crate) fn neighbourhood<'a>(&'a self, state: &'a State) -> Option<Neighbourhood<'a>> {
-        let mut layout = Layout::new(self.model());
-        let system = self.model().assemble(&mut layout, &state.fields, 0.0)?;
-        let factors = system.factors().ok()?;
+    pub(crate) fn neighbourhood<'a>(
+        &'a self,
+        layout: &mut Layout,
+        state: &'a State,
+    ) -> Option<Neighbourhood<'a>> {
+        let model = self.model();
+        let system = model.assemble(layout, &state.fields, 0.0)?;
+        let (tangent, slots, eliminations) = system.into_parts();
         Some(Neighbourhood {
-            state,
-            layout,
-            factors,
+            model,
+            fields: &state.fields,
+            factors: tangent.matrix.factorise().ok()?,
+            tangent,
+            slots,
+            eliminations,
         })
     }
 }
 
 /// A state with its tangent.
 pub(crate) struct Neighbourhood<'a> {
-    state: &'a State,
-    layout: Layout,
+    model: &'a Model,
+    fields: &'a Fields,
+    tangent: Tangent,
     factors: Factors,
+    slots: Arc<[Slot]>,
+    eliminations: Vec<Elimination>,
 }
 
 impl Neighbourhood<'_> {
-    /// Interface pressure and force of a nearby scene at an approach, by one iteration from the state
-    /// with its tangent: the error is of second order in the scenes' difference.
+    /// Interface pressures and forces of nearby scenes at their approaches, each by one iteration from the
+    /// state with its tangent: the error is of second order in the scenes' difference.
+    ///
+    /// Elements are evaluated anew only where they differ, and without their stiffness.
     ///
     /// `None` where an element is turned inside out.
-    pub(crate) fn solve(
-        &mut self,
-        nearby: &Scene,
-        approach_m: f64,
+    pub(crate) fn solve(&self, nearby: &[(&Scene, f64)]) -> Option<Vec<(Vec<PressurePoint>, f64)>> {
+        let size = self.tangent.right.len();
+        // The last column is the answer to a unit approach.
+        let mut columns = Vec::with_capacity((nearby.len() + 1) * size);
+        let mut changes = Vec::with_capacity(nearby.len());
+        for (scene, _) in nearby {
+            let mut right = self.tangent.right.clone();
+            changes.push(self.change(scene.model(), &mut right)?);
+            columns.append(&mut right);
+        }
+        columns.extend(&self.tangent.driver_column);
+        self.factors.solve(&mut columns).ok()?;
+        let (columns, by_approach) = columns.split_at(nearby.len() * size);
+        let mut found = Vec::with_capacity(nearby.len());
+        for (k, (scene, approach_m)) in nearby.iter().enumerate() {
+            let solution = &columns[k * size..(k + 1) * size];
+            let approach = approach_m - self.fields.approach;
+            let step = |equation: usize| solution[equation] - approach * by_approach[equation];
+            found.push(self.interface(scene.model(), &changes[k], approach, step)?);
+        }
+        Some(found)
+    }
+
+    /// The residual's change from this scene to a nearby one, taken from `right`, and the eliminations of
+    /// the elements that differ.
+    fn change(&self, nearby: &Model, right: &mut [f64]) -> Option<Vec<Option<Elimination>>> {
+        let model = self.model;
+        let mut changes = Vec::with_capacity(model.elements.len());
+        for (index, nodes) in model.elements.iter().enumerate() {
+            let materials = [model, nearby].map(|m| &m.materials[m.regions[index]]);
+            let is_moved = nodes
+                .iter()
+                .any(|&node| model.nodes[node] != nearby.nodes[node]);
+            if materials[0] == materials[1] && !is_moved {
+                changes.push(None);
+                continue;
+            }
+            let u = self.fields.element(nodes);
+            let evaluated = |model: &Model, material: &Material| {
+                model.geometry[index].nearby(
+                    model.kinematics,
+                    material,
+                    &u,
+                    &self.fields.pressures[index],
+                    &self.eliminations[index],
+                )
+            };
+            let (before, _) = evaluated(model, materials[0])?;
+            let (after, elimination) = evaluated(nearby, materials[1])?;
+            for (k, (after, before)) in after.iter().zip(&before).enumerate() {
+                if let Slot::Equation(row) = self.slots[2 * nodes[k / 2] + k % 2] {
+                    right[row] -= after - before;
+                }
+            }
+            changes.push(Some(elimination));
+        }
+        Some(changes)
+    }
+
+    /// Pressure and force on the interface after a step of the equations' unknowns and the approach.
+    fn interface(
+        &self,
+        nearby: &Model,
+        changes: &[Option<Elimination>],
+        approach: f64,
+        step: impl Fn(usize) -> f64,
     ) -> Option<(Vec<PressurePoint>, f64)> {
-        let model = nearby.model();
-        let interface = model.interface.as_ref()?;
-        let fields = &self.state.fields;
-        let system = model.assemble(&mut self.layout, fields, 0.0)?;
-        let step = system.nearby_step(&self.factors, fields, approach_m).ok()?;
-        let fields = step.apply(fields, 1.0);
-        let force = model.interface_forces(interface, &fields).sum();
-        Some((model.interface_pressure(interface, &fields), force))
+        let interface = nearby.interface.as_ref()?;
+        let steps: Vec<f64> = (self.slots.iter())
+            .map(|slot| match *slot {
+                Slot::Nowhere => 0.0,
+                Slot::Driver(factor) => factor * approach,
+                Slot::Equation(equation) => step(equation),
+            })
+            .collect();
+        let mut fields = self.fields.clone();
+        for (u, step) in fields.displacement.iter_mut().zip(&steps) {
+            *u += step;
+        }
+        // The pressures are read from the elements at the interface alone.
+        for &index in &interface.elements {
+            let nodes = &nearby.elements[index];
+            let outer = core::array::from_fn(|k| steps[2 * nodes[k / 2] + k % 2]);
+            let elimination = changes[index].as_ref().unwrap_or(&self.eliminations[index]);
+            let (centre, pressures) = elimination.recover(&outer);
+            fields.displacement[2 * nodes[8]] += centre[0];
+            fields.displacement[2 * nodes[8] + 1] += centre[1];
+            fields.pressures[index] = pressures;
+        }
+        let force = nearby.interface_forces(interface, &fields).sum();
+        Some((nearby.interface_pressure(interface, &fields), force))
     }
 }

@@ -286,6 +286,34 @@ impl Geometry {
         Some(self.eliminate(material.bulk_modulus(), &forces, &mut stiffness, pressures))
     }
 
+    /// Outer residual and elimination after a slight change of material or shape, by the forces there and
+    /// the stiffness `before`: right to first order in the change. `None` where turned inside out.
+    pub(crate) fn nearby(
+        &self,
+        kinematics: Kinematics,
+        material: &Material,
+        u: &[f64; ALL],
+        pressures: &[f64; 3],
+        before: &Elimination,
+    ) -> Option<([f64; OUTER], Elimination)> {
+        let forces = self.forces(kinematics, material.shear_modulus(), u, pressures)?;
+        let compliance_inverse = self.compliance_inverse(material.bulk_modulus());
+        let residual = forces.residual(&compliance_inverse, pressures);
+        let elimination = Elimination {
+            centre_residual: [residual[16], residual[17]],
+            volume_by_displacement: forces.volume_by_displacement,
+            volume: forces.volume,
+            compliance_inverse,
+            ..*before
+        };
+        Some((elimination.outer_residual(&residual), elimination))
+    }
+
+    /// κ M⁻¹.
+    fn compliance_inverse(&self, bulk: f64) -> [[f64; 3]; 3] {
+        self.inverse_mass.map(|row| row.map(|value| bulk * value))
+    }
+
     fn eliminate(
         &self,
         bulk: f64,
@@ -293,23 +321,13 @@ impl Geometry {
         stiffness: &mut [[f64; ALL]; ALL],
         pressures: &[f64; 3],
     ) -> Condensed {
-        let compliance_inverse = self.inverse_mass.map(|row| row.map(|value| bulk * value));
-        // Pressure equations: ∫ψ(J − 1) − M p/κ; κM⁻¹ times that is κM⁻¹∫ψ(J − 1) − p.
+        let compliance_inverse = self.compliance_inverse(bulk);
         let rows = &forces.volume_by_displacement;
         let scaled_rows: [[f64; ALL]; 3] = core::array::from_fn(|i| {
             core::array::from_fn(|k| (0..3).map(|j| compliance_inverse[i][j] * rows[j][k]).sum())
         });
-        let pressure_step: [f64; 3] = core::array::from_fn(|i| {
-            let projected: f64 = (0..3)
-                .map(|j| compliance_inverse[i][j] * forces.volume[j])
-                .sum();
-            projected - pressures[i]
-        });
-        let mut residual = forces.internal;
+        let residual = forces.residual(&compliance_inverse, pressures);
         for i in 0..ALL {
-            for (row, step) in rows.iter().zip(&pressure_step) {
-                residual[i] += row[i] * step;
-            }
             for k in 0..=i {
                 for (row, scaled) in rows.iter().zip(&scaled_rows) {
                     stiffness[i][k] += row[i] * scaled[k];
@@ -324,17 +342,17 @@ impl Geometry {
         ];
         let centre_row: [[f64; OUTER]; 2] =
             core::array::from_fn(|i| core::array::from_fn(|k| stiffness[OUTER + i][k]));
-        let centre_residual = [residual[16], residual[17]];
+        let elimination = Elimination {
+            centre_inverse,
+            centre_row,
+            centre_residual: [residual[16], residual[17]],
+            volume_by_displacement: *rows,
+            volume: forces.volume,
+            compliance_inverse,
+        };
         let mut outer = [[0.0; OUTER]; OUTER];
-        let mut outer_residual = [0.0; OUTER];
         for i in 0..OUTER {
-            let column = [centre_row[0][i], centre_row[1][i]];
-            let gain = [
-                column[0] * centre_inverse[0][0] + column[1] * centre_inverse[1][0],
-                column[0] * centre_inverse[0][1] + column[1] * centre_inverse[1][1],
-            ];
-            outer_residual[i] =
-                residual[i] - gain[0] * centre_residual[0] - gain[1] * centre_residual[1];
+            let gain = elimination.gain(i);
             for k in 0..=i {
                 outer[i][k] =
                     stiffness[i][k] - gain[0] * centre_row[0][k] - gain[1] * centre_row[1][k];
@@ -342,20 +360,50 @@ impl Geometry {
         }
         Condensed {
             stiffness: outer,
-            residual: outer_residual,
-            elimination: Elimination {
-                centre_inverse,
-                centre_row,
-                centre_residual,
-                volume_by_displacement: *rows,
-                volume: forces.volume,
-                compliance_inverse,
-            },
+            residual: elimination.outer_residual(&residual),
+            elimination,
         }
     }
 }
 
+impl Forces {
+    /// Residual of the nodes with the pressures eliminated.
+    ///
+    /// Pressure equations: ∫ψ(J − 1) − M p/κ; κM⁻¹ times that is κM⁻¹∫ψ(J − 1) − p.
+    fn residual(&self, compliance_inverse: &[[f64; 3]; 3], pressures: &[f64; 3]) -> [f64; ALL] {
+        let mut residual = self.internal;
+        for (k, row) in self.volume_by_displacement.iter().enumerate() {
+            let projected: f64 = (compliance_inverse[k].iter().zip(&self.volume))
+                .map(|(a, b)| a * b)
+                .sum();
+            let step = projected - pressures[k];
+            for (residual, by) in residual.iter_mut().zip(row) {
+                *residual += by * step;
+            }
+        }
+        residual
+    }
+}
+
 impl Elimination {
+    /// What the centre's residuals give the outer component `i`.
+    fn gain(&self, i: usize) -> [f64; 2] {
+        let column = [self.centre_row[0][i], self.centre_row[1][i]];
+        let inverse = &self.centre_inverse;
+        [
+            column[0] * inverse[0][0] + column[1] * inverse[1][0],
+            column[0] * inverse[0][1] + column[1] * inverse[1][1],
+        ]
+    }
+
+    /// Residual of the outer nodes with the centre eliminated.
+    fn outer_residual(&self, residual: &[f64; ALL]) -> [f64; OUTER] {
+        core::array::from_fn(|i| {
+            let gain = self.gain(i);
+            residual[i] - gain[0] * residual[OUTER] - gain[1] * residual[OUTER + 1]
+        })
+    }
+
     /// Increments of the centre's displacement and the new pressures, from the outer increments.
     pub(crate) fn recover(&self, outer: &[f64; OUTER]) -> ([f64; 2], [f64; 3]) {
         let right: [f64; 2] = core::array::from_fn(|i| {

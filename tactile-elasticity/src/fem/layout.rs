@@ -22,7 +22,16 @@ pub(crate) struct Layout {
     /// Equations that are coupled with each other by an element or by a contact.
     groups: Vec<Vec<usize>>,
     pattern: Option<Arc<Pattern>>,
+    /// Of each element, in the pattern.
+    places: Arc<[Places]>,
 }
+
+/// Where the entries of an element's stiffness, the lower half row by row, stand among the tangent's values;
+/// [`NO_PLACE`] where one of the two components has no equation.
+pub(crate) type Places = [u32; OUTER * (OUTER + 1) / 2];
+
+/// Of entries that are not in the tangent.
+pub(crate) const NO_PLACE: u32 = u32::MAX;
 
 impl Layout {
     pub(crate) fn new(model: &Model) -> Self {
@@ -57,6 +66,7 @@ impl Layout {
             equations,
             groups: Vec::new(),
             pattern: None,
+            places: Arc::new([]),
         };
         let elements = model.elements.iter();
         layout.groups = elements
@@ -86,6 +96,7 @@ impl Layout {
     /// before where it has them all.
     pub(crate) fn pattern<'a>(
         &mut self,
+        elements: &[[usize; 9]],
         contacts: impl Iterator<Item = &'a [usize]>,
     ) -> Result<Arc<Pattern>, Singular> {
         let mut is_new = false;
@@ -102,8 +113,35 @@ impl Layout {
         }
         let groups = self.groups.iter().map(Vec::as_slice);
         let pattern = Arc::new(Pattern::new(self.equations, groups)?);
+        let places = elements.iter().map(|nodes| self.places_of(nodes, &pattern));
+        self.places = places.collect();
         self.pattern = Some(Arc::clone(&pattern));
         Ok(pattern)
+    }
+}
+
+impl Layout {
+    /// Places of every element's stiffness in the pattern asked for last.
+    pub(crate) fn places(&self) -> Arc<[Places]> {
+        Arc::clone(&self.places)
+    }
+
+    fn places_of(&self, nodes: &[usize; 9], pattern: &Pattern) -> Places {
+        let equations: [Option<usize>; OUTER] =
+            core::array::from_fn(|k| match self.slots[2 * nodes[k / 2] + k % 2] {
+                Slot::Equation(equation) => Some(equation),
+                _ => None,
+            });
+        let mut places = [NO_PLACE; OUTER * (OUTER + 1) / 2];
+        let pairs = (0..OUTER).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        for (place, (i, j)) in places.iter_mut().zip(pairs) {
+            if let (Some(row), Some(column)) = (equations[i], equations[j]) {
+                let found = pattern.place(row, column);
+                // A tangent of 2³² entries would take 32 GB.
+                *place = found.map_or(NO_PLACE, |found| found as u32);
+            }
+        }
+        places
     }
 }
 

@@ -45,6 +45,12 @@ impl Model {
     /// A load that is not reached ends the solution: its [`Report`] says so. O(n b²) for each Newton
     /// iteration with n unknowns in a system of half-width b.
     pub fn solve(&self, loads: &[Load]) -> Solution {
+        self.solve_near(loads, &[])
+    }
+
+    /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a model with
+    /// the same elements at about that load.
+    pub(crate) fn solve_near(&self, loads: &[Load], guesses: &[State]) -> Solution {
         let mut solver = Solver {
             model: self,
             layout: Layout::new(self),
@@ -62,7 +68,8 @@ impl Model {
         };
         let mut states = Vec::with_capacity(loads.len());
         for (index, &load) in loads.iter().enumerate() {
-            if !solver.reach(load) {
+            let guess = guesses.get(index);
+            if !guess.is_some_and(|guess| solver.jump(guess, load)) && !solver.reach(load) {
                 solver.report.outcome = Outcome::Stopped {
                     load: index,
                     approach_m: solver.last.fields.approach,
@@ -86,6 +93,20 @@ impl Model {
 }
 
 impl Solver<'_> {
+    /// Goes to an approach from a guess; whether that succeeded.
+    fn jump(&mut self, guess: &State, load: Load) -> bool {
+        let Load::Approach(approach) = load else {
+            return false;
+        };
+        let found = self.newton(guess.fields.clone(), Goal::Approach(approach));
+        let is_found = found.is_some();
+        if let Some(found) = found {
+            self.before = Some(core::mem::replace(&mut self.last, found));
+            self.report.steps += 1;
+        }
+        is_found
+    }
+
     fn reach(&mut self, load: Load) -> bool {
         let reached = match load {
             Load::Approach(approach) => {

@@ -8,6 +8,7 @@ use super::material::{Kinematics, Material};
 use super::mesh::Boundary;
 use super::model::{Model, Support};
 use super::press::{Object, Press};
+use super::state::State;
 use crate::ElasticityError;
 use crate::error::{Quantity, positive};
 
@@ -237,6 +238,17 @@ impl Scene {
     /// Solves for the loads in order.
     pub fn solve(&self, loads: &[Load]) -> Solution {
         self.model.solve(loads)
+    }
+
+    /// [`Self::solve`] from the states of another scene at about these approaches, where its mesh has the
+    /// same elements.
+    pub(crate) fn solve_near(&self, loads: &[Load], near: Option<(&Self, &[State])>) -> Solution {
+        match near {
+            Some((scene, states)) if scene.model.elements == self.model.elements => {
+                self.model.solve_near(loads, states)
+            }
+            _ => self.model.solve(loads),
+        }
     }
 
     pub(crate) fn from_model(model: Model) -> Self {

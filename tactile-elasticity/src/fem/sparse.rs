@@ -5,6 +5,7 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymmetricOrdering,
     factorize_symbolic_cholesky,
@@ -50,7 +51,11 @@ impl Pattern {
             entries.as_ref(),
             Side::Lower,
             SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
+            CholeskySymbolicParams {
+                // Meshes of a few hundred elements already take half the time by blocks.
+                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+                ..Default::default()
+            },
         );
         Ok(Self {
             analysis: analysis.map_err(|_| Singular)?,
@@ -59,7 +64,7 @@ impl Pattern {
     }
 
     /// Place of the entry (i, j), which is that of (j, i) too.
-    fn place(&self, i: usize, j: usize) -> Option<usize> {
+    pub(crate) fn place(&self, i: usize, j: usize) -> Option<usize> {
         let (row, column) = (i.max(j), i.min(j));
         let range = self.entries.col_range(column);
         let rows = &self.entries.row_idx()[range.clone()];
@@ -96,6 +101,11 @@ impl Symmetric {
         if let Some(place) = place {
             self.values[place] += value;
         }
+    }
+
+    /// Adds to the entry at a place of the pattern.
+    pub(crate) fn add_at(&mut self, place: usize, value: f64) {
+        self.values[place] += value;
     }
 
     /// LDLᵀ factors.

@@ -6,7 +6,7 @@ use super::fields::Fields;
 use super::gap::DRIVER;
 use super::layout::{Layout, Slot, slot};
 use super::model::Model;
-use super::sparse::{Factors, Singular, Symmetric};
+use super::sparse::{Singular, Symmetric};
 use super::tangent::{Goal, Tangent};
 use std::sync::Arc;
 
@@ -47,23 +47,12 @@ impl Model {
         fields: &Fields,
         margin: f64,
     ) -> Option<System<'_>> {
-        let mut condensed = Vec::with_capacity(self.elements.len());
-        for (index, nodes) in self.elements.iter().enumerate() {
-            let material = &self.materials[self.regions[index]];
-            condensed.push(self.geometry[index].condensed(
-                self.kinematics,
-                material,
-                &fields.element(nodes),
-                &fields.pressures[index],
-                [self.external[2 * nodes[8]], self.external[2 * nodes[8] + 1]],
-            )?);
-        }
         let candidates = self.candidates(fields, 2.0 * margin.abs());
         let gaps = candidates
             .iter()
             .map(|candidate| candidate.gap.dofs.as_slice());
-        let matrix = Symmetric::zero(layout.pattern(gaps).ok()?);
-        let (slots, equations) = (layout.slots(), layout.equations);
+        let matrix = Symmetric::zero(layout.pattern(&self.elements, gaps).ok()?);
+        let (slots, places, equations) = (layout.slots(), layout.places(), layout.equations);
         let mut base = Tangent {
             matrix,
             right: vec![0.0; equations],
@@ -72,10 +61,22 @@ impl Model {
             force: 0.0,
         };
         let mut squares = 0.0;
-        let mut eliminations = Vec::with_capacity(condensed.len());
-        for (nodes, element) in self.elements.iter().zip(condensed) {
-            let slots: [Slot; OUTER] = core::array::from_fn(|k| slots[2 * nodes[k / 2] + k % 2]);
-            base.scatter(&slots, &element.residual, |i, j| element.stiffness[i][j]);
+        let mut eliminations = Vec::with_capacity(self.elements.len());
+        for (index, nodes) in self.elements.iter().enumerate() {
+            let element = self.geometry[index].condensed(
+                self.kinematics,
+                &self.materials[self.regions[index]],
+                &fields.element(nodes),
+                &fields.pressures[index],
+                [self.external[2 * nodes[8]], self.external[2 * nodes[8] + 1]],
+            )?;
+            let slots = core::array::from_fn(|k| slots[2 * nodes[k / 2] + k % 2]);
+            base.add_element(
+                &slots,
+                &places[index],
+                &element.residual,
+                &element.stiffness,
+            );
             squares += element.residual.iter().map(|f| f * f).sum::<f64>();
             eliminations.push(element.elimination);
         }
@@ -141,6 +142,11 @@ impl System<'_> {
         let mut active: Vec<bool> = self.candidates.iter().map(|c| c.pressure > 0.0).collect();
         let mut changes = 0;
         loop {
+            if self.candidates.is_empty() {
+                let factors = self.base.matrix.factorise()?;
+                let (solution, approach) = self.base.solve(&factors, goal, fields.approach)?;
+                return Ok(self.expand(&solution, approach));
+            }
             let mut tangent = self.base.clone();
             for (candidate, _) in self
                 .candidates
@@ -186,22 +192,9 @@ impl System<'_> {
         }
     }
 
-    /// Factors of the tangent, contacts aside.
-    pub(crate) fn factors(&self) -> Result<Factors, Singular> {
-        self.base.matrix.factorise()
-    }
-
-    /// The step from `fields` to an approach by the tangent of a nearby system without contacts: right
-    /// to first order in the difference of the two systems.
-    pub(crate) fn nearby_step(
-        &self,
-        factors: &Factors,
-        fields: &Fields,
-        approach_m: f64,
-    ) -> Result<Step, Singular> {
-        let goal = Goal::Approach(approach_m);
-        let (solution, approach) = self.base.solve(factors, goal, fields.approach)?;
-        Ok(self.expand(&solution, approach))
+    /// The tangent without contacts, and what the elements eliminated.
+    pub(crate) fn into_parts(self) -> (Tangent, Arc<[Slot]>, Vec<Elimination>) {
+        (self.base, self.slots, self.eliminations)
     }
 
     /// Displacements and new pressures of all elements from the equations' solution.

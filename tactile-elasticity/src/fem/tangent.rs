@@ -1,6 +1,7 @@
 //! The symmetric linear system of a Newton step.
 
-use super::layout::Slot;
+use super::element::OUTER;
+use super::layout::{NO_PLACE, Places, Slot};
 use super::sparse::{Factors, Singular, Symmetric};
 
 /// What a step is to reach.
@@ -23,6 +24,33 @@ pub(crate) struct Tangent {
 }
 
 impl Tangent {
+    /// Adds an element.
+    pub(crate) fn add_element(
+        &mut self,
+        slots: &[Slot; OUTER],
+        places: &Places,
+        residual: &[f64; OUTER],
+        stiffness: &[[f64; OUTER]; OUTER],
+    ) {
+        if slots.iter().any(|slot| matches!(slot, Slot::Driver(_))) {
+            self.scatter(slots, residual, |i, j| stiffness[i][j]);
+            return;
+        }
+        for (slot, residual) in slots.iter().zip(residual) {
+            if let Slot::Equation(row) = slot {
+                self.right[*row] -= residual;
+            }
+        }
+        let mut places = places.iter();
+        for (i, row) in stiffness.iter().enumerate() {
+            for (value, &place) in row[..=i].iter().zip(places.by_ref()) {
+                if place != NO_PLACE {
+                    self.matrix.add_at(place as usize, *value);
+                }
+            }
+        }
+    }
+
     /// Adds a symmetric contribution of which the lower half is asked.
     pub(crate) fn scatter(
         &mut self,

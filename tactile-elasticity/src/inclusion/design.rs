@@ -110,6 +110,7 @@ impl InclusionSearch {
             measured: observed.values,
             factor: covariance.cholesky().ok_or(ElasticityError::NoSolution)?,
             priors,
+            correction: Vec::new(),
         };
         let errors = (problem.errors(&parameters)).ok_or(ElasticityError::NoSolution)?;
         let [.., diameter, depth, youngs_modulus] = errors[..] else {

@@ -1,6 +1,6 @@
 //! Maximum a posteriori fit of a block's parameters to measured profiles.
 
-use super::forward::{Forward, Linearised};
+use super::forward::{Forward, Linearised, Solved};
 use super::parameters::{Coordinate, LumpParameters, Parameters};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -28,6 +28,8 @@ pub(crate) struct Problem {
     pub(crate) measured: Vec<f64>,
     pub(crate) factor: Cholesky<f64, Dyn>,
     pub(crate) priors: Vec<Prior>,
+    /// Of each value, what a finer mesh predicts over what this one does; empty where there is no finer one.
+    pub(crate) correction: Vec<f64>,
 }
 
 /// A local optimum.
@@ -42,12 +44,32 @@ pub(crate) struct Fit {
     pub(crate) evidence: f64,
     pub(crate) predicted: Vec<f64>,
     pub(crate) converged: bool,
+    solved: Solved,
 }
 
-/// Gauss–Newton iterations; from a start of the grid four to eight are taken.
-const MAX_ITERATIONS: usize = 25;
-/// Step over standard errors at which the fit ends: its rest is far below what the data tell.
-const STEP_OVER_ERROR: f64 = 0.03;
+/// When a fit ends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ending {
+    /// Step over standard errors below which it has settled.
+    step: f64,
+    /// Evaluations of the model with its derivatives.
+    evaluations: usize,
+}
+
+/// Of an answer: what is left is far below what the data tell.
+pub(crate) const SETTLED: Ending = Ending {
+    step: 0.03,
+    evaluations: 40,
+};
+
+/// Of a fit on a mesh that is refined afterwards, which moves it by more. From a start of the grid, four
+/// to eight evaluations are taken, under the wrong assumption about the face any number.
+pub(crate) const NEARLY_SETTLED: Ending = Ending {
+    step: 0.3,
+    evaluations: 14,
+};
+/// Corrections by a finer mesh: the second is a tenth of the first.
+const MAX_CORRECTIONS: usize = 3;
 /// Largest step of a logarithm.
 const LARGEST_STEP: f64 = 0.5;
 
@@ -58,6 +80,7 @@ struct Normal {
     misfit: f64,
     penalty: f64,
     predicted: Vec<f64>,
+    solved: Solved,
 }
 
 impl Problem {
@@ -109,11 +132,17 @@ impl Problem {
         solved.unwrap_or(vector)
     }
 
-    fn normal(&self, parameters: &Parameters) -> Option<Normal> {
+    fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
         let Linearised {
-            prediction,
-            columns,
-        } = self.forward.linearise(parameters, &self.coordinates())?;
+            mut prediction,
+            mut columns,
+            solved,
+        } = (self.forward).linearise(parameters, &self.coordinates(), near)?;
+        for values in columns.iter_mut().chain([&mut prediction.values]) {
+            for (value, factor) in values.iter_mut().zip(&self.correction) {
+                *value *= factor;
+            }
+        }
         let residual = self.whitened(self.residual(&prediction.values));
         let columns: Vec<DVector<f64>> = columns
             .into_iter()
@@ -133,71 +162,127 @@ impl Problem {
             misfit: residual.norm_squared(),
             penalty: self.penalty(parameters),
             predicted: prediction.values,
+            solved,
         })
     }
 
     /// Standard errors of the coordinates at some parameters; `None` where there is no solution.
     pub(crate) fn errors(&self, parameters: &Parameters) -> Option<Vec<f64>> {
-        let covariance = self.normal(parameters)?.matrix.cholesky()?.inverse();
+        let covariance = self.normal(parameters, None)?.matrix.cholesky()?.inverse();
         Some(covariance.diagonal().iter().map(|v| v.sqrt()).collect())
     }
 
-    /// Levenberg–Marquardt from a start; `None` where the start itself has no solution.
-    /// `go_on` is asked before each iteration.
-    pub(crate) fn fit(&self, start: Parameters, mut go_on: impl FnMut() -> bool) -> Option<Fit> {
+    /// Levenberg–Marquardt from a start; `None` where the start itself has no solution. `go_on` is asked
+    /// before each evaluation.
+    pub(crate) fn fit(
+        &self,
+        start: Parameters,
+        ending: Ending,
+        go_on: impl FnMut() -> bool,
+    ) -> Option<Fit> {
+        self.fit_near(start, None, ending, go_on)
+    }
+
+    fn fit_near(
+        &self,
+        start: Parameters,
+        near: Option<&Solved>,
+        ending: Ending,
+        mut go_on: impl FnMut() -> bool,
+    ) -> Option<Fit> {
         let mut parameters = start;
-        let mut normal = self.normal(&parameters)?;
+        let mut normal = self.normal(&parameters, near)?;
         let mut damping = 1e-3;
         let mut converged = false;
-        for _ in 0..MAX_ITERATIONS {
-            if converged || !go_on() {
+        for _ in 1..ending.evaluations {
+            if !go_on() {
                 break;
             }
-            let Some((next, next_normal, size)) = self.improved(&parameters, &normal, &mut damping)
-            else {
-                converged = true;
+            let (next, size) = self.step(&parameters, &normal, damping)?;
+            let now = normal.misfit + normal.penalty;
+            let found = self.normal(&next, Some(&normal.solved));
+            match found {
+                Some(found) if found.misfit + found.penalty <= now * (1.0 + 1e-9) => {
+                    damping = (0.2 * damping).max(1e-6);
+                    (parameters, normal) = (next, found);
+                    converged = size < ending.step;
+                }
+                // No step lowers the objective.
+                _ if size < ending.step => converged = true,
+                _ => damping = (10.0 * damping).max(1e-2),
+            }
+            if converged {
                 break;
-            };
-            converged = size < STEP_OVER_ERROR;
-            (parameters, normal) = (next, next_normal);
+            }
         }
         self.finished(parameters, normal, converged)
     }
 
-    /// The next parameters, their normal equations and the step in standard errors; `None` where no
-    /// step lowers the objective.
-    fn improved(
+    /// The next parameters and how far they are, in standard errors.
+    fn step(
         &self,
         parameters: &Parameters,
         normal: &Normal,
-        damping: &mut f64,
-    ) -> Option<(Parameters, Normal, f64)> {
-        let now = normal.misfit + normal.penalty;
-        for _ in 0..8 {
-            let mut matrix = normal.matrix.clone();
-            for k in 0..matrix.nrows() {
-                matrix[(k, k)] *= 1.0 + *damping;
+        damping: f64,
+    ) -> Option<(Parameters, f64)> {
+        let mut matrix = normal.matrix.clone();
+        for k in 0..matrix.nrows() {
+            matrix[(k, k)] *= 1.0 + damping;
+        }
+        let mut step = matrix.cholesky()?.solve(&normal.gradient);
+        let scaled = (self.priors.iter().zip(step.iter()))
+            .map(|(prior, step)| (step / prior.coordinate.unit()).abs())
+            .fold(0.0, f64::max);
+        if scaled > LARGEST_STEP {
+            step *= LARGEST_STEP / scaled;
+        }
+        let size = step.dot(&(&normal.matrix * &step)).sqrt();
+        Some((self.stepped(parameters, &step), size))
+    }
+
+    /// The fit as `finer` would give it, from a fit on this mesh: this mesh's predictions are corrected by
+    /// what a finer one changes at the fit, and fitted anew until the correction holds.
+    ///
+    /// What the meshes differ by changes slowly with the parameters, so that two or three predictions of
+    /// the finer one do, and none of its derivatives.
+    pub(crate) fn refined(
+        &mut self,
+        finer: &Forward,
+        mut fit: Fit,
+        mut go_on: impl FnMut() -> bool,
+    ) -> Option<Fit> {
+        let mut solved: Option<Solved> = None;
+        for _ in 0..MAX_CORRECTIONS {
+            if !go_on() {
+                break;
             }
-            let mut step = matrix.cholesky()?.solve(&normal.gradient);
-            let scaled = (self.priors.iter().zip(step.iter()))
-                .map(|(prior, step)| (step / prior.coordinate.unit()).abs())
-                .fold(0.0, f64::max);
-            if scaled > LARGEST_STEP {
-                step *= LARGEST_STEP / scaled;
+            let (fine, fine_solved) = finer.predict_near(&fit.parameters, solved.as_ref())?;
+            solved = Some(fine_solved);
+            // Corrected by the last factors, if there were any.
+            let mut here = fit.predicted.clone();
+            for (value, factor) in here.iter_mut().zip(&self.correction) {
+                *value /= factor;
             }
-            let size = step.dot(&(&normal.matrix * &step)).sqrt();
-            let next = self.stepped(parameters, &step);
-            let lower = |normal: &Normal| normal.misfit + normal.penalty <= now * (1.0 + 1e-9);
-            match self.normal(&next) {
-                Some(found) if lower(&found) => {
-                    *damping = (0.2 * *damping).max(1e-6);
-                    return Some((next, found, size));
-                }
-                _ if size < STEP_OVER_ERROR => return None,
-                _ => *damping = (10.0 * *damping).max(1e-2),
+            self.correction = fine.values.iter().zip(&here).map(|(a, b)| a / b).collect();
+            let next = self.fit_near(fit.parameters, Some(&fit.solved), SETTLED, &mut go_on)?;
+            let moved = self.distance(&fit, &next);
+            fit = next;
+            if moved < NEARLY_SETTLED.step {
+                break;
             }
         }
-        None
+        self.correction.clear();
+        Some(fit)
+    }
+
+    /// How far two fits are from each other, in standard errors.
+    fn distance(&self, a: &Fit, b: &Fit) -> f64 {
+        let distances = self.priors.iter().enumerate().map(|(k, prior)| {
+            let difference =
+                a.parameters.get(prior.coordinate) - b.parameters.get(prior.coordinate);
+            difference.abs() / b.covariance[(k, k)].sqrt()
+        });
+        distances.fold(0.0, f64::max)
     }
 
     fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
@@ -215,13 +300,18 @@ impl Problem {
             .iter()
             .map(|prior| prior.standard_error.ln())
             .sum();
+        // Assumptions about the face differ in what the model errs by, and so in the covariance.
+        let noise: f64 = (self.factor.l_dirty().diagonal().iter())
+            .map(|d| d.ln())
+            .sum();
         Some(Fit {
             parameters,
             covariance: cholesky.inverse(),
             misfit: normal.misfit,
-            evidence: -0.5 * (normal.misfit + normal.penalty) - logarithm - known,
+            evidence: -0.5 * (normal.misfit + normal.penalty) - logarithm - known - noise,
             predicted: normal.predicted,
             converged,
+            solved: normal.solved,
         })
     }
 }

@@ -4,7 +4,7 @@ use super::motion::{Motion, sizes};
 use super::parameters::{Coordinate, Parameters};
 use crate::fem::{
     Block, Guide, Interface, Kinematics, Load, Lump, Material, Outcome, PressurePoint, Scene,
-    pressure_at,
+    State, pressure_at,
 };
 
 /// A block of given size under a guide, and where its pressure is wanted.
@@ -29,10 +29,18 @@ pub(crate) struct Prediction {
     pub(crate) values: Vec<f64>,
 }
 
+/// A solved scene, from which scenes nearby are solved in fewer iterations.
+#[derive(Debug, Clone)]
+pub(crate) struct Solved {
+    scene: Scene,
+    states: Vec<State>,
+}
+
 /// A prediction and its derivative by each coordinate.
 #[derive(Debug, Clone)]
 pub(crate) struct Linearised {
     pub(crate) prediction: Prediction,
+    pub(crate) solved: Solved,
     /// One column a coordinate.
     pub(crate) columns: Vec<Vec<f64>>,
 }
@@ -74,20 +82,30 @@ impl Forward {
 
     /// The frames' pressures and forces; `None` where the block cannot be meshed or solved.
     pub(crate) fn predict(&self, parameters: &Parameters) -> Option<Prediction> {
-        let scene = self.scene(parameters)?;
-        let states = self.states(&scene, parameters)?;
-        let frames = states
-            .iter()
-            .map(|state| (state.pressure(), state.force_n()));
-        Some(self.collect(frames))
+        Some(self.predict_near(parameters, None)?.0)
     }
 
-    fn states(&self, scene: &Scene, parameters: &Parameters) -> Option<Vec<crate::fem::State>> {
+    /// As [`Self::predict`], from a scene solved nearby; and this one, solved.
+    pub(crate) fn predict_near(
+        &self,
+        parameters: &Parameters,
+        near: Option<&Solved>,
+    ) -> Option<(Prediction, Solved)> {
+        let scene = self.scene(parameters)?;
         let loads: Vec<Load> = (self.approaches_m.iter())
             .map(|approach| Load::Approach(approach + parameters.zero_m))
             .collect();
-        let solution = scene.solve(&loads);
-        (solution.report.outcome == Outcome::Solved).then_some(solution.states)
+        let near = near.map(|near| (&near.scene, near.states.as_slice()));
+        let solution = scene.solve_near(&loads, near);
+        if solution.report.outcome != Outcome::Solved {
+            return None;
+        }
+        let states = solution.states;
+        let frames = states
+            .iter()
+            .map(|state| (state.pressure(), state.force_n()));
+        let prediction = self.collect(frames);
+        Some((prediction, Solved { scene, states }))
     }
 
     /// The scene of parameters near those of `scene`, on its mesh.
@@ -120,35 +138,39 @@ impl Forward {
     /// The prediction and its derivatives by `coordinates`.
     ///
     /// A derivative is what one iteration on the slightly changed block, started from the solution with
-    /// its tangent, changes: one factorisation a frame, one assembly for each coordinate and frame.
+    /// its tangent, changes: one factorisation a frame, one residual for each coordinate and frame.
     pub(crate) fn linearise(
         &self,
         parameters: &Parameters,
         coordinates: &[Coordinate],
+        near: Option<&Solved>,
     ) -> Option<Linearised> {
-        let scene = self.scene(parameters)?;
-        let states = self.states(&scene, parameters)?;
-        let frames = states
-            .iter()
-            .map(|state| (state.pressure(), state.force_n()));
-        let prediction = self.collect(frames);
-        let mut neighbourhoods = Vec::with_capacity(states.len());
-        for state in &states {
-            neighbourhoods.push(scene.neighbourhood(state)?);
+        let (prediction, solved) = self.predict_near(parameters, near)?;
+        let Solved { scene, states } = &solved;
+        let mut nearby = Vec::with_capacity(coordinates.len());
+        for &coordinate in coordinates {
+            let moved = parameters.moved(coordinate, STEP * coordinate.unit());
+            nearby.push((self.changed(scene, parameters, &moved)?, moved.zero_m));
+        }
+        let mut layout = scene.layout();
+        // Of each coordinate, the interface's answer frame by frame.
+        let mut answers = vec![Vec::with_capacity(states.len()); coordinates.len()];
+        for (state, approach) in states.iter().zip(&self.approaches_m) {
+            let at: Vec<_> = (nearby.iter())
+                .map(|(changed, zero_m)| (changed, approach + zero_m))
+                .collect();
+            let found = scene.neighbourhood(&mut layout, state)?.solve(&at)?;
+            for (answers, found) in answers.iter_mut().zip(found) {
+                answers.push(found);
+            }
         }
         let mut columns = Vec::with_capacity(coordinates.len());
-        for &coordinate in coordinates {
-            let step = STEP * coordinate.unit();
-            let moved = parameters.moved(coordinate, step);
-            let changed = self.changed(&scene, parameters, &moved)?;
-            let mut nearby = Vec::with_capacity(states.len());
-            for (neighbourhood, approach) in neighbourhoods.iter_mut().zip(&self.approaches_m) {
-                nearby.push(neighbourhood.solve(&changed, approach + moved.zero_m)?);
-            }
-            let frames = nearby
+        for (frames, coordinate) in answers.iter().zip(coordinates) {
+            let frames = frames
                 .iter()
                 .map(|(points, force)| (points.as_slice(), *force));
             let there = self.collect(frames);
+            let step = STEP * coordinate.unit();
             let column = (there.values.iter().zip(&prediction.values))
                 .map(|(there, here)| (there - here) / step)
                 .collect();
@@ -157,6 +179,7 @@ impl Forward {
         Some(Linearised {
             prediction,
             columns,
+            solved,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::covariance::Observed;
 use super::estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
-use super::fit::{Fit, Prior, Problem, starts};
+use super::fit::{Fit, NEARLY_SETTLED, Prior, Problem, starts};
 use super::forward::Forward;
 use super::parameters::{Coordinate, Parameters};
 use super::profiles::{PressureProfile, check};
@@ -18,7 +18,7 @@ const REACH: f64 = 0.75;
 /// Fewer rings do not show an inclusion's shape.
 const MIN_RINGS: usize = 8;
 /// Elements along an eighth of the inclusion's circumference: of the starts, of the best start's fit, of
-/// the answer. The last one's pressure is within 0.1 % of twice as many.
+/// what corrects that fit. The last one's pressure is within 0.1 % of twice as many.
 const FINENESS: [usize; 3] = [2, 3, 5];
 /// Starts that are fitted, of the grid's best.
 const FITTED_STARTS: usize = 3;
@@ -148,13 +148,21 @@ impl InclusionSearch {
             progress,
             cancelled: false,
         };
-        let mut hypotheses = Vec::new();
+        let mut drafts = Vec::new();
         for interface in interfaces {
-            let found = self.hypothesis(&observed, &approaches_m, interface, &mut counter);
-            if counter.cancelled {
-                return Err(ElasticityError::Cancelled);
+            drafts.extend(self.draft(&observed, &approaches_m, interface, &mut counter));
+        }
+        let best = (drafts.iter().map(Draft::evidence))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or((0.0, 0.0));
+        let mut hypotheses = Vec::new();
+        for draft in drafts {
+            if best.0 - draft.evidence().0 < HOPELESS_EVIDENCE + HOPELESS_MISFIT * best.1 {
+                hypotheses.extend(self.hypothesis(&observed, &approaches_m, draft, &mut counter));
             }
-            hypotheses.extend(found);
+        }
+        if counter.cancelled {
+            return Err(ElasticityError::Cancelled);
         }
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let mut hypotheses = hypotheses.into_iter();
@@ -277,35 +285,32 @@ impl InclusionSearch {
         Ok(used)
     }
 
-    /// The best plain block and the best one with an inclusion; `None` where none could be solved.
-    fn hypothesis(
+    /// The best fits on the coarsest mesh; `None` where none could be solved.
+    fn draft(
         &self,
         observed: &Observed,
         approaches_m: &[f64],
         interface: Interface,
         counter: &mut Counter<'_>,
-    ) -> Option<Hypothesis> {
+    ) -> Option<Draft> {
         let guess = self.stiffness(observed, approaches_m);
-        let forward = |fineness| self.forward(observed, approaches_m, interface, fineness);
+        let coarsest = self.forward(observed, approaches_m, interface, FINENESS[0]);
         let mut problem = Problem {
-            forward: forward(FINENESS[0]),
+            forward: coarsest.clone(),
             measured: observed.values.clone(),
             factor: observed.covariance(&self.sensor, interface).cholesky()?,
             priors: self.block_priors(guess),
+            correction: Vec::new(),
         };
         let (_, start) = problem.scaled_start(&self.plain_block(guess))?;
-        let coarse = problem.fit(start, || counter.step())?;
+        let plain = problem.fit(start, NEARLY_SETTLED, || counter.step())?;
         if counter.cancelled {
             return None;
         }
-        problem.forward = forward(FINENESS[2]);
-        let plain = problem.fit(coarse.parameters, || counter.step())?;
-        let lump_priors = self.lump_priors(plain.parameters.block_modulus_pa);
-        problem.priors.extend(lump_priors);
-        problem.forward = Forward {
-            kinematics: Kinematics::Linear,
-            ..forward(FINENESS[0])
-        };
+        problem
+            .priors
+            .extend(self.lump_priors(plain.parameters.block_modulus_pa));
+        problem.forward.kinematics = Kinematics::Linear;
         let mut grid = Vec::new();
         for start in starts(&plain.parameters, self.guide.radius_m()) {
             if !counter.step() {
@@ -314,17 +319,42 @@ impl InclusionSearch {
             grid.extend(problem.scaled_start(&start));
         }
         grid.sort_by(|a, b| a.0.total_cmp(&b.0));
-        problem.forward = forward(FINENESS[0]);
-        let mut lump = (grid.iter().take(FITTED_STARTS))
-            .filter_map(|(_, start)| problem.fit(*start, || counter.step()))
+        problem.forward = coarsest;
+        let lump = (grid.iter().take(FITTED_STARTS))
+            .filter_map(|(_, start)| problem.fit(*start, NEARLY_SETTLED, || counter.step()))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
-        for fineness in &FINENESS[1..] {
-            problem.forward = forward(*fineness);
-            lump = lump.and_then(|fit| problem.fit(fit.parameters, || counter.step()));
-        }
-        if counter.cancelled {
-            return None;
-        }
+        Some(Draft {
+            problem,
+            interface,
+            plain,
+            lump,
+        })
+    }
+
+    /// A draft's fits on the answer's mesh; `None` where the plain block's could not be solved.
+    fn hypothesis(
+        &self,
+        observed: &Observed,
+        approaches_m: &[f64],
+        draft: Draft,
+        counter: &mut Counter<'_>,
+    ) -> Option<Hypothesis> {
+        let Draft {
+            mut problem,
+            interface,
+            plain,
+            lump,
+        } = draft;
+        let forward = |fineness| self.forward(observed, approaches_m, interface, fineness);
+        let [_, fitted, answers] = FINENESS.map(forward);
+        let with_lump = core::mem::take(&mut problem.priors);
+        problem.priors = with_lump[..with_lump.len() - LUMP_COORDINATES].to_vec();
+        let plain = problem.refined(&answers, plain, || counter.step())?;
+        problem.priors = with_lump;
+        problem.forward = fitted;
+        let lump = lump
+            .and_then(|fit| problem.fit(fit.parameters, NEARLY_SETTLED, || counter.step()))
+            .and_then(|fit| problem.refined(&answers, fit, || counter.step()));
         Some(Hypothesis {
             interface,
             plain,
@@ -366,6 +396,34 @@ impl Counter<'_> {
         };
         self.cancelled |= (self.progress)(progress).is_break();
         !self.cancelled
+    }
+}
+
+/// ln D, ln d and ln E₁, the last of the coordinates.
+const LUMP_COORDINATES: usize = 3;
+/// Difference of log evidence on the coarsest mesh beyond which an assumption about the face is given up:
+/// this and a part of the better one's misfit, most of which is the mesh's.
+const HOPELESS_EVIDENCE: f64 = 25.0;
+const HOPELESS_MISFIT: f64 = 0.3;
+
+/// The best fits on the coarsest mesh under one assumption about the face.
+struct Draft {
+    problem: Problem,
+    interface: Interface,
+    plain: Fit,
+    lump: Option<Fit>,
+}
+
+impl Draft {
+    /// Evidence and misfit of the better fit.
+    fn evidence(&self) -> (f64, f64) {
+        let fits = [Some(&self.plain), self.lump.as_ref()]
+            .into_iter()
+            .flatten();
+        let both = fits.map(|fit| (fit.evidence, fit.misfit));
+        both.fold((f64::NEG_INFINITY, 0.0), |best, fit| {
+            if fit.0 > best.0 { fit } else { best }
+        })
     }
 }
 

@@ -1,7 +1,7 @@
 //! The forward model and its derivatives, the fit, and what a search refuses.
 
 use super::covariance::Observed;
-use super::fit::{Prior, Problem};
+use super::fit::{Prior, Problem, SETTLED};
 use super::forward::Forward;
 use super::parameters::{Coordinate, LumpParameters, Parameters};
 use super::{AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen, Told};
@@ -83,7 +83,7 @@ fn derivatives_are_those_of_solutions_at_changed_parameters() {
         Coordinate::Zero,
         Coordinate::PoissonRatio,
     ];
-    let linearised = model.linearise(&here, &coordinates).unwrap();
+    let linearised = model.linearise(&here, &coordinates, None).unwrap();
     for (column, coordinate) in linearised.columns.iter().zip(coordinates) {
         let step = 0.01 * coordinate.unit().abs();
         let at = |by| model.predict(&here.moved(coordinate, by)).unwrap().values;
@@ -110,7 +110,7 @@ fn derivatives_by_sizes_follow_the_moving_mesh() {
     let model = forward(3, 1.0);
     let here = block(1.0);
     let coordinates = [Coordinate::Diameter, Coordinate::Depth, Coordinate::Height];
-    let linearised = model.linearise(&here, &coordinates).unwrap();
+    let linearised = model.linearise(&here, &coordinates, None).unwrap();
     for (column, coordinate) in linearised.columns.iter().zip(coordinates) {
         // Other sizes have other meshes: the step is large against what those differ by.
         let at = |by| model.predict(&here.moved(coordinate, by)).unwrap().values;
@@ -171,6 +171,7 @@ fn problem() -> (Problem, Parameters) {
             prior(Coordinate::Depth, 5e-3f64.ln(), 0.8),
             prior(Coordinate::LumpModulus, 20e3f64.ln(), 1.2),
         ],
+        correction: Vec::new(),
     };
     (problem, truth)
 }
@@ -185,7 +186,7 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
         depth_m: 6e-3,
         youngs_modulus_pa: 15e3,
     });
-    let fit = problem.fit(start, || true).unwrap();
+    let fit = problem.fit(start, SETTLED, || true).unwrap();
     assert!(fit.converged);
     for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
         let error = fit.covariance[(k, k)].sqrt();
@@ -199,7 +200,7 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
 #[test]
 fn a_step_that_may_not_go_on_ends_the_fit() {
     let (problem, truth) = problem();
-    let fit = problem.fit(truth, || false).unwrap();
+    let fit = problem.fit(truth, SETTLED, || false).unwrap();
     assert!(!fit.converged);
 }
 

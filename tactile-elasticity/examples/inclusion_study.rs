@@ -1,0 +1,366 @@
+//! Errors of the inclusion search over a folder of solved scenes, against the Cramér–Rao bound.
+//!
+//! ```text
+//! cargo run --release -p tactile-elasticity --features fem --example inclusion_study -- FOLDER [SEEDS] [NAME]
+//! ```
+//!
+//! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m, disc_radius_m,
+//! nu, contact, approach_1_m …, force_1_n …; D_m = 0 for a plain block) and for every scene a file
+//! `NAME.csv` (load_index, r_m, pressure_pa), solved by another program. Every scene is searched with
+//! SEEDS (default 1) draws of the sensor's errors: white noise of pixels, smooth errors of the calibration,
+//! force, and of what is known of the block: its height and the approaches' zero. NAME keeps the scenes
+//! whose names begin so.
+#![allow(clippy::print_stdout)]
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::StandardNormal;
+use std::error::Error;
+use std::path::Path;
+use tactile_elasticity::fem::{Guide, Interface, Layer, Material};
+use tactile_elasticity::inclusion::{
+    AssumedInclusion, ExpectedErrors, Inclusion, InclusionEstimate, InclusionSearch,
+    PressureProfile, SensorErrors, Specimen, Told,
+};
+
+/// A camera's pixel in metres, and its noise over the largest pressure.
+const PIXEL_M: f64 = 86e-6;
+const PIXEL_NOISE: f64 = 7.5e-3;
+/// Bound on a relative error up to which a parameter can be told.
+const TELLABLE: f64 = 0.3;
+
+struct SolvedScene {
+    name: String,
+    /// D, d, E₁; `None` for a plain block.
+    lump: Option<[f64; 3]>,
+    block_modulus_pa: f64,
+    height_m: f64,
+    radius_m: f64,
+    face_radius_m: f64,
+    poisson_ratio: f64,
+    interface: Interface,
+    approaches_m: Vec<f64>,
+    forces_n: Vec<f64>,
+    radii_m: Vec<f64>,
+    pressures_pa: Vec<Vec<f64>>,
+}
+
+fn rows(path: &Path) -> Result<(Vec<String>, Vec<Vec<String>>), Box<dyn Error>> {
+    let text = std::fs::read_to_string(path)?;
+    let mut lines = text
+        .lines()
+        .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let header = lines.next().ok_or("an empty file")?;
+    Ok((header, lines.collect()))
+}
+
+fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> {
+    let (header, table) = rows(&folder.join("scenes.csv"))?;
+    let mut scenes = Vec::new();
+    for row in table {
+        let text = |name: &str| -> Result<&str, String> {
+            let column = header.iter().position(|column| column == name);
+            let found = column.and_then(|column| row.get(column));
+            found.map(String::as_str).ok_or(format!("no column {name}"))
+        };
+        let number =
+            |name: &str| -> Result<f64, Box<dyn Error>> { Ok(text(name)?.parse::<f64>()?) };
+        let name = text("scene")?.to_owned();
+        let loads = header.iter().filter(|c| c.starts_with("approach_")).count();
+        let numbers = |prefix: &str, unit: &str| -> Result<Vec<f64>, Box<dyn Error>> {
+            (1..=loads)
+                .map(|load| number(&format!("{prefix}_{load}_{unit}")))
+                .collect()
+        };
+        let (_, points) = rows(&folder.join(format!("{name}.csv")))?;
+        let mut radii_m = Vec::new();
+        let mut pressures_pa = vec![Vec::new(); loads];
+        for point in points {
+            let (load, radius): (usize, f64) = (point[0].parse()?, point[1].parse()?);
+            if radius == 0.0 {
+                // A ring has an area.
+                continue;
+            }
+            if load == 1 {
+                radii_m.push(radius);
+            }
+            pressures_pa[load - 1].push(point[2].parse()?);
+        }
+        let diameter = number("D_m")?;
+        let lump = [diameter, number("depth_m")?, number("E1_pa")?];
+        scenes.push(SolvedScene {
+            lump: (diameter > 0.0).then_some(lump),
+            block_modulus_pa: number("E0_pa")?,
+            height_m: number("block_height_m")?,
+            radius_m: number("block_radius_m")?,
+            face_radius_m: number("disc_radius_m")?,
+            poisson_ratio: number("nu")?,
+            interface: match text("contact")? {
+                "bonded" => Interface::Bonded,
+                _ => Interface::Frictionless,
+            },
+            approaches_m: numbers("approach", "m")?,
+            forces_n: numbers("force", "n")?,
+            radii_m,
+            pressures_pa,
+            name,
+        });
+    }
+    Ok(scenes)
+}
+
+/// The sensor's guide in all scenes.
+fn guide(radius_m: f64) -> Result<Guide, Box<dyn Error>> {
+    let layer = |thickness_m, modulus| -> Result<Layer, Box<dyn Error>> {
+        Ok(Layer {
+            thickness_m,
+            material: Material::new(modulus, 0.495)?,
+        })
+    };
+    let layers = vec![layer(2e-3, 136e3)?, layer(3e-3, 80e3)?, layer(5e-3, 34e3)?];
+    Ok(Guide::new(layers, radius_m)?)
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    rng.sample(StandardNormal)
+}
+
+/// Ring means of a smooth random field in the plane of unit variance with Matérn's kernel of order 3/2:
+/// a sum of waves whose wave vectors follow the kernel's spectrum, Student's t with three degrees
+/// of freedom.
+fn smooth_field(radii_m: &[f64], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    const WAVES: usize = 400;
+    const ANGLES: usize = 32;
+    let mut means = vec![0.0; radii_m.len()];
+    for _ in 0..WAVES {
+        let chi_squared: f64 = (0..3).map(|_| normal(rng).powi(2)).sum();
+        let scale = (3.0 / chi_squared).sqrt() / length_m;
+        let wave_number = scale * normal(rng).hypot(normal(rng));
+        let phase = core::f64::consts::TAU * rng.random::<f64>();
+        for (mean, radius) in means.iter_mut().zip(radii_m) {
+            let around: f64 = (0..ANGLES)
+                .map(|k| {
+                    let angle = core::f64::consts::PI * (k as f64 + 0.5) / ANGLES as f64;
+                    (wave_number * radius * angle.cos()).cos()
+                })
+                .sum();
+            // The sine's part vanishes around the ring.
+            *mean += (2.0 / WAVES as f64).sqrt() * phase.cos() * around / ANGLES as f64;
+        }
+    }
+    means
+}
+
+/// White errors of the rings' means.
+fn white_errors(scene: &SolvedScene) -> Vec<f64> {
+    let width = scene.radii_m[1] - scene.radii_m[0];
+    let inner = scene.pressures_pa.iter().flat_map(|frame| {
+        let within = frame.iter().zip(&scene.radii_m);
+        within
+            .filter(|(_, r)| **r < 0.75 * scene.face_radius_m)
+            .map(|(p, _)| *p)
+    });
+    let full_scale = inner.fold(0.0, f64::max);
+    let errors = scene.radii_m.iter().map(|radius| {
+        let pixels = core::f64::consts::TAU * radius * width / PIXEL_M.powi(2);
+        PIXEL_NOISE * full_scale / pixels.sqrt()
+    });
+    errors.collect()
+}
+
+/// A scene as it is measured: frames with errors, and what is said of the block.
+fn measured(
+    scene: &SolvedScene,
+    seed: u64,
+) -> Result<(Specimen, Vec<PressureProfile>), Box<dyn Error>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let sensor = SensorErrors::default();
+    let said_height = scene.height_m * (0.02 * normal(&mut rng)).exp();
+    let zero = 20e-6 * normal(&mut rng);
+    let specimen = Specimen::new(said_height, scene.radius_m)?
+        .with_poisson_ratio(scene.poisson_ratio, 0.005)?;
+    let common = smooth_field(&scene.radii_m, sensor.correlation_m, &mut rng);
+    let white = white_errors(scene);
+    let mut frames = Vec::new();
+    for (load, pressures) in scene.pressures_pa.iter().enumerate() {
+        let own = smooth_field(&scene.radii_m, sensor.correlation_m, &mut rng);
+        let mut read = Vec::new();
+        for (k, pressure) in pressures.iter().enumerate() {
+            let smooth = sensor.common * common[k] + sensor.each_frame * own[k];
+            read.push(pressure * (1.0 + smooth) + white[k] * normal(&mut rng));
+        }
+        frames.push(PressureProfile {
+            approach_m: scene.approaches_m[load] - zero,
+            force_n: Some(scene.forces_n[load] * (1.0 + sensor.force * normal(&mut rng))),
+            pressure_pa: read,
+            standard_error_pa: white.clone(),
+        });
+    }
+    Ok((specimen, frames))
+}
+
+/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth.
+fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn Error>> {
+    let specimen = Specimen::new(scene.height_m, scene.radius_m)?
+        .with_poisson_ratio(scene.poisson_ratio, 0.005)?
+        .with_interface(scene.interface);
+    let search = InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?;
+    let assumed = AssumedInclusion {
+        diameter_m: lump[0],
+        depth_m: lump[1],
+        youngs_modulus_pa: lump[2],
+        block_modulus_pa: scene.block_modulus_pa,
+    };
+    // One white error for all rings: that of a ring at half the radius used.
+    let white = white_errors(scene)[scene.radii_m.len() / 2];
+    Ok(search.expected_errors(&assumed, &scene.approaches_m, &scene.radii_m, white)?)
+}
+
+fn parameters(inclusion: &Inclusion) -> [Told; 3] {
+    [
+        inclusion.diameter_m,
+        inclusion.depth_m,
+        inclusion.youngs_modulus_pa,
+    ]
+}
+
+#[derive(Default)]
+struct Tally {
+    /// |error| over the bound of each parameter, where that is below 30 %.
+    ratios: [Vec<f64>; 3],
+    /// Relative errors on wide shallow lumps.
+    shallow: [Vec<f64>; 3],
+    within: [usize; 3],
+    told: [usize; 3],
+    /// Parameters whose bound is above 30 %, and those of them not told.
+    open: usize,
+    left_open: usize,
+    findable: usize,
+    findable_found: usize,
+    plain: usize,
+    false_alarms: usize,
+}
+
+impl Tally {
+    fn add(&mut self, lump: [f64; 3], bounds: [f64; 3], estimate: &InclusionEstimate) {
+        if bounds[0] < 0.2 {
+            self.findable += 1;
+            self.findable_found += usize::from(estimate.found);
+        }
+        let Some(inclusion) = &estimate.inclusion else {
+            self.open += bounds.iter().filter(|bound| **bound > TELLABLE).count();
+            self.left_open += bounds.iter().filter(|bound| **bound > TELLABLE).count();
+            return;
+        };
+        for (k, told) in parameters(inclusion).iter().enumerate() {
+            let estimated = told.estimate();
+            let error = (estimated.value / lump[k]).ln().abs();
+            if bounds[k] > TELLABLE {
+                self.open += 1;
+                self.left_open += usize::from(told.value().is_none());
+            } else {
+                self.ratios[k].push(error / bounds[k]);
+            }
+            if lump[0] >= 14e-3 && lump[1] <= 4e-3 {
+                self.shallow[k].push(error);
+            }
+            let [low, high] = estimated.interval;
+            self.told[k] += 1;
+            self.within[k] += usize::from((low..=high).contains(&lump[k]));
+        }
+    }
+
+    fn print(&mut self) {
+        for (k, name) in ["D", "d", "E1"].into_iter().enumerate() {
+            println!(
+                "{name:>3}: |error| / bound: median {:.2}, 95th centile {:.2} ({}); 95 % intervals hold {:.1} % ({}); wide and shallow: median error {:.1} % ({})",
+                quantile(&mut self.ratios[k], 0.5),
+                quantile(&mut self.ratios[k], 0.95),
+                self.ratios[k].len(),
+                100.0 * self.within[k] as f64 / self.told[k].max(1) as f64,
+                self.told[k],
+                100.0 * quantile(&mut self.shallow[k], 0.5),
+                self.shallow[k].len(),
+            );
+        }
+        println!(
+            "found {} of {} with a bound on D below 20 %; not told {} of {} with a bound above 30 %; false alarms {} of {}",
+            self.findable_found,
+            self.findable,
+            self.left_open,
+            self.open,
+            self.false_alarms,
+            self.plain
+        );
+    }
+}
+
+fn quantile(values: &mut [f64], part: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = (part * (values.len().max(1) - 1) as f64).round() as usize;
+    values.get(at).copied().unwrap_or(f64::NAN)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().ok_or("usage: FOLDER [SEEDS] [NAME]")?;
+    let seeds: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let prefix = arguments.next().unwrap_or_default();
+    let mut tally = Tally::default();
+    for (index, scene) in scenes(Path::new(&folder))?.iter().enumerate() {
+        if !scene.name.starts_with(&prefix) {
+            continue;
+        }
+        let bounds = match scene.lump {
+            Some(lump) => {
+                let bounds = bounds(scene, lump)?;
+                [bounds.diameter, bounds.depth, bounds.youngs_modulus]
+            }
+            None => [f64::INFINITY; 3],
+        };
+        for seed in 0..seeds {
+            let (specimen, frames) = measured(scene, seed * 1000 + index as u64)?;
+            let search = InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?;
+            let begun = std::time::Instant::now();
+            let estimate = search.search(&scene.radii_m, &frames)?;
+            let seconds = begun.elapsed().as_secs_f64();
+            print!(
+                "{} {seed} {:?}: {seconds:.1} s, p {:.3}, {:?}, misfit {:.2}",
+                scene.name,
+                scene.interface,
+                estimate.probability,
+                estimate.interface,
+                estimate.misfit
+            );
+            match scene.lump {
+                Some(lump) => tally.add(lump, bounds, &estimate),
+                None => {
+                    tally.plain += 1;
+                    tally.false_alarms += usize::from(estimate.found);
+                }
+            }
+            if let (Some(lump), Some(inclusion)) = (scene.lump, &estimate.inclusion) {
+                for ((name, told), (truth, bound)) in ["D", "d", "E1"]
+                    .iter()
+                    .zip(parameters(inclusion))
+                    .zip(lump.iter().zip(bounds))
+                {
+                    let estimated = told.estimate();
+                    let error = (estimated.value / truth).ln();
+                    print!(
+                        "; {name} {}{:+.1} ± {:.1} % (bound {:.1}, z {:+.2})",
+                        if told.value().is_some() { "" } else { "open " },
+                        100.0 * error,
+                        100.0 * estimated.relative_error(),
+                        100.0 * bound,
+                        error / estimated.relative_error()
+                    );
+                }
+            } else {
+                print!("; {}", if estimate.found { "FOUND" } else { "none" });
+            }
+            println!("; {:?}", estimate.warnings);
+        }
+    }
+    tally.print();
+    Ok(())
+}
