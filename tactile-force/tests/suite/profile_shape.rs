@@ -82,6 +82,12 @@ fn radii_of_bent_profiles_are_right() {
             (found.value - bend).abs() < 4.0 * found.standard_error + 0.005,
             "{bend}: {found:?}"
         );
+        // The centre's level, through half a grey level of rounding and the noise.
+        let peak = fit.peak;
+        assert!(
+            (peak.value - 120.0).abs() < 4.0 * peak.standard_error + 0.1,
+            "{bend}: {peak:?}"
+        );
         // The best Hertz profile is 0.9 % too wide at c = −0.3.
         assert!(radius.standard_error < 0.03, "{bend}: {radius:?}");
     }
