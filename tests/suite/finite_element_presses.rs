@@ -7,9 +7,7 @@ mod solved;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide as Guide};
-use tactile_imaging::elasticity::modulus::{
-    HertzSphere, ModulusEstimate, ModulusEstimator, TabulatedContact,
-};
+use tactile_imaging::elasticity::modulus::{HertzSphere, ModulusEstimate, TabulatedContact};
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, Pipeline, Trial};
 use tactile_imaging::simulate::{
@@ -163,22 +161,23 @@ impl Ball {
                 press.measure()
             ),
         };
-        let loads = press.load_series().unwrap();
         // A table refuses any ball and guide but its own.
         let own_table = tables.iter().find_map(|table| {
             TabulatedContact::new(Arc::clone(table), self.radius_m, 0.5, &guide).ok()
         });
+        let tabulated = own_table.and_then(|table| {
+            let pipeline = pipeline.clone().with_estimator(table);
+            trial.press(&pipeline).unwrap().modulus().ok()
+        });
         let series = HertzSphere::new(self.radius_m, 0.5).unwrap();
-        let series = series
-            .with_other_body(guide.as_body())
-            .estimate(&loads)
-            .ok();
+        let series = pipeline.with_estimator(series.with_other_body(guide.as_body()));
+        let series = trial.press(&series).unwrap().modulus().ok();
         Reading {
             ball: self.name.clone(),
             largest_ratio: pair[1].contact_radius_m / self.radius_m,
             truth_pa: self.youngs_modulus_pa,
             layered,
-            tabulated: own_table.and_then(|table| table.estimate(&loads).ok()),
+            tabulated,
             series: series.map(|m| m.youngs_modulus_pa),
         }
     }
