@@ -112,6 +112,7 @@ impl PressTruth {
             from_centre_m: self.centre_m(),
             to_centre_m: later.centre_m(),
             scale: later.contact.contact_radius_m / self.contact.contact_radius_m,
+            height_scale: height_scale(&self.contact, &later.contact),
         }
     }
 
@@ -176,17 +177,17 @@ fn saturated_pixels(scene: &PressScene, load: usize) -> usize {
 
 /// The map that takes the apparent surface of one load to that of another: it scales about the contact's centre.
 ///
-/// The surface read from a press is a hemisphere of the contact's radius, which grows by (F₂/F₁)^⅓ whatever the object's
-/// modulus: the apparent strain says nothing about it.
+/// The surface read from a press follows Hertz's law, or nearly: a hemisphere of the contact's radius, which grows by (F₂/F₁)^⅓ whatever the
+/// object's modulus. Its strain says nothing about the modulus. At finite strain the surface grows less along z than across.
 ///
 /// ```
 /// use nalgebra::Point3;
 /// use tactile_imaging::simulate::SurfaceScaling;
-/// let map = SurfaceScaling { from_centre_m: [5e-3, 5e-3], to_centre_m: [6e-3, 5e-3], scale: 1.2 };
+/// let map = SurfaceScaling { from_centre_m: [5e-3, 5e-3], to_centre_m: [6e-3, 5e-3], scale: 1.2, height_scale: 1.1 };
 /// let moved = map.apply(&Point3::new(7e-3, 5e-3, 1e-3));
-/// assert!((moved - Point3::new(8.4e-3, 5e-3, 1.2e-3)).norm() < 1e-15);
+/// assert!((moved - Point3::new(8.4e-3, 5e-3, 1.1e-3)).norm() < 1e-15);
 /// let strain = map.green_lagrange_strain();
-/// assert!((strain[(2, 2)] - 0.22).abs() < 1e-15 && strain[(0, 1)] == 0.0, "½(1.2² − 1) I");
+/// assert!((strain[(0, 0)] - 0.22).abs() < 1e-15 && (strain[(2, 2)] - 0.105).abs() < 1e-15, "½(s² − 1)");
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -195,8 +196,10 @@ pub struct SurfaceScaling {
     pub from_centre_m: [f64; 2],
     /// Centre (x, y) of the second contact.
     pub to_centre_m: [f64; 2],
-    /// a₂/a₁ = (F₂/F₁)^⅓ under Hertz's law.
+    /// a₂/a₁, (F₂/F₁)^⅓ under Hertz's law.
     pub scale: f64,
+    /// Growth of the apparent heights, by least squares over the contact: a₂/a₁ under Hertz's law.
+    pub height_scale: f64,
 }
 
 impl SurfaceScaling {
@@ -205,11 +208,25 @@ impl SurfaceScaling {
         let [x, y] = std::array::from_fn(|k| {
             self.to_centre_m[k] + self.scale * (point[k] - self.from_centre_m[k])
         });
-        Point3::new(x, y, self.scale * point.z)
+        Point3::new(x, y, self.height_scale * point.z)
     }
 
-    /// The Green–Lagrange strain of the map, ½(s² − 1) I.
+    /// The Green–Lagrange strain of the map, ½(s² − 1) along each axis.
     pub fn green_lagrange_strain(&self) -> Matrix3<f64> {
-        Matrix3::from_diagonal_element(0.5 * (self.scale - 1.0) * (self.scale + 1.0))
+        let along = [self.scale, self.scale, self.height_scale];
+        Matrix3::from_diagonal(&along.map(|s| 0.5 * (s - 1.0) * (s + 1.0)).into())
     }
+}
+
+/// k of z₂(ρ) = k z₁(ρ) at equal ρ = r/a, by least squares over the discs.
+fn height_scale(from: &Contact, to: &Contact) -> f64 {
+    const RINGS: i32 = 32;
+    let (mut product, mut square) = (0.0, 0.0);
+    for ring in 0..RINGS {
+        let rho = ((f64::from(ring) + 0.5) / f64::from(RINGS)).sqrt();
+        let [first, second] = [from, to].map(|c| c.apparent_height_m(rho * c.contact_radius_m));
+        product += first * second;
+        square += first * first;
+    }
+    product / square
 }

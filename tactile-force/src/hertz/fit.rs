@@ -113,11 +113,11 @@ impl HertzFitter {
         };
         self.refine(rings, &data, &mut state)?;
         let mut equations = self.assemble(rings, &state, variance);
-        let misfit = Misfit::of(rings, &self.edge, &state.shape, variance, equations.chi2);
+        let mut misfit = Misfit::of(rings, &self.edge, &state.shape, variance, equations.chi2);
         if misfit.stands_out
             && let Some(bent) = self.bend(rings, &data, &state, &misfit)
         {
-            (state, equations) = bent;
+            (state, equations, misfit) = bent;
         }
         let origin = [place.column_start as f64, place.row_start as f64];
         self.report(&state, &equations, misfit, origin, pixel_size_m)
@@ -130,9 +130,10 @@ impl HertzFitter {
         data: &Data<'_>,
         hertz: &State,
         misfit: &Misfit,
-    ) -> Option<(State, Equations)> {
+    ) -> Option<(State, Equations, Misfit)> {
         let mut state = State {
             bent: true,
+            iterations: 0,
             ..*hertz
         };
         self.refine(rings, data, &mut state)?;
@@ -140,7 +141,8 @@ impl HertzFitter {
         let chi2 = equations.chi2;
         let left = Misfit::of(rings, &self.edge, &state.shape, data.variance, chi2);
         let explained = left.radial < EXPLAINED * misfit.radial;
-        (explained && state.shape.bend.abs() < LARGEST_BEND).then_some((state, equations))
+        state.iterations += hertz.iterations;
+        (explained && state.shape.bend.abs() < LARGEST_BEND).then_some((state, equations, left))
     }
 
     /// Fits and gathers the rings anew until the centre stays.

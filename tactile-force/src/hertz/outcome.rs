@@ -29,7 +29,8 @@ use crate::estimate::{Estimate, Real};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ProfileShape {
-    /// The pressure is Hertz's to within the misfit that the noise and a smooth guide explain.
+    /// The pressure is Hertz's, or with a [`bend`](HertzFit::bend) that of a ball at finite strain, to within the misfit that the noise and a smooth
+    /// guide explain.
     Hertz,
     /// Not a ball's profile: the misfit stands out of the noise and exceeds 1 % of the peak along the radius, or 3 % around it.
     /// The contact radius is that of the profile with its `bend`: for a ball at finite strain within 0.03 %, for other objects no more than a
@@ -81,7 +82,7 @@ pub struct HertzFit<T> {
     pub covariance: [[T; 6]; 6],
     /// Residual variance over the noise model's: near 1 if the contact is that of a ball.
     pub reduced_chi_squared: T,
-    /// Root mean square misfit of the mean level at each radius to the Hertz profile (c = 0), the noise's share subtracted, relative to the peak.
+    /// Root mean square misfit of the mean level at each radius, the noise's share subtracted, relative to the peak.
     pub radial_misfit: T,
     /// Root mean square misfit around the centre, the noise's and the radial share subtracted, relative to the peak.
     pub azimuthal_misfit: T,
