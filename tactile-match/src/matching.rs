@@ -161,7 +161,7 @@ pub enum Doubt {
     /// The residuals are so large that points strewn at random would explain the targets nearly as well; or those of a part of the set are
     /// far larger than the others', which may lie a point aside.
     LargeResiduals,
-    /// One pair in twelve or more is wrong, by the pairs' confidences.
+    /// One pair in twenty or more is wrong, by the pairs' confidences.
     Undecided,
 }
 
@@ -217,7 +217,9 @@ pub struct Matching<T: Scalar, const D: usize> {
     pub warped: Vec<Point<T, D>>,
     /// Target row of every model point; `None` for a point without a partner. No target row occurs twice.
     pub assignment: Vec<Option<usize>>,
-    /// Probability that the assignment (or the lack of one) of each model point is right, in [0, 1].
+    /// Probability that the assignment (or the lack of one) of each model point is right, in [0, 1]. Of the default matcher and noisy points:
+    /// of all pairs given a confidence c, a share c is right, within some five points above 0.6 and thirteen below, over bent, cropped, turned
+    /// and stretched scenes that were not tuned on (`--example confidence`).
     pub confidence: Vec<T>,
     /// The soft matches M the assignment was read from.
     pub soft: SoftMatches<T>,

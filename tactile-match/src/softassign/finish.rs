@@ -1,6 +1,8 @@
 //! From the last soft assignment to the answer: hard matches, confidences, positions, covariances.
 
 use super::anneal::{Annealer, Slack, State};
+use super::confidence::{Fitted, PairOdds};
+use super::locality::Locality;
 use super::soft_assign::SoftAssignment;
 use crate::Doubt;
 
@@ -17,10 +19,11 @@ const ENOUGH: f64 = 0.55;
 const FEWEST: f64 = 0.1;
 /// Least logarithm, a point, of how much more likely an answer makes the targets than chance does: wrong basins come to less than nothing.
 pub(crate) const TELLING: f64 = 0.2;
-/// Least mean confidence of pairs.
-const DECIDED: f64 = 0.92;
+/// Least mean confidence of pairs: of a hundred pairs the share that is right varies by two points about its mean, and scenes with less than nine
+/// in ten are to be doubted.
+const DECIDED: f64 = 0.95;
 /// Soft matches are read with weights raised to this power. Scaling rows and columns tells two points that may be swapped apart by half the
-/// logarithm of the odds that the whole permutations have; the power makes up for it, and confidences are the shares of right pairs.
+/// logarithm of the odds that the whole permutations have; the power makes up for it. The confidences of pairs are told by [`PairOdds`].
 const SHARPNESS: f64 = 1.55;
 /// Soft matches below this are not reported.
 const FAINT: f64 = 1e-3;
@@ -35,6 +38,8 @@ pub(crate) struct Answer<const D: usize> {
     pub(crate) variance: Vec<f64>,
     pub(crate) residual: f64,
     column_best: Vec<(f64, usize)>,
+    odds: PairOdds,
+    locality: Locality<D>,
 }
 
 impl<const D: usize> Answer<D> {
@@ -57,7 +62,7 @@ impl<const D: usize> Answer<D> {
     }
 
     /// Reads the answer from the run's final state; `spread` is the variance of the positions between the scales of the prior, empty where
-    /// there is one scale.
+    /// there is one scale; `gain` is that of the answer over chance, see [`SoftassignWorkspace::gain`](super::SoftassignWorkspace).
     pub(crate) fn read(
         &mut self,
         annealer: &mut Annealer<D>,
@@ -65,6 +70,7 @@ impl<const D: usize> Answer<D> {
         targets: &[[f64; D]],
         slack: Slack,
         spread: &[f64],
+        gain: f64,
     ) {
         let n = state.warped.len();
         let noisy = state.sigma > CLEAN;
@@ -79,6 +85,23 @@ impl<const D: usize> Answer<D> {
         let fit = self.place(state, targets, snaps);
         if !annealer.rigid.is_active() {
             annealer.regression.variances(&annealer.prior);
+        }
+        if noisy {
+            let fitted = Fitted {
+                annealer,
+                warped: &state.warped,
+                targets,
+                variance,
+            };
+            self.odds
+                .weigh(fitted, &mut self.assignment, &mut self.confidence);
+            self.locality.weigh(
+                (&state.warped, targets),
+                (variance, annealer.volume),
+                gain,
+                &self.assignment,
+                &mut self.confidence,
+            );
         }
         self.variance.clear();
         for i in 0..n {

@@ -60,6 +60,7 @@ impl<const D: usize> Regression<D> {
     /// Sets displacement and variance of every padded row; no penalty, no determinant.
     pub(crate) fn set(&mut self, padded: usize, row: impl Fn(usize) -> ([f64; D], f64)) {
         self.solution.clear();
+        self.whitened.clear();
         self.log_det = 0.0;
         self.variance.clear();
         self.displacement.0.iter_mut().for_each(Vec::clear);
@@ -107,6 +108,12 @@ impl<const D: usize> Regression<D> {
                 }
             }
         });
+    }
+
+    /// Covariance of the displacements of two points, along one axis, after [`variances`](Self::variances): `O(r)`. None of rigid fits.
+    pub(crate) fn covariance(&self, a: usize, b: usize) -> f64 {
+        let columns = self.whitened.chunks_exact(self.variance.len().max(1));
+        self.noise * columns.map(|column| column[a] * column[b]).sum::<f64>()
     }
 
     /// `Σ |c|²`, twice the prior's energy of the warp.

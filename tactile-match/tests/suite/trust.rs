@@ -103,20 +103,20 @@ fn check_trust<const D: usize>(outliers: f64) {
         "{D}-D: {within} within one standard deviation"
     );
     let total = |column: usize| tenths.iter().map(|tenth| tenth[column]).sum::<f64>();
-    // One pair in twenty: confidences are lower than the share of right pairs, by 2 % of the pairs in the plane and 3 % in space
-    // (`--example confidence` has the tenths).
+    // Confidences also allow for parts that lie aside, which these scenes have none of: 2 to 4 % too low.
     assert!(
-        (total(1) - total(2)).abs() < 0.05 * total(0),
+        (total(1) - total(2)).abs() < 0.04 * total(0),
         "{D}-D: confidence {} in all, {} of {} pairs are right",
         total(1),
         total(2),
         total(0)
     );
     for [count, confidence, right] in tenths {
-        // Fewer pairs say little: of these the share itself varies by a thirtieth.
-        if count > 200.0 {
+        // Over all kinds of scenes they are closer (`--example confidence`); ten points for one kind, and what the share of so few pairs varies by.
+        if count > 100.0 {
+            let chance = 0.5 / f64::sqrt(count);
             assert!(
-                (confidence - right).abs() < 0.15 * count,
+                (confidence - right).abs() < (0.1 + chance) * count,
                 "{D}-D: of {count} pairs of confidence {} {} are right",
                 confidence / count,
                 right / count

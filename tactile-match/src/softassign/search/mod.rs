@@ -175,9 +175,10 @@ impl AnnealedSoftassign {
             ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
         }
         let slack = self.options.slack();
+        let gain = ws.gain().unwrap_or(f64::INFINITY);
         let spread = &ws.scales.spread;
         ws.answer
-            .read(&mut ws.annealer, &ws.best, &ws.target, slack, spread);
+            .read(&mut ws.annealer, &ws.best, &ws.target, slack, spread, gain);
     }
 
     /// All starts in turn, as long as the best answer leaves doubt; then the scales of the prior.

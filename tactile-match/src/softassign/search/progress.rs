@@ -10,6 +10,12 @@ pub(super) const COMPLETE: f64 = 0.98;
 /// Share of the smaller set that a noisy answer should match.
 const EXPLAINED: f64 = 0.9;
 
+/// Where the smaller set has less than this share of the larger one's points, parts are out of sight or strewn about: its edges draw what lies
+/// behind them a point aside, and an answer leaves no doubt only where it makes the targets so much likelier than chance. Less misses more of
+/// such shifts, more costs noisy scenes further starts (`--example confidence`).
+const UNEQUAL: f64 = 0.95;
+const PLAIN_GAIN: f64 = 1.2;
+
 /// Share of residuals that may be larger than the noise of the others explains: single outliers, but no part of the set.
 const STRAGGLERS: f64 = 0.03;
 
@@ -39,8 +45,14 @@ impl AnnealedSoftassign {
     /// Whether noise explains the residuals: they are clearly below the spacing of the targets, for nearly all points.
     fn is_explained<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
+        let larger = ws.model.len().max(ws.target.len());
+        let wanted = if (points as f64) < UNEQUAL * larger as f64 {
+            PLAIN_GAIN
+        } else {
+            finish::TELLING
+        };
         points < MANY
-            && ws.gain().is_some_and(|gain| gain >= finish::TELLING)
+            && ws.gain().is_some_and(|gain| gain >= wanted)
             && ws.best.matched >= EXPLAINED * points as f64
             && ws.best.tail <= STRAGGLERS
     }

@@ -1,0 +1,298 @@
+//! How sure a pair is: the odds of the assignments that take it apart.
+//!
+//! Among noisy points a pair can be wrong in a few ways: two pairs have each other's targets, a point belongs to a target that is left over,
+//! a point that is left over belongs to the pair's target, or the pair has met by chance. With the residuals `rᵢ = t_j − yᵢ` of the warp and
+//! its hat matrix `H` the evidence changes in closed form. Where points i and k exchange targets that are `δ = t_l − t_j` apart,
+//!
+//! `ΔE = [δ·(rᵢ − r_k) + |δ|² (1 − (hᵢᵢ + h_kk)/2 + hᵢ_k)]/σ²`;
+//!
+//! where i alone moves by δ, `ΔE = [δ·rᵢ + ½ |δ|² (1 − hᵢᵢ)]/σ²`. The changes exclude each other, and what they share with changes elsewhere
+//! cancels to first order: the pair is right with the probability `1/(1 + Σ exp(−ΔE))`. Unlike the entries of the doubly stochastic matrix,
+//! which tell two points that may be exchanged apart by half their odds, these are shares of right pairs (`--example confidence`).
+
+use super::anneal::Annealer;
+use std::f64::consts::TAU;
+
+/// A point whose own target decides its position is not free of it altogether.
+const MAX_LEVERAGE: f64 = 0.95;
+/// Squared residuals beyond so many variances are no partner's: one in a thousand Gaussian ones is, in the plane and in space.
+const FARTHEST: f64 = 16.0;
+/// Odds fainter than this do not count.
+const FAINT: f64 = 1e-4;
+/// Rounds of exchanges until none makes the pairs likelier: one or two are needed.
+const ROUNDS: usize = 4;
+/// A change counts as one for the better from this on: rounding is less.
+const BETTER: f64 = -1e-9;
+/// Points that the soft matches leave without a partner get the likeliest one where it is surer than this, and others keep theirs where it
+/// is surer than that.
+const SURE: f64 = 0.5;
+const KEPT: f64 = 0.3;
+
+/// Memory of the odds.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PairOdds {
+    /// Target of each model row.
+    partners: Vec<Option<usize>>,
+    /// Model row of each target.
+    owners: Vec<Option<usize>>,
+    /// Pairs of points that are left over on both sides: squared distance, rows.
+    open: Vec<(f64, usize, usize)>,
+    leverages: Vec<Leverage>,
+    /// Sum of the odds against each pair.
+    against: Vec<f64>,
+}
+
+/// What a fit with soft weights says of a point that is matched for certain.
+#[derive(Clone, Copy, Debug)]
+struct Leverage {
+    /// Diagonal entry of the hat matrix.
+    hat: f64,
+    /// Residual of the certain match over that of the soft one.
+    shrink: f64,
+    /// Variance of where the other points put this one, over that of the noise.
+    others: f64,
+}
+
+/// What pairs are judged by.
+#[derive(Clone, Copy)]
+pub(crate) struct Fitted<'a, const D: usize> {
+    pub(crate) annealer: &'a Annealer<D>,
+    pub(crate) warped: &'a [[f64; D]],
+    pub(crate) targets: &'a [[f64; D]],
+    /// Variance of the noise along an axis.
+    pub(crate) variance: f64,
+}
+
+impl PairOdds {
+    /// Replaces `assignment` by the likeliest one in its neighbourhood, and sets the `confidence` of every pair; that of points without a
+    /// partner stays.
+    pub(crate) fn weigh<const D: usize>(
+        &mut self,
+        fitted: Fitted<'_, D>,
+        assignment: &mut [Option<usize>],
+        confidence: &mut [f64],
+    ) {
+        self.take(fitted, assignment);
+        self.complete(fitted);
+        for _ in 0..ROUNDS {
+            if !self.exchange(fitted) {
+                break;
+            }
+        }
+        self.add_odds(fitted);
+        for (i, partner) in assignment.iter_mut().enumerate() {
+            let sure = 1.0 / (1.0 + self.against[i]);
+            let wanted = if partner.is_some() { KEPT } else { SURE };
+            if self.partners[i].is_some() && sure > wanted {
+                *partner = self.partners[i];
+                confidence[i] = sure;
+            } else if partner.take().is_some() {
+                confidence[i] = 0.5; // undecided whether it has one
+            }
+        }
+    }
+
+    fn take<const D: usize>(&mut self, fitted: Fitted<'_, D>, assignment: &[Option<usize>]) {
+        self.partners.clear();
+        self.partners.extend_from_slice(assignment);
+        self.owners.clear();
+        self.owners.resize(fitted.targets.len(), None);
+        for (i, partner) in assignment.iter().enumerate() {
+            if let &Some(j) = partner {
+                self.owners[j] = Some(i);
+            }
+        }
+        let soft = &fitted.annealer.soft.weight;
+        let variances = &fitted.annealer.regression.variance;
+        self.leverages.clear();
+        self.leverages
+            .extend(soft.iter().zip(variances).map(|(weight, variance)| {
+                let variance = variance / fitted.variance;
+                let own = (weight * variance).min(MAX_LEVERAGE);
+                let others = variance / (1.0 - own);
+                let hat = (others / (1.0 + others)).min(MAX_LEVERAGE);
+                Leverage {
+                    hat,
+                    shrink: (1.0 - hat) / (1.0 - own),
+                    others,
+                }
+            }));
+    }
+
+    /// Pairs what is left over on both sides, nearest first: what the soft matches leave undecided mostly has a partner.
+    fn complete<const D: usize>(&mut self, fitted: Fitted<'_, D>) {
+        self.open.clear();
+        for (i, partner) in self.partners.iter().enumerate() {
+            if partner.is_some() {
+                continue;
+            }
+            let limit = FARTHEST * fitted.variance * (1.0 + self.leverages[i].others);
+            for (j, _) in fitted.annealer.soft.entries(i) {
+                let square = squared(&fitted.offset(i, j));
+                if self.owners[j].is_none() && square < limit {
+                    self.open.push((square, i, j));
+                }
+            }
+        }
+        let rows = |open: &(f64, usize, usize)| (open.1, open.2);
+        self.open
+            .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(rows(a).cmp(&rows(b))));
+        for &(_, i, j) in &self.open {
+            if self.partners[i].is_none() && self.owners[j].is_none() {
+                self.partners[i] = Some(j);
+                self.owners[j] = Some(i);
+            }
+        }
+    }
+
+    /// Makes for every point the change that makes the pairs likeliest; whether there was any.
+    fn exchange<const D: usize>(&mut self, fitted: Fitted<'_, D>) -> bool {
+        let mut changed = false;
+        for i in 0..self.partners.len() {
+            let mut best = (BETTER, None);
+            for (j, _) in fitted.annealer.soft.entries(i) {
+                let change = match (self.partners[i], self.owners[j]) {
+                    (Some(own), _) if own == j => continue,
+                    (Some(own), None) => self.of_move(fitted, (i, own), j),
+                    (Some(own), Some(k)) => self.of_exchange(fitted, (i, own), (k, j)),
+                    (None, Some(k)) => self.of_takeover(fitted, i, (k, j)),
+                    (None, None) => continue,
+                };
+                if change < best.0 {
+                    best = (change, Some(j));
+                }
+            }
+            let Some(j) = best.1 else { continue };
+            changed = true;
+            let (own, other) = (self.partners[i], self.owners[j]);
+            (self.partners[i], self.owners[j]) = (Some(j), Some(i));
+            if let Some(own) = own {
+                self.owners[own] = other;
+            }
+            if let Some(other) = other {
+                self.partners[other] = own;
+            }
+        }
+        changed
+    }
+
+    /// Sums the odds of the changes that take each pair apart.
+    fn add_odds<const D: usize>(&mut self, fitted: Fitted<'_, D>) {
+        let pairs = self.partners.iter().flatten().count() as f64;
+        // Half a point more on either side: none left over of a few does not exclude that one is.
+        let left_model = (self.partners.len() as f64 - pairs + 0.5) / (pairs + 0.5);
+        let left_target = (fitted.targets.len() as f64 - pairs + 0.5) / fitted.annealer.volume;
+        let scale = left_model * left_target * (TAU * fitted.variance).powf(0.5 * D as f64);
+        self.against.clear();
+        self.against.resize(self.partners.len(), 0.0);
+        for i in 0..self.partners.len() {
+            let Some(own) = self.partners[i] else {
+                for (j, _) in fitted.annealer.soft.entries(i) {
+                    if let Some(k) = self.owners[j] {
+                        self.against[k] += (-self.of_takeover(fitted, i, (k, j))).exp();
+                    }
+                }
+                continue;
+            };
+            let by_chance = scale * self.misfit(fitted, (i, own)).exp();
+            let mut against = by_chance;
+            for (j, _) in fitted.annealer.soft.entries(i) {
+                if j == own {
+                    continue;
+                }
+                let alone = (-self.of_move(fitted, (i, own), j)).exp();
+                let Some(k) = self.owners[j] else {
+                    against += alone;
+                    continue;
+                };
+                // Either point may take the other's target and leave that one without.
+                let theirs = scale * self.misfit(fitted, (k, j)).exp();
+                let taken = (-self.of_move(fitted, (k, j), own)).exp();
+                against += (-self.of_exchange(fitted, (i, own), (k, j))).exp()
+                    + alone * theirs
+                    + taken * by_chance;
+            }
+            self.against[i] += against;
+        }
+    }
+
+    /// Residual of a certain match.
+    fn residual<const D: usize>(&self, fitted: Fitted<'_, D>, (i, j): (usize, usize)) -> [f64; D] {
+        let shrink = self.leverages[i].shrink;
+        fitted.offset(i, j).map(|c| shrink * c)
+    }
+
+    /// Minus the logarithm of a target's density about where the others put its point, beside that of a point without noise.
+    fn misfit<const D: usize>(&self, fitted: Fitted<'_, D>, pair: (usize, usize)) -> f64 {
+        let free = 1.0 - self.leverages[pair.0].hat;
+        let square = squared(&self.residual(fitted, pair)) / (fitted.variance * free);
+        0.5 * (square.min(FARTHEST) - D as f64 * free.ln())
+    }
+
+    /// Change of the energy where point i of a pair goes to the target j, which is free.
+    fn of_move<const D: usize>(
+        &self,
+        fitted: Fitted<'_, D>,
+        (i, own): (usize, usize),
+        j: usize,
+    ) -> f64 {
+        let step = fitted.step(own, j);
+        let along = dot(&step, &self.residual(fitted, (i, own)));
+        (along + 0.5 * squared(&step) * (1.0 - self.leverages[i].hat)) / fitted.variance
+    }
+
+    /// Change of the energy where two pairs exchange their targets.
+    fn of_exchange<const D: usize>(
+        &self,
+        fitted: Fitted<'_, D>,
+        (i, own): (usize, usize),
+        (k, theirs): (usize, usize),
+    ) -> f64 {
+        let step = fitted.step(own, theirs);
+        let (mine, other) = (
+            self.residual(fitted, (i, own)),
+            self.residual(fitted, (k, theirs)),
+        );
+        let along = dot(&step, &mine) - dot(&step, &other);
+        let square = squared(&step);
+        let free = 1.0 - 0.5 * (self.leverages[i].hat + self.leverages[k].hat);
+        let least = (along + square * free) / fitted.variance;
+        if least > -FAINT.ln() {
+            return least; // neighbours move together, so that there is more to come
+        }
+        let together = fitted.annealer.regression.covariance(i, k) / fitted.variance;
+        least + square * together / fitted.variance
+    }
+
+    /// Change of the energy where point i, which is left over, takes the target of a pair.
+    fn of_takeover<const D: usize>(
+        &self,
+        fitted: Fitted<'_, D>,
+        i: usize,
+        (k, j): (usize, usize),
+    ) -> f64 {
+        let others = 1.0 + self.leverages[i].others;
+        let square = squared(&fitted.offset(i, j)) / (fitted.variance * others);
+        0.5 * (square + D as f64 * others.ln()) - self.misfit(fitted, (k, j))
+    }
+}
+
+impl<const D: usize> Fitted<'_, D> {
+    /// From where the warp puts point i to target j.
+    fn offset(&self, i: usize, j: usize) -> [f64; D] {
+        std::array::from_fn(|k| self.targets[j][k] - self.warped[i][k])
+    }
+
+    /// From one target to another.
+    fn step(&self, from: usize, to: usize) -> [f64; D] {
+        std::array::from_fn(|k| self.targets[to][k] - self.targets[from][k])
+    }
+}
+
+fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).map(|k| a[k] * b[k]).sum()
+}
+
+fn squared<const D: usize>(a: &[f64; D]) -> f64 {
+    dot(a, a)
+}

@@ -1,0 +1,101 @@
+//! How well the surroundings of each point fit: the evidence that its part of the set is not somewhere else.
+//!
+//! The odds of single pairs presume that the warp has found its place. Where a part of a set lies one point aside, its pairs agree with
+//! each other and are wrong together; what tells is that they fit little better than strewn points would. The gain of a surrounding is
+//! how much likelier Gaussian noise of its own residuals makes a target than the mean density ρ of the targets,
+//!
+//! `T = −ln [ρ (2πe s²)^{D/2}]`, `s²` the mean squared residual of the point's neighbours along an axis.
+
+use super::cells::Cells;
+use std::f64::consts::{E, TAU};
+
+/// Neighbours a point, for every dimension.
+const NEIGHBOURS: usize = 4;
+/// Neighbours that the whole set's noise counts for beside a surrounding's own residuals.
+const PRESUMED: f64 = 2.0;
+/// Probability that a surrounding is in its place: the logistic function of `BASE + WHOLE·min(g, 1) + PART·min(T, 2)` with the gain g of the
+/// whole answer. Fitted to bent, cropped, turned and stretched sets with noise and outliers (`--example confidence`, tuning seeds).
+const BASE: f64 = 1.8;
+const WHOLE: f64 = 6.0;
+const PART: f64 = 0.6;
+/// Gains beyond these say no more.
+const MOST_WHOLE: f64 = 1.0;
+const MOST_PART: f64 = 2.0;
+
+/// Memory of the surroundings.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Locality<const D: usize> {
+    cells: Cells<D>,
+    near: Vec<(f64, usize)>,
+    /// Squared residual of each point that has a partner.
+    squares: Vec<f64>,
+    paired: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Locality<D> {
+    /// Multiplies the confidence of every pair by the probability that its surrounding is in its place.
+    pub(crate) fn weigh(
+        &mut self,
+        (warped, targets): (&[[f64; D]], &[[f64; D]]),
+        (noise, volume): (f64, f64),
+        gain: f64,
+        assignment: &[Option<usize>],
+        confidence: &mut [f64],
+    ) {
+        let whole = BASE + WHOLE * gain.min(MOST_WHOLE);
+        if gain >= MOST_WHOLE {
+            let sure = logistic(whole + PART * MOST_PART);
+            let pairs = assignment.iter().zip(confidence);
+            pairs
+                .filter(|(partner, _)| partner.is_some())
+                .for_each(|(_, c)| *c *= sure);
+            return;
+        }
+        self.squares.clear();
+        self.paired.clear();
+        for (w, partner) in warped.iter().zip(assignment) {
+            let Some(j) = *partner else { continue };
+            self.paired.push(*w);
+            self.squares
+                .push((0..D).map(|k| (targets[j][k] - w[k]).powi(2)).sum());
+        }
+        let density = targets.len() as f64 / volume;
+        let spacing = density.recip().powf(1.0 / D as f64);
+        self.cells.build(&self.paired, spacing);
+        let pairs = assignment.iter().zip(warped).zip(confidence);
+        for ((_, w), confidence) in pairs.filter(|((partner, _), _)| partner.is_some()) {
+            let (count, squares) = self.around(w, spacing);
+            let total = squares + PRESUMED * D as f64 * noise;
+            let own = total / (D as f64 * (count + PRESUMED));
+            let part = -(density * (TAU * E * own).powf(0.5 * D as f64)).ln();
+            *confidence *= logistic(whole + PART * part.min(MOST_PART));
+        }
+    }
+
+    /// The nearest points with partners about `place`: how many, and the sum of their squared residuals.
+    fn around(&mut self, place: &[f64; D], spacing: f64) -> (f64, f64) {
+        let wanted = NEIGHBOURS * D + 1;
+        let mut radius = 1.5 * spacing;
+        // Twice as far until there are enough; a point far from all others makes do with fewer.
+        for _ in 0..3 {
+            self.near.clear();
+            let near = &mut self.near;
+            self.cells
+                .within(place, radius, |row, square| near.push((square, row)));
+            self.near
+                .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            self.near.dedup();
+            if self.near.len() >= wanted {
+                break;
+            }
+            radius *= 2.0;
+        }
+        self.near.truncate(wanted);
+        let squares = self.near.iter().map(|&(_, row)| self.squares[row]).sum();
+        (self.near.len() as f64, squares)
+    }
+}
+
+fn logistic(x: f64) -> f64 {
+    1.0 / (1.0 + (-x).exp())
+}
