@@ -62,9 +62,15 @@ pub(crate) const SETTLED: Ending = Ending {
     evaluations: 40,
 };
 
-/// Of a fit on a mesh that is refined afterwards, which moves it by more. From a start of the grid, four
-/// to eight evaluations are taken, under the wrong assumption about the face any number.
+/// Of a fit on a mesh that is refined afterwards, which moves it by more.
 pub(crate) const NEARLY_SETTLED: Ending = Ending {
+    step: 0.3,
+    ..SETTLED
+};
+
+/// Of the first fits. From a start of the grid, four to eight evaluations are taken, under the wrong
+/// assumption about the face any number.
+pub(crate) const DRAFTED: Ending = Ending {
     step: 0.3,
     evaluations: 14,
 };

@@ -1,6 +1,6 @@
 //! The forward model and its derivatives, the fit, and what a search refuses.
 
-use super::covariance::Observed;
+use super::covariance::{Meshed, Observed};
 use super::fit::{Prior, Problem, SETTLED};
 use super::forward::Forward;
 use super::parameters::{Coordinate, LumpParameters, Parameters};
@@ -156,7 +156,8 @@ fn problem() -> (Problem, Parameters) {
         values,
         frames: 2,
     };
-    let covariance = observed.covariance(&SensorErrors::default(), Interface::Bonded);
+    let covariance =
+        observed.covariance(&SensorErrors::default(), Interface::Bonded, Meshed::Finely);
     let prior = |coordinate, mean, error| Prior::new(coordinate, (mean, error));
     let problem = Problem {
         forward: forward(2, 1.0),
