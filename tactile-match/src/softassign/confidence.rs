@@ -17,6 +17,8 @@ use std::f64::consts::TAU;
 const MAX_LEVERAGE: f64 = 0.95;
 /// Squared residuals beyond so many variances are no partner's: one in a thousand Gaussian ones is, in the plane and in space.
 const FARTHEST: f64 = 16.0;
+/// Targets with fainter soft matches, some five standard deviations of the noise away, are not looked at.
+const IMPOSSIBLE: f64 = 1e-9;
 /// Odds fainter than this do not count.
 const FAINT: f64 = 1e-4;
 /// Rounds of exchanges until none makes the pairs likelier: one or two are needed.
@@ -127,7 +129,7 @@ impl PairOdds {
                 continue;
             }
             let limit = FARTHEST * fitted.variance * (1.0 + self.leverages[i].others);
-            for (j, _) in fitted.annealer.soft.entries(i) {
+            for j in fitted.candidates(i) {
                 let square = squared(&fitted.offset(i, j));
                 if self.owners[j].is_none() && square < limit {
                     self.open.push((square, i, j));
@@ -150,7 +152,7 @@ impl PairOdds {
         let mut changed = false;
         for i in 0..self.partners.len() {
             let mut best = (BETTER, None);
-            for (j, _) in fitted.annealer.soft.entries(i) {
+            for j in fitted.candidates(i) {
                 let change = match (self.partners[i], self.owners[j]) {
                     (Some(own), _) if own == j => continue,
                     (Some(own), None) => self.of_move(fitted, (i, own), j),
@@ -187,7 +189,7 @@ impl PairOdds {
         self.against.resize(self.partners.len(), 0.0);
         for i in 0..self.partners.len() {
             let Some(own) = self.partners[i] else {
-                for (j, _) in fitted.annealer.soft.entries(i) {
+                for j in fitted.candidates(i) {
                     if let Some(k) = self.owners[j] {
                         self.against[k] += (-self.of_takeover(fitted, i, (k, j))).exp();
                     }
@@ -196,7 +198,7 @@ impl PairOdds {
             };
             let by_chance = scale * self.misfit(fitted, (i, own)).exp();
             let mut against = by_chance;
-            for (j, _) in fitted.annealer.soft.entries(i) {
+            for j in fitted.candidates(i) {
                 if j == own {
                     continue;
                 }
@@ -281,6 +283,12 @@ impl<const D: usize> Fitted<'_, D> {
     /// From where the warp puts point i to target j.
     fn offset(&self, i: usize, j: usize) -> [f64; D] {
         std::array::from_fn(|k| self.targets[j][k] - self.warped[i][k])
+    }
+
+    /// Targets that point i could belong to.
+    fn candidates(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
+        let entries = self.annealer.soft.entries(i);
+        entries.filter(|&(_, p)| p > IMPOSSIBLE).map(|(j, _)| j)
     }
 
     /// From one target to another.

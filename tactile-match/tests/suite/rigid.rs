@@ -101,7 +101,7 @@ fn rigid_motions_are_recovered() {
 
 #[test]
 fn similarities_are_recovered() {
-    let scenes = [(0.0, 0), (0.01, 0)];
+    let scenes = [(0.0, 0), (0.01, 0), (0.01, 12)];
     check_motion::<2>(Transformation::Similarity, SCALE.powi(2), &scenes);
     check_motion::<3>(Transformation::Similarity, SCALE.powi(3), &scenes);
 }

@@ -4,11 +4,14 @@
 //! easy and end with the first, fast run. Where its answer neither fits exactly nor leaves residuals that noise explains, the further
 //! starts follow, from what costs least to what costs most. The answer of least energy wins; noisy scenes then average over the
 //! scales of the prior.
+mod cooling;
 mod progress;
 
 use super::anneal::Schedule;
 use super::prior::PriorScales;
 use super::{AnnealedSoftassign, Rotation, Search, SoftassignWorkspace, finish, starts};
+use cooling::{COOLEST, LABELLED, NEAR, REHEAT, SLOW};
+pub(super) use cooling::{Cooling, FAST};
 use nalgebra::SMatrix;
 use progress::{COMPLETE, MANY};
 use std::ops::ControlFlow;
@@ -20,59 +23,6 @@ pub(super) const SCALES: PriorScales = PriorScales {
     affine: 0.5,
 };
 
-/// How a run cools: the part of a [`Schedule`] that differs between starts.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Cooling {
-    /// First temperature, in radii of the model.
-    pub(super) sigma: f64,
-    rate: f64,
-    least: f64,
-    patience: usize,
-    sweeps: usize,
-}
-
-/// Further runs end when the temperature has stood still for so many iterations: matches that have not settled by then wander for hundreds.
-const PATIENCE: usize = 20;
-
-/// The first run: most scenes are easy.
-pub(super) const FAST: Cooling = Cooling {
-    sigma: 0.3,
-    rate: 0.75,
-    least: 0.9,
-    patience: usize::MAX,
-    sweeps: 3,
-};
-/// From the best answer so far.
-const REHEAT: Cooling = Cooling {
-    sigma: 0.1,
-    rate: 0.9,
-    least: 1.0,
-    patience: PATIENCE,
-    sweeps: 5,
-};
-/// The only run between sets that lie near each other. Residuals that stay above the temperature, whatever else moves, end it.
-const NEAR: Cooling = Cooling {
-    sigma: 0.2,
-    rate: 0.8,
-    least: 1.0,
-    patience: 12,
-    sweeps: 3,
-};
-/// Least first temperature of a run from the last answer of a series.
-const COOLEST: f64 = 0.03;
-/// Further runs.
-const SLOW: Cooling = Cooling {
-    sigma: 0.3,
-    rate: 0.93,
-    least: 1.0,
-    patience: PATIENCE,
-    sweeps: 5,
-};
-/// After relaxation labelling, whose pairs are trusted more than a first guess.
-const LABELLED: Cooling = Cooling {
-    sigma: 0.15,
-    ..SLOW
-};
 /// A cold run with partners for less than this share of the smaller set has collapsed.
 const COLLAPSED: f64 = 0.5;
 /// Residuals are compared no finer than this.
