@@ -199,6 +199,25 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
 }
 
 #[test]
+fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
+    let (problem, truth) = problem();
+    // From the limit itself and far from the truth in all else: ν's prior and the data pull it back,
+    // but first steps go beyond the limit.
+    let mut start = truth;
+    start.poisson_ratio = 0.4999;
+    start.block_modulus_pa *= 0.8;
+    start.lump = Some(LumpParameters {
+        diameter_m: 14e-3,
+        depth_m: 3e-3,
+        youngs_modulus_pa: 60e3,
+    });
+    let fit = problem.fit(start, SETTLED, || true).unwrap();
+    assert!(fit.converged);
+    // Noise-free values: what is left is what the priors pull, as in the fit from afar.
+    assert!(fit.misfit < 1.0, "{}", fit.misfit);
+}
+
+#[test]
 fn a_step_that_may_not_go_on_ends_the_fit() {
     let (problem, truth) = problem();
     let fit = problem.fit(truth, SETTLED, || false).unwrap();
