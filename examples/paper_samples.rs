@@ -1,14 +1,19 @@
 //! The paper's two samples, balls of 3 mm radius of 103 and 62 kPa at 0.7 and 1.2 N, by every estimator: a table and a plot beside the truth.
 //!
-//! `cargo run --release --features scene,simulate,plot --example paper_samples -- docs/paper_samples` simulates the presses by finite elements,
-//! writes each as a scene file with its frames, and measures those files. Without an argument it writes to `target/paper_samples`.
+//! ```console
+//! cargo run --release --features cli -- table examples/data/contact_table/scene.toml --out target/table   # some minutes, for the last row
+//! cargo run --release --features cli --example paper_samples -- target/paper_samples target/table/table.toml
+//! ```
+//! It simulates the presses by finite elements, writes each as a scene file with its frames, and measures those files. Without a table that row
+//! is left out; without a folder it writes to `target/paper_samples`.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use tactile_imaging::elasticity::contact::ContactTable;
 use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig};
 use tactile_imaging::plot::{Colour, Page, Panel};
-use tactile_imaging::scene::Scene;
+use tactile_imaging::scene::{Scene, read_contact_table};
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene, Sphere, write_folder,
 };
@@ -28,8 +33,10 @@ const ESTIMATORS: [(EstimatorChoice, &str); 5] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1);
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next();
     let folder = PathBuf::from(folder.unwrap_or_else(|| "target/paper_samples".into()));
+    let contact_table = arguments.next().map(read_contact_table).transpose()?;
     let mut table = String::from(
         "| sample | estimator | modulus | 95 % interval | error |\n|---|---|---|---|---|\n",
     );
@@ -37,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, material) in [("cl2000x", Elastic::CL2000X), ("cl2003x", Elastic::CL2003X)] {
         let truth_kpa = material.youngs_modulus_pa * 1e-3;
         let scene = write_sample(&folder.join(name), material)?;
-        let found = moduli(&scene)?;
+        let found = moduli(&scene, contact_table.as_ref())?;
         let mut points = Vec::new();
         for (k, (label, modulus)) in found.iter().enumerate() {
             let row = match modulus {
@@ -93,10 +100,18 @@ fn write_sample(folder: &Path, material: Elastic) -> Result<Scene, Box<dyn Error
 /// A modulus in kPa with its 95 % interval in words, or why there is none.
 type Modulus = Result<(f64, String), String>;
 
-fn moduli(scene: &Scene) -> Result<Vec<(&'static str, Modulus)>, Box<dyn Error>> {
-    let data = scene.load()?;
+fn moduli(
+    scene: &Scene,
+    contact_table: Option<&ContactTable>,
+) -> Result<Vec<(&'static str, Modulus)>, Box<dyn Error>> {
+    let mut data = scene.load()?;
+    data.contact_table = contact_table.cloned();
     let mut rows = Vec::new();
-    for (estimator, label) in ESTIMATORS {
+    let tabulated = (EstimatorChoice::TabulatedContact, "contact table");
+    let estimators = ESTIMATORS
+        .into_iter()
+        .chain(contact_table.map(|_| tabulated));
+    for (estimator, label) in estimators {
         let stages = StagesConfig {
             estimator,
             ..StagesConfig::default()
