@@ -44,19 +44,28 @@ struct SolvedScene {
     pressures_pa: Vec<Vec<f64>>,
 }
 
-fn rows(path: &Path) -> Result<(Vec<String>, Vec<Vec<String>>), Box<dyn Error>> {
+/// A CSV file.
+struct Table {
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+fn table(path: &Path) -> Result<Table, Box<dyn Error>> {
     let text = std::fs::read_to_string(path)?;
     let mut lines = text
         .lines()
         .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
     let header = lines.next().ok_or("an empty file")?;
-    Ok((header, lines.collect()))
+    Ok(Table {
+        header,
+        rows: lines.collect(),
+    })
 }
 
 fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> {
-    let (header, table) = rows(&folder.join("scenes.csv"))?;
+    let Table { header, rows } = table(&folder.join("scenes.csv"))?;
     let mut scenes = Vec::new();
-    for row in table {
+    for row in rows {
         let text = |name: &str| -> Result<&str, String> {
             let column = header.iter().position(|column| column == name);
             let found = column.and_then(|column| row.get(column));
@@ -71,7 +80,7 @@ fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> {
                 .map(|load| number(&format!("{prefix}_{load}_{unit}")))
                 .collect()
         };
-        let (_, points) = rows(&folder.join(format!("{name}.csv")))?;
+        let points = table(&folder.join(format!("{name}.csv")))?.rows;
         let mut radii_m = Vec::new();
         let mut pressures_pa = vec![Vec::new(); loads];
         for point in points {
