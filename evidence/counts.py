@@ -41,7 +41,7 @@ def simd_level():
 
 def binary():
     """Builds the bench as the step benches does, so that nothing is compiled twice, and returns its path."""
-    command = ["cargo", "test", "-p", "tactile-benches", "--all-features", "--bench", "instructions", "--no-run", "--message-format=json"]
+    command = ["cargo", "test", "--workspace", "--features", "tactile-benches/fem", "--bench", "instructions", "--no-run", "--message-format=json"]
     messages = (json.loads(line) for line in run(command).splitlines() if line.startswith("{"))
     built = [m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "instructions"]
     return built[-1]

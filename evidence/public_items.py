@@ -11,12 +11,13 @@ A type, trait or function has an example when its page shows one; a method when 
 It sees names, not signatures; before a release run `cargo semver-checks` as well (see CONTRIBUTING.md).
 """
 import html
+import os
 import pathlib
 import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-DOC = ROOT / "target" / "doc"
+DOC = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "doc"
 ITEMS, BARE = ROOT / "evidence" / "public_items.txt", ROOT / "evidence" / "without_example.txt"
 CRATES = ["elasticity", "force", "imaging", "match", "optics", "sfs", "tps"]
 

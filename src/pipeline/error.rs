@@ -211,6 +211,7 @@ pub enum PipelineError {
 
 impl PipelineError {
     /// The frame that the trouble comes from, counted from 0, where there is one.
+    #[cfg(feature = "scene")]
     pub(crate) fn frame(&self) -> Option<usize> {
         match self {
             Self::NoSuchFrame { frame, .. }

@@ -190,6 +190,7 @@ impl<'a> Press<'a> {
     }
 
     /// The image of a frame.
+    #[cfg(feature = "plot")]
     pub(crate) fn image(&self, frame: usize) -> Option<ArrayView2<'a, u8>> {
         Some(self.frames.get(frame)?.image)
     }
