@@ -82,7 +82,6 @@ mod radius;
 mod recovery;
 mod rigid;
 mod scene;
-mod slide;
 mod sparse;
 mod state;
 mod stress;

@@ -127,8 +127,7 @@ pub struct Inclusion {
 #[non_exhaustive]
 pub enum InclusionWarning {
     /// The best fit leaves more than the errors explain (below 1 chance in 1000): several inclusions,
-    /// one off the axis, or errors larger than stated. Errors are widened by the root of the excess, and
-    /// no parameter counts as told.
+    /// one off the axis, or errors larger than stated. Errors are widened by the root of the excess.
     PoorFit {
         /// χ² over its degrees of freedom.
         excess: f64,
@@ -137,8 +136,7 @@ pub enum InclusionWarning {
     OneFrame,
     /// The fit ended before it settled.
     NotConverged,
-    /// Bonded and frictionless faces explain the frames about equally well, or one of them could not be
-    /// solved; the better one is given and no parameter counts as told.
+    /// Bonded and frictionless faces explain the frames about equally well; the better one is given.
     UncertainInterface,
     /// The inclusion lies nearer to the surface or to the stage than half an element: the model does
     /// not reach that far.

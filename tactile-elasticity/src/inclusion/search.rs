@@ -1,8 +1,8 @@
 //! Search for an inclusion.
 
-use super::covariance::{Meshed, Observed};
+use super::covariance::Observed;
 use super::estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
-use super::fit::{DRAFTED, Fit, NEARLY_SETTLED, Prior, Problem, starts};
+use super::fit::{Fit, NEARLY_SETTLED, Prior, Problem, starts};
 use super::forward::Forward;
 use super::parameters::{Coordinate, Parameters};
 use super::profiles::{PressureProfile, check};
@@ -156,12 +156,9 @@ impl InclusionSearch {
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or((0.0, 0.0));
         let mut hypotheses = Vec::new();
-        let mut is_unsolved = false;
         for draft in drafts {
             if best.0 - draft.evidence().0 < HOPELESS_EVIDENCE + HOPELESS_MISFIT * best.1 {
-                let found = self.hypothesis(&observed, &approaches_m, draft, &mut counter);
-                is_unsolved |= found.is_none();
-                hypotheses.extend(found);
+                hypotheses.extend(self.hypothesis(&observed, &approaches_m, draft, &mut counter));
             }
         }
         if counter.cancelled {
@@ -170,11 +167,8 @@ impl InclusionSearch {
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let mut hypotheses = hypotheses.into_iter();
         let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
-        // An assumption that could not be solved may have been the right one.
-        let is_uncertain = is_unsolved
-            || (hypotheses.next())
-                .is_some_and(|other| best.evidence() - other.evidence() < CLEAR_EVIDENCE);
-        Ok(best.estimate(&observed, is_uncertain))
+        let runner_up = hypotheses.next();
+        Ok(best.estimate(&observed, runner_up.as_ref()))
     }
 
     fn observed(
@@ -304,12 +298,12 @@ impl InclusionSearch {
         let mut problem = Problem {
             forward: coarsest.clone(),
             measured: observed.values.clone(),
-            factor: (observed.covariance(&self.sensor, interface, Meshed::Coarsely)).cholesky()?,
+            factor: observed.covariance(&self.sensor, interface).cholesky()?,
             priors: self.block_priors(guess),
             correction: Vec::new(),
         };
         let (_, start) = problem.scaled_start(&self.plain_block(guess))?;
-        let plain = problem.fit(start, DRAFTED, || counter.step())?;
+        let plain = problem.fit(start, NEARLY_SETTLED, || counter.step())?;
         if counter.cancelled {
             return None;
         }
@@ -327,7 +321,7 @@ impl InclusionSearch {
         grid.sort_by(|a, b| a.0.total_cmp(&b.0));
         problem.forward = coarsest;
         let lump = (grid.iter().take(FITTED_STARTS))
-            .filter_map(|(_, start)| problem.fit(*start, DRAFTED, || counter.step()))
+            .filter_map(|(_, start)| problem.fit(*start, NEARLY_SETTLED, || counter.step()))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
         Some(Draft {
             problem,
@@ -353,8 +347,6 @@ impl InclusionSearch {
         } = draft;
         let forward = |fineness| self.forward(observed, approaches_m, interface, fineness);
         let [_, fitted, answers] = FINENESS.map(forward);
-        let covariance = observed.covariance(&self.sensor, interface, Meshed::Finely);
-        problem.factor = covariance.cholesky()?;
         let with_lump = core::mem::take(&mut problem.priors);
         problem.priors = with_lump[..with_lump.len() - LUMP_COORDINATES].to_vec();
         let plain = problem.refined(&answers, plain, || counter.step())?;
@@ -455,7 +447,7 @@ impl Hypothesis {
         self.plain.evidence.max(lump)
     }
 
-    fn estimate(self, observed: &Observed, is_uncertain: bool) -> InclusionEstimate {
+    fn estimate(self, observed: &Observed, other: Option<&Self>) -> InclusionEstimate {
         let freedom = observed.values.len() as f64;
         let rings = observed.radii_m.len();
         let split = |values: &[f64]| -> Vec<Vec<f64>> {
@@ -486,14 +478,13 @@ impl Hypothesis {
         if !chosen.converged {
             warnings.push(InclusionWarning::NotConverged);
         }
-        if is_uncertain {
+        if other.is_some_and(|other| self.evidence() - other.evidence() < CLEAR_EVIDENCE) {
             warnings.push(InclusionWarning::UncertainInterface);
         }
         if chosen.parameters.is_at_boundary() {
             warnings.push(InclusionWarning::AtBoundary);
         }
-        let is_reliable =
-            chosen.converged && !is_poor && !is_uncertain && !chosen.parameters.is_at_boundary();
+        let is_reliable = chosen.converged && !chosen.parameters.is_at_boundary();
         let error = |index: usize| widened * chosen.covariance[(index, index)].sqrt();
         let logarithm = |coordinate| chosen.parameters.get(coordinate);
         let told = |index, coordinate| {
