@@ -127,7 +127,8 @@ pub struct Inclusion {
 #[non_exhaustive]
 pub enum InclusionWarning {
     /// The best fit leaves more than the errors explain (below 1 chance in 1000): several inclusions,
-    /// one off the axis, or errors larger than stated. Errors are widened by the root of the excess.
+    /// one off the axis, or errors larger than stated. Errors are widened by the root of the excess, and
+    /// no parameter counts as told.
     PoorFit {
         /// χ² over its degrees of freedom.
         excess: f64,

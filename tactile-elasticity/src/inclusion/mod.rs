@@ -24,6 +24,7 @@ mod design;
 mod estimate;
 mod fit;
 mod forward;
+mod hypothesis;
 mod motion;
 mod parameters;
 mod profiles;

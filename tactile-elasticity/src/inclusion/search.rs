@@ -1,9 +1,10 @@
 //! Search for an inclusion.
 
 use super::covariance::Observed;
-use super::estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
+use super::estimate::InclusionEstimate;
 use super::fit::{Fit, NEARLY_SETTLED, Prior, Problem, starts};
 use super::forward::Forward;
+use super::hypothesis::Hypothesis;
 use super::parameters::{Coordinate, Parameters};
 use super::profiles::{PressureProfile, check};
 use super::specimen::{SensorErrors, Specimen};
@@ -22,10 +23,6 @@ const MIN_RINGS: usize = 8;
 const FINENESS: [usize; 3] = [2, 3, 5];
 /// Starts that are fitted, of the grid's best.
 const FITTED_STARTS: usize = 3;
-/// Least fall of χ² for an inclusion to count as found.
-const LEAST_FALL: f64 = 20.0;
-/// Least probability for that.
-const LEAST_PROBABILITY: f64 = 0.99;
 
 /// What a search is doing.
 ///
@@ -426,99 +423,3 @@ impl Draft {
         })
     }
 }
-
-/// The best fits under one assumption about the face.
-struct Hypothesis {
-    interface: Interface,
-    plain: Fit,
-    lump: Option<Fit>,
-}
-
-/// Probability that a χ² as large comes by chance, below which a fit counts as poor, in standard
-/// deviations of χ².
-const POOR: f64 = 3.1;
-
-impl Hypothesis {
-    fn evidence(&self) -> f64 {
-        let lump = self
-            .lump
-            .as_ref()
-            .map_or(f64::NEG_INFINITY, |fit| fit.evidence);
-        self.plain.evidence.max(lump)
-    }
-
-    fn estimate(self, observed: &Observed, other: Option<&Self>) -> InclusionEstimate {
-        let freedom = observed.values.len() as f64;
-        let rings = observed.radii_m.len();
-        let split = |values: &[f64]| -> Vec<Vec<f64>> {
-            let pressures = values[..observed.frames * rings].chunks(rings);
-            pressures.map(<[f64]>::to_vec).collect()
-        };
-        let gain = self
-            .lump
-            .as_ref()
-            .map_or(f64::NEG_INFINITY, |fit| fit.evidence - self.plain.evidence);
-        let fall = (self.lump.as_ref()).map_or(0.0, |fit| self.plain.misfit - fit.misfit);
-        let probability = 1.0 / (1.0 + (-gain).exp());
-        let found = probability > LEAST_PROBABILITY && fall > LEAST_FALL;
-        let chosen = match &self.lump {
-            Some(lump) if found => lump,
-            _ => &self.plain,
-        };
-        let misfit = chosen.misfit / freedom;
-        let is_poor = misfit > 1.0 + POOR * (2.0 / freedom).sqrt();
-        let widened = if is_poor { misfit.sqrt() } else { 1.0 };
-        let mut warnings = Vec::new();
-        if is_poor {
-            warnings.push(InclusionWarning::PoorFit { excess: misfit });
-        }
-        if observed.frames == 1 {
-            warnings.push(InclusionWarning::OneFrame);
-        }
-        if !chosen.converged {
-            warnings.push(InclusionWarning::NotConverged);
-        }
-        if other.is_some_and(|other| self.evidence() - other.evidence() < CLEAR_EVIDENCE) {
-            warnings.push(InclusionWarning::UncertainInterface);
-        }
-        if chosen.parameters.is_at_boundary() {
-            warnings.push(InclusionWarning::AtBoundary);
-        }
-        let is_reliable = chosen.converged && !chosen.parameters.is_at_boundary();
-        let error = |index: usize| widened * chosen.covariance[(index, index)].sqrt();
-        let logarithm = |coordinate| chosen.parameters.get(coordinate);
-        let told = |index, coordinate| {
-            let estimated = Estimated::from_logarithm(logarithm(coordinate), error(index));
-            Told::new(estimated, is_reliable)
-        };
-        let inclusion = found.then(|| Inclusion {
-            diameter_m: told(4, Coordinate::Diameter),
-            depth_m: told(5, Coordinate::Depth),
-            youngs_modulus_pa: told(6, Coordinate::LumpModulus),
-            correlation: core::array::from_fn(|i| {
-                core::array::from_fn(|k| {
-                    let c = &chosen.covariance;
-                    c[(4 + i, 4 + k)] / (c[(4 + i, 4 + i)] * c[(4 + k, 4 + k)]).sqrt()
-                })
-            }),
-        });
-        InclusionEstimate {
-            probability,
-            found,
-            block_modulus_pa: Estimated::from_logarithm(
-                logarithm(Coordinate::BlockModulus),
-                error(0),
-            ),
-            inclusion,
-            interface: self.interface,
-            misfit,
-            warnings,
-            radii_m: observed.radii_m.clone(),
-            fitted_pa: split(&chosen.predicted),
-            plain_pa: split(&self.plain.predicted),
-        }
-    }
-}
-
-/// Difference of log evidence above which one assumption is clearly better: 20 to 1.
-const CLEAR_EVIDENCE: f64 = 3.0;
