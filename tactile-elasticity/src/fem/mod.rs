@@ -82,6 +82,7 @@ mod radius;
 mod recovery;
 mod rigid;
 mod scene;
+mod slide;
 mod sparse;
 mod state;
 mod stress;

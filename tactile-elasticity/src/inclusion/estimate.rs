@@ -137,7 +137,8 @@ pub enum InclusionWarning {
     OneFrame,
     /// The fit ended before it settled.
     NotConverged,
-    /// Bonded and frictionless faces explain the frames about equally well; the better one is given.
+    /// Bonded and frictionless faces explain the frames about equally well, or one of them could not be
+    /// solved; the better one is given and no parameter counts as told.
     UncertainInterface,
     /// The inclusion lies nearer to the surface or to the stage than half an element: the model does
     /// not reach that far.

@@ -1,7 +1,7 @@
 //! Maximum a posteriori fit of a block's parameters to measured profiles.
 
 use super::forward::{Forward, Linearised, Solved};
-use super::parameters::{Coordinate, LumpParameters, Parameters};
+use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// What is known of a coordinate beforehand: a Gaussian.
@@ -62,9 +62,15 @@ pub(crate) const SETTLED: Ending = Ending {
     evaluations: 40,
 };
 
-/// Of a fit on a mesh that is refined afterwards, which moves it by more. From a start of the grid, four
-/// to eight evaluations are taken, under the wrong assumption about the face any number.
+/// Of a fit on a mesh that is refined afterwards, which moves it by more.
 pub(crate) const NEARLY_SETTLED: Ending = Ending {
+    step: 0.3,
+    ..SETTLED
+};
+
+/// Of the first fits. From a start of the grid, four to eight evaluations are taken, under the wrong
+/// assumption about the face any number.
+pub(crate) const DRAFTED: Ending = Ending {
     step: 0.3,
     evaluations: 14,
 };
@@ -229,7 +235,21 @@ impl Problem {
         for k in 0..matrix.nrows() {
             matrix[(k, k)] *= 1.0 + damping;
         }
-        let mut step = matrix.cholesky()?.solve(&normal.gradient);
+        let mut step = matrix.clone().cholesky()?.solve(&normal.gradient);
+        let poisson = |prior: &Prior| prior.coordinate == Coordinate::PoissonRatio;
+        if let Some(k) = self.priors.iter().position(poisson) {
+            // A step cut short at the limit of ν alone would not lower the objective: the others' steps
+            // are those that go with ν at its limit.
+            let room = LARGEST_POISSON_RATIO - parameters.poisson_ratio;
+            if step[k] > room {
+                let mut gradient = &normal.gradient - room * matrix.column(k);
+                matrix.row_mut(k).fill(0.0);
+                matrix.column_mut(k).fill(0.0);
+                matrix[(k, k)] = 1.0;
+                gradient[k] = room;
+                step = matrix.cholesky()?.solve(&gradient);
+            }
+        }
         let scaled = (self.priors.iter().zip(step.iter()))
             .map(|(prior, step)| (step / prior.coordinate.unit()).abs())
             .fold(0.0, f64::max);

@@ -32,8 +32,15 @@ pub(crate) struct Prediction {
 /// A solved scene, from which scenes nearby are solved in fewer iterations.
 #[derive(Debug, Clone)]
 pub(crate) struct Solved {
-    scene: Scene,
+    /// One for all frames; where surfaces slide, one a frame.
+    scenes: Vec<Scene>,
     states: Vec<State>,
+}
+
+impl Solved {
+    fn scene(&self, frame: usize) -> &Scene {
+        &self.scenes[frame.min(self.scenes.len() - 1)]
+    }
 }
 
 /// A prediction and its derivative by each coordinate.
@@ -92,20 +99,50 @@ impl Forward {
         near: Option<&Solved>,
     ) -> Option<(Prediction, Solved)> {
         let scene = self.scene(parameters)?;
-        let loads: Vec<Load> = (self.approaches_m.iter())
-            .map(|approach| Load::Approach(approach + parameters.zero_m))
+        let approaches: Vec<f64> = (self.approaches_m.iter())
+            .map(|approach| approach + parameters.zero_m)
             .collect();
-        let near = near.map(|near| (&near.scene, near.states.as_slice()));
-        let solution = scene.solve_near(&loads, near);
-        if solution.report.outcome != Outcome::Solved {
-            return None;
+        let slides = self.interface == Interface::Frictionless;
+        let solved = if slides && self.kinematics == Kinematics::Finite {
+            self.solve_sliding(&scene, parameters, &approaches, near)?
+        } else {
+            let loads: Vec<Load> = approaches.into_iter().map(Load::Approach).collect();
+            let near = near.map(|near| (near.scene(0), near.states.as_slice()));
+            let solution = scene.solve_near(&loads, near);
+            if solution.report.outcome != Outcome::Solved {
+                return None;
+            }
+            Solved {
+                scenes: vec![scene],
+                states: solution.states,
+            }
+        };
+        let frames = (solved.states.iter()).map(|state| (state.pressure(), state.force_n()));
+        Some((self.collect(frames), solved))
+    }
+
+    /// Frame by frame, each from the same frame of a solution nearby or from the frame before.
+    fn solve_sliding(
+        &self,
+        scene: &Scene,
+        parameters: &Parameters,
+        approaches_m: &[f64],
+        near: Option<&Solved>,
+    ) -> Option<Solved> {
+        // The inclusion's mesh stays where it is.
+        let depth_m = (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m);
+        let mut solved = Solved {
+            scenes: Vec::with_capacity(approaches_m.len()),
+            states: Vec::with_capacity(approaches_m.len()),
+        };
+        for (frame, &approach) in approaches_m.iter().enumerate() {
+            let before = || solved.scenes.last().zip(solved.states.last());
+            let near = near.map(|near| (near.scene(frame), &near.states[frame]));
+            let (scene, state) = scene.slid(approach, depth_m, near.or_else(before))?;
+            solved.scenes.push(scene);
+            solved.states.push(state);
         }
-        let states = solution.states;
-        let frames = states
-            .iter()
-            .map(|state| (state.pressure(), state.force_n()));
-        let prediction = self.collect(frames);
-        Some((prediction, Solved { scene, states }))
+        Some(solved)
     }
 
     /// The scene of parameters near those of `scene`, on its mesh.
@@ -146,21 +183,27 @@ impl Forward {
         near: Option<&Solved>,
     ) -> Option<Linearised> {
         let (prediction, solved) = self.predict_near(parameters, near)?;
-        let Solved { scene, states } = &solved;
-        let mut nearby = Vec::with_capacity(coordinates.len());
-        for &coordinate in coordinates {
-            let moved = parameters.moved(coordinate, STEP * coordinate.unit());
-            nearby.push((self.changed(scene, parameters, &moved)?, moved.zero_m));
-        }
-        let mut layout = scene.layout();
+        let moved: Vec<Parameters> = (coordinates.iter())
+            .map(|&coordinate| parameters.moved(coordinate, STEP * coordinate.unit()))
+            .collect();
+        let changed = |scene: &Scene| -> Option<Vec<Scene>> {
+            (moved.iter())
+                .map(|moved| self.changed(scene, parameters, moved))
+                .collect()
+        };
+        let mut layout = solved.scene(0).layout();
+        let mut nearby = Vec::new();
         // Of each coordinate, the interface's answer frame by frame.
-        let mut answers = vec![Vec::with_capacity(states.len()); coordinates.len()];
-        for (state, approach) in states.iter().zip(&self.approaches_m) {
-            let at: Vec<_> = (nearby.iter())
-                .map(|(changed, zero_m)| (changed, approach + zero_m))
+        let mut answers = vec![Vec::with_capacity(solved.states.len()); coordinates.len()];
+        for (frame, state) in solved.states.iter().enumerate() {
+            if frame < solved.scenes.len() {
+                nearby = changed(solved.scene(frame))?;
+            }
+            let at: Vec<(&Scene, f64)> = (nearby.iter().zip(&moved))
+                .map(|(scene, moved)| (scene, self.approaches_m[frame] + moved.zero_m))
                 .collect();
-            let found = scene.neighbourhood(&mut layout, state)?.solve(&at)?;
-            for (answers, found) in answers.iter_mut().zip(found) {
+            let neighbourhood = solved.scene(frame).neighbourhood(&mut layout, state)?;
+            for (answers, found) in answers.iter_mut().zip(neighbourhood.solve(&at)?) {
                 answers.push(found);
             }
         }

@@ -10,8 +10,6 @@ use crate::fem::Interface;
 const LEAST_FALL: f64 = 20.0;
 /// Least probability for that.
 const LEAST_PROBABILITY: f64 = 0.99;
-/// Difference of log evidence above which one assumption is clearly better: 20 to 1.
-const CLEAR_EVIDENCE: f64 = 3.0;
 /// Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as poor.
 const POOR: f64 = 3.1;
 
@@ -31,7 +29,7 @@ impl Hypothesis {
         self.plain.evidence.max(lump)
     }
 
-    pub(super) fn estimate(self, observed: &Observed, other: Option<&Self>) -> InclusionEstimate {
+    pub(super) fn estimate(self, observed: &Observed, is_uncertain: bool) -> InclusionEstimate {
         let freedom = observed.values.len() as f64;
         let rings = observed.radii_m.len();
         let split = |values: &[f64]| -> Vec<Vec<f64>> {
@@ -62,13 +60,14 @@ impl Hypothesis {
         if !chosen.converged {
             warnings.push(InclusionWarning::NotConverged);
         }
-        if other.is_some_and(|other| self.evidence() - other.evidence() < CLEAR_EVIDENCE) {
+        if is_uncertain {
             warnings.push(InclusionWarning::UncertainInterface);
         }
         if chosen.parameters.is_at_boundary() {
             warnings.push(InclusionWarning::AtBoundary);
         }
-        let is_reliable = chosen.converged && !is_poor && !chosen.parameters.is_at_boundary();
+        let is_reliable =
+            chosen.converged && !is_poor && !is_uncertain && !chosen.parameters.is_at_boundary();
         let error = |index: usize| widened * chosen.covariance[(index, index)].sqrt();
         let logarithm = |coordinate| chosen.parameters.get(coordinate);
         let told = |index, coordinate| {

@@ -51,7 +51,7 @@ impl Coordinate {
 }
 
 /// Largest Poisson ratio of the elements.
-const LARGEST_POISSON_RATIO: f64 = 0.4999;
+pub(crate) const LARGEST_POISSON_RATIO: f64 = 0.4999;
 
 impl Parameters {
     pub(crate) fn get(&self, coordinate: Coordinate) -> f64 {

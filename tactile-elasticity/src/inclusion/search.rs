@@ -1,8 +1,8 @@
 //! Search for an inclusion.
 
-use super::covariance::Observed;
+use super::covariance::{Meshed, Observed};
 use super::estimate::InclusionEstimate;
-use super::fit::{Fit, NEARLY_SETTLED, Prior, Problem, starts};
+use super::fit::{DRAFTED, Fit, NEARLY_SETTLED, Prior, Problem, starts};
 use super::forward::Forward;
 use super::hypothesis::Hypothesis;
 use super::parameters::{Coordinate, Parameters};
@@ -21,6 +21,8 @@ const MIN_RINGS: usize = 8;
 /// Elements along an eighth of the inclusion's circumference: of the starts, of the best start's fit, of
 /// what corrects that fit. The last one's pressure is within 0.1 % of twice as many.
 const FINENESS: [usize; 3] = [2, 3, 5];
+/// Difference of log evidence above which one assumption is clearly better: 20 to 1.
+const CLEAR_EVIDENCE: f64 = 3.0;
 /// Starts that are fitted, of the grid's best.
 const FITTED_STARTS: usize = 3;
 
@@ -153,9 +155,12 @@ impl InclusionSearch {
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or((0.0, 0.0));
         let mut hypotheses = Vec::new();
+        let mut is_unsolved = false;
         for draft in drafts {
             if best.0 - draft.evidence().0 < HOPELESS_EVIDENCE + HOPELESS_MISFIT * best.1 {
-                hypotheses.extend(self.hypothesis(&observed, &approaches_m, draft, &mut counter));
+                let found = self.hypothesis(&observed, &approaches_m, draft, &mut counter);
+                is_unsolved |= found.is_none();
+                hypotheses.extend(found);
             }
         }
         if counter.cancelled {
@@ -164,8 +169,11 @@ impl InclusionSearch {
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let mut hypotheses = hypotheses.into_iter();
         let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
-        let runner_up = hypotheses.next();
-        Ok(best.estimate(&observed, runner_up.as_ref()))
+        // An assumption that could not be solved may have been the right one.
+        let is_uncertain = is_unsolved
+            || (hypotheses.next())
+                .is_some_and(|other| best.evidence() - other.evidence() < CLEAR_EVIDENCE);
+        Ok(best.estimate(&observed, is_uncertain))
     }
 
     fn observed(
@@ -295,12 +303,12 @@ impl InclusionSearch {
         let mut problem = Problem {
             forward: coarsest.clone(),
             measured: observed.values.clone(),
-            factor: observed.covariance(&self.sensor, interface).cholesky()?,
+            factor: (observed.covariance(&self.sensor, interface, Meshed::Coarsely)).cholesky()?,
             priors: self.block_priors(guess),
             correction: Vec::new(),
         };
         let (_, start) = problem.scaled_start(&self.plain_block(guess))?;
-        let plain = problem.fit(start, NEARLY_SETTLED, || counter.step())?;
+        let plain = problem.fit(start, DRAFTED, || counter.step())?;
         if counter.cancelled {
             return None;
         }
@@ -318,7 +326,7 @@ impl InclusionSearch {
         grid.sort_by(|a, b| a.0.total_cmp(&b.0));
         problem.forward = coarsest;
         let lump = (grid.iter().take(FITTED_STARTS))
-            .filter_map(|(_, start)| problem.fit(*start, NEARLY_SETTLED, || counter.step()))
+            .filter_map(|(_, start)| problem.fit(*start, DRAFTED, || counter.step()))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
         Some(Draft {
             problem,
@@ -344,6 +352,8 @@ impl InclusionSearch {
         } = draft;
         let forward = |fineness| self.forward(observed, approaches_m, interface, fineness);
         let [_, fitted, answers] = FINENESS.map(forward);
+        let covariance = observed.covariance(&self.sensor, interface, Meshed::Finely);
+        problem.factor = covariance.cholesky()?;
         let with_lump = core::mem::take(&mut problem.priors);
         problem.priors = with_lump[..with_lump.len() - LUMP_COORDINATES].to_vec();
         let plain = problem.refined(&answers, plain, || counter.step())?;

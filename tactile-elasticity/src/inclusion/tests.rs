@@ -1,6 +1,6 @@
 //! The forward model and its derivatives, the fit, and what a search refuses.
 
-use super::covariance::Observed;
+use super::covariance::{Meshed, Observed};
 use super::fit::{Prior, Problem, SETTLED};
 use super::forward::Forward;
 use super::parameters::{Coordinate, LumpParameters, Parameters};
@@ -156,7 +156,8 @@ fn problem() -> (Problem, Parameters) {
         values,
         frames: 2,
     };
-    let covariance = observed.covariance(&SensorErrors::default(), Interface::Bonded);
+    let covariance =
+        observed.covariance(&SensorErrors::default(), Interface::Bonded, Meshed::Finely);
     let prior = |coordinate, mean, error| Prior::new(coordinate, (mean, error));
     let problem = Problem {
         forward: forward(2, 1.0),
@@ -194,6 +195,25 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
         // Without noise the priors alone pull, whose means are not the truth.
         assert!(z.abs() < 0.7, "{coordinate:?}: {z}");
     }
+    assert!(fit.misfit < 1.0, "{}", fit.misfit);
+}
+
+#[test]
+fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
+    let (problem, truth) = problem();
+    // From the limit itself and far from the truth in all else: ν's prior and the data pull it back,
+    // but first steps go beyond the limit.
+    let mut start = truth;
+    start.poisson_ratio = 0.4999;
+    start.block_modulus_pa *= 0.8;
+    start.lump = Some(LumpParameters {
+        diameter_m: 14e-3,
+        depth_m: 3e-3,
+        youngs_modulus_pa: 60e3,
+    });
+    let fit = problem.fit(start, SETTLED, || true).unwrap();
+    assert!(fit.converged);
+    // Noise-free values: what is left is what the priors pull, as in the fit from afar.
     assert!(fit.misfit < 1.0, "{}", fit.misfit);
 }
 
