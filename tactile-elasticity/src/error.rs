@@ -80,6 +80,16 @@ pub enum ElasticityError {
     /// The strain is zero: stress over strain is undefined.
     #[error("the strain is zero: stress over strain is undefined")]
     ZeroStrain,
+    /// Loads that follow each other are not in the order of time.
+    #[error("load {load} was at {found_s} s, before the one that it follows ({before_s} s)")]
+    TimeDecreases {
+        /// Its index among the loads given.
+        load: usize,
+        /// The time of the load before.
+        before_s: f64,
+        /// The time given.
+        found_s: f64,
+    },
     /// Stress and strain have opposite signs.
     #[error("stress ({stress_pa} Pa) and strain ({strain}) have opposite signs")]
     OppositeSigns {
@@ -206,6 +216,7 @@ pub enum Quantity {
     Layers,
     Samples,
     PoissonRatio,
+    Time,
 }
 
 impl core::fmt::Display for Quantity {
@@ -234,6 +245,7 @@ impl core::fmt::Display for Quantity {
             Self::Layers => "layers",
             Self::Samples => "samples",
             Self::PoissonRatio => "Poisson ratio",
+            Self::Time => "time",
         })
     }
 }

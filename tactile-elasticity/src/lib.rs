@@ -34,6 +34,7 @@ pub mod field;
 #[cfg(feature = "fem")]
 pub mod inclusion;
 pub mod modulus;
+pub mod relaxation;
 mod scalar;
 mod selection;
 pub mod strain;

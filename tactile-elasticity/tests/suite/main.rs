@@ -5,6 +5,7 @@ mod curve;
 mod hertz_reference;
 mod modulus;
 mod recorded;
+mod relaxation;
 mod stability;
 mod stability_scale;
 mod strain_reference;
