@@ -103,4 +103,12 @@ pub enum MatchError {
         /// The landmark's row.
         row: usize,
     },
+    /// The standard deviation of a target is not positive and finite.
+    #[error("the standard deviation of target {row} is {value}, not positive and finite")]
+    TargetDeviation {
+        /// The target's row.
+        row: usize,
+        /// The value found.
+        value: f64,
+    },
 }

@@ -5,7 +5,7 @@ use super::landmarks::Known;
 use super::prior::Prior;
 use super::regression::Regression;
 use super::rigid::RigidFit;
-use super::soft_assign::SoftAssignment;
+use super::soft_assign::{Gaussian, SoftAssignment};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -143,13 +143,14 @@ impl<const D: usize> Annealer<D> {
         let weight = (TAU * variance).powf(0.5 * D as f64) * density;
         let [rows, columns] = [slack.model, slack.target]
             .map(|side| (side * weight).powf(sharpness).max(1e-30) as f32);
-        self.soft.affinities(
-            warped,
-            variance / sharpness,
-            FAINTER * f64::from(rows.min(columns)),
-        );
+        let gaussian = Gaussian {
+            variance,
+            sharpness,
+        };
+        let least = FAINTER * f64::from(rows.min(columns));
+        self.soft.affinities(warped, gaussian, least);
         self.soft.normalise(sweeps, rows, columns);
-        self.soft.moments(warped);
+        self.soft.sum_moments(warped);
     }
 
     /// Alternates until the temperature stands still; `observe` is told every iteration and may stop the run.
@@ -168,7 +169,7 @@ impl<const D: usize> Annealer<D> {
             state.iterations += 1;
             state.trace.push(self.free_energy(state, variance));
             observe(state.iterations, *state.trace.last().unwrap_or(&0.0))?;
-            let floor = schedule.floor * schedule.floor;
+            let floor = self.floor(schedule).powi(2);
             if variance < COLD && state.matched < schedule.collapse {
                 break; // the temperature fell below the noise: points lose their partners, and none comes back
             }
@@ -195,7 +196,9 @@ impl<const D: usize> Annealer<D> {
     /// points have such residuals, though the root mean square of all is small.
     pub(crate) fn tail(&mut self, least: f64) -> f64 {
         self.sums.clear();
-        let rows = self.soft.weight.iter().zip(&self.soft.spread);
+        let moments = &self.soft.moments;
+        let spread = &moments.by_precision().spread;
+        let rows = moments.plain().weight.iter().zip(spread);
         let matched = rows.filter(|&(&weight, _)| weight > 0.5);
         self.sums
             .extend(matched.map(|(weight, spread)| spread / weight));
@@ -228,17 +231,23 @@ impl<const D: usize> Annealer<D> {
         self.predicted.clone_from(&state.warped);
         for _ in 0..rounds {
             let residual = self.step(state, schedule, state.sigma * state.sigma);
-            let spread = self
-                .soft
-                .weight
+            let moments = &self.soft.moments;
+            let weights = &moments.by_squared_precision().weight;
+            let spread = weights
                 .iter()
                 .zip(&self.regression.variance)
                 .map(|(w, v)| w * v)
                 .sum::<f64>();
-            let open = spread / self.soft.weight.iter().sum::<f64>().max(1e-9);
-            state.sigma = (residual + open).sqrt().max(schedule.floor);
+            let total: f64 = moments.by_precision().weight.iter().sum();
+            let open = spread / total.max(1e-9);
+            state.sigma = (residual + open).sqrt().max(self.floor(schedule));
             self.predicted.clone_from(&state.warped);
         }
+    }
+
+    /// The lowest temperature: the schedule's, or the least error of the targets where that is known.
+    fn floor(&self, schedule: &Schedule) -> f64 {
+        schedule.floor.max(self.soft.errors.floor())
     }
 
     /// One soft assignment and one fit; the residual variance that is left.
@@ -249,24 +258,27 @@ impl<const D: usize> Annealer<D> {
         self.assign(&predicted, variance, schedule.slack, schedule.sweeps, 1.0);
         self.predicted = predicted;
         self.fit(state, variance);
+        let moments = &self.soft.moments;
+        let (fitted, noise) = (moments.by_precision(), moments.by_squared_precision());
         let (mut total, mut squares, mut within) = (0.0, 0.0, 0.0);
         for i in 0..state.warped.len() {
-            let (w, shift) = (self.soft.weight[i], self.soft.shift[i]);
-            within += self.soft.spread[i] - w * shift.iter().map(|s| s * s).sum::<f64>();
+            let w = fitted.weight[i];
+            let shifts = noise.shift[i].iter().map(|s| s * s);
+            within += noise.spread[i] - noise.weight[i] * shifts.sum::<f64>();
             let leverage = (w * self.regression.variance[i] / variance).min(MAX_LEVERAGE);
-            let mut square = self.soft.spread[i];
+            let mut square = noise.spread[i];
             for k in 0..D {
                 let (u, z) = (self.regression.displacement.0[k][i], self.residuals.0[k][i]);
                 let moved = state.base[i][k] + u;
                 let step = moved - self.predicted[i][k];
-                square += w * step * (step - 2.0 * shift[k]);
+                square += noise.weight[i] * step * (step - 2.0 * noise.shift[i][k]);
                 state.warped[i][k] = moved;
                 self.predicted[i][k] = state.base[i][k] + (u - leverage * z) / (1.0 - leverage);
             }
             total += w;
             squares += square.max(0.0);
         }
-        state.matched = total;
+        state.matched = moments.plain().weight.iter().sum();
         self.ambiguity = within / (D as f64 * total.max(1e-9) * variance);
         if total > 0.0 {
             squares / (D as f64 * total)
@@ -278,12 +290,17 @@ impl<const D: usize> Annealer<D> {
     /// Fits the warp to the moments of the soft assignment about the predicted positions.
     fn fit(&mut self, state: &State<D>, variance: f64) {
         let stride = self.prior.stride;
-        let rows = self.predicted.iter().zip(&state.base).zip(&self.soft.shift);
+        let rows = self
+            .predicted
+            .iter()
+            .zip(&state.base)
+            .zip(&self.soft.moments.by_precision().shift);
         let target = |((p, b), s): ((&[f64; D], &[f64; D]), &[f64; D])| {
             std::array::from_fn(|k| p[k] + s[k] - b[k])
         };
         self.residuals.fill(stride, rows.map(target));
-        self.weights.clone_from(&self.soft.weight);
+        let soft = self.soft.moments.by_precision();
+        self.weights.clone_from(&soft.weight);
         self.weights.resize(stride, 0.0);
         self.add_landmarks(&state.base, variance);
         if self.rigid.is_active() {
@@ -304,7 +321,8 @@ impl<const D: usize> Annealer<D> {
 
     /// The annealed energy: distances under M, over the temperature, plus the warp's penalty, a model point.
     fn free_energy(&self, state: &State<D>, variance: f64) -> f64 {
-        let data: f64 = self.soft.spread.iter().sum::<f64>() / (2.0 * variance);
+        let spread = &self.soft.moments.by_precision().spread;
+        let data = spread.iter().sum::<f64>() / (2.0 * variance);
         (data + 0.5 * self.regression.penalty()) / state.warped.len() as f64
     }
 
@@ -316,11 +334,12 @@ impl<const D: usize> Annealer<D> {
         let variance = state.sigma.max(resolution).powi(2);
         let (n, m) = (state.warped.len(), self.soft.targets());
         let gaussian = n as f64 * (TAU * variance).powf(0.5 * D as f64);
-        self.soft.affinities(
-            &state.warped,
+        let kernel = Gaussian {
             variance,
-            FAINTER * LEAST_SHARE * gaussian / self.volume,
-        );
+            sharpness: 1.0,
+        };
+        let least = FAINTER * LEAST_SHARE * gaussian / self.volume;
+        self.soft.affinities(&state.warped, kernel, least);
         self.soft.column_totals(&mut self.sums);
         let sums = &self.sums[..m];
         let density = 1.0 / gaussian;
@@ -346,6 +365,7 @@ impl<const D: usize> Annealer<D> {
         self.sums
             .iter_mut()
             .for_each(|s| *s = gauss / (gauss * *s + outlier));
+        self.soft.errors.weigh(&mut self.sums);
         self.soft.row_totals(&self.sums, &mut self.weights);
         self.weights.resize(self.prior.stride, 0.0);
         let rows = state.warped.iter().zip(&state.base);

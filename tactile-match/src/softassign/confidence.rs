@@ -1,20 +1,24 @@
 //! How sure a pair is: the odds of the assignments that take it apart.
 //!
 //! Among noisy points a pair can be wrong in a few ways: two pairs have each other's targets, a point belongs to a target that is left over,
-//! a point that is left over belongs to the pair's target, or the pair has met by chance. With the residuals `rᵢ = t_j − yᵢ` of the warp and
-//! its hat matrix `H` the evidence changes in closed form. Where points i and k exchange targets that are `δ = t_l − t_j` apart,
+//! a point that is left over belongs to the pair's target, or the pair has met by chance. With `rᵢ = tⱼ − ŷᵢ` about where the *other* points
+//! put point i, with the variance `σ²(1 + oᵢ)`, the evidence changes in closed form. Where i goes to a target that is δ away from its own,
 //!
-//! `ΔE = [δ·(rᵢ − r_k) + |δ|² (1 − (hᵢᵢ + h_kk)/2 + hᵢ_k)]/σ²`;
+//! `ΔEᵢ(δ) = [δ·rᵢ + ½ |δ|²]/σ²(1 + oᵢ)`;
 //!
-//! where i alone moves by δ, `ΔE = [δ·rᵢ + ½ |δ|² (1 − hᵢᵢ)]/σ²`. The changes exclude each other, and what they share with changes elsewhere
-//! cancels to first order: the pair is right with the probability `1/(1 + Σ exp(−ΔE))`. Unlike the entries of the doubly stochastic matrix,
-//! which tell two points that may be exchanged apart by half their odds, these are shares of right pairs (`--example confidence`).
+//! where i and k exchange targets that are δ apart, `ΔE = ΔEᵢ(δ) + ΔE_k(−δ) + |δ|² c_ik/σ⁴` with the posterior covariance `c_ik` of their positions.
+//! Targets of their own errors have `1/ρⱼ + oᵢ` in place of `1 + oᵢ` ([`target_errors`](super::target_errors)). The changes exclude each other, and
+//! what they share with changes elsewhere cancels to first order: the pair is right with the probability `1/(1 + Σ exp(−ΔE))`. Unlike the
+//! entries of the doubly stochastic matrix, which tell two points that may be exchanged apart by half their odds, these are shares of right
+//! pairs (`--example confidence`).
 
 use super::anneal::Annealer;
 use std::f64::consts::TAU;
 
 /// A point whose own target decides its position is not free of it altogether.
 const MAX_LEVERAGE: f64 = 0.95;
+/// The variance of what the other points say of it is at most so many times the noise's.
+const MOST_OTHERS: f64 = MAX_LEVERAGE / (1.0 - MAX_LEVERAGE);
 /// Squared residuals beyond so many variances are no partner's: one in a thousand Gaussian ones is, in the plane and in space.
 const FARTHEST: f64 = 16.0;
 /// Targets with fainter soft matches, some five standard deviations of the noise away, are not looked at.
@@ -47,10 +51,8 @@ pub(crate) struct PairOdds {
 /// What a fit with soft weights says of a point that is matched for certain.
 #[derive(Clone, Copy, Debug)]
 struct Leverage {
-    /// Diagonal entry of the hat matrix.
-    hat: f64,
-    /// Residual of the certain match over that of the soft one.
-    shrink: f64,
+    /// Residual of the prediction by the other points over that of the fit.
+    stretch: f64,
     /// Variance of where the other points put this one, over that of the noise.
     others: f64,
 }
@@ -104,19 +106,16 @@ impl PairOdds {
                 self.owners[j] = Some(i);
             }
         }
-        let soft = &fitted.annealer.soft.weight;
+        let soft = &fitted.annealer.soft.moments.by_precision().weight;
         let variances = &fitted.annealer.regression.variance;
         self.leverages.clear();
         self.leverages
             .extend(soft.iter().zip(variances).map(|(weight, variance)| {
                 let variance = variance / fitted.variance;
                 let own = (weight * variance).min(MAX_LEVERAGE);
-                let others = variance / (1.0 - own);
-                let hat = (others / (1.0 + others)).min(MAX_LEVERAGE);
                 Leverage {
-                    hat,
-                    shrink: (1.0 - hat) / (1.0 - own),
-                    others,
+                    stretch: 1.0 / (1.0 - own),
+                    others: variance / (1.0 - own),
                 }
             }));
     }
@@ -128,8 +127,9 @@ impl PairOdds {
             if partner.is_some() {
                 continue;
             }
-            let limit = FARTHEST * fitted.variance * (1.0 + self.leverages[i].others);
+            let others = self.leverages[i].others;
             for j in fitted.candidates(i) {
+                let limit = FARTHEST * fitted.variance * (fitted.width(j) + others);
                 let square = squared(&fitted.offset(i, j));
                 if self.owners[j].is_none() && square < limit {
                     self.open.push((square, i, j));
@@ -218,20 +218,25 @@ impl PairOdds {
         }
     }
 
-    /// Residual of a certain match.
+    /// From where the other points put the point of a pair to its target.
     fn residual<const D: usize>(&self, fitted: Fitted<'_, D>, (i, j): (usize, usize)) -> [f64; D] {
-        let shrink = self.leverages[i].shrink;
-        fitted.offset(i, j).map(|c| shrink * c)
+        let stretch = self.leverages[i].stretch;
+        fitted.offset(i, j).map(|c| stretch * c)
+    }
+
+    /// Variance of that, over the noise's.
+    fn variance<const D: usize>(&self, fitted: Fitted<'_, D>, (i, j): (usize, usize)) -> f64 {
+        fitted.width(j) + self.leverages[i].others.min(MOST_OTHERS)
     }
 
     /// Minus the logarithm of a target's density about where the others put its point, beside that of a point without noise.
     fn misfit<const D: usize>(&self, fitted: Fitted<'_, D>, pair: (usize, usize)) -> f64 {
-        let free = 1.0 - self.leverages[pair.0].hat;
-        let square = squared(&self.residual(fitted, pair)) / (fitted.variance * free);
-        0.5 * (square.min(FARTHEST) - D as f64 * free.ln())
+        let variance = self.variance(fitted, pair);
+        let square = squared(&self.residual(fitted, pair)) / (fitted.variance * variance);
+        0.5 * (square.min(FARTHEST) + D as f64 * variance.ln())
     }
 
-    /// Change of the energy where point i of a pair goes to the target j, which is free.
+    /// Change of the energy where point i of a pair goes to the target j.
     fn of_move<const D: usize>(
         &self,
         fitted: Fitted<'_, D>,
@@ -239,8 +244,14 @@ impl PairOdds {
         j: usize,
     ) -> f64 {
         let step = fitted.step(own, j);
-        let along = dot(&step, &self.residual(fitted, (i, own)));
-        (along + 0.5 * squared(&step) * (1.0 - self.leverages[i].hat)) / fitted.variance
+        let residual = self.residual(fitted, (i, own));
+        let [before, after] = [own, j].map(|j| self.variance(fitted, (i, j)));
+        let moved = (dot(&step, &residual) + 0.5 * squared(&step)) / (after * fitted.variance);
+        if after == before {
+            return moved; // targets of equal error, by far the most calls: no logarithm
+        }
+        let precision = 0.5 * squared(&residual) * (1.0 / after - 1.0 / before);
+        moved + precision / fitted.variance + 0.5 * D as f64 * (after / before).ln()
     }
 
     /// Change of the energy where two pairs exchange their targets.
@@ -250,20 +261,13 @@ impl PairOdds {
         (i, own): (usize, usize),
         (k, theirs): (usize, usize),
     ) -> f64 {
-        let step = fitted.step(own, theirs);
-        let (mine, other) = (
-            self.residual(fitted, (i, own)),
-            self.residual(fitted, (k, theirs)),
-        );
-        let along = dot(&step, &mine) - dot(&step, &other);
-        let square = squared(&step);
-        let free = 1.0 - 0.5 * (self.leverages[i].hat + self.leverages[k].hat);
-        let least = (along + square * free) / fitted.variance;
+        let least = self.of_move(fitted, (i, own), theirs) + self.of_move(fitted, (k, theirs), own);
         if least > -FAINT.ln() {
             return least; // neighbours move together, so that there is more to come
         }
-        let together = fitted.annealer.regression.covariance(i, k) / fitted.variance;
-        least + square * together / fitted.variance
+        let widths = fitted.width(own) * fitted.width(theirs);
+        let together = fitted.annealer.regression.covariance(i, k) / (fitted.variance * widths);
+        least + squared(&fitted.step(own, theirs)) * together / fitted.variance
     }
 
     /// Change of the energy where point i, which is left over, takes the target of a pair.
@@ -273,7 +277,7 @@ impl PairOdds {
         i: usize,
         (k, j): (usize, usize),
     ) -> f64 {
-        let others = 1.0 + self.leverages[i].others;
+        let others = fitted.width(j) + self.leverages[i].others;
         let square = squared(&fitted.offset(i, j)) / (fitted.variance * others);
         0.5 * (square + D as f64 * others.ln()) - self.misfit(fitted, (k, j))
     }
@@ -283,6 +287,11 @@ impl<const D: usize> Fitted<'_, D> {
     /// From where the warp puts point i to target j.
     fn offset(&self, i: usize, j: usize) -> [f64; D] {
         std::array::from_fn(|k| self.targets[j][k] - self.warped[i][k])
+    }
+
+    /// Variance of a target over the noise's.
+    fn width(&self, j: usize) -> f64 {
+        self.annealer.soft.errors.width(j, self.variance)
     }
 
     /// Targets that point i could belong to.

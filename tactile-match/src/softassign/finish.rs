@@ -73,7 +73,7 @@ impl<const D: usize> Answer<D> {
         gain: f64,
     ) {
         let n = state.warped.len();
-        let noisy = state.sigma > CLEAN;
+        let noisy = state.sigma > CLEAN || annealer.soft.errors.differ();
         // What the prior's factor leaves out must not cost a clean pair its match.
         let variance = state.sigma.max(READ).powi(2);
         let (sweeps, sharpness) = if noisy { (8, SHARPNESS) } else { (3, 1.0) };
@@ -126,8 +126,8 @@ impl<const D: usize> Answer<D> {
                     self.column_best[j] = (p, i);
                 }
             }
-            let free = (1.0 - soft.weight[i]).max(0.0);
-            let matched = best.1 != usize::MAX && soft.weight[i] > 0.5;
+            let free = (1.0 - soft.moments.plain().weight[i]).max(0.0);
+            let matched = best.1 != usize::MAX && soft.moments.plain().weight[i] > 0.5;
             self.assignment.push(matched.then_some(best.1));
             self.confidence
                 .push(if matched { best.0.min(1.0) } else { free });

@@ -115,6 +115,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             () if workspace.stopped => StopReason::Callback,
             // The floor is reached to rounding.
             () if workspace.best.sigma <= 1.000_001 * finish::FLOOR
+                && !workspace.annealer.soft.errors.differ()
                 && workspace.doubt().is_none() =>
             {
                 StopReason::Exact

@@ -17,6 +17,22 @@ pub(super) fn gaussians<const D: usize>(
     (0..LANES).for_each(|l| row[l] = exp(row[l] * scale));
 }
 
+/// The same for targets of different precision, times their heights.
+#[inline(always)]
+pub(super) fn gaussians_of<const D: usize>(
+    row: &mut [f32; LANES],
+    targets: [&[f32; LANES]; D],
+    y: &[f32; D],
+    scale: f32,
+    (precision, height): (&[f32; LANES], &[f32; LANES]),
+) {
+    *row = [0.0; LANES];
+    for (t, c) in targets.iter().zip(y) {
+        (0..LANES).for_each(|l| row[l] += (t[l] - c) * (t[l] - c));
+    }
+    (0..LANES).for_each(|l| row[l] = height[l] * exp(row[l] * scale * precision[l]));
+}
+
 /// Running sums of a row, lane by lane.
 pub(super) struct Moments<const D: usize> {
     pub(super) weight: [f32; LANES],

@@ -90,7 +90,8 @@ impl AnnealedSoftassign {
             flow = refine(ws, run, flow, observe);
         }
         let schedule = self.schedule(FAST);
-        if flow.is_continue() && ws.state.sigma > finish::CLEAN {
+        let noisy = ws.state.sigma > finish::CLEAN || ws.annealer.soft.errors.differ();
+        if flow.is_continue() && noisy {
             ws.annealer.settle(&mut ws.state, &schedule, SETTLING);
         }
         ws.levels = levels;
@@ -130,9 +131,16 @@ impl AnnealedSoftassign {
         levels: &mut Levels<D>,
         stride: usize,
     ) {
-        levels.sample(&ws.model, &ws.target, stride, &mut ws.state);
+        levels.sample(
+            &ws.model,
+            (&ws.target, &ws.deviations),
+            stride,
+            &mut ws.state,
+        );
         ws.annealer.prior.build(&levels.model, SCALES);
-        ws.annealer.soft.set_targets(&levels.target);
+        ws.annealer
+            .soft
+            .set_targets(&levels.target, &levels.deviations);
         ws.annealer
             .rigid
             .set(self.options.transformation, &levels.model);
@@ -166,7 +174,12 @@ impl AnnealedSoftassign {
         let mut base = levels.base.clone();
         for rotation in starts::rotations::<D>(starts::ANY) {
             starts::moments(&ws.model, &ws.target, &rotation, &mut levels.base);
-            levels.sample(&ws.model, &ws.target, stride, &mut ws.state);
+            levels.sample(
+                &ws.model,
+                (&ws.target, &ws.deviations),
+                stride,
+                &mut ws.state,
+            );
             ws.state.warped.clone_from(&ws.state.base);
             let run = self.sampled(ws, FAST.sigma);
             refine(ws, run, ControlFlow::Continue(()), observe)?;

@@ -17,6 +17,8 @@ pub(super) struct Levels<const D: usize> {
     pub(super) target_order: Blocks<D>,
     pub(super) model: Vec<[f64; D]>,
     pub(super) target: Vec<[f64; D]>,
+    /// Standard deviations of the targets; empty where the caller did not tell them.
+    pub(super) deviations: Vec<f64>,
     /// Where the start puts all model points.
     pub(super) base: Vec<[f64; D]>,
     pub(super) coarse: State<D>,
@@ -31,24 +33,29 @@ impl<const D: usize> Levels<D> {
     pub(super) fn sample(
         &mut self,
         model: &[[f64; D]],
-        target: &[[f64; D]],
+        (target, deviations): (&[[f64; D]], &[f64]),
         stride: usize,
         state: &mut State<D>,
     ) {
         state.base.clear();
         self.model.clear();
         self.target.clear();
+        self.deviations.clear();
         if stride == 1 {
             state.base.extend_from_slice(&self.base);
             self.model.extend_from_slice(model);
             self.target.extend_from_slice(target);
+            self.deviations.extend_from_slice(deviations);
             return;
         }
         let rows = self.model_order.order.iter().step_by(stride);
         state.base.extend(rows.clone().map(|&i| self.base[i]));
         self.model.extend(rows.map(|&i| model[i]));
         let rows = self.target_order.order.iter().step_by(stride);
-        self.target.extend(rows.map(|&j| target[j]));
+        self.target.extend(rows.clone().map(|&j| target[j]));
+        if !deviations.is_empty() {
+            self.deviations.extend(rows.map(|&j| deviations[j]));
+        }
     }
 
     /// The field of `coarse`, every `step`-th point of the level of this stride, at all points of that level, in `state.warped`.

@@ -36,6 +36,7 @@ mod lanes;
 mod large;
 mod levels;
 mod locality;
+mod moments;
 mod next;
 mod options;
 mod patterns;
@@ -48,6 +49,7 @@ mod series;
 mod soft_assign;
 mod spline;
 mod starts;
+mod target_errors;
 mod tuples;
 
 pub use batch::PointSets;
@@ -125,6 +127,8 @@ pub struct SoftassignWorkspace<const D: usize> {
     scales: ScaleAverage<D>,
     levels: Levels<D>,
     known: Vec<Known<D>>,
+    /// Standard deviations of the targets; empty where the caller did not tell them.
+    deviations: Vec<f64>,
     /// Typical distance of a target from the next, once the search asks for it.
     spacing: f64,
     /// Share of points without a partner that the caller expects.
@@ -174,6 +178,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
         self.target.clear();
         self.target.extend(target.iter().map(|p| frame.target(p)));
         self.known.clear();
+        self.deviations.clear();
         Ok(())
     }
 }

@@ -8,7 +8,9 @@
 //! Gaussian are kept. At a low temperature that is a small part of `I J`.
 
 use super::blocks::{Blocks, LANES};
-use super::lanes::{Moments, gaussians};
+use super::lanes::{gaussians, gaussians_of};
+use super::moments::AllMoments;
+use super::target_errors::TargetErrors;
 use pulp::Arch;
 
 /// Match matrices of so many entries (16 MB) are kept as if they were dense.
@@ -17,29 +19,37 @@ const SMALL: usize = 1 << 22;
 /// The match matrix in factored form, with the moments of its rows. Columns stand in the order of the blocks.
 #[derive(Clone, Debug)]
 pub(crate) struct SoftAssignment<const D: usize> {
-    blocks: Blocks<D>,
+    pub(super) blocks: Blocks<D>,
+    /// How precise the targets are.
+    pub(crate) errors: TargetErrors,
     /// Affinities so much fainter than the largest there can be are left out.
     pub(crate) faintest: f64,
     /// Where the blocks of every row begin in `active`, and one past the last.
-    starts: Vec<usize>,
-    active: Vec<u32>,
+    pub(super) starts: Vec<usize>,
+    pub(super) active: Vec<u32>,
     reach: Vec<f32>,
-    kernel: Vec<f32>,
+    pub(super) kernel: Vec<f32>,
     pub(crate) row_scale: Vec<f32>,
     pub(crate) column_scale: Vec<f32>,
     column_sum: Vec<f32>,
-    /// Row sums without the slack.
-    pub(crate) weight: Vec<f64>,
-    /// Mean of `tⱼ − yᵢ` under row i.
-    pub(crate) shift: Vec<[f64; D]>,
-    /// Sum of `m_ij |tⱼ − yᵢ|²` over row i.
-    pub(crate) spread: Vec<f64>,
+    /// Moments of the rows.
+    pub(crate) moments: AllMoments<D>,
+}
+
+/// What the affinities are: `exp(−s |yᵢ − tⱼ|²/2σ²)`, wider and lower for targets that are less precise than others.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gaussian {
+    /// The variance σ² of the most precise targets.
+    pub(crate) variance: f64,
+    /// The power s that they are raised to.
+    pub(crate) sharpness: f64,
 }
 
 impl<const D: usize> Default for SoftAssignment<D> {
     fn default() -> Self {
         Self {
             blocks: Blocks::default(),
+            errors: TargetErrors::default(),
             faintest: 1e-6,
             starts: Vec::new(),
             active: Vec::new(),
@@ -48,17 +58,16 @@ impl<const D: usize> Default for SoftAssignment<D> {
             row_scale: Vec::new(),
             column_scale: Vec::new(),
             column_sum: Vec::new(),
-            weight: Vec::new(),
-            shift: Vec::new(),
-            spread: Vec::new(),
+            moments: AllMoments::default(),
         }
     }
 }
 
 impl<const D: usize> SoftAssignment<D> {
-    /// Takes the target points.
-    pub(crate) fn set_targets(&mut self, targets: &[[f64; D]]) {
+    /// Takes the target points and their standard deviations, where those are known.
+    pub(crate) fn set_targets(&mut self, targets: &[[f64; D]], deviations: &[f64]) {
         self.blocks.build(targets);
+        self.errors.set(deviations);
     }
 
     /// Number of target points.
@@ -66,13 +75,22 @@ impl<const D: usize> SoftAssignment<D> {
         self.blocks.order.len()
     }
 
-    /// The Gaussian affinities of `warped` at variance `variance`; blocks in which all are below `least`, or
-    /// below [`faintest`](Self::faintest), are left out.
-    pub(crate) fn affinities(&mut self, warped: &[[f64; D]], variance: f64, least: f64) {
-        let blocks = &self.blocks;
+    /// The Gaussian affinities of `warped`; blocks in which all are below `least`, or below [`faintest`](Self::faintest), are left out.
+    pub(crate) fn affinities(&mut self, warped: &[[f64; D]], gaussian: Gaussian, least: f64) {
+        let Gaussian {
+            variance,
+            sharpness,
+        } = gaussian;
+        let Self { blocks, errors, .. } = self;
+        errors.prepare(&blocks.order, variance, 0.5 * D as f64 * sharpness);
+        let widest = errors.widest(variance) / sharpness;
         let (scale, cut) = (
-            (-0.5 / variance) as f32,
-            (-2.0 * variance * least.min(self.faintest).ln()) as f32,
+            (-0.5 / (variance / sharpness)) as f32,
+            (-2.0 * widest * least.min(self.faintest).ln()) as f32,
+        );
+        let (precision, height) = (
+            errors.precision.as_chunks::<LANES>().0,
+            errors.height.as_chunks::<LANES>().0,
         );
         self.starts.clear();
         self.starts.push(0);
@@ -93,7 +111,13 @@ impl<const D: usize> SoftAssignment<D> {
                 let y = y.map(|v| v as f32);
                 let range = range[0]..range[1];
                 for (row, &block) in rows[range.clone()].iter_mut().zip(&self.active[range]) {
-                    gaussians(row, blocks.at(block), &y, scale);
+                    let targets = blocks.at(block);
+                    let Some(precision) = precision.get(block as usize) else {
+                        gaussians(row, targets, &y, scale);
+                        continue;
+                    };
+                    let height = &height[block as usize];
+                    gaussians_of(row, targets, &y, scale, (precision, height));
                 }
             }
         });
@@ -149,50 +173,6 @@ impl<const D: usize> SoftAssignment<D> {
         });
     }
 
-    /// Row sums, mean shifts and spreads of M about `warped`.
-    pub(crate) fn moments(&mut self, warped: &[[f64; D]]) {
-        self.weight.clear();
-        self.shift.clear();
-        self.spread.clear();
-        let Self {
-            blocks,
-            starts,
-            active,
-            kernel,
-            row_scale,
-            column_scale,
-            weight,
-            shift,
-            spread,
-            ..
-        } = self;
-        let columns = column_scale.as_chunks::<LANES>().0;
-        Arch::new().dispatch(|| {
-            for ((i, y), &a) in warped.iter().enumerate().zip(&*row_scale) {
-                let y = y.map(|v| v as f32);
-                let mut sums = Moments::new();
-                for (block, k) in row_of(starts, active, kernel, i) {
-                    sums.add(k, &columns[block], blocks.at(block as u32), &y);
-                }
-                let total = f64::from(sums.weight.iter().sum::<f32>());
-                let mean = |s: [f32; LANES]| f64::from(s.iter().sum::<f32>()) / total;
-                weight.push(total * f64::from(a));
-                shift.push(sums.shift.map(|s| if total > 0.0 { mean(s) } else { 0.0 }));
-                spread.push(f64::from(sums.spread.iter().sum::<f32>()) * f64::from(a));
-            }
-        });
-    }
-
-    /// Makes rows that the last column normalisation left above one sum to one: where points coincide, a few sweeps do not
-    /// converge.
-    pub(crate) fn cap_rows(&mut self) {
-        for (weight, scale) in self.weight.iter_mut().zip(&mut self.row_scale) {
-            let excess = weight.max(1.0);
-            *scale /= excess as f32;
-            *weight /= excess;
-        }
-    }
-
     /// Row `i` of M where it is not zero: target rows, in the order of the blocks, and entries.
     pub(crate) fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let (scale, columns) = (self.row_scale[i], self.column_scale.as_chunks::<LANES>().0);
@@ -232,7 +212,7 @@ impl<const D: usize> SoftAssignment<D> {
 }
 
 #[inline(always)]
-fn row_of<'a>(
+pub(super) fn row_of<'a>(
     starts: &[usize],
     active: &'a [u32],
     kernel: &'a [f32],
@@ -260,7 +240,7 @@ mod tests {
             .map(|i| [f64::from(i) * 0.1, f64::from(i * i % 7) * 0.2])
             .collect();
         let mut soft = SoftAssignment::default();
-        soft.set_targets(&targets);
+        soft.set_targets(&targets, &[]);
         (
             targets
                 .iter()
@@ -271,18 +251,28 @@ mod tests {
         )
     }
 
+    fn plain(variance: f64) -> Gaussian {
+        Gaussian {
+            variance,
+            sharpness: 1.0,
+        }
+    }
+
     #[test]
     fn rows_and_columns_sum_to_one_with_their_slack() {
         let (warped, mut soft) = scene();
-        soft.affinities(&warped, 0.02, 1e-9);
+        soft.affinities(&warped, plain(0.02), 1e-9);
         soft.normalise(300, 0.05, 0.05);
-        soft.moments(&warped);
+        soft.sum_moments(&warped);
         let mut columns = vec![0.0; 41];
         for i in 0..37 {
             let slack = f64::from(soft.row_scale[i]) * 0.05;
             let sum: f64 = soft.entries(i).map(|(_, p)| p).sum();
             // Single precision sums of 41 terms, at the fixed point of the sweeps.
-            assert!((sum + slack - 1.0).abs() < 1e-5 && (sum - soft.weight[i]).abs() < 1e-5);
+            assert!(
+                (sum + slack - 1.0).abs() < 1e-5
+                    && (sum - soft.moments.plain().weight[i]).abs() < 1e-5
+            );
             soft.entries(i).for_each(|(j, p)| columns[j] += p);
         }
         for (c, &j) in soft.blocks.order.iter().enumerate() {
@@ -295,9 +285,9 @@ mod tests {
         let (warped, mut soft) = scene();
         let (mut near, mut sparse) = (vec![vec![0.0_f64; 41]; 37], 0);
         for least in [1e-30, 1e-7] {
-            soft.affinities(&warped, 0.01, least);
+            soft.affinities(&warped, plain(0.01), least);
             soft.normalise(5, 0.01, 0.01);
-            soft.moments(&warped);
+            soft.sum_moments(&warped);
             sparse = sparse.max(37 * 3 - soft.active.len());
             for i in 0..37 {
                 for (j, p) in soft.entries(i) {

@@ -16,4 +16,5 @@ mod serialtrack;
 mod series;
 mod softassign;
 mod stability;
+mod target_errors;
 mod trust;

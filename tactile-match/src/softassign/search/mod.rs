@@ -85,7 +85,7 @@ impl AnnealedSoftassign {
         reset(ws);
         ws.annealer.volume = bounding_volume(&ws.target);
         ws.annealer.prior.build(&ws.model, SCALES);
-        ws.annealer.soft.set_targets(&ws.target);
+        ws.annealer.soft.set_targets(&ws.target, &ws.deviations);
         ws.annealer
             .rigid
             .set(self.options.transformation, &ws.model);
@@ -146,7 +146,8 @@ impl AnnealedSoftassign {
         {
             self.follow_patterns(ws, observe)?;
         }
-        if ws.best.sigma > finish::CLEAN && !ws.annealer.rigid.is_active() {
+        let noisy = ws.best.sigma > finish::CLEAN || ws.annealer.soft.errors.differ();
+        if noisy && !ws.annealer.rigid.is_active() {
             self.average_scales(ws);
         }
         ControlFlow::Continue(())
