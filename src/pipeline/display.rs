@@ -155,6 +155,9 @@ fn stop_text(stop: StopReason) -> &'static str {
 impl Display for Measurement {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         line(f, "Young's modulus", &self.youngs_modulus_pa)?;
+        if let Some(time) = &self.time {
+            writeln!(f, "{:<16} {time}", "over time")?;
+        }
         for (i, frame) in self.frames.iter().enumerate() {
             line(f, &format!("frame {}", i + 1), frame)?;
         }

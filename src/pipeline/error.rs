@@ -124,6 +124,24 @@ pub enum PipelineError {
         /// The frame.
         frame: usize,
     },
+    /// The time of a frame is negative or not finite.
+    #[error("the time of frame {} must be zero or a positive number of seconds, found {found_s}", frame + 1)]
+    Time {
+        /// The frame.
+        frame: usize,
+        /// What was given.
+        found_s: f64,
+    },
+    /// Frames do not follow each other in time.
+    #[error("frame {} was taken at {found_s} s, before the one that it follows ({before_s} s)", frame + 1)]
+    TimeDecreases {
+        /// The frame.
+        frame: usize,
+        /// The time of the last frame before it that has one.
+        before_s: f64,
+        /// Its own time.
+        found_s: f64,
+    },
     /// A match and a strain take two frames.
     #[error("a strain takes two frames, found {found}")]
     TooFewFrames {
@@ -219,6 +237,8 @@ impl PipelineError {
             | Self::NoContact { frame }
             | Self::OppositeSignal { frame, .. }
             | Self::NoForce { frame }
+            | Self::Time { frame, .. }
+            | Self::TimeDecreases { frame, .. }
             | Self::NotUniaxial { frame, .. }
             | Self::Surface { frame, .. } => Some(*frame),
             Self::Match { to, .. }

@@ -1,5 +1,6 @@
 //! Which input the error of a modulus comes from.
-use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, SharedErrors};
+use super::time::quiet;
+use crate::elasticity::modulus::{LoadSeries, ModulusEstimator, SharedErrors};
 use std::fmt;
 
 /// An input whose error a modulus carries.
@@ -149,16 +150,4 @@ fn relative_variance(
     let estimate = estimator.estimate(series).ok()?;
     let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
     relative.is_finite().then_some(relative * relative)
-}
-
-/// The load without noise.
-fn quiet(load: &LoadState<f64>) -> LoadState<f64> {
-    let quiet = |e: Estimate<f64>| Estimate::new(e.value, NEGLIGIBLE * e.value.abs());
-    LoadState {
-        force_n: quiet(load.force_n),
-        contact_radius_m: load.contact_radius_m.map(quiet),
-        contact_area_m2: load.contact_area_m2.map(quiet),
-        indentation_m: load.indentation_m.map(quiet),
-        mean_strain: load.mean_strain.map(quiet),
-    }
 }

@@ -107,6 +107,25 @@ pub enum Flag {
         /// Lateral strain of the points.
         texture_strain: f64,
     },
+    /// The sample relaxes: the modulus is a mean over the time of the frames.
+    SampleRelaxes {
+        /// Modulus of a load too fast to relax, in pascals.
+        instantaneous_pa: f64,
+        /// Modulus of a load held for ever.
+        equilibrium_pa: f64,
+        /// Time constant under a held approach, in seconds.
+        time_constant_s: f64,
+    },
+    /// The sensor's gain changes with time.
+    SensorDrifts {
+        /// Relative change over the frames.
+        change: f64,
+    },
+    /// The modulus changes with time, and it cannot be told whether it is the sample or the sensor.
+    ChangesWithTime {
+        /// Relative change over the frames.
+        change: f64,
+    },
     /// The matcher stopped before it converged.
     MatchNotConverged,
     /// Some control points have no partner.
@@ -257,6 +276,26 @@ impl fmt::Display for Flag {
                     100.0 * texture_strain
                 )
             }
+            Self::SampleRelaxes {
+                instantaneous_pa,
+                equilibrium_pa,
+                time_constant_s,
+            } => write!(
+                f,
+                "the sample relaxes from {:.1} to {:.1} kPa with {time_constant_s:.2} s: the modulus is a mean over the time of the frames",
+                instantaneous_pa * 1e-3,
+                equilibrium_pa * 1e-3
+            ),
+            Self::SensorDrifts { change } => write!(
+                f,
+                "the sensor's gain changes by {:+.1} % over the frames",
+                100.0 * change
+            ),
+            Self::ChangesWithTime { change } => write!(
+                f,
+                "the modulus changes by {:+.1} % over the frames: a relaxing sample or a drifting sensor, which the frames do not tell apart",
+                100.0 * change
+            ),
             Self::MatchNotConverged => write!(f, "the match did not converge"),
             Self::Unmatched { points: 1 } => write!(f, "1 control point has no partner"),
             Self::Unmatched { points } => write!(f, "{points} control points have no partner"),

@@ -3,6 +3,7 @@ use super::error::PipelineError;
 use super::error_budget::ErrorShare;
 use super::flag::Flag;
 use super::report::Report;
+use super::time::TimeResult;
 use crate::elasticity::modulus::{EstimatorKind, ModulusEstimate, Warning};
 use crate::force::Estimate;
 use crate::matching::StopReason;
@@ -181,6 +182,8 @@ pub struct Measurement {
     /// Young's modulus by the pipeline's estimator.
     #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
     pub youngs_modulus_pa: Result<ModulusResult, PipelineError>,
+    /// The time that the modulus is of, where frames say when they were taken, and whether it changed meanwhile.
+    pub time: Option<TimeResult>,
     /// Which inputs the modulus' error comes from, the largest first; empty without a modulus.
     pub error_budget: Vec<ErrorShare>,
     /// By every estimator that the frames allow, the paper's ratio first.

@@ -54,6 +54,7 @@ mod source;
 mod strain_error;
 mod strain_spline;
 mod surface;
+mod time;
 #[cfg(feature = "simulate")]
 mod trial;
 
@@ -85,5 +86,6 @@ pub use source::FrameSource;
 pub use source::ImageFolder;
 pub use strain_spline::StrainSpline;
 pub use surface::ContactSurface;
+pub use time::TimeResult;
 #[cfg(feature = "simulate")]
 pub use trial::{FrameTruth, Trial, Truth};

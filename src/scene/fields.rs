@@ -69,7 +69,6 @@ impl<'a> Fields<'a> {
         }
     }
 
-    #[cfg(feature = "inclusion")]
     pub(crate) fn unusable(&self, name: &str, reason: &dyn std::fmt::Display) -> SceneError {
         SceneError::Unusable {
             file: self.file.into(),

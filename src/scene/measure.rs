@@ -89,7 +89,12 @@ impl Scene {
                 value,
                 standard_error: frame.force_error_n.unwrap_or(0.0),
             });
-            press.add_gauged_frame(image.view(), gauge);
+            let added = press.add_gauged_frame(image.view(), gauge);
+            if let Some(time_s) = frame.time_s {
+                press
+                    .set_time_s(added, time_s)
+                    .map_err(|e| self.measure_error(e))?;
+            }
         }
         Ok(press)
     }
@@ -159,6 +164,9 @@ impl Scene {
     pub fn measure_error(&self, error: PipelineError) -> SceneError {
         let field = match (&error, error.frame()) {
             (PipelineError::NoForce { .. }, Some(i)) => format!("frames[{}].force_N", i + 1),
+            (PipelineError::Time { .. } | PipelineError::TimeDecreases { .. }, Some(i)) => {
+                format!("frames[{}].time_s", i + 1)
+            }
             (_, Some(i)) => match self.frames.get(i) {
                 Some(frame) => format!("frames[{}].image = {}", i + 1, frame.image.display()),
                 None => format!("frames[{}]", i + 1),

@@ -12,6 +12,7 @@
 //! image = "frame_1.png"
 //! force_N = 0.70                         # a gauge reading, if there is one
 //! force_error_N = 0.002                  # its standard error; without, that of the force scale alone (0.1 %)
+//! time_s = 0.5                           # since the object touched, not decreasing: five tell a relaxing sample from a drifting sensor
 //!
 //! [[frames]]
 //! image = "frame_2.png"
@@ -127,7 +128,7 @@ pub enum CalibrationSource {
 /// let head = "reference = \"reference.png\"\npixel_size_m = [2e-5, 2e-5]";
 /// let frames = "[[frames]]\nimage = \"one.png\"\nforce_N = 0.7\n[[frames]]\nimage = \"two.png\"";
 /// let scene = Scene::parse(&format!("{head}\n{frames}\n{rest}"), "press/scene.toml")?;
-/// assert_eq!(scene.frames[0], SceneFrame { image: "press/one.png".into(), force_n: Some(0.7), force_error_n: None });
+/// assert_eq!(scene.frames[0], SceneFrame { image: "press/one.png".into(), force_n: Some(0.7), force_error_n: None, time_s: None });
 /// assert_eq!(scene.frames[1].force_n, None, "no gauge: the calibration tells the force");
 /// # Ok::<(), tactile_imaging::scene::SceneError>(())
 /// ```
@@ -139,6 +140,8 @@ pub struct SceneFrame {
     pub force_n: Option<f64>,
     /// The standard error of that reading in newtons, if one is stated.
     pub force_error_n: Option<f64>,
+    /// When it was taken, in seconds since the object touched, if that is known.
+    pub time_s: Option<f64>,
 }
 
 /// A layer of the waveguide.

@@ -119,8 +119,9 @@ pub(super) fn calibration(
 
 pub(super) fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFrame>, SceneError> {
     let tables = fields.tables("frames", "one or more [[frames]] tables with `image`")?;
-    let frame = |f: &Fields<'_>| {
-        f.only(&["image", "force_N", "force_error_N"])?;
+    let mut last_s = 0.0;
+    let mut frame = |f: &Fields<'_>| {
+        f.only(&["image", "force_N", "force_error_N", "time_s"])?;
         let image = folder.join(f.string("image", "the path of an image")?);
         let force_n = f.optional_number("force_N", "a positive number (newtons)", positive)?;
         let not_negative = |v: f64| v >= 0.0 && v.is_finite();
@@ -129,13 +130,26 @@ pub(super) fn frames(fields: &Fields<'_>, folder: &Path) -> Result<Vec<SceneFram
             "zero or a positive number (newtons)",
             not_negative,
         )?;
+        let time_s = f.optional_number(
+            "time_s",
+            "zero or a positive number (seconds)",
+            not_negative,
+        )?;
+        if let Some(found) = time_s {
+            if found < last_s {
+                let reason = format!("{found} s is before the frame that it follows ({last_s} s)");
+                return Err(f.unusable("time_s", &reason));
+            }
+            last_s = found;
+        }
         Ok(SceneFrame {
             image,
             force_n,
             force_error_n,
+            time_s,
         })
     };
-    tables.iter().map(frame).collect()
+    tables.iter().map(&mut frame).collect()
 }
 
 pub(super) fn contact_table(

@@ -58,8 +58,11 @@ impl Press<'_> {
             Ok(_) => self.error_budget().unwrap_or_default(),
             Err(_) => Vec::new(),
         };
+        let time = self.time_dependence().ok().flatten();
+        flags.extend(self.time_flags(time.as_ref()));
         Measurement {
             youngs_modulus_pa,
+            time,
             error_budget,
             estimators: estimates.iter().map(ModulusResult::from).collect(),
             frames,

@@ -2,6 +2,7 @@
 mod measure;
 mod modulus;
 mod results;
+mod time;
 
 use super::composition::Pipeline;
 use super::contact::FrameContact;
@@ -21,6 +22,8 @@ use std::sync::Arc;
 struct Loaded<'a> {
     image: ArrayView2<'a, u8>,
     gauge: Option<Estimate<f64>>,
+    /// Seconds since the object touched, where they are known.
+    time_s: Option<f64>,
     contact: Option<FrameContact>,
     surface: Option<ContactSurface>,
     points: Option<ControlPoints>,
@@ -121,7 +124,8 @@ impl<'a> Press<'a> {
         let reference = Arc::clone(self.runner.reference());
         let mut press = self.pipeline().press_on(reference);
         for frame in &self.frames {
-            press.add_gauged_frame(frame.image, frame.gauge);
+            let added = press.add_gauged_frame(frame.image, frame.gauge);
+            press.frames[added].time_s = frame.time_s;
         }
         press
     }
@@ -175,6 +179,7 @@ impl<'a> Press<'a> {
         self.frames.push(Loaded {
             image,
             gauge,
+            time_s: None,
             contact: None,
             surface: None,
             points: None,

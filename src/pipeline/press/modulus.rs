@@ -94,7 +94,7 @@ impl Press<'_> {
     }
 
     /// What every frame says of its load, and the relative errors that all share.
-    fn loads(&mut self, with_strain: bool) -> Result<LoadSeries<f64>, PipelineError> {
+    pub(super) fn loads(&mut self, with_strain: bool) -> Result<LoadSeries<f64>, PipelineError> {
         let mut readings: Vec<LoadReading> = Vec::with_capacity(self.frames.len());
         // Contacts that the frame's edge cuts.
         let mut cut = Vec::with_capacity(self.frames.len());

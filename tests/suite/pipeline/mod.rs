@@ -4,6 +4,7 @@ mod repeated;
 mod strain_of_sizes;
 mod strain_stream;
 mod streams;
+mod time;
 
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2};

@@ -227,4 +227,19 @@ pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
         "[stages]\nintegrator = \"cosine-poisson\"\n[object]",
         &["`stages.integrator` must be absent", "\"brooks-horn\""],
     ),
+    (
+        "force_N = 0.8",
+        "time_s = -1.0",
+        &["`frames[1].time_s` must be zero or a positive number (seconds)"],
+    ),
+    (
+        "force_N = 0.8",
+        "time_s = nan",
+        &["`frames[1].time_s` must be zero or a positive number (seconds)"],
+    ),
+    (
+        "force_N = 0.8\n[[frames]]",
+        "time_s = 2\n[[frames]]\ntime_s = 1.5",
+        &["`frames[2].time_s`: 1.5 s is before the frame that it follows (2 s)"],
+    ),
 ];

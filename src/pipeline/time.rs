@@ -1,0 +1,212 @@
+//! Whether the modulus changes over the time of a press.
+use super::display::with_error;
+use crate::elasticity::modulus::{
+    Estimate, Interval, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
+};
+use crate::elasticity::relaxation::{TimeDependence, TimedModulus, time_dependence};
+use std::fmt::{self, Display, Formatter};
+
+/// The time that a modulus is of, and whether it changed meanwhile.
+///
+/// ```
+/// use tactile_imaging::elasticity::relaxation::TimeDependence;
+/// use tactile_imaging::pipeline::TimeResult;
+/// let change = TimeDependence::Undecided { change: -0.08 };
+/// let result = TimeResult { from_s: 0.5, to_s: 8.0, loads: 3, change };
+/// assert_eq!(result.to_string(), "0.5 to 8 s: the moduli of 3 loads change by -8.0 %, as a relaxing sample or a drifting sensor would");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct TimeResult {
+    /// Time of the first load that has a modulus, in seconds since the object touched.
+    pub from_s: f64,
+    /// Time of the last.
+    pub to_s: f64,
+    /// How many loads have a time and a modulus.
+    pub loads: usize,
+    /// What their moduli say of it.
+    pub change: TimeDependence,
+}
+
+impl TimeResult {
+    /// Relative change from the first time to the last.
+    pub(super) fn relative_change(&self) -> f64 {
+        match self.change {
+            TimeDependence::Relaxes(solid) => {
+                let at = |time_s: f64| {
+                    let fresh = solid.instantaneous_pa - solid.equilibrium_pa;
+                    solid.equilibrium_pa + fresh * (-time_s / solid.time_constant_s).exp()
+                };
+                at(self.to_s) / at(self.from_s) - 1.0
+            }
+            TimeDependence::Drifts { per_s } => per_s.value * (self.to_s - self.from_s),
+            TimeDependence::Undecided { change } => change,
+            _ => 0.0,
+        }
+    }
+}
+
+impl Display for TimeResult {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} to {} s: ", self.from_s, self.to_s)?;
+        match self.change {
+            TimeDependence::Relaxes(solid) => {
+                let modulus = |value: f64, interval| within(value, interval, 1e-3, "kPa");
+                write!(
+                    f,
+                    "the sample relaxes from {} to {} with a time constant of {}",
+                    modulus(solid.instantaneous_pa, solid.instantaneous_95_pa),
+                    modulus(solid.equilibrium_pa, solid.equilibrium_95_pa),
+                    within(solid.time_constant_s, solid.time_constant_95_s, 1.0, "s"),
+                )
+            }
+            TimeDependence::Drifts { per_s } => write!(
+                f,
+                "the sensor's gain rises by {} % a second",
+                with_error(per_s.value, per_s.standard_error, 100.0)
+            ),
+            TimeDependence::Undecided { change } => write!(
+                f,
+                "the moduli of {} loads change by {:+.1} %, as a relaxing sample or a drifting sensor would",
+                self.loads,
+                100.0 * change
+            ),
+            _ => write!(f, "no change beyond the errors of {} loads", self.loads),
+        }
+    }
+}
+
+/// A value with its unit and its 95 % interval.
+fn within(value: f64, interval: Interval<f64>, scale: f64, unit: &str) -> String {
+    let half_width = interval.upper.map_or(value, |upper| upper - interval.lower) * 0.5;
+    // Two digits of the interval's half width.
+    let decimals = (1.0 - (half_width * scale).log10().floor()).clamp(0.0, 9.0) as usize;
+    let digits = |v: f64| format!("{:.decimals$}", v * scale);
+    match interval.upper {
+        Some(upper) => format!(
+            "{} {unit} (95 %: {} to {})",
+            digits(value),
+            digits(interval.lower),
+            digits(upper)
+        ),
+        None => format!(
+            "{} {unit} (95 %: above {})",
+            digits(value),
+            digits(interval.lower)
+        ),
+    }
+}
+
+/// What is left of an error that is taken out: an estimator without any error gives no interval.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// What the moduli of single loads say of time. `times_s` has a place for each load; what has no time or alone gives no modulus is left out, and None is
+/// returned where fewer than two are left.
+pub(super) fn of_moduli(
+    estimator: &dyn ModulusEstimator<f64>,
+    series: &LoadSeries<f64>,
+    times_s: &[Option<f64>],
+) -> Option<TimeResult> {
+    let mut moduli = Vec::with_capacity(times_s.len());
+    let (mut law_error, mut scale_error) = (0.0_f64, 0.0_f64);
+    for (load, time_s) in series.loads().iter().zip(times_s) {
+        let Some(time_s) = *time_s else {
+            continue;
+        };
+        let Some(alone) = SingleLoad::of(estimator, load, series.shared_errors()) else {
+            continue;
+        };
+        law_error = law_error.max(alone.law_error);
+        scale_error = scale_error.max(alone.scale_error);
+        moduli.push(TimedModulus {
+            time_s,
+            force_n: load.force_n.value,
+            youngs_modulus_pa: alone.modulus_pa,
+        });
+    }
+    result(&moduli, scale_error, law_error)
+}
+
+/// What forces by the light over those by a gauge say of the sensor's gain.
+pub(super) fn of_gains(forces: &[(f64, Estimate<f64>, Estimate<f64>)]) -> Option<TimeResult> {
+    let ratios: Vec<TimedModulus> = (forces.iter())
+        .map(|&(time_s, light, gauge)| {
+            let relative = |force: Estimate<f64>| force.standard_error / force.value;
+            let ratio = light.value / gauge.value;
+            let error = ratio * relative(light).hypot(relative(gauge));
+            TimedModulus {
+                time_s,
+                force_n: gauge.value,
+                // In place of a modulus: the gain multiplies it.
+                youngs_modulus_pa: Estimate::new(ratio, error),
+            }
+        })
+        .collect();
+    result(&ratios, 0.0, 0.0)
+}
+
+fn result(moduli: &[TimedModulus], scale_error: f64, law_error: f64) -> Option<TimeResult> {
+    let [first, .., last] = moduli else {
+        return None;
+    };
+    let change = time_dependence(moduli, scale_error, law_error).ok()?;
+    Some(TimeResult {
+        from_s: first.time_s,
+        to_s: last.time_s,
+        loads: moduli.len(),
+        change,
+    })
+}
+
+/// What one load alone says, and where its error comes from.
+struct SingleLoad {
+    /// The modulus with the load's own error.
+    modulus_pa: Estimate<f64>,
+    /// Relative error of the law.
+    law_error: f64,
+    /// Relative error that is common to all loads, the law's among it.
+    scale_error: f64,
+}
+
+impl SingleLoad {
+    fn of(
+        estimator: &dyn ModulusEstimator<f64>,
+        load: &LoadState<f64>,
+        shared: &SharedErrors<f64>,
+    ) -> Option<Self> {
+        let none = SharedErrors {
+            force_scale: NEGLIGIBLE,
+            ..SharedErrors::default()
+        };
+        let with = |load: LoadState<f64>, shared: &SharedErrors<f64>| {
+            let series = LoadSeries::new([load]).with_shared_errors(*shared).ok()?;
+            let estimate = estimator.estimate(&series).ok()?;
+            let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
+            relative
+                .is_finite()
+                .then_some((estimate.youngs_modulus_pa, relative))
+        };
+        let (value, all) = with(*load, shared)?;
+        let (_, own_and_law) = with(*load, &none)?;
+        let (_, law_error) = with(quiet(load), &none)?;
+        let beyond = |whole: f64, part: f64| (whole * whole - part * part).max(0.0).sqrt();
+        let own = beyond(own_and_law, law_error);
+        Some(Self {
+            modulus_pa: Estimate::new(value, own * value),
+            law_error,
+            scale_error: beyond(all, own),
+        })
+    }
+}
+
+/// The load without errors of its own.
+pub(super) fn quiet(load: &LoadState<f64>) -> LoadState<f64> {
+    let quiet = |e: Estimate<f64>| Estimate::new(e.value, NEGLIGIBLE * e.value.abs());
+    LoadState {
+        force_n: quiet(load.force_n),
+        contact_radius_m: load.contact_radius_m.map(quiet),
+        contact_area_m2: load.contact_area_m2.map(quiet),
+        indentation_m: load.indentation_m.map(quiet),
+        mean_strain: load.mean_strain.map(quiet),
+    }
+}
