@@ -84,6 +84,7 @@ mod rigid;
 mod scene;
 mod slide;
 mod sparse;
+mod squeeze;
 mod state;
 mod stress;
 mod system;

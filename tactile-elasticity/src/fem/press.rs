@@ -182,7 +182,7 @@ impl Press {
         growth.powf(FINENESS as f64 / self.fineness as f64)
     }
 
-    fn object_mesh(&self) -> Mesh {
+    pub(super) fn object_mesh(&self) -> Mesh {
         match self.object {
             Object::Ball { radius_m } | Object::HalfBall { radius_m } => {
                 Mesh::half_ball(radius_m, self.size())
