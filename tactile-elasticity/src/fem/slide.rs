@@ -16,9 +16,9 @@ use super::scene::Scene;
 use super::state::State;
 
 /// Rounds of meshing and solving; each leaves about a tenth of the distance before.
-const MAX_ROUNDS: usize = 4;
+const MAX_ROUNDS: usize = 5;
 /// Distance of nodes over the face's radius at which they meet: pressures change by as large a part.
-const MET: f64 = 2e-4;
+const MET: f64 = 2e-5;
 
 /// Largest change of a shift over the distance of two nodes; inside the face it is below 0.1.
 const LARGEST_GROWTH: f64 = 0.3;

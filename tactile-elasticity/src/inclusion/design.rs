@@ -1,6 +1,6 @@
 //! What a scan can tell before it is made.
 
-use super::covariance::{Meshed, Observed};
+use super::covariance::{Observed, Resolution};
 use super::fit::Problem;
 use super::parameters::LumpParameters;
 use super::profiles::check_approaches;
@@ -102,7 +102,7 @@ impl InclusionSearch {
             *white = 0.0;
         }
         observed.values = predicted.values;
-        let covariance = observed.covariance(self.sensor(), interface, Meshed::Finely);
+        let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
         let mut priors = self.block_priors(assumed.block_modulus_pa);
         priors.extend(self.lump_priors(assumed.block_modulus_pa));
         let problem = Problem {
@@ -110,7 +110,6 @@ impl InclusionSearch {
             measured: observed.values,
             factor: covariance.cholesky().ok_or(ElasticityError::NoSolution)?,
             priors,
-            correction: Vec::new(),
         };
         let errors = (problem.errors(&parameters)).ok_or(ElasticityError::NoSolution)?;
         let [.., diameter, depth, youngs_modulus] = errors[..] else {

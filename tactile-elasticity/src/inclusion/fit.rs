@@ -1,7 +1,7 @@
 //! Maximum a posteriori fit of a block's parameters to measured profiles.
 
 use super::forward::{Forward, Linearised, Solved};
-use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
+use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// What is known of a coordinate beforehand: a Gaussian.
@@ -28,8 +28,6 @@ pub(crate) struct Problem {
     pub(crate) measured: Vec<f64>,
     pub(crate) factor: Cholesky<f64, Dyn>,
     pub(crate) priors: Vec<Prior>,
-    /// Of each value, what a finer mesh predicts over what this one does; empty where there is no finer one.
-    pub(crate) correction: Vec<f64>,
 }
 
 /// A local optimum.
@@ -44,7 +42,6 @@ pub(crate) struct Fit {
     pub(crate) evidence: f64,
     pub(crate) predicted: Vec<f64>,
     pub(crate) converged: bool,
-    solved: Solved,
 }
 
 /// When a fit ends.
@@ -58,26 +55,33 @@ pub(crate) struct Ending {
 
 /// Of an answer: what is left is far below what the data tell.
 pub(crate) const SETTLED: Ending = Ending {
-    step: 0.03,
-    evaluations: 40,
+    step: 0.2,
+    evaluations: 20,
 };
 
-/// Of a fit on a mesh that is refined afterwards, which moves it by more.
-pub(crate) const NEARLY_SETTLED: Ending = Ending {
-    step: 0.3,
-    ..SETTLED
-};
-
-/// Of the first fits. From a start of the grid, four to eight evaluations are taken, under the wrong
-/// assumption about the face any number.
+/// Of the first fits, which a finer mesh moves by more. From a start of the grid, four to eight
+/// evaluations are taken, under the wrong assumption about the face any number.
 pub(crate) const DRAFTED: Ending = Ending {
-    step: 0.3,
-    evaluations: 14,
+    step: 0.5,
+    evaluations: 12,
 };
-/// Corrections by a finer mesh: the second is a tenth of the first.
-const MAX_CORRECTIONS: usize = 3;
 /// Largest step of a logarithm.
 const LARGEST_STEP: f64 = 0.5;
+
+/// Levenberg's damping: at first, and its bounds. Beyond the largest no step lowers the objective.
+const FIRST_DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-6;
+const LARGEST_DAMPING: f64 = 10.0;
+
+/// Distance of the optimum in standard errors that the solutions' tolerance may hide.
+const UNRESOLVED: f64 = 1.0;
+
+/// A change of the coordinates.
+struct Step {
+    by: DVector<f64>,
+    /// In standard errors, before it is cut to [`LARGEST_STEP`].
+    size: f64,
+}
 
 /// The quadratic model of the objective at some parameters.
 struct Normal {
@@ -140,15 +144,10 @@ impl Problem {
 
     fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
         let Linearised {
-            mut prediction,
-            mut columns,
+            prediction,
+            columns,
             solved,
         } = (self.forward).linearise(parameters, &self.coordinates(), near)?;
-        for values in columns.iter_mut().chain([&mut prediction.values]) {
-            for (value, factor) in values.iter_mut().zip(&self.correction) {
-                *value *= factor;
-            }
-        }
         let residual = self.whitened(self.residual(&prediction.values));
         let columns: Vec<DVector<f64>> = columns
             .into_iter()
@@ -184,125 +183,73 @@ impl Problem {
         &self,
         start: Parameters,
         ending: Ending,
-        go_on: impl FnMut() -> bool,
-    ) -> Option<Fit> {
-        self.fit_near(start, None, ending, go_on)
-    }
-
-    fn fit_near(
-        &self,
-        start: Parameters,
-        near: Option<&Solved>,
-        ending: Ending,
         mut go_on: impl FnMut() -> bool,
     ) -> Option<Fit> {
         let mut parameters = start;
-        let mut normal = self.normal(&parameters, near)?;
-        let mut damping = 1e-3;
-        let mut converged = false;
-        for _ in 1..ending.evaluations {
-            if !go_on() {
-                break;
+        let mut normal = self.normal(&parameters, None)?;
+        let mut damping = FIRST_DAMPING;
+        let mut evaluations = 1;
+        let converged = loop {
+            // How far the quadratic model's optimum is; steps cut short by damping say nothing of it.
+            let left = self.step(&parameters, &normal, 0.0)?.size;
+            if left < ending.step {
+                break true;
             }
-            let (next, size) = self.step(&parameters, &normal, damping)?;
+            if damping > LARGEST_DAMPING {
+                // No step lowers the objective: what is left is the solutions' tolerance.
+                break left < UNRESOLVED;
+            }
+            if evaluations == ending.evaluations || !go_on() {
+                break false;
+            }
+            evaluations += 1;
+            let next = self.stepped(&parameters, &self.step(&parameters, &normal, damping)?.by);
             let now = normal.misfit + normal.penalty;
-            let found = self.normal(&next, Some(&normal.solved));
-            match found {
-                Some(found) if found.misfit + found.penalty <= now * (1.0 + 1e-9) => {
-                    damping = (0.2 * damping).max(1e-6);
+            match self.normal(&next, Some(&normal.solved)) {
+                Some(found) if found.misfit + found.penalty <= now => {
+                    let gain = now - found.misfit - found.penalty;
+                    let is_free = damping < 1e-2;
+                    damping = (0.1 * damping).max(LEAST_DAMPING);
                     (parameters, normal) = (next, found);
-                    converged = size < ending.step;
+                    if is_free && gain < ending.step.powi(2) {
+                        break true;
+                    }
                 }
-                // No step lowers the objective.
-                _ if size < ending.step => converged = true,
                 _ => damping = (10.0 * damping).max(1e-2),
             }
-            if converged {
-                break;
-            }
-        }
+        };
         self.finished(parameters, normal, converged)
     }
 
-    /// The next parameters and how far they are, in standard errors.
-    fn step(
-        &self,
-        parameters: &Parameters,
-        normal: &Normal,
-        damping: f64,
-    ) -> Option<(Parameters, f64)> {
+    /// The damped step towards the quadratic model's optimum.
+    fn step(&self, parameters: &Parameters, normal: &Normal, damping: f64) -> Option<Step> {
         let mut matrix = normal.matrix.clone();
         for k in 0..matrix.nrows() {
             matrix[(k, k)] *= 1.0 + damping;
         }
-        let mut step = matrix.clone().cholesky()?.solve(&normal.gradient);
+        let mut by = matrix.clone().cholesky()?.solve(&normal.gradient);
         let poisson = |prior: &Prior| prior.coordinate == Coordinate::PoissonRatio;
         if let Some(k) = self.priors.iter().position(poisson) {
             // A step cut short at the limit of ν alone would not lower the objective: the others' steps
             // are those that go with ν at its limit.
             let room = LARGEST_POISSON_RATIO - parameters.poisson_ratio;
-            if step[k] > room {
+            if by[k] > room {
                 let mut gradient = &normal.gradient - room * matrix.column(k);
                 matrix.row_mut(k).fill(0.0);
                 matrix.column_mut(k).fill(0.0);
                 matrix[(k, k)] = 1.0;
                 gradient[k] = room;
-                step = matrix.cholesky()?.solve(&gradient);
+                by = matrix.cholesky()?.solve(&gradient);
             }
         }
-        let scaled = (self.priors.iter().zip(step.iter()))
-            .map(|(prior, step)| (step / prior.coordinate.unit()).abs())
+        let size = by.dot(&(&normal.matrix * &by)).sqrt();
+        let scaled = (self.priors.iter().zip(by.iter()))
+            .map(|(prior, by)| (by / prior.coordinate.unit()).abs())
             .fold(0.0, f64::max);
         if scaled > LARGEST_STEP {
-            step *= LARGEST_STEP / scaled;
+            by *= LARGEST_STEP / scaled;
         }
-        let size = step.dot(&(&normal.matrix * &step)).sqrt();
-        Some((self.stepped(parameters, &step), size))
-    }
-
-    /// The fit as `finer` would give it, from a fit on this mesh: this mesh's predictions are corrected by
-    /// what a finer one changes at the fit, and fitted anew until the correction holds.
-    ///
-    /// What the meshes differ by changes slowly with the parameters, so that two or three predictions of
-    /// the finer one do, and none of its derivatives.
-    pub(crate) fn refined(
-        &mut self,
-        finer: &Forward,
-        mut fit: Fit,
-        mut go_on: impl FnMut() -> bool,
-    ) -> Option<Fit> {
-        let mut solved: Option<Solved> = None;
-        for _ in 0..MAX_CORRECTIONS {
-            if !go_on() {
-                break;
-            }
-            let (fine, fine_solved) = finer.predict_near(&fit.parameters, solved.as_ref())?;
-            solved = Some(fine_solved);
-            // Corrected by the last factors, if there were any.
-            let mut here = fit.predicted.clone();
-            for (value, factor) in here.iter_mut().zip(&self.correction) {
-                *value /= factor;
-            }
-            self.correction = fine.values.iter().zip(&here).map(|(a, b)| a / b).collect();
-            let next = self.fit_near(fit.parameters, Some(&fit.solved), SETTLED, &mut go_on)?;
-            let moved = self.distance(&fit, &next);
-            fit = next;
-            if moved < NEARLY_SETTLED.step {
-                break;
-            }
-        }
-        self.correction.clear();
-        Some(fit)
-    }
-
-    /// How far two fits are from each other, in standard errors.
-    fn distance(&self, a: &Fit, b: &Fit) -> f64 {
-        let distances = self.priors.iter().enumerate().map(|(k, prior)| {
-            let difference =
-                a.parameters.get(prior.coordinate) - b.parameters.get(prior.coordinate);
-            difference.abs() / b.covariance[(k, k)].sqrt()
-        });
-        distances.fold(0.0, f64::max)
+        Some(Step { by, size })
     }
 
     fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
@@ -331,30 +278,6 @@ impl Problem {
             evidence: -0.5 * (normal.misfit + normal.penalty) - logarithm - known - noise,
             predicted: normal.predicted,
             converged,
-            solved: normal.solved,
         })
     }
-}
-
-/// Starts: diameters and depths that a face of this radius can see, in a block of this height.
-pub(crate) fn starts(plain: &Parameters, face_radius_m: f64) -> Vec<Parameters> {
-    let mut starts = Vec::new();
-    for diameter in [0.35, 0.65, 1.05] {
-        for depth in [0.15, 0.3, 0.55] {
-            for contrast in [2.5, 8.0] {
-                let lump = LumpParameters {
-                    diameter_m: diameter * face_radius_m,
-                    depth_m: depth * face_radius_m,
-                    youngs_modulus_pa: contrast * plain.block_modulus_pa,
-                };
-                if lump.diameter_m + lump.depth_m < 0.95 * plain.height_m {
-                    starts.push(Parameters {
-                        lump: Some(lump),
-                        ..*plain
-                    });
-                }
-            }
-        }
-    }
-    starts
 }

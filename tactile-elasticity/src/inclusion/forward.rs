@@ -32,6 +32,7 @@ pub(crate) struct Prediction {
 /// A solved scene, from which scenes nearby are solved in fewer iterations.
 #[derive(Debug, Clone)]
 pub(crate) struct Solved {
+    meshed: Meshed,
     /// One for all frames; where surfaces slide, one a frame.
     scenes: Vec<Scene>,
     states: Vec<State>,
@@ -43,6 +44,38 @@ impl Solved {
     }
 }
 
+/// A scene as it was meshed, before its mesh is moved to other parameters or along the interface.
+///
+/// The number of elements depends on the parameters in jumps, and with it the mesh's error: a fit compares
+/// solutions on one mesh, moved.
+#[derive(Debug, Clone)]
+struct Meshed {
+    scene: Scene,
+    parameters: Parameters,
+}
+
+impl Meshed {
+    /// Whether its mesh still has good elements where it is moved to these parameters.
+    fn reaches(&self, parameters: &Parameters) -> bool {
+        let lumps = match (self.parameters.lump, parameters.lump) {
+            (None, None) => true,
+            (Some(from), Some(to)) => {
+                let pairs = sizes(from).into_iter().zip(sizes(to));
+                pairs.into_iter().all(|(from, to)| is_near(from, to))
+            }
+            _ => false,
+        };
+        lumps && is_near(self.parameters.height_m, parameters.height_m)
+    }
+}
+
+fn is_near(from: f64, to: f64) -> bool {
+    (to / from).ln().abs() < REACH
+}
+
+/// Largest change of the logarithm of a length by which a mesh is moved.
+const REACH: f64 = 0.3;
+
 /// A prediction and its derivative by each coordinate.
 #[derive(Debug, Clone)]
 pub(crate) struct Linearised {
@@ -51,10 +84,6 @@ pub(crate) struct Linearised {
     /// One column a coordinate.
     pub(crate) columns: Vec<Vec<f64>>,
 }
-
-/// Relative step of the difference quotients: the truncation error is about as large as the step,
-/// rounding and the unbalanced force of 1e-8 stay a hundred times below.
-const STEP: f64 = 1e-3;
 
 impl Forward {
     pub(crate) fn observations(&self) -> usize {
@@ -98,13 +127,20 @@ impl Forward {
         parameters: &Parameters,
         near: Option<&Solved>,
     ) -> Option<(Prediction, Solved)> {
-        let scene = self.scene(parameters)?;
+        let meshed = match near {
+            Some(near) if near.meshed.reaches(parameters) => near.meshed.clone(),
+            _ => Meshed {
+                scene: self.scene(parameters)?,
+                parameters: *parameters,
+            },
+        };
+        let scene = self.changed(&meshed.scene, &meshed.parameters, parameters)?;
         let approaches: Vec<f64> = (self.approaches_m.iter())
             .map(|approach| approach + parameters.zero_m)
             .collect();
         let slides = self.interface == Interface::Frictionless;
         let solved = if slides && self.kinematics == Kinematics::Finite {
-            self.solve_sliding(&scene, parameters, &approaches, near)?
+            self.solve_sliding(&meshed, &scene, parameters, &approaches, near)?
         } else {
             let loads: Vec<Load> = approaches.into_iter().map(Load::Approach).collect();
             let near = near.map(|near| (near.scene(0), near.states.as_slice()));
@@ -113,6 +149,7 @@ impl Forward {
                 return None;
             }
             Solved {
+                meshed,
                 scenes: vec![scene],
                 states: solution.states,
             }
@@ -124,6 +161,7 @@ impl Forward {
     /// Frame by frame, each from the same frame of a solution nearby or from the frame before.
     fn solve_sliding(
         &self,
+        meshed: &Meshed,
         scene: &Scene,
         parameters: &Parameters,
         approaches_m: &[f64],
@@ -132,6 +170,7 @@ impl Forward {
         // The inclusion's mesh stays where it is.
         let depth_m = (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m);
         let mut solved = Solved {
+            meshed: meshed.clone(),
             scenes: Vec::with_capacity(approaches_m.len()),
             states: Vec::with_capacity(approaches_m.len()),
         };
@@ -174,8 +213,9 @@ impl Forward {
 
     /// The prediction and its derivatives by `coordinates`.
     ///
-    /// A derivative is what one iteration on the slightly changed block, started from the solution with
-    /// its tangent, changes: one factorisation a frame, one residual for each coordinate and frame.
+    /// A derivative is the difference of one iteration on the slightly changed block and one on the block
+    /// itself, both from the solution with its tangent: one factorisation a frame, one residual for each
+    /// coordinate and frame. The iteration on the block itself takes out what the solution leaves unbalanced.
     pub(crate) fn linearise(
         &self,
         parameters: &Parameters,
@@ -184,7 +224,7 @@ impl Forward {
     ) -> Option<Linearised> {
         let (prediction, solved) = self.predict_near(parameters, near)?;
         let moved: Vec<Parameters> = (coordinates.iter())
-            .map(|&coordinate| parameters.moved(coordinate, STEP * coordinate.unit()))
+            .map(|&coordinate| parameters.moved(coordinate, parameters.small_step(coordinate)))
             .collect();
         let changed = |scene: &Scene| -> Option<Vec<Scene>> {
             (moved.iter())
@@ -195,26 +235,32 @@ impl Forward {
         let mut nearby = Vec::new();
         // Of each coordinate, the interface's answer frame by frame.
         let mut answers = vec![Vec::with_capacity(solved.states.len()); coordinates.len()];
+        let mut here = Vec::with_capacity(solved.states.len());
         for (frame, state) in solved.states.iter().enumerate() {
             if frame < solved.scenes.len() {
                 nearby = changed(solved.scene(frame))?;
             }
-            let at: Vec<(&Scene, f64)> = (nearby.iter().zip(&moved))
+            let scene = solved.scene(frame);
+            let mut at: Vec<(&Scene, f64)> = (nearby.iter().zip(&moved))
                 .map(|(scene, moved)| (scene, self.approaches_m[frame] + moved.zero_m))
                 .collect();
-            let neighbourhood = solved.scene(frame).neighbourhood(&mut layout, state)?;
-            for (answers, found) in answers.iter_mut().zip(neighbourhood.solve(&at)?) {
+            at.push((scene, self.approaches_m[frame] + parameters.zero_m));
+            let mut found = scene.neighbourhood(&mut layout, state)?.solve(&at)?;
+            here.extend(found.pop());
+            for (answers, found) in answers.iter_mut().zip(found) {
                 answers.push(found);
             }
         }
+        let frames = |answers: &[(Vec<PressurePoint>, f64)]| {
+            let frames = (answers.iter()).map(|(points, force)| (points.as_slice(), *force));
+            self.collect(frames)
+        };
+        let here = frames(&here);
         let mut columns = Vec::with_capacity(coordinates.len());
-        for (frames, coordinate) in answers.iter().zip(coordinates) {
-            let frames = frames
-                .iter()
-                .map(|(points, force)| (points.as_slice(), *force));
-            let there = self.collect(frames);
-            let step = STEP * coordinate.unit();
-            let column = (there.values.iter().zip(&prediction.values))
+        for (answers, coordinate) in answers.iter().zip(coordinates) {
+            let there = frames(answers);
+            let step = parameters.small_step(*coordinate);
+            let column = (there.values.iter().zip(&here.values))
                 .map(|(there, here)| (there - here) / step)
                 .collect();
             columns.push(column);

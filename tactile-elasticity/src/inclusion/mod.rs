@@ -21,6 +21,7 @@
 //! Assoc. 90 (1995) 773.
 mod covariance;
 mod design;
+mod drafts;
 mod estimate;
 mod fit;
 mod forward;
@@ -28,6 +29,7 @@ mod hypothesis;
 mod motion;
 mod parameters;
 mod profiles;
+mod progress;
 mod search;
 mod specimen;
 #[cfg(test)]
@@ -36,5 +38,6 @@ mod tests;
 pub use design::{AssumedInclusion, ExpectedErrors};
 pub use estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
 pub use profiles::PressureProfile;
-pub use search::{InclusionSearch, SearchProgress};
+pub use progress::SearchProgress;
+pub use search::InclusionSearch;
 pub use specimen::{SensorErrors, Specimen};

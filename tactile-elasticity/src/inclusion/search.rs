@@ -1,12 +1,13 @@
 //! Search for an inclusion.
 
-use super::covariance::{Meshed, Observed};
+use super::covariance::Observed;
+use super::drafts::Draft;
 use super::estimate::InclusionEstimate;
-use super::fit::{DRAFTED, Fit, NEARLY_SETTLED, Prior, Problem, starts};
+use super::fit::Prior;
 use super::forward::Forward;
-use super::hypothesis::Hypothesis;
 use super::parameters::{Coordinate, Parameters};
 use super::profiles::{PressureProfile, check};
+use super::progress::{Counter, SearchProgress};
 use super::specimen::{SensorErrors, Specimen};
 use crate::ElasticityError;
 use crate::error::Quantity;
@@ -18,29 +19,12 @@ use core::ops::ControlFlow;
 const REACH: f64 = 0.75;
 /// Fewer rings do not show an inclusion's shape.
 const MIN_RINGS: usize = 8;
-/// Elements along an eighth of the inclusion's circumference: of the starts, of the best start's fit, of
-/// what corrects that fit. The last one's pressure is within 0.1 % of twice as many.
-const FINENESS: [usize; 3] = [2, 3, 5];
 /// Difference of log evidence above which one assumption is clearly better: 20 to 1.
 const CLEAR_EVIDENCE: f64 = 3.0;
-/// Starts that are fitted, of the grid's best.
-const FITTED_STARTS: usize = 3;
-
-/// What a search is doing.
-///
-/// ```
-/// use tactile_elasticity::inclusion::SearchProgress;
-///
-/// let progress = SearchProgress { done: 3, expected: 30 };
-/// assert!(progress.done < progress.expected);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SearchProgress {
-    /// Solutions so far.
-    pub done: usize,
-    /// About how many there will be.
-    pub expected: usize,
-}
+/// Difference of the first fits' log evidence beyond which an assumption about the face is given up: this
+/// and a part of the better one's misfit, most of which is the mesh's.
+const HOPELESS_EVIDENCE: f64 = 25.0;
+const HOPELESS_MISFIT: f64 = 0.1;
 
 /// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
 ///
@@ -147,21 +131,23 @@ impl InclusionSearch {
             progress,
             cancelled: false,
         };
-        let mut drafts = Vec::new();
+        let mut drafts: Vec<Draft> = Vec::new();
         for interface in interfaces {
-            drafts.extend(self.draft(&observed, &approaches_m, interface, &mut counter));
+            let another = drafts.first().and_then(Draft::with_lump);
+            let draft = self.draft(&observed, &approaches_m, interface, another, &mut counter);
+            drafts.extend(draft);
         }
-        let best = (drafts.iter().map(Draft::evidence))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .unwrap_or((0.0, 0.0));
+        let best = (drafts.iter()).max_by(|a, b| a.evidence().total_cmp(&b.evidence()));
+        let hopeless = best.map_or(f64::NEG_INFINITY, |best| {
+            best.evidence() - HOPELESS_EVIDENCE - HOPELESS_MISFIT * best.misfit()
+        });
+        drafts.retain(|draft| draft.evidence() > hopeless);
         let mut hypotheses = Vec::new();
         let mut is_unsolved = false;
         for draft in drafts {
-            if best.0 - draft.evidence().0 < HOPELESS_EVIDENCE + HOPELESS_MISFIT * best.1 {
-                let found = self.hypothesis(&observed, &approaches_m, draft, &mut counter);
-                is_unsolved |= found.is_none();
-                hypotheses.extend(found);
-            }
+            let found = self.hypothesis(&observed, &approaches_m, draft, &mut counter);
+            is_unsolved |= found.is_none();
+            hypotheses.extend(found);
         }
         if counter.cancelled {
             return Err(ElasticityError::Cancelled);
@@ -267,6 +253,10 @@ impl InclusionSearch {
         &self.sensor
     }
 
+    pub(crate) fn guide(&self) -> &Guide {
+        &self.guide
+    }
+
     pub(crate) fn specimen(&self) -> &Specimen {
         &self.specimen
     }
@@ -288,148 +278,5 @@ impl InclusionSearch {
             });
         }
         Ok(used)
-    }
-
-    /// The best fits on the coarsest mesh; `None` where none could be solved.
-    fn draft(
-        &self,
-        observed: &Observed,
-        approaches_m: &[f64],
-        interface: Interface,
-        counter: &mut Counter<'_>,
-    ) -> Option<Draft> {
-        let guess = self.stiffness(observed, approaches_m);
-        let coarsest = self.forward(observed, approaches_m, interface, FINENESS[0]);
-        let mut problem = Problem {
-            forward: coarsest.clone(),
-            measured: observed.values.clone(),
-            factor: (observed.covariance(&self.sensor, interface, Meshed::Coarsely)).cholesky()?,
-            priors: self.block_priors(guess),
-            correction: Vec::new(),
-        };
-        let (_, start) = problem.scaled_start(&self.plain_block(guess))?;
-        let plain = problem.fit(start, DRAFTED, || counter.step())?;
-        if counter.cancelled {
-            return None;
-        }
-        problem
-            .priors
-            .extend(self.lump_priors(plain.parameters.block_modulus_pa));
-        problem.forward.kinematics = Kinematics::Linear;
-        let mut grid = Vec::new();
-        for start in starts(&plain.parameters, self.guide.radius_m()) {
-            if !counter.step() {
-                return None;
-            }
-            grid.extend(problem.scaled_start(&start));
-        }
-        grid.sort_by(|a, b| a.0.total_cmp(&b.0));
-        problem.forward = coarsest;
-        let lump = (grid.iter().take(FITTED_STARTS))
-            .filter_map(|(_, start)| problem.fit(*start, DRAFTED, || counter.step()))
-            .max_by(|a, b| a.evidence.total_cmp(&b.evidence));
-        Some(Draft {
-            problem,
-            interface,
-            plain,
-            lump,
-        })
-    }
-
-    /// A draft's fits on the answer's mesh; `None` where the plain block's could not be solved.
-    fn hypothesis(
-        &self,
-        observed: &Observed,
-        approaches_m: &[f64],
-        draft: Draft,
-        counter: &mut Counter<'_>,
-    ) -> Option<Hypothesis> {
-        let Draft {
-            mut problem,
-            interface,
-            plain,
-            lump,
-        } = draft;
-        let forward = |fineness| self.forward(observed, approaches_m, interface, fineness);
-        let [_, fitted, answers] = FINENESS.map(forward);
-        let covariance = observed.covariance(&self.sensor, interface, Meshed::Finely);
-        problem.factor = covariance.cholesky()?;
-        let with_lump = core::mem::take(&mut problem.priors);
-        problem.priors = with_lump[..with_lump.len() - LUMP_COORDINATES].to_vec();
-        let plain = problem.refined(&answers, plain, || counter.step())?;
-        problem.priors = with_lump;
-        problem.forward = fitted;
-        let lump = lump
-            .and_then(|fit| problem.fit(fit.parameters, NEARLY_SETTLED, || counter.step()))
-            .and_then(|fit| problem.refined(&answers, fit, || counter.step()));
-        Some(Hypothesis {
-            interface,
-            plain,
-            lump,
-        })
-    }
-
-    /// Modulus of a plain block by the mean pressure over the mean strain: right within a factor of
-    /// three, from which the fit of ln E₀ converges.
-    fn stiffness(&self, observed: &Observed, approaches_m: &[f64]) -> f64 {
-        let rings = observed.radii_m.len();
-        let last = observed.frames - 1;
-        let pressures = &observed.values[last * rings..observed.frames * rings];
-        let mean = pressures.iter().sum::<f64>() / rings as f64;
-        let strain = approaches_m[last] / self.specimen.height_m();
-        // Below a pascal there is no contact; the fit will say so by its misfit.
-        (0.5 * mean / strain).max(1.0)
-    }
-}
-
-struct Counter<'a> {
-    done: usize,
-    expected: usize,
-    progress: &'a mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
-    cancelled: bool,
-}
-
-impl Counter<'_> {
-    /// Reports a solution; `false` where the search is to end.
-    fn step(&mut self) -> bool {
-        if self.cancelled {
-            return false;
-        }
-        self.done += 1;
-        self.expected = self.expected.max(self.done);
-        let progress = SearchProgress {
-            done: self.done,
-            expected: self.expected,
-        };
-        self.cancelled |= (self.progress)(progress).is_break();
-        !self.cancelled
-    }
-}
-
-/// ln D, ln d and ln E₁, the last of the coordinates.
-const LUMP_COORDINATES: usize = 3;
-/// Difference of log evidence on the coarsest mesh beyond which an assumption about the face is given up:
-/// this and a part of the better one's misfit, most of which is the mesh's.
-const HOPELESS_EVIDENCE: f64 = 25.0;
-const HOPELESS_MISFIT: f64 = 0.3;
-
-/// The best fits on the coarsest mesh under one assumption about the face.
-struct Draft {
-    problem: Problem,
-    interface: Interface,
-    plain: Fit,
-    lump: Option<Fit>,
-}
-
-impl Draft {
-    /// Evidence and misfit of the better fit.
-    fn evidence(&self) -> (f64, f64) {
-        let fits = [Some(&self.plain), self.lump.as_ref()]
-            .into_iter()
-            .flatten();
-        let both = fits.map(|fit| (fit.evidence, fit.misfit));
-        both.fold((f64::NEG_INFINITY, 0.0), |best, fit| {
-            if fit.0 > best.0 { fit } else { best }
-        })
     }
 }

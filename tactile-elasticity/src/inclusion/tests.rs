@@ -1,9 +1,9 @@
 //! The forward model and its derivatives, the fit, and what a search refuses.
 
-use super::covariance::{Meshed, Observed};
+use super::covariance::{Observed, Resolution};
 use super::fit::{Prior, Problem, SETTLED};
 use super::forward::Forward;
-use super::parameters::{Coordinate, LumpParameters, Parameters};
+use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
 use super::{AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen, Told};
 use crate::ElasticityError;
 use crate::fem::{Guide, Interface, Kinematics, Layer, Material};
@@ -73,51 +73,90 @@ fn an_inclusion_as_soft_as_the_tissue_is_none() {
     assert!(distance(&with[..rings], &without[..rings]) < 2e-3);
 }
 
-#[test]
-fn derivatives_are_those_of_solutions_at_changed_parameters() {
-    let model = forward(2, 1.0);
-    let here = block(1.0);
-    let coordinates = [
-        Coordinate::BlockModulus,
-        Coordinate::LumpModulus,
-        Coordinate::Zero,
-        Coordinate::PoissonRatio,
-    ];
-    let linearised = model.linearise(&here, &coordinates, None).unwrap();
-    for (column, coordinate) in linearised.columns.iter().zip(coordinates) {
-        let step = 0.01 * coordinate.unit().abs();
-        let at = |by| model.predict(&here.moved(coordinate, by)).unwrap().values;
+const COORDINATES: [Coordinate; 7] = [
+    Coordinate::BlockModulus,
+    Coordinate::LumpModulus,
+    Coordinate::Zero,
+    Coordinate::PoissonRatio,
+    Coordinate::Diameter,
+    Coordinate::Depth,
+    Coordinate::Height,
+];
+
+/// How far derivatives are from difference quotients of solutions on the same mesh, moved.
+fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64)> {
+    let linearised = model.linearise(here, &COORDINATES, None).unwrap();
+    let error = |column: &[f64], coordinate| {
+        // The truncation error of a central quotient is of the step's square, the solutions' tolerance is
+        // a hundred times below the difference.
+        let step = 200.0 * here.small_step(coordinate).abs();
+        let at = |by| {
+            let moved = here.moved(coordinate, by);
+            let near = Some(&linearised.solved);
+            model.predict_near(&moved, near).unwrap().0.values
+        };
         let (low, high) = (at(-step), at(step));
         let quotient: Vec<f64> = (low.iter().zip(&high))
             .map(|(low, high)| (high - low) / (2.0 * step))
             .collect();
-        // The columns are one-sided quotients with a step of a thousandth; the compressibility 1 − 2ν is
-        // a fiftieth, and the step in ν a hundredth of that.
-        let tolerance = match coordinate {
-            Coordinate::PoissonRatio => 2e-2,
-            _ => 5e-3,
+        distance(column, &quotient)
+    };
+    let columns = linearised.columns.iter().zip(COORDINATES);
+    columns
+        .map(|(column, coordinate)| (coordinate, error(column, coordinate)))
+        .collect()
+}
+
+#[test]
+fn derivatives_are_those_of_solutions_at_changed_parameters() {
+    // Near the limit of ν the bulk modulus is 160 times Young's: what a difference quotient leaves of
+    // second order grows with it.
+    for (poisson_ratio, tolerance) in [(0.45, 2e-4), (0.495, 1e-3), (0.498, 2e-3)] {
+        let here = Parameters {
+            poisson_ratio,
+            ..block(1.0)
         };
-        let rings = 32;
-        let off = distance(&column[..rings], &quotient[..rings]);
-        assert!(off < tolerance, "{coordinate:?}: {off}");
-        let off = distance(&column[rings..], &quotient[rings..]);
-        assert!(off < tolerance, "{coordinate:?}, force: {off}");
+        for (coordinate, error) in derivative_errors(&forward(2, 1.0), &here) {
+            assert!(
+                error < tolerance,
+                "ν {poisson_ratio}, {coordinate:?}: {error}"
+            );
+        }
     }
 }
 
 #[test]
-fn derivatives_by_sizes_follow_the_moving_mesh() {
+fn derivatives_without_friction_are_those_of_one_iteration() {
+    let model = Forward {
+        interface: Interface::Frictionless,
+        ..forward(2, 1.0)
+    };
+    for (coordinate, error) in derivative_errors(&model, &block(1.0)) {
+        // How the face slides as parameters change is left out of the derivatives: a percent or two, most
+        // where the block gets wider.
+        let tolerance = match coordinate {
+            Coordinate::PoissonRatio => 0.12,
+            _ => 0.025,
+        };
+        assert!(error < tolerance, "{coordinate:?}: {error}");
+    }
+}
+
+#[test]
+fn a_moved_mesh_is_as_good_as_a_new_one() {
     let model = forward(3, 1.0);
     let here = block(1.0);
-    let coordinates = [Coordinate::Diameter, Coordinate::Depth, Coordinate::Height];
-    let linearised = model.linearise(&here, &coordinates, None).unwrap();
-    for (column, coordinate) in linearised.columns.iter().zip(coordinates) {
-        // Other sizes have other meshes: the step is large against what those differ by.
-        let at = |by| model.predict(&here.moved(coordinate, by)).unwrap().values;
-        let (low, high) = (at(-0.06), at(0.06));
-        let quotient: Vec<f64> = low.iter().zip(&high).map(|(a, b)| (b - a) / 0.12).collect();
-        let off = distance(&column[..32], &quotient[..32]);
-        assert!(off < 0.08, "{coordinate:?}: {off}");
+    let (_, solved) = model.predict_near(&here, None).unwrap();
+    for coordinate in [Coordinate::Diameter, Coordinate::Depth, Coordinate::Height] {
+        for by in [-0.2, 0.2] {
+            let there = here.moved(coordinate, by);
+            let moved = model.predict_near(&there, Some(&solved)).unwrap().0.values;
+            let new = model.predict(&there).unwrap().values;
+            // The roughness that first fits count with.
+            let off = distance(&moved[..32], &new[..32]);
+            assert!(off < 8e-3, "{coordinate:?} by {by}: {off}");
+            assert!(moved != new, "{coordinate:?}: the mesh was built anew");
+        }
     }
 }
 
@@ -146,21 +185,24 @@ fn small_strain_is_the_limit_of_small_approaches() {
     assert!(distance(&linear, &finite) < 1e-3);
 }
 
-/// Noise-free values with the covariance of a good sensor, to be fitted on the mesh they come from.
+/// Values without noise from a finer mesh than the fit's, with the errors of a first fit.
 fn problem() -> (Problem, Parameters) {
     let truth = block(1.0);
-    let values = forward(2, 1.0).predict(&truth).unwrap().values;
+    let values = forward(5, 1.0).predict(&truth).unwrap().values;
     let observed = Observed {
-        radii_m: forward(2, 1.0).radii_m,
+        radii_m: forward(5, 1.0).radii_m,
         white: values.iter().map(|p| 1e-3 * p).collect(),
         values,
         frames: 2,
     };
-    let covariance =
-        observed.covariance(&SensorErrors::default(), Interface::Bonded, Meshed::Finely);
+    let covariance = observed.covariance(
+        &SensorErrors::default(),
+        Interface::Bonded,
+        Resolution::FirstFits,
+    );
     let prior = |coordinate, mean, error| Prior::new(coordinate, (mean, error));
     let problem = Problem {
-        forward: forward(2, 1.0),
+        forward: forward(3, 1.0),
         measured: observed.values,
         factor: covariance.cholesky().unwrap(),
         priors: vec![
@@ -172,7 +214,6 @@ fn problem() -> (Problem, Parameters) {
             prior(Coordinate::Depth, 5e-3f64.ln(), 0.8),
             prior(Coordinate::LumpModulus, 20e3f64.ln(), 1.2),
         ],
-        correction: Vec::new(),
     };
     (problem, truth)
 }
@@ -192,10 +233,11 @@ fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
     for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
         let error = fit.covariance[(k, k)].sqrt();
         let z = (fit.parameters.get(coordinate) - truth.get(coordinate)) / error;
-        // Without noise the priors alone pull, whose means are not the truth.
+        // Without noise the coarse mesh and the priors pull, whose means are not the truth.
         assert!(z.abs() < 0.7, "{coordinate:?}: {z}");
     }
-    assert!(fit.misfit < 1.0, "{}", fit.misfit);
+    // The covariance has the coarse mesh's error in it.
+    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
 }
 
 #[test]
@@ -204,7 +246,7 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
     // From the limit itself and far from the truth in all else: ν's prior and the data pull it back,
     // but first steps go beyond the limit.
     let mut start = truth;
-    start.poisson_ratio = 0.4999;
+    start.poisson_ratio = LARGEST_POISSON_RATIO;
     start.block_modulus_pa *= 0.8;
     start.lump = Some(LumpParameters {
         diameter_m: 14e-3,
@@ -213,14 +255,15 @@ fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
     });
     let fit = problem.fit(start, SETTLED, || true).unwrap();
     assert!(fit.converged);
-    // Noise-free values: what is left is what the priors pull, as in the fit from afar.
-    assert!(fit.misfit < 1.0, "{}", fit.misfit);
+    // As of the fit from afar.
+    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
 }
 
 #[test]
 fn a_step_that_may_not_go_on_ends_the_fit() {
-    let (problem, truth) = problem();
-    let fit = problem.fit(truth, SETTLED, || false).unwrap();
+    let (problem, mut start) = problem();
+    start.block_modulus_pa *= 1.5;
+    let fit = problem.fit(start, SETTLED, || false).unwrap();
     assert!(!fit.converged);
 }
 
