@@ -364,8 +364,13 @@ fn main() -> Result<(), Box<dyn Error>> {
                         error / estimated.relative_error()
                     );
                 }
+            } else if let Some(inclusion) = &estimate.inclusion {
+                for (name, told) in ["D", "d", "E1"].iter().zip(parameters(inclusion)) {
+                    print!("; {name} {:.3e}", told.estimate().value);
+                }
+                print!("; found where there is none");
             } else {
-                print!("; {}", if estimate.found { "FOUND" } else { "none" });
+                print!("; none");
             }
             println!("; {:?}", estimate.warnings);
         }

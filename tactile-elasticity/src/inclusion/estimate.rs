@@ -159,7 +159,8 @@ pub struct InclusionEstimate {
     /// Probability that there is an inclusion, one and none being equally likely beforehand.
     pub probability: f64,
     /// Whether one was found: the probability is above 0.99 and χ² falls by more than 20 (for three
-    /// parameters and some ten independent places to look, one false alarm in about a thousand).
+    /// parameters and some ten independent places to look, one false alarm in about a thousand), and its
+    /// modulus is a fifth or more from the tissue's.
     pub found: bool,
     /// Young's modulus of the tissue, in pascals.
     pub block_modulus_pa: Estimated,

@@ -10,6 +10,9 @@ use crate::fem::Interface;
 const LEAST_FALL: f64 = 20.0;
 /// Least probability for that.
 const LEAST_PROBABILITY: f64 = 0.99;
+/// Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no more than what
+/// its mesh differs by from a plain block's (a contrast of 1.02 to 1.04 in plain blocks by CalculiX).
+const LEAST_CONTRAST: f64 = 1.2;
 /// Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as poor.
 const POOR: f64 = 3.1;
 
@@ -42,7 +45,12 @@ impl Hypothesis {
             .map_or(f64::NEG_INFINITY, |fit| fit.evidence - self.plain.evidence);
         let fall = (self.lump.as_ref()).map_or(0.0, |fit| self.plain.misfit - fit.misfit);
         let probability = 1.0 / (1.0 + (-gain).exp());
-        let found = probability > LEAST_PROBABILITY && fall > LEAST_FALL;
+        let contrast = (self.lump.as_ref()).map_or(0.0, |fit| {
+            let modulus = |coordinate| fit.parameters.get(coordinate);
+            (modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus)).abs()
+        });
+        let found =
+            probability > LEAST_PROBABILITY && fall > LEAST_FALL && contrast > LEAST_CONTRAST.ln();
         let chosen = match &self.lump {
             Some(lump) if found => lump,
             _ => &self.plain,
