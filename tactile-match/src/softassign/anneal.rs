@@ -1,6 +1,7 @@
 //! The alternation: soft assignment at a falling temperature, then the warp that it asks for.
 
 use super::axes::Axes;
+use super::extrapolate::Extrapolation;
 use super::landmarks::Known;
 use super::prior::Prior;
 use super::regression::Regression;
@@ -47,10 +48,16 @@ pub(crate) struct Schedule {
     pub(crate) least: f64,
     /// Most iterations.
     pub(crate) limit: usize,
+    /// Whether undecided matches let the temperature fall ahead of the residuals, see [`Extrapolation`].
+    pub(crate) extrapolates: bool,
     /// Iterations after which a temperature that no longer falls is the last.
     pub(crate) patience: usize,
+    /// The same for the first temperature: a start colder than the noise.
+    pub(crate) stuck: usize,
     /// Sinkhorn sweeps an iteration.
     pub(crate) sweeps: usize,
+    /// Undecided matches stand still when residuals and temperature, as variances, differ by less than this share.
+    pub(crate) still: f64,
     /// A cold run that matches fewer points has collapsed and ends.
     pub(crate) collapse: f64,
     /// What is expected of points without a partner.
@@ -78,6 +85,8 @@ pub(crate) struct State<const D: usize> {
     pub(crate) settled: bool,
     /// Share of the matched points whose residual the noise of the others does not explain, see [`Annealer::tail`].
     pub(crate) tail: f64,
+    /// Spread of the soft partners within a row, relative to the temperature: 1 undecided, 0 decided.
+    pub(crate) ambiguity: f64,
 }
 
 impl<const D: usize> State<D> {
@@ -87,7 +96,7 @@ impl<const D: usize> State<D> {
         self.trace.clone_from(&other.trace);
         (self.sigma, self.iterations) = (other.sigma, other.iterations);
         (self.energy, self.settled, self.matched) = (other.energy, other.settled, other.matched);
-        self.tail = other.tail;
+        (self.tail, self.ambiguity) = (other.tail, other.ambiguity);
     }
 }
 
@@ -161,7 +170,7 @@ impl<const D: usize> Annealer<D> {
         observe: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let mut variance = schedule.sigma * schedule.sigma;
-        let mut standing = 0;
+        let (mut standing, mut extrapolation) = (0, Extrapolation::default());
         state.settled = false;
         self.predicted.clone_from(&state.warped);
         for iteration in 0..schedule.limit {
@@ -176,18 +185,28 @@ impl<const D: usize> Annealer<D> {
             let decided = self.ambiguity < DECIDED;
             let fall = |rate: f64| variance * rate * rate;
             let lowest = fall(if decided { DECIDED_RATE } else { schedule.rate }).max(floor);
-            let next = residual.min(fall(schedule.least)).max(lowest).min(variance);
-            let still = if decided { 1e-3 } else { 1e-4 };
+            let aim = if schedule.extrapolates && !decided {
+                extrapolation.next(variance, residual)
+            } else {
+                residual
+            };
+            let next = aim.min(fall(schedule.least)).max(lowest).min(variance);
+            let still = if decided { 1e-3 } else { schedule.still };
             standing = if next < variance { 0 } else { standing + 1 };
+            let patience = if state.iterations > standing {
+                schedule.patience
+            } else {
+                schedule.stuck // never colder than at the start
+            };
             state.settled = variance <= floor
-                || standing > schedule.patience
+                || standing > patience
                 || (iteration > 5 && (residual - variance).abs() < still * variance);
             if state.settled {
                 break;
             }
             variance = next;
         }
-        state.sigma = variance.sqrt();
+        (state.sigma, state.ambiguity) = (variance.sqrt(), self.ambiguity);
         ControlFlow::Continue(())
     }
 

@@ -28,6 +28,7 @@ mod cells;
 mod confidence;
 mod consensus;
 mod correspond;
+mod extrapolate;
 mod finish;
 mod found;
 mod frame;

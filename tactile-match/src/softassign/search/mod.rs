@@ -9,8 +9,10 @@ mod progress;
 
 use super::anneal::Schedule;
 use super::prior::PriorScales;
-use super::{AnnealedSoftassign, Rotation, Search, SoftassignWorkspace, finish, starts};
-use cooling::{COOLEST, LABELLED, NEAR, REHEAT, SLOW};
+use super::{
+    AnnealedSoftassign, Rotation, Search, SoftassignWorkspace, Transformation, finish, starts,
+};
+use cooling::{COOLEST, LABELLED, NEAR, REHEAT, SLOW, TURNED};
 pub(super) use cooling::{Cooling, FAST};
 use nalgebra::SMatrix;
 use progress::{COMPLETE, MANY};
@@ -180,10 +182,18 @@ impl AnnealedSoftassign {
             Some((Start::Centred, SLOW)),
             limited.then_some((Start::Labelling, LABELLED)),
         ];
-        let moments = starts::rotations::<D>(rotations).map(|r| (Start::Moments(r), SLOW));
+        // A motion without bending has its basins far apart, and no prior that tells how likely it is.
+        let bends = !ws.annealer.rigid.is_active();
+        let moments = starts::rotations::<D>(rotations).map(|rotation| {
+            let turned = limited && bends && rotation != SMatrix::<f64, D, D>::identity();
+            (Start::Moments(rotation), if turned { TURNED } else { SLOW })
+        });
         for (start, cooling) in first.into_iter().flatten().chain(moments) {
             if self.is_done(ws) {
                 return ControlFlow::Continue(());
+            }
+            if matches!(start, Start::Labelling) && bends && self.is_hidden(ws) {
+                continue;
             }
             self.run(ws, start, cooling, observe)?;
         }
@@ -304,7 +314,7 @@ impl AnnealedSoftassign {
         ws.state.tail = ws.annealer.tail(NOTICED * ws.spacing);
         ws.annealer
             .evaluate(&mut ws.state, self.options.share, RESOLUTION);
-        if ws.state.energy < ws.best.energy || ws.starts == 1 {
+        if ws.state.energy + cooling.margin < ws.best.energy || ws.starts == 1 {
             ws.best.copy_from(&ws.state);
         }
         flow
@@ -341,14 +351,23 @@ impl AnnealedSoftassign {
     }
 
     pub(super) fn schedule(&self, cooling: Cooling) -> Schedule {
+        // A motion without bending stands still while it turns into place.
+        let bends = self.options.transformation == Transformation::NonRigid;
         Schedule {
             sigma: cooling.sigma,
             floor: finish::FLOOR,
             rate: cooling.rate,
             least: cooling.least,
+            extrapolates: cooling.extrapolates && bends,
             patience: cooling.patience,
+            stuck: if bends {
+                cooling.stuck
+            } else {
+                cooling.patience
+            },
             limit: self.options.max_iterations,
             sweeps: cooling.sweeps,
+            still: cooling.still,
             collapse: 0.0,
             slack: self.options.slack(),
         }

@@ -1,5 +1,6 @@
 //! Whether a search is over.
 use super::super::{AnnealedSoftassign, SoftassignWorkspace, finish};
+use super::REHEAT;
 
 /// So many points that an incomplete exact answer is not worth a second try.
 pub(super) const MANY: usize = 500;
@@ -21,6 +22,9 @@ const STRAGGLERS: f64 = 0.03;
 
 /// The same where the data are clean and the set is dense: the points at the edge of a part that lies one point aside.
 const CLEAN_STRAGGLERS: f64 = 0.01;
+
+/// Soft partners spread so far, relative to the temperature, leave no point its own.
+const NO_PARTNERS: f64 = 0.8;
 
 impl AnnealedSoftassign {
     /// Whether no further start can do better.
@@ -68,5 +72,11 @@ impl AnnealedSoftassign {
         ws.best.sigma <= finish::CLEAN
             && ws.best.matched >= wanted * points as f64
             && (ws.best.tail <= CLEAN_STRAGGLERS || points < MANY)
+    }
+
+    /// Whether noise seems to hide which point is which, so that the points' surroundings tell nothing: the best answer is undecided at the
+    /// temperature of a second try.
+    pub(super) fn is_hidden<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
+        ws.best.ambiguity >= NO_PARTNERS && ws.best.sigma >= 0.999 * REHEAT.sigma
     }
 }
