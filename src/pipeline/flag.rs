@@ -107,6 +107,20 @@ pub enum Flag {
         /// Lateral strain of the points.
         texture_strain: f64,
     },
+    /// The pressure rises to the outline of a flat face, as where it sticks: it does not spread freely, and its strain is not that of its material.
+    FaceSticks {
+        /// The frame.
+        frame: usize,
+        /// Light just inside the outline over that further inside.
+        edge_ratio: f64,
+    },
+    /// A face is squeezed so far that the modulus depends on the law between stress and strain.
+    MaterialLaw {
+        /// The largest strain e_zz, of the pipeline's measure.
+        strain: f64,
+        /// By how much stress over strain there exceeds the modulus of a neo-Hookean sample.
+        excess: f64,
+    },
     /// The sample relaxes: the modulus is a mean over the time of the frames.
     SampleRelaxes {
         /// Modulus of a load too fast to relax, in pascals.
@@ -276,6 +290,17 @@ impl fmt::Display for Flag {
                     100.0 * texture_strain
                 )
             }
+            Self::FaceSticks { frame, edge_ratio } => write!(
+                f,
+                "frame {}: the pressure rises towards the outline ({edge_ratio:.2} of that further inside): the face sticks, its strain is not that of its material",
+                frame + 1
+            ),
+            Self::MaterialLaw { strain, excess } => write!(
+                f,
+                "at a strain of {:.1} % the modulus depends on the law of the material: of a rubber-like sample it is {:.0} % off (strain = \"hencky\" is closest)",
+                100.0 * strain,
+                100.0 * excess
+            ),
             Self::SampleRelaxes {
                 instantaneous_pa,
                 equilibrium_pa,

@@ -1,6 +1,6 @@
 //! Simulated presses on the layered waveguide, with the truth at every stage.
 //!
-//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. It shares no code with the
+//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. But for finite elements it shares no code with the
 //! measuring crates, so that a measurement of a simulated frame is a test and not a tautology.
 //!
 //! | module | what it holds |
@@ -8,6 +8,7 @@
 //! | [`material`](Elastic) | the pressed sphere, the waveguide's layers |
 //! | [`contact`](Contact) | sphere on waveguide: pressure, radius, indentation, surface displacement |
 //! | [`contact_state`](ContactState) | contacts computed elsewhere, as tables over the radius |
+//! | `squeezed_cylinder` | cylinders between plates by the finite elements of `tactile-elasticity` (feature `fem`) |
 //! | `pixel_average` | exact averages of the contact pressure over pixels |
 //! | [`light`](Response) | pressure → grey levels |
 //! | [`camera`](Camera) | blur, vignetting, photon and read noise, quantisation |
@@ -52,6 +53,8 @@ mod press_options;
 mod random;
 mod relief;
 mod simulation;
+#[cfg(feature = "fem")]
+mod squeezed_cylinder;
 mod stream;
 mod truth;
 mod uniaxial;

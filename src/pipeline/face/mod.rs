@@ -26,12 +26,14 @@
 //! their errors allow, the face slips or sticks, and a flag says so.
 mod area;
 mod distance;
+mod material_law;
 mod shape;
 mod texture;
 
 pub(super) use area::FaceWorkspace;
+pub(super) use material_law::caution as material_law_caution;
 pub use shape::ShapeProblem;
-pub(super) use shape::check;
+pub(super) use shape::{check, sticks};
 pub(super) use texture::{TextureStretch, spots, stretch};
 
 use crate::force::Estimate;

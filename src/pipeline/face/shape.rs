@@ -127,10 +127,15 @@ fn problem(contact: &ContactReading, object: Object) -> Result<FaceReading, Shap
     if edge_ratio < LEAST_EDGE_RATIO {
         return Err(ShapeProblem::NoEdge { edge_ratio });
     }
-    if edge_ratio > GREATEST_EDGE_RATIO && matches!(object, Object::Unknown { .. }) {
+    if sticks(&face) && matches!(object, Object::Unknown { .. }) {
         return Err(ShapeProblem::RaisedEdge { edge_ratio });
     }
     Ok(face)
+}
+
+/// Whether the pressure rises to the outline of a face that was said to be flat, as where it sticks to what it is pressed on.
+pub(in crate::pipeline) fn sticks(face: &FaceReading) -> bool {
+    face.edge_ratio > GREATEST_EDGE_RATIO
 }
 
 /// Whether the contacts are those of one flat face under uniaxial load; `frame` numbers go with the contacts.

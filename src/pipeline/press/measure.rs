@@ -4,6 +4,7 @@ use crate::force::Estimate;
 use crate::matching::StopReason;
 use crate::pipeline::background;
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::face;
 use crate::pipeline::flag::Flag;
 use crate::pipeline::measurement::{
     FrameResult, MatchResult, Measurement, ModulusResult, StrainResult,
@@ -58,6 +59,7 @@ impl Press<'_> {
             Ok(_) => self.error_budget().unwrap_or_default(),
             Err(_) => Vec::new(),
         };
+        flags.extend(self.material_law());
         let time = self.time_dependence().ok().flatten();
         flags.extend(self.time_flags(time.as_ref()));
         Measurement {
@@ -86,6 +88,19 @@ impl Press<'_> {
         })
     }
 
+    /// A caution where a flat face is squeezed so far that the law of its material matters.
+    fn material_law(&mut self) -> Option<Flag> {
+        self.pipeline().settings().object.flat_face()?;
+        let series = self.loads(true).ok()?;
+        let strains = series.loads().iter().filter_map(|load| load.mean_strain);
+        let largest = strains
+            .map(|e| e.value)
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let measure = self.pipeline().strain().name();
+        // Loads count a squeeze as positive.
+        face::material_law_caution(measure, -largest.abs())
+    }
+
     fn frame_result(
         &mut self,
         frame: usize,
@@ -104,6 +119,12 @@ impl Press<'_> {
                 ball || !matches!(flag, Flag::NotABall { .. } | Flag::NotRound { .. })
             }),
         );
+        if let Some(face) = &reading.face
+            && face::sticks(face)
+        {
+            let edge_ratio = face.edge_ratio;
+            flags.push(Flag::FaceSticks { frame, edge_ratio });
+        }
         if let (Some(gauge_n), Some(force_n)) = (gauge_force_n, reading.force_n) {
             let apart = (gauge_n - force_n.value).abs();
             if apart > 3.0 * force_n.standard_error && apart > 0.02 * gauge_n {

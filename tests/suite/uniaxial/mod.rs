@@ -3,6 +3,8 @@
 
 mod refusals;
 mod scenes;
+#[cfg(feature = "fem")]
+mod squeezed_cylinders;
 mod study;
 
 use scenes::{Face, measured, plain, speckled};
