@@ -3,6 +3,7 @@
 use super::anneal::{Annealer, Slack, State};
 use super::confidence::{Fitted, PairOdds};
 use super::locality::Locality;
+use super::search::are_unequal;
 use super::soft_assign::SoftAssignment;
 use crate::Doubt;
 
@@ -40,25 +41,36 @@ pub(crate) struct Answer<const D: usize> {
     column_best: Vec<(f64, usize)>,
     odds: PairOdds,
     locality: Locality<D>,
+    /// See [`Locality::contrast`]; 1 where it was not needed.
+    contrast: f64,
 }
 
 impl<const D: usize> Answer<D> {
     /// Why the pairs are not to be relied on: `smaller` points could have a partner, `share` of them are expected to have none.
     pub(crate) fn doubt(&self, smaller: usize, share: f64) -> Option<Doubt> {
         let pairs = self.assignment.iter().flatten().count() as f64;
-        let sure: f64 = self
-            .assignment
-            .iter()
-            .zip(&self.confidence)
-            .filter(|(partner, _)| partner.is_some())
-            .map(|(_, confidence)| confidence)
-            .sum();
         let enough = ENOUGH.min(1.0 - 1.5 * share).max(FEWEST);
         match () {
             () if pairs < enough * smaller as f64 => Some(Doubt::FewPairs),
-            () if sure < DECIDED * pairs => Some(Doubt::Undecided),
+            () if self.sureness() < DECIDED => Some(Doubt::Undecided),
             () => None,
         }
+    }
+
+    /// Mean confidence of the pairs; 1 where there are none.
+    pub(crate) fn sureness(&self) -> f64 {
+        let paired = self.assignment.iter().zip(&self.confidence);
+        let (mut pairs, mut sure) = (0.0, 0.0);
+        for (_, confidence) in paired.filter(|(partner, _)| partner.is_some()) {
+            pairs += 1.0;
+            sure += confidence;
+        }
+        if pairs > 0.0 { sure / pairs } else { 1.0 }
+    }
+
+    /// How much worse the worst surrounding fits than most.
+    pub(crate) fn contrast(&self) -> f64 {
+        self.contrast
     }
 
     /// Reads the answer from the run's final state; `spread` is the variance of the positions between the scales of the prior, empty where
@@ -85,6 +97,12 @@ impl<const D: usize> Answer<D> {
         let fit = self.place(state, targets, snaps);
         if !annealer.rigid.is_active() {
             annealer.regression.variances(&annealer.prior);
+        }
+        self.contrast = 1.0;
+        if noisy && are_unequal(n, targets.len()) {
+            self.contrast =
+                self.locality
+                    .contrast((&state.warped, targets), annealer.volume, &self.assignment);
         }
         if noisy {
             let fitted = Fitted {

@@ -30,6 +30,8 @@ pub(crate) struct Locality<const D: usize> {
     /// Squared residual of each point that has a partner.
     squares: Vec<f64>,
     paired: Vec<[f64; D]>,
+    /// Mean squared residual of every surrounding.
+    around: Vec<f64>,
 }
 
 impl<const D: usize> Locality<D> {
@@ -51,6 +53,52 @@ impl<const D: usize> Locality<D> {
                 .for_each(|(_, c)| *c *= sure);
             return;
         }
+        let spacing = self.take((warped, targets), volume, assignment);
+        let density = targets.len() as f64 / volume;
+        let pairs = assignment.iter().zip(warped).zip(confidence);
+        for ((_, w), confidence) in pairs.filter(|((partner, _), _)| partner.is_some()) {
+            let (count, squares) = self.around(w, spacing);
+            let total = squares + PRESUMED * D as f64 * noise;
+            let own = total / (D as f64 * (count + PRESUMED));
+            let part = -(density * (TAU * E * own).powf(0.5 * D as f64)).ln();
+            *confidence *= logistic(whole + PART * part.min(MOST_PART));
+        }
+    }
+
+    /// Mean squared residual of the surrounding that fits worst, over the median of all surroundings.
+    pub(crate) fn contrast(
+        &mut self,
+        (warped, targets): (&[[f64; D]], &[[f64; D]]),
+        volume: f64,
+        assignment: &[Option<usize>],
+    ) -> f64 {
+        let spacing = self.take((warped, targets), volume, assignment);
+        let mut around = std::mem::take(&mut self.around);
+        around.clear();
+        for i in 0..self.paired.len() {
+            let place = self.paired[i];
+            let (count, squares) = self.around(&place, spacing);
+            around.push(squares / count.max(1.0));
+        }
+        let worst = around.iter().copied().fold(0.0, f64::max);
+        let middle = around.len() / 2;
+        let contrast = if around.is_empty() {
+            1.0
+        } else {
+            let median = *around.select_nth_unstable_by(middle, f64::total_cmp).1;
+            if median > 0.0 { worst / median } else { 1.0 }
+        };
+        self.around = around;
+        contrast
+    }
+
+    /// Takes the pairs and their residuals; the typical distance of the targets.
+    fn take(
+        &mut self,
+        (warped, targets): (&[[f64; D]], &[[f64; D]]),
+        volume: f64,
+        assignment: &[Option<usize>],
+    ) -> f64 {
         self.squares.clear();
         self.paired.clear();
         for (w, partner) in warped.iter().zip(assignment) {
@@ -62,14 +110,7 @@ impl<const D: usize> Locality<D> {
         let density = targets.len() as f64 / volume;
         let spacing = density.recip().powf(1.0 / D as f64);
         self.cells.build(&self.paired, spacing);
-        let pairs = assignment.iter().zip(warped).zip(confidence);
-        for ((_, w), confidence) in pairs.filter(|((partner, _), _)| partner.is_some()) {
-            let (count, squares) = self.around(w, spacing);
-            let total = squares + PRESUMED * D as f64 * noise;
-            let own = total / (D as f64 * (count + PRESUMED));
-            let part = -(density * (TAU * E * own).powf(0.5 * D as f64)).ln();
-            *confidence *= logistic(whole + PART * part.min(MOST_PART));
-        }
+        spacing
     }
 
     /// The nearest points with partners about `place`: how many, and the sum of their squared residuals.
@@ -98,4 +139,28 @@ impl<const D: usize> Locality<D> {
 
 fn logistic(x: f64) -> f64 {
     1.0 / (1.0 + (-x).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid whose residuals are 0.05 but for its last two columns, where they are `aside`.
+    fn contrast(aside: f64) -> f64 {
+        let warped: Vec<[f64; 2]> = (0..100)
+            .map(|i| [f64::from(i % 10), f64::from(i / 10)])
+            .collect();
+        let residual = |w: &[f64; 2]| if w[0] > 7.5 { aside } else { 0.05 };
+        let targets: Vec<[f64; 2]> = warped.iter().map(|w| [w[0] + residual(w), w[1]]).collect();
+        let assignment: Vec<Option<usize>> = (0..100).map(Some).collect();
+        Locality::default().contrast((&warped, &targets), 100.0, &assignment)
+    }
+
+    #[test]
+    fn a_part_with_larger_residuals_stands_out() {
+        // Equal residuals: but for rounding all surroundings are alike.
+        assert!((contrast(0.05) - 1.0).abs() < 1e-6);
+        // Four times the squares, in corner surroundings that lie half in the part or more.
+        assert!(contrast(0.1) > 2.0);
+    }
 }

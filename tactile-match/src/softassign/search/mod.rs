@@ -15,6 +15,7 @@ use super::{
 use cooling::{COOLEST, LABELLED, NEAR, REHEAT, SLOW, TURNED};
 pub(super) use cooling::{Cooling, FAST};
 use nalgebra::SMatrix;
+pub(super) use progress::are_unequal;
 use progress::{COMPLETE, MANY};
 use std::ops::ControlFlow;
 

@@ -26,6 +26,11 @@ const CLEAN_STRAGGLERS: f64 = 0.01;
 /// Soft partners spread so far, relative to the temperature, leave no point its own.
 const NO_PARTNERS: f64 = 0.8;
 
+/// Whether parts of one set are out of sight or strewn about.
+pub(in super::super) fn are_unequal(model: usize, target: usize) -> bool {
+    (model.min(target) as f64) < UNEQUAL * model.max(target) as f64
+}
+
 impl AnnealedSoftassign {
     /// Whether no further start can do better.
     pub(super) fn is_done<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
@@ -49,8 +54,7 @@ impl AnnealedSoftassign {
     /// Whether noise explains the residuals: they are clearly below the spacing of the targets, for nearly all points.
     fn is_explained<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
-        let larger = ws.model.len().max(ws.target.len());
-        let wanted = if (points as f64) < UNEQUAL * larger as f64 {
+        let wanted = if are_unequal(ws.model.len(), ws.target.len()) {
             PLAIN_GAIN
         } else {
             finish::TELLING
