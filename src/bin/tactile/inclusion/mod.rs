@@ -23,7 +23,7 @@ use tactile_imaging::inclusion::InclusionScene;
 /// SCENE.toml names frames of the guide pressed onto a flat block at known approaches, the block's size and the guide's
 /// layers (examples/data/inclusion/scene.toml is one); without it a block with a lump is simulated. The pressure over the radius is compared with finite elements at
 /// finite strain; the answer is whether there is a lump, its diameter, depth and modulus with 95 % intervals, or which of them the
-/// frames leave open. --out gets profiles.csv and inclusion.svg. A search takes some ten seconds for each kind of interface.
+/// frames leave open. --out gets profiles.csv and inclusion.svg. A search takes some five seconds for each kind of interface.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
