@@ -79,6 +79,8 @@ struct Reading {
     layered: ModulusEstimate<f64>,
     tabulated: Option<ModulusEstimate<f64>>,
     series: Option<f64>,
+    /// Relative errors of the two contact radii.
+    radius_errors: [f64; 2],
 }
 
 impl Ball {
@@ -161,6 +163,10 @@ impl Ball {
                 press.measure()
             ),
         };
+        let radius_errors = [0, 1].map(|frame| {
+            let contact = press.contact(frame).unwrap().unwrap();
+            contact.contact_radius_m.value / pair[frame].contact_radius_m - 1.0
+        });
         // A table refuses any ball and guide but its own.
         let own_table = tables.iter().find_map(|table| {
             TabulatedContact::new(Arc::clone(table), self.radius_m, 0.5, &guide).ok()
@@ -179,6 +185,7 @@ impl Ball {
             layered,
             tabulated,
             series: series.map(|m| m.youngs_modulus_pa),
+            radius_errors,
         }
     }
 
@@ -264,12 +271,13 @@ fn summaries(readings: &[Reading]) -> [Summary; 2] {
             )
         };
         println!(
-            "{} a/R {:.2}: layered {}, table {}, series {:?} %",
+            "{} a/R {:.2}: layered {}, table {}, series {:?} %, radius {:+.3} %",
             r.ball,
             r.largest_ratio,
             interval(&r.layered),
             r.tabulated.as_ref().map_or("none".to_owned(), interval),
             r.series.map(|e| (100.0 * (e / r.truth_pa - 1.0)).round()),
+            100.0 * r.radius_errors[1],
         );
     }
     let layered = Summary::of(readings.iter().map(|r| (&r.layered, r.truth_pa)));
@@ -287,6 +295,10 @@ fn balls_are_measured_within_their_intervals() {
             readings.push(ball.read(first, 1 + 10 * k as u64 + first as u64, &[]));
         }
     }
+    // The best Hertz profile is up to 0.9 % too wide; rounding to grey levels and the lens's blur leave some hundredths of a per cent.
+    let radius = (readings.iter().flat_map(|r| r.radius_errors))
+        .fold(0.0, |worst: f64, e| worst.max(e.abs()));
+    assert!(radius < 2e-3, "{radius}");
     // As near as a contact table is to come; measured 0.4 and 1.9 %.
     summaries(&readings)[0].check(0.01, 0.04);
 }
