@@ -47,7 +47,8 @@ pub(crate) struct Fit {
 /// When a fit ends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ending {
-    /// Step over standard errors below which it has settled.
+    /// Distance of the optimum in standard errors below which it has settled; an undamped step that gains less
+    /// than its square is the last.
     step: f64,
     /// Evaluations of the model with its derivatives.
     evaluations: usize,
@@ -65,6 +66,7 @@ pub(crate) const DRAFTED: Ending = Ending {
     step: 0.5,
     evaluations: 12,
 };
+
 /// Largest step of a logarithm.
 const LARGEST_STEP: f64 = 0.5;
 
@@ -208,10 +210,10 @@ impl Problem {
             match self.normal(&next, Some(&normal.solved)) {
                 Some(found) if found.misfit + found.penalty <= now => {
                     let gain = now - found.misfit - found.penalty;
-                    let is_free = damping < 1e-2;
+                    let is_undamped = damping < 1e-2;
                     damping = (0.1 * damping).max(LEAST_DAMPING);
                     (parameters, normal) = (next, found);
-                    if is_free && gain < ending.step.powi(2) {
+                    if is_undamped && gain < ending.step.powi(2) {
                         break true;
                     }
                 }

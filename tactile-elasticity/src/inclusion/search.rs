@@ -5,7 +5,7 @@ use super::drafts::Draft;
 use super::estimate::InclusionEstimate;
 use super::fit::Prior;
 use super::forward::Forward;
-use super::parameters::{Coordinate, Parameters};
+use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
 use super::profiles::{PressureProfile, check};
 use super::progress::{Counter, SearchProgress};
 use super::specimen::{SensorErrors, Specimen};
@@ -218,13 +218,14 @@ impl InclusionSearch {
             lump: None,
             zero_m: 0.0,
             height_m: self.specimen.height_m(),
-            poisson_ratio: self.specimen.poisson_ratio(),
+            poisson_ratio: self.specimen.poisson_ratio().min(LARGEST_POISSON_RATIO),
         }
     }
 
     /// What is known of the block; `guess` of its modulus counts where nobody has said it.
     pub(crate) fn block_priors(&self, guess: f64) -> Vec<Prior> {
-        let [height, zero, poisson] = self.specimen.known();
+        let [height, zero, (poisson_ratio, error)] = self.specimen.known();
+        let poisson = (poisson_ratio.min(LARGEST_POISSON_RATIO), error);
         // Three decades each way.
         let modulus = self.specimen.block_modulus().unwrap_or((guess.ln(), 3.5));
         vec![

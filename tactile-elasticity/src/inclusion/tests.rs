@@ -272,6 +272,21 @@ fn search() -> InclusionSearch {
     InclusionSearch::new(specimen.with_interface(Interface::Bonded), guide(1.0)).unwrap()
 }
 
+#[test]
+fn a_block_said_to_be_incompressible_is_fitted_at_the_limit() {
+    // A prior beyond the limit, narrow against the distance, would pull against every step.
+    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+    let specimen = specimen.with_poisson_ratio(0.4999, 1e-4).unwrap();
+    let search = InclusionSearch::new(specimen, guide(1.0)).unwrap();
+    let start = search.plain_block(5e3);
+    assert_eq!(start.poisson_ratio, LARGEST_POISSON_RATIO);
+    for prior in search.block_priors(5e3) {
+        if prior.coordinate == Coordinate::PoissonRatio {
+            assert_eq!(prior.mean, LARGEST_POISSON_RATIO);
+        }
+    }
+}
+
 fn frame(approach_m: f64) -> PressureProfile {
     PressureProfile {
         approach_m,
