@@ -6,6 +6,7 @@ use crate::fem::{
     Block, Guide, Interface, Kinematics, Load, Lump, Material, Outcome, PressurePoint, Scene,
     State, pressure_at,
 };
+use std::sync::Arc;
 
 /// A block of given size under a guide, and where its pressure is wanted.
 #[derive(Debug, Clone)]
@@ -32,7 +33,7 @@ pub(crate) struct Prediction {
 /// A solved scene, from which scenes nearby are solved in fewer iterations.
 #[derive(Debug, Clone)]
 pub(crate) struct Solved {
-    meshed: Meshed,
+    meshed: Arc<Meshed>,
     /// One for all frames; where surfaces slide, one a frame.
     scenes: Vec<Scene>,
     states: Vec<State>,
@@ -128,11 +129,11 @@ impl Forward {
         near: Option<&Solved>,
     ) -> Option<(Prediction, Solved)> {
         let meshed = match near {
-            Some(near) if near.meshed.reaches(parameters) => near.meshed.clone(),
-            _ => Meshed {
+            Some(near) if near.meshed.reaches(parameters) => Arc::clone(&near.meshed),
+            _ => Arc::new(Meshed {
                 scene: self.scene(parameters)?,
                 parameters: *parameters,
-            },
+            }),
         };
         let scene = self.changed(&meshed.scene, &meshed.parameters, parameters)?;
         let approaches: Vec<f64> = (self.approaches_m.iter())
@@ -140,7 +141,7 @@ impl Forward {
             .collect();
         let slides = self.interface == Interface::Frictionless;
         let solved = if slides && self.kinematics == Kinematics::Finite {
-            self.solve_sliding(&meshed, &scene, parameters, &approaches, near)?
+            self.solve_sliding(meshed, &scene, parameters, &approaches, near)?
         } else {
             let loads: Vec<Load> = approaches.into_iter().map(Load::Approach).collect();
             let near = near.map(|near| (near.scene(0), near.states.as_slice()));
@@ -161,7 +162,7 @@ impl Forward {
     /// Frame by frame, each from the same frame of a solution nearby or from the frame before.
     fn solve_sliding(
         &self,
-        meshed: &Meshed,
+        meshed: Arc<Meshed>,
         scene: &Scene,
         parameters: &Parameters,
         approaches_m: &[f64],
@@ -170,7 +171,7 @@ impl Forward {
         // The inclusion's mesh stays where it is.
         let depth_m = (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m);
         let mut solved = Solved {
-            meshed: meshed.clone(),
+            meshed,
             scenes: Vec::with_capacity(approaches_m.len()),
             states: Vec::with_capacity(approaches_m.len()),
         };

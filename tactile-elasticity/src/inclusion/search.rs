@@ -126,7 +126,7 @@ impl InclusionSearch {
         let interfaces = self.specimen.interfaces();
         let mut counter = Counter {
             done: 0,
-            // Per interface: a plain fit, the grid, three coarse fits, a fine one.
+            // Per interface: a plain fit, the grid, two first fits, the answer's.
             expected: interfaces.len() * 55,
             progress,
             cancelled: false,
