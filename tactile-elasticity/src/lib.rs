@@ -31,6 +31,7 @@ mod error;
 #[cfg(feature = "fem")]
 pub mod fem;
 pub mod field;
+mod golden_section;
 #[cfg(feature = "fem")]
 pub mod inclusion;
 pub mod modulus;

@@ -1,6 +1,7 @@
 //! Least squares at a given contact point.
 
 use super::IndentationCurve;
+use crate::golden_section::golden_section;
 use crate::modulus::ContactLaw;
 
 /// The best line at one contact point.
@@ -22,6 +23,8 @@ pub(crate) struct Problem<'a> {
 }
 
 const SCAN: usize = 300;
+/// Golden sections down to rounding.
+const SECTIONS: usize = 70;
 
 impl Problem<'_> {
     /// f(z − z₀) of every point; None where the law does not reach so far.
@@ -91,7 +94,8 @@ impl Problem<'_> {
             (start.contact_m - step).max(from),
             (start.contact_m + step).min(to),
         );
-        let refined = golden(low, high, |x| self.at(x))?;
+        let squares = |x| self.at(x).map_or(f64::INFINITY, |profile| profile.squares);
+        let refined = self.at(golden_section(low, high, SECTIONS, squares))?;
         Some(if refined.squares <= start.squares {
             refined
         } else {
@@ -101,31 +105,13 @@ impl Problem<'_> {
 
     /// The least at a given modulus, the contact point sought around `near`.
     pub(crate) fn best_at_modulus(&self, near: f64, reach: f64, modulus: f64) -> Option<Profile> {
-        golden(near - reach, near + reach, |x| self.at_modulus(x, modulus))
+        let at = |x| self.at_modulus(x, modulus);
+        let squares = |x| at(x).map_or(f64::INFINITY, |profile| profile.squares);
+        at(golden_section(
+            near - reach,
+            near + reach,
+            SECTIONS,
+            squares,
+        ))
     }
-}
-
-/// Golden-section search for the least squares in [low, high].
-fn golden(mut low: f64, mut high: f64, at: impl Fn(f64) -> Option<Profile>) -> Option<Profile> {
-    let ratio = 0.5 * (5.0f64.sqrt() - 1.0);
-    let value = |p: &Option<Profile>| p.map_or(f64::INFINITY, |p| p.squares);
-    let (mut a, mut b) = (
-        at(high - ratio * (high - low)),
-        at(low + ratio * (high - low)),
-    );
-    for _ in 0..70 {
-        if value(&a) <= value(&b) {
-            high = low + ratio * (high - low);
-            b = a;
-            a = at(high - ratio * (high - low));
-        } else {
-            low = high - ratio * (high - low);
-            a = b;
-            b = at(low + ratio * (high - low));
-        }
-        if high - low <= 1e-12 * (high.abs() + low.abs()) {
-            break;
-        }
-    }
-    if value(&a) <= value(&b) { a } else { b }
 }

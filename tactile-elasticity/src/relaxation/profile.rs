@@ -2,6 +2,7 @@
 
 use super::StandardLinearSolid;
 use super::fit::{Form, Line, Series};
+use crate::golden_section::golden_section;
 use crate::modulus::{Interval, quantile_95};
 
 /// Time constants tried, from a tenth of the shortest interval to ten times the whole, in logarithmic steps.
@@ -44,18 +45,10 @@ impl<'a> Profile<'a> {
         let least = (0..=STEPS)
             .map(on_grid)
             .min_by(|x, y| self.chi_squared(*x).total_cmp(&self.chi_squared(*y)))?;
-        let (mut left, mut right) = ((least - step).max(low), (least + step).min(high));
-        const GOLDEN: f64 = 0.618_033_988_749_894_8;
         // Each section leaves 0.62 of the last: 40 leave 1e-8 of a step.
-        for _ in 0..40 {
-            let width = GOLDEN * (right - left);
-            let (inner_left, inner_right) = (right - width, left + width);
-            match self.chi_squared(inner_left) < self.chi_squared(inner_right) {
-                true => right = inner_right,
-                false => left = inner_left,
-            }
-        }
-        let middle = 0.5 * (left + right);
+        let middle = golden_section((least - step).max(low), (least + step).min(high), 40, |x| {
+            self.chi_squared(x)
+        });
         let refined = match self.chi_squared(middle) < self.chi_squared(least) {
             true => middle,
             false => least,
