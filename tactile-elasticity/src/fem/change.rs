@@ -1,6 +1,7 @@
 //! Scenes near a solved one, on the same mesh: derivatives by parameters.
 
-use super::element::{Elimination, Geometry};
+use super::condensation::Elimination;
+use super::element::Geometry;
 use super::fields::Fields;
 use super::layout::{Layout, Slot};
 use super::material::Material;

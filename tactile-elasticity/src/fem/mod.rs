@@ -62,6 +62,7 @@ mod block;
 mod bodies;
 mod candidates;
 mod change;
+mod condensation;
 mod contact;
 mod curve;
 mod element;

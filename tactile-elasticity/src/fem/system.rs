@@ -1,7 +1,8 @@
 //! The linear system of one Newton iteration.
 
 use super::candidates::Candidate;
-use super::element::{Elimination, OUTER};
+use super::condensation::Elimination;
+use super::element::OUTER;
 use super::fields::Fields;
 use super::gap::DRIVER;
 use super::layout::{Layout, Slot, slot};

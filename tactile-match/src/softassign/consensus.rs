@@ -1,8 +1,9 @@
 //! A warp from doubtful pairs: a robust fit keeps those that agree.
 
-use super::anneal::{Annealer, State};
+use super::anneal::Annealer;
 use super::axes::Axes;
 use super::prior::{Prior, PriorScales};
+use super::schedule::State;
 use std::f64::consts::TAU;
 
 /// Rounds of the fit; the first half with a nearly affine warp.

@@ -1,8 +1,9 @@
 //! From the last soft assignment to the answer: hard matches, confidences, positions, covariances.
 
-use super::anneal::{Annealer, Slack, State};
+use super::anneal::Annealer;
 use super::confidence::{Fitted, PairOdds};
 use super::locality::Locality;
+use super::schedule::{Slack, State};
 use super::search::are_unequal;
 use super::soft_assign::SoftAssignment;
 use crate::Doubt;

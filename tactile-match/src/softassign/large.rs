@@ -7,8 +7,8 @@
 //! coarser sample was dense, and so on to all points. There only targets within a few spacings are looked at: time `O(I r²)` an
 //! iteration with r ≤ 64 modes of the prior, memory `O(I r)`.
 
-use super::anneal::Schedule;
 use super::levels::{Levels, STEP};
+use super::schedule::Schedule;
 use super::search::{FAST, NOTICED, RESOLUTION, SCALES, bounding_volume};
 use super::{AnnealedSoftassign, Rotation, SoftassignWorkspace, finish, starts};
 use std::ops::ControlFlow;

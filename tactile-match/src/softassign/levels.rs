@@ -1,9 +1,10 @@
 //! Samples of large sets, and fields that are extended from one to the next.
 
-use super::anneal::{Annealer, State};
+use super::anneal::Annealer;
 use super::axes::Axes;
 use super::blocks::Blocks;
 use super::prior::Prior;
+use super::schedule::State;
 
 /// Points of a level for one of the next coarser level.
 pub(super) const STEP: usize = 8;

@@ -1,6 +1,6 @@
 //! What a caller may say about a scene.
 
-use super::anneal::Slack;
+use super::schedule::Slack;
 use crate::{
     MatchError,
     validate::{at_least_one, option_within},

@@ -6,10 +6,11 @@
 //!
 //! `−ln p = (Σ wᵢ|zᵢ|² − cᵀ D b)/2σ² + (d/2) ln det(1 + D G D/σ²)`, `b = [Lₛ X]ᵀ W z`.
 
-use super::anneal::{Request, State};
+use super::anneal::Request;
 use super::axes::Axes;
 use super::prior::{Prior, PriorScales};
 use super::regression::{cholesky, dot, solve};
+use super::schedule::State;
 use pulp::Arch;
 
 /// Lengths ℓ over which the warp may bend, in radii of the model, and amplitudes τ at the first of them: a factor √2 and 2 apart, about what

@@ -1,39 +1,17 @@
 //! Contacts of a soft ball with one guide, computed once and interpolated.
 
+mod curve;
 #[cfg(feature = "fem")]
 mod solve;
 mod surface;
 
+pub use curve::ContactCurve;
 #[cfg(feature = "fem")]
 pub use solve::{TableOptions, TableProgress};
 
 use super::{Layer, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson, positive};
 use surface::{Sample, Surface};
-
-/// The contacts of one ball under growing loads, of [`ContactTable`]'s example: columns of equal length.
-///
-/// ```
-/// use tactile_elasticity::contact::ContactCurve;
-///
-/// let curve = ContactCurve {
-///     youngs_modulus_pa: 60e3,
-///     contact_radius_m: vec![0.3e-3, 0.6e-3],
-///     force_n: vec![0.9e-3, 7.1e-3],
-/// };
-/// assert_eq!(curve.contact_radius_m.len(), curve.force_n.len());
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct ContactCurve {
-    /// E of the ball, in pascals.
-    pub youngs_modulus_pa: f64,
-    /// Contact radii, growing, in metres.
-    pub contact_radius_m: Vec<f64>,
-    /// The force at each, in newtons.
-    pub force_n: Vec<f64>,
-}
 
 /// Force over contact radius and modulus for a ball of one radius on one guide, or on a rigid flat.
 ///
@@ -109,9 +87,6 @@ const ROUNDING: f64 = 1e-12;
 
 /// How much smaller than its smallest a contact may be: ln(F/F_Hertz) is some −0.1 a/R there, and is taken on along its tangent.
 const SMALLER: f64 = 0.6;
-
-/// Fewest contacts of a curve.
-const FEWEST_CONTACTS: usize = 4;
 
 impl ContactTable {
     /// From curves of growing modulus for a ball of radius R (m) and Poisson ratio ν on a guide, or on a
@@ -304,39 +279,6 @@ impl ContactTable {
             }
         }
         Ok(())
-    }
-}
-
-impl ContactCurve {
-    fn check(&self) -> Result<(), ElasticityError> {
-        positive(self.youngs_modulus_pa, Quantity::YoungsModulus)?;
-        at_least(
-            self.contact_radius_m.len(),
-            FEWEST_CONTACTS,
-            Quantity::ContactRadius,
-        )?;
-        if self.force_n.len() != self.contact_radius_m.len() {
-            return Err(ElasticityError::LengthMismatch {
-                quantity: Quantity::Force,
-                expected: self.contact_radius_m.len(),
-                found: self.force_n.len(),
-            });
-        }
-        growing(
-            self.contact_radius_m.iter().copied(),
-            Quantity::ContactRadius,
-        )?;
-        growing(self.force_n.iter().copied(), Quantity::Force)
-    }
-
-    fn samples(&self, radius_m: f64, poisson_ratio: f64) -> impl Iterator<Item = Sample> {
-        let log_modulus = self.youngs_modulus_pa.ln();
-        let contacts = self.contact_radius_m.iter().zip(&self.force_n);
-        contacts.map(move |(a, force)| Sample {
-            ratio: a / radius_m,
-            log_modulus,
-            value: force.ln() - log_hertz(*a, log_modulus, radius_m, poisson_ratio),
-        })
     }
 }
 

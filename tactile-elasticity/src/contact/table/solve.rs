@@ -1,6 +1,7 @@
 //! Contact tables by finite elements.
 
-use super::{ContactCurve, ContactTable, FEWEST_CONTACTS};
+use super::curve::FEWEST_CONTACTS;
+use super::{ContactCurve, ContactTable};
 use crate::contact::{Bond, Waveguide};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::fem::{Guide, Layer, Load, Material, Scene, State};

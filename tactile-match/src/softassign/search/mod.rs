@@ -7,8 +7,8 @@
 mod cooling;
 mod progress;
 
-use super::anneal::Schedule;
 use super::prior::PriorScales;
+use super::schedule::Schedule;
 use super::{
     AnnealedSoftassign, Rotation, Search, SoftassignWorkspace, Transformation, finish, starts,
 };
