@@ -207,12 +207,17 @@ fn measured(
     Ok((specimen, frames))
 }
 
-/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth.
+/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth, of the sensor's errors alone.
 fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn Error>> {
     let specimen = Specimen::new(scene.height_m, scene.radius_m)?
         .with_poisson_ratio(scene.poisson_ratio, 0.005)?
         .with_interface(scene.interface);
-    let search = InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?;
+    let errors = SensorErrors {
+        model: 0.0,
+        ..SensorErrors::default()
+    };
+    let search =
+        InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?.with_sensor_errors(errors)?;
     let assumed = AssumedInclusion {
         diameter_m: lump[0],
         depth_m: lump[1],

@@ -160,16 +160,20 @@ pub struct SensorErrors {
     pub correlation_m: f64,
     /// Relative standard error of the force.
     pub force: f64,
+    /// Part of the finite elements' own error (how far another code's pressures are off) that counts: 1; 0 for
+    /// what the sensor alone would leave open, as in published bounds.
+    pub model: f64,
 }
 
 impl Default for SensorErrors {
-    /// 0.3 % in common and 0.1 % of each frame, correlated over 3 mm; 0.1 % of the force.
+    /// 0.3 % in common and 0.1 % of each frame, correlated over 3 mm; 0.1 % of the force; and the model's error.
     fn default() -> Self {
         Self {
             common: 3e-3,
             each_frame: 1e-3,
             correlation_m: 3e-3,
             force: 1e-3,
+            model: 1.0,
         }
     }
 }
@@ -180,6 +184,7 @@ impl SensorErrors {
         not_negative(self.each_frame, Quantity::StandardError)?;
         positive(self.correlation_m, Quantity::Distance)?;
         positive(self.force, Quantity::StandardError)?;
+        not_negative(self.model, Quantity::StandardError)?;
         Ok(self)
     }
 }
