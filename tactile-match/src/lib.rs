@@ -31,6 +31,8 @@ mod cpd;
 mod error;
 mod frame;
 mod hard;
+#[cfg(all(debug_assertions, not(test)))]
+mod instances;
 pub mod labelling;
 mod matching;
 mod nearest;

@@ -28,6 +28,7 @@ mod estimate;
 mod frame;
 mod integrate;
 mod lighting;
+mod line_fft;
 mod quality;
 mod reconstruct;
 mod sample;

@@ -1,53 +1,26 @@
 //! The two float types the crate computes in.
 
-use std::sync::Arc;
-
 use num_traits::{Float, FromPrimitive, NumAssign};
 use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
 
-pub(crate) use sealed::LineFft;
-
-struct Planned<T>(Arc<dyn Fft<T>>);
-
-macro_rules! scalar {
-    ($t:ty) => {
-        impl LineFft<$t> for Planned<$t> {
-            fn process(&self, lines: &mut [Complex<$t>], scratch: &mut [Complex<$t>]) {
-                self.0.process_with_scratch(lines, scratch);
-            }
-            fn scratch_len(&self) -> usize {
-                self.0.get_inplace_scratch_len()
-            }
-        }
-        impl sealed::Sealed for $t {
-            fn plan_fft(length: usize, inverse: bool) -> Box<dyn LineFft<$t>> {
-                let mut planner = FftPlanner::<$t>::new();
-                Box::new(Planned(if inverse {
-                    planner.plan_fft_inverse(length)
-                } else {
-                    planner.plan_fft_forward(length)
-                }))
-            }
-        }
-        impl Scalar for $t {}
-    };
+impl sealed::Sealed for f32 {
+    fn as_doubles(_: &mut [Complex<Self>]) -> Option<&mut [Complex<f64>]> {
+        None
+    }
 }
 
-scalar!(f32);
-scalar!(f64);
+impl sealed::Sealed for f64 {
+    fn as_doubles(values: &mut [Complex<Self>]) -> Option<&mut [Complex<f64>]> {
+        Some(values)
+    }
+}
+
+impl Scalar for f32 {}
+impl Scalar for f64 {}
 
 pub(crate) mod sealed {
     use num_traits::{Float, FromPrimitive};
     use rustfft::num_complex::Complex;
-
-    /// A complex Fourier transform of one length, whatever the library behind it.
-    pub trait LineFft<T>: Send + Sync {
-        /// Transforms `lines`, a whole number of lines, in place. `scratch` is at least [`Self::scratch_len`] long.
-        fn process(&self, lines: &mut [Complex<T>], scratch: &mut [Complex<T>]);
-        /// Scratch needed by [`Self::process`].
-        fn scratch_len(&self) -> usize;
-    }
 
     pub trait Sealed: Float + FromPrimitive {
         /// `value` rounded to this type.
@@ -63,7 +36,8 @@ pub(crate) mod sealed {
             self.to_f64().unwrap_or(f64::NAN)
         }
 
-        fn plan_fft(length: usize, inverse: bool) -> Box<dyn LineFft<Self>>;
+        /// The same values where this type is `f64`.
+        fn as_doubles(values: &mut [Complex<Self>]) -> Option<&mut [Complex<f64>]>;
     }
 }
 

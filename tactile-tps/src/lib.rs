@@ -36,6 +36,8 @@ mod factorization;
 mod far;
 mod fit;
 mod influence;
+#[cfg(all(debug_assertions, not(test)))]
+mod instances;
 mod iterative;
 mod kernel;
 mod layout;

@@ -287,11 +287,14 @@ fn summaries(readings: &[Reading]) -> [Summary; 2] {
     [layered, tabulated]
 }
 
+/// One pair of loads a ball; with `ALL_LOADS` set, every pair, for `.ci/run studies`.
 #[test]
 fn balls_are_measured_within_their_intervals() {
+    let all = std::env::var_os("ALL_LOADS").is_some();
     let mut readings = Vec::new();
     for (k, ball) in recorded_balls().iter().enumerate() {
-        for first in 0..ball.states.len() - 1 {
+        let pairs = ball.states.len() - 1;
+        for first in (0..pairs).filter(|first| all || *first == k % pairs) {
             readings.push(ball.read(first, 1 + 10 * k as u64 + first as u64, &[]));
         }
     }

@@ -7,22 +7,22 @@
 use rustfft::num_complex::Complex;
 
 use crate::Scalar;
-use crate::scalar::LineFft;
+use crate::line_fft::LineFft;
 
 /// DCT-II and its inverse for lines of one length.
 pub(crate) struct CosineTransform<T> {
     length: usize,
-    forward: Box<dyn LineFft<T>>,
-    inverse: Box<dyn LineFft<T>>,
+    forward: LineFft,
+    inverse: LineFft,
     /// e^{−iπk/2N}.
     twiddles: Vec<Complex<T>>,
     line: Vec<Complex<T>>,
-    scratch: Vec<Complex<T>>,
+    scratch: Vec<Complex<f64>>,
 }
 
 impl<T: Scalar> CosineTransform<T> {
     pub(crate) fn new(length: usize) -> Self {
-        let (forward, inverse) = (T::plan_fft(length, false), T::plan_fft(length, true));
+        let (forward, inverse) = (LineFft::forward(length), LineFft::inverse(length));
         let scratch = forward.scratch_len().max(inverse.scratch_len());
         let zero = Complex::new(T::zero(), T::zero());
         let twiddle = |k: usize| {
@@ -36,7 +36,7 @@ impl<T: Scalar> CosineTransform<T> {
             inverse,
             twiddles,
             line: vec![zero; length],
-            scratch: vec![zero; scratch],
+            scratch: vec![Complex::default(); scratch],
         }
     }
 

@@ -11,7 +11,7 @@ use rustfft::num_complex::Complex;
 use super::SlopeIntegrator;
 use super::cosine_poisson::resize;
 use super::shift::write_levelled;
-use crate::scalar::LineFft;
+use crate::line_fft::LineFft;
 use crate::{BoundingBox, Domain, Scalar, SfsError, Surface, Workspace};
 
 /// Integration by Fourier projection, periodic in both directions.
@@ -34,18 +34,18 @@ pub struct FrankotChellappa;
 /// Transforms and spectrum, kept between calls.
 #[derive(Default)]
 pub(crate) struct FourierBuffers<T> {
-    plans: Option<Plans<T>>,
+    plans: Option<Plans>,
     /// p + i q, then its spectrum, then the heights in the real part.
     field: Vec<Complex<T>>,
     lines: Vec<Complex<T>>,
-    scratch: Vec<Complex<T>>,
+    scratch: Vec<Complex<f64>>,
     heights: Vec<T>,
 }
 
-struct Plans<T> {
+struct Plans {
     size: [usize; 2],
-    forward: [Box<dyn LineFft<T>>; 2],
-    inverse: [Box<dyn LineFft<T>>; 2],
+    forward: [LineFft; 2],
+    inverse: [LineFft; 2],
 }
 
 impl<T: Scalar> SlopeIntegrator<T> for FrankotChellappa {
@@ -151,19 +151,19 @@ impl<T: Scalar> FourierBuffers<T> {
         {
             return;
         }
-        let both = |inverse| [T::plan_fft(rows, inverse), T::plan_fft(columns, inverse)];
         let plans = Plans {
             size: [rows, columns],
-            forward: both(false),
-            inverse: both(true),
+            forward: [rows, columns].map(LineFft::forward),
+            inverse: [rows, columns].map(LineFft::inverse),
         };
         let lengths = plans
             .forward
             .iter()
             .chain(&plans.inverse)
             .map(|fft| fft.scratch_len());
+        let longest = lengths.max().unwrap_or(0);
+        self.scratch.resize(longest, Complex::default());
         let zero = Complex::new(T::zero(), T::zero());
-        self.scratch.resize(lengths.max().unwrap_or(0), zero);
         self.lines.resize(LANES * rows, zero);
         self.plans = Some(plans);
     }

@@ -170,5 +170,5 @@ fn spheres_of_10_to_500_kilopascal() {
 /// patterned block, so that the strain here is that of the bumps' centres.
 #[test]
 fn blocks_by_the_ratio_of_stress_and_the_strain_of_their_bumps() {
-    Study::run(scenes(30), "blocks", block::trial).check();
+    Study::run(scenes(12), "blocks", block::trial).check();
 }
