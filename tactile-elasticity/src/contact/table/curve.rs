@@ -7,7 +7,7 @@ use crate::error::{ElasticityError, Quantity, positive};
 /// Fewest contacts of a curve.
 pub(super) const FEWEST_CONTACTS: usize = 4;
 
-/// The contacts of one ball under growing loads, of [`ContactTable`]'s example: columns of equal length.
+/// The contacts of one ball under growing loads, of [`ContactTable`](super::ContactTable)'s example: columns of equal length.
 ///
 /// ```
 /// use tactile_elasticity::contact::ContactCurve;
