@@ -91,6 +91,14 @@ pub enum PipelineError {
         /// How many there are.
         frames: usize,
     },
+    /// A frame that is read on demand could not be read again.
+    #[error("frame {}: {reason}", frame + 1)]
+    Unreadable {
+        /// The frame.
+        frame: usize,
+        /// What its reader said.
+        reason: String,
+    },
     /// A frame could not be read as a contact.
     #[error("frame {}: {source}", frame + 1)]
     Contact {
@@ -233,6 +241,7 @@ impl PipelineError {
     pub(crate) fn frame(&self) -> Option<usize> {
         match self {
             Self::NoSuchFrame { frame, .. }
+            | Self::Unreadable { frame, .. }
             | Self::Contact { frame, .. }
             | Self::NoContact { frame }
             | Self::OppositeSignal { frame, .. }

@@ -159,10 +159,8 @@ fn frames_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
             ];
             circle([x, y], c.contact_radius_m.value * MM)
         });
-        let Some(image) = press.image(frame) else {
-            continue;
-        };
-        let panel = axes(title).heat_map(HeatMap::of_frame(image, size));
+        let image = press.image(frame)?;
+        let panel = axes(title).heat_map(HeatMap::of_frame(image.view(), size));
         page = page.panel(panel.line(circle.unwrap_or_default(), Colour::ORANGE, "contact radius"));
     }
     Ok(page)

@@ -6,7 +6,7 @@ use crate::io::{
     Column, Quantity, ReadError, read_grey_image, read_grey_image_of_bits, read_table,
 };
 use crate::sensor::Sensor;
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use std::path::Path;
 
 /// A scene's calibration, read.
@@ -57,7 +57,7 @@ pub enum LoadedCalibration {
 pub struct SceneData {
     /// The frame without contact.
     pub reference: Array2<u8>,
-    /// The frames, in the order of the scene.
+    /// The frames, in the order of the scene; those that are missing are read from their files whenever a stage needs them.
     pub frames: Vec<Array2<u8>>,
     /// The calibration.
     pub calibration: LoadedCalibration,
@@ -71,26 +71,39 @@ impl Scene {
     /// # Errors
     /// [`SceneError::File`] and [`SceneError::SizeMismatch`], naming the field and the file.
     pub fn load(&self) -> Result<SceneData, SceneError> {
-        let reference = self.image("reference", &self.reference)?;
-        let mut frames = Vec::with_capacity(self.frames.len());
-        for (i, frame) in self.frames.iter().enumerate() {
-            let field = format!("frames[{}].image", i + 1);
-            let image = self.image(&field, &frame.image)?;
-            if image.dim() != reference.dim() {
-                return Err(SceneError::SizeMismatch {
-                    file: self.file.clone(),
-                    field,
-                    image: frame.image.clone(),
-                    reference: self.reference.clone(),
-                    expected: size(&reference),
-                    found: size(&image),
-                });
-            }
-            frames.push(image);
-        }
+        let mut data = self.load_without_frames()?;
+        let reference = data.reference.view();
+        let frames = (0..self.frames.len()).map(|index| self.read_frame(index, reference));
+        data.frames = frames.collect::<Result<_, _>>()?;
+        Ok(data)
+    }
+
+    /// As [`load`](Self::load) without the frames: a [`press`](Self::press) then reads each when it is added and again when a
+    /// stage needs it, so that any number of them fits into memory.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+    /// use tactile_imaging::scene::Scene;
+    /// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+    /// # let folder = tempfile::tempdir()?;
+    /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
+    /// # let path = write_folder(&made, &calibration, folder.path())?;
+    /// let scene = Scene::read(&path)?;
+    /// let (whole, part) = (scene.load()?, scene.load_without_frames()?);
+    /// let pipeline = scene.pipeline(&whole)?;
+    /// let modulus = scene.press(&pipeline, &whole)?.modulus()?;
+    /// assert_eq!(scene.press(&pipeline, &part)?.modulus()?, modulus);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), but for the frames' own.
+    pub fn load_without_frames(&self) -> Result<SceneData, SceneError> {
         Ok(SceneData {
-            reference,
-            frames,
+            reference: self.image("reference", &self.reference)?,
+            frames: Vec::new(),
             calibration: self.load_calibration()?,
             contact_table: (self.contact_table.as_ref())
                 .map(read_contact_table)
@@ -98,13 +111,30 @@ impl Scene {
         })
     }
 
+    /// The image of a frame, of the reference's size.
+    pub(super) fn read_frame(
+        &self,
+        index: usize,
+        reference: ArrayView2<'_, u8>,
+    ) -> Result<Array2<u8>, SceneError> {
+        let path = &self.frames[index].image;
+        let field = format!("frames[{}].image", index + 1);
+        let image = self.image(&field, path)?;
+        if image.dim() == reference.dim() {
+            return Ok(image);
+        }
+        Err(SceneError::SizeMismatch {
+            file: self.file.clone(),
+            field,
+            image: path.clone(),
+            reference: self.reference.clone(),
+            expected: size(reference),
+            found: size(image.view()),
+        })
+    }
+
     fn image(&self, field: &str, path: &Path) -> Result<Array2<u8>, SceneError> {
-        let read = match self.bits {
-            Some(bits) => read_grey_image_of_bits(path, bits),
-            None => read_grey_image(path),
-        };
-        read.map(|i| i.to_u8())
-            .map_err(|source| self.file_error(field, source))
+        read_image(path, self.bits).map_err(|source| self.file_error(field, source))
     }
 
     fn load_calibration(&self) -> Result<LoadedCalibration, SceneError> {
@@ -151,6 +181,15 @@ impl Scene {
     }
 }
 
+/// An image in eight bits a pixel, of a camera of `bits` where that is said.
+pub(super) fn read_image(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
+    let read = match bits {
+        Some(bits) => read_grey_image_of_bits(path, bits),
+        None => read_grey_image(path),
+    };
+    read.map(|image| image.to_u8())
+}
+
 /// Pairs of integrated pixel value and force from a CSV file.
 pub(crate) fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair<f64>>, ReadError> {
     let value = Column {
@@ -168,6 +207,6 @@ pub(crate) fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair<f64>>, ReadE
     Ok(pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect())
 }
 
-fn size(image: &Array2<u8>) -> [u32; 2] {
+fn size(image: ArrayView2<'_, u8>) -> [u32; 2] {
     [image.nrows() as u32, image.ncols() as u32]
 }

@@ -1,5 +1,6 @@
 //! A scene as a pipeline with its frames.
 use super::contact_table::guide;
+use super::load::read_image;
 use super::{LoadedCalibration, Scene, SceneData, SceneError};
 use crate::elasticity::ElasticityError;
 use crate::elasticity::modulus::TabulatedContact;
@@ -35,7 +36,7 @@ impl Scene {
     /// [`SceneError`]: one sentence that names the file and the field.
     pub fn measure_file(path: impl AsRef<std::path::Path>) -> Result<Measurement, SceneError> {
         let scene = Self::read(path)?;
-        let data = scene.load()?;
+        let data = scene.load_without_frames()?;
         let mut press = scene.press(&scene.pipeline(&data)?, &data)?;
         Ok(press.measure())
     }
@@ -72,10 +73,10 @@ impl Scene {
         self.build(data).map_err(|e| self.measure_error(e))
     }
 
-    /// The scene's frames on a pipeline, ready to be asked.
+    /// The scene's frames on a pipeline, ready to be asked; those that `data` lacks are read from their files.
     ///
     /// # Errors
-    /// [`SceneError::Measure`].
+    /// [`SceneError::Measure`]; [`SceneError::File`] and [`SceneError::SizeMismatch`] of frames that are read.
     pub fn press<'a>(
         &self,
         pipeline: &Pipeline,
@@ -84,12 +85,20 @@ impl Scene {
         let mut press = pipeline
             .press(data.reference.view())
             .map_err(|e| self.measure_error(e))?;
-        for (image, frame) in data.frames.iter().zip(&self.frames) {
+        for (index, frame) in self.frames.iter().enumerate() {
             let gauge = frame.force_n.map(|value| Estimate {
                 value,
                 standard_error: frame.force_error_n.unwrap_or(0.0),
             });
-            let added = press.add_gauged_frame(image.view(), gauge);
+            let added = match data.frames.get(index) {
+                Some(image) => press.add_gauged_frame(image.view(), gauge),
+                None => {
+                    let image = self.read_frame(index, data.reference.view())?;
+                    let (path, bits) = (frame.image.clone(), self.bits);
+                    let read = move || read_image(&path, bits).map_err(|e| e.to_string());
+                    press.add_frame_on_demand(image.view(), gauge, read)
+                }
+            };
             if let Some(time_s) = frame.time_s {
                 press
                     .set_time_s(added, time_s)

@@ -78,9 +78,10 @@ impl Press<'_> {
     /// A caution where the light of a frame, away from its contact, differs from the reference's; of the frame where it does most.
     fn light_drift(&self) -> Option<Flag> {
         let reference = self.runner.reference().image();
-        let steps = self.frames.iter().filter_map(|frame| {
+        let steps = self.frames.iter().enumerate().filter_map(|(index, frame)| {
             let contact = frame.contact.as_ref()?.bounds()?;
-            background::median_step_outside(frame.image, reference, contact)
+            let image = frame.image.get(index).ok()?;
+            background::median_step_outside(image.view(), reference, contact)
         });
         let greatest = steps.max_by_key(|step| step.abs())?;
         (greatest != 0).then_some(Flag::LightDrifted {

@@ -1,4 +1,5 @@
 //! A press: frames at one or more loads, of which nothing is computed before it is asked for.
+mod frame_image;
 mod measure;
 mod modulus;
 mod results;
@@ -13,14 +14,16 @@ use super::runner::{SkipRecords, StageRunner};
 use super::surface::{ContactSurface, ControlPoints};
 use crate::force::{Estimate, ReferenceFrame};
 use crate::matching::Matching;
-use ndarray::ArrayView2;
+use frame_image::{FrameImage, fingerprint};
+use ndarray::{Array2, ArrayView2};
+#[cfg(feature = "plot")]
+use ndarray::{CowArray, Ix2};
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 /// A frame and what is known of it so far.
 struct Loaded<'a> {
-    image: ArrayView2<'a, u8>,
+    image: FrameImage<'a>,
     gauge: Option<Estimate<f64>>,
     /// Seconds since the object touched, where they are known.
     time_s: Option<f64>,
@@ -123,10 +126,11 @@ impl<'a> Press<'a> {
     pub fn renewed(&self) -> Self {
         let reference = Arc::clone(self.runner.reference());
         let mut press = self.pipeline().press_on(reference);
-        for frame in &self.frames {
-            let added = press.add_gauged_frame(frame.image, frame.gauge);
-            press.frames[added].time_s = frame.time_s;
+        for (index, frame) in self.frames.iter().enumerate() {
+            press.push(frame.image.clone(), frame.gauge, self.twins[index]);
+            press.frames[index].time_s = frame.time_s;
         }
+        press.by_fingerprint.clone_from(&self.by_fingerprint);
         press
     }
 
@@ -162,20 +166,68 @@ impl<'a> Press<'a> {
         image: ArrayView2<'a, u8>,
         gauge: Option<Estimate<f64>>,
     ) -> usize {
+        let twin = self.twin_of(image, gauge);
+        self.push(FrameImage::Lent(image), gauge, twin)
+    }
+
+    /// Adds a frame that is read whenever a stage needs it and never kept, for more frames than memory takes; returns its
+    /// number. `image` is what `read` gives; an error of `read` is a sentence and becomes
+    /// [`PipelineError::Unreadable`].
+    ///
+    /// ```
+    /// use tactile_imaging::{Object, Pipeline};
+    /// # use tactile_imaging::force::CalibrationPair;
+    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
+    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
+    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
+    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
+    /// # });
+    /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
+    /// let mut press = pipeline.press(hertz(0.0).view())?;
+    /// for peak in [60.0, 120.0] {
+    ///     // In earnest: of a file.
+    ///     let read = move || Ok(hertz(peak));
+    ///     press.add_frame_on_demand(hertz(peak).view(), None, read);
+    /// }
+    /// assert!(press.contact(1)?.is_some());
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
+    pub fn add_frame_on_demand(
+        &mut self,
+        image: ArrayView2<'_, u8>,
+        gauge: Option<Estimate<f64>>,
+        read: impl Fn() -> Result<Array2<u8>, String> + Send + Sync + 'static,
+    ) -> usize {
+        let twin = self.twin_of(image, gauge);
+        self.push(FrameImage::on_demand(image, Arc::new(read)), gauge, twin)
+    }
+
+    /// The frame that a new one equals: an earlier one, or itself.
+    fn twin_of(&mut self, image: ArrayView2<'_, u8>, gauge: Option<Estimate<f64>>) -> usize {
         let index = self.frames.len();
         let equal = |&&at: &&usize| {
             let earlier = &self.frames[at];
-            earlier.gauge == gauge && earlier.image == image
+            earlier.gauge == gauge && earlier.image.shows(image)
         };
         let alike = self.by_fingerprint.entry(fingerprint(image)).or_default();
-        let twin = alike.iter().find(equal).copied();
-        if twin.is_none() {
-            alike.push(index);
-        } else if self.pipeline().settings().skips.equal_frames {
-            self.runner
-                .skip(Stage::Contact, index, SkipReason::EqualFrame, image.len());
+        match alike.iter().find(equal).copied() {
+            Some(twin) => {
+                if self.runner.pipeline().settings().skips.equal_frames {
+                    let reason = SkipReason::EqualFrame;
+                    self.runner.skip(Stage::Contact, index, reason, image.len());
+                }
+                twin
+            }
+            None => {
+                alike.push(index);
+                index
+            }
         }
-        self.twins.push(twin.unwrap_or(index));
+    }
+
+    fn push(&mut self, image: FrameImage<'a>, gauge: Option<Estimate<f64>>, twin: usize) -> usize {
+        let index = self.frames.len();
+        self.twins.push(twin);
         self.frames.push(Loaded {
             image,
             gauge,
@@ -196,8 +248,11 @@ impl<'a> Press<'a> {
 
     /// The image of a frame.
     #[cfg(feature = "plot")]
-    pub(crate) fn image(&self, frame: usize) -> Option<ArrayView2<'a, u8>> {
-        Some(self.frames.get(frame)?.image)
+    pub(crate) fn image(&self, frame: usize) -> Result<CowArray<'a, u8, Ix2>, PipelineError> {
+        let frames = self.frames.len();
+        let loaded = self.frames.get(frame);
+        let loaded = loaded.ok_or(PipelineError::NoSuchFrame { frame, frames })?;
+        loaded.image.get(frame)
     }
 
     /// Number of frames.
@@ -228,16 +283,4 @@ impl<'a> Press<'a> {
     fn is_repeated(&self, frame: usize) -> bool {
         self.twins[frame] != frame
     }
-}
-
-/// A hash of some sixty rows' pixels: the same for equal images, another for nearly all others, so that a frame is compared with few.
-fn fingerprint(image: ArrayView2<'_, u8>) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    image.dim().hash(&mut hasher);
-    for row in image.rows().into_iter().step_by(image.nrows() / 64 + 1) {
-        row.iter()
-            .step_by(7)
-            .for_each(|pixel| hasher.write_u8(*pixel));
-    }
-    hasher.finish()
 }

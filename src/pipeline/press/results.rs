@@ -19,8 +19,9 @@ impl Press<'_> {
         if self.frames[at].contact.is_none() {
             let mut contact = FrameContact::default();
             let loaded = &self.frames[at];
+            let image = loaded.image.get(frame)?;
             self.runner
-                .contact(frame, loaded.image, loaded.gauge, &mut contact)?;
+                .contact(frame, image.view(), loaded.gauge, &mut contact)?;
             self.frames[at].contact = Some(contact);
         }
         Ok(self.frames[at]
@@ -34,8 +35,8 @@ impl Press<'_> {
         if let Some(reading) = self.contact(frame)? {
             return Ok(*reading);
         }
-        let image = self.frames[self.twin(frame)?].image;
-        let grey = background::greatest_step(image, self.runner.reference().image());
+        let image = self.frames[self.twin(frame)?].image.get(frame)?;
+        let grey = background::greatest_step(image.view(), self.runner.reference().image());
         Err(if grey.abs() > background::CLEAR_STEP_GREY {
             PipelineError::OppositeSignal { frame, grey }
         } else {
@@ -72,9 +73,10 @@ impl Press<'_> {
                 .as_ref()
                 .ok_or(PipelineError::NoContact { frame })?;
             let first = self.frames[0].contact.as_ref().unwrap_or(contact);
+            let image = loaded.image.get(frame)?;
             let surface = self
                 .runner
-                .surface(frame, loaded.image, contact, first.pixels())?;
+                .surface(frame, image.view(), contact, first.pixels())?;
             self.frames[at].surface = Some(surface);
         }
         self.frames[at]
@@ -167,7 +169,11 @@ impl Press<'_> {
         let (Some(one), Some(two)) = (&self.frames[first].contact, &self.frames[at].contact) else {
             return Err(PipelineError::NoContact { frame });
         };
-        let images = [self.frames[first].image, self.frames[at].image];
+        let images = [
+            self.frames[first].image.get(0)?,
+            self.frames[at].image.get(frame)?,
+        ];
+        let images = images.each_ref().map(|image| image.view());
         self.runner.texture([0, frame], images, [one, two])
     }
 

@@ -23,7 +23,12 @@ impl Source {
             let scene = Scene::read(path).map_err(Failure::input)?;
             allow(&scene, context)?;
             let job = format!("reading {} frames", scene.frames.len());
-            let data = waiting(job, || scene.load()).map_err(Failure::input)?;
+            let data = if scene.frames.len() <= KEPT_FRAMES {
+                waiting(job, || scene.load())
+            } else {
+                scene.load_without_frames()
+            };
+            let data = data.map_err(Failure::input)?;
             return Ok(Self::Scene(Box::new((scene, data))));
         }
         let job = format!("simulating {} frames", arguments.simulation.forces.len());
@@ -50,7 +55,11 @@ impl Source {
     pub fn press(&self, pipeline: &Pipeline) -> Result<Press<'_>, Failure> {
         match self {
             Self::Simulated(trial) => trial.press(pipeline).map_err(Failure::input),
-            Self::Scene(own) => own.0.press(pipeline, &own.1).map_err(Failure::input),
+            Self::Scene(own) => {
+                let (scene, data) = own.as_ref();
+                let job = format!("reading {} frames", scene.frames.len());
+                waiting(job, || scene.press(pipeline, data)).map_err(Failure::input)
+            }
         }
     }
 
@@ -81,10 +90,14 @@ impl Source {
     }
 }
 
+/// Frames up to which their pixels are kept: a press read twice is timed without its files. More are read again whenever a
+/// stage needs them.
+const KEPT_FRAMES: usize = 64;
+
 /// Bytes that results take for every frame beside its pixels: what `/usr/bin/time -v` shows for scenes of thousands of frames.
 const BYTES_OF_A_FRAME: f64 = 8e3;
 
-/// Refuses a scene whose frames and their results do not fit into memory.
+/// Refuses a scene whose results do not fit into memory.
 fn allow(scene: &Scene, context: &Context) -> Result<(), Failure> {
     let Ok(reference) = tactile_imaging::io::read_grey_image(&scene.reference) else {
         // Loading will say what is wrong with it.
@@ -92,7 +105,8 @@ fn allow(scene: &Scene, context: &Context) -> Result<(), Failure> {
     };
     let frames = scene.frames.len();
     context.memory.allow(
-        (frames + 1) as f64 * (reference.levels.len() as f64 + BYTES_OF_A_FRAME),
+        (frames.min(KEPT_FRAMES) + 1) as f64 * reference.levels.len() as f64
+            + frames as f64 * BYTES_OF_A_FRAME,
         &format!("a scene of {frames} frames"),
         "give fewer or smaller frames",
     )

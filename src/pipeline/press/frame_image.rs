@@ -1,0 +1,71 @@
+//! The images of a press: lent by the caller, or read whenever they are needed.
+use crate::pipeline::error::PipelineError;
+use ndarray::{Array2, ArrayView2, CowArray, Ix2};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+
+/// Reads an image again; the error is a sentence.
+pub(super) type Read = Arc<dyn Fn() -> Result<Array2<u8>, String> + Send + Sync>;
+
+#[derive(Clone)]
+pub(super) enum FrameImage<'a> {
+    Lent(ArrayView2<'a, u8>),
+    OnDemand {
+        read: Read,
+        /// A hash of all its pixels and its size.
+        hash: u64,
+    },
+}
+
+impl<'a> FrameImage<'a> {
+    pub(super) fn on_demand(image: ArrayView2<'_, u8>, read: Read) -> Self {
+        Self::OnDemand {
+            read,
+            hash: hash_of_all(image),
+        }
+    }
+
+    /// The image of the frame with this number.
+    pub(super) fn get(&self, frame: usize) -> Result<CowArray<'a, u8, Ix2>, PipelineError> {
+        match self {
+            Self::Lent(image) => Ok(CowArray::from(*image)),
+            Self::OnDemand { read, .. } => match read() {
+                Ok(image) => Ok(CowArray::from(image)),
+                Err(reason) => Err(PipelineError::Unreadable { frame, reason }),
+            },
+        }
+    }
+
+    /// Whether this is the same image, bit for bit. Of one that is read on demand the hash decides: that two images of
+    /// thousands share one by chance has a probability below 1e-10.
+    pub(super) fn shows(&self, image: ArrayView2<'_, u8>) -> bool {
+        match self {
+            Self::Lent(own) => *own == image,
+            Self::OnDemand { hash, .. } => *hash == hash_of_all(image),
+        }
+    }
+}
+
+/// A hash of some sixty rows' pixels: the same for equal images, another for nearly all others, so that a frame is compared with few.
+pub(super) fn fingerprint(image: ArrayView2<'_, u8>) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    image.dim().hash(&mut hasher);
+    for row in image.rows().into_iter().step_by(image.nrows() / 64 + 1) {
+        row.iter()
+            .step_by(7)
+            .for_each(|pixel| hasher.write_u8(*pixel));
+    }
+    hasher.finish()
+}
+
+fn hash_of_all(image: ArrayView2<'_, u8>) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    image.dim().hash(&mut hasher);
+    for row in image.rows() {
+        match row.as_slice() {
+            Some(pixels) => hasher.write(pixels),
+            None => row.iter().for_each(|pixel| hasher.write_u8(*pixel)),
+        }
+    }
+    hasher.finish()
+}
