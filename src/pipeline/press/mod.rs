@@ -210,23 +210,20 @@ impl<'a> Press<'a> {
             earlier.gauge == gauge && earlier.image.shows(image)
         };
         let alike = self.by_fingerprint.entry(fingerprint(image)).or_default();
-        match alike.iter().find(equal).copied() {
-            Some(twin) => {
-                if self.runner.pipeline().settings().skips.equal_frames {
-                    let reason = SkipReason::EqualFrame;
-                    self.runner.skip(Stage::Contact, index, reason, image.len());
-                }
-                twin
-            }
-            None => {
-                alike.push(index);
-                index
-            }
-        }
+        let twin = alike.iter().find(equal).copied();
+        twin.unwrap_or_else(|| {
+            alike.push(index);
+            index
+        })
     }
 
     fn push(&mut self, image: FrameImage<'a>, gauge: Option<Estimate<f64>>, twin: usize) -> usize {
         let index = self.frames.len();
+        if twin != index && self.pipeline().settings().skips.equal_frames {
+            let pixels = self.runner.reference().image().len();
+            self.runner
+                .skip(Stage::Contact, index, SkipReason::EqualFrame, pixels);
+        }
         self.twins.push(twin);
         self.frames.push(Loaded {
             image,

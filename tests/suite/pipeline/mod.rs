@@ -1,5 +1,6 @@
 //! The pipeline pulls: what is not asked for is not computed, what is skipped changes no answer, stages can be swapped.
 mod hostile;
+mod on_demand;
 mod repeated;
 mod strain_of_sizes;
 mod strain_stream;
