@@ -84,7 +84,19 @@ impl ContactDetector {
         };
         let peak = peak(&workspace.region);
         let noise = self.noise(workspace, reference, &drift, peak);
-        let contact = self.summarise(&workspace.region, extent, peak, frame, &noise)?;
+        let saturated = if self.options.polarity.sign() > 0 && statistics.saturated == 0 {
+            0
+        } else {
+            self.saturated(&workspace.region, frame, extent.area)?
+        };
+        let contact = summarise(
+            &workspace.region,
+            extent,
+            peak,
+            saturated,
+            frame.dim(),
+            &noise,
+        );
         Ok(Detection {
             statistics,
             drift,
@@ -178,42 +190,6 @@ impl ContactDetector {
         }
     }
 
-    fn summarise<T: Real>(
-        &self,
-        region: &Region,
-        extent: Extent,
-        peak: f32,
-        frame: ArrayView2<'_, u8>,
-        noise: &DifferenceNoise,
-    ) -> Result<Contact<T>, ForceError> {
-        let whole = BoundingBox {
-            row_start: 0,
-            row_end: frame.nrows(),
-            column_start: 0,
-            column_end: frame.ncols(),
-        };
-        let place = region.place.unwrap_or(whole);
-        let saturated_px = self.saturated(region, place.of(frame), extent.area)?;
-        let sums = Sums::over(region);
-        let local = sums.centroid();
-        let origin = [place.column_start as f64, place.row_start as f64];
-        let centroid =
-            |k: usize| Estimate::nearest(origin[k] + local[k], sums.centroid_variance(k, noise));
-        let aperture = region.bounds(&region.aperture).unwrap_or(place);
-        Ok(Contact {
-            bounding_box: region.bounds(&region.mask).unwrap_or(place),
-            area_px: extent.area,
-            equivalent_radius_px: T::nearest((extent.area as f64 / std::f64::consts::PI).sqrt()),
-            integrated_pixel_value: Estimate::nearest(sums.sum(), sums.variance(noise)),
-            centroid_px: [centroid(0), centroid(1)],
-            peak: T::nearest(f64::from(peak)),
-            aperture_px: region.aperture.iter().map(Run::len).sum(),
-            saturated_px,
-            other_contacts: extent.others,
-            touches_edge: aperture.grown(1, frame.dim()) != grown_freely(aperture),
-        })
-    }
-
     /// Number of saturated pixels of the mask; an error where their share exceeds the limit.
     fn saturated(
         &self,
@@ -221,6 +197,7 @@ impl ContactDetector {
         frame: ArrayView2<'_, u8>,
         area: usize,
     ) -> Result<usize, ForceError> {
+        let frame = region.place.map_or(frame, |place| place.of(frame));
         let full = if self.options.polarity.sign() > 0 {
             u8::MAX
         } else {
@@ -244,6 +221,42 @@ impl ContactDetector {
         } else {
             Ok(saturated)
         }
+    }
+}
+
+/// The contact of a region.
+fn summarise<T: Real>(
+    region: &Region,
+    extent: Extent,
+    peak: f32,
+    saturated_px: usize,
+    size: (usize, usize),
+    noise: &DifferenceNoise,
+) -> Contact<T> {
+    let whole = BoundingBox {
+        row_start: 0,
+        row_end: size.0,
+        column_start: 0,
+        column_end: size.1,
+    };
+    let place = region.place.unwrap_or(whole);
+    let sums = Sums::over(region);
+    let local = sums.centroid();
+    let origin = [place.column_start as f64, place.row_start as f64];
+    let centroid =
+        |k: usize| Estimate::nearest(origin[k] + local[k], sums.centroid_variance(k, noise));
+    let aperture = region.bounds(&region.aperture).unwrap_or(place);
+    Contact {
+        bounding_box: region.bounds(&region.mask).unwrap_or(place),
+        area_px: extent.area,
+        equivalent_radius_px: T::nearest((extent.area as f64 / std::f64::consts::PI).sqrt()),
+        integrated_pixel_value: Estimate::nearest(sums.sum(), sums.variance(noise)),
+        centroid_px: [centroid(0), centroid(1)],
+        peak: T::nearest(f64::from(peak)),
+        aperture_px: region.aperture.iter().map(Run::len).sum(),
+        saturated_px,
+        other_contacts: extent.others,
+        touches_edge: aperture.grown(1, size) != grown_freely(aperture),
     }
 }
 

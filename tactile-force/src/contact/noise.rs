@@ -8,14 +8,14 @@ use crate::frame::trimmed_variance;
 pub(super) const RESPONSES: usize = 4081;
 
 /// Pixels beyond which rows are left out.
-const ENOUGH: usize = 1 << 15;
+const ENOUGH: usize = 1 << 13;
 
 /// Fewest pixels from which the noise is estimated.
 const FEWEST: u64 = 30;
 
 /// Variance per grey level: that of the pixels brighter than half the peak, by their second differences in both directions
 /// (as the reference's own noise, see [`crate::NoiseModel`]), less the background's, over their mean. The edge, where the signal itself bends, is darker.
-/// Of a large contact every so many rows are enough: 30 000 pixels know a variance to 1 %, a standard error to half of that.
+/// Of a large contact every so many rows are enough: 8 000 pixels know a variance to 2 %, a standard error to half of that.
 pub(super) fn gain(region: &Region, histogram: &mut Vec<u64>, background: f64, peak: f32) -> f64 {
     histogram.clear();
     histogram.resize(RESPONSES, 0);
@@ -24,7 +24,7 @@ pub(super) fn gain(region: &Region, histogram: &mut Vec<u64>, background: f64, p
     let rows = d.len() / columns;
     let (mut count, mut signal) = (0_u64, 0.0);
     let area: usize = region.mask.iter().map(Run::len).sum();
-    let stride = (area / ENOUGH).max(1);
+    let stride = area.div_ceil(ENOUGH).max(1);
     let evaluated = |r: &&Run| {
         r.row > 0 && (r.row as usize) + 1 < rows && (r.row as usize).is_multiple_of(stride)
     };

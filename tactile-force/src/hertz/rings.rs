@@ -70,7 +70,7 @@ impl Ring {
     }
 }
 
-/// Rings of a quarter of a pixel's width near the contact's edge and one pixel's further in, where the profile hardly bends
+/// Rings of a quarter of a pixel's width near the contact's edge and four pixels' further in, where the profile hardly bends
 /// across a ring; reused from fit to fit.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rings {
@@ -78,11 +78,14 @@ pub(crate) struct Rings {
 }
 
 /// Pixels well inside the edge beyond which rows are left out there: the profile is flat and they only repeat each other.
-const ENOUGH: f64 = 32768.0;
+const ENOUGH: f64 = 8192.0;
 /// Rings per pixel of distance near the edge.
 const PER_PIXEL: f64 = 4.0;
-/// How far inside the edge the rings are thin: there a² − r² is twenty times its change across a wide ring.
+/// How far inside the edge the rings are thin, in pixels.
 const EDGE: f64 = 20.0;
+/// Rings per pixel of distance further in. At the innermost thin ring a² − r² is ten times its change across a wide one, whose spread in r² the
+/// level takes into account: what is left is of the fourth order, 1e-6 of the level.
+const PER_PIXEL_INSIDE: f64 = 0.25;
 
 impl Rings {
     /// Every ring that has pixels.
@@ -95,7 +98,9 @@ impl Rings {
     pub(super) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         self.rings.clear();
         let wide = (radius - EDGE).max(0.0).floor();
-        let stride = (std::f64::consts::PI * wide * wide / aspect / ENOUGH).max(1.0) as u32;
+        let stride = (std::f64::consts::PI * wide * wide / aspect / ENOUGH)
+            .ceil()
+            .max(1.0) as u32;
         let gather = Gather {
             rings: &mut self.rings,
             region,
@@ -117,18 +122,19 @@ struct Gather<'a> {
     region: &'a Region,
     centre: [f64; 2],
     aspect: f64,
-    /// Distance up to which rings are one pixel wide.
+    /// Distance up to which rings are wide.
     wide: f64,
     /// Of the rows inside that distance every so many are gathered.
     stride: u32,
 }
 
 impl Gather<'_> {
-    /// Number of the ring at a distance: r up to `wide`, four times as steep beyond.
+    /// Number of the ring at a distance: slowly growing up to `wide`, steeply beyond.
     #[inline(always)]
     fn ring(&self, r: f64) -> usize {
-        let thin = PER_PIXEL * r - (PER_PIXEL - 1.0) * self.wide;
-        (if thin > r { thin } else { r }) as i32 as usize
+        let inside = PER_PIXEL_INSIDE * r;
+        let thin = PER_PIXEL * r - (PER_PIXEL - PER_PIXEL_INSIDE) * self.wide;
+        (if thin > inside { thin } else { inside }) as i32 as usize
     }
 
     /// The pixels of a row that lie inside the distance `wide`.
