@@ -113,6 +113,12 @@ pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImag
 }
 
 fn parse(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<GreyImage, ReadError> {
+    let (image, largest) = decode(bytes, path, bits)?;
+    Ok(to_grey(image, largest))
+}
+
+/// The image, and the sample that stands for the level 255.
+fn decode(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<(DynamicImage, f64), ReadError> {
     let broken = |source| ReadError::Image {
         path: path.into(),
         source,
@@ -140,7 +146,19 @@ fn parse(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<GreyImage, ReadE
     }
     let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
     let largest = full_scale(&decoded, bytes, path, bits)?;
-    Ok(to_grey(decoded, largest))
+    Ok((decoded, largest))
+}
+
+/// Reads a grey image in eight bits a pixel: as [`GreyImage::to_u8`], but samples that are grey levels already are taken as they stand.
+pub(crate) fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
+    match decode(&read_bytes(path)?, path, bits)? {
+        (DynamicImage::ImageLuma8(image), 255.0) => {
+            let shape = (image.height() as usize, image.width() as usize);
+            let levels = Array2::from_shape_vec(shape, image.into_raw());
+            Ok(levels.unwrap_or_else(|_| Array2::zeros(shape)))
+        }
+        (image, largest) => Ok(to_grey(image, largest).to_u8()),
+    }
 }
 
 /// The decoded sample that stands for the level 255. The decoder stretches the samples of a PGM, PPM or PAM from the largest

@@ -99,6 +99,17 @@ pub enum PipelineError {
         /// What its reader said.
         reason: String,
     },
+    /// The surface of a frame was left out of a measurement of many.
+    #[error(
+        "frame {}: no surface was reconstructed; of {frames} frames only those are whose strain is worked out (`Press::surface` gives any)",
+        frame + 1
+    )]
+    NotReconstructed {
+        /// The frame.
+        frame: usize,
+        /// How many there are.
+        frames: usize,
+    },
     /// A frame could not be read as a contact.
     #[error("frame {}: {source}", frame + 1)]
     Contact {
@@ -242,6 +253,7 @@ impl PipelineError {
         match self {
             Self::NoSuchFrame { frame, .. }
             | Self::Unreadable { frame, .. }
+            | Self::NotReconstructed { frame, .. }
             | Self::Contact { frame, .. }
             | Self::NoContact { frame }
             | Self::OppositeSignal { frame, .. }

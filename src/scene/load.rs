@@ -2,9 +2,8 @@
 use super::{CalibrationSource, Scene, SceneError, read_contact_table};
 use crate::elasticity::contact::ContactTable;
 use crate::force::CalibrationPair;
-use crate::io::{
-    Column, Quantity, ReadError, read_grey_image, read_grey_image_of_bits, read_table,
-};
+use crate::io::image::read_grey_levels;
+use crate::io::{Column, Quantity, ReadError, read_table};
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
 use std::path::Path;
@@ -183,11 +182,7 @@ impl Scene {
 
 /// An image in eight bits a pixel, of a camera of `bits` where that is said.
 pub(super) fn read_image(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
-    let read = match bits {
-        Some(bits) => read_grey_image_of_bits(path, bits),
-        None => read_grey_image(path),
-    };
-    read.map(|image| image.to_u8())
+    read_grey_levels(path, bits)
 }
 
 /// Pairs of integrated pixel value and force from a CSV file.

@@ -1,8 +1,8 @@
 //! Standard output and standard error: results on the one, notes on the other.
 use crate::failure::Exit;
-use serde_json::Value;
+use serde::Serialize;
 use std::fmt::Display;
-use std::io::{ErrorKind, Write, stderr, stdout};
+use std::io::{BufWriter, ErrorKind, Write, stderr, stdout};
 
 /// Where results are printed. A reader that goes away (`| head -1`) ends the printing, not the program.
 pub struct Console {
@@ -28,10 +28,19 @@ impl Console {
         }
     }
 
-    /// Prints the result as JSON, where it is wanted.
-    pub fn value(&mut self, value: &Value) {
-        if self.json {
-            self.print(&format!("{value:#}"));
+    /// Prints the result as JSON, where it is wanted, number by number: that of many frames is as large as what they say.
+    pub fn value(&mut self, value: &impl Serialize) {
+        if !self.json || self.reader_left || self.error.is_some() {
+            return;
+        }
+        let mut output = BufWriter::new(stdout().lock());
+        let written = serde_json::to_writer_pretty(&mut output, value)
+            .map_err(std::io::Error::from)
+            .and_then(|()| writeln!(output))
+            .and_then(|()| output.flush());
+        drop(output);
+        if let Err(error) = written {
+            self.keep(error);
         }
     }
 

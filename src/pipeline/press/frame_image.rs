@@ -36,6 +36,11 @@ impl<'a> FrameImage<'a> {
         }
     }
 
+    /// Whether the image is read whenever it is needed.
+    pub(super) fn is_on_demand(&self) -> bool {
+        matches!(self, Self::OnDemand { .. })
+    }
+
     /// Whether this is the same image, bit for bit. Of one that is read on demand the hash decides: that two images of
     /// thousands share one by chance has a probability below 1e-10.
     pub(super) fn shows(&self, image: ArrayView2<'_, u8>) -> bool {

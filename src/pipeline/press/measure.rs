@@ -10,10 +10,12 @@ use crate::pipeline::measurement::{
     FrameResult, MatchResult, Measurement, ModulusResult, StrainResult,
 };
 use crate::pipeline::object::Object;
+use crate::pipeline::report::{SkipReason, Stage};
 use nalgebra::Matrix3;
 
-/// Frames of a press up to which all surfaces are kept: some hundred kilobytes each, which plots want to show. With more, only those of
-/// the first and the last frame are.
+/// Frames of a press up to which all surfaces are reconstructed and kept, which plots want to show: some milliseconds and some hundred
+/// kilobytes each. With more, only those of the first and the last frame are kept, and of the others only those reconstructed whose strain is
+/// worked out.
 const KEPT_SURFACES: usize = 64;
 
 /// Radius in pixels of a contact below which the strain's stated error has been seen to be too small: over 40 presses the largest deviation is
@@ -79,9 +81,12 @@ impl Press<'_> {
     fn light_drift(&self) -> Option<Flag> {
         let reference = self.runner.reference().image();
         let steps = self.frames.iter().enumerate().filter_map(|(index, frame)| {
-            let contact = frame.contact.as_ref()?.bounds()?;
+            let known = frame.contact.as_ref()?;
+            if frame.image.is_on_demand() {
+                return known.light_step_grey;
+            }
             let image = frame.image.get(index).ok()?;
-            background::median_step_outside(image.view(), reference, contact)
+            background::median_step_outside(image.view(), reference, known.contact.bounds()?)
         });
         let greatest = steps.max_by_key(|step| step.abs())?;
         (greatest != 0).then_some(Flag::LightDrifted {
@@ -137,14 +142,7 @@ impl Press<'_> {
             }
         }
         let radius = self.pipeline().settings().object.sphere_radius_m();
-        let surface_height_m = self.surface(frame).map(|s| {
-            let heights = s.surface.heights.iter().copied().filter(|h| h.is_finite());
-            heights.fold(0.0, f64::max)
-        });
-        let last = self.frames() - 1;
-        if self.frames() > KEPT_SURFACES && frame != 0 && frame != last {
-            self.forget_surface(frame)?;
-        }
+        let surface_height_m = self.surface_height(frame);
         Ok(FrameResult {
             force_n: reading.force_n.ok_or(PipelineError::NoForce { frame }),
             gauge_force_n,
@@ -156,6 +154,25 @@ impl Press<'_> {
             mean_stress_pa: reading.mean_stress_pa(),
             surface_height_m,
         })
+    }
+
+    /// The height of a frame's surface, unless there are many frames and this one's surface served nothing.
+    fn surface_height(&mut self, frame: usize) -> Result<f64, PipelineError> {
+        let frames = self.frames();
+        let kept = frames <= KEPT_SURFACES || frame == 0 || frame == frames - 1;
+        if !kept && !self.has_surface(frame) {
+            let pixels = self.contact_pixels(frame)?;
+            let reason = SkipReason::NotAsked;
+            self.runner.skip(Stage::Surface, frame, reason, pixels);
+            return Err(PipelineError::NotReconstructed { frame, frames });
+        }
+        let surface = &self.surface(frame)?.surface;
+        let heights = surface.heights.iter().copied().filter(|h| h.is_finite());
+        let highest = heights.fold(0.0, f64::max);
+        if !kept {
+            self.forget_surface(frame)?;
+        }
+        Ok(highest)
     }
 
     /// The last frame, if there are two.

@@ -27,11 +27,22 @@ struct Loaded<'a> {
     gauge: Option<Estimate<f64>>,
     /// Seconds since the object touched, where they are known.
     time_s: Option<f64>,
-    contact: Option<FrameContact>,
-    surface: Option<ContactSurface>,
+    // Boxed, so that thousands of frames, whose strain nobody asks for, take no room for it.
+    contact: Option<Box<KnownContact>>,
+    surface: Option<Box<ContactSurface>>,
     points: Option<ControlPoints>,
-    matching: Option<Matching<f64, 3>>,
-    strain: Option<PairStrain>,
+    matching: Option<Box<Matching<f64, 3>>>,
+    strain: Option<Box<PairStrain>>,
+}
+
+/// The contact of a frame, and what is known of its image.
+struct KnownContact {
+    /// Without its mask where the image is read on demand: nothing as large as an image is kept of such a frame.
+    contact: FrameContact,
+    /// Number of the contact's pixels.
+    pixels: usize,
+    /// The median of frame minus reference outside the contact, of an image that is read on demand.
+    light_step_grey: Option<i32>,
 }
 
 /// Frames at one or more loads. Every result is computed when it is first asked for, with what it needs and nothing else,

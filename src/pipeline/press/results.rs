@@ -1,5 +1,5 @@
 //! What a press says of its frames, one stage after the other: contact, surface, control points, match, strain.
-use super::{Loaded, Press};
+use super::{KnownContact, Loaded, Press};
 use crate::matching::Matching;
 use crate::pipeline::background;
 use crate::pipeline::contact::{ContactReading, FrameContact};
@@ -8,8 +8,9 @@ use crate::pipeline::face::TextureStretch;
 use crate::pipeline::pair::PairStrain;
 use crate::pipeline::surface::{ContactSurface, ControlPoints};
 use nalgebra::Point3;
+use ndarray::{Array2, ArrayView2, CowArray, Ix2};
 
-impl Press<'_> {
+impl<'a> Press<'a> {
     /// The contact of a frame with its force; `None` where nothing touches.
     ///
     /// # Errors
@@ -17,17 +18,51 @@ impl Press<'_> {
     pub fn contact(&mut self, frame: usize) -> Result<Option<&ContactReading>, PipelineError> {
         let at = self.twin(frame)?;
         if self.frames[at].contact.is_none() {
-            let mut contact = FrameContact::default();
-            let loaded = &self.frames[at];
-            let image = loaded.image.get(frame)?;
-            self.runner
-                .contact(frame, image.view(), loaded.gauge, &mut contact)?;
-            self.frames[at].contact = Some(contact);
+            let image = self.frames[at].image.get(frame)?;
+            let mut contact = self.measured(frame, image.view())?;
+            let pixels = contact.pixels();
+            let mut light_step_grey = None;
+            if self.frames[at].image.is_on_demand() {
+                let reference = self.runner.reference().image();
+                let around = contact.bounds();
+                light_step_grey = around.and_then(|contact| {
+                    background::median_step_outside(image.view(), reference, contact)
+                });
+                contact.mask = Array2::default((0, 0));
+            }
+            self.frames[at].contact = Some(Box::new(KnownContact {
+                contact,
+                pixels,
+                light_step_grey,
+            }));
         }
-        Ok(self.frames[at]
-            .contact
-            .as_ref()
-            .and_then(|c| c.reading.as_ref()))
+        let known = self.frames[at].contact.as_ref();
+        Ok(known.and_then(|known| known.contact.reading.as_ref()))
+    }
+
+    fn measured(
+        &mut self,
+        frame: usize,
+        image: ArrayView2<'_, u8>,
+    ) -> Result<FrameContact, PipelineError> {
+        let mut contact = FrameContact::default();
+        let gauge = self.gauge(frame);
+        self.runner.contact(frame, image, gauge, &mut contact)?;
+        Ok(contact)
+    }
+
+    /// A frame's image and its contact with the mask, which is found again where the frame keeps none.
+    fn masked(
+        &mut self,
+        frame: usize,
+    ) -> Result<(CowArray<'a, u8, Ix2>, FrameContact), PipelineError> {
+        let at = self.twin(frame)?;
+        let image = self.frames[at].image.get(frame)?;
+        let contact = match &self.frames[at].contact {
+            Some(known) if !self.frames[at].image.is_on_demand() => known.contact.clone(),
+            _ => self.measured(frame, image.view())?,
+        };
+        Ok((image, contact))
     }
 
     /// The contact of a frame that must have one.
@@ -64,25 +99,30 @@ impl Press<'_> {
     /// [`PipelineError::NoContact`], [`PipelineError::Surface`], and those of [`contact`](Self::contact).
     pub fn surface(&mut self, frame: usize) -> Result<&ContactSurface, PipelineError> {
         self.reading(frame)?;
-        self.contact(0)?;
         let at = self.twin(frame)?;
         if self.frames[at].surface.is_none() {
-            let loaded = &self.frames[at];
-            let contact = loaded
-                .contact
-                .as_ref()
-                .ok_or(PipelineError::NoContact { frame })?;
-            let first = self.frames[0].contact.as_ref().unwrap_or(contact);
-            let image = loaded.image.get(frame)?;
-            let surface = self
-                .runner
-                .surface(frame, image.view(), contact, first.pixels())?;
-            self.frames[at].surface = Some(surface);
+            let pixels = self.contact_pixels(0)?;
+            let (image, contact) = self.masked(frame)?;
+            let surface = self.runner.surface(frame, image.view(), &contact, pixels)?;
+            self.frames[at].surface = Some(Box::new(surface));
         }
         self.frames[at]
             .surface
-            .as_ref()
+            .as_deref()
             .ok_or(PipelineError::NoContact { frame })
+    }
+
+    /// Number of the pixels of a frame's contact.
+    pub(super) fn contact_pixels(&mut self, frame: usize) -> Result<usize, PipelineError> {
+        self.contact(frame)?;
+        let known = self.frames[self.twin(frame)?].contact.as_ref();
+        Ok(known.map_or(0, |known| known.pixels))
+    }
+
+    /// Whether a frame's surface has been reconstructed.
+    pub(super) fn has_surface(&self, frame: usize) -> bool {
+        self.twin(frame)
+            .is_ok_and(|at| self.frames[at].surface.is_some())
     }
 
     /// Frees the memory of a frame's surface; it is reconstructed again when it is asked for.
@@ -116,7 +156,7 @@ impl Press<'_> {
         if self.frames[at].points.is_none() {
             let surface = self.frames[at]
                 .surface
-                .as_ref()
+                .as_deref()
                 .ok_or(PipelineError::NoContact { frame })?;
             let points = self.runner.control_points(frame, surface)?;
             self.frames[at].points = Some(points);
@@ -153,11 +193,11 @@ impl Press<'_> {
             let matching = self
                 .runner
                 .matching([0, frame], &model.points, &target.points)?;
-            self.frames[at].matching = Some(matching);
+            self.frames[at].matching = Some(Box::new(matching));
         }
         self.frames[at]
             .matching
-            .as_ref()
+            .as_deref()
             .ok_or(PipelineError::NoContact { frame })
     }
 
@@ -165,16 +205,10 @@ impl Press<'_> {
     pub(super) fn texture(&mut self, frame: usize) -> Result<TextureStretch, PipelineError> {
         self.reading(0)?;
         self.reading(frame)?;
-        let (first, at) = (self.twin(0)?, self.twin(frame)?);
-        let (Some(one), Some(two)) = (&self.frames[first].contact, &self.frames[at].contact) else {
-            return Err(PipelineError::NoContact { frame });
-        };
-        let images = [
-            self.frames[first].image.get(0)?,
-            self.frames[at].image.get(frame)?,
-        ];
-        let images = images.each_ref().map(|image| image.view());
-        self.runner.texture([0, frame], images, [one, two])
+        let (first_image, first) = self.masked(0)?;
+        let (image, contact) = self.masked(frame)?;
+        let images = [first_image.view(), image.view()];
+        self.runner.texture([0, frame], images, [&first, &contact])
     }
 
     /// The strain between the first frame and a later one; of an object with a flat face by the growth of its area, the same at all points.
@@ -190,7 +224,7 @@ impl Press<'_> {
             let strain = self
                 .runner
                 .strain_of_faces(frames, readings.each_ref(), poisson_ratio)?;
-            return Ok(self.frames[at].strain.insert(strain));
+            return Ok(self.frames[at].strain.insert(Box::new(strain)));
         }
         self.matching(frame)?;
         if self.frames[at].strain.is_none() {
@@ -200,16 +234,16 @@ impl Press<'_> {
             );
             let matching = self.frames[at]
                 .matching
-                .as_ref()
+                .as_deref()
                 .ok_or(PipelineError::NoContact { frame })?;
             let strain = self
                 .runner
                 .strain([0, frame], model, &target.points, matching)?;
-            self.frames[at].strain = Some(strain);
+            self.frames[at].strain = Some(Box::new(strain));
         }
         self.frames[at]
             .strain
-            .as_ref()
+            .as_deref()
             .ok_or(PipelineError::NoContact { frame })
     }
 }

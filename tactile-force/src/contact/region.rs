@@ -2,6 +2,7 @@
 
 use ndarray::ArrayView2;
 
+use super::every_nth::EveryNth;
 use super::runs::{self, Components, Run, push_runs};
 use crate::drift::{DriftLine, IlluminationDrift};
 use crate::frame::{BoundingBox, ReferenceFrame};
@@ -115,6 +116,18 @@ impl Region {
         for run in &self.mask {
             self.pixels[run.span(columns)].fill(1);
         }
+    }
+
+    /// Every so many rows and columns of what runs cover.
+    pub(crate) fn every_nth(&self, runs: &[Run], step: usize) -> [EveryNth; 2] {
+        let start = runs.iter().map(|run| run.start).min().unwrap_or(0) as usize;
+        let end = runs.iter().map(|run| run.end).max().unwrap_or(1) as usize;
+        let first = runs.first().map_or(0, |run| run.row) as usize;
+        let last = runs.last().map_or(0, |run| run.row) as usize;
+        [
+            EveryNth::of(first..last + 1, step),
+            EveryNth::of(start..end, step),
+        ]
     }
 
     /// Box of runs in frame coordinates.

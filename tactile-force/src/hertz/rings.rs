@@ -1,6 +1,6 @@
 //! Pixels gathered into thin rings about a centre.
 
-use crate::contact::Region;
+use crate::contact::{EveryNth, Region};
 
 /// Sums over the pixels of one ring; (u, v) is a pixel's place relative to the centre, d its difference. Four by four, so
 /// that a pixel is added with a few wide instructions.
@@ -77,7 +77,7 @@ pub(crate) struct Rings {
     rings: Vec<Ring>,
 }
 
-/// Pixels well inside the edge beyond which rows are left out there: the profile is flat and they only repeat each other.
+/// Pixels well inside the edge beyond which some are left out there: the profile is flat and they only repeat each other.
 const ENOUGH: f64 = 8192.0;
 /// Rings per pixel of distance near the edge.
 const PER_PIXEL: f64 = 4.0;
@@ -98,16 +98,15 @@ impl Rings {
     pub(super) fn gather(&mut self, region: &Region, centre: [f64; 2], aspect: f64, radius: f64) {
         self.rings.clear();
         let wide = (radius - EDGE).max(0.0).floor();
-        let stride = (std::f64::consts::PI * wide * wide / aspect / ENOUGH)
-            .ceil()
-            .max(1.0) as u32;
+        let inside = std::f64::consts::PI * wide * wide / aspect;
+        let step = (inside / ENOUGH).sqrt().ceil() as usize;
         let gather = Gather {
             rings: &mut self.rings,
             region,
             centre,
             aspect,
             wide,
-            stride,
+            every: region.every_nth(&region.aperture, step),
         };
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
@@ -124,8 +123,8 @@ struct Gather<'a> {
     aspect: f64,
     /// Distance up to which rings are wide.
     wide: f64,
-    /// Of the rows inside that distance every so many are gathered.
-    stride: u32,
+    /// Of the rows and columns inside that distance, those that are gathered.
+    every: [EveryNth; 2],
 }
 
 impl Gather<'_> {
@@ -141,7 +140,7 @@ impl Gather<'_> {
     #[inline(always)]
     fn inner(&self, v: f64, first: f64, len: usize) -> std::ops::Range<usize> {
         let half = (self.wide * self.wide - v * v).max(0.0).sqrt();
-        let at = |u: f64| ((u - first).max(0.0) as usize).min(len);
+        let at = |u: f64| ((u - first).max(0.0).ceil() as usize).min(len);
         let (start, end) = (at(-half), at(half));
         if start < end { start..end } else { 0..0 }
     }
@@ -164,6 +163,7 @@ impl pulp::NullaryFnOnce for Gather<'_> {
     #[inline(always)]
     fn call(mut self) {
         let columns = self.region.columns();
+        let [every_row, every_column] = self.every;
         for run in &self.region.aperture {
             let v = (f64::from(run.row) - self.centre[1]) * self.aspect;
             let first = f64::from(run.start) - self.centre[0];
@@ -173,13 +173,16 @@ impl pulp::NullaryFnOnce for Gather<'_> {
                 self.rings.resize(needed, Ring::default());
             }
             let pixels = &self.region.difference[run.span(columns)];
-            let inner = if run.row % self.stride == 0 {
-                0..0
-            } else {
-                self.inner(v, first, pixels.len())
-            };
+            let inner = self.inner(v, first, pixels.len());
             self.row(v, first, &pixels[..inner.start]);
             self.row(v, first + inner.end as f64, &pixels[inner.end..]);
+            if every_row.contains(run.row as usize) {
+                let start = run.start as usize;
+                for column in every_column.within(start + inner.start..start + inner.end) {
+                    let at = column - start;
+                    self.row(v, first + at as f64, &pixels[at..=at]);
+                }
+            }
         }
     }
 }

@@ -98,7 +98,9 @@ fn a_contact_that_the_border_cuts_is_left_out() {
         press.modulus().unwrap()
     };
     let modulus = measurement.youngs_modulus_pa.unwrap();
-    assert_eq!(modulus.value, alone.youngs_modulus_pa);
+    // Each load is weighted anew in a series: rounding.
+    let relative = modulus.value / alone.youngs_modulus_pa - 1.0;
+    assert!(relative.abs() < 1e-12, "{relative:e}");
     // Where every contact is cut there is no better answer, but the caution.
     let half = [150, 150].map(|left| cut(&frames[1], left));
     let reference = cut(&trial.simulation.reference, 150);

@@ -9,11 +9,12 @@ use crate::numbers::positive;
 use crate::outputs::Outputs;
 use crate::progress::{Progress, waiting_or_interrupted};
 use clap::{Args, ValueEnum};
-use serde_json::json;
+use serde::Serialize;
 use source::Source;
 use std::path::PathBuf;
-use tactile_imaging::pipeline::{ContactReading, PipelineError, Press};
+use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Truth};
 use tactile_imaging::plot::{save_press_pages, summary_lines};
+use timing::Timing;
 
 /// Measure the Young's modulus of an object from frames at two or more loads
 ///
@@ -64,6 +65,17 @@ struct Simulation {
     /// Simulation: no noise, blur, vignetting or background.
     #[arg(long, conflicts_with = "scene")]
     ideal_camera: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer<'a> {
+    #[serde(flatten)]
+    measurement: &'a Measurement,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    truth: Option<&'a Truth>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    timing: &'a [Timing],
 }
 
 /// What the simulated contacts obey.
@@ -170,14 +182,11 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
             context.console.note(source.explain(error.clone()));
         }
     }
-    let mut value = json!(measurement);
-    if let Some(truth) = &truth {
-        value["truth"] = json!(truth);
-    }
-    if !timing.is_empty() {
-        value["timing"] = json!(timing);
-    }
-    context.console.value(&value);
+    context.console.value(&Answer {
+        measurement: &measurement,
+        truth: truth.as_ref(),
+        timing: &timing,
+    });
     if let Some(folder) = &arguments.out {
         let mut lines = summary_lines(&measurement);
         if let (Some(truth), Ok(modulus)) = (&truth, &measurement.youngs_modulus_pa) {
