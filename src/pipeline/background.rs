@@ -1,6 +1,7 @@
 //! How a frame differs from the reference where there is no contact: the light has changed, or the two were swapped.
 use crate::force::BoundingBox;
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, Axis, Slice};
+use std::ops::Range;
 
 /// Difference in grey levels of a block's mean that is no noise: a camera's 1 to 3 grey levels are a tenth of it in a block.
 pub(super) const CLEAR_STEP_GREY: f64 = 4.0;
@@ -9,7 +10,7 @@ pub(super) const CLEAR_STEP_GREY: f64 = 4.0;
 const BLOCK: usize = 8;
 
 /// Rows looked at for the median: some ten thousand pixels tell it to a grey level.
-const ROWS: usize = 64;
+const ROWS: usize = 24;
 
 /// The mean of frame minus reference, in grey levels, of the block where it is greatest.
 pub(super) fn greatest_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> f64 {
@@ -51,13 +52,23 @@ pub(super) fn median_step_outside(
     let mut counts = [0_usize; 511];
     let mut total = 0;
     for row in (0..image.nrows()).step_by(image.nrows() / ROWS + 1) {
-        let inside = (contact.row_start..contact.row_end).contains(&row);
-        for (column, (&f, &r)) in image.row(row).iter().zip(reference.row(row)).enumerate() {
-            if inside && (contact.column_start..contact.column_end).contains(&column) {
-                continue;
+        let columns = image.ncols();
+        let mut count = |span: Range<usize>| {
+            total += span.len();
+            let span = Slice::from(span);
+            let pixels = image.row(row).slice_axis_move(Axis(0), span);
+            for (&f, &r) in pixels
+                .iter()
+                .zip(reference.row(row).slice_axis(Axis(0), span))
+            {
+                counts[usize::from(255 + u16::from(f) - u16::from(r))] += 1;
             }
-            counts[usize::from(255 + u16::from(f) - u16::from(r))] += 1;
-            total += 1;
+        };
+        if (contact.row_start..contact.row_end).contains(&row) {
+            count(0..contact.column_start);
+            count(contact.column_end..columns);
+        } else {
+            count(0..columns);
         }
     }
     // The median of fewer is not known to a grey level.

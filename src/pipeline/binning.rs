@@ -4,7 +4,8 @@
 //! pixels cost one pass, lower the noise by the block's width, and leave the reconstruction a small grid.
 use super::contact::resize;
 use crate::force::BoundingBox;
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, Slice};
+use std::ops::Range;
 
 /// Pixels of the reconstruction's grid, inside the contact, for every control point: the points then stand four or
 /// more pixels apart. Finer grids cost time, and neither heights nor strains become better.
@@ -78,20 +79,15 @@ pub(super) fn mean_difference(
     means: &mut Array2<f64>,
 ) {
     resize(means, (region.rows() / side, region.columns() / side));
-    means.fill(0.0);
     let (frame, reference) = (region.of(frame), region.of(reference));
-    for (row, (f, r)) in frame.rows().into_iter().zip(reference.rows()).enumerate() {
-        let mut out = means.row_mut(row / side);
-        let blocks = f.exact_chunks(side).into_iter().zip(r.exact_chunks(side));
-        for (sum, (f, r)) in out.iter_mut().zip(blocks) {
-            *sum += f64::from(
-                f.iter()
-                    .zip(r)
-                    .map(|(&f, &r)| i32::from(f) - i32::from(r))
-                    .sum::<i32>(),
-            );
+    let pairs = |row: usize, columns: Range<usize>, sums: &mut [i32]| {
+        let frame = span_of(&frame, row, columns.clone());
+        let reference = span_of(&reference, row, columns);
+        for ((sum, &f), &r) in sums.iter_mut().zip(frame).zip(reference) {
+            *sum += i32::from(f) - i32::from(r);
         }
-    }
+    };
+    sum_blocks(side, means.view_mut(), pairs, f64::from);
     let scale = scale / (side * side) as f64;
     means.mapv_inplace(|sum| sum * scale);
 }
@@ -107,18 +103,61 @@ pub(super) fn block_mask(
 ) {
     resize(blocks, (region.rows() / side, region.columns() / side));
     let (rows, columns) = (contact.rows(), contact.columns());
-    for ((row, column), inside) in blocks.indexed_iter_mut() {
-        let span = |start: usize, end: usize| [start.min(end), (start + side).min(end)];
-        let ([row_start, row_end], [column_start, column_end]) =
-            (span(row * side, rows), span(column * side, columns));
-        let pixels = BoundingBox {
-            row_start,
-            row_end,
-            column_start,
-            column_end,
+    let inside = |row: usize, span: Range<usize>, counts: &mut [i32]| {
+        if row < rows {
+            let span = span.start.min(columns)..span.end.min(columns);
+            for (count, &inside) in counts.iter_mut().zip(span_of(&mask, row, span)) {
+                *count += i32::from(inside);
+            }
         }
-        .of(mask);
-        *inside = 4 * pixels.iter().filter(|m| **m).count() >= 3 * side * side;
+    };
+    let three_quarters = |count: i32| 4 * count as usize >= 3 * side * side;
+    sum_blocks(side, blocks.view_mut(), inside, three_quarters);
+}
+
+/// Some columns of a row.
+fn span_of<'a, T>(
+    image: &ArrayView2<'a, T>,
+    row: usize,
+    columns: Range<usize>,
+) -> ArrayView1<'a, T> {
+    let row = (*image).index_axis_move(Axis(0), row);
+    row.slice_axis_move(Axis(0), Slice::from(columns))
+}
+
+/// Columns that are summed at a time.
+const STRIP: usize = 128;
+
+/// Sums over square blocks: the rows of a band of blocks are added up column by column, in wide instructions, then the columns of each block.
+/// `add` adds the pixels of a row, in a span of columns, to sums.
+fn sum_blocks<T>(
+    side: usize,
+    mut blocks: ArrayViewMut2<'_, T>,
+    add: impl Fn(usize, Range<usize>, &mut [i32]),
+    result: impl Fn(i32) -> T,
+) {
+    // A block that is wider than the strip is laid over it several times.
+    let per_strip = (STRIP / side).max(1);
+    for (band, mut blocks) in blocks.rows_mut().into_iter().enumerate() {
+        let strips = blocks.axis_chunks_iter_mut(Axis(0), per_strip);
+        for (strip, mut blocks) in strips.enumerate() {
+            let first = strip * per_strip * side;
+            let mut sums = [0; STRIP];
+            for start in (0..blocks.len() * side).step_by(STRIP) {
+                let width = STRIP.min(blocks.len() * side - start);
+                for row in band * side..(band + 1) * side {
+                    add(
+                        row,
+                        first + start..first + start + width,
+                        &mut sums[..width],
+                    );
+                }
+            }
+            let columns = STRIP.min(side);
+            for (block, columns) in blocks.iter_mut().zip(sums.chunks(columns)) {
+                *block = result(columns.iter().sum());
+            }
+        }
     }
 }
 

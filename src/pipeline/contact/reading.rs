@@ -158,22 +158,26 @@ impl FrameContact {
     /// The smallest box of the frame that holds the contact's pixels: `region` may be wider.
     pub(in crate::pipeline) fn bounds(&self) -> Option<BoundingBox> {
         let region = self.region?;
-        let inside = self.mask.indexed_iter().filter(|(_, inside)| **inside);
-        inside.fold(None, |bounds: Option<BoundingBox>, ((row, column), _)| {
-            let (row, column) = (region.row_start + row, region.column_start + column);
-            let pixel = BoundingBox {
-                row_start: row,
-                row_end: row + 1,
-                column_start: column,
-                column_end: column + 1,
+        let mut bounds: Option<BoundingBox> = None;
+        for (row, pixels) in self.mask.rows().into_iter().enumerate() {
+            let Some(first) = pixels.iter().position(|inside| *inside) else {
+                continue;
             };
-            Some(bounds.map_or(pixel, |bounds| BoundingBox {
-                row_start: bounds.row_start.min(row),
-                row_end: bounds.row_end.max(row + 1),
-                column_start: bounds.column_start.min(column),
-                column_end: bounds.column_end.max(column + 1),
-            }))
-        })
+            let last = pixels.iter().rposition(|inside| *inside).unwrap_or(first);
+            let run = BoundingBox {
+                row_start: region.row_start + row,
+                row_end: region.row_start + row + 1,
+                column_start: region.column_start + first,
+                column_end: region.column_start + last + 1,
+            };
+            bounds = Some(bounds.map_or(run, |bounds| BoundingBox {
+                row_end: run.row_end,
+                column_start: bounds.column_start.min(run.column_start),
+                column_end: bounds.column_end.max(run.column_end),
+                ..bounds
+            }));
+        }
+        bounds
     }
 
     /// Gives up the saving of the contact's box: the mask is laid out over the whole frame.
