@@ -6,7 +6,7 @@ take a minute; here every mutant of the sample is put beside the original behind
 tests are built once, and run once for every mutant. One that fails a test or hangs is caught.
 
     python3 -m venv v && v/bin/pip install tree-sitter tree-sitter-rust
-    v/bin/python evidence/mutants.py tactile-tps --sample 100 --seed 1 --copy /tmp/mutants
+    v/bin/python evidence/mutants.py tactile-tps --sample 100 --seed 1 --copy ../mutants
 
 works on a copy of the repository in the folder given, and prints every mutant with what became of it and the totals.
 """
@@ -16,6 +16,8 @@ import json
 import os
 import random
 import re
+import resource
+import signal
 import subprocess
 import sys
 import time
@@ -28,6 +30,7 @@ SWITCH = """
 #[doc(hidden)]
 #[allow(missing_docs, unreachable_pub, dead_code)]
 pub mod mutant {
+    extern crate std; // some crates have it for their tests alone
     static ON: std::sync::OnceLock<u32> = std::sync::OnceLock::new();
     #[inline(always)]
     pub fn on(id: u32) -> bool {
@@ -173,7 +176,7 @@ def main():
     arguments.add_argument("--seed", type=int, default=1)
     arguments.add_argument("--copy", required=True, help="folder for the copy of the repository")
     arguments.add_argument("--files", default="", help="regular expression that a mutant's file must match")
-    arguments.add_argument("--limit", type=float, default=60, help="seconds that the tests may take")
+    arguments.add_argument("--limit", type=float, default=60, help="seconds of processor time that the tests may take")
     arguments.add_argument("--slow", nargs="*", default=[], help="tests that are run only where all others pass")
     arguments.add_argument("--built", action="store_true", help="go on with a copy that holds the switches of this sample")
     given = arguments.parse_args()
@@ -202,9 +205,12 @@ def main():
         quick = [option for test in given.slow for option in ("--skip", test)]
         for program, some in [(p, quick) for p in programs] + [(p, given.slow) for p in programs if given.slow]:
             try:
-                tests = subprocess.run([program, "-q", *some], cwd=folder, env={**os.environ, "MUTANT": str(number), "CARGO_MANIFEST_DIR": folder},
-                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=given.limit)
+                tests = subprocess.run([program, "-q", *some], cwd=folder, env={**os.environ, "MUTANT": str(number), "PROPTEST_MAX_SHRINK_ITERS": "0", "CARGO_MANIFEST_DIR": folder},
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=20 * given.limit,
+                                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(given.limit), int(given.limit))))
             except subprocess.TimeoutExpired:
+                return "hung"
+            if tests.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
                 return "hung"
             if tests.returncode != 0:
                 return "caught"

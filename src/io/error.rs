@@ -139,6 +139,16 @@ pub enum ReadError {
         /// The unit in the heading.
         found: String,
     },
+    /// A value that no number can hold after its conversion to SI.
+    #[error("{}: the column `{column}` has the value {value:e}, too large to be converted to SI", path.display())]
+    Overflow {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// The value as it stands in the file.
+        value: f64,
+    },
     /// A table that is not UTF-8.
     #[error("{} is UTF-16 text: save it as UTF-8", path.display())]
     Encoding {

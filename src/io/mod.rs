@@ -21,6 +21,7 @@ pub mod table;
 mod units;
 
 pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
+pub(crate) use error::shorten;
 pub use error::{Expected, ReadError};
 pub(crate) use files::read_bytes;
 pub use files::write_file;

@@ -78,7 +78,7 @@ impl Table {
     /// in a file without one, which must then have exactly these.
     ///
     /// # Errors
-    /// [`ReadError::MissingColumn`], [`ReadError::Unit`] and, where the number of columns is wrong,
+    /// [`ReadError::MissingColumn`], [`ReadError::Unit`], [`ReadError::Overflow`] and, where the number of columns is wrong,
     /// [`ReadError::Line`]; `path` is the name they give to the file.
     pub fn columns<const N: usize>(
         &self,
@@ -103,7 +103,16 @@ impl Table {
                 let factor = headings[at].factor(column.quantity, column.unit, path)?;
                 (at, factor)
             };
-            found[position] = self.values.column(at).iter().map(|v| v * factor).collect();
+            let values = self.values.column(at);
+            let overflows = |v: &&f64| v.is_finite() && !(*v * factor).is_finite();
+            if let Some(&value) = values.iter().find(overflows) {
+                return Err(ReadError::Overflow {
+                    path: path.into(),
+                    column: column.names.first().copied().unwrap_or_default().into(),
+                    value,
+                });
+            }
+            found[position] = values.iter().map(|v| v * factor).collect();
         }
         Ok(found)
     }
@@ -358,5 +367,10 @@ mod tests {
             "t.csv: the column `force` occurs more than once: rename one"
         );
         assert!(message("depth_m,force (lbf)\n1,2\n").contains("is in `lbf`"));
+        // The largest number is 1.8e308: a finite number of kilonewtons need not be one of newtons.
+        assert_eq!(
+            message("depth_m,force_kN\n1,-9e307\n"),
+            "t.csv: the column `force` has the value -9e307, too large to be converted to SI"
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! Reading the fields of a TOML table, with the path of every field for errors.
 use super::error::SceneError;
+use crate::io::shorten;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -34,7 +35,8 @@ impl<'a> Fields<'a> {
             None => Ok(()),
             Some(key) => Err(SceneError::Unknown {
                 file: self.file.into(),
-                field: self.path(key),
+                // A quoted key may hold line breaks.
+                field: self.path(&shorten(key)),
                 known: known.to_vec(),
             }),
         }
@@ -55,7 +57,8 @@ impl<'a> Fields<'a> {
     pub(crate) fn wrong(&self, name: &str, expected: &'static str, found: &Value) -> SceneError {
         let found = match found {
             Value::String(_) | Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => {
-                found.to_string()
+                // One line of a text of any length.
+                shorten(&found.to_string())
             }
             Value::Array(values) => format!("an array of {}", values.len()),
             Value::Table(_) => "a table".into(),

@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod architecture;
+mod corpus;
 mod finite_element_presses;
 mod force_on_simulated_frames;
 mod io_properties;

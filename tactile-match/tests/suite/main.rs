@@ -4,6 +4,7 @@ mod allocation;
 mod assignment;
 mod common;
 mod conformance;
+mod corpus;
 mod dense_sets;
 mod drift;
 mod hostile;

@@ -2,6 +2,17 @@
 
 /// Replacement in the valid file, and what the sentence must contain.
 pub(super) const MISTAKES: &[(&str, &str, &[&str])] = &[
+    // Names and texts of several lines; the sentence has one.
+    (
+        "[object]",
+        "\"two\\nlines\" = 1\n[object]",
+        &["unknown field", "twolines`"],
+    ),
+    (
+        "pixel_size_m = [1e-4, 1e-4]",
+        "pixel_size_m = \"two\\nlines\"",
+        &["`pixel_size_m` must be", "twolines"],
+    ),
     (
         "reference = \"reference.png\"",
         "",

@@ -1,53 +1,12 @@
 //! Matchers, point sets and checks that the test files share.
 
+pub(crate) mod contract;
+
+#[allow(unused_imports)] // the tests inside the crate share the point sets alone
+pub(crate) use contract::{assert_consistent, matchers};
 use nalgebra::{Point, RealField, SMatrix, SVector};
 use proptest::prelude::*;
-use tactile_match::labelling::Neighbourhood;
-use tactile_match::{
-    AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
-    Matching, Motion, NearestNeighbour, PointMatcher, RelaxationLabelling,
-    SparseRelaxationLabelling,
-};
 use tactile_tps::Scalar;
-
-pub(crate) type Matchers<T, const D: usize> = Vec<(&'static str, Box<dyn PointMatcher<T, D>>)>;
-
-/// The matchers that every test file runs; a new one is added here and nowhere else.
-pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
-    let drift = |motion| {
-        let options = DriftOptions::default().with_motion(motion);
-        CoherentPointDrift::new(options.expect("a valid motion"))
-    };
-    // Eight neighbours instead of half of all points: what is checked here does not need the time of the latter.
-    let options = LabellingOptions::default().with_neighbourhood(Neighbourhood::Nearest(8));
-    let dense = RelaxationLabelling::new(options.expect("neighbours"));
-    vec![
-        ("relaxation", Box::new(AnnealedSoftassign::default())),
-        ("dense relaxation", Box::new(dense)),
-        (
-            "sparse relaxation",
-            Box::new(SparseRelaxationLabelling::default()),
-        ),
-        ("nearest neighbour", Box::new(NearestNeighbour::new())),
-        ("linear assignment", Box::new(LinearAssignment::new())),
-        (
-            "coherent point drift",
-            Box::new(CoherentPointDrift::default()),
-        ),
-        (
-            "coherent point drift, rigid",
-            Box::new(drift(Motion::Rigid)),
-        ),
-        (
-            "coherent point drift, similarity",
-            Box::new(drift(Motion::Similarity)),
-        ),
-        (
-            "coherent point drift, affine",
-            Box::new(drift(Motion::Affine)),
-        ),
-    ]
-}
 
 /// Largest distance of two points of the same row.
 pub(crate) fn largest_step<T: Scalar, const D: usize>(a: &[Point<T, D>], b: &[Point<T, D>]) -> f64 {
@@ -145,116 +104,6 @@ pub(crate) fn rotation<T: RealField + Copy, const D: usize>(angle: f64) -> SMatr
     let mut r = SMatrix::identity();
     (r[(0, 0)], r[(0, 1)], r[(1, 0)], r[(1, 1)]) = (cos, -sin, sin, cos);
     r
-}
-
-/// What holds of every [`Matching`], whatever it was made from.
-pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
-    name: &str,
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
-    matching: &Matching<T, D>,
-) {
-    let (rows, columns) = (model.len(), target.len());
-    let lengths = [
-        matching.warped.len(),
-        matching.assignment.len(),
-        matching.confidence.len(),
-        matching.soft.rows(),
-    ];
-    assert_eq!(lengths, [rows; 4], "{name}: one entry per model point");
-    assert_eq!(
-        matching.displacement_covariance.len(),
-        rows,
-        "{name}: one covariance per model point"
-    );
-    assert_partition(name, columns, matching);
-    let probability = |p: T| p >= T::zero() && p <= T::one() + nalgebra::convert(1e-5);
-    assert!(
-        matching.confidence.iter().all(|&p| probability(p)),
-        "{name}: confidence {:?}",
-        matching.confidence
-    );
-    for i in 0..rows {
-        let sum = matching.soft.row(i).fold(T::zero(), |sum, (j, p)| {
-            assert!(
-                j < columns && probability(p),
-                "{name}: soft match ({i}, {j}) = {p}"
-            );
-            sum + p
-        });
-        assert!(probability(sum), "{name}: soft row {i} sums to {sum}");
-    }
-    let finite = |p: &Point<T, D>| p.iter().all(|c| c.is_finite());
-    assert!(
-        matching.warped.iter().all(finite),
-        "{name}: warped points {:?}",
-        matching.warped
-    );
-    for (i, (point, warped)) in model.iter().zip(&matching.warped).enumerate() {
-        // Rounding of a spline's sum, whose terms may exceed the set's size by some orders of magnitude.
-        let size = target
-            .iter()
-            .chain(&matching.warped)
-            .chain([point])
-            .fold(T::zero(), |m, p| m.max(p.coords.amax()));
-        let step = (matching.warp.apply(point) - warped).norm();
-        let tolerance: T = nalgebra::convert(1e10 * T::UNIT_ROUNDOFF);
-        assert!(
-            step <= tolerance.min(nalgebra::convert(1e-3)) * size,
-            "{name}: the warp takes point {i} {step} astray"
-        );
-    }
-    for covariance in &matching.displacement_covariance {
-        assert!(
-            covariance.iter().all(|c| c.is_finite()),
-            "{name}: covariance {covariance}"
-        );
-        assert!(
-            (0..D).all(|d| covariance[(d, d)] >= T::zero()),
-            "{name}: covariance {covariance}"
-        );
-    }
-    assert!(
-        matching.energy.iter().all(|e| e.is_finite()),
-        "{name}: energy {:?}",
-        matching.energy
-    );
-    let report = &matching.report;
-    assert!(
-        report.residual.is_finite() && report.sigma.is_finite(),
-        "{name}: {report:?}"
-    );
-}
-
-/// No target twice; matched and unmatched rows together are all rows.
-fn assert_partition<T: Scalar, const D: usize>(
-    name: &str,
-    columns: usize,
-    matching: &Matching<T, D>,
-) {
-    let mut seen = vec![false; columns];
-    for &j in matching
-        .assignment
-        .iter()
-        .flatten()
-        .chain(&matching.unmatched_target)
-    {
-        assert!(
-            !std::mem::replace(&mut seen[j], true),
-            "{name}: target {j} twice"
-        );
-    }
-    assert!(
-        seen.iter().all(|s| *s),
-        "{name}: a target is neither matched nor unmatched"
-    );
-    let unmatched: Vec<usize> = (0..matching.assignment.len())
-        .filter(|&i| matching.assignment[i].is_none())
-        .collect();
-    assert_eq!(
-        unmatched, matching.unmatched_model,
-        "{name}: unmatched model rows"
-    );
 }
 
 /// Coordinates a caller may come with by mistake.

@@ -1,0 +1,8 @@
+//! Fuzz target: scenes, sensors, calibrations and contact tables.
+#![no_main]
+
+#[allow(dead_code)]
+#[path = "../../tests/suite/corpus/readers.rs"]
+mod readers;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| readers::toml(bytes));

@@ -1,0 +1,89 @@
+//! Point sets made from any bytes, and what must hold of every matcher's answer to them.
+//!
+//! Shared by the replay of the kept corpus and by the fuzz target `matcher` of `fuzz/`.
+
+use super::contract::{assert_consistent, matchers};
+use nalgebra::{Point, SVector};
+use tactile_match::MatchError;
+use tactile_tps::Scalar;
+
+/// Largest number of points of a set: enough for every stage of the matchers, few enough for a thousand inputs a minute.
+const MOST: usize = 24;
+
+/// Values that arithmetic meets its limits with.
+const EXTREMES: [f64; 12] = [
+    -0.0,
+    5e-324,
+    f64::MIN_POSITIVE,
+    1e-300,
+    1e9,
+    -1e12,
+    1e100,
+    1e154,
+    f64::MAX,
+    f64::MIN,
+    f64::INFINITY,
+    f64::NAN,
+];
+
+/// Reads two sets of points and gives them to every matcher, in both precisions.
+///
+/// The first byte says whether the points lie in the plane or in space and whether the target is the model moved; the second and third
+/// how many there are. Then come coordinates: a byte below 200 is a multiple of a tenth, above it an extreme value, and 255 stands before the eight
+/// bytes of any number. What is not there is zero.
+pub(crate) fn matcher(bytes: &[u8]) {
+    let mut bytes = bytes.iter().copied();
+    let mut next = || bytes.next().unwrap_or(0);
+    let kind = next();
+    let counts = [next(), next()].map(|n| usize::from(n) % MOST + 1);
+    let mut coordinate = || match next() {
+        255 => f64::from_le_bytes(std::array::from_fn(|_| next())),
+        byte if byte < 200 => f64::from(byte) / 10.0 - 10.0,
+        byte => EXTREMES[usize::from(byte) % EXTREMES.len()],
+    };
+    if kind & 1 == 0 {
+        both_precisions::<2>(kind, counts, &mut coordinate);
+    } else {
+        both_precisions::<3>(kind, counts, &mut coordinate);
+    }
+}
+
+fn both_precisions<const D: usize>(
+    kind: u8,
+    counts: [usize; 2],
+    coordinate: &mut impl FnMut() -> f64,
+) {
+    let mut point = || Point::from(SVector::from_fn(|_, _| coordinate()));
+    let model: Vec<Point<f64, D>> = (0..counts[0]).map(|_| point()).collect();
+    let target: Vec<Point<f64, D>> = if kind & 2 == 0 {
+        (0..counts[1]).map(|_| point()).collect()
+    } else {
+        let step = point();
+        model.iter().rev().map(|p| p + step.coords).collect()
+    };
+    every_matcher(&model, &target);
+    let single = |points: &[Point<f64, D>]| -> Vec<Point<f32, D>> {
+        points.iter().map(|p| p.map(|c| c as f32)).collect()
+    };
+    every_matcher(&single(&model), &single(&target));
+}
+
+/// Every matcher gives a consistent answer, or says that a coordinate cannot be used where one cannot.
+fn every_matcher<T: Scalar, const D: usize>(model: &[Point<T, D>], target: &[Point<T, D>]) {
+    // A coordinate is usable where the square of a difference of two such is finite.
+    let sixteen = nalgebra::convert(16.0);
+    let usable = |p: &Point<T, D>| p.iter().all(|&c| (c * c * sixteen).is_finite());
+    let all_usable = model.iter().chain(target).all(usable);
+    for (name, matcher) in matchers::<T, D>() {
+        match matcher.match_points(model, target) {
+            Ok(matching) => {
+                assert!(all_usable, "{name}: an answer to {model:?} and {target:?}");
+                assert_consistent(name, model, target, &matching);
+            }
+            Err(MatchError::NotFinite { .. }) => {
+                assert!(!all_usable, "{name}: {model:?} and {target:?} are finite");
+            }
+            Err(error) => panic!("{name}: {error}"),
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! What must hold of every reader for any bytes: an answer within its documented range, or an error of one sentence that names the file.
+//!
+//! Shared by the replay of the kept corpus and by the fuzz targets of `fuzz/`.
+
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use tactile_imaging::io::{CasePoints, PointTable};
+use tactile_imaging::io::{
+    Column, GreyImage, Quantity, cases::parse_cases, grid::parse_grid, image::parse_grey_image,
+    points::parse_points, points::read_point_table_in, read_grey_image_of_bits, read_table,
+};
+use tactile_imaging::scene::{Scene, read_contact_table};
+use tactile_imaging::sensor::{Sensor, SensorCalibration};
+
+/// A CSV file, read in every way that CSV files are read.
+pub(crate) fn table(bytes: &[u8]) {
+    let file = Scratch::new("table.csv", bytes);
+    let finite = |values: &[f64]| assert!(values.iter().all(|v| v.is_finite()), "{values:?}");
+    for point in answer(parse_points::<2>(bytes, "table.csv")).unwrap_or_default() {
+        finite(point.coords.as_slice());
+    }
+    for point in answer(parse_points::<3>(bytes, "table.csv")).unwrap_or_default() {
+        finite(point.coords.as_slice());
+    }
+    // The dimension that the table is found to have is one that it can be read in.
+    match answer(read_point_table_in(&file.path)) {
+        Some((PointTable::Plane(points), _)) => {
+            assert_eq!(parse_points::<2>(bytes, "table.csv").unwrap(), points);
+        }
+        Some((PointTable::Space(points), _)) => {
+            assert_eq!(parse_points::<3>(bytes, "table.csv").unwrap(), points);
+        }
+        None => {}
+    }
+    if let Some(grid) = answer(parse_grid(bytes, "table.csv")) {
+        assert!(!grid.is_empty() && grid.iter().all(|v| !v.is_infinite()));
+    }
+    let Some(table) = answer(read_table(&file.path)) else {
+        return;
+    };
+    finite(table.values.as_slice().expect("rows one after another"));
+    for (names, quantity, unit) in [
+        (["x", "indentation"], Quantity::Length, "m"),
+        (["force", "f"], Quantity::Force, "N"),
+        (["pressure", "p"], Quantity::Pressure, "Pa"),
+        (["time", "t"], Quantity::Time, "s"),
+        (["y", "value"], Quantity::Number, "1"),
+    ] {
+        let column = Column {
+            names: &names,
+            quantity,
+            unit,
+        };
+        if let Some([values]) = answer(table.columns([column], &file.path)) {
+            finite(&values);
+        }
+    }
+}
+
+/// A file of matching cases.
+pub(crate) fn case(bytes: &[u8]) {
+    for case in answer(parse_cases(bytes, "cases.txt")).unwrap_or_default() {
+        let finite = match &case.points {
+            CasePoints::Plane { model, target } => {
+                let mut points = model.iter().chain(target);
+                points.all(|p| p.iter().all(|c| c.is_finite()))
+            }
+            CasePoints::Space { model, target } => {
+                let mut points = model.iter().chain(target);
+                points.all(|p| p.iter().all(|c| c.is_finite()))
+            }
+        };
+        assert!(finite && !case.name.is_empty(), "{case:?}");
+    }
+}
+
+/// An image file, with and without the number of bits of its camera.
+pub(crate) fn image(bytes: &[u8]) {
+    let levels_are_grey = |image: GreyImage| {
+        // Half a level: where the caller says how many bits there are, the decoder's rounding may pass the largest level.
+        let grey = |level: &f64| (0.0..=255.5).contains(level);
+        assert!(image.levels.iter().all(grey) && [8, 16].contains(&image.bits));
+        assert_eq!(image.to_u8().dim(), image.levels.dim());
+    };
+    if let Some(image) = answer(parse_grey_image(bytes, "image.png")) {
+        levels_are_grey(image);
+    }
+    let file = Scratch::new("image.png", bytes);
+    for bits in [1, 12, 16] {
+        if let Some(image) = answer(read_grey_image_of_bits(&file.path, bits)) {
+            levels_are_grey(image);
+        }
+    }
+}
+
+/// A TOML file, read as a scene, a sensor, the presses of a calibration and a table of contacts.
+pub(crate) fn toml(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    answer(Scene::parse(&text, "file.toml"));
+    if let Some(sensor) = answer(Sensor::parse(&text, "file.toml")) {
+        let again = Scratch::new("file.toml", b"");
+        sensor.write(&again.path).expect("a sensor can be written");
+        Sensor::read(&again.path).expect("what was read and written is read again");
+    }
+    let file = Scratch::new("file.toml", bytes);
+    answer(SensorCalibration::read(&file.path));
+    answer(read_contact_table(&file.path));
+}
+
+/// The answer, if there is one; an error names the file and holds no value printed for debugging.
+fn answer<T, E: Display>(result: Result<T, E>) -> Option<T> {
+    let sentence = match result {
+        Ok(answer) => return Some(answer),
+        Err(error) => error.to_string(),
+    };
+    let files = ["table.csv", "cases.txt", "image.png", "file.toml"];
+    assert!(files.iter().any(|f| sentence.contains(f)), "{sentence}");
+    assert!(
+        !sentence.contains("Some(") && !sentence.contains("Err("),
+        "{sentence}"
+    );
+    None
+}
+
+/// A file in a folder that is deleted with it.
+struct Scratch {
+    path: PathBuf,
+    _folder: tempfile::TempDir,
+}
+
+impl Scratch {
+    fn new(name: impl AsRef<Path>, bytes: &[u8]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder for temporary files");
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("a temporary file");
+        Self {
+            path,
+            _folder: folder,
+        }
+    }
+}
