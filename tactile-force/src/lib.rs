@@ -44,6 +44,7 @@ mod lens;
 mod measure;
 mod pressure;
 mod shear;
+mod simd;
 
 pub use calibration::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, GreyHistogram,

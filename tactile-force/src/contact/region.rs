@@ -6,6 +6,7 @@ use super::every_nth::EveryNth;
 use super::runs::{self, Components, Run, push_runs};
 use crate::drift::{DriftLine, IlluminationDrift};
 use crate::frame::{BoundingBox, ReferenceFrame};
+use crate::simd::vectorized;
 
 /// Differences over one box, row-major, and the contact in it as runs.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +59,13 @@ impl Region {
             let line = (!drift.is_zero()).then(|| drift.line(row, place.column_start));
             // Slices, where the layout allows, turn into wide instructions.
             match (f.to_slice(), r.to_slice()) {
-                (Some(f), Some(r)) => extend(&mut self.difference, f.iter().zip(r), line, sign),
+                (Some(frame), Some(mean)) => vectorized(RowDifferences {
+                    differences: &mut self.difference,
+                    frame,
+                    mean,
+                    line,
+                    sign,
+                }),
                 _ => extend(&mut self.difference, f.iter().zip(r), line, sign),
             }
             if let Some(line) = flat.map(|f| f.line(row, place.column_start)) {
@@ -88,9 +95,12 @@ impl Region {
             &self.smooth
         };
         self.mask.clear();
-        for (y, row) in smooth.chunks(columns).enumerate() {
-            push_runs(&mut self.mask, y, row, |s| *s > limit);
-        }
+        vectorized(Threshold {
+            mask: &mut self.mask,
+            smooth,
+            columns,
+            limit,
+        });
         let (kept, others) = self.components.keep_largest(&mut self.mask, notable);
         let filled = self
             .components
@@ -143,7 +153,27 @@ impl Region {
     }
 }
 
+/// Appends the differences of a row whose pixels lie side by side.
+struct RowDifferences<'a> {
+    differences: &'a mut Vec<f32>,
+    frame: &'a [u8],
+    mean: &'a [f32],
+    line: Option<DriftLine>,
+    sign: f32,
+}
+
+impl pulp::NullaryFnOnce for RowDifferences<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let pixels = self.frame.iter().zip(self.mean);
+        extend(self.differences, pixels, self.line, self.sign);
+    }
+}
+
 /// Appends the differences of one row.
+#[inline(always)]
 fn extend<'a>(
     differences: &mut Vec<f32>,
     pixels: impl Iterator<Item = (&'a u8, &'a f32)>,
@@ -165,13 +195,43 @@ fn extend<'a>(
 
 /// Greatest of the values and zero.
 pub(super) fn greatest(values: &[f32]) -> f32 {
-    let larger = |a: f32, b: f32| if b > a { b } else { a };
-    let mut lanes = [0.0_f32; 16];
-    let (chunks, rest) = values.as_chunks::<16>();
-    for chunk in chunks {
-        lanes = std::array::from_fn(|k| larger(lanes[k], chunk[k]));
+    vectorized(Greatest(values))
+}
+
+struct Greatest<'a>(&'a [f32]);
+
+impl pulp::NullaryFnOnce for Greatest<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn call(self) -> f32 {
+        let larger = |a: f32, b: f32| if b > a { b } else { a };
+        let mut lanes = [0.0_f32; 16];
+        let (chunks, rest) = self.0.as_chunks::<16>();
+        for chunk in chunks {
+            lanes = std::array::from_fn(|k| larger(lanes[k], chunk[k]));
+        }
+        lanes.iter().chain(rest).copied().fold(0.0, larger)
     }
-    lanes.iter().chain(rest).copied().fold(0.0, larger)
+}
+
+/// The runs of every row of a smoothed region that exceed a limit.
+struct Threshold<'a> {
+    mask: &'a mut Vec<Run>,
+    smooth: &'a [f32],
+    columns: usize,
+    limit: f32,
+}
+
+impl pulp::NullaryFnOnce for Threshold<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (y, row) in self.smooth.chunks(self.columns).enumerate() {
+            push_runs(self.mask, y, row, |s| *s > self.limit);
+        }
+    }
 }
 
 /// Sums over a box of odd width centred at every pixel; beyond the region there is nothing to add.

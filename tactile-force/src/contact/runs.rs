@@ -24,6 +24,7 @@ impl Run {
 const BLOCK: usize = 32;
 
 /// Appends the runs of a row where `inside` holds.
+#[inline(always)]
 pub(super) fn push_runs<P>(
     runs: &mut Vec<Run>,
     row: usize,

@@ -2,6 +2,7 @@
 
 use super::region::Region;
 use crate::frame::DifferenceNoise;
+use crate::simd::vectorized;
 
 /// Sums over the aperture; coordinates are relative to the region's first pixel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,7 +29,8 @@ impl Sums {
                 cubes(last) - cubes(first - 1.0),
                 y * y * n,
             ];
-            let [d0, d1, d2] = moments(&region.difference[run.span(columns)]);
+            let differences = &region.difference[run.span(columns)];
+            let [d0, d1, d2] = vectorized(Moments(differences));
             let weighted = [
                 d0,
                 d1 + first * d0,
@@ -76,25 +78,32 @@ impl Sums {
 }
 
 /// Σ d, Σ x d, Σ x² d for x = 0, 1, …; in lanes, so that no sum waits for the one before.
-fn moments(differences: &[f32]) -> [f64; 3] {
-    const LANES: usize = 8;
-    let mut lanes = [[0.0; LANES]; 3];
-    let mut x: [f64; LANES] = std::array::from_fn(|k| k as f64);
-    let (chunks, rest) = differences.as_chunks::<LANES>();
-    for chunk in chunks {
-        for k in 0..LANES {
-            let d = f64::from(chunk[k]);
+struct Moments<'a>(&'a [f32]);
+
+impl pulp::NullaryFnOnce for Moments<'_> {
+    type Output = [f64; 3];
+
+    #[inline(always)]
+    fn call(self) -> [f64; 3] {
+        const LANES: usize = 8;
+        let mut lanes = [[0.0; LANES]; 3];
+        let mut x: [f64; LANES] = std::array::from_fn(|k| k as f64);
+        let (chunks, rest) = self.0.as_chunks::<LANES>();
+        for chunk in chunks {
+            for k in 0..LANES {
+                let d = f64::from(chunk[k]);
+                lanes[0][k] += d;
+                lanes[1][k] += x[k] * d;
+                lanes[2][k] += x[k] * x[k] * d;
+                x[k] += LANES as f64;
+            }
+        }
+        for (k, d) in rest.iter().enumerate() {
+            let d = f64::from(*d);
             lanes[0][k] += d;
             lanes[1][k] += x[k] * d;
             lanes[2][k] += x[k] * x[k] * d;
-            x[k] += LANES as f64;
         }
+        lanes.map(|sums| sums.iter().sum())
     }
-    for (k, d) in rest.iter().enumerate() {
-        let d = f64::from(*d);
-        lanes[0][k] += d;
-        lanes[1][k] += x[k] * d;
-        lanes[2][k] += x[k] * x[k] * d;
-    }
-    lanes.map(|sums| sums.iter().sum())
 }

@@ -1,6 +1,7 @@
 //! Pixels gathered into thin rings about a centre.
 
 use crate::contact::{EveryNth, Region};
+use crate::simd::vectorized;
 
 /// Sums over the pixels of one ring; (u, v) is a pixel's place relative to the centre, d its difference. Four by four, so
 /// that a pixel is added with a few wide instructions.
@@ -108,11 +109,7 @@ impl Rings {
             wide,
             every: region.every_nth(&region.aperture, step),
         };
-        #[cfg(target_arch = "x86_64")]
-        if let Some(simd) = pulp::x86::V3::try_new() {
-            return simd.vectorize(gather);
-        }
-        pulp::NullaryFnOnce::call(gather);
+        vectorized(gather);
     }
 }
 
