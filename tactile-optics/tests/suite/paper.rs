@@ -95,7 +95,9 @@ fn indices_and_abbe_numbers_of_the_materials() {
         assert!((material.index(0.6e-6_f64).unwrap() - at_600).abs() < 5.6e-4);
     }
     assert!((Dispersion::PDMS_RTV615.index(0.6e-6_f32).unwrap() - 1.4297).abs() < 1e-3);
+    // The published fit ends at 750 nm, on both sides nothing is extrapolated.
     assert!(Dispersion::PDMS_10_1.index(0.3e-6_f64).is_err());
+    assert!(Dispersion::PDMS_10_1.index(0.85e-6_f64).is_err());
     assert!(Dispersion::N_BK7.index(f64::NAN).is_err());
     // Normal dispersion: the index falls with the wavelength.
     let falling = |m: Dispersion| {
