@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod architecture;
+mod assumptions;
 mod corpus;
 mod finite_element_presses;
 mod force_on_simulated_frames;

@@ -1,0 +1,222 @@
+//! A sensor and a press as they are, and as the user states them.
+use nalgebra::DMatrix;
+use tactile_imaging::elasticity::contact::{Layer, Waveguide};
+use tactile_imaging::elasticity::fem::{self, Guide, Interface, Material, Press};
+use tactile_imaging::pipeline::{
+    EstimatorChoice, Measurement, Object, Pipeline, StagesConfig, Trial,
+};
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, ContactLaw, ContactState, Illumination, Load, PressOptions,
+    Response,
+};
+
+pub(super) const RADIUS_M: f64 = 3e-3;
+pub(super) const MODULUS_PA: f64 = 103e3;
+const LOADS_N: [f64; 2] = [0.7, 1.2];
+
+/// The paper's camera with pixels four times as wide over the same 30 mm.
+fn coarse() -> Camera {
+    let camera = Camera::default();
+    Camera {
+        shape: [260, 348],
+        pixel_size_m: camera.pixel_size_m.map(|p| 4.0 * p),
+        ..camera
+    }
+}
+
+/// What is pressed: always solved by finite elements at finite strain.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum Sample {
+    /// The paper's ball of 103 kPa on its guide, ν = ½.
+    #[default]
+    Ball,
+    /// The same ball with this Poisson's ratio.
+    Compressible(f64),
+    /// The flat face of a cylinder between plates, sliding or sticking.
+    Face(Interface),
+}
+
+/// How things are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct World {
+    pub(super) sample: Sample,
+    /// Light goes as this power of the pressure.
+    pub(super) exponent: f64,
+    pub(super) camera: Camera,
+    /// Brightness of the lamps in the two frames.
+    pub(super) levels: [f64; 2],
+    /// Largest difference between loading and unloading over the range, in the calibration.
+    pub(super) hysteresis: f64,
+    /// The gauge shows so many times the force.
+    pub(super) gauge: f64,
+}
+
+/// What the user says of them: relative to the truth, with relative standard errors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stated {
+    pub(super) object: Object,
+    pub(super) estimator: EstimatorChoice,
+    pub(super) layer_moduli: f64,
+    pub(super) layer_error: f64,
+    pub(super) force_error: f64,
+    pub(super) pixel_size: f64,
+    pub(super) length_error: f64,
+    pub(super) radius_error: f64,
+    pub(super) poisson_error: f64,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self {
+            sample: Sample::Ball,
+            exponent: 1.0,
+            camera: coarse(),
+            levels: [1.0; 2],
+            hysteresis: 0.0,
+            gauge: 1.0,
+        }
+    }
+}
+
+impl Default for Stated {
+    /// Everything rightly, and nothing said of errors.
+    fn default() -> Self {
+        Self {
+            object: Object::sphere(RADIUS_M),
+            estimator: EstimatorChoice::default(),
+            layer_moduli: 1.0,
+            layer_error: 0.0,
+            force_error: 0.0,
+            pixel_size: 1.0,
+            length_error: 0.0,
+            radius_error: 0.0,
+            poisson_error: 0.0,
+        }
+    }
+}
+
+impl Sample {
+    /// The contacts at both loads; none where the simulator brings them along.
+    fn states(self, options: &PressOptions) -> Option<Vec<ContactState>> {
+        let material = options.object.material;
+        match self {
+            Self::Ball => None,
+            Self::Compressible(poisson_ratio) => {
+                let material = Material::new(MODULUS_PA, poisson_ratio).unwrap();
+                Some(on_the_guide(material, options))
+            }
+            Self::Face(faces) => {
+                let (radius_m, height_m) = (6e-3, 8e-3);
+                let states = ContactState::of_squeezed_cylinder(
+                    radius_m, height_m, &material, faces, &LOADS_N,
+                );
+                Some(states.unwrap())
+            }
+        }
+    }
+}
+
+fn on_the_guide(material: Material, options: &PressOptions) -> Vec<ContactState> {
+    let layers = options.waveguide.layers.iter().map(|layer| fem::Layer {
+        thickness_m: layer.thickness_m,
+        material: Material::new(layer.material.youngs_modulus_pa, 0.4999).unwrap(),
+    });
+    let ball = fem::Object::Ball { radius_m: RADIUS_M };
+    let press = Press::new(ball, material).unwrap();
+    let press = press.on_guide(Guide::new(layers.collect(), 28e-3).unwrap());
+    let scene = press.unwrap().scene().unwrap();
+    let states = scene.solve(&LOADS_N.map(fem::Load::Force)).states;
+    let contact = |state: &fem::State| {
+        let points = state.pressure().iter();
+        let contact_radius_m = state.contact_radius().expect("a contact").radius_m;
+        let mut contact = ContactState {
+            force_n: state.force_n(),
+            contact_radius_m,
+            indentation_m: state.approach_m(),
+            radius_m: points.clone().map(|p| p.r_m).collect(),
+            pressure_pa: points.clone().map(|p| p.pressure_pa).collect(),
+            height_m: points.map(|p| p.z_m - state.approach_m()).collect(),
+        };
+        contact.radius_m.push(contact_radius_m);
+        contact.pressure_pa.push(0.0);
+        contact
+            .height_m
+            .push(*contact.height_m.last().expect("points"));
+        contact
+    };
+    states.iter().map(contact).collect()
+}
+
+impl World {
+    /// Calibrated, pressed and measured as the user states it.
+    pub(super) fn measure(&self, stated: &Stated, seed: u64) -> Measurement {
+        let load = |(force_n, level): (f64, f64)| Load {
+            illumination: Illumination {
+                level,
+                ..Illumination::default()
+            },
+            ..Load::normal(force_n)
+        };
+        let mut options = PressOptions {
+            camera: self.camera,
+            response: match self.exponent {
+                1.0 => Response::Linear,
+                exponent => Response::Power { exponent },
+            },
+            loads: LOADS_N.into_iter().zip(self.levels).map(load).collect(),
+            seed,
+            ..PressOptions::finite_elements()
+        };
+        assert_eq!(options.object.material.youngs_modulus_pa, MODULUS_PA);
+        if let Some(states) = self.sample.states(&options) {
+            options.law = ContactLaw::Tabulated(states);
+        }
+        let calibration = CalibrationOptions {
+            hysteresis: self.hysteresis,
+            ..CalibrationOptions::default()
+        };
+        let mut trial = Trial::new(options, &calibration).unwrap();
+        for pair in &mut trial.pairs {
+            pair.force_n *= self.gauge;
+        }
+        let pipeline = stated.pipeline(&trial);
+        trial.press(&pipeline).unwrap().measure()
+    }
+}
+
+impl Stated {
+    fn pipeline(&self, trial: &Trial) -> Pipeline {
+        let layers = &trial.scene.options().waveguide.layers;
+        let layer = |l: &tactile_imaging::simulate::WaveguideLayer| Layer {
+            thickness_m: l.thickness_m,
+            youngs_modulus_pa: self.layer_moduli * l.material.youngs_modulus_pa,
+            poisson_ratio: l.material.poisson_ratio,
+        };
+        let guide = Waveguide::new(layers.iter().map(layer).collect()).unwrap();
+        // The moduli of all layers have one error in common; ln E of the layers comes first.
+        let n = layers.len();
+        let covariance = DMatrix::from_fn(3 * n, 3 * n, |i, j| {
+            if i < n && j < n {
+                self.layer_error.powi(2)
+            } else {
+                0.0
+            }
+        });
+        let stages = StagesConfig {
+            estimator: self.estimator,
+            ..StagesConfig::default()
+        };
+        let size = trial.simulation.pixel_size_m.map(|p| self.pixel_size * p);
+        let pipeline = Pipeline::from_pairs(&trial.pairs, size, self.object).unwrap();
+        pipeline
+            .with_waveguide(guide)
+            .with_layer_covariance(covariance)
+            .unwrap()
+            .with_scale_errors(self.force_error, self.length_error)
+            .unwrap()
+            .with_object_errors(self.radius_error * RADIUS_M, self.poisson_error)
+            .unwrap()
+            .with_stages(&stages)
+            .unwrap()
+    }
+}
