@@ -67,6 +67,33 @@ fn a_series_agrees_with_matches_made_anew() {
     }
 }
 
+/// `Near` leaves out the other starts and the average over scales: on the sets it is meant for it finds every partner, and the thorough search's warp.
+#[test]
+fn a_near_search_finds_what_a_thorough_one_finds() {
+    let model = dome(150);
+    for noise in [0.0, 0.003, 0.01] {
+        for k in [1, 4, 8] {
+            let target = frame(&model, k, noise);
+            let found = near().match_points(&model, &target).unwrap();
+            let thorough = AnnealedSoftassign::default()
+                .match_points(&model, &target)
+                .unwrap();
+            assert_eq!(found.assignment, (0..150).map(Some).collect::<Vec<_>>());
+            // The thorough search is the more careful: of a hundred noisy points it may leave one without a partner.
+            let pairs = found.assignment.iter().zip(&thorough.assignment);
+            assert!(pairs.filter(|(a, b)| a != b).count() <= 2);
+            for (a, b) in found.warped.iter().zip(&thorough.warped) {
+                // Each is no farther off than a corner of the noise's cube, √3 of its half side.
+                assert!(
+                    (a - b).norm() < 1e-12 + 2.0 * 3_f64.sqrt() * noise,
+                    "{a} {b}"
+                );
+            }
+            assert_eq!(found.report.starts, 1);
+        }
+    }
+}
+
 #[test]
 fn a_target_far_from_the_last_is_matched_all_the_same() {
     let (model, mut warm) = (dome(120), WarmStart::new());
