@@ -48,6 +48,9 @@ impl ContactMesh {
     }
 }
 
+/// Between a ball's core and the first shell, as a share of an element.
+const CORNER_ROOM: f64 = 0.05;
+
 /// A spherical inclusion on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Inclusion {
@@ -154,12 +157,15 @@ impl Mesh {
             debug_assert!(c >= 0.0);
             [circle * from_axis.sin(), top - 2.0 * circle * half * half]
         };
+        // The shells are nearer to the pole inside the ball than on its surface: on a fine mesh they would cut the corner.
+        let [r, z] = shell(start, 2 * m);
+        let corner = size.corner().min(r.hypot(z) - CORNER_ROOM * first);
         let pole = Pole {
             elements: m,
             core: size.inner / radius,
             axis: [0.0, size.inner],
             // The core's free corner lies inside the square's, which opens the angle there.
-            corner: [core::f64::consts::FRAC_1_SQRT_2 * size.corner(); 2],
+            corner: [core::f64::consts::FRAC_1_SQRT_2 * corner; 2],
             surface: |angle: f64| {
                 let half = (0.5 * angle).sin();
                 [radius * angle.sin(), 2.0 * radius * half * half]

@@ -346,6 +346,17 @@ fn presses_of_other_proportions_are_refused() {
     );
 }
 
+/// The ball's shells stay clear of its core whatever the number of elements.
+#[test]
+fn a_ball_can_be_meshed_at_any_fineness() {
+    let ball = Object::Ball { radius_m: 3e-3 };
+    let press = Press::new(ball, Material::new(103e3, 0.495).unwrap()).unwrap();
+    for fineness in 2..=24 {
+        let scene = press.clone().with_fineness(fineness).unwrap().scene();
+        assert!(scene.is_ok(), "{fineness}: {:?}", scene.err());
+    }
+}
+
 #[test]
 fn a_soft_cylinder_on_a_flat_is_stiffer_than_a_free_column() {
     let (radius_m, height_m, modulus) = (2e-3, 20e-3, 50e3);
