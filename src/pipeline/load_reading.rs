@@ -44,7 +44,8 @@ impl LoadReading {
                 .map(|depth| Estimate::new(depth.value, depth.standard_error)),
             face_m2: contact
                 .face
-                .map(|face| Estimate::new(face.area_m2.value, face.area_m2.standard_error)),
+                .map(|face| face.area_m2)
+                .map(|area| area_with_floor(area.value, area.standard_error, pixel_size_m)),
             mean_strain,
         })
     }
@@ -66,6 +67,19 @@ pub(super) fn radius_with_floor(
 ) -> Estimate<f64> {
     let floor = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
     Estimate::new(value, standard_error.hypot(floor))
+}
+
+/// The area of a face with what no outline can know better: a hundredth of a pixel all around it, by which speckles at the rim, blur and
+/// rounding shift the outline from one load to the next. Without it 88 % of the 95 % intervals hold, with it 97 % (`SCENES=400 cargo test --release --test
+/// suite moduli_of_blocks -- --nocapture`).
+pub(super) fn area_with_floor(
+    value: f64,
+    standard_error: f64,
+    pixel_size_m: [f64; 2],
+) -> Estimate<f64> {
+    let shift_m = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
+    let outline_m = 2.0 * (std::f64::consts::PI * value).sqrt();
+    Estimate::new(value, standard_error.hypot(shift_m * outline_m))
 }
 
 /// Loads and the relative errors they share. Of the calibration's errors the smallest relative one is common to all loads (the

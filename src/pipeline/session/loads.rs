@@ -1,7 +1,7 @@
 //! The loads that a session has seen: a bounded number, similar ones merged.
 use crate::elasticity::modulus::Estimate;
 use crate::pipeline::contact::ContactReading;
-use crate::pipeline::load_reading::{LoadReading, radius_with_floor};
+use crate::pipeline::load_reading::{LoadReading, area_with_floor, radius_with_floor};
 
 /// Loads that a session keeps apart; more are merged.
 ///
@@ -92,7 +92,9 @@ impl MergedLoad {
                 pixel_size_m,
             )),
             indentation_m: self.indentation_m,
-            face_m2: self.face_m2,
+            face_m2: self
+                .face_m2
+                .map(|area| area_with_floor(area.value, area.standard_error, pixel_size_m)),
             mean_strain: self.mean_strain,
         }
     }
