@@ -170,7 +170,8 @@ impl<T: Real> StressCalibration<T> for LinearCalibration<T> {
     fn error_covariance_n2(&self, a: T, b: T) -> T {
         let (level, slope) = (self.level_n.standard_error, self.slope_n.standard_error);
         let (a, b) = (a - self.centre, b - self.centre);
-        level * level + slope * a * (slope * b) + self.covariance * (a + b)
+        let branch = self.report.branch_error_n();
+        level * level + slope * a * (slope * b) + self.covariance * (a + b) + branch * branch
     }
 
     fn integrated_pixel_value(&self, force_n: T) -> Option<T> {

@@ -95,7 +95,8 @@ pub trait StressCalibration<T: Real>: Send + Sync {
     /// dF/dV, in newtons per grey level.
     fn sensitivity_n(&self, integrated_pixel_value: T) -> T;
 
-    /// Standard error of the force due to the uncertainty of the calibration's own parameters, in newtons.
+    /// Standard error of the force due to the uncertainty of the calibration's own parameters and to the difference of its branches
+    /// ([`Hysteresis::width_n`]), in newtons.
     fn standard_error_n(&self, integrated_pixel_value: T) -> T;
 
     /// Covariance of the calibration's errors at two integrated pixel values, in N²; at one and the same it is the square of

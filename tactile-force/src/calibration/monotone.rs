@@ -316,7 +316,9 @@ impl<T: Real> StressCalibration<T> for MonotoneCalibration<T> {
     }
 
     fn standard_error_n(&self, integrated_pixel_value: T) -> T {
-        evaluate(&self.knots, integrated_pixel_value).2
+        evaluate(&self.knots, integrated_pixel_value)
+            .2
+            .hypot(self.report.branch_error_n())
     }
 
     fn integrated_pixel_value(&self, force_n: T) -> Option<T> {

@@ -160,7 +160,8 @@ impl<T: Real> StressCalibration<T> for PolynomialCalibration<T> {
                 covariance += a * b * self.covariance[i * terms + j].as_f64()
             });
         });
-        T::nearest(covariance)
+        let branch = self.report.branch_error_n();
+        T::nearest(covariance) + branch * branch
     }
 
     fn integrated_pixel_value(&self, force_n: T) -> Option<T> {

@@ -24,6 +24,9 @@ use crate::estimate::{Estimate, Real};
 /// let hysteresis = line.report().hysteresis.expect("both branches");
 /// assert!((hysteresis.mean_n.value - 0.01).abs() < 1e-12);
 /// assert!((hysteresis.share_of_full_scale - 0.01 / 1.01).abs() < 1e-9);
+/// // The line lies between the branches, and says so of a force whose branch it is not told.
+/// assert!((hysteresis.width_n - 0.005).abs() < 1e-12);
+/// assert!((line.standard_error_n(5.0) - 0.005).abs() < 3e-4);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,9 @@ pub struct Hysteresis<T> {
     pub greatest_n: T,
     /// Mean difference over the range both branches cover, and its standard error, in newtons.
     pub mean_n: Estimate<T>,
+    /// Half of the mean difference where it exceeds three times its own error, else zero, in newtons: the standard error of every force
+    /// whose branch is not known, common to all of them, and part of what the calibration states.
+    pub width_n: T,
     /// |greatest| as a share of the full scale.
     pub share_of_full_scale: T,
 }
@@ -88,6 +94,13 @@ pub struct CalibrationReport<T> {
     pub iterations: usize,
     /// Why the fit stopped.
     pub stop: StopReason,
+}
+
+impl<T: Real> CalibrationReport<T> {
+    /// Standard error of a force whose branch is not known; 0 where the branches were not compared.
+    pub(super) fn branch_error_n(&self) -> T {
+        self.hysteresis.map_or(T::zero(), |h| h.width_n)
+    }
 }
 
 /// Properties of the fitted curve that a report states.
@@ -246,8 +259,17 @@ fn hysteresis<T: Real>(
     Some(Hysteresis {
         greatest_n: T::nearest(greatest),
         mean_n: Estimate::nearest(mean, variance),
+        width_n: T::nearest(width(mean, variance)),
         share_of_full_scale: T::nearest(greatest.abs() / full_scale),
     })
+}
+
+/// Half of a difference that stands out of its error. What noise alone makes must not widen the errors of calibrations without
+/// hysteresis: three standard errors let one in 400 through.
+fn width(difference: f64, variance: f64) -> f64 {
+    const STANDS_OUT: f64 = 3.0;
+    let is_real = difference.abs() > STANDS_OUT * variance.sqrt();
+    if is_real { 0.5 * difference.abs() } else { 0.0 }
 }
 
 /// Piecewise linear through points sorted by abscissa; `None` outside them.

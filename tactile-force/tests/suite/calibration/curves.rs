@@ -78,6 +78,13 @@ fn hysteresis_is_measured_with_its_sign() {
     assert!((h.greatest_n - 0.02).abs() < 5e-4, "{h:?}");
     assert!((h.mean_n.value - 0.08 / 6.0).abs() < 5e-4, "{h:?}");
     assert!((h.share_of_full_scale - 0.01).abs() < 3e-4, "{h:?}");
+    // The curves lie between the branches: what they state of one force holds half of the difference, and of two it is common.
+    assert!((h.width_n / (0.04 / 6.0) - 1.0).abs() < 0.05, "{h:?}");
+    for curve in all(&pairs, &options(false, Robustness::None)) {
+        let (low, high) = (0.8e6, 2.4e6);
+        assert!(curve.standard_error_n(low) >= h.width_n);
+        assert!(curve.error_covariance_n2(low, high) >= 0.9 * h.width_n.powi(2));
+    }
 }
 
 #[test]
