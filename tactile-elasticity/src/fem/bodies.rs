@@ -48,7 +48,8 @@ impl ContactMesh {
     }
 }
 
-/// Between a ball's core and the first shell, as a share of an element.
+/// Between a ball's core and the first shell, as a share of an element. With 0.02 the mesh of sixteen elements has one without area, with
+/// 0.05 and 0.2 all from 2 to 24 are sound (the test `a_ball_can_be_meshed_at_any_fineness`); more squeezes the core's corner instead.
 const CORNER_ROOM: f64 = 0.05;
 
 /// A spherical inclusion on the axis.

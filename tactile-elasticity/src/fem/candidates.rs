@@ -6,6 +6,7 @@ use super::gap::{Gap, averaged};
 use super::material::Kinematics;
 use super::model::Model;
 use super::placement::Placement;
+use super::stick::Slip;
 
 /// Part of a node's area that has something opposite to it, below which the node is open.
 const LEAST_SHARE: f64 = 0.25;
@@ -18,6 +19,8 @@ pub(crate) struct Candidate {
     pub(crate) gap: Gap,
     /// λ − ε g: the pressure per reference area if positive.
     pub(crate) pressure: f64,
+    /// From where it sticks, if it does.
+    pub(crate) slip: Option<Slip>,
 }
 
 impl Model {
@@ -58,6 +61,8 @@ impl Model {
                     index,
                     gap: averaged(around, total),
                     pressure: fields.multipliers[index] - node.penalty * value,
+                    slip: (fields.anchors.get(index))
+                        .and_then(|anchor| anchor.as_ref().map(|anchor| anchor.slip(fields))),
                 });
             }
         }

@@ -59,6 +59,7 @@ pub(crate) struct ContactPoint {
 /// A node of a contact surface, which carries a pressure.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactNode {
+    pub(crate) pair: usize,
     pub(crate) node: usize,
     /// Reference area of the hat function.
     pub(crate) weight: f64,
@@ -168,6 +169,7 @@ pub(crate) fn contact_segments(
                 let known = corners.iter().position(|corner| corner.node == node);
                 let index = known.unwrap_or_else(|| {
                     corners.push(ContactNode {
+                        pair,
                         node,
                         weight: 0.0,
                         penalty: f64::INFINITY,

@@ -2,6 +2,7 @@
 
 use super::element::ALL;
 use super::model::Model;
+use super::stick::Anchor;
 
 /// The unknowns: displacements, element pressures and the approach.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +15,8 @@ pub(crate) struct Fields {
     pub(crate) multipliers: Vec<f64>,
     /// Contact pressures per reference area, unknowns of their own as element pressures are.
     pub(crate) contact: Vec<f64>,
+    /// Where contact nodes stick; empty where surfaces slide.
+    pub(crate) anchors: Vec<Option<Anchor>>,
 }
 
 impl Fields {
@@ -24,6 +27,11 @@ impl Fields {
             approach: 0.0,
             multipliers: vec![0.0; model.contact_nodes.len()],
             contact: vec![0.0; model.contact_nodes.len()],
+            anchors: if model.sticks {
+                vec![None; model.contact_nodes.len()]
+            } else {
+                Vec::new()
+            },
         }
     }
 

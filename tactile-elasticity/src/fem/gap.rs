@@ -21,6 +21,13 @@ pub(crate) struct Gap {
     pub(crate) axial: f64,
 }
 
+/// The point of a surface that is closest to another.
+pub(crate) struct Nearest {
+    pub(crate) at: CurvePoint,
+    /// Parameter on its edge.
+    xi: f64,
+}
+
 /// The average of gaps with weights that sum to `total`.
 pub(crate) fn averaged(gaps: &[(Gap, f64)], total: f64) -> Gap {
     let mut dofs: Vec<usize> = Vec::with_capacity(24);
@@ -115,10 +122,9 @@ impl Placement<'_> {
         })
     }
 
-    /// Distance to the closest point of the deformed surface, along its normal.
-    fn surface_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
-        let position = combine(&point.shape, point.nodes, |n| self.current(n));
-        let mut best: Option<(f64, CurvePoint, f64, bool)> = None;
+    /// The closest point of a deformed surface; `None` beyond its outer end.
+    pub(crate) fn nearest(&self, curve: &SurfaceCurve, position: [f64; 2]) -> Option<Nearest> {
+        let mut best: Option<(f64, Nearest, bool)> = None;
         for (index, edge) in curve.edges().iter().enumerate() {
             let [a, _, b] = edge.map(|node| self.current(node));
             let length = (b[0] - a[0]).hypot(b[1] - a[1]);
@@ -136,13 +142,17 @@ impl Placement<'_> {
             let distance = (position[0] - r).hypot(position[1] - z);
             if best.as_ref().is_none_or(|(least, ..)| distance < *least) {
                 let beyond = index + 1 == curve.edges().len() && xi >= 1.0;
-                best = Some((distance, at, xi, beyond));
+                best = Some((distance, Nearest { at, xi }, beyond));
             }
         }
-        let (_, at, xi, beyond) = best?;
-        if beyond {
-            return None;
-        }
+        let (_, nearest, beyond) = best?;
+        (!beyond).then_some(nearest)
+    }
+
+    /// Distance to the closest point of the deformed surface, along its normal.
+    fn surface_gap(&self, point: &ContactPoint, curve: &SurfaceCurve) -> Option<Gap> {
+        let position = combine(&point.shape, point.nodes, |n| self.current(n));
+        let Nearest { at, xi } = self.nearest(curve, position)?;
         let on_curve = at.sum(&at.position, |n| self.current(n));
         let along = at.sum(&at.first, |n| self.current(n));
         let bend = at.sum(&BEND, |n| self.current(n));
@@ -202,7 +212,7 @@ impl Placement<'_> {
     }
 
     /// Edge and parameter of a surface's point at a reference radius.
-    fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
+    pub(crate) fn opposite(&self, curve: &SurfaceCurve, radius: f64) -> Option<(usize, f64)> {
         let edge = curve.edges().iter().position(|edge| {
             let [a, _, b] = edge.map(|node| self.nodes[node][0]);
             a <= radius && radius <= b

@@ -1,7 +1,7 @@
 //! Axisymmetric finite elements at finite strain, with contact between deformable bodies.
 //!
-//! Bodies of revolution of compressible neo-Hookean material (or of Hooke's law) meet without friction
-//! or bonded: a soft ball on a rigid flat or on a layered guide, a guide's face on a block of tissue
+//! Bodies of revolution of compressible neo-Hookean material (or of Hooke's law) meet without friction,
+//! without slip or bonded: a soft ball on a rigid flat or on a layered guide, a guide's face on a block of tissue
 //! with a stiff inclusion. Loads are forces or approaches; what is not reached ends in a report.
 //!
 //! [`Scene`] has the ready models, [`Press`] balls, half balls, cylinders, plates and cones on a guide or a rigid flat, [`Model`] puts
@@ -45,7 +45,8 @@
 //! converges. Contact without friction: pressures piecewise linear on the nodes of one surface, gaps to
 //! the closest points of the other's edges, integrated from one end of these edges to the next
 //! (segment-to-segment), augmented Lagrangian, the contact zone of each iteration by a primal–dual active
-//! set. Surfaces that touch from the start and only slide share their axial displacements instead.
+//! set. Contact without slip: nodes are held along the surface, by a penalty, where they first touched, in load steps of a tenth.
+//! Surfaces that touch from the start and only slide share their axial displacements instead.
 //!
 //! Measured against independent finite-element programs at ν = 0.495: a ball on a rigid flat up to
 //! a/R = 0.9 within 0.2 % in contact radius and 0.1 % in approach at given force; a bonded block with an
@@ -54,7 +55,10 @@
 //! up to a/R = 1.07 within 0.2 % in contact radius and 0.3 % in approach at given force, 0.6 % in force at
 //! given contact radius (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
 //!
+//! Without slip a flat punch follows Spence within 0.05 % at ν = 0, 0.3 and 0.45, a ball's stiffness within 0.3 % at ν = 0.3.
+//!
 //! # References
+//! D. A. Spence, Proc. R. Soc. A 305 (1968) 55–80; F. M. Borodich and L. M. Keer, Int. J. Solids Struct. 41 (2004) 2479–2499 (contact without slip).
 //! T. J. R. Hughes, *The Finite Element Method* (1987). P. Wriggers, *Computational Contact Mechanics*
 //! (2006). M. Hintermüller, K. Ito & K. Kunisch, SIAM J. Optim. 13 (2003) 865. B. Yang, T. A. Laursen &
 //! X. Meng, Int. J. Numer. Meth. Eng. 62 (2005) 1183.
@@ -87,6 +91,7 @@ mod slide;
 mod sparse;
 mod squeeze;
 mod state;
+mod stick;
 mod stress;
 mod system;
 mod tangent;

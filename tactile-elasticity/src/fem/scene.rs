@@ -12,7 +12,7 @@ use super::state::State;
 use crate::ElasticityError;
 use crate::error::{Quantity, positive};
 
-/// What lies between a guide's face and a block's surface.
+/// Whether two surfaces that are pressed together slide.
 ///
 /// ```
 /// use tactile_elasticity::fem::{Block, Guide, Interface, Layer, Load, Material, Scene};
@@ -29,9 +29,9 @@ use crate::error::{Quantity, positive};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Interface {
-    /// The two move together.
+    /// The two move together, from the start or from where they first touch.
     Bonded,
-    /// They slide on each other. They are not let part: the pressure is positive where they press.
+    /// They slide on each other. A guide and a block are not let part: the pressure is positive where they press.
     Frictionless,
 }
 

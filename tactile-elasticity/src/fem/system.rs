@@ -49,10 +49,11 @@ impl Model {
         margin: f64,
     ) -> Option<System<'_>> {
         let candidates = self.candidates(fields, 2.0 * margin.abs());
-        let gaps = candidates
-            .iter()
-            .map(|candidate| candidate.gap.dofs.as_slice());
-        let matrix = Symmetric::zero(layout.pattern(&self.elements, gaps).ok()?);
+        let coupled = candidates.iter().flat_map(|candidate| {
+            let slip = candidate.slip.as_ref().map(|slip| slip.dofs.as_slice());
+            core::iter::once(candidate.gap.dofs.as_slice()).chain(slip)
+        });
+        let matrix = Symmetric::zero(layout.pattern(&self.elements, coupled).ok()?);
         let (slots, places, equations) = (layout.slots(), layout.places(), layout.equations);
         let mut base = Tangent {
             matrix,
@@ -84,6 +85,12 @@ impl Model {
         for (slot, force) in slots.iter().zip(&self.external) {
             if let Slot::Equation(equation) = slot {
                 base.right[*equation] += force;
+            }
+        }
+        for candidate in &candidates {
+            if let Some(slip) = &candidate.slip {
+                let node = &self.contact_nodes[candidate.index];
+                base.add_slip(&slots, slip, node.weight * node.penalty);
             }
         }
         // Residual with the contacts at this state, before their turning is added.
@@ -239,6 +246,7 @@ impl Step {
             pressures: pressures.map(|(old, new)| along(old, new)).collect(),
             approach: fields.approach + length * self.approach,
             multipliers: fields.multipliers.clone(),
+            anchors: fields.anchors.clone(),
             contact: fields
                 .contact
                 .iter()

@@ -1,8 +1,9 @@
 //! The symmetric linear system of a Newton step.
 
 use super::element::OUTER;
-use super::layout::{NO_PLACE, Places, Slot};
+use super::layout::{NO_PLACE, Places, Slot, slot};
 use super::sparse::{Factors, Singular, Symmetric};
+use super::stick::Slip;
 
 /// What a step is to reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +50,16 @@ impl Tangent {
                 }
             }
         }
+    }
+
+    /// Adds a spring of this stiffness that holds a contact node at its anchor.
+    pub(crate) fn add_slip(&mut self, slots: &[Slot], slip: &Slip, stiffness: f64) {
+        let slots: Vec<Slot> = slip.dofs.iter().map(|&dof| slot(slots, dof)).collect();
+        let load = stiffness * slip.value;
+        let residual: Vec<f64> = slip.first.iter().map(|by| load * by).collect();
+        self.scatter(&slots, &residual, |i, j| {
+            stiffness * slip.first[i] * slip.first[j]
+        });
     }
 
     /// Adds a symmetric contribution of which the lower half is asked.

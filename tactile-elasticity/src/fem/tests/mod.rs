@@ -2,4 +2,6 @@
 
 mod contact;
 mod elements;
+mod press;
 mod squeeze;
+mod stick;

@@ -1,0 +1,158 @@
+//! Contact without slip: what touches stays where it first touched.
+//!
+//! A contact node that carries a pressure after a load step is anchored to the point opposite to it. Let d be its displacement relative
+//! to that point since then and t the surface's direction. The traction τ = ε t·d per reference area holds it back, with the penalty ε
+//! of the normal pressure; it derives from the potential ½ ε (t·d)². t is that of the last load step: the potential is quadratic, and
+//! its tangent symmetric. A node whose pressure has ended is free again after the load step: were it so at once, Newton's method would toss
+//! it between the two states.
+//!
+//! A node that comes into contact within a load step has done so, on the average, in its middle: it is anchored to the mean of its
+//! relative displacements before and after. Nodes that touch unloaded are anchored there.
+
+use super::contact::{ContactNode, Opposite};
+use super::fields::Fields;
+use super::gap::DRIVER;
+use super::material::Kinematics;
+use super::model::Model;
+use super::placement::Placement;
+
+/// Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding of coordinates leaves 1e-16 of it.
+const TOUCHING: f64 = 1e-9;
+
+/// Where a contact node is held.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Anchor {
+    /// The node and those of the opposite edge, with their weights in the relative displacement.
+    weights: Vec<(usize, f64)>,
+    /// Whether what is opposite moves by the approach.
+    driven: bool,
+    /// Relative displacement at which it was anchored.
+    start: [f64; 2],
+    /// Along the surface, a unit vector.
+    direction: [f64; 2],
+}
+
+/// A distance along the surface and its derivatives by the displacement components `dofs`.
+#[derive(Debug, Clone)]
+pub(crate) struct Slip {
+    pub(crate) value: f64,
+    pub(crate) dofs: Vec<usize>,
+    pub(crate) first: Vec<f64>,
+}
+
+impl Anchor {
+    fn displacement(&self, fields: &Fields) -> [f64; 2] {
+        let mut sum = [0.0, if self.driven { -fields.approach } else { 0.0 }];
+        for &(node, weight) in &self.weights {
+            sum[0] += weight * fields.displacement[2 * node];
+            sum[1] += weight * fields.displacement[2 * node + 1];
+        }
+        sum
+    }
+
+    /// The same place on a surface that has turned.
+    fn turned(&self, direction: [f64; 2]) -> Self {
+        Self {
+            direction,
+            ..self.clone()
+        }
+    }
+
+    /// How far the node has slipped from its anchor.
+    pub(crate) fn slip(&self, fields: &Fields) -> Slip {
+        let [r, z] = self.displacement(fields);
+        let [along_r, along_z] = self.direction;
+        let mut slip = Slip {
+            value: (r - self.start[0]) * along_r + (z - self.start[1]) * along_z,
+            dofs: Vec::with_capacity(2 * self.weights.len() + 1),
+            first: Vec::with_capacity(2 * self.weights.len() + 1),
+        };
+        for &(node, weight) in &self.weights {
+            slip.dofs.extend([2 * node, 2 * node + 1]);
+            slip.first.extend([weight * along_r, weight * along_z]);
+        }
+        if self.driven {
+            slip.dofs.push(DRIVER);
+            slip.first.push(-along_z);
+        }
+        slip
+    }
+}
+
+impl Model {
+    /// Anchors of the nodes that touch without load.
+    pub(crate) fn first_anchors(&self, unloaded: &Fields) -> Vec<Option<Anchor>> {
+        let mut anchors = vec![None; self.contact_nodes.len()];
+        for candidate in self.candidates(unloaded, 0.0) {
+            let contact = &self.contact_nodes[candidate.index];
+            if candidate.gap.value <= TOUCHING * contact.spacing {
+                anchors[candidate.index] = self.anchor(contact, unloaded);
+            }
+        }
+        anchors
+    }
+
+    /// Anchors after a load step: those of nodes that still press, turned with the surface, and new ones where nodes have come into
+    /// contact.
+    pub(crate) fn next_anchors(&self, before: &Fields, after: &Fields) -> Vec<Option<Anchor>> {
+        let anchors = after.contact.iter().zip(&after.anchors);
+        let contacts = self.contact_nodes.iter().zip(anchors);
+        contacts
+            .map(|(contact, (&pressure, known))| {
+                let found = (pressure > 0.0).then(|| self.anchor(contact, after))??;
+                let start = match known {
+                    Some(known) => return Some(known.turned(found.direction)),
+                    None => [before, after].map(|fields| found.displacement(fields)),
+                };
+                let start = [0, 1].map(|k| 0.5 * (start[0][k] + start[1][k]));
+                Some(Anchor { start, ..found })
+            })
+            .collect()
+    }
+
+    fn anchor(&self, contact: &ContactNode, fields: &Fields) -> Option<Anchor> {
+        let opposite = &self.opposites[contact.pair];
+        self.placement(fields).anchor(contact.node, opposite)
+    }
+}
+
+impl Placement<'_> {
+    /// The anchor of a node at the point opposite to it.
+    fn anchor(&self, node: usize, opposite: &Opposite) -> Option<Anchor> {
+        let mut weights = vec![(node, 1.0)];
+        let (direction, driven) = match opposite {
+            Opposite::Rigid {
+                shape,
+                side,
+                driven,
+                ..
+            } => {
+                let [r, _] = self.current(node);
+                let [_, slope, _] = shape.profile(r)?;
+                ([1.0, side * slope], *driven)
+            }
+            Opposite::Surface(curve) => {
+                let at = match self.kinematics {
+                    Kinematics::Finite => self.nearest(curve, self.current(node))?.at,
+                    Kinematics::Linear => {
+                        let (edge, xi) = self.opposite(curve, self.nodes[node][0])?;
+                        curve.at(edge, xi)
+                    }
+                };
+                let opposite = at.nodes.iter().zip(at.position);
+                weights.extend(opposite.map(|(node, weight)| (*node, -weight)));
+                (at.sum(&at.first, |n| self.current(n)), false)
+            }
+        };
+        let direction = match self.kinematics {
+            Kinematics::Finite => direction.map(|x| x / direction[0].hypot(direction[1])),
+            Kinematics::Linear => [1.0, 0.0],
+        };
+        Some(Anchor {
+            weights,
+            driven,
+            start: [0.0; 2],
+            direction,
+        })
+    }
+}
