@@ -43,10 +43,12 @@ impl<'a> FrameImage<'a> {
 
     /// Whether this is the same image, bit for bit. Of one that is read on demand the hash decides: that two images of
     /// thousands share one by chance has a probability below 1e-10.
-    pub(super) fn shows(&self, image: ArrayView2<'_, u8>) -> bool {
-        match self {
-            Self::Lent(own) => *own == image,
-            Self::OnDemand { hash, .. } => *hash == hash_of_all(image),
+    pub(super) fn equals(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Lent(one), Self::Lent(other)) => one == other,
+            (Self::OnDemand { hash: one, .. }, Self::OnDemand { hash: other, .. }) => one == other,
+            (Self::Lent(image), Self::OnDemand { hash, .. })
+            | (Self::OnDemand { hash, .. }, Self::Lent(image)) => *hash == hash_of_all(*image),
         }
     }
 }

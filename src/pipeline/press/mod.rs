@@ -52,7 +52,7 @@ struct KnownContact {
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Stage;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
@@ -122,7 +122,7 @@ impl<'a> Press<'a> {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::Stage;
     /// let pipeline = trial.pipeline()?;
@@ -177,8 +177,9 @@ impl<'a> Press<'a> {
         image: ArrayView2<'a, u8>,
         gauge: Option<Estimate<f64>>,
     ) -> usize {
-        let twin = self.twin_of(image, gauge);
-        self.push(FrameImage::Lent(image), gauge, twin)
+        let frame = FrameImage::Lent(image);
+        let twin = self.twin_of(&frame, fingerprint(image), gauge);
+        self.push(frame, gauge, twin)
     }
 
     /// Adds a frame that is read whenever a stage needs it and never kept, for more frames than memory takes; returns its
@@ -209,18 +210,24 @@ impl<'a> Press<'a> {
         gauge: Option<Estimate<f64>>,
         read: impl Fn() -> Result<Array2<u8>, String> + Send + Sync + 'static,
     ) -> usize {
-        let twin = self.twin_of(image, gauge);
-        self.push(FrameImage::on_demand(image, Arc::new(read)), gauge, twin)
+        let frame = FrameImage::on_demand(image, Arc::new(read));
+        let twin = self.twin_of(&frame, fingerprint(image), gauge);
+        self.push(frame, gauge, twin)
     }
 
     /// The frame that a new one equals: an earlier one, or itself.
-    fn twin_of(&mut self, image: ArrayView2<'_, u8>, gauge: Option<Estimate<f64>>) -> usize {
+    fn twin_of(
+        &mut self,
+        image: &FrameImage<'a>,
+        fingerprint: u64,
+        gauge: Option<Estimate<f64>>,
+    ) -> usize {
         let index = self.frames.len();
         let equal = |&&at: &&usize| {
             let earlier = &self.frames[at];
-            earlier.gauge == gauge && earlier.image.shows(image)
+            earlier.gauge == gauge && earlier.image.equals(image)
         };
-        let alike = self.by_fingerprint.entry(fingerprint(image)).or_default();
+        let alike = self.by_fingerprint.entry(fingerprint).or_default();
         let twin = alike.iter().find(equal).copied();
         twin.unwrap_or_else(|| {
             alike.push(index);

@@ -31,7 +31,7 @@ impl Press<'_> {
     /// ```
     /// # use tactile_imaging::pipeline::Trial;
     /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// # let pipeline = trial.pipeline()?;
     /// let series = trial.press(&pipeline)?.load_series()?;
@@ -61,7 +61,7 @@ impl Press<'_> {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::elasticity::modulus::EstimatorKind;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
