@@ -92,11 +92,7 @@ fn frame_pass() {
 
 /// The whole pipeline on frames of 348 × 260 pixels, a quarter of the paper's each way: callgrind slows it fiftyfold.
 fn pipeline() {
-    let camera = Camera {
-        shape: [260, 348],
-        pixel_size_m: [86.2e-6; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(4);
     let options = PressOptions {
         camera,
         ..PressOptions::default()

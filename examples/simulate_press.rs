@@ -12,11 +12,7 @@ use tactile_imaging::simulate::{
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).unwrap_or("target/press".into());
     // Small frames of the paper's field of view.
-    let camera = Camera {
-        shape: [130, 174],
-        pixel_size_m: [172.4e-6; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(8);
     let scene = PressScene::new(PressOptions {
         camera,
         ..PressOptions::default()

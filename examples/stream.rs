@@ -6,11 +6,7 @@ use tactile_imaging::pipeline::{FrameSource, Session, Trial, with_error};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, LoadCycle, PressOptions};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let camera = Camera {
-        shape: [260, 348],
-        pixel_size_m: [86.2e-6; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(4);
     let options = PressOptions {
         camera,
         ..PressOptions::default()

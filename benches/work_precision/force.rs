@@ -13,14 +13,7 @@ const SEEDS: u32 = 4;
 
 pub(crate) fn frame(study: &mut Study) {
     study.error_label = "rms error of the contact radius, relative";
-    let camera = study.choose(
-        Camera {
-            shape: [260, 348],
-            pixel_size_m: [86.2e-6; 2],
-            ..Camera::default()
-        },
-        Camera::default(),
-    );
+    let camera = study.choose(Camera::default().coarser(4), Camera::default());
     let options = PressOptions {
         loads: vec![Load::normal(0.7)],
         camera,

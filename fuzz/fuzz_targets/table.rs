@@ -1,6 +1,7 @@
 //! Fuzz target: CSV tables of points, grids and columns.
 #![no_main]
 
+// The checks are one file for all targets and the tests; each target calls one of them.
 #[allow(dead_code)]
 #[path = "../../tests/suite/corpus/readers.rs"]
 mod readers;

@@ -81,8 +81,8 @@ pub(super) fn mean_difference(
     resize(means, (region.rows() / side, region.columns() / side));
     let (frame, reference) = (region.of(frame), region.of(reference));
     let pairs = |row: usize, columns: Range<usize>, sums: &mut [i32]| {
-        let frame = span_of(&frame, row, columns.clone());
-        let reference = span_of(&reference, row, columns);
+        let frame = span_of(frame, row, columns.clone());
+        let reference = span_of(reference, row, columns);
         for ((sum, &f), &r) in sums.iter_mut().zip(frame).zip(reference) {
             *sum += i32::from(f) - i32::from(r);
         }
@@ -106,7 +106,7 @@ pub(super) fn block_mask(
     let inside = |row: usize, span: Range<usize>, counts: &mut [i32]| {
         if row < rows {
             let span = span.start.min(columns)..span.end.min(columns);
-            for (count, &inside) in counts.iter_mut().zip(span_of(&mask, row, span)) {
+            for (count, &inside) in counts.iter_mut().zip(span_of(mask, row, span)) {
                 *count += i32::from(inside);
             }
         }
@@ -117,11 +117,11 @@ pub(super) fn block_mask(
 
 /// Some columns of a row.
 fn span_of<'a, T>(
-    image: &ArrayView2<'a, T>,
+    image: ArrayView2<'a, T>,
     row: usize,
     columns: Range<usize>,
 ) -> ArrayView1<'a, T> {
-    let row = (*image).index_axis_move(Axis(0), row);
+    let row = image.index_axis_move(Axis(0), row);
     row.slice_axis_move(Axis(0), Slice::from(columns))
 }
 

@@ -51,7 +51,7 @@ impl fmt::Display for ErrorSource {
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::{ErrorShare, ErrorSource};
 /// // A ball of 3 mm whose radius is known to 0.3 mm.

@@ -54,7 +54,7 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::FrameResult;
 /// let pipeline = trial.pipeline()?;
@@ -100,7 +100,7 @@ pub struct FrameResult {
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::MatchResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
@@ -133,7 +133,7 @@ pub struct MatchResult {
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::StrainResult;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
@@ -164,7 +164,7 @@ pub struct StrainResult {
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::Measurement;
 /// let pipeline = trial.pipeline()?.with_control_points(60);

@@ -17,7 +17,7 @@ pub(crate) const LEAST_MATCHES: usize = 8;
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::PairStrain;
 /// let pipeline = trial.pipeline()?.with_control_points(60);

@@ -11,7 +11,7 @@ pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Skips;
 /// let everything = trial.pipeline()?.with_skips(Skips { equal_frames: false, outside_contact: false, last_answer: false });

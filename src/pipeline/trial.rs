@@ -16,7 +16,7 @@ use crate::simulate::{
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::FrameTruth;
 /// let frames: Vec<FrameTruth> = trial.truth().frames;
@@ -48,7 +48,7 @@ pub struct FrameTruth {
 ///
 /// ```
 /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Truth;
 /// let truth: Truth = trial.truth();
@@ -75,7 +75,7 @@ pub struct Truth {
 /// ```
 /// use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
 /// // A coarse camera: 174 × 130 pixels on 30 mm.
-/// let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(8);
 /// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// let pipeline = trial.pipeline()?;
 /// let modulus = trial.press(&pipeline)?.modulus()?;

@@ -21,7 +21,7 @@ const UM: f64 = 1e6;
 /// use tactile_imaging::Pipeline;
 /// use tactile_imaging::pipeline::{LightContact, Object};
 /// use tactile_imaging::plot::{save_press_pages, summary_lines};
-/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(16);
 /// # let scene = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
 /// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
 /// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
@@ -74,7 +74,7 @@ pub fn save_press_pages(
 /// use tactile_imaging::Pipeline;
 /// use tactile_imaging::pipeline::{LightContact, Object};
 /// use tactile_imaging::plot::summary_lines;
-/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(16);
 /// # let scene = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
 /// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
 /// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();

@@ -41,7 +41,7 @@ pub enum LoadedCalibration {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
 /// use tactile_imaging::scene::{LoadedCalibration, Scene};
-/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(16);
 /// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// # let folder = tempfile::tempdir()?;
 /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
@@ -84,7 +84,7 @@ impl Scene {
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
     /// use tactile_imaging::scene::Scene;
-    /// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(16);
     /// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// # let folder = tempfile::tempdir()?;
     /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };

@@ -18,7 +18,7 @@ impl Scene {
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene, write_folder};
     /// use tactile_imaging::scene::Scene;
-    /// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(16);
     /// # let made = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
     /// # let folder = tempfile::tempdir()?;
     /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };

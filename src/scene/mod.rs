@@ -187,7 +187,7 @@ pub struct SceneLayer {
 /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
 /// # use tactile_imaging::simulate::{Elastic, Sphere};
 /// use tactile_imaging::scene::Scene;
-/// # let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(16);
 /// # let object = Sphere { radius_m: 20e-3, material: Elastic::CL2000X };
 /// # let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
 /// # let folder = tempfile::tempdir()?;

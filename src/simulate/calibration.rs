@@ -14,7 +14,7 @@ use super::random::{Purpose, row_stream};
 ///
 /// ```
 /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let options = CalibrationOptions { largest_force_n: 1.0, steps: 4, ..CalibrationOptions::default() };
 /// let forces: Vec<_> = scene.calibrate(&options)?.points.iter().map(|p| p.true_force_n).collect();
@@ -58,7 +58,7 @@ impl Default for CalibrationOptions {
 ///
 /// ```
 /// use tactile_imaging::simulate::{Branch, CalibrationOptions, Camera, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let options = CalibrationOptions { steps: 2, hysteresis: 0.1, ..CalibrationOptions::default() };
 /// let series = scene.calibrate(&options)?;
@@ -80,7 +80,7 @@ pub enum Branch {
 ///
 /// ```
 /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let options = CalibrationOptions { steps: 4, gauge_noise_n: 2e-3, ..CalibrationOptions::default() };
 /// for point in scene.calibrate(&options)?.points {
@@ -106,7 +106,7 @@ pub struct CalibrationPoint {
 ///
 /// ```
 /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
 /// let (light, force) = series.pairs().fold((0.0, 0.0), |sum, (v, f)| (sum.0 + v, sum.1 + f));
@@ -143,7 +143,7 @@ impl PressScene {
     /// use tactile_imaging::force::CalibrationPair;
     /// use tactile_imaging::pipeline::{LightContact, Object};
     /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
     /// let pairs: Vec<_> = series.pairs().map(|(light, force)| CalibrationPair::loading(light, force)).collect();

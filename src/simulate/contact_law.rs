@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::contact_state::ContactState;
+use super::contact_state::{ContactState, EQUAL_FORCES};
 use super::error::{SimulateError, at_least, within};
 use super::finite_elements;
 use super::material::{Sphere, Waveguide};
@@ -60,7 +60,7 @@ impl ContactLaw {
             within(
                 "force_n",
                 pair[1].force_n,
-                pair[0].force_n * (1.0 + 1e-9),
+                pair[0].force_n * (1.0 + EQUAL_FORCES),
                 f64::MAX,
             )?;
         }
@@ -77,7 +77,8 @@ impl ContactLaw {
         waveguide: &Waveguide,
     ) -> Result<f64, SimulateError> {
         let states = self.states(sphere, waveguide)?;
-        Ok(states.map_or(f64::MAX, |s| s.last().map_or(0.0, |last| last.force_n)))
+        let largest = |last: &ContactState| last.force_n * (1.0 + EQUAL_FORCES);
+        Ok(states.map_or(f64::MAX, |s| s.last().map_or(0.0, largest)))
     }
 
     /// The states of a contact computed elsewhere; none for a closed form.

@@ -8,6 +8,9 @@ use super::error::{SimulateError, at_least, finite, not_negative, positive, with
 /// recovered at nodes miss the force by up to some percent where the mesh is coarse; a wrong unit misses it by far more.
 const LARGEST_FORCE_MISMATCH: f64 = 0.05;
 
+/// Forces that differ by no more than this part are one: a solver meets the force that it was asked for within its tolerance.
+pub(super) const EQUAL_FORCES: f64 = 1e-9;
+
 /// An axisymmetric contact at one load, computed by other means: finite elements, integral equations, a measurement.
 ///
 /// The columns are samples over the distance r from the contact's axis in the deformed configuration. Between samples p² is linear
@@ -16,7 +19,7 @@ const LARGEST_FORCE_MISMATCH: f64 = 0.05;
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, ContactLaw, ContactState, Load, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// // A flat-topped pressure: 1.2 N on a disc of 4 mm radius, level in its inner half.
 /// let radius_m: Vec<f64> = (0..=40).map(|k| 1e-4 * f64::from(k)).collect();
 /// let shape = |r: f64| (1.0 - ((r - 2e-3).max(0.0) / 2e-3).powi(2)).sqrt();
@@ -182,11 +185,14 @@ impl ContactState {
     /// two of them, with a, p over its mean, z/F^⅔ and δ/F^⅔ linear in F^⅓. Below
     /// the first, that one shrunk by Hertz's scaling, a ∝ F^⅓ and z ∝ F^⅔. None above the last.
     pub(super) fn at_force(states: &[Self], force_n: f64) -> Option<Self> {
-        let next = states.partition_point(|s| s.force_n < force_n * (1.0 - 1e-12));
+        let next = states.partition_point(|s| s.force_n < force_n * (1.0 - EQUAL_FORCES));
         let upper = states.get(next)?;
         let scale = (force_n / upper.force_n).cbrt();
         let state = match next.checked_sub(1).map(|k| &states[k]) {
-            _ if (scale - 1.0).abs() < 1e-12 => upper.clone(),
+            _ if (scale - 1.0).abs() < EQUAL_FORCES => Self {
+                force_n,
+                ..upper.clone()
+            },
             None => upper.scaled(force_n, scale),
             Some(lower) => {
                 let from = (lower.force_n / upper.force_n).cbrt();

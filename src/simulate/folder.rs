@@ -16,7 +16,7 @@ use super::press::PressScene;
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::simulate::{CalibrationOptions, Camera, FolderError, PressOptions, PressScene, write_folder};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let (file, few) = (tempfile::NamedTempFile::new()?, CalibrationOptions { steps: 1, ..Default::default() });
 /// assert!(matches!(write_folder(&scene, &few, file.path()), Err(FolderError::Write { .. })), "not a folder");
@@ -56,7 +56,7 @@ pub enum FolderError {
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::scene::Scene;
 /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let folder = tempfile::tempdir()?;
 /// let calibration = CalibrationOptions { steps: 4, ..CalibrationOptions::default() };

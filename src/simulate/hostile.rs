@@ -13,7 +13,7 @@ use super::simulation::PressSimulation;
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, Hostile, PressOptions};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let base = PressOptions { camera, ..PressOptions::default() };
 /// let bright = Hostile::SaturatedContact.simulate(&base)?;
 /// assert!(bright.truth[0].saturated_pixels > 0 && bright.frames[0].iter().any(|&v| v == 255));

@@ -8,7 +8,7 @@ use super::error::{SimulateError, finite, not_negative, within};
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene, Response};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// // The light at 1.2 N over that at 0.7 N.
 /// let ratio = |response| {
 ///     let scene = PressScene::new(PressOptions { camera, response, ..PressOptions::default() })?;
@@ -73,7 +73,7 @@ impl Response {
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, Illumination, Load, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() }.ideal();
+/// let camera = Camera::default().coarser(16).ideal();
 /// let illumination = Illumination { level: 1.2, tilt: [0.1, 0.0] };
 /// let loads = vec![Load { illumination, ..Load::normal(0.0) }];
 /// let light = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?.expected_frame(0);

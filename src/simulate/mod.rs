@@ -8,7 +8,7 @@
 //! | [`material`](Elastic) | the pressed sphere, the waveguide's layers |
 //! | [`contact`](Contact) | sphere on waveguide: pressure, radius, indentation, surface displacement |
 //! | [`contact_state`](ContactState) | contacts computed elsewhere, as tables over the radius |
-//! | `squeezed_cylinder` | cylinders between plates by the finite elements of `tactile-elasticity` (feature `fem`) |
+//! | `solved_states` | balls and cylinders between plates by the finite elements of `tactile-elasticity` (feature `fem`) |
 //! | `pixel_average` | exact averages of the contact pressure over pixels |
 //! | [`light`](Response) | pressure → grey levels |
 //! | [`camera`](Camera) | blur, vignetting, photon and read noise, quantisation |
@@ -54,7 +54,7 @@ mod random;
 mod relief;
 mod simulation;
 #[cfg(feature = "fem")]
-mod squeezed_cylinder;
+mod solved_states;
 mod stream;
 mod truth;
 mod uniaxial;

@@ -15,7 +15,7 @@ use super::press_options::{Load, PressOptions};
 /// ```
 /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
 ///
-/// let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(4);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let made = scene.simulate();
 /// assert_eq!(made.frames.len(), 2);
@@ -75,7 +75,7 @@ impl PressScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() }.ideal();
+    /// let camera = Camera::default().coarser(16).ideal();
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// // The light above the background, over the grey levels of a pascal, times the area of a pixel: 0.7 N.
     /// let (light, dark) = (scene.expected_frame(0), scene.reference(0).mapv(f64::from));
@@ -110,7 +110,7 @@ impl PressScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let light = scene.expected_frame(1);
     /// let frames: Vec<_> = (0..50).map(|repeat| scene.frame(1, repeat)).collect();
@@ -145,7 +145,7 @@ impl PressScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, ContactLaw, Elastic, Load, PressOptions, PressScene, Sphere};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let ball = Sphere { radius_m: 10e-3, material: Elastic::RIGID };
     /// let other = scene.with_object(ball, ContactLaw::Hertz, vec![Load::normal(0.5)])?;
@@ -178,7 +178,7 @@ impl PressScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?.with_centre([40.0, 30.0]);
     /// assert_eq!(scene.truth(0).centre_px, [40.0, 30.0]);
     /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())

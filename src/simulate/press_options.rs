@@ -10,7 +10,7 @@ use super::material::{Elastic, Sphere, Waveguide};
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, Gain, Load, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = |force_n, gain| {
 ///     PressScene::new(PressOptions { camera, gain, loads: vec![Load::normal(force_n)], ..Default::default() })
 /// };
@@ -54,11 +54,12 @@ impl Gain {
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, Load, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
-/// let loads = vec![Load::normal(0.7), Load { shear_n: [0.276, 0.0], ..Load::normal(0.7) }];
+/// let camera = Camera::default().coarser(16);
+/// let loads = vec![Load::normal(0.7), Load { shear_n: [0.28, 0.0], ..Load::normal(0.7) }];
 /// let scene = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?;
 /// let [x, sheared] = [0, 1].map(|k| scene.truth(k).centre_px[0]);
-/// assert!((sheared - x - 2.0).abs() < 1e-9, "0.276 N over 400 N/m are 0.69 mm, two pixels");
+/// let moved_m = (sheared - x) * camera.pixel_size_m[0];
+/// assert!((moved_m - 0.7e-3).abs() < 1e-12, "0.28 N over 400 N/m");
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,7 +91,7 @@ impl Load {
 /// let options = PressOptions {
 ///     object: Sphere { radius_m: 20e-3, material: Elastic::CL2003X },
 ///     loads: vec![Load::normal(0.2), Load::normal(0.4)],
-///     camera: Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() },
+///     camera: Camera::default().coarser(16),
 ///     seed: 7,
 ///     ..PressOptions::default()
 /// };

@@ -16,7 +16,7 @@ use super::random::{Purpose, row_stream};
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, FaceOutline, UniaxialOptions, UniaxialScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let disc = UniaxialOptions { outline: FaceOutline::Ellipse, face_m: [12e-3; 2], camera, ..UniaxialOptions::default() };
 /// let scene = UniaxialScene::new(disc)?;
 /// let state = scene.states()[0];
@@ -59,7 +59,7 @@ impl FaceOutline {
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, SurfacePattern, UniaxialOptions, UniaxialScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let pattern = SurfacePattern { bumps: [3, 3], bump_height_m: [0.4e-3, 0.4e-3], ..SurfacePattern::default() };
 /// let scene = UniaxialScene::new(UniaxialOptions { camera, pattern, ..UniaxialOptions::default() })?;
 /// let heights = scene.material_points(60, 60).into_iter().map(|p| p.z);

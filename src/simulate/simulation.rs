@@ -9,7 +9,7 @@ use super::truth::PressTruth;
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?.simulate();
 /// let sum = |frame: &ndarray::Array2<u8>| frame.iter().map(|&v| f64::from(v)).sum::<f64>();
 /// let light = made.frames.iter().map(|frame| sum(frame) - sum(&made.reference)).collect::<Vec<_>>();

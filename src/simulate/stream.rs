@@ -14,7 +14,7 @@ use super::truth::PressTruth;
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let cycle = LoadCycle { cycles: 2, rest_s: 0.5, light_drift_per_s: 0.01, ..LoadCycle::default() };
 /// let stream = scene.stream(cycle)?;
@@ -64,7 +64,7 @@ impl Default for LoadCycle {
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let cycle = LoadCycle { rest_s: 0.0, frame_rate_hz: 8.0, ..LoadCycle::default() };
 /// let frames: Vec<_> = scene.stream(cycle)?.collect();
@@ -86,7 +86,7 @@ pub struct StreamedFrame {
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let mut stream = scene.stream(LoadCycle { frame_rate_hz: 10.0, ..LoadCycle::default() })?;
 /// assert_eq!(stream.len(), 11);
@@ -107,7 +107,7 @@ impl PressScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, LoadCycle, PressOptions, PressScene};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let cycle = LoadCycle { rest_s: 0.0, frame_rate_hz: 8.0, ..LoadCycle::default() };
     /// let forces = scene.stream(cycle)?.map(|f| f.truth.contact.force_n);

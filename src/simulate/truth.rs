@@ -13,7 +13,7 @@ use super::press_options::Load;
 ///
 /// ```
 /// use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
-/// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let (truth, later) = (scene.truth(0), scene.truth(1));
 /// assert!((truth.pressure_pa().sum() * camera.pixel_area_m2() - 0.7).abs() < 1e-9, "the force");

@@ -29,7 +29,7 @@ use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
 /// ```
 /// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
 ///
-/// let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+/// let camera = Camera::default().coarser(4);
 /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
 /// let step = scene.increment(0, 1);
 /// assert!((step.stress_zz_pa / step.strain_zz / 103e3 - 1.0).abs() < 1e-12);
@@ -122,7 +122,7 @@ impl UniaxialScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() }.ideal();
+    /// let camera = Camera::default().coarser(16).ideal();
     /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
     /// let (light, dark) = (scene.expected_frame(1), scene.reference(0).mapv(f64::from));
     /// let seen_n = (&light - &dark).sum() / scene.grey_per_pascal() * camera.pixel_area_m2();
@@ -165,7 +165,7 @@ impl UniaxialScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
-    /// let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(8);
     /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
     /// let (height, middle) = (scene.height_m(2), [64, 86]);
     /// let from_light = scene.pressure_pa(2)[middle] * scene.height_per_pascal_m(2);
@@ -211,7 +211,7 @@ impl UniaxialScene {
     ///
     /// ```
     /// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
-    /// let camera = Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(16);
     /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
     /// let (points, state) = (scene.material_points(4, 3), scene.states()[2]);
     /// let moved: Vec<_> = points.iter().map(|p| scene.deform(2, p)).collect();

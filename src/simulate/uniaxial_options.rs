@@ -14,7 +14,7 @@ use super::relief::{FaceOutline, SurfacePattern};
 ///     material: Elastic::CL2003X,
 ///     face_m: [10e-3, 14e-3],
 ///     forces_n: vec![0.1, 0.4],
-///     camera: Camera { shape: [65, 87], pixel_size_m: [345e-6; 2], ..Camera::default() },
+///     camera: Camera::default().coarser(16),
 ///     ..UniaxialOptions::default()
 /// };
 /// let step = UniaxialScene::new(options)?.increment(0, 1);

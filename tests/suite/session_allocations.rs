@@ -4,11 +4,7 @@ use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
 #[test]
 fn pushing_frames_allocates_nothing_after_warm_up() {
-    let camera = Camera {
-        shape: [260, 348],
-        pixel_size_m: [86.2e-6; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(4);
     let loads = vec![Load::normal(0.3), Load::normal(0.7), Load::normal(1.2)];
     let options = PressOptions {
         camera,

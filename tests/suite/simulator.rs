@@ -7,11 +7,7 @@ use tactile_imaging::simulate::{
 
 /// The default scene on a quarter of the pixels a side.
 fn small() -> PressOptions {
-    let camera = Camera {
-        shape: [260, 348],
-        pixel_size_m: [30e-3 / 348.0; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(4);
     PressOptions {
         camera,
         ..PressOptions::default()
@@ -153,10 +149,12 @@ fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
         beyond,
         SimulateError::OutOfRange {
             field: "force_n",
-            maximum: 0.7,
+            maximum,
             ..
-        }
+        } if (maximum / 0.7 - 1.0).abs() < 1e-8
     ));
+    // A solver's state carries the force it was asked for but for its tolerance.
+    assert!(with(0.7 * (1.0 + 1e-10)).is_ok());
     let cycle = LoadCycle::default();
     assert!(
         with(0.7).unwrap().stream(cycle).is_err(),

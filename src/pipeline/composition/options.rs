@@ -70,7 +70,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(40);
     /// assert_eq!(trial.press(&pipeline)?.control_points(0)?.len(), 40);
@@ -109,13 +109,13 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::Binning;
     /// let pipeline = trial.pipeline()?.with_binning(Binning::Blocks(2))?;
     /// let mut press = trial.press(&pipeline)?;
-    /// // Blocks of 2 × 2 pixels of 172.4 µm.
-    /// assert!((press.surface(0)?.pixel_size_m[0] - 344.8e-6).abs() < 1e-12);
+    /// // Blocks of 2 × 2 pixels.
+    /// assert!((press.surface(0)?.pixel_size_m[0] / camera.pixel_size_m[0] - 2.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -229,7 +229,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use nalgebra::DMatrix;
     /// // Three layers, their moduli known to 5 % each.
@@ -267,7 +267,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::{Skips, Stage};
     /// let pipeline = trial.pipeline()?.with_skips(Skips { equal_frames: false, ..Skips::default() });

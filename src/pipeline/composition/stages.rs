@@ -18,7 +18,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::{StagesConfig, StrainChoice};
     /// let config = StagesConfig { strain: StrainChoice::Hencky, ..StagesConfig::default() };
@@ -68,7 +68,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::SurfaceInput;
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting};
@@ -100,7 +100,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::{PipelineError, SurfaceInput};
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting, MaskedLeastSquares};
@@ -140,7 +140,7 @@ impl Pipeline {
     /// ```
     /// # use tactile_imaging::pipeline::Trial;
     /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::elasticity::modulus::{EstimatorKind, TataraSphere};
     /// let tatara = trial.pipeline()?.with_estimator(TataraSphere::new(3e-3, 0.5)?);
@@ -161,7 +161,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::sfs::Random;
     /// let pipeline = trial.pipeline()?.with_sampler(Random::new(7)).with_control_points(40);
@@ -184,7 +184,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
     /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::new()).with_control_points(60);
@@ -209,7 +209,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::elasticity::strain::Hencky;
     /// let green = trial.pipeline()?.with_control_points(60);
@@ -230,7 +230,7 @@ impl Pipeline {
     ///
     /// ```
     /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::tps::AffineModel;
     /// let pipeline = trial.pipeline()?.with_warp(AffineModel).with_control_points(60);

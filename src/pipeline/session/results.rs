@@ -14,7 +14,7 @@ impl Session {
     /// use std::sync::Arc;
     /// use tactile_imaging::pipeline::{Session, Trial};
     /// use tactile_imaging::simulate::{Camera, CalibrationOptions, Load, PressOptions};
-    /// let camera = Camera { shape: [260, 348], pixel_size_m: [86.2e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(4);
     /// let loads = [0.7, 1.0, 1.2].map(Load::normal).to_vec();
     /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
@@ -53,7 +53,7 @@ impl Session {
     /// # use std::sync::Arc;
     /// # use tactile_imaging::pipeline::{Session, Trial};
     /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
-    /// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// # let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
     /// session.push(trial.simulation.frames[0].view())?;

@@ -17,7 +17,7 @@ use ndarray::ArrayView2;
 /// # use std::sync::Arc;
 /// # use tactile_imaging::pipeline::{Session, Trial};
 /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
-/// # let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+/// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
 /// for frame in &trial.simulation.frames {

@@ -15,8 +15,11 @@ use self::record::Answers;
 use super::common::{Uniform, bend, options};
 
 /// Relative to the largest number of a line: sums of 40 terms in another order differ by 1e-15, times condition numbers
-/// of at most 1e3.
-const TOLERANCE: f64 = 1e-12;
+/// of at most 1e4: processors with wider instructions sum in another order.
+const TOLERANCE: f64 = 1e-11;
+
+/// Where λ minimises a score: its least is flat, so that λ is known to the root of rounding, 1e-8.
+const SELECTED_TOLERANCE: f64 = 1e-7;
 
 fn spline<const D: usize, const M: usize, K: Kernel>(
     answers: &mut Answers,
@@ -126,5 +129,12 @@ fn all() -> Answers {
 fn answers_are_the_recorded_ones() {
     let found = all();
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/recorded.txt");
-    found.check(path, |_, _, largest| TOLERANCE * largest);
+    found.check(path, |name, _, largest| {
+        let relative = if name.contains("/gcv/") {
+            SELECTED_TOLERANCE
+        } else {
+            TOLERANCE
+        };
+        relative * largest
+    });
 }

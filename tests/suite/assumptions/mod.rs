@@ -1,7 +1,7 @@
 //! What happens when the world is not as assumed: the error of the modulus, what was stated of it, and whether that was true.
 //!
 //! Contacts are by finite elements at finite strain. A row departs from what the default pipeline assumes in one respect or in all; its
-//! answer's interval holds the truth, or a flag about the modulus says what is wrong, or the row is one that [`UNSEEN`] or [`DEFECTS`] names.
+//! answer's interval holds the truth, or a flag about the modulus says what is wrong, or the row is one that [`UNSEEN`] names.
 #![allow(clippy::print_stdout)]
 mod worlds;
 
@@ -18,9 +18,6 @@ const UNSEEN: [&str; 3] = [
     "pixels stated 1 % too large",
     "ball stated 3 % too large",
 ];
-
-/// What the program could see and does not say: the calibration's pairs know their branches, and no flag or interval counts that they differ.
-const DEFECTS: [&str; 1] = ["hysteresis 5 % in the calibration"];
 
 struct Row {
     assumed: &'static str,
@@ -133,6 +130,11 @@ fn rows() -> Vec<Row> {
             nothing,
         ),
         row(
+            "friction: the ball sticks",
+            |w| w.sample = Sample::Sticking,
+            nothing,
+        ),
+        row(
             "friction: a cylinder's face sticks",
             |w| w.sample = Sample::Face(Interface::Bonded),
             |s| s.object = cylinder,
@@ -145,14 +147,7 @@ fn rows() -> Vec<Row> {
             }),
             nothing,
         ),
-        row(
-            "87 × 65 pixels",
-            camera(|c| {
-                c.shape = [65, 87];
-                c.pixel_size_m = c.pixel_size_m.map(|p| 4.0 * p);
-            }),
-            nothing,
-        ),
+        row("87 × 65 pixels", camera(|c| *c = c.coarser(4)), nothing),
         row("all of it, small", all_of_it, nothing),
         row("all of it, small, errors stated", all_of_it, |s| {
             s.object = ball(0.5, 1.01);
@@ -255,13 +250,14 @@ fn a_world_that_is_not_as_assumed_stays_within_the_interval_or_is_flagged() {
     for row in rows() {
         let found = row.run(seeds);
         found.print(row.assumed, seeds);
-        let known = UNSEEN
-            .iter()
-            .chain(&DEFECTS)
-            .any(|name| *name == row.assumed);
-        if found.silent > 0 && !known {
-            silent.push((row.assumed, found.silent));
+        // Of five draws one may miss an interval of 95 %.
+        if found.silent as u64 > seeds / 5 {
+            silent.push(row.assumed);
         }
     }
-    assert!(silent.is_empty(), "neither held nor flagged: {silent:?}");
+    silent.sort_unstable();
+    let mut unseen = UNSEEN.to_vec();
+    unseen.sort_unstable();
+    // One that is seen meanwhile leaves the list.
+    assert_eq!(silent, unseen, "neither held nor flagged");
 }

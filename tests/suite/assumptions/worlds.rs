@@ -14,16 +14,6 @@ pub(super) const RADIUS_M: f64 = 3e-3;
 pub(super) const MODULUS_PA: f64 = 103e3;
 const LOADS_N: [f64; 2] = [0.7, 1.2];
 
-/// The paper's camera with pixels four times as wide over the same 30 mm.
-fn coarse() -> Camera {
-    let camera = Camera::default();
-    Camera {
-        shape: [260, 348],
-        pixel_size_m: camera.pixel_size_m.map(|p| 4.0 * p),
-        ..camera
-    }
-}
-
 /// What is pressed: always solved by finite elements at finite strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Sample {
@@ -32,6 +22,8 @@ pub(super) enum Sample {
     Ball,
     /// The same ball with this Poisson's ratio.
     Compressible(f64),
+    /// The same ball on a guide to which it sticks.
+    Sticking,
     /// The flat face of a cylinder between plates, sliding or sticking.
     Face(Interface),
 }
@@ -70,7 +62,8 @@ impl Default for World {
         Self {
             sample: Sample::Ball,
             exponent: 1.0,
-            camera: coarse(),
+            // Four times as wide pixels as the paper's over the same 30 mm.
+            camera: Camera::default().coarser(4),
             levels: [1.0; 2],
             hysteresis: 0.0,
             gauge: 1.0,
@@ -101,10 +94,12 @@ impl Sample {
         let material = options.object.material;
         match self {
             Self::Ball => None,
-            Self::Compressible(poisson_ratio) => {
-                let material = Material::new(MODULUS_PA, poisson_ratio).unwrap();
-                Some(on_the_guide(material, options))
-            }
+            Self::Compressible(poisson_ratio) => Some(on_the_guide(
+                poisson_ratio,
+                Interface::Frictionless,
+                options,
+            )),
+            Self::Sticking => Some(on_the_guide(NEARLY_HALF, Interface::Bonded, options)),
             Self::Face(faces) => {
                 let (radius_m, height_m) = (6e-3, 8e-3);
                 let states = ContactState::of_squeezed_cylinder(
@@ -116,34 +111,26 @@ impl Sample {
     }
 }
 
-fn on_the_guide(material: Material, options: &PressOptions) -> Vec<ContactState> {
+/// ν = ½ for the elements.
+const NEARLY_HALF: f64 = 0.4999;
+
+fn on_the_guide(
+    poisson_ratio: f64,
+    interface: Interface,
+    options: &PressOptions,
+) -> Vec<ContactState> {
+    let material = Material::new(MODULUS_PA, poisson_ratio).unwrap();
     let layers = options.waveguide.layers.iter().map(|layer| fem::Layer {
         thickness_m: layer.thickness_m,
-        material: Material::new(layer.material.youngs_modulus_pa, 0.4999).unwrap(),
+        material: Material::new(layer.material.youngs_modulus_pa, NEARLY_HALF).unwrap(),
     });
     let ball = fem::Object::Ball { radius_m: RADIUS_M };
     let press = Press::new(ball, material).unwrap();
     let press = press.on_guide(Guide::new(layers.collect(), 28e-3).unwrap());
-    let scene = press.unwrap().scene().unwrap();
+    let press = press.unwrap().with_interface(interface);
+    let scene = press.scene().unwrap();
     let states = scene.solve(&LOADS_N.map(fem::Load::Force)).states;
-    let contact = |state: &fem::State| {
-        let points = state.pressure().iter();
-        let contact_radius_m = state.contact_radius().expect("a contact").radius_m;
-        let mut contact = ContactState {
-            force_n: state.force_n(),
-            contact_radius_m,
-            indentation_m: state.approach_m(),
-            radius_m: points.clone().map(|p| p.r_m).collect(),
-            pressure_pa: points.clone().map(|p| p.pressure_pa).collect(),
-            height_m: points.map(|p| p.z_m - state.approach_m()).collect(),
-        };
-        contact.radius_m.push(contact_radius_m);
-        contact.pressure_pa.push(0.0);
-        contact
-            .height_m
-            .push(*contact.height_m.last().expect("points"));
-        contact
-    };
+    let contact = |state| ContactState::from_solved(state).expect("a contact");
     states.iter().map(contact).collect()
 }
 

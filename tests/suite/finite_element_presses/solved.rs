@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use tactile_imaging::elasticity::contact::{ContactTable, TableOptions};
-use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Press, State};
+use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Press};
 use tactile_imaging::simulate::ContactState;
 
 /// A ball's radius and the layers (thickness, modulus) that it is pressed on; none is a rigid flat.
@@ -63,7 +63,10 @@ pub(super) fn ball(seed: u64) -> Ball {
     let states = press(radius_m, layers, modulus, fineness)
         .solve(&loads)
         .states;
-    let states: Vec<ContactState> = states.iter().filter_map(contact_state).collect();
+    let states: Vec<ContactState> = states
+        .iter()
+        .filter_map(ContactState::from_solved)
+        .collect();
     Ball {
         name: format!("{seed}: {modulus:.0} Pa, {radius_m} m on {layers:?}"),
         youngs_modulus_pa: modulus,
@@ -88,21 +91,4 @@ fn press(radius_m: f64, layers: &[(f64, f64)], modulus: f64, fineness: usize) ->
         press = press.on_guide(guide).unwrap();
     }
     press.with_fineness(fineness).unwrap().scene().unwrap()
-}
-
-fn contact_state(state: &State) -> Option<ContactState> {
-    let contact_radius_m = state.contact_radius()?.radius_m;
-    let points = state.pressure().iter();
-    let mut contact = ContactState {
-        force_n: state.force_n(),
-        contact_radius_m,
-        indentation_m: state.approach_m(),
-        radius_m: points.clone().map(|p| p.r_m).collect(),
-        pressure_pa: points.clone().map(|p| p.pressure_pa).collect(),
-        height_m: points.map(|p| p.z_m - state.approach_m()).collect(),
-    };
-    contact.radius_m.push(contact_radius_m);
-    contact.pressure_pa.push(0.0);
-    contact.height_m.push(*contact.height_m.last()?);
-    Some(contact)
 }

@@ -19,10 +19,8 @@ use tactile_imaging::simulate::{
 /// A quarter of the default resolution, so that a thousand frames take seconds.
 fn camera() -> Camera {
     Camera {
-        shape: [260, 348],
-        pixel_size_m: [86.2e-6; 2],
         vignetting: 0.0,
-        ..Camera::default()
+        ..Camera::default().coarser(4)
     }
 }
 

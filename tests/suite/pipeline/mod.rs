@@ -25,11 +25,7 @@ use tactile_imaging::simulate::{
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
 fn trial(forces: &[f64], seed: u64) -> Trial {
-    let camera = Camera {
-        shape: [260, 348],
-        pixel_size_m: [86.2e-6; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(4);
     let loads = forces.iter().map(|&f| Load::normal(f)).collect();
     Trial::new(
         PressOptions {

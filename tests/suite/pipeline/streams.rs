@@ -131,11 +131,7 @@ fn drift_of_the_light_is_seen_in_frames_without_contact() {
 /// The answer after 4 000 frames is that after the first cycles, and the truth: the loads kept apart are full after a few hundred.
 #[test]
 fn four_thousand_frames_leave_memory_and_answer_alone() {
-    let camera = Camera {
-        shape: [65, 87],
-        pixel_size_m: [344.8e-6; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(16);
     let (loads, gain) = (vec![Load::normal(1.5)], Gain::PeakGrey(180.0));
     let options = PressOptions {
         camera,

@@ -208,11 +208,7 @@ fn measured(scene: &Scene, pipeline: &Pipeline) -> String {
 #[test]
 fn stages_by_name_are_those_given_as_values() {
     let folder = tempfile::tempdir().unwrap();
-    let camera = Camera {
-        shape: [130, 174],
-        pixel_size_m: [172.4e-6; 2],
-        ..Camera::default()
-    };
+    let camera = Camera::default().coarser(8);
     let made = PressScene::new(PressOptions {
         camera,
         ..PressOptions::default()

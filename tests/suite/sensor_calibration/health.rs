@@ -1,15 +1,19 @@
 //! A session notices that its sensor has changed, and leaves a healthy one in peace.
-use super::coarse;
 use super::sensors::{Effects, SAMPLE_RADIUS_M, Simulated};
 use tactile_imaging::force::{ChartState, HealthOptions};
 use tactile_imaging::pipeline::{LightContact, Object, Pipeline, Session};
 use tactile_imaging::sensor::Sensor;
+use tactile_imaging::simulate::Camera;
 
 const BASELINE: usize = 100;
 
 #[test]
 fn a_change_of_gain_is_found_within_fifty_frames_and_not_before() {
-    let stage = LightContact::gauged(coarse().pixel_size_m, &Sensor::force_options()).unwrap();
+    let stage = LightContact::gauged(
+        Camera::default().coarser(4).pixel_size_m,
+        &Sensor::force_options(),
+    )
+    .unwrap();
     let pipeline = Pipeline::new(stage, Object::sphere(SAMPLE_RADIUS_M)).unwrap();
     let health = HealthOptions::default()
         .with_baseline_frames(BASELINE)
@@ -20,7 +24,7 @@ fn a_change_of_gain_is_found_within_fifty_frames_and_not_before() {
         ..Effects::NONE
     };
     for (seed, gain) in [(1, 1.02), (2, 0.98)] {
-        let mut simulated = Simulated::new(flicker, coarse(), seed);
+        let mut simulated = Simulated::new(flicker, Camera::default().coarser(4), seed);
         let reference = simulated.reference();
         let mut session = Session::new(&pipeline, reference.view())
             .unwrap()

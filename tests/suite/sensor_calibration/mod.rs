@@ -107,22 +107,7 @@ impl Study {
 /// The paper's camera with pixels twice as wide over the same 30 mm: small enough for a test, and blurred by so little that the local
 /// curve, which is not linear, reads the same pressure from the mean light of a pixel as from its parts.
 fn half() -> Camera {
-    let camera = Camera::default();
-    Camera {
-        shape: [521, 696],
-        pixel_size_m: camera.pixel_size_m.map(|p| 2.0 * p),
-        ..camera
-    }
-}
-
-/// A coarser camera over the same 30 mm: a quarter of the pixels along each side.
-fn coarse() -> Camera {
-    let camera = Camera::default();
-    Camera {
-        shape: [260, 348],
-        pixel_size_m: camera.pixel_size_m.map(|p| 4.0 * p),
-        ..camera
-    }
+    Camera::default().coarser(2)
 }
 
 #[test]
@@ -142,7 +127,7 @@ fn mistakes_of_a_calibration_are_named() {
         exponent: 1.0,
         ..Effects::ALL
     };
-    let good = Simulated::new(effects, coarse(), 77).calibration();
+    let good = Simulated::new(effects, Camera::default().coarser(4), 77).calibration();
     let sentence = |change: &dyn Fn(&mut SensorCalibration)| {
         let mut broken = good.clone();
         change(&mut broken);
@@ -190,7 +175,7 @@ fn mistakes_of_a_calibration_are_named() {
 /// A sensor's file says the same when it is read again, and names what is wrong in one that cannot be used.
 #[test]
 fn a_sensor_file_is_read_as_it_was_written() {
-    let calibrated = Simulated::new(Effects::ALL, coarse(), 78)
+    let calibrated = Simulated::new(Effects::ALL, Camera::default().coarser(4), 78)
         .calibration()
         .run()
         .unwrap();

@@ -1,6 +1,5 @@
 //! Each effect alone on a sensor that was not calibrated for it: the answer moves by less than its interval, or it is flagged.
 #![allow(clippy::print_stdout)]
-use super::coarse;
 use super::sensors::{
     BALL_ERROR, Effects, POISSON_ERROR, SAMPLE_POISSON, SAMPLE_RADIUS_M, Simulated, estimator,
 };
@@ -188,7 +187,13 @@ fn answer(effects: Effects, left_out: Option<LeftOut>, camera: Camera, seed: u64
 fn table(seeds: u64) -> Vec<(&'static str, u32)> {
     // The same draws without an effect.
     let ideal = |seed: u64| {
-        let (modulus, flags) = answer(Effects::NONE, None, coarse(), 500 + seed).unwrap();
+        let (modulus, flags) = answer(
+            Effects::NONE,
+            None,
+            Camera::default().coarser(4),
+            500 + seed,
+        )
+        .unwrap();
         assert!(flags.is_empty(), "flags without an effect: {flags:?}");
         modulus.youngs_modulus_pa
     };
@@ -198,7 +203,12 @@ fn table(seeds: u64) -> Vec<(&'static str, u32)> {
         let (mut worst, mut widest, mut flagged, mut outside) = (0.0_f64, 0.0_f64, 0, 0_u32);
         let mut flags = BTreeSet::new();
         for (seed, ideal_pa) in (0..).zip(&ideals) {
-            let (found, raised) = match answer(effects, Some(left_out), coarse(), 500 + seed) {
+            let (found, raised) = match answer(
+                effects,
+                Some(left_out),
+                Camera::default().coarser(4),
+                500 + seed,
+            ) {
                 Ok(answer) => answer,
                 Err(error) => {
                     flagged += 1;

@@ -19,11 +19,7 @@ pub(crate) fn camera() -> Camera {
 
 /// 174 × 130 pixels on 30 mm: enough for force, radius and modulus.
 pub(crate) fn coarse_camera() -> Camera {
-    Camera {
-        shape: [130, 174],
-        pixel_size_m: [172.4e-6; 2],
-        ..Camera::default()
-    }
+    Camera::default().coarser(8)
 }
 
 /// A press at these forces seen by a camera, its brightest pixel at this grey above the background.

@@ -95,7 +95,7 @@ impl Source {
 const KEPT_FRAMES: usize = 64;
 
 /// Bytes that results take for every frame beside its pixels: what `/usr/bin/time -v` shows for scenes of thousands of frames.
-const BYTES_OF_A_FRAME: f64 = 8e3;
+const BYTES_OF_A_FRAME: f64 = 4e3;
 
 /// Refuses a scene whose results do not fit into memory.
 fn allow(scene: &Scene, context: &Context) -> Result<(), Failure> {

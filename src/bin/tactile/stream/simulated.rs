@@ -70,18 +70,9 @@ fn verdict(
 }
 
 fn press_options(arguments: &Arguments) -> PressOptions {
-    let small = Camera {
-        shape: [260, 348],
-        pixel_size_m: [86.2e-6; 2],
-        ..Camera::default()
-    };
-    let camera = if arguments.simulation.full_size {
-        Camera::default()
-    } else {
-        small
-    };
+    let factor = if arguments.simulation.full_size { 1 } else { 4 };
     PressOptions {
-        camera,
+        camera: Camera::default().coarser(factor),
         loads: vec![Load::normal(largest_force_n(arguments))],
         gain: Gain::PeakGrey(200.0),
         ..PressOptions::default()

@@ -1,4 +1,4 @@
-//! Cylinders between plates by finite elements, as states that the simulator draws.
+//! What finite elements found, as states that the simulator draws.
 
 use super::contact_state::ContactState;
 use super::error::{SimulateError, at_least, positive};
@@ -9,6 +9,40 @@ use crate::elasticity::fem::{Interface, Load, Material, Scene, State};
 const LARGEST_POISSON_RATIO: f64 = 0.4999;
 
 impl ContactState {
+    /// A state that the solver of `tactile-elasticity` found of a ball, a cone or another object with a free rim; `None` without contact.
+    ///
+    /// The samples are the contact's nodes and its rim, at which the pressure is 0.
+    ///
+    /// ```
+    /// use tactile_imaging::elasticity::fem::{self, Material, Press};
+    /// use tactile_imaging::simulate::ContactState;
+    /// let ball = fem::Object::Ball { radius_m: 3e-3 };
+    /// let scene = Press::new(ball, Material::new(103e3, 0.49)?)?.scene()?;
+    /// let solved = scene.solve(&[fem::Load::Force(0.2)]);
+    /// let state = ContactState::from_solved(&solved.states[0]).expect("a contact");
+    /// // Hertz: a³ = 3 F R (1 − ν²) / (4 E).
+    /// assert!((state.contact_radius_m / 1.49e-3 - 1.0).abs() < 0.03, "{}", state.contact_radius_m);
+    /// assert_eq!(state.pressure_pa.last(), Some(&0.0));
+    /// # Ok::<(), tactile_imaging::elasticity::ElasticityError>(())
+    /// ```
+    pub fn from_solved(state: &State) -> Option<Self> {
+        let contact_radius_m = state.contact_radius()?.radius_m;
+        let approach_m = state.approach_m();
+        let points = state.pressure();
+        let mut contact = Self {
+            force_n: state.force_n(),
+            contact_radius_m,
+            indentation_m: approach_m,
+            radius_m: points.iter().map(|p| p.r_m).collect(),
+            pressure_pa: points.iter().map(|p| p.pressure_pa).collect(),
+            height_m: points.iter().map(|p| p.z_m - approach_m).collect(),
+        };
+        contact.radius_m.push(contact_radius_m);
+        contact.pressure_pa.push(0.0);
+        contact.height_m.push(*contact.height_m.last()?);
+        Some(contact)
+    }
+
     /// The face of a cylinder squeezed between two rigid plates on which its faces slide or to which they stick, neo-Hookean and at finite strain: a state
     /// for each force, for [`ContactLaw::Tabulated`](super::ContactLaw::Tabulated). Solved anew at each call, some 0.1 s a state: keep the states.
     ///
@@ -21,7 +55,7 @@ impl ContactState {
     /// let states = |faces| ContactState::of_squeezed_cylinder(6e-3, 6e-3, &Elastic::CL2000X, faces, &[0.5, 1.0]);
     /// let [sliding, sticking] = [states(Interface::Frictionless)?, states(Interface::Bonded)?];
     /// assert!(sliding[1].contact_radius_m > 6.2e-3 && sticking[1].contact_radius_m == 6e-3);
-    /// let camera = Camera { shape: [130, 174], pixel_size_m: [172.4e-6; 2], ..Camera::default() };
+    /// let camera = Camera::default().coarser(8);
     /// let (law, loads) = (ContactLaw::Tabulated(sticking), vec![Load::normal(0.5), Load::normal(1.0)]);
     /// let scene = PressScene::new(PressOptions { law, loads, camera, ..PressOptions::default() })?;
     /// assert_eq!(scene.frame(1, 0).dim(), (130, 174));
