@@ -7,8 +7,8 @@
 //! cargo bench -p tactile-benches --bench work_precision -- --quick --within=1.5   # judged less strictly: a machine that is not ours alone
 //! ```
 //! Writes `target/work_precision/STUDY.csv` and `.svg` (time on one axis, error on the other, the front drawn, defaults marked) and fails if
-//! a default lies more than 20 % behind the front of its study, that is, if some setting is at once more than 1.2 times faster and
-//! 1.2 times more accurate. A setting that is only faster, with the same error, is not counted against a default: read the table for these.
+//! a default lies more than 20 % behind the front of its study in time or in error, whichever is worse: if some setting is more than 1.2
+//! times faster and no less accurate, or more than 1.2 times more accurate and no slower.
 //! With `--test` everything runs once and nothing is judged: one timing is none.
 #![allow(missing_docs, clippy::print_stdout)]
 

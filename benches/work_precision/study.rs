@@ -15,6 +15,9 @@ pub(crate) enum Effort {
 /// Differences below this are rounding, not error.
 const ROUNDING: f64 = 1e-14;
 
+/// Settings whose times or errors differ by less than this factor count as equal in it: times of one job scatter by as much.
+const AS_GOOD: f64 = 0.98;
+
 pub(crate) struct Entry {
     pub(crate) knob: &'static str,
     pub(crate) setting: String,
@@ -109,9 +112,15 @@ impl Study {
         order
     }
 
-    /// The largest f such that some setting is both f times faster and f times more accurate; one on the front.
+    /// How far behind the front a setting lies, in time or in error, whichever is worse: times faster that one is which is no less
+    /// accurate, or times more accurate one that is no slower. One on the front.
     pub(crate) fn behind(&self, entry: &Entry) -> f64 {
-        let factor = |other: &Entry| (entry.seconds / other.seconds).min(entry.error / other.error);
+        let factor = |other: &Entry| {
+            let (faster, better) = (entry.seconds / other.seconds, entry.error / other.error);
+            let in_time = if better >= AS_GOOD { faster } else { 1.0 };
+            let in_error = if faster >= AS_GOOD { better } else { 1.0 };
+            in_time.max(in_error)
+        };
         self.entries.iter().map(factor).fold(1.0, f64::max)
     }
 

@@ -3,15 +3,18 @@
 //! the frame: ten sensors, each calibrated once, and on each presses at random places with random forces and noise. Beside
 //! them what is skipped: a frame without contact, the second of two equal frames, and what a stream keeps from frame to frame.
 #![allow(clippy::print_stdout)]
-use criterion::measurement::WallTime;
-use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
+mod face;
+mod stream;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use face::flat_faces;
 use ndarray::Array2;
-use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
+use stream::stream;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::ReferenceFrame;
-use tactile_imaging::pipeline::{Measurement, Press, Session, Stage, Trial};
+use tactile_imaging::pipeline::{Measurement, Press, Stage, Trial};
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, PressSimulation,
     Sphere,
@@ -51,56 +54,6 @@ fn press(c: &mut Criterion) {
     });
     stream(&mut group, &trial);
     group.finish();
-}
-
-/// What a stream of frames takes for each, by what it shows.
-fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {
-    let (one, two) = (&trial.simulation.frames[0], &trial.simulation.frames[1]);
-    let empty = trial.scene.reference(9);
-    let pipeline = trial.pipeline().expect("a calibrated sensor");
-    let session = || Session::new(&pipeline, trial.simulation.reference.view()).expect("a session");
-    let mut turn = session();
-    let mut side = false;
-    group.bench_function("force_of_a_frame", |b| {
-        b.iter(|| {
-            side = !side;
-            turn.push(black_box(if side { one } else { two }).view())
-                .expect("a contact")
-        });
-    });
-    let mut same = session();
-    group.bench_function("force_of_an_equal_frame", |b| {
-        b.iter(|| same.push(black_box(one).view()).expect("a contact"));
-    });
-    let mut strained = session();
-    for frame in [one, two] {
-        strained
-            .push(frame.view())
-            .and_then(|_| strained.strain().map(drop))
-            .expect("a strain");
-    }
-    let third = trial.scene.frame(1, 11);
-    group.bench_function("strain_of_a_frame", |b| {
-        b.iter(|| {
-            side = !side;
-            strained
-                .push(black_box(if side { &third } else { two }).view())
-                .expect("a contact");
-            strained
-                .strain()
-                .expect("a strain")
-                .map(|found| found.strain.summary.mean)
-        });
-    });
-    let (mut quiet, other) = (session(), trial.scene.reference(10));
-    group.bench_function("frame_without_contact", |b| {
-        b.iter(|| {
-            side = !side;
-            quiet
-                .push(black_box(if side { &empty } else { &other }).view())
-                .expect("no contact")
-        });
-    });
 }
 
 /// Share of the frame under the larger load of sensor `k` of ten: 1.2 to 13 %, in equal ratios. Forces vary by a fifth
@@ -391,5 +344,5 @@ fn papers_presses(_: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, press, papers_presses, scenes);
+criterion_group!(benches, press, flat_faces, papers_presses, scenes);
 criterion_main!(benches);

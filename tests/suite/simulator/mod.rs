@@ -1,8 +1,11 @@
-//! The scene simulator against itself: its truth is consistent and its noise has the moments it states.
+//! The scene simulator against itself: its truth is consistent.
+mod noise;
+mod tabulated;
+
 use ndarray::Array2;
 use tactile_imaging::simulate::{
-    Camera, ContactLaw, ContactState, Elastic, Gain, Illumination, Load, LoadCycle, PressOptions,
-    PressScene, Response, SimulateError, Sphere,
+    Camera, ContactLaw, Elastic, Gain, Illumination, Load, PressOptions, PressScene, Response,
+    SimulateError, Sphere,
 };
 
 /// The default scene on a quarter of the pixels a side.
@@ -73,105 +76,6 @@ fn the_bent_response_integrates_exactly() {
     assert!((brightest - 215.0).abs() < 0.1, "{brightest}");
 }
 
-/// Hertz's contact of `scene` at `load` as a table of `samples` distances out to 1.3 a.
-fn tabulated(scene: &PressScene, load: usize, samples: usize) -> ContactState {
-    let contact = scene.truth(load).contact;
-    let reach = 1.3 * contact.contact_radius_m;
-    let radius_m: Vec<f64> = (0..samples)
-        .map(|k| reach * k as f64 / (samples - 1) as f64)
-        .collect();
-    ContactState {
-        force_n: contact.force_n,
-        contact_radius_m: contact.contact_radius_m,
-        indentation_m: contact.indentation_m,
-        pressure_pa: radius_m.iter().map(|&r| contact.pressure_pa(r)).collect(),
-        height_m: vec![-1e-4; samples],
-        radius_m,
-    }
-}
-
-#[test]
-fn a_table_of_hertz_is_seen_as_hertz() {
-    let options = PressOptions {
-        centre_px: Some([170.37, 131.8]),
-        ..small()
-    };
-    let exact = PressScene::new(options.clone()).unwrap();
-    let states = (0..2).map(|k| tabulated(&exact, k, 81)).collect();
-    let table = PressScene::new(PressOptions {
-        law: ContactLaw::Tabulated(states),
-        ..options.clone()
-    })
-    .unwrap();
-    let area = options.camera.pixel_area_m2();
-    for load in 0..2 {
-        let (expected, found) = (exact.truth(load), table.truth(load));
-        let peak = expected.contact.peak_pressure_pa;
-        let difference = (expected.pressure_pa() - found.pressure_pa())
-            .fold(0.0, |worst: f64, v| worst.max(v.abs()));
-        // At the rim 16 midpoints a side stand for the pixel; inside only rounding is left.
-        assert!(difference < 1e-3 * peak, "{difference} of {peak} Pa");
-        assert!(relative(found.visible_force_n, expected.visible_force_n) < 2e-5);
-        assert!(relative(found.pressure_pa().sum() * area, expected.contact.force_n) < 2e-5);
-        assert!(
-            relative(
-                found.integrated_pixel_value,
-                expected.integrated_pixel_value
-            ) < 2e-5
-        );
-        let (seen, wanted) = (table.frame(load, 0), exact.frame(load, 0));
-        let other = seen.iter().zip(&wanted).filter(|(a, b)| a != b).count();
-        // The same noise falls on the same light: a difference of 1e-4 grey levels moves the rounding of one pixel in 10⁴.
-        assert!(other < 20, "{other} of {} pixels", seen.len());
-        let apparent = found
-            .contact
-            .apparent_height_m(0.6 * found.contact.contact_radius_m);
-        assert!(relative(apparent, 0.8 * found.contact.contact_radius_m) < 1e-3);
-    }
-}
-
-#[test]
-fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
-    let scene = PressScene::new(small()).unwrap();
-    let law = ContactLaw::Tabulated(vec![tabulated(&scene, 0, 40)]);
-    let with = |force_n: f64| {
-        let loads = vec![Load::normal(force_n)];
-        let law = law.clone();
-        PressScene::new(PressOptions {
-            law,
-            loads,
-            ..small()
-        })
-    };
-    assert!(with(0.7).is_ok() && with(0.1).is_ok() && with(0.0).is_ok());
-    let beyond = with(0.71).unwrap_err();
-    assert!(matches!(
-        beyond,
-        SimulateError::OutOfRange {
-            field: "force_n",
-            maximum,
-            ..
-        } if (maximum / 0.7 - 1.0).abs() < 1e-8
-    ));
-    // A solver's state carries the force it was asked for but for its tolerance.
-    assert!(with(0.7 * (1.0 + 1e-10)).is_ok());
-    let cycle = LoadCycle::default();
-    assert!(
-        with(0.7).unwrap().stream(cycle).is_err(),
-        "1.2 N in the cycle"
-    );
-    let reachable = LoadCycle {
-        largest_force_n: 0.7,
-        ..cycle
-    };
-    let scene = with(0.7).unwrap();
-    assert_eq!(scene.stream(reachable).unwrap().count(), 88);
-    // Below the only state the contact shrinks as Hertz's does.
-    let radius = |scene: &PressScene| scene.truth(0).contact.contact_radius_m;
-    let shrunk = radius(&with(0.1).unwrap()) / radius(&scene);
-    assert!(relative(shrunk, (0.1_f64 / 0.7).cbrt()) < 1e-12);
-}
-
 #[test]
 fn light_as_a_power_of_the_pressure_integrates_as_hertz_says() {
     for exponent in [0.8, 1.0, 1.3] {
@@ -228,89 +132,6 @@ fn blur_keeps_force_and_centroid_and_reaches_in_from_beyond_the_edge() {
     assert_eq!(beyond.truth(0).visible_force_n, 0.0);
     assert!(beyond.expected_frame(0)[[120, 0]] > background + 0.1);
 }
-
-#[test]
-fn noise_has_the_stated_mean_and_variance() {
-    let camera = Camera {
-        shape: [400, 500],
-        ..Camera::default()
-    };
-    for grey in [0.3, 4.0, 15.0, 120.0, 200.0] {
-        let light = Array2::from_elem((400, 500), grey);
-        let image = camera.expose(light.view(), 7, 3);
-        let n = image.len() as f64;
-        let mean = image.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
-        let variance = image
-            .iter()
-            .map(|&v| (f64::from(v) - mean).powi(2))
-            .sum::<f64>()
-            / (n - 1.0);
-        // Rounding adds 1/12 where the noise spans a level or more; below that, and where noise is clipped at black,
-        // the moments are those of the rounded law, so only the brighter fields are checked.
-        if grey < 4.0 {
-            continue;
-        }
-        let expected = camera.noise_sd_grey(grey).powi(2) + 1.0 / 12.0;
-        // Five standard errors: a false alarm in 10⁶.
-        assert!(
-            (mean - grey).abs() < 5.0 * (expected / n).sqrt() + 0.02,
-            "mean {mean} of {grey}"
-        );
-        assert!(
-            relative(variance, expected) < 5.0 * (2.0 / n).sqrt() + 0.02,
-            "variance {variance} {expected}"
-        );
-    }
-}
-
-#[test]
-fn faint_light_is_poisson() {
-    // 20 electrons a grey level and no read noise: at 2 grey levels the count is Poisson of mean 40.
-    let camera = Camera {
-        shape: [400, 500],
-        full_well_electrons: 5100.0,
-        read_noise_grey: 0.0,
-        ..Camera::default()
-    };
-    let image = camera.expose(Array2::from_elem((400, 500), 2.0).view(), 1, 1);
-    let zero = image.iter().filter(|&&v| v == 0).count() as f64 / image.len() as f64;
-    // Grey 0 is fewer than 10 electrons: P(X ≤ 9 | 40) = 9.2e-9; grey ≤ 1 is fewer than 30: 0.0374… by summation.
-    let at_most = |k: u32| {
-        let mut term = (-40.0_f64).exp();
-        let mut sum = term;
-        for i in 1..=k {
-            term *= 40.0 / f64::from(i);
-            sum += term;
-        }
-        sum
-    };
-    let dim = image.iter().filter(|&&v| v <= 1).count() as f64 / image.len() as f64;
-    let expected = at_most(29);
-    let error = (expected * (1.0 - expected) / image.len() as f64).sqrt();
-    assert!(zero < 1e-4);
-    assert!((dim - expected).abs() < 5.0 * error, "{dim} {expected}");
-}
-
-#[test]
-fn the_same_seed_gives_the_same_bits_in_any_order_and_another_seed_others() {
-    let scene = PressScene::new(small()).unwrap();
-    let made = scene.simulate();
-    assert_eq!(scene.frame(1, 0), made.frames[1]);
-    assert_eq!(scene.frame(0, 0), made.frames[0]);
-    assert_eq!(scene.reference(0), made.reference);
-    assert_ne!(scene.reference(1), made.reference);
-    let other = PressScene::new(PressOptions { seed: 2, ..small() }).unwrap();
-    assert_ne!(other.reference(0), made.reference);
-}
-
-#[test]
-fn the_noise_stream_keeps_its_meaning_over_versions() {
-    // Changes when the generator, the ziggurat or their use changes: then say so in the change log.
-    let light = Array2::from_elem((2, 6), 100.0);
-    let image = Camera::default().expose(light.view(), 42, 5);
-    assert_eq!(image.as_slice().unwrap(), NOISE_OF_SEED_42);
-}
-const NOISE_OF_SEED_42: &[u8] = &[100, 102, 101, 102, 96, 101, 102, 101, 100, 101, 102, 98];
 
 #[test]
 fn shear_moves_the_contact_by_force_over_stiffness() {

@@ -1,0 +1,104 @@
+//! Contacts given as tables over the radius.
+use super::{relative, small};
+use tactile_imaging::simulate::{
+    ContactLaw, ContactState, Load, LoadCycle, PressOptions, PressScene, SimulateError,
+};
+
+/// Hertz's contact of `scene` at `load` as a table of `samples` distances out to 1.3 a.
+fn tabulated(scene: &PressScene, load: usize, samples: usize) -> ContactState {
+    let contact = scene.truth(load).contact;
+    let reach = 1.3 * contact.contact_radius_m;
+    let radius_m: Vec<f64> = (0..samples)
+        .map(|k| reach * k as f64 / (samples - 1) as f64)
+        .collect();
+    ContactState {
+        force_n: contact.force_n,
+        contact_radius_m: contact.contact_radius_m,
+        indentation_m: contact.indentation_m,
+        pressure_pa: radius_m.iter().map(|&r| contact.pressure_pa(r)).collect(),
+        height_m: vec![-1e-4; samples],
+        radius_m,
+    }
+}
+
+#[test]
+fn a_table_of_hertz_is_seen_as_hertz() {
+    let options = PressOptions {
+        centre_px: Some([170.37, 131.8]),
+        ..small()
+    };
+    let exact = PressScene::new(options.clone()).unwrap();
+    let states = (0..2).map(|k| tabulated(&exact, k, 81)).collect();
+    let table = PressScene::new(PressOptions {
+        law: ContactLaw::Tabulated(states),
+        ..options.clone()
+    })
+    .unwrap();
+    let area = options.camera.pixel_area_m2();
+    for load in 0..2 {
+        let (expected, found) = (exact.truth(load), table.truth(load));
+        let peak = expected.contact.peak_pressure_pa;
+        let difference = (expected.pressure_pa() - found.pressure_pa())
+            .fold(0.0, |worst: f64, v| worst.max(v.abs()));
+        // At the rim 16 midpoints a side stand for the pixel; inside only rounding is left.
+        assert!(difference < 1e-3 * peak, "{difference} of {peak} Pa");
+        assert!(relative(found.visible_force_n, expected.visible_force_n) < 2e-5);
+        assert!(relative(found.pressure_pa().sum() * area, expected.contact.force_n) < 2e-5);
+        assert!(
+            relative(
+                found.integrated_pixel_value,
+                expected.integrated_pixel_value
+            ) < 2e-5
+        );
+        let (seen, wanted) = (table.frame(load, 0), exact.frame(load, 0));
+        let other = seen.iter().zip(&wanted).filter(|(a, b)| a != b).count();
+        // The same noise falls on the same light: a difference of 1e-4 grey levels moves the rounding of one pixel in 10⁴.
+        assert!(other < 20, "{other} of {} pixels", seen.len());
+        let apparent = found
+            .contact
+            .apparent_height_m(0.6 * found.contact.contact_radius_m);
+        assert!(relative(apparent, 0.8 * found.contact.contact_radius_m) < 1e-3);
+    }
+}
+
+#[test]
+fn a_tabulated_contact_refuses_loads_beyond_its_last_state() {
+    let scene = PressScene::new(small()).unwrap();
+    let law = ContactLaw::Tabulated(vec![tabulated(&scene, 0, 40)]);
+    let with = |force_n: f64| {
+        let loads = vec![Load::normal(force_n)];
+        let law = law.clone();
+        PressScene::new(PressOptions {
+            law,
+            loads,
+            ..small()
+        })
+    };
+    assert!(with(0.7).is_ok() && with(0.1).is_ok() && with(0.0).is_ok());
+    let beyond = with(0.71).unwrap_err();
+    assert!(matches!(
+        beyond,
+        SimulateError::OutOfRange {
+            field: "force_n",
+            maximum,
+            ..
+        } if (maximum / 0.7 - 1.0).abs() < 1e-8
+    ));
+    // A solver's state carries the force it was asked for but for its tolerance.
+    assert!(with(0.7 * (1.0 + 1e-10)).is_ok());
+    let cycle = LoadCycle::default();
+    assert!(
+        with(0.7).unwrap().stream(cycle).is_err(),
+        "1.2 N in the cycle"
+    );
+    let reachable = LoadCycle {
+        largest_force_n: 0.7,
+        ..cycle
+    };
+    let scene = with(0.7).unwrap();
+    assert_eq!(scene.stream(reachable).unwrap().count(), 88);
+    // Below the only state the contact shrinks as Hertz's does.
+    let radius = |scene: &PressScene| scene.truth(0).contact.contact_radius_m;
+    let shrunk = radius(&with(0.1).unwrap()) / radius(&scene);
+    assert!(relative(shrunk, (0.1_f64 / 0.7).cbrt()) < 1e-12);
+}
