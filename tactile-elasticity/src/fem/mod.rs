@@ -55,7 +55,8 @@
 //! up to a/R = 1.07 within 0.2 % in contact radius and 0.3 % in approach at given force, 0.6 % in force at
 //! given contact radius (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
 //!
-//! Without slip a flat punch follows Spence within 0.05 % at ν = 0, 0.3 and 0.45, a ball's stiffness within 0.3 % at ν = 0.3.
+//! Without slip a flat punch follows Spence within 0.05 % at ν = 0, 0.3 and 0.45, a ball's stiffness Borodich and Keer within 0.5 % at ν = 0.3
+//! (the tests of `fem::stick`).
 //!
 //! # References
 //! D. A. Spence, Proc. R. Soc. A 305 (1968) 55–80; F. M. Borodich and L. M. Keer, Int. J. Solids Struct. 41 (2004) 2479–2499 (contact without slip).

@@ -3,15 +3,19 @@
 use crate::ElasticityError;
 use crate::fem::*;
 
+/// The paper's three layers.
+fn paper_guide(radius_m: f64) -> Guide {
+    let layers = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)].map(|(thickness_m, modulus)| Layer {
+        thickness_m,
+        material: Material::new(modulus, 0.495).unwrap(),
+    });
+    Guide::new(layers.to_vec(), radius_m).unwrap()
+}
+
 #[test]
 fn a_ball_on_a_layered_guide_agrees_with_another_program_at_large_contact_radii() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
-    let layer = |thickness_m, modulus| Layer {
-        thickness_m,
-        material: material(modulus),
-    };
-    let layers = vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)];
-    let guide = Guide::new(layers, 25e-3).unwrap();
+    let guide = paper_guide(25e-3);
     let scene = Scene::ball_on_guide(3e-3, material(103e3), &guide).unwrap();
     // Force, contact radius and approach by an independent program: axisymmetric elements at finite
     // strain, neo-Hookean, without friction, extrapolated over its meshes.
@@ -35,13 +39,8 @@ fn a_ball_on_a_layered_guide_agrees_with_another_program_at_large_contact_radii(
 #[test]
 fn balls_on_guides_solve_to_contact_radii_beyond_their_own() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
-    let layer = |thickness_m, modulus| Layer {
-        thickness_m,
-        material: material(modulus),
-    };
-    let layers = vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)];
     for (radius, modulus, approach) in [(3e-3, 250e3, 1.2), (12e-3, 30e3, 0.7)] {
-        let guide = Guide::new(layers.clone(), 5.0 * radius).unwrap();
+        let guide = paper_guide(5.0 * radius);
         let scene = Scene::ball_on_guide(radius, material(modulus), &guide).unwrap();
         let loads = [0.4, 0.7, 1.0].map(|part| Load::Approach(part * approach * radius));
         let solution = scene.solve(&loads);
@@ -202,12 +201,7 @@ fn the_rim_of_the_guide_is_not_felt() {
 #[test]
 fn a_finer_mesh_moves_the_table_little() {
     let material = |modulus| Material::new(modulus, 0.495).unwrap();
-    let layer = |thickness_m, modulus| Layer {
-        thickness_m,
-        material: material(modulus),
-    };
-    let layers = vec![layer(2e-3, 136e3), layer(3e-3, 80e3), layer(5e-3, 34e3)];
-    let guide = Guide::new(layers, 25e-3).unwrap();
+    let guide = paper_guide(25e-3);
     let press = Press::new(Object::Ball { radius_m: 3e-3 }, material(103e3)).unwrap();
     let press = press.on_guide(guide).unwrap();
     let loads = [0.05, 0.3, 1.0].map(Load::Force);
