@@ -79,7 +79,7 @@ pub struct FrameResult {
     pub force_n: Result<Estimate<f64>, PipelineError>,
     /// What a gauge read, in newtons.
     pub gauge_force_n: Option<f64>,
-    /// Contact radius in metres.
+    /// Contact radius in metres; of a flat face that of a disc of its area.
     pub contact_radius_m: Estimate<f64>,
     /// Contact radius over the ball's radius: small-contact theory holds up to 0.3.
     pub contact_ratio: Option<f64>,

@@ -95,6 +95,11 @@ impl Object {
         }
     }
 
+    /// Whether the user has said that its face is flat.
+    pub(super) fn is_flat(&self) -> bool {
+        matches!(self, Self::Block { .. } | Self::Cylinder { .. })
+    }
+
     /// Refuses what is not physical.
     pub(super) fn checked(self) -> Result<Self, PipelineError> {
         let length_and_ratio =

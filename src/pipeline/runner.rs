@@ -1,6 +1,6 @@
 //! Runs the stages of a pipeline one at a time, for a press and a session alike: times every run, and records what was skipped.
 use super::composition::Pipeline;
-use super::contact::{ContactReading, FrameContact};
+use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::face::{self, FaceWorkspace, TextureStretch};
 use super::load_reading::{self, LoadReading};
@@ -35,6 +35,8 @@ pub(super) struct MatchHistory {
 /// A pipeline at work on the frames of one sensor.
 pub(super) struct StageRunner {
     pipeline: Pipeline,
+    /// In place of the pipeline's, where it has one for objects of this kind.
+    contact: Option<Arc<dyn ContactStage>>,
     reference: Arc<ReferenceFrame>,
     force: ForceWorkspace,
     face: FaceWorkspace,
@@ -49,7 +51,10 @@ impl StageRunner {
         reference: Arc<ReferenceFrame>,
         skip_records: SkipRecords,
     ) -> Self {
+        let known_flat = pipeline.settings().object.is_flat();
+        let contact = known_flat.then(|| pipeline.contact().for_flat_faces());
         Self {
+            contact: contact.flatten(),
             pipeline,
             reference,
             force: ForceWorkspace::default(),
@@ -89,8 +94,8 @@ impl StageRunner {
         contact: &mut FrameContact,
     ) -> Result<(), PipelineError> {
         let start = Instant::now();
-        self.pipeline
-            .contact()
+        let stage = self.contact.as_deref().unwrap_or(self.pipeline.contact());
+        stage
             .measure(&mut self.force, image, &self.reference, gauge, contact)
             .map_err(|source| PipelineError::Contact { frame, source })?;
         self.face(image, contact);
@@ -114,11 +119,7 @@ impl StageRunner {
         if !may_be_flat || contact.reading.is_none() {
             return;
         }
-        let sign = if stage.polarity() == Polarity::Darker {
-            -1.0
-        } else {
-            1.0
-        };
+        let sign = sign_of(stage.polarity());
         let images = [image, self.reference.image()];
         let mut face = self
             .face
@@ -134,6 +135,9 @@ impl StageRunner {
         }
         if let Some(reading) = &mut contact.reading {
             reading.face = face;
+            if let Some(face) = face.filter(face::has_edge) {
+                reading.take_area(face.area_m2);
+            }
         }
     }
 
@@ -265,11 +269,7 @@ impl StageRunner {
         let start = Instant::now();
         let stage = self.pipeline.contact();
         let [hx, hy] = stage.pixel_size_m();
-        let sign = if stage.polarity() == Polarity::Darker {
-            -1.0
-        } else {
-            1.0
-        };
+        let sign = sign_of(stage.polarity());
         let none = PipelineError::NoTexture { from, to };
         let mut points = [Vec::new(), Vec::new()];
         let mut faces = Vec::with_capacity(2);
@@ -328,5 +328,14 @@ impl StageRunner {
         let estimate = estimator.estimate(loads).map_err(PipelineError::Modulus);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate
+    }
+}
+
+/// What makes the signal of a contact positive.
+fn sign_of(polarity: Polarity) -> f32 {
+    if polarity == Polarity::Darker {
+        -1.0
+    } else {
+        1.0
     }
 }

@@ -133,6 +133,9 @@ impl CalibrationSeries {
     }
 }
 
+/// The camera's largest grey level.
+const BRIGHTEST: f64 = 255.0;
+
 impl PressScene {
     /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter; every reading is the sum
     /// over a simulated frame. The reference frame is exposed once.
@@ -157,7 +160,8 @@ impl PressScene {
     /// ```
     ///
     /// # Errors
-    /// [`SimulateError::OutOfRange`] for an option without meaning.
+    /// [`SimulateError::OutOfRange`] for an option without meaning; [`SimulateError::CalibrationSaturates`] where a pixel's light is beyond the
+    /// camera's range.
     pub fn calibrate(
         &self,
         options: &CalibrationOptions,
@@ -180,7 +184,12 @@ impl PressScene {
         for (k, (branch, true_force_n)) in options.forces().enumerate() {
             let lit = options.lit_force_n(branch, true_force_n);
             let press = self.with_press(options.indenter, law.clone(), Load::normal(lit))?;
-            let sum = exposure(press.expected_frame(0).view(), k + 1);
+            let light = press.expected_frame(0);
+            if light.iter().any(|&grey| grey > BRIGHTEST) {
+                let force_n = true_force_n;
+                return Err(SimulateError::CalibrationSaturates { force_n });
+            }
+            let sum = exposure(light.view(), k + 1);
             let normal: f64 = StandardNormal.sample(&mut gauge);
             let force_n = true_force_n + options.gauge_noise_n * normal;
             points.push(CalibrationPoint {

@@ -50,6 +50,14 @@ pub enum SimulateError {
         /// Entries given.
         found: usize,
     },
+    /// A frame of the calibration is too bright for the camera: its sum would not be in proportion to the force.
+    #[error(
+        "at {force_n} N the calibration's indenter lights pixels beyond the camera's range: take a larger indenter, or a smaller force"
+    )]
+    CalibrationSaturates {
+        /// The smallest force of the calibration at which pixels saturate.
+        force_n: f64,
+    },
     /// A load is too great for the law to have an equilibrium.
     #[error("the force {force_n} N exceeds {limit_n} N, the largest the material law can carry")]
     Overload {

@@ -132,11 +132,17 @@ impl Ball {
             seed,
             ..PressOptions::default()
         };
-        let calibration = CalibrationOptions {
+        // The smallest indenter that does not saturate the camera: a soft ball's gain is high.
+        let calibrations = [1.0, 2.0, 4.0, 8.0].map(|times| CalibrationOptions {
+            indenter: Sphere {
+                radius_m: (times * self.radius_m).max(10e-3),
+                material: Elastic::RIGID,
+            },
             largest_force_n: 1.2 * pair[1].force_n,
             ..CalibrationOptions::default()
-        };
-        let trial = Trial::new(options, &calibration).unwrap();
+        });
+        let mut trials = (calibrations.iter()).filter_map(|c| Trial::new(options.clone(), c).ok());
+        let trial = trials.next().unwrap();
         let size = trial.simulation.pixel_size_m;
         // The rigid ball that calibrates leaves no contact on a rigid flat: there the light of a pascal is given.
         let grey_per_newton = trial.scene.grey_per_pascal() / (size[0] * size[1]);

@@ -192,4 +192,11 @@ impl ContactStage for LightContact {
     fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
         self.calibration.local()
     }
+
+    fn for_flat_faces(&self) -> Option<Arc<dyn ContactStage>> {
+        Some(Arc::new(Self {
+            meter: self.meter.clone().without_profile(),
+            ..self.clone()
+        }))
+    }
 }

@@ -79,6 +79,12 @@ pub trait ContactStage: Send + Sync {
     fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
         None
     }
+
+    /// The stage to take for objects that are known to have a flat face, if it saves work that only a ball's contact needs, such as the fit of its
+    /// profile. The contact radius is then taken from the face's area.
+    fn for_flat_faces(&self) -> Option<Arc<dyn ContactStage>> {
+        None
+    }
 }
 
 /// A stage behind a pointer is one.
@@ -110,6 +116,10 @@ macro_rules! forward {
 
             fn pressure_curve(&self) -> Option<&dyn LocalCalibration> {
                 (**self).pressure_curve()
+            }
+
+            fn for_flat_faces(&self) -> Option<Arc<dyn ContactStage>> {
+                (**self).for_flat_faces()
             }
         }
     };

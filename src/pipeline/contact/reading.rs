@@ -34,7 +34,7 @@ pub struct ContactReading {
     pub force_noise_n: f64,
     /// The part that comes from the calibration and is common to all frames, in newtons.
     pub force_calibration_n: f64,
-    /// Contact radius in metres.
+    /// Contact radius in metres; of a flat face √(A/π), that of a disc of its area.
     pub contact_radius_m: Estimate<f64>,
     /// Indentation in metres, where the sensor measures depth.
     pub indentation_m: Option<Estimate<f64>>,
@@ -83,6 +83,16 @@ impl ContactReading {
         self.force_noise_n = gauge.map_or(0.0, |gauge| gauge.standard_error);
         self.force_calibration_n = 0.0;
         self.out_of_calibration = false;
+    }
+
+    /// The contact is a flat face of that area: the radius is that of a disc as large.
+    pub(in crate::pipeline) fn take_area(&mut self, area_m2: Estimate<f64>) {
+        let radius_m = (area_m2.value / std::f64::consts::PI).sqrt();
+        self.area_m2 = area_m2.value;
+        self.contact_radius_m = Estimate {
+            value: radius_m,
+            standard_error: 0.5 * radius_m * area_m2.standard_error / area_m2.value,
+        };
     }
 
     pub(super) fn of_light(force: &ForceMeasurement<f64>) -> Option<Self> {

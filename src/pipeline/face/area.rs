@@ -3,7 +3,7 @@ use super::distance::{FARTHEST, to_outline};
 use super::{BAND, FaceReading, RING};
 use crate::force::{BoundingBox, Estimate};
 use crate::pipeline::contact::{FrameContact, resize};
-use ndarray::{Array2, ArrayView2, Axis, Slice};
+use ndarray::{Array2, ArrayBase, ArrayView1, ArrayView2, Axis, Ix2, Slice};
 
 /// Pixels around the contact's box that are looked at: the band, and the background beyond it.
 const MARGIN: usize = 10;
@@ -51,6 +51,14 @@ impl Moments {
         self.0[3] += weight * (x * x + y * y);
     }
 
+    /// A row's sums of the weights, and of them with the column and its square.
+    fn add_row(&mut self, [one, column, square]: [f64; 3], hx: f64, y: f64) {
+        self.0[0] += one;
+        self.0[1] += column * hx;
+        self.0[2] += one * y;
+        self.0[3] += square * hx * hx + one * y * y;
+    }
+
     /// Σ w r² about (x, y), over Σ w.
     fn about(&self, x: f64, y: f64) -> f64 {
         let [w, wx, wy, wrr] = self.0;
@@ -64,8 +72,9 @@ pub(in crate::pipeline) struct FaceWorkspace {
     signal: Array2<f32>,
     inside: Array2<bool>,
     distance: Array2<u8>,
+    /// The pixels nearer to the outline than [`FARTHEST`].
+    near: Vec<[usize; 2]>,
     tiles: Array2<Tile>,
-    levels: Vec<f32>,
 }
 
 impl FaceWorkspace {
@@ -84,6 +93,7 @@ impl FaceWorkspace {
         self.load([frame, reference], window, sign);
         self.threshold(region, window, contact)?;
         to_outline(&self.inside, &mut self.distance);
+        self.list_near();
         let background = self.background();
         self.signal.mapv_inplace(|s| s - background as f32);
         let variance = self.noise_variance();
@@ -92,11 +102,7 @@ impl FaceWorkspace {
     }
 
     fn load(&mut self, [frame, reference]: [ArrayView2<'_, u8>; 2], w: BoundingBox, sign: f32) {
-        let [frame, reference] = [frame, reference].map(|mut image| {
-            image.slice_axis_inplace(Axis(0), Slice::from(w.row_start..w.row_end));
-            image.slice_axis_inplace(Axis(1), Slice::from(w.column_start..w.column_end));
-            image
-        });
+        let [frame, reference] = [frame, reference].map(|image| within(image, w));
         let shape = frame.dim();
         resize(&mut self.signal, shape);
         resize(&mut self.inside, shape);
@@ -119,42 +125,49 @@ impl FaceWorkspace {
         w: BoundingBox,
         contact: &FrameContact,
     ) -> Option<()> {
-        let [row0, column0] = [
-            region.row_start - w.row_start,
-            region.column_start - w.column_start,
-        ];
-        self.levels.clear();
-        for ((row, column), inside) in contact.mask.indexed_iter() {
-            if *inside {
-                self.levels
-                    .push(self.signal[[row0 + row, column0 + column]]);
-            }
-        }
-        let quarter = self.levels.len() / 4;
-        if self.levels.is_empty() {
-            return None;
-        }
-        let (_, level, _) = self.levels.select_nth_unstable_by(quarter, f32::total_cmp);
-        let level = LEVEL as f32 * *level;
+        let part = BoundingBox {
+            row_start: region.row_start - w.row_start,
+            row_end: region.row_end - w.row_start,
+            column_start: region.column_start - w.column_start,
+            column_end: region.column_end - w.column_start,
+        };
+        let signal = within(self.signal.view(), part);
+        let mut levels = Histogram::default();
+        ndarray::Zip::from(&contact.mask)
+            .and(signal)
+            .for_each(|inside, &signal| {
+                if *inside {
+                    levels.count(signal);
+                }
+            });
+        let level = LEVEL as f32 * levels.lower_quartile()?;
         if level <= 0.0 {
             return None;
         }
         self.inside.fill(false);
-        for ((row, column), inside) in contact.mask.indexed_iter() {
-            let at = [row0 + row, column0 + column];
-            self.inside[at] = *inside && self.signal[at] > level;
-        }
+        ndarray::Zip::from(within(self.inside.view_mut(), part))
+            .and(&contact.mask)
+            .and(signal)
+            .for_each(|inside, mask, &signal| *inside = *mask && signal > level);
         Some(())
+    }
+
+    fn list_near(&mut self) {
+        self.near.clear();
+        for (row, distances) in self.distance.rows().into_iter().enumerate() {
+            let columns = distances.iter().enumerate();
+            let near = columns.filter(|&(_, &distance)| distance < FARTHEST);
+            self.near.extend(near.map(|(column, _)| [row, column]));
+        }
     }
 
     /// Mean light a few pixels outside the outline: what the reference does not know of.
     fn background(&self) -> f64 {
-        let near = BAND + 2..=MARGIN as u8 - 1;
+        let beyond = BAND + 2..=MARGIN as u8 - 1;
         let (mut sum, mut count) = (0.0, 0.0);
-        for ((signal, inside), distance) in self.signal.iter().zip(&self.inside).zip(&self.distance)
-        {
-            if !inside && near.contains(distance) {
-                sum += f64::from(*signal);
+        for &at in &self.near {
+            if !self.inside[at] && beyond.contains(&self.distance[at]) {
+                sum += f64::from(self.signal[at]);
                 count += 1.0;
             }
         }
@@ -164,9 +177,9 @@ impl FaceWorkspace {
     /// Variance of a pixel's noise, from the pixels some way inside.
     fn noise_variance(&self) -> f64 {
         let mut noise = NoiseLevel::default();
-        for ((at, distance), inside) in self.distance.indexed_iter().zip(&self.inside) {
-            if *inside && (BAND + 2..FARTHEST).contains(distance) {
-                noise.see(&self.signal, [at.0, at.1]);
+        for &at in &self.near {
+            if self.inside[at] && self.distance[at] >= BAND + 2 {
+                noise.see(&self.signal, at);
             }
         }
         noise.variance()
@@ -176,17 +189,19 @@ impl FaceWorkspace {
     fn average_ring(&mut self, variance: f64) -> Option<()> {
         let ring = BAND + 1..=BAND + RING;
         let (mut all, mut count) = (0.0, 0.0);
-        for ((at, distance), inside) in self.distance.indexed_iter().zip(&self.inside) {
-            if *inside && ring.contains(distance) {
-                let tile = &mut self.tiles[[at.0 / TILE, at.1 / TILE]];
-                tile.count += 1.0;
+        for &[row, column] in &self.near {
+            let at = [row, column];
+            let distance = self.distance[at];
+            if self.inside[at] && ring.contains(&distance) {
+                let tile = &mut self.tiles[[row / TILE, column / TILE]];
                 let light = f64::from(self.signal[at]);
-                let depth = f64::from(*distance) - RING_MIDDLE;
+                let depth = f64::from(distance) - RING_MIDDLE;
+                tile.count += 1.0;
                 tile.sum += light;
                 tile.depth += depth;
                 tile.depth_squared += depth * depth;
                 tile.depth_light += depth * light;
-                all += f64::from(self.signal[at]);
+                all += light;
                 count += 1.0;
             }
         }
@@ -223,45 +238,43 @@ impl FaceWorkspace {
 
     /// Area, moments and errors.
     fn sum(&mut self, [hx, hy]: [f64; 2], variance: f64) -> Option<FaceReading> {
-        let (mut area, mut light) = (Moments::default(), Moments::default());
+        let [mut area, mut light] = self.deep_moments([hx, hy]);
         // Light 3 to 5 and 7 to 9 pixels inside, and the outline's length.
         let (mut near, mut far, mut outline) = ([0.0; 2], [0.0; 2], 0.0);
         let mut of_pixels = 0.0;
-        for row in 0..self.signal.nrows() {
-            for column in 0..self.signal.ncols() {
-                let at = [row, column];
-                let (inside, distance) = (self.inside[at], self.distance[at]);
-                let signal = f64::from(self.signal[at]);
-                let (x, y) = (column as f64 * hx, row as f64 * hy);
-                if distance > BAND {
-                    if inside {
-                        area.add(1.0, x, y);
-                        light.add(signal, x, y);
-                        match distance {
-                            4..=5 => near = [near[0] + signal, near[1] + 1.0],
-                            8..=9 => far = [far[0] + signal, far[1] + 1.0],
-                            _ => {}
-                        }
+        for &[row, column] in &self.near {
+            let at = [row, column];
+            let (inside, distance) = (self.inside[at], self.distance[at]);
+            let signal = f64::from(self.signal[at]);
+            let (x, y) = (column as f64 * hx, row as f64 * hy);
+            if distance > BAND {
+                if inside {
+                    area.add(1.0, x, y);
+                    light.add(signal, x, y);
+                    match distance {
+                        4..=5 => near = [near[0] + signal, near[1] + 1.0],
+                        8..=9 => far = [far[0] + signal, far[1] + 1.0],
+                        _ => {}
                     }
-                    continue;
                 }
-                let tile = &mut self.tiles[[row / TILE, column / TILE]];
-                let depth = if inside {
-                    f64::from(distance) - 0.5
-                } else {
-                    0.0
-                };
-                let level = tile.mean + tile.slope * (depth + 0.5 - RING_MIDDLE);
-                if level <= 0.0 {
-                    return None;
-                }
-                let share = signal / level;
-                tile.covered += share;
-                of_pixels += tile.mean.powi(-2);
-                area.add(share, x, y);
-                light.add(signal, x, y);
-                outline += if inside && distance == 1 { 1.0 } else { 0.0 };
+                continue;
             }
+            let tile = &mut self.tiles[[row / TILE, column / TILE]];
+            let depth = if inside {
+                f64::from(distance) - 0.5
+            } else {
+                0.0
+            };
+            let level = tile.mean + tile.slope * (depth + 0.5 - RING_MIDDLE);
+            if level <= 0.0 {
+                return None;
+            }
+            let share = signal / level;
+            tile.covered += share;
+            of_pixels += tile.mean.powi(-2);
+            area.add(share, x, y);
+            light.add(signal, x, y);
+            outline += if inside && distance == 1 { 1.0 } else { 0.0 };
         }
         if far[1] < FEWEST || area.0[0] <= 0.0 || light.0[0] <= 0.0 {
             return None;
@@ -285,6 +298,37 @@ impl FaceWorkspace {
         })
     }
 
+    /// Moments of the area and of the light over the pixels that are further inside than those near the outline: of all, nearly all.
+    fn deep_moments(&self, [hx, hy]: [f64; 2]) -> [Moments; 2] {
+        let [mut area, mut light] = [Moments::default(); 2];
+        let rows = self.signal.rows().into_iter();
+        let rows = rows.zip(self.inside.rows()).zip(self.distance.rows());
+        for (row, ((signal, inside), distance)) in rows.enumerate() {
+            // Of one and of the signal: their sums, and those with the column and its square.
+            let (mut ones, mut signals) = ([0_u64; 3], [0.0; 3]);
+            let (inside, distance) = (pixels_of(inside), pixels_of(distance));
+            let pixels = pixels_of(signal)
+                .iter()
+                .zip(inside)
+                .zip(distance)
+                .enumerate();
+            for (column, ((&signal, &inside), &distance)) in pixels {
+                if inside && distance == FARTHEST {
+                    let column = column as u64;
+                    let (x, signal) = (column as f64, f64::from(signal));
+                    ones = [ones[0] + 1, ones[1] + column, ones[2] + column * column];
+                    signals[0] += signal;
+                    signals[1] += signal * x;
+                    signals[2] += signal * x * x;
+                }
+            }
+            let y = row as f64 * hy;
+            area.add_row(ones.map(|sum| sum as f64), hx, y);
+            light.add_row(signals, hx, y);
+        }
+        [area, light]
+    }
+
     /// Σ w² over the ring's pixels, w what a grey level of one of them takes from the area.
     fn weights_squared(&self) -> f64 {
         let mut sum = 0.0;
@@ -296,6 +340,47 @@ impl FaceWorkspace {
             }
         }
         sum
+    }
+}
+
+/// The part of an image in a box.
+fn within<P: ndarray::RawData>(
+    mut image: ArrayBase<P, Ix2>,
+    part: BoundingBox,
+) -> ArrayBase<P, Ix2> {
+    image.slice_axis_inplace(Axis(0), Slice::from(part.row_start..part.row_end));
+    image.slice_axis_inplace(Axis(1), Slice::from(part.column_start..part.column_end));
+    image
+}
+
+/// A row's pixels, side by side as they lie in an array of this module.
+fn pixels_of<T>(row: ArrayView1<'_, T>) -> &[T] {
+    row.to_slice().unwrap_or_default()
+}
+
+/// How many pixels have each of the 511 signals that two images of 8 bits may have.
+struct Histogram([usize; 511]);
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self([0; 511])
+    }
+}
+
+impl Histogram {
+    fn count(&mut self, signal: f32) {
+        self.0[(signal as i32 + 255) as usize] += 1;
+    }
+
+    /// The signal that a quarter of the pixels is below; `None` without pixels.
+    fn lower_quartile(&self) -> Option<f32> {
+        let quarter = self.0.iter().sum::<usize>() / 4;
+        let mut below = 0;
+        let level = self.0.iter().position(|pixels| {
+            below += pixels;
+            below > quarter
+        })?;
+        Some(level as f32 - 255.0)
     }
 }
 

@@ -1,64 +1,54 @@
 //! How far pixels are from an outline, along rows, columns and diagonals alike.
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1, ArrayViewMut1, Axis};
 
 /// Distances above this are not told apart.
 pub(super) const FARTHEST: u8 = 12;
 
 /// For every pixel the chessboard distance to the nearest pixel on the other side of the outline, at most [`FARTHEST`]: 1 beside the outline.
-/// What is beyond the image counts as its last pixel does. Two passes, O(pixels).
+/// What is beyond the image counts as its last pixel does. O(pixels), over whole rows at a time.
 pub(super) fn to_outline(inside: &Array2<bool>, distance: &mut Array2<u8>) {
+    let mut from_one_side = [false, true].map(|side| from_side(inside, side));
+    let [from_outside, from_inside] = &mut from_one_side;
+    // One of the two is zero.
+    ndarray::Zip::from(distance)
+        .and(from_outside)
+        .and(from_inside)
+        .for_each(|distance, outside, inside| *distance = *outside + *inside);
+}
+
+/// The chessboard distance to the nearest pixel on a side, at most [`FARTHEST`]. With g the distance within the column, it is the least of
+/// max(|k|, g(x + k)) over the columns x + k near by.
+fn from_side(inside: &Array2<bool>, side: bool) -> Array2<u8> {
     let (rows, columns) = inside.dim();
-    distance.fill(FARTHEST);
-    let pixels = inside.as_slice().unwrap_or_default();
-    let Some(distances) = distance.as_slice_mut() else {
-        return;
-    };
-    let closer = |own: u8, side: bool, other: usize, distances: &[u8]| {
-        let other = if pixels[other] == side {
-            distances[other]
-        } else {
-            0
-        };
-        own.min(other + 1)
-    };
-    for row in 0..rows {
-        for column in 0..columns {
-            let at = row * columns + column;
-            let (mut own, side) = (distances[at], pixels[at]);
-            if row > 0 {
-                own = closer(own, side, at - columns, distances);
-                if column > 0 {
-                    own = closer(own, side, at - columns - 1, distances);
-                }
-                if column + 1 < columns {
-                    own = closer(own, side, at - columns + 1, distances);
-                }
+    let mut distance = inside.mapv(|pixel| if pixel == side { 0 } else { FARTHEST });
+    for row in 1..rows {
+        let (above, mut below) = distance.view_mut().split_at(Axis(0), row);
+        come_closer(below.row_mut(0), above.row(row - 1));
+    }
+    for row in (1..rows).rev() {
+        let (mut above, below) = distance.view_mut().split_at(Axis(0), row);
+        come_closer(above.row_mut(row - 1), below.row(0));
+    }
+    let reach = usize::from(FARTHEST) - 1;
+    let mut line = vec![FARTHEST; columns + 2 * reach];
+    let lines = distance.as_slice_mut().unwrap_or_default();
+    for row in lines.chunks_exact_mut(columns.max(1)) {
+        line[reach..reach + columns].copy_from_slice(row);
+        for k in 1..=reach {
+            let (left, right) = (&line[reach - k..], &line[reach + k..]);
+            for ((own, left), right) in row.iter_mut().zip(left).zip(right) {
+                *own = (*own).min((*left).min(*right).max(k as u8));
             }
-            if column > 0 {
-                own = closer(own, side, at - 1, distances);
-            }
-            distances[at] = own;
         }
     }
-    for row in (0..rows).rev() {
-        for column in (0..columns).rev() {
-            let at = row * columns + column;
-            let (mut own, side) = (distances[at], pixels[at]);
-            if row + 1 < rows {
-                own = closer(own, side, at + columns, distances);
-                if column > 0 {
-                    own = closer(own, side, at + columns - 1, distances);
-                }
-                if column + 1 < columns {
-                    own = closer(own, side, at + columns + 1, distances);
-                }
-            }
-            if column + 1 < columns {
-                own = closer(own, side, at + 1, distances);
-            }
-            distances[at] = own;
-        }
-    }
+    distance
+}
+
+/// Lowers the distances of a row to one more than those of a row beside it.
+fn come_closer(row: ArrayViewMut1<'_, u8>, beside: ArrayView1<'_, u8>) {
+    ndarray::Zip::from(row)
+        .and(beside)
+        .for_each(|own, beside| *own = (*own).min(*beside + 1));
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ mod texture;
 pub(super) use area::FaceWorkspace;
 pub(super) use material_law::caution as material_law_caution;
 pub use shape::ShapeProblem;
-pub(super) use shape::{check, sticks};
+pub(super) use shape::{check, has_edge, sticks};
 pub(super) use texture::{TextureStretch, spots, stretch};
 
 use crate::force::Estimate;

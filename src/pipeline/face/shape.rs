@@ -124,13 +124,18 @@ fn problem(contact: &ContactReading, object: Object) -> Result<FaceReading, Shap
     }
     let face = contact.face.ok_or(ShapeProblem::TooSmall)?;
     let edge_ratio = face.edge_ratio;
-    if edge_ratio < LEAST_EDGE_RATIO {
+    if !has_edge(&face) {
         return Err(ShapeProblem::NoEdge { edge_ratio });
     }
     if sticks(&face) && matches!(object, Object::Unknown { .. }) {
         return Err(ShapeProblem::RaisedEdge { edge_ratio });
     }
     Ok(face)
+}
+
+/// Whether the outline is an edge, as that of a flat face, and no ball's.
+pub(in crate::pipeline) fn has_edge(face: &FaceReading) -> bool {
+    face.edge_ratio >= LEAST_EDGE_RATIO
 }
 
 /// Whether the pressure rises to the outline of a face that was said to be flat, as where it sticks to what it is pressed on.

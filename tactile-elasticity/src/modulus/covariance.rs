@@ -55,6 +55,16 @@ impl Covariance {
         self
     }
 
+    /// With standard errors of a law or a table that err the same way at all loads as far as the smallest goes. What they err beyond that at
+    /// the others is not known to be in proportion: counted as common, the weighted mean would extrapolate it away.
+    pub(crate) fn with_model_errors(self, standard_error: impl Fn(usize) -> f64) -> Self {
+        let least = (0..self.len())
+            .map(&standard_error)
+            .fold(f64::INFINITY, f64::min);
+        self.with_shared(|_| least)
+            .with_own(|i| (standard_error(i).powi(2) - least.powi(2)).max(0.0).sqrt())
+    }
+
     /// With a matrix of all pairs.
     pub(crate) fn with_given(mut self, entry: impl FnMut(usize, usize) -> f64) -> Self {
         let matrix = DMatrix::from_fn(self.len(), self.len(), entry);

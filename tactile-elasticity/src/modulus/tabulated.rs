@@ -200,7 +200,7 @@ impl TabulatedContact {
             .with_shared(|i| over(i, (2.0 - forces[i].radius_slope) * shared.size))
             .with_shared(|i| over(i, (1.0 - forces[i].modulus_slope) * shared.other_body))
             .with_shared(|i| over(i, forces[i].modulus_slope * of_poisson_ratio))
-            .with_shared(|i| over(i, model));
+            .with_model_errors(|i| over(i, model));
         [
             (
                 of_forces,

@@ -69,7 +69,11 @@ impl ReferenceFrame {
     pub fn from_frames(frames: &[ArrayView2<'_, u8>]) -> Result<Self, ForceError> {
         let size = common_size(frames)?;
         let mean = mean_of(frames, size);
-        let image = mean.mapv(|m| m.round() as u8);
+        // To the nearest, halves upwards: exact, and the standard library's rounding is a function call a pixel.
+        let image = match frames {
+            [frame] => frame.as_standard_layout().into_owned(),
+            _ => mean.mapv(|m| (f64::from(m) + 0.5) as u8),
+        };
         let noise = if frames.len() == 1 {
             NoiseModel::of_frame(frames[0])
         } else {
@@ -86,14 +90,8 @@ impl ReferenceFrame {
                 .unwrap_or(0)
         };
         let brightest = (0..size.0.div_ceil(TILE_ROWS)).map(band).collect();
-        for tile in 0..tiles.sums.len() {
-            let mean_sum: f64 = tiles
-                .pixels(tile, size)
-                .of(mean.view())
-                .iter()
-                .map(|m| f64::from(*m))
-                .sum();
-            tiles.sums[tile] = mean_sum.round() as i32;
+        if frames.len() > 1 {
+            sum_means(mean.view(), &mut tiles);
         }
         Ok(Self {
             image,
@@ -292,11 +290,25 @@ fn common_size(frames: &[ArrayView2<'_, u8>]) -> Result<(usize, usize), ForceErr
 
 /// The mean of the frames, pixel by pixel.
 fn mean_of(frames: &[ArrayView2<'_, u8>], size: (usize, usize)) -> Array2<f32> {
+    if let [frame] = frames {
+        let mut mean = Array2::zeros(size);
+        mean.zip_mut_with(frame, |mean, grey| *mean = f32::from(*grey));
+        return mean;
+    }
     let n = frames.len() as f64;
     Array2::from_shape_fn(size, |at| {
         let total: u32 = frames.iter().map(|f| u32::from(f[at])).sum();
         (f64::from(total) / n) as f32
     })
+}
+
+/// The tiles' sums from the mean of several frames, which is finer than whole grey levels.
+fn sum_means(mean: ArrayView2<'_, f32>, tiles: &mut Tiles) {
+    for tile in 0..tiles.sums.len() {
+        let pixels = tiles.pixels(tile, mean.dim()).of(mean);
+        let sum: f64 = pixels.iter().map(|m| f64::from(*m)).sum();
+        tiles.sums[tile] = sum.round() as i32;
+    }
 }
 
 fn check_size((rows, columns): (usize, usize)) -> Result<(), ForceError> {

@@ -83,6 +83,20 @@ impl<T: Real> ForceMeter<T> {
         self
     }
 
+    /// The same meter without the fit of Hertz's profile, see [`ForceOptions::without_profile`]: for contacts known to be no ball's.
+    ///
+    /// ```
+    /// use tactile_force::ForceMeter;
+    ///
+    /// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?.without_profile();
+    /// # let _ = meter;
+    /// # Ok::<(), tactile_force::ForceError>(())
+    /// ```
+    pub fn without_profile(mut self) -> Self {
+        self.skip_profile = true;
+        self
+    }
+
     /// Measures one frame. A calibration with a [local curve](StressCalibration::local) turns the contact's grey levels into
     /// pressures: the force is their integral, and the profile is fitted to them.
     ///

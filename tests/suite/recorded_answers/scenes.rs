@@ -416,7 +416,16 @@ fn scene_file() -> Vec<Answer> {
     };
     let made = PressScene::new(options).expect("a scene");
     let folder = tempfile::tempdir().expect("a folder");
-    let path = write_folder(&made, &CalibrationOptions::default(), folder.path()).expect("files");
+    // A smaller ball than the object would saturate.
+    let indenter = Sphere {
+        radius_m: 60e-3,
+        material: Elastic::RIGID,
+    };
+    let calibration = CalibrationOptions {
+        indenter,
+        ..CalibrationOptions::default()
+    };
+    let path = write_folder(&made, &calibration, folder.path()).expect("files");
     let scene = Scene::read(&path).expect("a scene");
     let data = scene.load().expect("its files");
     let pipeline = scene

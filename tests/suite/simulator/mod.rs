@@ -4,8 +4,8 @@ mod tabulated;
 
 use ndarray::Array2;
 use tactile_imaging::simulate::{
-    Camera, ContactLaw, Elastic, Gain, Illumination, Load, PressOptions, PressScene, Response,
-    SimulateError, Sphere,
+    CalibrationOptions, Camera, ContactLaw, Elastic, Gain, Illumination, Load, PressOptions,
+    PressScene, Response, SimulateError, Sphere,
 };
 
 /// The default scene on a quarter of the pixels a side.
@@ -174,6 +174,29 @@ fn a_brighter_gain_saturates_and_the_truth_counts_it() {
     // Rounding puts light from 254.5 on at 255 as well.
     let bright = frame.iter().filter(|&&v| v == 255).count();
     assert!(bright >= truth.saturated_pixels && bright < truth.saturated_pixels + 100);
+}
+
+/// A gain that suits a large soft ball's low pressure is too high for a small rigid one: its sums are no longer in proportion to the force.
+#[test]
+fn a_calibration_that_saturates_is_refused_and_says_what_helps() {
+    let large = Sphere {
+        radius_m: 20e-3,
+        material: Elastic::CL2003X,
+    };
+    let scene = PressScene::new(PressOptions {
+        object: large,
+        ..small()
+    });
+    let scene = scene.unwrap();
+    let mut options = CalibrationOptions::default();
+    let error = scene.calibrate(&options).unwrap_err();
+    assert!(
+        matches!(error, SimulateError::CalibrationSaturates { force_n } if force_n < 1.0),
+        "{error}"
+    );
+    assert!(error.to_string().contains("a larger indenter"), "{error}");
+    options.indenter.radius_m = 60e-3;
+    assert!(scene.calibrate(&options).is_ok());
 }
 
 #[test]

@@ -62,8 +62,15 @@ fn the_area_of_a_face_is_that_of_its_outline_to_a_thousandth() {
             let frame = scene.frame(load, 0);
             let mut press = pipeline.press(reference.view()).unwrap();
             press.add_frame(frame.view());
-            let area = press.contact(0).unwrap().unwrap().face.unwrap().area_m2;
+            let contact = press.contact(0).unwrap().unwrap();
+            let area = contact.face.unwrap().area_m2;
             let truth = scene.states()[load].area_m2;
+            let radius = contact.contact_radius_m.value;
+            let disc = std::f64::consts::PI * radius * radius;
+            assert!(
+                (disc / truth - 1.0).abs() < 1e-3,
+                "the radius is that of a disc as large, and no fit of a ball's profile"
+            );
             println!(
                 "{outline:?} {load}: {:+.2e} ± {:.1e}",
                 area.value / truth - 1.0,

@@ -96,18 +96,11 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let lengths = none
             .clone()
             .with_own(|i| all[i].log_force.slope * all[i].length.relative_error());
-        // One law errs the same way at all loads, as far as its smallest error goes. What it errs beyond that at the others is not known to
-        // be in proportion: counted as common, the weighted mean would extrapolate it away.
-        let least = all
-            .iter()
-            .map(|o| o.model_error)
-            .fold(f64::INFINITY, f64::min);
         let common = none
             .with_shared(|_| shared.force_scale)
             .with_shared(|i| all[i].log_force.slope * shared.length_scale)
             .with_shared(|i| all[i].log_force.size_slope * shared.size)
-            .with_shared(|_| least)
-            .with_own(|i| (all[i].model_error.powi(2) - least.powi(2)).max(0.0).sqrt());
+            .with_model_errors(|i| all[i].model_error);
         [
             (
                 forces,
