@@ -139,6 +139,8 @@ impl Ball {
                 material: Elastic::RIGID,
             },
             largest_force_n: 1.2 * pair[1].force_n,
+            // A gauge that suits the range, which loads between a hundredth of a newton and a hundred have.
+            gauge_noise_n: 1e-3 * pair[1].force_n,
             ..CalibrationOptions::default()
         });
         let mut trials = (calibrations.iter()).filter_map(|c| Trial::new(options.clone(), c).ok());
