@@ -167,7 +167,8 @@ impl ContactTable {
         &self.curves
     }
 
-    /// Root mean square relative error of the interpolated force: what each contact of the table misses when it is left out.
+    /// Root mean square relative error of the interpolated force: what each contact of the table misses when it is left out, but for those at the
+    /// ends of the curves and of the softest and the stiffest ball, where that would show how well the fit extrapolates.
     pub fn interpolation_error(&self) -> f64 {
         self.surface.error()
     }

@@ -33,7 +33,7 @@ pub(super) struct Surface {
     log_modulus: Range,
     /// Rows by degree in a/R, columns by degree in ln E.
     coefficients: DMatrix<f64>,
-    /// Root mean square of what each sample misses when it is left out of the fit.
+    /// Root mean square of what each sample that has others on both sides misses when it is left out of the fit.
     error: f64,
 }
 
@@ -109,18 +109,37 @@ impl Surface {
             .r()
             .solve_upper_triangular(&(orthogonal.transpose() * &values))?;
         let residuals = &values - &basis * &solution;
-        let left_out = residuals.iter().enumerate().map(|(i, residual)| {
+        let left_out = |i: usize| {
             let leverage = orthogonal.row(i).norm_squared();
-            residual / (1.0 - leverage).max(1e-6)
-        });
-        let squares: f64 = left_out.map(|e| e * e).sum();
-        surface.error = (squares / samples.len() as f64).sqrt();
+            residuals[i] / (1.0 - leverage).max(1e-6)
+        };
+        let between = (0..samples.len()).filter(|&i| surface.surrounds(samples, i));
+        let (mut squares, mut count) = (0.0, 0);
+        for i in between {
+            squares += left_out(i).powi(2);
+            count += 1;
+        }
+        if count == 0 {
+            squares = (0..samples.len()).map(|i| left_out(i).powi(2)).sum();
+            count = samples.len();
+        }
+        surface.error = (squares / count as f64).sqrt();
         surface.coefficients = DMatrix::from_column_slice(rows, columns, solution.as_slice());
         solution.iter().all(|c| c.is_finite()).then_some(surface)
     }
 
     pub(super) fn error(&self) -> f64 {
         self.error
+    }
+
+    /// Whether there are contacts on both sides of one: at the ends of its curve and for the smallest and the largest modulus leaving one out would
+    /// show how well the fit extrapolates, which it does nowhere.
+    fn surrounds(&self, samples: &[Sample], i: usize) -> bool {
+        let own = samples[i].log_modulus;
+        let same = |k: usize| samples.get(k).is_some_and(|s| s.log_modulus == own);
+        let inside = i > 0 && same(i - 1) && same(i + 1);
+        let of_one = self.log_modulus.lower == self.log_modulus.upper;
+        inside && (of_one || (own > self.log_modulus.lower && own < self.log_modulus.upper))
     }
 
     /// At a/R and ln E; the caller keeps to the range of the samples.
