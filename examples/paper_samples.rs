@@ -11,7 +11,7 @@ use std::error::Error;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use tactile_imaging::elasticity::contact::ContactTable;
-use tactile_imaging::pipeline::{EstimatorChoice, StagesConfig};
+use tactile_imaging::pipeline::EstimatorChoice;
 use tactile_imaging::plot::{Colour, Page, Panel};
 use tactile_imaging::scene::{Scene, read_contact_table};
 use tactile_imaging::simulate::{
@@ -112,11 +112,9 @@ fn moduli(
         .into_iter()
         .chain(contact_table.map(|_| tabulated));
     for (estimator, label) in estimators {
-        let stages = StagesConfig {
-            estimator,
-            ..StagesConfig::default()
-        };
-        let pipeline = scene.pipeline(&data)?.with_stages(&stages)?;
+        let mut scene = scene.clone();
+        scene.stages.estimator = estimator;
+        let pipeline = scene.pipeline(&data)?;
         let mut press = scene.press(&pipeline, &data)?;
         let modulus = press.modulus().map(|found| {
             let [lower, upper] = [Some(found.interval_95.lower), found.interval_95.upper]

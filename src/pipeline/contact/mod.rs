@@ -82,6 +82,13 @@ pub trait ContactStage: Send + Sync {
 
     /// The stage to take for objects that are known to have a flat face, if it saves work that only a ball's contact needs, such as the fit of its
     /// profile. The contact radius is then taken from the face's area.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::{ContactStage, LightContact};
+    /// let light = LightContact::gauged([50e-6; 2], &Default::default())?;
+    /// assert!(light.for_flat_faces().is_some(), "without the fit of Hertz's profile");
+    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
+    /// ```
     fn for_flat_faces(&self) -> Option<Arc<dyn ContactStage>> {
         None
     }
