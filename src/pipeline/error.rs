@@ -118,6 +118,21 @@ pub enum PipelineError {
         /// Why.
         source: ForceError,
     },
+    /// What a contact stage left behind does not fit the frame.
+    #[error(
+        "frame {}: the contact stage gave a mask of {} × {} pixels for a box of {} × {} pixels in a frame of {} × {}",
+        frame + 1, mask.0, mask.1, region.0, region.1, image.0, image.1
+    )]
+    ContactMask {
+        /// The frame.
+        frame: usize,
+        /// Rows and columns of the mask.
+        mask: (usize, usize),
+        /// Rows and columns of the region.
+        region: (usize, usize),
+        /// Rows and columns of the frame, in which the region must lie.
+        image: (usize, usize),
+    },
     /// A frame shows no contact, but one is needed.
     #[error("frame {} shows no contact: it does not differ from the reference by more than its noise", frame + 1)]
     NoContact {
@@ -255,6 +270,7 @@ impl PipelineError {
             | Self::Unreadable { frame, .. }
             | Self::NotReconstructed { frame, .. }
             | Self::Contact { frame, .. }
+            | Self::ContactMask { frame, .. }
             | Self::NoContact { frame }
             | Self::OppositeSignal { frame, .. }
             | Self::NoForce { frame }

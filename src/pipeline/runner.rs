@@ -98,6 +98,7 @@ impl StageRunner {
         stage
             .measure(&mut self.force, image, &self.reference, gauge, contact)
             .map_err(|source| PipelineError::Contact { frame, source })?;
+        check_mask(frame, image.dim(), contact)?;
         self.face(image, contact);
         self.report.ran(Stage::Contact, start.elapsed());
         let pixels = image.len();
@@ -338,4 +339,31 @@ fn sign_of(polarity: Polarity) -> f32 {
     } else {
         1.0
     }
+}
+
+/// Refuses a mask that does not fill its region, and a region that does not lie in the frame: a stage may be a user's own.
+fn check_mask(
+    frame: usize,
+    image: (usize, usize),
+    contact: &FrameContact,
+) -> Result<(), PipelineError> {
+    let Some(at) = contact.region else {
+        return Ok(());
+    };
+    let ordered = at.row_start <= at.row_end && at.column_start <= at.column_end;
+    let inside = ordered && at.row_end <= image.0 && at.column_end <= image.1;
+    let mask = contact.mask.dim();
+    if inside && mask == (at.rows(), at.columns()) {
+        return Ok(());
+    }
+    let region = (
+        at.row_end.saturating_sub(at.row_start),
+        at.column_end.saturating_sub(at.column_start),
+    );
+    Err(PipelineError::ContactMask {
+        frame,
+        mask,
+        region,
+        image,
+    })
 }

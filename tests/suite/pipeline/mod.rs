@@ -2,6 +2,7 @@
 mod blocks;
 mod hostile;
 mod on_demand;
+mod own_contact_stage;
 mod repeated;
 mod strain_of_sizes;
 mod strain_stream;

@@ -1,0 +1,83 @@
+//! A contact stage of a user's own may err.
+use ndarray::{Array2, ArrayView2};
+use tactile_imaging::force::{
+    BoundingBox, Estimate, ForceError, ForceWorkspace, Polarity, ReferenceFrame,
+};
+use tactile_imaging::pipeline::{ContactStage, FrameContact, LightContact, PipelineError};
+use tactile_imaging::{Object, Pipeline};
+
+/// Light, whose mask or region is then spoiled.
+struct Spoiled {
+    light: LightContact,
+    spoil: fn(&mut FrameContact),
+}
+
+impl ContactStage for Spoiled {
+    fn measure(
+        &self,
+        workspace: &mut ForceWorkspace,
+        frame: ArrayView2<'_, u8>,
+        reference: &ReferenceFrame,
+        gauge: Option<Estimate<f64>>,
+        contact: &mut FrameContact,
+    ) -> Result<(), ForceError> {
+        self.light
+            .measure(workspace, frame, reference, gauge, contact)?;
+        (self.spoil)(contact);
+        Ok(())
+    }
+
+    fn polarity(&self) -> Polarity {
+        self.light.polarity()
+    }
+
+    fn pixel_size_m(&self) -> [f64; 2] {
+        self.light.pixel_size_m()
+    }
+}
+
+/// A square face of 30 pixels, and a frame without it.
+fn frames() -> [Array2<u8>; 2] {
+    let face = Array2::from_shape_fn((64, 64), |(r, c)| {
+        let inside = (17..47).contains(&r) && (17..47).contains(&c);
+        if inside { 110 } else { 10 }
+    });
+    [Array2::from_elem((64, 64), 10), face]
+}
+
+#[test]
+fn a_mask_that_does_not_fit_is_an_error_and_no_panic() {
+    let spoils: [fn(&mut FrameContact); 3] = [
+        |contact| contact.mask = Array2::default((3, 5)),
+        |contact| {
+            contact.region = contact.region.map(|region| BoundingBox {
+                row_end: region.row_end + 100,
+                row_start: region.row_start + 100,
+                ..region
+            });
+        },
+        |contact| {
+            contact.region = contact.region.map(|region| BoundingBox {
+                row_end: region.row_start,
+                row_start: region.row_end,
+                ..region
+            });
+        },
+    ];
+    let [reference, face] = frames();
+    let block = Object::Block { poisson_ratio: 0.5 };
+    for object in [block, Object::sphere(3e-3)] {
+        for spoil in spoils {
+            let light = LightContact::gauged([50e-6; 2], &Default::default()).unwrap();
+            let pipeline = Pipeline::new(Spoiled { light, spoil }, object).unwrap();
+            let mut press = pipeline.press(reference.view()).unwrap();
+            press.add_frame(face.view());
+            let error = press.contact(0).unwrap_err();
+            assert!(
+                matches!(error, PipelineError::ContactMask { frame: 0, .. }),
+                "{error}"
+            );
+            assert!(press.measure().youngs_modulus_pa.is_err());
+        }
+    }
+}
