@@ -25,6 +25,7 @@ mod numbers;
 mod outputs;
 mod progress;
 mod reconstruct;
+mod simulated;
 mod strain;
 mod stream;
 mod table;

@@ -3,11 +3,12 @@ use super::{Arguments, Physics, Polymer, Simulation};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::progress::waiting;
+use crate::simulated::trial;
 use std::path::Path;
 use tactile_imaging::Pipeline;
 use tactile_imaging::pipeline::{PipelineError, Press, Trial, Truth};
 use tactile_imaging::scene::{Scene, SceneData};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Elastic, Load, PressOptions, Sphere};
+use tactile_imaging::simulate::{Camera, Elastic, Load, PressOptions, Sphere};
 
 /// Frames with all that is needed to measure them.
 pub enum Source {
@@ -33,7 +34,7 @@ impl Source {
         }
         let job = format!("simulating {} frames", arguments.simulation.forces.len());
         let options = options(&arguments.simulation);
-        let trial = waiting(job, || Trial::new(options, &CalibrationOptions::default()));
+        let trial = waiting(job, || trial(options));
         let trial = trial.map_err(|error| {
             let hint = match arguments.simulation.physics {
                 Physics::FiniteElements => ", or try --physics hertz",

@@ -5,10 +5,11 @@ use crate::context::Context;
 use crate::failure::{Exit, Failure};
 use crate::outputs::Outputs;
 use crate::progress::Progress;
+use crate::simulated::trial;
 use ndarray::Array2;
 use std::time::{Duration, Instant};
 use tactile_imaging::pipeline::{FrameSource, PipelineError, Session, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, LoadCycle, PressOptions};
+use tactile_imaging::simulate::{Camera, Gain, Load, LoadCycle, PressOptions};
 
 /// Times in seconds and frames.
 type Recording = Vec<(f64, Array2<u8>)>;
@@ -31,7 +32,7 @@ pub fn run(
         &job,
         "ask for fewer cycles or a lower rate",
     )?;
-    let trial = Trial::new(options, &CalibrationOptions::default())
+    let trial = trial(options)
         .map_err(|error| Failure::input(format!("the press cannot be simulated: {error}")))?;
     let frames = record(&trial, arguments, context)?;
     let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
