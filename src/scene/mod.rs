@@ -191,7 +191,8 @@ pub struct SceneLayer {
 /// # let object = Sphere { radius_m: 20e-3, material: Elastic::CL2000X };
 /// # let made = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
 /// # let folder = tempfile::tempdir()?;
-/// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
+/// # let indenter = Sphere { radius_m: 60e-3, material: Elastic::RIGID };
+/// # let calibration = CalibrationOptions { steps: 8, indenter, ..CalibrationOptions::default() };
 /// # let path = write_folder(&made, &calibration, folder.path())?;
 /// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
 /// let data = scene.load()?;
