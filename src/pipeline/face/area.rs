@@ -1,5 +1,6 @@
 //! The area within a contact's outline, from the light of the pixels that the outline cuts.
 use super::distance::{FARTHEST, to_outline};
+use super::histogram::Histogram;
 use super::{BAND, FaceReading, RING};
 use crate::force::{BoundingBox, Estimate};
 use crate::pipeline::contact::{FrameContact, resize};
@@ -356,32 +357,6 @@ fn within<P: ndarray::RawData>(
 /// A row's pixels, side by side as they lie in an array of this module.
 fn pixels_of<T>(row: ArrayView1<'_, T>) -> &[T] {
     row.to_slice().unwrap_or_default()
-}
-
-/// How many pixels have each of the 511 signals that two images of 8 bits may have.
-struct Histogram([usize; 511]);
-
-impl Default for Histogram {
-    fn default() -> Self {
-        Self([0; 511])
-    }
-}
-
-impl Histogram {
-    fn count(&mut self, signal: f32) {
-        self.0[(signal as i32 + 255) as usize] += 1;
-    }
-
-    /// The signal that a quarter of the pixels is below; `None` without pixels.
-    fn lower_quartile(&self) -> Option<f32> {
-        let quarter = self.0.iter().sum::<usize>() / 4;
-        let mut below = 0;
-        let level = self.0.iter().position(|pixels| {
-            below += pixels;
-            below > quarter
-        })?;
-        Some(level as f32 - 255.0)
-    }
 }
 
 /// Variance of the pixels' noise, from second differences along rows: they leave out what is linear, a texture too.

@@ -26,6 +26,7 @@
 //! their errors allow, the face slips or sticks, and a flag says so.
 mod area;
 mod distance;
+mod histogram;
 mod material_law;
 mod shape;
 mod texture;
