@@ -1,7 +1,7 @@
 //! Time, memory and right pairs of large sets in space under a smooth deformation of a tenth of their size, shuffled.
 //!
 //! ```text
-//! cargo run --release -p tactile-match --example large_sets -- POINTS [surface|volume] [NOISE OUTLIERS]
+//! cargo run --release -p tactile-match --example large_sets -- POINTS [surface|volume] [NOISE OUTLIERS [SEED]]
 //! ```
 //!
 //! Noise is a standard deviation along an axis in shares of the size (the largest extent), outliers a share of the points. Memory is the
@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let n = number(0)? as usize;
     let surface = arguments.get(1).is_none_or(|kind| kind == "surface");
     let (noise, outliers) = (2.0 * number(2)?, number(3)?);
-    let mut stream = Stream(n as u64);
+    let mut stream = Stream(n as u64 + 7919 * number(4)? as u64);
     let model = points(n, surface, &mut stream);
     let truth = deform(&model, &mut stream);
     let order = stream.permutation(n);

@@ -23,6 +23,9 @@ const MOST_OTHERS: f64 = MAX_LEVERAGE / (1.0 - MAX_LEVERAGE);
 const FARTHEST: f64 = 16.0;
 /// Targets with fainter soft matches, some five standard deviations of the noise away, are not looked at.
 const IMPOSSIBLE: f64 = 1e-9;
+/// A point whose likeliest target has less than one chance in fifty has no partner that could be told: its confidence would be far below
+/// [`KEPT`]. Of large sets whose noise exceeds their spacing these are nearly all points, with hundreds of candidates each.
+const HOPELESS: f64 = 0.02;
 /// Odds fainter than this do not count.
 const FAINT: f64 = 1e-4;
 /// Rounds of exchanges until none makes the pairs likelier: one or two are needed.
@@ -39,6 +42,8 @@ const KEPT: f64 = 0.3;
 pub(crate) struct PairOdds {
     /// Target of each model row.
     partners: Vec<Option<usize>>,
+    /// Rows whose partner cannot be told, see [`HOPELESS`].
+    hopeless: Vec<bool>,
     /// Model row of each target.
     owners: Vec<Option<usize>>,
     /// Pairs of points that are left over on both sides: squared distance, rows.
@@ -99,6 +104,12 @@ impl PairOdds {
     fn take<const D: usize>(&mut self, fitted: Fitted<'_, D>, assignment: &[Option<usize>]) {
         self.partners.clear();
         self.partners.extend_from_slice(assignment);
+        self.hopeless.clear();
+        self.hopeless
+            .extend((0..self.partners.len()).map(|i| fitted.is_hopeless(i)));
+        for (partner, &hopeless) in self.partners.iter_mut().zip(&self.hopeless) {
+            *partner = partner.filter(|_| !hopeless);
+        }
         self.owners.clear();
         self.owners.resize(fitted.targets.len(), None);
         for (i, partner) in assignment.iter().enumerate() {
@@ -124,7 +135,7 @@ impl PairOdds {
     fn complete<const D: usize>(&mut self, fitted: Fitted<'_, D>) {
         self.open.clear();
         for (i, partner) in self.partners.iter().enumerate() {
-            if partner.is_some() {
+            if partner.is_some() || self.hopeless[i] {
                 continue;
             }
             let others = self.leverages[i].others;
@@ -150,7 +161,7 @@ impl PairOdds {
     /// Makes for every point the change that makes the pairs likeliest; whether there was any.
     fn exchange<const D: usize>(&mut self, fitted: Fitted<'_, D>) -> bool {
         let mut changed = false;
-        for i in 0..self.partners.len() {
+        for i in (0..self.partners.len()).filter(|&i| !self.hopeless[i]) {
             let mut best = (BETTER, None);
             for j in fitted.candidates(i) {
                 let change = match (self.partners[i], self.owners[j]) {
@@ -187,7 +198,7 @@ impl PairOdds {
         let scale = left_model * left_target * (TAU * fitted.variance).powf(0.5 * D as f64);
         self.against.clear();
         self.against.resize(self.partners.len(), 0.0);
-        for i in 0..self.partners.len() {
+        for i in (0..self.partners.len()).filter(|&i| !self.hopeless[i]) {
             let Some(own) = self.partners[i] else {
                 for j in fitted.candidates(i) {
                     if let Some(k) = self.owners[j] {
@@ -292,6 +303,12 @@ impl<const D: usize> Fitted<'_, D> {
     /// Variance of a target over the noise's.
     fn width(&self, j: usize) -> f64 {
         self.annealer.soft.errors.width(j, self.variance)
+    }
+
+    /// Whether point i has a partner that nothing tells from others.
+    fn is_hopeless(&self, i: usize) -> bool {
+        let soft = &self.annealer.soft;
+        soft.moments.plain().weight[i] > 0.5 && soft.entries(i).all(|(_, p)| p < HOPELESS)
     }
 
     /// Targets that point i could belong to.
