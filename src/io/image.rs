@@ -18,9 +18,14 @@ use std::path::Path;
 /// A calibration holds for the grey that it was made with: reading colour frames by another one moves every level.
 ///
 /// ```
-/// use tactile_imaging::io::Grey;
-/// assert_eq!(Grey::default().weights(), [0.299, 0.587, 0.114]);
-/// assert_eq!(Grey::Mean.weights(), [1.0 / 3.0; 3]);
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{Grey, read_grey_image_as};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("blue.ppm");
+/// std::fs::write(&path, b"P6\n1 1\n255\n\x00\x00\x5a")?; // 90 levels of blue
+/// let levels = |grey| read_grey_image_as(&path, grey, None).map(|image| image.to_u8()[[0, 0]]);
+/// assert_eq!((levels(Grey::Mean)?, levels(Grey::default())?), (30, 10));
+/// # Ok(()) }
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -36,7 +41,7 @@ pub enum Grey {
 
 impl Grey {
     /// Weights of red, green and blue, of sum 1.
-    pub fn weights(self) -> [f64; 3] {
+    pub(crate) fn weights(self) -> [f64; 3] {
         match self {
             Grey::Rec601 => [0.299, 0.587, 0.114],
             Grey::Rec709 => [0.2126, 0.7152, 0.0722],
