@@ -1,11 +1,14 @@
 //! The pipeline on frames of 1392 × 1042 pixels with 200 control points: the paper's press, both results asserted, and a
 //! table of times and errors over 500 simulated scenes (two with `--test` or `--quick`) whose contacts cover 1 to 15 % of
 //! the frame: ten sensors, each calibrated once, and on each presses at random places with random forces and noise. Beside
-//! them what is skipped: a frame without contact, the second of two equal frames, and what a stream keeps from frame to frame.
+//! them what is skipped: a frame without contact, the second of two equal frames, and what a stream keeps from frame to frame;
+//! and what a sensor calibrated for its curve, flat field and lens costs a frame beside a line from sums to force.
 #![allow(clippy::print_stdout)]
+mod calibrated;
 mod face;
 mod stream;
 
+use calibrated::calibrated;
 use criterion::{Criterion, criterion_group, criterion_main};
 use face::flat_faces;
 use ndarray::Array2;
@@ -53,6 +56,7 @@ fn press(c: &mut Criterion) {
         });
     });
     stream(&mut group, &trial);
+    calibrated(&mut group);
     group.finish();
 }
 

@@ -1,7 +1,7 @@
 //! Grey images from PNG, PGM and JPEG files.
 //!
 //! Colour is turned to grey by the luma of Rec. 601, Y = 0.299 R + 0.587 G + 0.114 B, on the stored (gamma-coded) values,
-//! as OpenCV and most camera software do; alpha is ignored.
+//! as OpenCV and most camera software do, or by other weights that are asked for ([`Grey`]); alpha is ignored.
 //!
 //! Levels are on the scale of 8 bits, 0 to 255, and samples of more bits keep their precision as fractions: a sample v
 //! becomes 255 v/m, where m is the largest value that the camera gives. A PGM or PPM says m (its `maxval`). A PNG of 16
@@ -13,8 +13,42 @@ use ndarray::{Array2, ArrayView2};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Weights of red, green and blue in the luma of Rec. 601.
-pub(crate) const REC_601: [f64; 3] = [0.299, 0.587, 0.114];
+/// How red, green and blue make a grey level, on the stored (gamma-coded) values.
+///
+/// A calibration holds for the grey that it was made with: reading colour frames by another one moves every level.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{Grey, read_grey_image_as};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("blue.ppm");
+/// std::fs::write(&path, b"P6\n1 1\n255\n\x00\x00\x5a")?; // 90 levels of blue
+/// let levels = |grey| read_grey_image_as(&path, grey, None).map(|image| image.to_u8()[[0, 0]]);
+/// assert_eq!((levels(Grey::Mean)?, levels(Grey::default())?), (30, 10));
+/// # Ok(()) }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Grey {
+    /// The luma of Rec. 601, 0.299 R + 0.587 G + 0.114 B: what OpenCV and most camera software do.
+    #[default]
+    Rec601,
+    /// The luma of Rec. 709, 0.2126 R + 0.7152 G + 0.0722 B.
+    Rec709,
+    /// The mean of the channels: the depth tables of 9DTact.
+    Mean,
+}
+
+impl Grey {
+    /// Weights of red, green and blue, of sum 1.
+    pub(crate) fn weights(self) -> [f64; 3] {
+        match self {
+            Grey::Rec601 => [0.299, 0.587, 0.114],
+            Grey::Rec709 => [0.2126, 0.7152, 0.0722],
+            Grey::Mean => [1.0 / 3.0; 3],
+        }
+    }
+}
 
 /// Longest side of an image in pixels.
 pub(crate) const LARGEST_SIDE: u32 = 30_000;
@@ -95,6 +129,33 @@ pub fn read_grey_image_of_bits(path: impl AsRef<Path>, bits: u8) -> Result<GreyI
     parse(&read_bytes(path)?, path, Some(bits))
 }
 
+/// Reads a grey image as [`read_grey_image`], colours weighted as asked for; samples of 16 bits as
+/// [`read_grey_image_of_bits`] where `bits` is given.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{Grey, read_grey_image_as};
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("frame.ppm");
+/// std::fs::write(&path, b"P6\n1 1\n255\n\x1e\x3c\x00")?;
+/// // Red 30, green 60, blue 0.
+/// assert_eq!(read_grey_image_as(&path, Grey::Mean, None)?.levels, ndarray::array![[30.0]]);
+/// assert_eq!(read_grey_image_as(&path, Grey::Rec601, None)?.to_u8(), ndarray::array![[44]]);
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// As [`read_grey_image_of_bits`].
+pub fn read_grey_image_as(
+    path: impl AsRef<Path>,
+    grey: Grey,
+    bits: Option<u8>,
+) -> Result<GreyImage, ReadError> {
+    let path = path.as_ref();
+    let (image, largest) = decode(&read_bytes(path)?, path, bits)?;
+    Ok(to_grey(image, largest, grey))
+}
+
 /// Decodes a grey image from the bytes of a file; `name` stands for the file in errors.
 ///
 /// ```
@@ -114,7 +175,7 @@ pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImag
 
 fn parse(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<GreyImage, ReadError> {
     let (image, largest) = decode(bytes, path, bits)?;
-    Ok(to_grey(image, largest))
+    Ok(to_grey(image, largest, Grey::default()))
 }
 
 /// The image, and the sample that stands for the level 255.
@@ -157,7 +218,7 @@ pub(crate) fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u
             let levels = Array2::from_shape_vec(shape, image.into_raw());
             Ok(levels.unwrap_or_else(|_| Array2::zeros(shape)))
         }
-        (image, largest) => Ok(to_grey(image, largest).to_u8()),
+        (image, largest) => Ok(to_grey(image, largest, Grey::default()).to_u8()),
     }
 }
 
@@ -287,11 +348,12 @@ pub fn write_grey_image(
 }
 
 /// Levels from samples of which `largest` stands for 255.
-fn to_grey(image: DynamicImage, largest: f64) -> GreyImage {
+fn to_grey(image: DynamicImage, largest: f64, grey: Grey) -> GreyImage {
     let colour = image.color().has_color();
     let shape = (image.height() as usize, image.width() as usize);
     let scale = largest / 255.0;
-    let luma = |rgb: [f64; 3]| (0..3).map(|i| REC_601[i] * rgb[i]).sum::<f64>();
+    let weights = grey.weights();
+    let level = |rgb: [f64; 3]| (0..3).map(|i| weights[i] * rgb[i]).sum::<f64>();
     let wide = is_wide(&image);
     let levels: Vec<f64> = match (wide, colour) {
         (false, false) => image
@@ -302,7 +364,7 @@ fn to_grey(image: DynamicImage, largest: f64) -> GreyImage {
         (false, true) => image
             .into_rgb8()
             .pixels()
-            .map(|p| luma(p.0.map(|v| f64::from(v) / scale)))
+            .map(|p| level(p.0.map(|v| f64::from(v) / scale)))
             .collect(),
         (true, false) => image
             .into_luma_alpha16()
@@ -312,7 +374,7 @@ fn to_grey(image: DynamicImage, largest: f64) -> GreyImage {
         (true, true) => image
             .into_rgb16()
             .pixels()
-            .map(|p| luma(p.0.map(|v| f64::from(v) / scale)))
+            .map(|p| level(p.0.map(|v| f64::from(v) / scale)))
             .collect(),
     };
     let levels = Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape));
@@ -336,7 +398,7 @@ mod tests {
         let image = pnm("P6\n3 1\n255\n", &[255, 0, 0, 0, 255, 0, 0, 0, 255]);
         assert!(image.colour);
         // 255 times the weights; the sums differ from the products by rounding alone.
-        for (level, weight) in image.levels.iter().zip(REC_601) {
+        for (level, weight) in image.levels.iter().zip(Grey::Rec601.weights()) {
             assert!((level - 255.0 * weight).abs() < 1e-12);
         }
         assert_eq!(image.to_u8().into_raw_vec_and_offset().0, [76, 150, 29]);

@@ -26,7 +26,9 @@ pub use error::{Expected, ReadError};
 pub(crate) use files::read_bytes;
 pub use files::write_file;
 pub use grid::{read_grid, write_grid};
-pub use image::{GreyImage, read_grey_image, read_grey_image_of_bits, write_grey_image};
+pub use image::{
+    Grey, GreyImage, read_grey_image, read_grey_image_as, read_grey_image_of_bits, write_grey_image,
+};
 pub use points::{PointTable, read_point_table, read_points, write_points};
 pub use table::{Column, Table, read_table};
 pub use units::Quantity;

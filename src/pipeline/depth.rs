@@ -54,6 +54,27 @@ impl DarkContact {
         })
     }
 
+    /// The indentation counted from no darkness instead of the table's own zero, often a contact circle found at a
+    /// threshold ([`DepthTable::zeroed`]). Depths want the same: `DarkContact::depth_table(&entries)?.zeroed()`.
+    ///
+    /// ```
+    /// use tactile_imaging::pipeline::DarkContact;
+    /// // A level is 30 µm deep, and depth was counted from where three levels were seen.
+    /// let table: Vec<_> = (3..60).map(|s| (f64::from(s), 30e-6 * f64::from(s - 3))).collect();
+    /// let contact = DarkContact::new(&table, [0.1e-3; 2])?.zeroed()?;
+    /// let depths = DarkContact::depth_table(&table)?.zeroed()?;
+    /// assert!((depths.depth(10.0).0 - 0.3e-3).abs() < 1e-12);
+    /// # let _ = contact;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`PipelineError::DepthTable`] where the table does not tell its zero.
+    pub fn zeroed(self) -> Result<Self, PipelineError> {
+        let table = self.table.zeroed().map_err(PipelineError::DepthTable)?;
+        Ok(Self { table, ..self })
+    }
+
     /// The table as a reconstruction, zero where there is no contact.
     ///
     /// # Errors

@@ -167,6 +167,16 @@ pub enum SfsError {
         /// Index of the offending entry.
         index: usize,
     },
+    /// A calibration table does not tell the depth at zero signal.
+    #[error(
+        "the table does not tell its depth at zero signal: it has {entries} entries above the threshold of contact (4 are needed), which a parabola misses by {misfit:.3} of their range (0.010 is allowed)"
+    )]
+    TableZero {
+        /// Entries above the threshold of contact.
+        entries: usize,
+        /// Root mean square of the distances to the parabola over the range of the depths.
+        misfit: f64,
+    },
     /// More control points were asked for than the surface has pixels.
     #[error(
         "{requested} control points asked for, but the surface has only {available} usable pixels"

@@ -266,6 +266,14 @@ const CALLS: &[(&str, &str)] = &[
         "falling.csv",
     ),
     (
+        "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --grey green",
+        "green",
+    ),
+    (
+        "depth --reference dark_reference.pgm --table three_depths.csv --pixel-um 100 dark_frame.pgm --zero-table",
+        "three_depths.csv",
+    ),
+    (
         "depth --reference dark_reference.pgm --table depth_table.csv --pixel-um 100 dark_frame.pgm --ball --ball-radius-mm 4",
         "--ball",
     ),
@@ -360,6 +368,10 @@ fn more_files(folder: &Path) {
     put("gramme.csv", "indentation_mm,force (gf)\n0,0\n1,1\n2,3\n");
     put("three.csv", "0,0,0\n1,1,1\n2,3,4\n");
     put("two_rows.csv", "indentation_m,force_N\n0,0\n1e-4,1e-3\n");
+    put(
+        "three_depths.csv",
+        "darkness,depth_mm\n4,0.1\n20,0.5\n60,2\n",
+    );
     put("falling.csv", "darkness,depth_mm\n0,0\n5,1\n3,2\n");
     put(
         "equal.csv",

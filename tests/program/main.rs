@@ -3,6 +3,7 @@
 
 mod bad_calls;
 mod bad_files;
+mod depth;
 mod frames;
 mod harness;
 mod help;

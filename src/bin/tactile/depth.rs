@@ -4,20 +4,22 @@ use crate::failure::{Exit, Failure};
 use crate::images;
 use crate::numbers::{four_digits, one_or_two, positive};
 use crate::outputs::Outputs;
-use clap::Args;
+use clap::{Args, ValueEnum};
+use ndarray::Array2;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{Column, Quantity, read_table};
+use tactile_imaging::io::{Column, Grey, Quantity, read_grey_image_as, read_table};
 use tactile_imaging::pipeline::{
-    BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, SurfaceInput,
-    with_error,
+    BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, PipelineError,
+    SurfaceInput, with_error,
 };
 use tactile_imaging::plot::{Colour, HeatMap, Marker, Page, Panel};
+use tactile_imaging::sfs::DepthTable;
 
 /// Find the contact and its depth in frames of a sensor that grows darker with depth
 ///
-/// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference) and depth (m, mm, µm, by its
-/// heading; mm without one). With --ball-radius-mm a ball of this radius is fitted to the depth, with --ball one of any.
+/// TABLE.csv says how deep a darkness is: columns darkness (grey levels below the reference, of the same --grey) and depth (m, mm, µm,
+/// by its heading; mm without one). With --ball-radius-mm a ball of this radius is fitted to the depth, with --ball one of any.
 /// --out gets NAME_depth.csv (m, NaN outside the contact) and NAME_depth.svg for every frame NAME.
 #[derive(Args)]
 #[command(after_help = "\
@@ -43,12 +45,68 @@ pub struct Arguments {
     /// Fit a ball of any radius.
     #[arg(long, conflicts_with = "ball_radius_mm")]
     ball: bool,
+    /// Shift the table so that no darkness is no depth: for tables counted from a contact circle found at some darkness.
+    #[arg(long)]
+    zero_table: bool,
+    /// How the colours of a frame make its grey: as those of the table were made.
+    #[arg(long, value_enum, default_value_t = GreyOf::Rec601)]
+    grey: GreyOf,
     /// Bits of the camera, for images of 16 bits whose file does not say.
     #[arg(long, value_parser = clap::value_parser!(u8).range(8..=16))]
     bits: Option<u8>,
     /// Folder for the depth of every frame, as CSV and SVG.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum GreyOf {
+    /// 0.299 R + 0.587 G + 0.114 B, as OpenCV and most camera software do
+    #[value(name = "rec601")]
+    Rec601,
+    /// 0.2126 R + 0.7152 G + 0.0722 B
+    #[value(name = "rec709")]
+    Rec709,
+    /// The mean of the channels, as 9DTact's tables
+    Mean,
+}
+
+impl Arguments {
+    /// A frame in eight bits, in the grey of the table.
+    fn read(&self, path: &Path) -> Result<Array2<u8>, Failure> {
+        let grey = match self.grey {
+            GreyOf::Rec601 => Grey::Rec601,
+            GreyOf::Rec709 => Grey::Rec709,
+            GreyOf::Mean => Grey::Mean,
+        };
+        Ok(read_grey_image_as(path, grey, self.bits)?.to_u8())
+    }
+
+    fn pipeline(&self, entries: &[(f64, f64)]) -> Result<Pipeline, Failure> {
+        let in_table = |error| Failure::input(format!("{}: {error}", self.table.display()));
+        let (contact, table) = self.depths(entries).map_err(in_table)?;
+        let unknown = Object::Unknown {
+            poisson_ratio: Object::DEFAULT_POISSON_RATIO,
+        };
+        let ball = |mm| Object::sphere(mm / MM);
+        let object = self.ball_radius_mm.map_or(unknown, ball);
+        let pipeline = Pipeline::new(contact, object).map_err(Failure::input)?;
+        Ok(pipeline.with_surface(table, SurfaceInput::Signal))
+    }
+
+    /// The stages that read the table.
+    fn depths(
+        &self,
+        entries: &[(f64, f64)],
+    ) -> Result<(DarkContact, DepthTable<f64>), PipelineError> {
+        let contact = DarkContact::new(entries, self.pixel_um.map(|um| um * 1e-6))?;
+        let table = DarkContact::depth_table(entries)?;
+        if !self.zero_table {
+            return Ok((contact, table));
+        }
+        let zeroed = table.zeroed().map_err(PipelineError::DepthTable)?;
+        Ok((contact.zeroed()?, zeroed))
+    }
 }
 
 const MM: f64 = 1e3;
@@ -69,24 +127,13 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     inputs.extend(arguments.frames.iter().map(PathBuf::as_path));
     let mut outputs = Outputs::plan(arguments.out.as_deref(), &names, &inputs)?;
     let entries = depth_table(&arguments.table)?;
-    let in_table = |error| Failure::input(format!("{}: {error}", arguments.table.display()));
     let pixel_m = arguments.pixel_um.map(|um| um * 1e-6);
-    let contact = DarkContact::new(&entries, pixel_m).map_err(in_table)?;
-    let table = DarkContact::depth_table(&entries).map_err(in_table)?;
-    let object = arguments.ball_radius_mm.map_or(
-        Object::Unknown {
-            poisson_ratio: Object::DEFAULT_POISSON_RATIO,
-        },
-        |mm| Object::sphere(mm / MM),
-    );
-    let pipeline = Pipeline::new(contact, object)
-        .map_err(Failure::input)?
-        .with_surface(table, SurfaceInput::Signal);
-    let reference = images::eight_bits(&arguments.reference, arguments.bits)?;
+    let pipeline = arguments.pipeline(&entries)?;
+    let reference = arguments.read(&arguments.reference)?;
     let first = (arguments.reference.as_path(), reference.dim());
     let mut frames = Vec::new();
     for path in &arguments.frames {
-        let frame = images::eight_bits(path, arguments.bits)?;
+        let frame = arguments.read(path)?;
         images::same_shape((path, frame.dim()), first)?;
         frames.push(frame);
     }

@@ -118,7 +118,7 @@ impl ContactDetector {
         let Some(tiles) = reference.tile_sums(&workspace.pass.tiles) else {
             return IlluminationDrift::none();
         };
-        drift::fit(self.options.drift, size, tiles, sd, &mut workspace.scratch)
+        drift::fit(self.options.drift, size, tiles, sd, &mut workspace.drift)
     }
 
     /// The mask in a region around the suspect pixels, which grows while the aperture meets its border.

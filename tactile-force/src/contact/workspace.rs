@@ -4,6 +4,7 @@ use ndarray::ArrayView2;
 
 use super::region::Region;
 use crate::calibration::GreyHistogram;
+use crate::drift::FitWorkspace;
 use crate::frame::{BoundingBox, PassWorkspace, ReferenceFrame};
 use crate::health::FrameCondition;
 
@@ -29,7 +30,7 @@ pub struct DetectorWorkspace {
     pub(super) pass: PassWorkspace,
     pub(crate) region: Region,
     pub(super) histogram: Vec<u64>,
-    pub(super) scratch: Vec<f64>,
+    pub(super) drift: FitWorkspace,
 }
 
 impl DetectorWorkspace {
@@ -62,7 +63,7 @@ impl DetectorWorkspace {
         let size = reference.image().dim();
         let tiles = reference.tile_sums(&self.pass.tiles)?;
         let sd = reference.difference_variance().sqrt();
-        FrameCondition::of(size, tiles, sd, &mut self.scratch)
+        FrameCondition::of(size, tiles, sd, &mut self.drift)
     }
 
     /// The grey histogram of the last frame's contact over its aperture, each pixel covering `pixel_area_m2`: a row of the fit of a

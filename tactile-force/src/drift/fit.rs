@@ -10,15 +10,30 @@ const LEAST_SHARE: f64 = 0.5;
 /// Unevenness of the drift, as a share of the background, up to which a tile agrees.
 const UNEVEN: f64 = 0.01;
 
+/// Buffers of the fit, which goes over all tiles several times.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FitWorkspace {
+    tiles: Vec<TileSum>,
+    residuals: Vec<f64>,
+    pub(crate) scratch: Vec<f64>,
+}
+
 /// Fits the correction to all tiles but those that stand out (the contact), by least squares on what stays, again and
 /// again until the set settles; `sd` is the noise of one pixel's difference.
 pub(crate) fn fit(
     correction: DriftCorrection,
     (rows, columns): (usize, usize),
-    tiles: impl Iterator<Item = TileSum> + Clone,
+    given: impl Iterator<Item = TileSum>,
     sd: f64,
-    scratch: &mut Vec<f64>,
+    workspace: &mut FitWorkspace,
 ) -> IlluminationDrift {
+    let FitWorkspace {
+        tiles,
+        residuals,
+        scratch,
+    } = workspace;
+    tiles.clear();
+    tiles.extend(given);
     let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
     let mut drift = IlluminationDrift {
         correction,
@@ -29,26 +44,22 @@ pub(crate) fn fit(
         drift.coefficients[0] = 1.0;
     }
     let terms = correction.terms();
-    drift.coefficients[0] += median(
-        scratch,
-        tiles
-            .clone()
-            .map(|t| drift.residual(&t) / weight(&drift, &t)),
-    );
+    let change = |t: &TileSum| drift.residual(t) / weight(&drift, t);
+    drift.coefficients[0] += median(scratch, tiles.iter().map(change));
     let mut kept = 0;
     for _ in 0..20 {
-        let spread = 1.4826
-            * median(
-                scratch,
-                tiles.clone().map(|t| (drift.residual(&t) / t.pixels).abs()),
-            );
+        residuals.clear();
+        residuals.extend(tiles.iter().map(|t| drift.residual(t)));
+        let both = tiles.iter().zip(residuals.iter().copied());
+        let level = |(tile, residual): &(&TileSum, f64)| (residual / tile.pixels).abs();
+        let spread = 1.4826 * median(scratch, both.clone().map(|b| level(&b)));
         let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
         let limit = 3.0 * spread.max(noise);
-        let before = drift;
-        let near = tiles
-            .clone()
-            .filter(|t| (before.residual(t) / t.pixels).abs() <= limit);
-        let count = drift.step(near, terms, sd);
+        let near = both.filter(|b| level(b) <= limit);
+        let count = match terms {
+            1 => drift.step::<1>(near, sd),
+            _ => drift.step::<3>(near, sd),
+        };
         drift.tiles = count;
         if count == kept {
             break;
@@ -75,11 +86,11 @@ fn weight(drift: &IlluminationDrift, tile: &TileSum) -> f64 {
 
 impl IlluminationDrift {
     /// The automatic correction if it is sure enough, else none and the reason.
-    fn accepted(self, tiles: impl Iterator<Item = TileSum>, sd: f64) -> Self {
+    fn accepted(self, tiles: &[TileSum], sd: f64) -> Self {
         let (mut agree, mut all) = (0.0, 0.0);
         for tile in tiles {
             let limit = 3.0 * sd * tile.pixels.sqrt() + UNEVEN * tile.reference;
-            agree += f64::from(self.residual(&tile).abs() <= limit);
+            agree += f64::from(self.residual(tile).abs() <= limit);
             all += 1.0;
         }
         let share = agree / f64::max(all, 1.0);
@@ -102,17 +113,21 @@ impl IlluminationDrift {
         }
     }
 
-    /// One least-squares step on the given tiles; returns their number.
-    fn step(&mut self, tiles: impl Iterator<Item = TileSum>, terms: usize, sd: f64) -> usize {
+    /// One least-squares step of so many terms on the given tiles with their residuals; returns the number of tiles.
+    fn step<'a, const TERMS: usize>(
+        &mut self,
+        tiles: impl Iterator<Item = (&'a TileSum, f64)>,
+        sd: f64,
+    ) -> usize {
         let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
-        let sums = Normal::of(self, tiles, terms, scale);
+        let sums = Normal::of::<TERMS>(self, tiles, scale);
         let Some(inverse) = sums.matrix.try_inverse() else {
             return sums.count;
         };
         let step = inverse * sums.right;
-        for i in 0..terms {
+        for i in 0..TERMS {
             self.coefficients[i] += step[i] / scale[i];
-            for j in 0..terms {
+            for j in 0..TERMS {
                 self.covariance[i][j] = inverse[(i, j)] * sd * sd / (scale[i] * scale[j]);
             }
         }
@@ -133,14 +148,13 @@ struct Normal {
 
 impl Normal {
     /// Places count from the frame's middle, in units of `scale`.
-    fn of(
+    fn of<'a, const TERMS: usize>(
         drift: &IlluminationDrift,
-        tiles: impl Iterator<Item = TileSum>,
-        terms: usize,
+        tiles: impl Iterator<Item = (&'a TileSum, f64)>,
         scale: [f64; 3],
     ) -> Self {
         let (mut matrix, right) = (nalgebra::Matrix3::identity(), nalgebra::Vector3::zeros());
-        matrix.view_mut((0, 0), (terms, terms)).fill(0.0);
+        matrix.view_mut((0, 0), (TERMS, TERMS)).fill(0.0);
         let mut sums = Self {
             matrix,
             right,
@@ -148,17 +162,16 @@ impl Normal {
             reference: 0.0,
             pixels: 0.0,
         };
-        for tile in tiles {
-            let w = weight(drift, &tile);
-            let at = [
-                1.0,
-                (tile.x - drift.middle[0]) / scale[1],
-                (tile.y - drift.middle[1]) / scale[2],
-            ];
-            let residual = drift.residual(&tile);
-            for i in 0..terms {
+        for (tile, residual) in tiles {
+            let w = weight(drift, tile);
+            let place = |k: usize, x: f64| (x - drift.middle[k]) / scale[k + 1];
+            let at = match TERMS {
+                1 => [1.0, 0.0, 0.0],
+                _ => [1.0, place(0, tile.x), place(1, tile.y)],
+            };
+            for i in 0..TERMS {
                 sums.right[i] += w * at[i] * residual / tile.pixels;
-                for j in 0..terms {
+                for j in 0..TERMS {
                     sums.matrix[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
                 }
             }

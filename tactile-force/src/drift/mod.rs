@@ -5,7 +5,7 @@ mod fit;
 
 pub use correction::{DriftCorrection, DriftOutcome};
 
-pub(crate) use fit::fit;
+pub(crate) use fit::{FitWorkspace, fit};
 
 use crate::frame::TileSum;
 

@@ -254,6 +254,7 @@ impl ReferenceFrame {
     }
 
     /// One tile of the last pass.
+    #[inline]
     pub(crate) fn tile_sum(&self, passed: &Tiles, tile: usize) -> TileSum {
         let at = passed.pixels(tile, self.image.dim());
         TileSum {

@@ -1,6 +1,6 @@
 //! Brightness and noise of a frame outside the contact.
 
-use crate::drift::{DriftCorrection, IlluminationDrift, fit};
+use crate::drift::{DriftCorrection, FitWorkspace, IlluminationDrift, fit};
 use crate::estimate::Estimate;
 use crate::frame::TileSum;
 
@@ -37,15 +37,16 @@ impl FrameCondition {
         size: (usize, usize),
         tiles: impl Iterator<Item = TileSum> + Clone,
         sd: f64,
-        scratch: &mut Vec<f64>,
+        workspace: &mut FitWorkspace,
     ) -> Option<Self> {
         let drift = fit(
             DriftCorrection::Illumination,
             size,
             tiles.clone(),
             sd,
-            scratch,
+            workspace,
         );
+        let scratch = &mut workspace.scratch;
         let (mut grey, mut pixels) = (0.0, 0.0);
         scratch.clear();
         for tile in tiles {

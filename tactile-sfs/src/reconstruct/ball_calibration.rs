@@ -5,13 +5,14 @@
 
 use ndarray::Array2;
 
+use super::contact_circle::contact_circle;
 use super::depth_table::DepthTable;
 use super::signal::Signal;
 use crate::error::positive;
 use crate::{Domain, Frame, Scalar, SfsError};
 
 /// Fewest pixels of contact a calibration makes sense for.
-const FEWEST: usize = 100;
+pub(super) const FEWEST: usize = 100;
 
 /// A depth table and how well the ball fits it; what [`DepthTable::from_ball`] returns.
 ///
@@ -49,8 +50,9 @@ pub struct BallCalibration<T> {
 impl<T: Scalar> DepthTable<T> {
     /// Calibrates a table from one press of a ball.
     ///
-    /// The contact is where the signal exceeds `threshold`; the domain's mask should leave out whatever else does, and
-    /// may leave out part of the contact (to test the table on the rest) if `circle` gives centre (px) and radius (m).
+    /// The contact is the largest connected patch of the domain where the signal exceeds `threshold`; the mask may leave
+    /// out part of it (to test the table on the rest) if `circle` gives centre (px) and radius (m). The table counts depth
+    /// from the contact's outline, where the signal is the threshold: [`zeroed`](DepthTable::zeroed) counts it from no signal.
     ///
     /// Lengths in metres, signals in grey levels; O(pixels log pixels).
     ///
@@ -159,38 +161,6 @@ fn cap_depths(
         });
     }
     Ok(samples)
-}
-
-/// Centroid (px) and radius of equal area (m) of the pixels above the threshold. Stray pixels are kept from counting by
-/// demanding that four of the eight neighbours are above it too.
-fn contact_circle(
-    signals: &Array2<f64>,
-    threshold: f64,
-    step: [f64; 2],
-) -> Result<([f64; 2], f64), SfsError> {
-    let above = |r: usize, c: usize| signals.get([r, c]).is_some_and(|&s| s > threshold);
-    let (mut x, mut y, mut count) = (0.0, 0.0, 0usize);
-    for ((r, c), _) in signals.indexed_iter().filter(|(_, s)| **s > threshold) {
-        let near = (0..9)
-            .filter(|k| above((r + k / 3).wrapping_sub(1), (c + k % 3).wrapping_sub(1)))
-            .count();
-        if near > 4 {
-            x += c as f64;
-            y += r as f64;
-            count += 1;
-        }
-    }
-    if count < FEWEST {
-        return Err(SfsError::TooFewPixels {
-            needed: FEWEST,
-            available: count,
-        });
-    }
-    let n = count as f64;
-    Ok((
-        [x / n, y / n],
-        (n * step[0] * step[1] / core::f64::consts::PI).sqrt(),
-    ))
 }
 
 /// Mean depth of each signal level (steps of one unit), pooled until depths increase; starts at depth 0 for signal 0.

@@ -28,9 +28,9 @@ use crate::{
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthTable<T> {
-    entries: Vec<(T, T)>,
+    pub(super) entries: Vec<(T, T)>,
     signal: Signal<T>,
-    contact_threshold: T,
+    pub(super) contact_threshold: T,
 }
 
 impl<T: Scalar> DepthTable<T> {

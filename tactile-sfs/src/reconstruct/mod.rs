@@ -2,11 +2,13 @@
 
 mod ball_calibration;
 mod brooks_horn;
+mod contact_circle;
 mod depth_table;
 mod eikonal;
 mod pentland;
 mod reflectance;
 mod signal;
+mod table_zero;
 mod tsai_shah;
 
 use std::sync::Arc;

@@ -11,3 +11,4 @@ mod order;
 mod recorded;
 mod samplers;
 mod stability_scale;
+mod table_zero;
