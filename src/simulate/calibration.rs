@@ -1,5 +1,6 @@
 //! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and unloading (Fig. 9).
 
+use ndarray::Array2;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::contact_law::ContactLaw;
@@ -135,6 +136,8 @@ impl CalibrationSeries {
 
 /// The camera's largest grey level.
 const BRIGHTEST: f64 = 255.0;
+/// An indenter is doubled so many times at most: sixteen times the radius is a sixth of the pressure.
+const DOUBLINGS: usize = 4;
 
 impl PressScene {
     /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter; every reading is the sum
@@ -174,18 +177,12 @@ impl PressScene {
             frame.iter().map(|&v| u64::from(v)).sum::<u64>() as f64
         };
         let reference = exposure(dark.view(), 0);
-        // A table belongs to the scene's own object.
-        let law = match &self.options().law {
-            ContactLaw::Tabulated(_) | ContactLaw::FiniteElements => ContactLaw::Hertz,
-            closed_form => closed_form.clone(),
-        };
         let mut gauge = row_stream(seed, Purpose::Gauge, 0, 0);
         let mut points = Vec::with_capacity(2 * options.steps + 1);
         for (k, (branch, true_force_n)) in options.forces().enumerate() {
             let lit = options.lit_force_n(branch, true_force_n);
-            let press = self.with_press(options.indenter, law.clone(), Load::normal(lit))?;
-            let light = press.expected_frame(0);
-            if light.iter().any(|&grey| grey > BRIGHTEST) {
+            let light = self.calibration_light(options.indenter, lit)?;
+            if is_beyond_range(&light) {
                 let force_n = true_force_n;
                 return Err(SimulateError::CalibrationSaturates { force_n });
             }
@@ -204,6 +201,58 @@ impl PressScene {
             newton_per_grey: camera.pixel_area_m2() / self.grey_per_pascal(),
         })
     }
+
+    /// The calibration with an indenter of two, four, eight or sixteen times the radius where the given one saturates the camera: a gain that
+    /// suits the low pressure of a large or soft object is too high for a small rigid ball.
+    ///
+    /// ```
+    /// use tactile_imaging::simulate::{CalibrationOptions, Camera, Elastic, PressOptions, PressScene, Sphere};
+    /// let camera = Camera::default().coarser(16);
+    /// let object = Sphere { radius_m: 20e-3, material: Elastic::CL2003X };
+    /// let scene = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
+    /// let given = CalibrationOptions::default();
+    /// assert!(scene.calibrate(&given).is_err());
+    /// assert!(scene.calibrate(&scene.unsaturated(given)?).is_ok());
+    /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SimulateError::OutOfRange`] for an option without meaning; [`SimulateError::CalibrationSaturates`] where the largest of these
+    /// saturates too.
+    pub fn unsaturated(
+        &self,
+        mut options: CalibrationOptions,
+    ) -> Result<CalibrationOptions, SimulateError> {
+        options.validate()?;
+        // Light grows with the force on both branches.
+        let force_n = options.largest_force_n;
+        for _ in 0..=DOUBLINGS {
+            if !is_beyond_range(&self.calibration_light(options.indenter, force_n)?) {
+                return Ok(options);
+            }
+            options.indenter.radius_m *= 2.0;
+        }
+        Err(SimulateError::CalibrationSaturates { force_n })
+    }
+
+    /// The light of an indenter at a normal force.
+    fn calibration_light(
+        &self,
+        indenter: Sphere,
+        force_n: f64,
+    ) -> Result<Array2<f64>, SimulateError> {
+        // A table belongs to the scene's own object.
+        let law = match &self.options().law {
+            ContactLaw::Tabulated(_) | ContactLaw::FiniteElements => ContactLaw::Hertz,
+            closed_form => closed_form.clone(),
+        };
+        let press = self.with_press(indenter, law, Load::normal(force_n))?;
+        Ok(press.expected_frame(0))
+    }
+}
+
+fn is_beyond_range(light: &Array2<f64>) -> bool {
+    light.iter().any(|&grey| grey > BRIGHTEST)
 }
 
 impl CalibrationOptions {

@@ -11,8 +11,8 @@ use tactile_imaging::elasticity::modulus::{HertzSphere, ModulusEstimate, Tabulat
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, Pipeline, Trial};
 use tactile_imaging::simulate::{
-    CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, Sphere,
-    Waveguide, WaveguideLayer,
+    CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, PressScene,
+    Sphere, Waveguide, WaveguideLayer,
 };
 
 struct Ball {
@@ -132,19 +132,20 @@ impl Ball {
             seed,
             ..PressOptions::default()
         };
-        // The smallest indenter that does not saturate the camera: a soft ball's gain is high.
-        let calibrations = [1.0, 2.0, 4.0, 8.0].map(|times| CalibrationOptions {
+        let calibration = CalibrationOptions {
             indenter: Sphere {
-                radius_m: (times * self.radius_m).max(10e-3),
+                radius_m: self.radius_m.max(10e-3),
                 material: Elastic::RIGID,
             },
             largest_force_n: 1.2 * pair[1].force_n,
             // A gauge that suits the range, which loads between a hundredth of a newton and a hundred have.
             gauge_noise_n: 1e-3 * pair[1].force_n,
             ..CalibrationOptions::default()
-        });
-        let mut trials = (calibrations.iter()).filter_map(|c| Trial::new(options.clone(), c).ok());
-        let trial = trials.next().unwrap();
+        };
+        // A soft ball's gain is high.
+        let scene = PressScene::new(options.clone()).unwrap();
+        let calibration = scene.unsaturated(calibration).unwrap();
+        let trial = Trial::new(options, &calibration).unwrap();
         let size = trial.simulation.pixel_size_m;
         // The rigid ball that calibrates leaves no contact on a rigid flat: there the light of a pascal is given.
         let grey_per_newton = trial.scene.grey_per_pascal() / (size[0] * size[1]);

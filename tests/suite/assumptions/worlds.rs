@@ -7,7 +7,7 @@ use tactile_imaging::pipeline::{
 };
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, ContactLaw, ContactState, Illumination, Load, PressOptions,
-    Response,
+    PressScene, Response,
 };
 
 pub(super) const RADIUS_M: f64 = 3e-3;
@@ -158,14 +158,13 @@ impl World {
         if let Some(states) = self.sample.states(&options) {
             options.law = ContactLaw::Tabulated(states);
         }
-        let mut calibration = CalibrationOptions {
+        let calibration = CalibrationOptions {
             hysteresis: self.hysteresis,
             ..CalibrationOptions::default()
         };
-        if let Sample::Face(_) = self.sample {
-            // A gain that suits a face's low pressure takes a larger ball, whose middle does not saturate.
-            calibration.indenter.radius_m = 60e-3;
-        }
+        // A gain that suits a face's low pressure takes a larger ball, whose middle does not saturate.
+        let scene = PressScene::new(options.clone()).unwrap();
+        let calibration = scene.unsaturated(calibration).unwrap();
         let mut trial = Trial::new(options, &calibration).unwrap();
         for pair in &mut trial.pairs {
             pair.force_n *= self.gauge;
