@@ -48,6 +48,7 @@ mod pair;
 mod press;
 mod report;
 mod runner;
+mod same_image;
 mod session;
 mod settings;
 mod source;

@@ -1,5 +1,6 @@
 //! The images of a press: lent by the caller, or read whenever they are needed.
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::same_image::is_same_image;
 use ndarray::{Array2, ArrayView2, CowArray, Ix2};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -45,7 +46,7 @@ impl<'a> FrameImage<'a> {
     /// thousands share one by chance has a probability below 1e-10.
     pub(super) fn equals(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Lent(one), Self::Lent(other)) => one == other,
+            (Self::Lent(one), Self::Lent(other)) => is_same_image(*one, *other),
             (Self::OnDemand { hash: one, .. }, Self::OnDemand { hash: other, .. }) => one == other,
             (Self::Lent(image), Self::OnDemand { hash, .. })
             | (Self::OnDemand { hash, .. }, Self::Lent(image)) => *hash == hash_of_all(*image),

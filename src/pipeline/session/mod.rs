@@ -19,6 +19,7 @@ use super::face;
 use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
 use super::runner::{SkipRecords, StageRunner};
+use super::same_image::is_same_image;
 use crate::force::{HealthOptions, HealthReport, ShearCalibration, ShearTracker};
 pub use drift::DriftWatch;
 use health::SensorHealth;
@@ -183,7 +184,7 @@ impl Session {
         let number = self.frames;
         self.frames += 1;
         let skip = self.runner.pipeline().settings().skips.equal_frames;
-        let repeated = skip && self.measured && self.last == frame;
+        let repeated = skip && self.measured && is_same_image(self.last.view(), frame);
         if repeated {
             self.runner.skip(
                 Stage::Contact,

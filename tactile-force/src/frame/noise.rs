@@ -1,6 +1,7 @@
 //! Photon, read and quantisation noise.
 
 use ndarray::ArrayView2;
+use pulp::Arch;
 
 use crate::error::{ForceError, Requirement};
 
@@ -87,37 +88,22 @@ impl NoiseModel {
     /// what stays is corrected for the cut tails.
     pub(super) fn of_frame(frame: ArrayView2<'_, u8>) -> Self {
         let columns = frame.ncols();
-        // Counting one value again and again waits for memory; in turn in several histograms it does not.
-        let mut histograms = [[0_u32; RESPONSES]; 4];
+        let mut counts = Counts::new();
         let mut lines = [0, 1, 2].map(|_| vec![0_i16; columns]);
-        let (mut bends, mut responses) = (vec![0_i16; columns], Vec::with_capacity(columns));
-        for (row, pixels) in frame.rows().into_iter().enumerate() {
-            let [above, here, below] = &mut lines;
-            std::mem::swap(above, here);
-            std::mem::swap(here, below);
-            for (level, pixel) in below.iter_mut().zip(&pixels) {
-                *level = i16::from(*pixel);
-            }
-            if row < 2 || columns < 3 {
-                continue;
-            }
-            for (x, bend) in bends.iter_mut().enumerate() {
-                *bend = above[x] - 2 * here[x] + below[x];
-            }
-            let (left, middle, right) = (&bends[..columns - 2], &bends[1..], &bends[2..]);
-            let beside = left.iter().zip(middle).zip(right);
-            responses.clear();
-            responses.extend(beside.map(|((l, m), r)| (l - 2 * m + r).unsigned_abs()));
-            for responses in responses.chunks(histograms.len()) {
-                for (histogram, &response) in histograms.iter_mut().zip(responses) {
-                    histogram[usize::from(response)] += 1;
+        let mut scratch = [vec![0_i16; columns], vec![0_i16; columns]];
+        Arch::new().dispatch(|| {
+            for (row, pixels) in frame.rows().into_iter().enumerate() {
+                lines.rotate_left(1);
+                match pixels.as_slice() {
+                    Some(pixels) => widen(pixels.iter(), &mut lines[2]),
+                    None => widen(pixels.iter(), &mut lines[2]),
+                }
+                if row >= 2 && columns >= 3 {
+                    counts.add(respond(&lines, &mut scratch));
                 }
             }
-        }
-        let [a, b, c, d] = &histograms;
-        let histogram: Vec<u64> = (0..RESPONSES)
-            .map(|k| [a, b, c, d].map(|part| u64::from(part[k])).iter().sum())
-            .collect();
+        });
+        let histogram = counts.histogram();
         Self {
             read_variance: (trimmed_variance(&histogram) / 36.0).max(QUANTISATION),
             gain: 0.0,
@@ -139,6 +125,76 @@ impl NoiseModel {
             read_variance: variance.max(QUANTISATION),
             gain: 0.0,
         }
+    }
+}
+
+#[inline(always)]
+fn widen<'a>(pixels: impl Iterator<Item = &'a u8>, levels: &mut [i16]) {
+    for (level, pixel) in levels.iter_mut().zip(pixels) {
+        *level = i16::from(*pixel);
+    }
+}
+
+/// Absolute responses of the middle one of three rows, of at least three pixels, without its ends.
+#[inline(always)]
+fn respond<'a>(
+    [above, here, below]: &[Vec<i16>; 3],
+    [bends, responses]: &'a mut [Vec<i16>; 2],
+) -> &'a [i16] {
+    for (((bend, a), h), b) in bends.iter_mut().zip(above).zip(here).zip(below) {
+        *bend = a - 2 * h + b;
+    }
+    let beside = bends.iter().zip(&bends[1..]).zip(&bends[2..]);
+    for (response, ((left, middle), right)) in responses.iter_mut().zip(beside) {
+        *response = (left - 2 * middle + right).abs();
+    }
+    &responses[..bends.len() - 2]
+}
+
+/// Counts of a frame's responses. Two neighbours that are both small, as nearly all are, are counted in one place: half the writes, which are
+/// what counting waits for.
+struct Counts {
+    pairs: Vec<u32>,
+    single: Vec<u32>,
+}
+
+impl Counts {
+    /// Responses below this are small.
+    const SMALL: u16 = 64;
+
+    fn new() -> Self {
+        Self {
+            pairs: vec![0; usize::from(Self::SMALL).pow(2)],
+            single: vec![0; RESPONSES],
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, responses: &[i16]) {
+        let (pairs, rest) = responses.as_chunks::<2>();
+        for pair in pairs {
+            let [a, b] = pair.map(i16::cast_unsigned);
+            if a | b < Self::SMALL {
+                self.pairs[usize::from(a * Self::SMALL + b)] += 1;
+            } else {
+                self.single[usize::from(a)] += 1;
+                self.single[usize::from(b)] += 1;
+            }
+        }
+        for a in rest {
+            self.single[usize::from(a.cast_unsigned())] += 1;
+        }
+    }
+
+    /// Responses of every absolute value.
+    fn histogram(&self) -> Vec<u64> {
+        let mut counts: Vec<u64> = self.single.iter().map(|&n| u64::from(n)).collect();
+        let small = usize::from(Self::SMALL);
+        for (pair, &n) in self.pairs.iter().enumerate() {
+            counts[pair / small] += u64::from(n);
+            counts[pair % small] += u64::from(n);
+        }
+        counts
     }
 }
 
@@ -168,4 +224,36 @@ pub(crate) fn trimmed_variance(histogram: &[u64]) -> f64 {
         variance = next;
     }
     variance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Small and large responses, an odd number of them.
+    #[test]
+    fn pairs_are_counted_like_single_responses() {
+        let rows: [Vec<i16>; 2] = [
+            (0..799).map(|k| k * 37 % 71).collect(),
+            (0..33).map(|k| k * 127).collect(),
+        ];
+        let (mut counts, mut expected) = (Counts::new(), vec![0; RESPONSES]);
+        for responses in &rows {
+            counts.add(responses);
+            responses.iter().for_each(|&r| expected[r as usize] += 1);
+        }
+        assert_eq!(counts.histogram(), expected);
+    }
+
+    #[test]
+    fn responses_are_those_of_the_mask() {
+        let lines = [[7, 250, 3, 90], [0, 255, 0, 255], [12, 13, 200, 1]].map(Vec::from);
+        let mask = [1, -2, 1];
+        let expected = [0, 1].map(|x: usize| {
+            let terms = (0..9).map(|k| mask[k / 3] * mask[k % 3] * lines[k / 3][x + k % 3]);
+            terms.sum::<i16>().abs()
+        });
+        let mut scratch = [vec![0; 4], vec![0; 4]];
+        assert_eq!(respond(&lines, &mut scratch), expected);
+    }
 }
