@@ -20,10 +20,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         youngs_modulus_pa: 40e3,
         block_modulus_pa: 5e3,
     };
-    // Rings of a picture with pixels of a tenth of a millimetre, 1 Pa of white noise each.
+    // Rings of a picture whose pixels have 30 Pa of white noise and a tenth of a millimetre.
     let radii_m: Vec<f64> = (0..20).map(|k| (f64::from(k) + 0.5) * 0.6e-3).collect();
+    let pixels = |radius_m: f64| core::f64::consts::TAU * radius_m * 0.6e-3 / 1e-8;
+    let noise_pa: Vec<f64> = radii_m.iter().map(|&r| 30.0 / pixels(r).sqrt()).collect();
     for approaches_m in [vec![1e-3], vec![3e-3], vec![1.5e-3, 3e-3]] {
-        let errors = search.expected_errors(&lump, &approaches_m, &radii_m, 1.0)?;
+        let errors = search.expected_errors(&lump, &approaches_m, &radii_m, &noise_pa)?;
         println!(
             "pressed by {approaches_m:?} m: diameter within {:.1} %, depth {:.1} %, modulus {:.0} %",
             100.0 * errors.diameter,

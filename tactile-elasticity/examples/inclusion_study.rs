@@ -224,9 +224,8 @@ fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn
         youngs_modulus_pa: lump[2],
         block_modulus_pa: scene.block_modulus_pa,
     };
-    // One white error for all rings: that of a ring at half the radius used.
-    let white = white_errors(scene)[scene.radii_m.len() / 2];
-    Ok(search.expected_errors(&assumed, &scene.approaches_m, &scene.radii_m, white)?)
+    let white = white_errors(scene);
+    Ok(search.expected_errors(&assumed, &scene.approaches_m, &scene.radii_m, &white)?)
 }
 
 fn parameters(inclusion: &Inclusion) -> [Told; 3] {

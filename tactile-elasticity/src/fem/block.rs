@@ -24,6 +24,11 @@ pub(crate) struct BlockMeshes {
     pub(crate) block: Option<Mesh>,
 }
 
+/// Shortest element at the rim of a face that slides, over the face's radius. Shared displacements hold finer ones less and
+/// less as the face sinks in: of 0.02, they turn over at a tenth of the block's height, and the pressure within three
+/// quarters of the face jumps by 1 %. Until then it is that of the finer ones within 0.05 %.
+const SLIDING_RIM: f64 = 0.045;
+
 impl BlockMesh {
     /// Box around the inclusion that takes a grid of its own: radius, lower and upper height.
     fn cell(&self) -> Option<(Inclusion, [f64; 3])> {
@@ -48,10 +53,12 @@ impl BlockMesh {
         let inner = cell.map_or(0.5 * self.disc_radius, |(_, [radius, _, _])| radius);
         // Above a wide inclusion the pressure wants elements no longer than elsewhere.
         let n = self.fineness.max((inner / face).ceil() as usize);
-        let mut rim = graded_up_to(self.disc_radius, inner, 0.25 * face, 1.35, face);
+        let shortest = if self.bonded { 0.0 } else { SLIDING_RIM };
+        let first = (0.25 * face).max(shortest * self.disc_radius);
+        let mut rim = graded_up_to(self.disc_radius, inner, first, 1.35, face);
         rim.reverse();
         let core: Vec<f64> = (0..=n).map(|k| inner * k as f64 / n as f64).collect();
-        let beyond = graded(self.disc_radius, self.block_radius, 0.25 * face, 1.7);
+        let beyond = graded(self.disc_radius, self.block_radius, first, 1.7);
         let heights = match cell {
             Some((_, [_, low, high])) => {
                 let size = (high - low) / (2 * n) as f64;

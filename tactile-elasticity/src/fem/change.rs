@@ -68,6 +68,15 @@ impl Scene {
     }
 }
 
+/// What one iteration finds of a nearby scene.
+#[derive(Debug, Clone)]
+pub(crate) struct Found {
+    pub(crate) pressure: Vec<PressurePoint>,
+    pub(crate) force_n: f64,
+    /// r and z of every node but the elements' centres.
+    pub(crate) displacement: Vec<f64>,
+}
+
 /// A state with its tangent.
 pub(crate) struct Neighbourhood<'a> {
     model: &'a Model,
@@ -79,13 +88,13 @@ pub(crate) struct Neighbourhood<'a> {
 }
 
 impl Neighbourhood<'_> {
-    /// Interface pressures and forces of nearby scenes at their approaches, each by one iteration from the
+    /// What is found of nearby scenes at their approaches, each by one iteration from the
     /// state with its tangent: the error is of second order in the scenes' difference.
     ///
     /// Elements are evaluated anew only where they differ, and without their stiffness.
     ///
     /// `None` where an element is turned inside out.
-    pub(crate) fn solve(&self, nearby: &[(&Scene, f64)]) -> Option<Vec<(Vec<PressurePoint>, f64)>> {
+    pub(crate) fn solve(&self, nearby: &[(&Scene, f64)]) -> Option<Vec<Found>> {
         let size = self.tangent.right.len();
         // The last column is the answer to a unit approach.
         let mut columns = Vec::with_capacity((nearby.len() + 1) * size);
@@ -151,7 +160,7 @@ impl Neighbourhood<'_> {
         changes: &[Option<Elimination>],
         approach: f64,
         step: impl Fn(usize) -> f64,
-    ) -> Option<(Vec<PressurePoint>, f64)> {
+    ) -> Option<Found> {
         let interface = nearby.interface.as_ref()?;
         let steps: Vec<f64> = (self.slots.iter())
             .map(|slot| match *slot {
@@ -174,7 +183,10 @@ impl Neighbourhood<'_> {
             fields.displacement[2 * nodes[8] + 1] += centre[1];
             fields.pressures[index] = pressures;
         }
-        let force = nearby.interface_forces(interface, &fields).sum();
-        Some((nearby.interface_pressure(interface, &fields), force))
+        Some(Found {
+            pressure: nearby.interface_pressure(interface, &fields),
+            force_n: nearby.interface_forces(interface, &fields).sum(),
+            displacement: fields.displacement,
+        })
     }
 }

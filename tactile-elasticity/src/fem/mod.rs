@@ -98,6 +98,7 @@ mod system;
 mod tangent;
 mod vtk;
 
+pub(crate) use change::Found;
 pub use guide::{Guide, Layer};
 pub use load::{Load, Outcome, Report, Solution};
 pub use material::{Kinematics, Material};
@@ -108,6 +109,7 @@ pub(crate) use pressure::pressure_at;
 pub use pressure::{ContactRadius, PressurePoint};
 pub use rigid::RigidShape;
 pub use scene::{Block, Interface, Lump, Scene};
+pub(crate) use slide::Relaxation;
 pub use state::State;
 pub use stress::Stress;
 #[cfg(test)]

@@ -16,12 +16,12 @@ use super::scene::Scene;
 use super::state::State;
 
 /// Rounds of meshing and solving; each leaves about a tenth of the distance before.
-const MAX_ROUNDS: usize = 5;
+const MAX_ROUNDS: usize = 10;
 /// Distance of nodes over the face's radius at which they meet: pressures change by as large a part.
-const MET: f64 = 2e-5;
+const MET: f64 = 2e-6;
 
 /// Largest change of a shift over the distance of two nodes; inside the face it is below 0.1.
-const LARGEST_GROWTH: f64 = 0.3;
+const LARGEST_GROWTH: f64 = 0.9;
 
 /// A node of the upper surface and the one of the lower that shares its axial displacement.
 struct Pair {
@@ -48,6 +48,7 @@ impl Scene {
         };
         let guess = near.map_or(&[][..], |(_, state)| core::slice::from_ref(state));
         let mut state = scene.model.solve_near(&load, guess).states.pop()?;
+        let mut relaxation = Relaxation::default();
         for _ in 0..MAX_ROUNDS {
             let pairs = scene.model.pairs();
             let radius =
@@ -60,11 +61,12 @@ impl Scene {
             if pairs.iter().all(|pair| apart(pair).abs() <= MET * face) {
                 break;
             }
+            let parts = relaxation.next(pairs.iter().map(apart));
             let mut shifts = Vec::with_capacity(pairs.len());
-            for pair in &pairs {
+            for (pair, part) in pairs.iter().zip(parts) {
                 let [upper, lower] =
                     [pair.upper, pair.lower].map(|node| scene.model.nodes[node][0]);
-                shifts.push([lower, upper - lower - apart(pair)]);
+                shifts.push([lower, upper - lower - part * apart(pair)]);
             }
             limit_growth(&mut shifts);
             let Some(next) = self.shifted(&shifts, depth_m) else {
@@ -77,6 +79,24 @@ impl Scene {
             (scene, state) = (next, found);
         }
         Some((scene, state))
+    }
+
+    /// How far the nodes of each pair are apart along r, at the nodes' displacements (r, z).
+    pub(crate) fn distances(&self, displacement: &[f64]) -> Vec<f64> {
+        let radius = |node: usize| self.model.nodes[node][0] + displacement[2 * node];
+        let pairs = self.model.pairs().into_iter();
+        pairs
+            .map(|pair| radius(pair.upper) - radius(pair.lower))
+            .collect()
+    }
+
+    /// This scene with the upper node of each pair moved back by its distance.
+    pub(crate) fn moved_back(&self, distances: &[f64], depth_m: f64) -> Option<Self> {
+        let pairs = self.model.pairs().into_iter().zip(distances);
+        let shifts: Vec<[f64; 2]> = pairs
+            .map(|(pair, distance)| [self.model.nodes[pair.upper][0], -distance])
+            .collect();
+        self.shifted(&shifts, depth_m)
     }
 
     /// This scene with the upper surface's nodes where another scene has them.
@@ -128,6 +148,38 @@ impl Scene {
         Some(scene)
     }
 }
+
+/// Part of its distance by which each pair's node is moved: a secant's step, pair by pair.
+///
+/// A move by δ changes a distance by −δ where the face is smooth. At the rim, whose pressure the move
+/// changes, the change is larger, at a tenth of the block's height twice as large: full steps would never end.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Relaxation {
+    /// Distance before the last move, and the part of it that was moved.
+    last: Vec<(f64, f64)>,
+}
+
+impl Relaxation {
+    pub(crate) fn next(&mut self, distances: impl Iterator<Item = f64>) -> Vec<f64> {
+        let mut last = core::mem::take(&mut self.last).into_iter();
+        for now in distances {
+            let part = last.next().map_or(1.0, |(before, part)| {
+                let secant = part * before / (before - now);
+                // Distances that are rounding alone say nothing.
+                if secant.is_finite() {
+                    secant.clamp(LEAST_PART, 1.0)
+                } else {
+                    1.0
+                }
+            });
+            self.last.push((now, part));
+        }
+        self.last.iter().map(|(_, part)| *part).collect()
+    }
+}
+
+/// Least part of a distance that is moved.
+const LEAST_PART: f64 = 0.2;
 
 /// Keeps neighbouring shifts from differing by more than a part of the nodes' distance: at the rim, where
 /// the displacement is singular, elements would be turned inside out.

@@ -21,6 +21,12 @@ struct ModelErrors {
     element: f64,
     /// Of the forces beyond the pressures': most of it sits at the guide's rim.
     force: f64,
+    /// What the rim sends inwards beyond `rim` as the face sinks in, at the outermost radius and the last frame: it
+    /// grows with the cube of the radius and with the load. Half of its variance is correlated over
+    /// `element`: waves of the elements' length.
+    sinking: f64,
+    /// The same of the forces.
+    sinking_force: f64,
 }
 
 /// Correlation length of the shape's error over the outermost radius.
@@ -35,6 +41,8 @@ const BONDED: ModelErrors = ModelErrors {
     rough: 6e-4,
     element: 0.08,
     force: 6e-3,
+    sinking: 1e-3,
+    sinking_force: 3e-3,
 };
 
 /// The same, without friction: all pressures 0.1 to 0.25 % low, the shape within 0.1 %, lower by 0.15 to 0.45 %
@@ -46,6 +54,8 @@ const FRICTIONLESS: ModelErrors = ModelErrors {
     rough: 1.2e-3,
     element: 0.12,
     force: 6e-3,
+    sinking: 2.5e-3,
+    sinking_force: 3e-3,
 };
 
 /// Which mesh a covariance is for.
@@ -70,6 +80,8 @@ impl ModelErrors {
             rim: part * whole.rim,
             rough: part * whole.rough,
             force: part * whole.force,
+            sinking: part * whole.sinking,
+            sinking_force: part * whole.sinking_force,
             ..whole
         };
         match resolution {
@@ -110,6 +122,15 @@ pub(crate) struct Observed {
 }
 
 impl Observed {
+    /// Each frame's pressure over the last one's: as large a part of its approach, nearly.
+    fn loads(&self) -> Vec<f64> {
+        let rings = self.radii_m.len();
+        let sums = self.values[..self.frames * rings].chunks(rings);
+        let sums: Vec<f64> = sums.map(|frame| frame.iter().sum()).collect();
+        let last = sums.last().copied().unwrap_or(1.0);
+        sums.into_iter().map(|sum| sum / last).collect()
+    }
+
     /// Covariance of the values; relative errors are of the values observed.
     pub(crate) fn covariance(
         &self,
@@ -121,6 +142,7 @@ impl Observed {
         let (frames, rings) = (self.frames, self.radii_m.len());
         let outermost = self.radii_m.last().copied().unwrap_or(1.0);
         let values = &self.values;
+        let loads = self.loads();
         let mut covariance = DMatrix::from_fn(values.len(), values.len(), |i, k| {
             model.scale.powi(2) * values[i] * values[k]
         });
@@ -131,10 +153,13 @@ impl Observed {
                 let rough = model.rough.powi(2) * ring_kernel(a, b, model.element * outermost);
                 let rim = (model.rim * a * b / outermost.powi(2)).powi(2);
                 let common = sensor.common.powi(2) * smooth + shape + rim + rough;
+                let waves = 0.5 + 0.5 * ring_kernel(a, b, model.element * outermost);
+                let sinking = waves * (model.sinking * (a * b / outermost.powi(2)).powi(3)).powi(2);
                 for k in 0..frames {
                     for l in 0..frames {
                         let own = sensor.each_frame.powi(2) * smooth;
-                        let relative = if k == l { common + own } else { common };
+                        let both = common + sinking * loads[k] * loads[l];
+                        let relative = if k == l { both + own } else { both };
                         let (row, column) = (k * rings + i, l * rings + j);
                         covariance[(row, column)] += relative * values[row] * values[column];
                     }
@@ -144,7 +169,9 @@ impl Observed {
         for k in frames * rings..values.len() {
             covariance[(k, k)] += (sensor.force * values[k]).powi(2);
             for l in frames * rings..values.len() {
-                covariance[(k, l)] += model.force.powi(2) * values[k] * values[l];
+                let grown = loads[k - frames * rings] * loads[l - frames * rings];
+                let relative = model.force.powi(2) + model.sinking_force.powi(2) * grown;
+                covariance[(k, l)] += relative * values[k] * values[l];
             }
         }
         for (k, white) in self.white.iter().enumerate() {

@@ -3,8 +3,8 @@
 use super::motion::{Motion, sizes};
 use super::parameters::{Coordinate, Parameters};
 use crate::fem::{
-    Block, Guide, Interface, Kinematics, Load, Lump, Material, Outcome, PressurePoint, Scene,
-    State, pressure_at,
+    Block, Found, Guide, Interface, Kinematics, Load, Lump, Material, Outcome, PressurePoint,
+    Relaxation, Scene, State, pressure_at,
 };
 use std::sync::Arc;
 
@@ -70,6 +70,15 @@ impl Meshed {
     }
 }
 
+/// Depth down to which a sliding face moves the block's mesh: the inclusion's stays where it is.
+fn sliding_depth(parameters: &Parameters) -> f64 {
+    (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m)
+}
+
+/// Rounds in which the faces of slightly changed blocks are made to meet again: each leaves a tenth of the
+/// distance before.
+const SLIDING_ROUNDS: usize = 2;
+
 fn is_near(from: f64, to: f64) -> bool {
     (to / from).ln().abs() < REACH
 }
@@ -89,6 +98,11 @@ pub(crate) struct Linearised {
 impl Forward {
     pub(crate) fn observations(&self) -> usize {
         self.approaches_m.len() * (self.radii_m.len() + 1)
+    }
+
+    /// Whether the mesh follows the face's sliding.
+    fn slides(&self) -> bool {
+        self.interface == Interface::Frictionless && self.kinematics == Kinematics::Finite
     }
 
     fn scene(&self, parameters: &Parameters) -> Option<Scene> {
@@ -139,8 +153,7 @@ impl Forward {
         let approaches: Vec<f64> = (self.approaches_m.iter())
             .map(|approach| approach + parameters.zero_m)
             .collect();
-        let slides = self.interface == Interface::Frictionless;
-        let solved = if slides && self.kinematics == Kinematics::Finite {
+        let solved = if self.slides() {
             self.solve_sliding(meshed, &scene, parameters, &approaches, near)?
         } else {
             let loads: Vec<Load> = approaches.into_iter().map(Load::Approach).collect();
@@ -168,8 +181,7 @@ impl Forward {
         approaches_m: &[f64],
         near: Option<&Solved>,
     ) -> Option<Solved> {
-        // The inclusion's mesh stays where it is.
-        let depth_m = (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m);
+        let depth_m = sliding_depth(parameters);
         let mut solved = Solved {
             meshed,
             scenes: Vec::with_capacity(approaches_m.len()),
@@ -242,19 +254,42 @@ impl Forward {
                 nearby = changed(solved.scene(frame))?;
             }
             let scene = solved.scene(frame);
-            let mut at: Vec<(&Scene, f64)> = (nearby.iter().zip(&moved))
-                .map(|(scene, moved)| (scene, self.approaches_m[frame] + moved.zero_m))
-                .collect();
-            at.push((scene, self.approaches_m[frame] + parameters.zero_m));
-            let mut found = scene.neighbourhood(&mut layout, state)?.solve(&at)?;
+            let neighbourhood = scene.neighbourhood(&mut layout, state)?;
+            let approach = |parameters: &Parameters| self.approaches_m[frame] + parameters.zero_m;
+            let solve = |nearby: &[Scene]| {
+                let mut at: Vec<(&Scene, f64)> = (nearby.iter().zip(&moved))
+                    .map(|(scene, moved)| (scene, approach(moved)))
+                    .collect();
+                at.push((scene, approach(parameters)));
+                neighbourhood.solve(&at)
+            };
+            let mut found = solve(&nearby)?;
+            if self.slides() {
+                let depth_m = sliding_depth(parameters);
+                let mut relaxations = vec![Relaxation::default(); nearby.len()];
+                for _ in 0..SLIDING_ROUNDS {
+                    let met = scene.distances(&found[nearby.len()].displacement);
+                    for ((nearby, found), relaxation) in
+                        nearby.iter_mut().zip(&found).zip(&mut relaxations)
+                    {
+                        let apart = nearby.distances(&found.displacement);
+                        let mut apart: Vec<f64> =
+                            apart.iter().zip(&met).map(|(a, b)| a - b).collect();
+                        let parts = relaxation.next(apart.iter().copied());
+                        apart.iter_mut().zip(parts).for_each(|(a, part)| *a *= part);
+                        *nearby = nearby.moved_back(&apart, depth_m)?;
+                    }
+                    found = solve(&nearby)?;
+                }
+            }
             here.extend(found.pop());
             for (answers, found) in answers.iter_mut().zip(found) {
                 answers.push(found);
             }
         }
-        let frames = |answers: &[(Vec<PressurePoint>, f64)]| {
-            let frames = (answers.iter()).map(|(points, force)| (points.as_slice(), *force));
-            self.collect(frames)
+        let frames = |answers: &[Found]| {
+            let frames = answers.iter();
+            self.collect(frames.map(|found| (found.pressure.as_slice(), found.force_n)))
         };
         let here = frames(&here);
         let mut columns = Vec::with_capacity(coordinates.len());

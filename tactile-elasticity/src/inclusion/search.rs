@@ -47,7 +47,7 @@ const HOPELESS_MISFIT: f64 = 0.1;
 /// let search = search.with_sensor_errors(SensorErrors { common: 1.5e-3, ..SensorErrors::default() })?;
 /// // Would two frames tell enough of a small lump?
 /// let lump = AssumedInclusion { diameter_m: 8e-3, depth_m: 4e-3, youngs_modulus_pa: 40e3, block_modulus_pa: 5e3 };
-/// let errors = search.expected_errors(&lump, &[1.5e-3, 3e-3], &radii_m, 1.0)?;
+/// let errors = search.expected_errors(&lump, &[1.5e-3, 3e-3], &radii_m, &vec![1.0; radii_m.len()])?;
 /// println!("its diameter would be known within {:.0} %", 100.0 * errors.diameter);
 /// let estimate = search.search_with_progress(&radii_m, &frames, &mut |progress| {
 ///     println!("{} of {}", progress.done, progress.expected);

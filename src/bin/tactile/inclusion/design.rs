@@ -31,8 +31,8 @@ pub fn run(
                 .map(|k| largest * height_m * k as f64 / frames as f64)
                 .collect();
             let pressure = assumed.block_modulus_pa * largest;
-            let errors =
-                search.expected_errors(assumed, &approaches, &radii, RING_NOISE * pressure);
+            let white = vec![RING_NOISE * pressure; radii.len()];
+            let errors = search.expected_errors(assumed, &approaches, &radii, &white);
             let errors = errors.map_err(|error| match file {
                 Some(file) => Failure::input(format!("{}: {error}", file.display())),
                 None => Failure::input(error),
