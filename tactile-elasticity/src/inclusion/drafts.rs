@@ -19,11 +19,12 @@ const CERTAIN_EVIDENCE: f64 = 50.0;
 
 /// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the pressure is within 0.05 %
 /// of a mesh of ten; five leave waves of 0.1 % above a wide shallow inclusion, which move its size and depth by one bound. A
-/// face that slides takes three to four solutions for one, and its rim errs by more than five elements do.
-const fn answer_fineness(interface: Interface) -> usize {
+/// face that slides takes three to four solutions for one, and its rim errs by more than five elements do; so does the
+/// noise on an inclusion that hardly shows.
+fn answer_fineness(interface: Interface, is_certain: bool) -> usize {
     match interface {
-        Interface::Bonded => 7,
-        Interface::Frictionless => 5,
+        Interface::Bonded if is_certain => 7,
+        _ => 5,
     }
 }
 
@@ -125,21 +126,18 @@ impl InclusionSearch {
             plain,
             lump,
         } = draft;
-        problem.forward = self.forward(
-            observed,
-            approaches_m,
-            interface,
-            answer_fineness(interface),
-        );
-        let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
-        problem.factor = covariance.cholesky()?;
         let with_lump = core::mem::take(&mut problem.priors);
         let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| lump.evidence - plain.evidence);
-        let plain = if gain < CERTAIN_EVIDENCE {
+        let is_certain = gain > CERTAIN_EVIDENCE;
+        let fineness = answer_fineness(interface, is_certain);
+        problem.forward = self.forward(observed, approaches_m, interface, fineness);
+        let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
+        problem.factor = covariance.cholesky()?;
+        let plain = if is_certain {
+            plain
+        } else {
             problem.priors = with_lump[..with_lump.len() - LUMP_COORDINATES].to_vec();
             problem.fit(plain.parameters, SETTLED, || counter.step())?
-        } else {
-            plain
         };
         problem.priors = with_lump;
         let lump = lump.and_then(|fit| problem.fit(fit.parameters, SETTLED, || counter.step()));
