@@ -25,14 +25,17 @@ pub struct Estimated {
 impl Estimated {
     /// From a logarithm that is Gaussian.
     pub(crate) fn from_logarithm(logarithm: f64, error: f64) -> Self {
+        Self::from_interval(logarithm, [TWO_SIDED_95 * error; 2])
+    }
+
+    /// From a logarithm and how far its 95 % interval reaches down and up; the standard error is that of a
+    /// Gaussian with an interval as wide.
+    pub(crate) fn from_interval(logarithm: f64, [down, up]: [f64; 2]) -> Self {
         let value = logarithm.exp();
         Self {
             value,
-            standard_error: value * error,
-            interval: [
-                value * (-TWO_SIDED_95 * error).exp(),
-                value * (TWO_SIDED_95 * error).exp(),
-            ],
+            standard_error: value * 0.5 * (down + up) / TWO_SIDED_95,
+            interval: [value * (-down).exp(), value * up.exp()],
         }
     }
 
@@ -43,7 +46,7 @@ impl Estimated {
 }
 
 /// Standard deviations that 95 % of a Gaussian lie within.
-const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
+pub(crate) const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
 /// A parameter of an inclusion: told, or not.
 ///

@@ -38,9 +38,12 @@ pub(crate) struct Fit {
     pub(crate) covariance: DMatrix<f64>,
     /// rᵀ C⁻¹ r.
     pub(crate) misfit: f64,
+    /// The priors' part of the objective.
+    pub(crate) penalty: f64,
     /// Logarithm of the evidence by Laplace's approximation, up to what all models share.
     pub(crate) evidence: f64,
     pub(crate) predicted: Vec<f64>,
+    pub(crate) solved: Solved,
     pub(crate) converged: bool,
 }
 
@@ -86,11 +89,11 @@ struct Step {
 }
 
 /// The quadratic model of the objective at some parameters.
-struct Normal {
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
-    misfit: f64,
-    penalty: f64,
+pub(super) struct Normal {
+    pub(super) matrix: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+    pub(super) misfit: f64,
+    pub(super) penalty: f64,
     predicted: Vec<f64>,
     solved: Solved,
 }
@@ -144,7 +147,7 @@ impl Problem {
         solved.unwrap_or(vector)
     }
 
-    fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
+    pub(super) fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
         let Linearised {
             prediction,
             columns,
@@ -254,7 +257,7 @@ impl Problem {
         Some(Step { by, size })
     }
 
-    fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
+    pub(super) fn stepped(&self, parameters: &Parameters, step: &DVector<f64>) -> Parameters {
         let steps = self.priors.iter().zip(step.iter());
         steps.fold(*parameters, |moved, (prior, &by)| {
             moved.moved(prior.coordinate, by)
@@ -277,8 +280,10 @@ impl Problem {
             parameters,
             covariance: cholesky.inverse(),
             misfit: normal.misfit,
+            penalty: normal.penalty,
             evidence: -0.5 * (normal.misfit + normal.penalty) - logarithm - known - noise,
             predicted: normal.predicted,
+            solved: normal.solved,
             converged,
         })
     }

@@ -1,8 +1,10 @@
 //! What the fits under one assumption about the face say.
 
 use super::covariance::Observed;
-use super::estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
-use super::fit::Fit;
+use super::estimate::{
+    Estimated, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95, Told,
+};
+use super::fit::{Fit, Problem};
 use super::parameters::Coordinate;
 use crate::fem::Interface;
 
@@ -18,6 +20,7 @@ const POOR: f64 = 3.1;
 
 /// The best fits under one assumption about the face.
 pub(super) struct Hypothesis {
+    pub(super) problem: Problem,
     pub(super) interface: Interface,
     pub(super) plain: Fit,
     pub(super) lump: Option<Fit>,
@@ -78,8 +81,13 @@ impl Hypothesis {
             chosen.converged && !is_poor && !is_uncertain && !chosen.parameters.is_at_boundary();
         let error = |index: usize| widened * chosen.covariance[(index, index)].sqrt();
         let logarithm = |coordinate| chosen.parameters.get(coordinate);
+        let profile = (found.then(|| self.problem.profile(chosen))).flatten();
         let told = |index, coordinate| {
-            let estimated = Estimated::from_logarithm(logarithm(coordinate), error(index));
+            let reach = match &profile {
+                Some(profile) => profile.reach(index, TWO_SIDED_95 * widened),
+                None => [TWO_SIDED_95 * error(index); 2],
+            };
+            let estimated = Estimated::from_interval(logarithm(coordinate), reach);
             Told::new(estimated, is_reliable)
         };
         let inclusion = found.then(|| Inclusion {

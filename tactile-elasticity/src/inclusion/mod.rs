@@ -13,13 +13,16 @@
 //!
 //! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there gives
 //! errors and correlations, its determinant the evidence (Laplace), whose ratio with and without
-//! inclusion is the odds that there is one.
+//! inclusion is the odds that there is one. The intervals of D, d and E₁ are those of the profile along ln E₁, which
+//! is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no more.
 //!
 //! # References
 //! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won, IEEE Sensors
 //! J. 13 (2013). A. Tarantola, *Inverse Problem Theory* (2005). R. E. Kass & A. E. Raftery, J. Am. Stat.
 //! Assoc. 90 (1995) 773.
 mod covariance;
+#[cfg(test)]
+mod departures;
 mod design;
 mod drafts;
 mod estimate;
@@ -28,6 +31,7 @@ mod forward;
 mod hypothesis;
 mod motion;
 mod parameters;
+mod profile;
 mod profiles;
 mod progress;
 mod search;

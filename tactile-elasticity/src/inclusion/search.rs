@@ -30,7 +30,7 @@ const HOPELESS_MISFIT: f64 = 0.1;
 ///
 /// Maximum a posteriori over ln D, ln d, ln E₁, ln E₀, the block's height, ν and the approaches' zero by
 /// Levenberg–Marquardt on finite-strain finite elements from several starts; errors by Laplace's
-/// approximation; an inclusion's probability from the evidence with and without one.
+/// approximation and the profile along ln E₁; an inclusion's probability from the evidence with and without one.
 ///
 /// ```no_run
 /// use tactile_elasticity::fem::{Guide, Layer, Material};
