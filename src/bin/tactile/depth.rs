@@ -82,6 +82,10 @@ impl Arguments {
         Ok(read_grey_image_as(path, grey, self.bits)?.to_u8())
     }
 
+    fn pixel_m(&self) -> [f64; 2] {
+        self.pixel_um.map(|um| um * 1e-6)
+    }
+
     fn pipeline(&self, entries: &[(f64, f64)]) -> Result<Pipeline, Failure> {
         let in_table = |error| Failure::input(format!("{}: {error}", self.table.display()));
         let (contact, table) = self.depths(entries).map_err(in_table)?;
@@ -99,7 +103,7 @@ impl Arguments {
         &self,
         entries: &[(f64, f64)],
     ) -> Result<(DarkContact, DepthTable<f64>), PipelineError> {
-        let contact = DarkContact::new(entries, self.pixel_um.map(|um| um * 1e-6))?;
+        let contact = DarkContact::new(entries, self.pixel_m())?;
         let table = DarkContact::depth_table(entries)?;
         if !self.zero_table {
             return Ok((contact, table));
@@ -127,7 +131,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     inputs.extend(arguments.frames.iter().map(PathBuf::as_path));
     let mut outputs = Outputs::plan(arguments.out.as_deref(), &names, &inputs)?;
     let entries = depth_table(&arguments.table)?;
-    let pixel_m = arguments.pixel_um.map(|um| um * 1e-6);
+    let pixel_m = arguments.pixel_m();
     let pipeline = arguments.pipeline(&entries)?;
     let reference = arguments.read(&arguments.reference)?;
     let first = (arguments.reference.as_path(), reference.dim());
