@@ -14,6 +14,7 @@
 pub mod cases;
 mod error;
 mod files;
+mod grey;
 pub mod grid;
 pub mod image;
 pub mod points;
@@ -25,9 +26,10 @@ pub(crate) use error::shorten;
 pub use error::{Expected, ReadError};
 pub(crate) use files::read_bytes;
 pub use files::write_file;
+pub use grey::Grey;
 pub use grid::{read_grid, write_grid};
 pub use image::{
-    Grey, GreyImage, read_grey_image, read_grey_image_as, read_grey_image_of_bits, write_grey_image,
+    GreyImage, read_grey_image, read_grey_image_as, read_grey_image_of_bits, write_grey_image,
 };
 pub use points::{PointTable, read_point_table, read_points, write_points};
 pub use table::{Column, Table, read_table};
