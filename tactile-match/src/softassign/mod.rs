@@ -32,6 +32,7 @@ mod extrapolate;
 mod finish;
 mod found;
 mod frame;
+mod gated;
 mod landmarks;
 mod lanes;
 mod large;
@@ -50,6 +51,7 @@ mod search;
 mod series;
 mod soft_assign;
 mod spline;
+mod spread;
 mod starts;
 mod target_errors;
 mod tuples;
@@ -137,6 +139,9 @@ pub struct SoftassignWorkspace<const D: usize> {
     /// Share of points without a partner that the caller expects.
     expected_share: f64,
     starts: usize,
+    /// Whether a slow run from the centroids has ended in the best answer before it, whose soft partners spread no farther than noise makes
+    /// them.
+    confirmed: bool,
     stopped: bool,
 }
 

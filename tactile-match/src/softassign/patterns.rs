@@ -7,6 +7,7 @@
 //! targets found there is the candidate's misfit.
 
 use super::cells::Cells;
+use super::gated::GatedNearest;
 use nalgebra::{SMatrix, SVector};
 
 /// Neighbours a point, for every dimension.
@@ -15,6 +16,8 @@ const NEIGHBOURS: usize = 4;
 const REACH: f64 = 0.25;
 /// A neighbour's target lies within this many spacings of where it is expected.
 const GATE: f64 = 0.45;
+/// Side of the cells in which candidates are looked up, in spacings.
+const CANDIDATE_CELLS: f64 = 2.0;
 /// Rounds of looking up the neighbours' targets and fitting the affine correction.
 const ROUNDS: usize = 2;
 /// Misfits above this share of the largest there can be are not worth a correction.
@@ -26,16 +29,26 @@ const RESOLUTION: f64 = 2e-3;
 /// Points by which the spacing is told.
 const SAMPLE: usize = 101;
 
+/// The target that the pattern of a model point fits best.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    target: usize,
+    misfit: f64,
+    /// Misfit at the next best target.
+    second: f64,
+}
+
 /// Memory of the start.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LocalPatterns<const D: usize> {
+    /// Where candidates and where neighbours' targets are looked up.
     targets: Cells<D>,
+    gated: GatedNearest<D>,
     model: Cells<D>,
     offsets: Vec<[f64; D]>,
     distances: Vec<(f64, usize)>,
     candidates: Vec<usize>,
-    /// Target, misfit, and that of the next best candidate, for every model point.
-    best: Vec<(usize, f64, f64)>,
+    best: Vec<Candidate>,
     /// The likeliest target of every model point, with the probability that it is right.
     pub(crate) pairs: Vec<(usize, f64)>,
     pub(crate) spacing: f64,
@@ -60,7 +73,8 @@ impl<const D: usize> LocalPatterns<D> {
         if !(self.spacing > 0.0 && self.spacing < reach) {
             return false;
         }
-        self.targets.build(target, 2.0 * GATE * self.spacing);
+        self.targets.build(target, CANDIDATE_CELLS * self.spacing);
+        self.gated.build(target, GATE * self.spacing);
         self.model.build(warped, 2.0 * self.spacing);
         self.best.clear();
         for i in rows {
@@ -117,27 +131,35 @@ impl<const D: usize> LocalPatterns<D> {
         );
     }
 
-    /// The candidate of least misfit for model point `i`, with its misfit and that of the second.
+    /// The candidate of least misfit for model point `i`.
     fn best_candidate(
         &mut self,
         warped: &[[f64; D]],
         target: &[[f64; D]],
         i: usize,
         reach: f64,
-    ) -> (usize, f64, f64) {
+    ) -> Candidate {
         let candidates = &mut self.candidates;
         candidates.clear();
         self.targets
             .within(&warped[i], reach, |j, _| candidates.push(j));
         candidates.sort_unstable();
         candidates.dedup();
-        let mut best = (0, f64::INFINITY, f64::INFINITY);
+        let mut best = Candidate {
+            target: 0,
+            misfit: f64::INFINITY,
+            second: f64::INFINITY,
+        };
         for &j in &self.candidates {
             let misfit = self.misfit(target, j);
-            if misfit < best.1 {
-                best = (j, misfit, best.1);
-            } else if misfit < best.2 {
-                best.2 = misfit;
+            if misfit < best.misfit {
+                best = Candidate {
+                    target: j,
+                    misfit,
+                    second: best.misfit,
+                };
+            } else if misfit < best.second {
+                best.second = misfit;
             }
         }
         best
@@ -170,7 +192,7 @@ impl<const D: usize> LocalPatterns<D> {
         for offset in &self.offsets {
             let offset = SVector::from(*offset);
             let place = SVector::from(*centre) + offset + bend * offset;
-            let Some(found) = self.targets.nearest(&place.into(), gate) else {
+            let Some(found) = self.gated.find(&place.into()) else {
                 misfit += gate * gate;
                 continue;
             };
@@ -189,7 +211,8 @@ impl<const D: usize> LocalPatterns<D> {
     fn weigh(&mut self) {
         let values = (NEIGHBOURS * D * D) as f64;
         self.distances.clear();
-        self.distances.extend(self.best.iter().map(|b| (b.1, 0)));
+        self.distances
+            .extend(self.best.iter().map(|best| (best.misfit, 0)));
         let place = self.distances.len() / 4;
         let typical = self
             .distances
@@ -198,15 +221,15 @@ impl<const D: usize> LocalPatterns<D> {
             .0;
         let variance = (typical / values).max((RESOLUTION * self.spacing).powi(2));
         self.pairs.clear();
-        let pair = |&(j, best, second): &(usize, f64, f64)| {
-            let trust = if best.is_finite() {
-                1.0 / (1.0 + (-0.5 * (second - best) / variance).exp())
+        let pair = |best: &Candidate| {
+            let trust = if best.misfit.is_finite() {
+                1.0 / (1.0 + (-0.5 * (best.second - best.misfit) / variance).exp())
             } else {
                 0.0
             };
             // A misfit three times the typical is no longer one.
-            let fits = (-0.5 * best / (9.0 * variance * values)).exp();
-            (j, trust * fits)
+            let fits = (-0.5 * best.misfit / (9.0 * variance * values)).exp();
+            (best.target, trust * fits)
         };
         self.pairs.extend(self.best.iter().map(pair));
     }

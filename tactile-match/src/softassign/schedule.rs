@@ -33,8 +33,8 @@ pub(crate) struct Schedule {
     pub(crate) still: f64,
     /// A cold run that matches fewer points has collapsed and ends.
     pub(crate) collapse: f64,
-    /// With so many matched, residuals that no longer fall are noise.
-    pub(crate) full: f64,
+    /// So many points can have a partner: with nearly all of them matched, residuals that no longer fall are noise.
+    pub(crate) partners: f64,
     /// What is expected of points without a partner.
     pub(crate) slack: Slack,
 }

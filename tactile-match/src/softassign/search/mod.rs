@@ -5,6 +5,7 @@
 //! starts follow, from what costs least to what costs most. The answer of least energy wins; noisy scenes then average over the
 //! scales of the prior.
 mod cooling;
+mod place;
 mod progress;
 
 use super::prior::PriorScales;
@@ -15,6 +16,7 @@ use super::{
 use cooling::{COOLEST, LABELLED, NEAR, REHEAT, SLOW, TURNED};
 pub(super) use cooling::{Cooling, FAST};
 use nalgebra::SMatrix;
+use place::Start;
 pub(super) use progress::are_unequal;
 use progress::{COMPLETE, MANY};
 use std::ops::ControlFlow;
@@ -28,15 +30,14 @@ pub(super) const SCALES: PriorScales = PriorScales {
 
 /// A cold run with partners for less than this share of the smaller set has collapsed.
 const COLLAPSED: f64 = 0.5;
-/// A run with partners for this share of the smaller set has found them all, but for single points that noise has moved far: at 0.97 two of 324 noisy
-/// scenes kept a part one point aside (`--example peer_cases`).
-const FULL: f64 = 0.99;
 /// Residuals are compared no finer than this.
 pub(super) const RESOLUTION: f64 = 0.01;
 /// Soft partners spread more than this: the evidence of a warp cannot be told from that of its matches.
 const UNDECIDED: f64 = 0.3;
 /// Residuals below so many spacings are no sign that a part lies aside.
 pub(super) const NOTICED: f64 = 0.1;
+/// Runs whose energies differ by less have ended in the same answer.
+const AGREEING: f64 = 0.5;
 /// Gaussians fainter than this are left out.
 const FAINTEST: f64 = 1e-6;
 /// Rounds in which matches and noise level follow the averaged warp; a third one moves it by a hundredth of the noise.
@@ -46,23 +47,6 @@ const PATTERNED: usize = 150;
 /// Most runs from local patterns, and their first temperature in spacings.
 const PATTERN_RUNS: usize = 3;
 const PATTERN_SIGMA: f64 = 0.3;
-
-/// Where a run starts.
-#[derive(Clone, Copy, Debug)]
-enum Start<const D: usize> {
-    /// The centroids on each other.
-    Centred,
-    /// The best answer so far.
-    Best,
-    /// The best answer so far, put right by the local patterns of a dense set.
-    Patterns,
-    /// The pairs of relaxation labelling.
-    Labelling,
-    /// The second moments on each other, after a rotation.
-    Moments(SMatrix<f64, D, D>),
-    /// The affine map that local tuples of points agree on.
-    Tuples,
-}
 
 type Observer<'a> = &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>;
 
@@ -149,6 +133,7 @@ impl AnnealedSoftassign {
         if smaller >= PATTERNED
             && ws.best.matched >= COLLAPSED * smaller as f64
             && !self.is_certain(ws)
+            && !self.is_evident(ws)
         {
             self.follow_patterns(ws, observe)?;
         }
@@ -182,8 +167,8 @@ impl AnnealedSoftassign {
         let first = [
             dense.then_some((Start::Tuples, seeded)),
             Some((Start::Best, REHEAT)),
-            (!dense).then_some((Start::Tuples, seeded)),
             Some((Start::Centred, SLOW)),
+            (!dense).then_some((Start::Tuples, seeded)),
             limited.then_some((Start::Labelling, LABELLED)),
         ];
         // A motion without bending has its basins far apart, and no prior that tells how likely it is.
@@ -199,12 +184,23 @@ impl AnnealedSoftassign {
             if matches!(start, Start::Labelling) && bends && self.is_hidden(ws) {
                 continue;
             }
+            let before = ws.best.energy;
             self.run(ws, start, cooling, observe)?;
+            if matches!(start, Start::Centred) && (ws.state.energy - before).abs() < AGREEING {
+                self.confirm(ws);
+            }
         }
         if !self.is_done(ws) {
             self.run(ws, Start::Best, REHEAT, observe)?;
         }
         ControlFlow::Continue(())
+    }
+
+    /// Two runs have ended in the best answer: whether noise explains how far its soft partners spread.
+    fn confirm<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
+        let variance = ws.best.sigma * ws.best.sigma;
+        let slack = self.options.slack();
+        ws.confirmed = ws.best.ambiguity <= ws.annealer.spread_of(&ws.target, variance, slack);
     }
 
     /// Short runs from where the patterns of a dense set put it, as long as each matches more points.
@@ -248,47 +244,6 @@ impl AnnealedSoftassign {
         }
     }
 
-    /// Puts `ws.state` to a start: base and warped positions. False where the sets do not have such a start.
-    fn place<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>, start: Start<D>) -> bool {
-        let (model, target) = (&*ws.model, &*ws.target);
-        let state = &mut ws.state;
-        match start {
-            Start::Best => {
-                state.copy_from(&ws.best);
-                return true;
-            }
-            Start::Patterns => {
-                state.copy_from(&ws.best);
-                if !ws.patterns.propose(&state.warped, target) {
-                    return false;
-                }
-                let pairs = &ws.patterns.pairs;
-                ws.consensus
-                    .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
-                return true;
-            }
-            Start::Centred | Start::Labelling => starts::centred(model, target, &mut state.base),
-            Start::Moments(rotation) => {
-                starts::moments(model, target, &rotation, &mut state.base);
-            }
-            Start::Tuples => {
-                let limited = self.options.rotation == Rotation::Limited;
-                if !ws.tuples.find(model, target, ws.spacing, limited) {
-                    return false;
-                }
-                ws.tuples.apply(model, &mut state.base);
-            }
-        }
-        state.warped.clone_from(&state.base);
-        if matches!(start, Start::Labelling) {
-            ws.correspondence.find(&state.base, target);
-            let pairs = &ws.correspondence.pairs;
-            ws.consensus
-                .fit(&mut ws.annealer, SCALES, (model, target), pairs, state);
-        }
-        true
-    }
-
     /// Anneals `ws.state` from where it was put; kept if it is the best so far.
     fn anneal<const D: usize>(
         &self,
@@ -300,7 +255,7 @@ impl AnnealedSoftassign {
         let smaller = ws.model.len().min(ws.target.len());
         let schedule = Schedule {
             collapse: COLLAPSED * smaller as f64,
-            full: FULL * smaller as f64,
+            partners: smaller as f64,
             ..schedule
         };
         ws.starts += 1;
@@ -373,7 +328,7 @@ impl AnnealedSoftassign {
             sweeps: cooling.sweeps,
             still: cooling.still,
             collapse: 0.0,
-            full: f64::INFINITY,
+            partners: f64::INFINITY,
             slack: self.options.slack(),
         }
     }
@@ -385,7 +340,7 @@ fn reset<const D: usize>(ws: &mut SoftassignWorkspace<D>) {
     ws.patterns.spacing = 0.0;
     ws.spacing = 0.0;
     ws.scales.spread.clear();
-    (ws.starts, ws.stopped) = (0, false);
+    (ws.starts, ws.stopped, ws.confirmed) = (0, false, false);
     ws.best.energy = f64::INFINITY;
 }
 
