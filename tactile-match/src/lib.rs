@@ -37,6 +37,7 @@ pub mod labelling;
 mod matching;
 mod nearest;
 mod shape_context;
+mod simd;
 mod soft;
 mod softassign;
 mod validate;

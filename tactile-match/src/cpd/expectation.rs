@@ -1,7 +1,7 @@
 //! The E-step: which target point belongs to which model point, as sums over the posterior `P` without storing it.
 
 use super::exp::exp_of_negative;
-use super::simd::{Loop, vectorised};
+use crate::simd::{Loop, vectorised};
 
 /// `D` coordinates, each contiguous over the points.
 pub(super) type Columns<const D: usize> = [Vec<f64>; D];
@@ -85,6 +85,7 @@ struct Accumulate<'a, const D: usize> {
 }
 
 impl<const D: usize> Loop for Accumulate<'_, D> {
+    type Output = ();
     #[inline(always)]
     fn run(self) {
         let sums = self.posterior;

@@ -6,7 +6,7 @@
 
 use super::exp::exp_of_negative;
 use super::expectation::Columns;
-use super::simd::{Loop, vectorised};
+use crate::simd::{Loop, vectorised};
 
 /// `G ≈ L Lᵀ`, and what evaluates the motion at other points.
 #[derive(Clone, Debug, Default)]
@@ -123,6 +123,7 @@ struct NextColumn<'a, const D: usize> {
 }
 
 impl<const D: usize> Loop for NextColumn<'_, D> {
+    type Output = ();
     #[inline(always)]
     fn run(self) {
         let len = self.column.len();

@@ -23,7 +23,6 @@ mod non_rigid;
 mod options;
 mod outcome;
 mod registration;
-mod simd;
 mod warp;
 
 pub use options::DriftOptions;

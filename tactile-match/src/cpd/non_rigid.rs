@@ -5,7 +5,7 @@
 
 use super::expectation::{Columns, Posterior};
 use super::kernel::KernelFactor;
-use super::simd::{Loop, vectorised};
+use crate::simd::{Loop, vectorised};
 use nalgebra::{Cholesky, DMatrix, Dyn, VecStorage};
 
 /// The coefficients `z`, a row per column of `L`, and the memory of the step.
@@ -75,6 +75,7 @@ struct Assemble<'a, const D: usize> {
 }
 
 impl<const D: usize> Loop for Assemble<'_, D> {
+    type Output = ();
     #[inline(always)]
     fn run(self) {
         let rank = self.kernel.rank();
@@ -139,6 +140,7 @@ struct Apply<'a, const D: usize> {
 }
 
 impl<const D: usize> Loop for Apply<'_, D> {
+    type Output = ();
     #[inline(always)]
     fn run(self) {
         let rank = self.kernel.rank();

@@ -6,9 +6,9 @@
 //! directions are twelve sectors, in space the 26 neighbours of a cube's centre. Points between two sectors of the plane
 //! count for both in proportion, so that a small turn changes the histogram a little.
 
+use crate::simd::vectorised;
 use crate::{MatchError, validate};
 use nalgebra::Point;
-use pulp::Arch;
 use tactile_tps::Scalar;
 
 /// Radial bins: the outermost ends at the largest radius, each further one at half the radius.
@@ -95,13 +95,16 @@ impl ShapeContexts {
     pub fn costs_into(&self, i: usize, other: &Self, costs: &mut Vec<f32>) {
         costs.clear();
         let (g, total) = (self.row(i), self.totals[i]);
-        Arch::new().dispatch(|| {
-            let rows = other.histograms.chunks_exact(other.width.max(1));
-            costs.extend(
-                rows.zip(&other.totals)
-                    .map(|(h, t)| chi_squared(g, h) / (total + t).max(1.0)),
-            );
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                let rows = other.histograms.chunks_exact(other.width.max(1));
+                costs.extend(
+                    rows.zip(&other.totals)
+                        .map(|(h, t)| chi_squared(g, h) / (total + t).max(1.0)),
+                );
+            },
+        );
     }
 
     fn row(&self, i: usize) -> &[f32] {

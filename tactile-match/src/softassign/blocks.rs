@@ -75,7 +75,11 @@ impl<const D: usize> Blocks<D> {
     pub(crate) fn at(&self, block: u32) -> [&[f32; LANES]; D] {
         let axes = self.axes.as_chunks::<LANES>().0;
         let count = axes.len() / D;
-        std::array::from_fn(|k| &axes[k * count + block as usize])
+        let mut at = [&[0.0; LANES]; D];
+        for k in 0..D {
+            at[k] = &axes[k * count + block as usize];
+        }
+        at
     }
 
     /// Appends the blocks whose boxes lie within the squared distance `cut` of `y`, in ascending order; `squared` is scratch.
@@ -93,8 +97,11 @@ impl<const D: usize> Blocks<D> {
         let groups = self.groups.low.len() / D;
         if groups <= FEW_GROUPS {
             squared_distances(y, (&self.low, &self.high), count, squared);
-            let near = (0..).zip(&*squared).filter(|&(_, &s)| s <= cut);
-            found.extend(near.map(|(block, _)| block));
+            for (block, &square) in squared.iter().enumerate() {
+                if square <= cut {
+                    found.push(block as u32);
+                }
+            }
             return;
         }
         let boxes = (&*self.groups.low, &*self.groups.high);

@@ -1,43 +1,91 @@
 //! What the soft assignment does with one block of targets: Gaussians and moments, lane by lane in single precision.
+//!
+//! Plain loops over arrays of one length: closures and iterators in their place are functions of their own, which the compiler does not
+//! give the wider registers of their [caller](crate::simd).
 
 use super::blocks::LANES;
+
+/// One value a target of a block.
+pub(super) type Lanes = [f32; LANES];
 
 /// `exp(scale · |t − y|²)` for a block of targets `t`.
 #[inline(always)]
 pub(super) fn gaussians<const D: usize>(
-    row: &mut [f32; LANES],
-    targets: [&[f32; LANES]; D],
+    row: &mut Lanes,
+    targets: [&Lanes; D],
     y: &[f32; D],
     scale: f32,
 ) {
-    *row = [0.0; LANES];
-    for (t, c) in targets.iter().zip(y) {
-        (0..LANES).for_each(|l| row[l] += (t[l] - c) * (t[l] - c));
+    *row = squared_distances(targets, y);
+    for value in row {
+        *value = exp(*value * scale);
     }
-    (0..LANES).for_each(|l| row[l] = exp(row[l] * scale));
 }
 
 /// The same for targets of different precision, times their heights.
 #[inline(always)]
 pub(super) fn gaussians_of<const D: usize>(
-    row: &mut [f32; LANES],
-    targets: [&[f32; LANES]; D],
+    row: &mut Lanes,
+    targets: [&Lanes; D],
     y: &[f32; D],
     scale: f32,
-    (precision, height): (&[f32; LANES], &[f32; LANES]),
+    (precision, height): (&Lanes, &Lanes),
 ) {
-    *row = [0.0; LANES];
-    for (t, c) in targets.iter().zip(y) {
-        (0..LANES).for_each(|l| row[l] += (t[l] - c) * (t[l] - c));
+    *row = squared_distances(targets, y);
+    for l in 0..LANES {
+        row[l] = height[l] * exp(row[l] * scale * precision[l]);
     }
-    (0..LANES).for_each(|l| row[l] = height[l] * exp(row[l] * scale * precision[l]));
+}
+
+#[inline(always)]
+fn squared_distances<const D: usize>(targets: [&Lanes; D], y: &[f32; D]) -> Lanes {
+    let mut squares = [0.0; LANES];
+    for d in 0..D {
+        for l in 0..LANES {
+            let apart = targets[d][l] - y[d];
+            squares[l] += apart * apart;
+        }
+    }
+    squares
+}
+
+/// `sums += a · b`.
+#[inline(always)]
+pub(super) fn add_product(sums: &mut Lanes, a: &Lanes, b: &Lanes) {
+    for l in 0..LANES {
+        sums[l] += a[l] * b[l];
+    }
+}
+
+/// `sums += factor · values`.
+#[inline(always)]
+pub(super) fn add_scaled(sums: &mut Lanes, factor: f32, values: &Lanes) {
+    let mut sum = *sums; // a copy cannot overlap with the values
+    for l in 0..LANES {
+        sum[l] += factor * values[l];
+    }
+    *sums = sum;
+}
+
+/// Sum of all lanes, half and half. Not inlined: the compiler would else arrange the running sums for these few additions rather than for the
+/// loop before.
+#[inline(never)]
+pub(super) fn sum(mut values: Lanes) -> f32 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for l in 0..half {
+            values[l] += values[l + half];
+        }
+        half /= 2;
+    }
+    values[0]
 }
 
 /// Running sums of a row, lane by lane.
 pub(super) struct Moments<const D: usize> {
-    pub(super) weight: [f32; LANES],
-    pub(super) shift: [[f32; LANES]; D],
-    pub(super) spread: [f32; LANES],
+    pub(super) weight: Lanes,
+    pub(super) shift: [Lanes; D],
+    pub(super) spread: Lanes,
 }
 
 impl<const D: usize> Moments<D> {
@@ -51,13 +99,7 @@ impl<const D: usize> Moments<D> {
     }
 
     #[inline(always)]
-    pub(super) fn add(
-        &mut self,
-        k: &[f32; LANES],
-        b: &[f32; LANES],
-        targets: [&[f32; LANES]; D],
-        y: &[f32; D],
-    ) {
+    pub(super) fn add(&mut self, k: &Lanes, b: &Lanes, targets: [&Lanes; D], y: &[f32; D]) {
         let mut m = [0.0_f32; LANES];
         for l in 0..LANES {
             m[l] = k[l] * b[l];

@@ -25,6 +25,7 @@ mod batch;
 mod blocks;
 mod candidate_labels;
 mod cells;
+mod columns;
 mod confidence;
 mod consensus;
 mod correspond;

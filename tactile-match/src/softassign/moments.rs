@@ -1,9 +1,9 @@
 //! Moments of the rows of the match matrix: how much of a point is matched, and where its soft partners lie.
 
 use super::blocks::LANES;
-use super::lanes::Moments;
-use super::soft_assign::{SoftAssignment, row_of};
-use pulp::Arch;
+use super::lanes::{Moments, sum};
+use super::soft_assign::{SoftAssignment, row_of, single};
+use crate::simd::vectorised;
 
 /// Sums over the rows of M, each entry times a power of its target's precision.
 #[derive(Clone, Debug, Default)]
@@ -71,20 +71,28 @@ impl<const D: usize> SoftAssignment<D> {
         shift.clear();
         spread.clear();
         let columns = factors.as_chunks::<LANES>().0;
-        Arch::new().dispatch(|| {
-            for ((i, y), &a) in warped.iter().enumerate().zip(&self.row_scale) {
-                let y = y.map(|v| v as f32);
-                let mut sums = Moments::new();
-                for (block, k) in row_of(&self.starts, &self.active, &self.kernel, i) {
-                    sums.add(k, &columns[block], self.blocks.at(block as u32), &y);
+        vectorised(
+            #[inline(always)]
+            || {
+                for ((i, y), &a) in warped.iter().enumerate().zip(&self.row_scale) {
+                    let y = single(y);
+                    let mut sums = Moments::new();
+                    for (block, k) in row_of(&self.starts, &self.active, &self.kernel, i) {
+                        sums.add(k, &columns[block], self.blocks.at(block as u32), &y);
+                    }
+                    let total = f64::from(sum(sums.weight));
+                    let mut mean = [0.0; D];
+                    for d in 0..D {
+                        if total > 0.0 {
+                            mean[d] = f64::from(sum(sums.shift[d])) / total;
+                        }
+                    }
+                    weight.push(total * f64::from(a));
+                    shift.push(mean);
+                    spread.push(f64::from(sum(sums.spread)) * f64::from(a));
                 }
-                let total = f64::from(sums.weight.iter().sum::<f32>());
-                let mean = |s: [f32; LANES]| f64::from(s.iter().sum::<f32>()) / total;
-                weight.push(total * f64::from(a));
-                shift.push(sums.shift.map(|s| if total > 0.0 { mean(s) } else { 0.0 }));
-                spread.push(f64::from(sums.spread.iter().sum::<f32>()) * f64::from(a));
-            }
-        });
+            },
+        );
     }
 
     /// Makes rows that the last column normalisation left above one sum to one: where points coincide, a few sweeps do not

@@ -6,8 +6,9 @@
 //! `(uᵢ − hᵢ zᵢ)/(1 − hᵢ)`.
 
 use super::axes::Axes;
-use super::prior::{LANES, Prior};
-use pulp::Arch;
+use super::columns;
+use super::prior::Prior;
+use crate::simd::vectorised;
 
 /// Memory and answer of a regression.
 #[derive(Clone, Debug, Default)]
@@ -33,25 +34,33 @@ impl<const D: usize> Regression<D> {
         let r = prior.rank_beside(noise);
         (self.rank, self.noise) = (r, noise);
         self.gram.resize(r * r, 0.0);
-        self.solution.clear();
         self.weighted.resize(prior.stride, 0.0);
-        Arch::new().dispatch(|| {
-            for p in 0..r {
-                let column = prior.column(p);
-                for ((v, l), w) in self.weighted.iter_mut().zip(column).zip(weights) {
-                    *v = l * w;
+        let column = |p: usize| prior.column(p);
+        vectorised(
+            #[inline(always)]
+            || {
+                columns::normal_equations(
+                    column,
+                    r,
+                    weights,
+                    &targets.0,
+                    &mut self.weighted,
+                    &mut self.gram,
+                    &mut self.solution,
+                );
+                for p in 0..r {
+                    self.gram[p * r + p] += noise;
                 }
-                for q in 0..=p {
-                    self.gram[p * r + q] = dot(&self.weighted, prior.column(q));
-                }
-                self.gram[p * r + p] += noise;
-                self.solution
-                    .push(std::array::from_fn(|k| dot(&self.weighted, &targets.0[k])));
-            }
-            cholesky(&mut self.gram, r);
-            solve(&self.gram, r, &mut self.solution);
-            self.displace(prior);
-        });
+                columns::cholesky(&mut self.gram, r);
+                columns::solve(&self.gram, r, &mut self.solution);
+                columns::combine(
+                    column,
+                    &self.solution,
+                    &mut self.displacement.0,
+                    prior.stride,
+                );
+            },
+        );
         self.log_det = (0..r)
             .map(|p| 2.0 * self.gram[p * r + p].ln() - noise.ln())
             .sum();
@@ -73,41 +82,22 @@ impl<const D: usize> Regression<D> {
         }
     }
 
-    #[inline(always)]
-    fn displace(&mut self, prior: &Prior) {
-        for (k, axis) in self.displacement.0.iter_mut().enumerate() {
-            axis.clear();
-            axis.resize(prior.stride, 0.0);
-            for (p, c) in self.solution.iter().enumerate() {
-                for (u, l) in axis.iter_mut().zip(prior.column(p)) {
-                    *u += c[k] * l;
-                }
-            }
-        }
-    }
-
     /// Computes the variances of the last fit: `O(I r²)`.
     pub(crate) fn variances(&mut self, prior: &Prior) {
         let (r, stride) = (self.rank, prior.stride);
-        self.whitened.clear();
         self.variance.clear();
         self.variance.resize(stride, 0.0);
-        Arch::new().dispatch(|| {
-            for p in 0..r {
-                self.whitened.extend_from_slice(prior.column(p));
-                let (done, current) = self.whitened.split_at_mut(p * stride);
-                for (column, a) in done.chunks_exact(stride).zip(&self.gram[p * r..]) {
-                    for (v, c) in current.iter_mut().zip(column) {
-                        *v -= a * c;
+        vectorised(
+            #[inline(always)]
+            || {
+                columns::whiten(&prior.columns, stride, &self.gram, r, &mut self.whitened);
+                for column in self.whitened.chunks_exact(stride) {
+                    for (v, sum) in column.iter().zip(&mut self.variance) {
+                        *sum += v * v * self.noise;
                     }
                 }
-                let scale = 1.0 / self.gram[p * r + p];
-                for (v, sum) in current.iter_mut().zip(&mut self.variance) {
-                    *v *= scale;
-                    *sum += *v * *v * self.noise;
-                }
-            }
-        });
+            },
+        );
     }
 
     /// Covariance of the displacements of two points, along one axis, after [`variances`](Self::variances): `O(r)`. None of rigid fits.
@@ -119,70 +109,6 @@ impl<const D: usize> Regression<D> {
     /// `Σ |c|²`, twice the prior's energy of the warp.
     pub(crate) fn penalty(&self) -> f64 {
         self.solution.iter().flatten().map(|c| c * c).sum()
-    }
-}
-
-#[inline(always)]
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    for (x, y) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        for l in 0..LANES {
-            sums[l] += x[l] * y[l];
-        }
-    }
-    sums.iter().sum()
-}
-
-/// Cholesky factor in place of the lower triangle. The diagonal carries σ², so that pivots stay positive; rounding is
-/// caught by a floor.
-#[inline(always)]
-pub(super) fn cholesky(a: &mut [f64], n: usize) {
-    for i in 0..n {
-        let (above, current) = a.split_at_mut(i * n);
-        for j in 0..i {
-            let row = &above[j * n..j * n + j];
-            let sum = current[j] - short_dot(row, &current[..j]);
-            current[j] = sum / above[j * n + j];
-        }
-        let sum = current[i] - short_dot(&current[..i], &current[..i]);
-        current[i] = sum.max(f64::MIN_POSITIVE).sqrt();
-    }
-}
-
-/// A dot product with four running sums; the remainder one by one.
-#[inline(always)]
-fn short_dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (x, y) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = x
-        .remainder()
-        .iter()
-        .zip(y.remainder())
-        .map(|(p, q)| p * q)
-        .sum();
-    for (p, q) in x.zip(y) {
-        for l in 0..4 {
-            sums[l] += p[l] * q[l];
-        }
-    }
-    rest + sums.iter().sum::<f64>()
-}
-
-#[inline(always)]
-pub(super) fn solve<const D: usize>(factor: &[f64], n: usize, b: &mut [[f64; D]]) {
-    for i in 0..n {
-        let mut value = b[i];
-        for (f, earlier) in factor[i * n..i * n + i].iter().zip(&*b) {
-            (0..D).for_each(|d| value[d] -= f * earlier[d]);
-        }
-        b[i] = value.map(|v| v / factor[i * n + i]);
-    }
-    for i in (0..n).rev() {
-        b[i] = b[i].map(|v| v / factor[i * n + i]);
-        let done = b[i];
-        for (f, earlier) in factor[i * n..i * n + i].iter().zip(b.iter_mut()) {
-            (0..D).for_each(|d| earlier[d] -= f * done[d]);
-        }
     }
 }
 

@@ -8,10 +8,10 @@
 
 use super::anneal::Request;
 use super::axes::Axes;
+use super::columns;
 use super::prior::{Prior, PriorScales};
-use super::regression::{cholesky, dot, solve};
 use super::schedule::State;
-use pulp::Arch;
+use crate::simd::vectorised;
 
 /// Lengths ℓ over which the warp may bend, in radii of the model, and amplitudes τ at the first of them: a factor √2 and 2 apart, about what
 /// the evidence of a hundred points tells apart.
@@ -138,10 +138,9 @@ impl<const D: usize> ScaleAverage<D> {
         }
         // Modes that the noise hides at the largest amplitude are hidden at all.
         let largest = AMPLITUDES[0] * length / LENGTHS[0];
-        let columns = self.smooth[l].rank_beside(noise / (largest * largest)) + D + 1;
-        self.gram.resize(columns * columns, 0.0);
+        let count = self.smooth[l].rank_beside(noise / (largest * largest)) + D + 1;
+        self.gram.resize(count * count, 0.0);
         self.weighted.resize(stride, 0.0);
-        self.moments.clear();
         let Self {
             smooth: priors,
             affine,
@@ -152,26 +151,27 @@ impl<const D: usize> ScaleAverage<D> {
         } = self;
         let smooth = &priors[l];
         let column = |p: usize| {
-            let smooth_columns = columns - D - 1;
+            let smooth_columns = count - D - 1;
             if p < smooth_columns {
                 smooth.column(p)
             } else {
                 &affine[(p - smooth_columns) * stride..][..stride]
             }
         };
-        Arch::new().dispatch(|| {
-            for p in 0..columns {
-                for ((v, l), w) in weighted.iter_mut().zip(column(p)).zip(request.weights) {
-                    *v = l * w;
-                }
-                for q in 0..=p {
-                    gram[p * columns + q] = dot(weighted, column(q));
-                }
-                moments.push(std::array::from_fn(|k| {
-                    dot(weighted, &request.displacements.0[k])
-                }));
-            }
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                columns::normal_equations(
+                    column,
+                    count,
+                    request.weights,
+                    &request.displacements.0,
+                    weighted,
+                    gram,
+                    moments,
+                );
+            },
+        );
         if self.mean.0[0].is_empty() {
             self.mean
                 .0
@@ -184,15 +184,15 @@ impl<const D: usize> ScaleAverage<D> {
 
     /// The energy of one amplitude; leaves the coefficients in `solution`.
     fn fit(&mut self, request: Request<'_, D>, bending: f64, affine: f64, noise: f64) -> f64 {
-        let columns = self.moments.len();
-        let smooth = columns - D - 1;
+        let count = self.moments.len();
+        let smooth = count - D - 1;
         let amplitude = |p: usize| if p < smooth { bending } else { affine };
         self.factor.clone_from(&self.gram);
-        for p in 0..columns {
+        for p in 0..count {
             for q in 0..=p {
-                self.factor[p * columns + q] *= amplitude(p) * amplitude(q);
+                self.factor[p * count + q] *= amplitude(p) * amplitude(q);
             }
-            self.factor[p * columns + p] += noise;
+            self.factor[p * count + p] += noise;
         }
         self.solution.clear();
         let scaled = self.moments.iter().enumerate();
@@ -201,11 +201,14 @@ impl<const D: usize> ScaleAverage<D> {
         let Self {
             factor, solution, ..
         } = self;
-        Arch::new().dispatch(|| {
-            cholesky(factor, columns);
-            solve(factor, columns, solution);
-        });
-        let explained: f64 = (0..columns)
+        vectorised(
+            #[inline(always)]
+            || {
+                columns::cholesky(factor, count);
+                columns::solve(factor, count, solution);
+            },
+        );
+        let explained: f64 = (0..count)
             .map(|p| {
                 (0..D)
                     .map(|k| solution[p][k] * self.moments[p][k])
@@ -213,8 +216,8 @@ impl<const D: usize> ScaleAverage<D> {
                     * amplitude(p)
             })
             .sum();
-        let log_det: f64 = (0..columns)
-            .map(|p| 2.0 * factor[p * columns + p].ln() - noise.ln())
+        let log_det: f64 = (0..count)
+            .map(|p| 2.0 * factor[p * count + p].ln() - noise.ln())
             .sum();
         let squares: f64 = request
             .displacements
@@ -250,27 +253,29 @@ impl<const D: usize> ScaleAverage<D> {
             ..
         } = self;
         let prior = &priors[l];
-        Arch::new().dispatch(|| {
-            for k in 0..D {
-                let axis = &mut displacement.0[k];
-                axis.clear();
-                axis.resize(stride, 0.0);
-                for (p, c) in solution.iter().enumerate() {
-                    let (column, factor) = if p < smooth {
-                        (prior.column(p), bending * c[k])
-                    } else {
-                        (&functions[(p - smooth) * stride..][..stride], affine * c[k])
-                    };
-                    axis.iter_mut()
-                        .zip(column)
-                        .for_each(|(u, l)| *u += factor * l);
-                }
-                for ((sum, squares), u) in mean.0[k].iter_mut().zip(square.iter_mut()).zip(&*axis) {
-                    *sum += weight * u;
-                    *squares += weight * u * u;
-                }
+        let column = |p: usize| {
+            if p < smooth {
+                prior.column(p)
+            } else {
+                &functions[(p - smooth) * stride..][..stride]
             }
-        });
+        };
+        for (p, c) in solution.iter_mut().enumerate() {
+            let amplitude = if p < smooth { bending } else { affine };
+            *c = c.map(|c| c * amplitude);
+        }
+        vectorised(
+            #[inline(always)]
+            || {
+                columns::combine(column, solution, &mut displacement.0, stride);
+                for (sum, axis) in mean.0.iter_mut().zip(&displacement.0) {
+                    for ((sum, square), u) in sum.iter_mut().zip(square.iter_mut()).zip(axis) {
+                        *sum += weight * u;
+                        *square += weight * u * u;
+                    }
+                }
+            },
+        );
     }
 }
 

@@ -8,10 +8,10 @@
 //! Gaussian are kept. At a low temperature that is a small part of `I J`.
 
 use super::blocks::{Blocks, LANES};
-use super::lanes::{gaussians, gaussians_of};
+use super::lanes::{add_product, add_scaled, gaussians, gaussians_of, sum};
 use super::moments::AllMoments;
 use super::target_errors::TargetErrors;
-use pulp::Arch;
+use crate::simd::vectorised;
 
 /// Match matrices of so many entries (16 MB) are kept as if they were dense.
 const SMALL: usize = 1 << 22;
@@ -96,31 +96,34 @@ impl<const D: usize> SoftAssignment<D> {
         self.starts.push(0);
         self.active.clear();
         let kernel = &mut self.kernel;
-        Arch::new().dispatch(|| {
-            for y in warped {
-                let y = y.map(|v| v as f32);
-                blocks.within(&y, cut, &mut self.reach, &mut self.active);
-                self.starts.push(self.active.len());
-            }
-            let dense = warped.len() * blocks.width();
-            let sparse = self.active.len() * LANES;
-            // Of small sets all the memory there can be is taken at once: no later match of sets of this size needs more.
-            kernel.resize(if dense <= SMALL { dense } else { sparse }, 0.0);
-            let rows = kernel.as_chunks_mut::<LANES>().0;
-            for (y, range) in warped.iter().zip(self.starts.windows(2)) {
-                let y = y.map(|v| v as f32);
-                let range = range[0]..range[1];
-                for (row, &block) in rows[range.clone()].iter_mut().zip(&self.active[range]) {
-                    let targets = blocks.at(block);
-                    let Some(precision) = precision.get(block as usize) else {
-                        gaussians(row, targets, &y, scale);
-                        continue;
-                    };
-                    let height = &height[block as usize];
-                    gaussians_of(row, targets, &y, scale, (precision, height));
+        vectorised(
+            #[inline(always)]
+            || {
+                for y in warped {
+                    let y = single(y);
+                    blocks.within(&y, cut, &mut self.reach, &mut self.active);
+                    self.starts.push(self.active.len());
                 }
-            }
-        });
+                let dense = warped.len() * blocks.width();
+                let sparse = self.active.len() * LANES;
+                // Of small sets all the memory there can be is taken at once: no later match of sets of this size needs more.
+                kernel.resize(if dense <= SMALL { dense } else { sparse }, 0.0);
+                let rows = kernel.as_chunks_mut::<LANES>().0;
+                for (y, range) in warped.iter().zip(self.starts.windows(2)) {
+                    let y = single(y);
+                    let range = range[0]..range[1];
+                    for (row, &block) in rows[range.clone()].iter_mut().zip(&self.active[range]) {
+                        let targets = blocks.at(block);
+                        let Some(precision) = precision.get(block as usize) else {
+                            gaussians(row, targets, &y, scale);
+                            continue;
+                        };
+                        let height = &height[block as usize];
+                        gaussians_of(row, targets, &y, scale, (precision, height));
+                    }
+                }
+            },
+        );
     }
 
     /// Number of model points.
@@ -148,29 +151,32 @@ impl<const D: usize> SoftAssignment<D> {
             column_sum,
             ..
         } = self;
-        Arch::new().dispatch(|| {
-            for _ in 0..sweeps {
-                refill(column_sum, column_scale.len(), column_slack);
-                let (b, sums) = (
-                    column_scale.as_chunks::<LANES>().0,
-                    column_sum.as_chunks_mut::<LANES>().0,
-                );
-                for (i, a) in row_scale.iter_mut().enumerate() {
-                    let mut dots = [0.0_f32; LANES];
-                    for (block, k) in row_of(starts, active, kernel, i) {
-                        (0..LANES).for_each(|l| dots[l] += k[l] * b[block][l]);
+        vectorised(
+            #[inline(always)]
+            || {
+                for _ in 0..sweeps {
+                    refill(column_sum, column_scale.len(), column_slack);
+                    let (b, sums) = (
+                        column_scale.as_chunks::<LANES>().0,
+                        column_sum.as_chunks_mut::<LANES>().0,
+                    );
+                    for (i, a) in row_scale.iter_mut().enumerate() {
+                        let mut dots = [0.0_f32; LANES];
+                        for (block, k) in row_of(starts, active, kernel, i) {
+                            add_product(&mut dots, k, &b[block]);
+                        }
+                        let scale = 1.0 / (sum(dots) + row_slack);
+                        *a = scale;
+                        for (block, k) in row_of(starts, active, kernel, i) {
+                            add_scaled(&mut sums[block], scale, k);
+                        }
                     }
-                    *a = 1.0 / (dots.iter().sum::<f32>() + row_slack);
-                    for (block, k) in row_of(starts, active, kernel, i) {
-                        (0..LANES).for_each(|l| sums[block][l] += *a * k[l]);
+                    for (b, s) in column_scale.iter_mut().zip(&*column_sum) {
+                        *b = 1.0 / s;
                     }
                 }
-                column_scale
-                    .iter_mut()
-                    .zip(&*column_sum)
-                    .for_each(|(b, s)| *b = 1.0 / s);
-            }
-        });
+            },
+        );
     }
 
     /// Row `i` of M where it is not zero: target rows, in the order of the blocks, and entries.
@@ -187,27 +193,38 @@ impl<const D: usize> SoftAssignment<D> {
     pub(crate) fn column_totals(&self, totals: &mut Vec<f64>) {
         refill(totals, self.blocks.width(), 0.0);
         let totals = totals.as_chunks_mut::<LANES>().0;
-        Arch::new().dispatch(|| {
-            for i in 0..self.rows() {
-                self.row(i)
-                    .for_each(|(b, k)| (0..LANES).for_each(|l| totals[b][l] += f64::from(k[l])));
-            }
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                for i in 0..self.rows() {
+                    for (b, k) in self.row(i) {
+                        for l in 0..LANES {
+                            totals[b][l] += f64::from(k[l]);
+                        }
+                    }
+                }
+            },
+        );
     }
 
     /// Sums of the affinities over the columns, each times its factor, for every row.
     pub(crate) fn row_totals(&self, factors: &[f64], totals: &mut Vec<f64>) {
         let factors = factors.as_chunks::<LANES>().0;
         totals.clear();
-        Arch::new().dispatch(|| {
-            for i in 0..self.rows() {
-                let mut sums = [0.0; LANES];
-                self.row(i).for_each(|(b, k)| {
-                    (0..LANES).for_each(|l| sums[l] += f64::from(k[l]) * factors[b][l]);
-                });
-                totals.push(sums.iter().sum());
-            }
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                for i in 0..self.rows() {
+                    let mut sums = [0.0; LANES];
+                    for (b, k) in self.row(i) {
+                        for l in 0..LANES {
+                            sums[l] += f64::from(k[l]) * factors[b][l];
+                        }
+                    }
+                    totals.push(sums.iter().sum());
+                }
+            },
+        );
     }
 }
 
@@ -224,6 +241,16 @@ pub(super) fn row_of<'a>(
         .iter()
         .map(|&b| b as usize)
         .zip(&rows[range])
+}
+
+/// In single precision.
+#[inline(always)]
+pub(super) fn single<const D: usize>(y: &[f64; D]) -> [f32; D] {
+    let mut single = [0.0; D];
+    for d in 0..D {
+        single[d] = y[d] as f32;
+    }
+    single
 }
 
 fn refill<V: Clone>(values: &mut Vec<V>, len: usize, value: V) {
