@@ -128,7 +128,7 @@ pub enum ReadError {
         column: String,
     },
     /// A column's unit is not one of its quantity.
-    #[error("{}: the column `{column}` is in `{found}`, expected one of {known}", path.display())]
+    #[error("{}: the column `{column}` {}, expected one of {known}", path.display(), named(found))]
     Unit {
         /// The file.
         path: PathBuf,
@@ -136,7 +136,7 @@ pub enum ReadError {
         column: String,
         /// The units that are known.
         known: String,
-        /// The unit in the heading.
+        /// The unit in the heading; empty where it names none.
         found: String,
     },
     /// A value that no number can hold after its conversion to SI.
@@ -221,6 +221,14 @@ pub enum ReadError {
         /// What the decoder said.
         source: ::image::ImageError,
     },
+}
+
+/// A heading's unit for a message.
+fn named(unit: &str) -> String {
+    match unit {
+        "" => "names no unit".into(),
+        unit => format!("is in `{unit}`"),
+    }
 }
 
 fn list(names: &[String]) -> String {

@@ -190,22 +190,19 @@ fn to_points<const D: usize>(table: &Table, path: &Path) -> Result<Vec<Point<f64
             found: 3,
         });
     }
-    let unit_of = |axis: &str| {
-        headings
-            .iter()
-            .find(|h| h.name == axis)
-            .map(|h| h.unit.is_some())
-    };
     let axes = ["x", "y", "z"];
+    let has_unit = |wanted: bool| {
+        axes[..D].iter().find(|axis| {
+            let mut of_axis = headings.iter().filter(|h| h.name == **axis);
+            of_axis.any(|h| h.unit.is_some() == wanted)
+        })
+    };
     // A unit beside one coordinate and none beside another leaves open what the other is in.
-    if let Some(axis) = axes[..D]
-        .iter()
-        .find(|axis| unit_of(axis).is_some_and(|u| Some(u) != unit_of("x")))
-    {
+    if let (Some(axis), Some(_)) = (has_unit(false), has_unit(true)) {
         return Err(ReadError::Unit {
             path: path.into(),
             column: (*axis).into(),
-            known: "the units of length, as the others are".into(),
+            known: "the units of length, as other columns name one".into(),
             found: String::new(),
         });
     }

@@ -1,4 +1,5 @@
 //! What can be wrong with the description of a scene.
+use std::fmt;
 
 /// A scene's description was rejected.
 ///
@@ -14,7 +15,7 @@
 #[non_exhaustive]
 pub enum SimulateError {
     /// A value lies outside the range that has a meaning (NaN always does).
-    #[error("{field} is {found}, expected a number in {minimum} to {maximum}")]
+    #[error("{field} is {}, expected a number in {} to {}", Short(*found), Short(*minimum), Short(*maximum))]
     OutOfRange {
         /// The field's name.
         field: &'static str,
@@ -70,6 +71,19 @@ pub enum SimulateError {
 
 /// Smallest value called positive: far below any length, modulus or count in use.
 const TINY: f64 = f64::MIN_POSITIVE;
+
+/// A number as it is given, but not with hundreds of zeros.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0 == 0.0 || (1e-6..1e9).contains(&self.0.abs()) {
+            write!(f, "{}", self.0)
+        } else {
+            write!(f, "{:e}", self.0)
+        }
+    }
+}
 
 /// `found` if it lies in `minimum..=maximum`.
 pub(super) fn within(

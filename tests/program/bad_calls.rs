@@ -299,6 +299,18 @@ const CALLS: &[(&str, &str)] = &[
     ("measure --radius-mm nan", "radius-mm"),
     ("measure --modulus-kpa 0", "modulus-kpa"),
     ("measure --polymer steel", "steel"),
+    (
+        "measure --forces 1e300",
+        "force_n is 1e300, expected a number in 0 to ",
+    ),
+    (
+        "strain half_units.csv half_units.csv",
+        "the column `y` names no unit",
+    ),
+    (
+        "strain units_later.csv units_later.csv",
+        "the column `x` names no unit",
+    ),
     ("measure wrong_size.toml", "80 × 64"),
     ("measure no_frames.toml", "frames"),
     ("measure misspelt.toml", "referense"),
@@ -412,6 +424,8 @@ fn more_files(folder: &Path) {
         "black.pgm",
         &format!("P2\n48 48\n255\n{}", "0 ".repeat(48 * 48)),
     );
+    put("half_units.csv", "x_um,y\n1,2\n3,4\n5,6\n");
+    put("units_later.csv", "x,y_um\n1,2\n3,4\n5,6\n");
     put("million.csv", &"0.5,0.25\n".repeat(1_000_000));
     let samples = (0..400_u16).map(|k| 10 * k).collect();
     let image = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_raw(20, 20, samples);
