@@ -1,7 +1,7 @@
 //! The images of a press: lent by the caller, or read whenever they are needed.
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::same_image::is_same_image;
-use ndarray::{Array2, ArrayView2, CowArray, Ix2};
+use ndarray::{Array2, ArrayView1, ArrayView2, CowArray, Ix2};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
@@ -54,22 +54,28 @@ impl<'a> FrameImage<'a> {
     }
 }
 
-/// A hash of some sixty rows' pixels: the same for equal images, another for nearly all others, so that a frame is compared with few.
+/// Rows that a fingerprint looks at.
+const FINGERPRINTED: usize = 8;
+
+/// A hash of a few rows: the same for equal images, another for nearly all others, so that a frame is compared with few.
 pub(super) fn fingerprint(image: ArrayView2<'_, u8>) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    image.dim().hash(&mut hasher);
-    for row in image.rows().into_iter().step_by(image.nrows() / 64 + 1) {
-        row.iter()
-            .step_by(7)
-            .for_each(|pixel| hasher.write_u8(*pixel));
-    }
-    hasher.finish()
+    hash(
+        image,
+        image
+            .rows()
+            .into_iter()
+            .step_by(image.nrows() / FINGERPRINTED + 1),
+    )
 }
 
 fn hash_of_all(image: ArrayView2<'_, u8>) -> u64 {
+    hash(image, image.rows().into_iter())
+}
+
+fn hash<'a>(image: ArrayView2<'_, u8>, rows: impl Iterator<Item = ArrayView1<'a, u8>>) -> u64 {
     let mut hasher = DefaultHasher::new();
     image.dim().hash(&mut hasher);
-    for row in image.rows() {
+    for row in rows {
         match row.as_slice() {
             Some(pixels) => hasher.write(pixels),
             None => row.iter().for_each(|pixel| hasher.write_u8(*pixel)),

@@ -5,12 +5,13 @@ use std::ops::Range;
 use ndarray::{ArrayView2, Axis, Zip};
 
 use super::statistics::{BoundingBox, FrameStatistics};
-use super::strip::{Kernel, Rows, STRIP_TILES, Strip};
+use super::strip::{Rows, STRIP_TILES, Strip, compare};
 use super::tiles::{TILE_COLUMNS, TILE_ROWS, Tiles};
 
+/// What a frame without a reference, or a band below the image, is compared with.
 const ZEROS: [u8; STRIP_TILES * TILE_COLUMNS] = [0; STRIP_TILES * TILE_COLUMNS];
 
-/// Sums of the frame itself, extremes and the box of |frame − reference| > threshold. Both images are in standard layout
+/// The sum of the frame itself, extremes and the box of |frame − reference| > threshold. Both images are in standard layout
 /// and have the same, nonzero size; without a reference it counts as black. With the reference come the brightest
 /// pixels of its bands of eight rows: only where they leave room for 255 are saturated pixels counted one by one.
 pub(super) fn scan(
@@ -25,7 +26,6 @@ pub(super) fn scan(
     let brightest = reference.map(|(_, b)| b);
     let reference = reference.map(|(r, _)| r);
     let pass = Pass {
-        kernel: Kernel::best(),
         frame,
         reference,
         size,
@@ -41,12 +41,12 @@ pub(super) fn scan(
                 .sum::<usize>();
         }
     }
+    s.sum = tiles.sums.iter().map(|&sum| i64::from(sum)).sum();
     s
 }
 
 /// The inputs of a pass.
 struct Pass<'a> {
-    kernel: Kernel,
     frame: &'a [u8],
     reference: Option<&'a [u8]>,
     size: (usize, usize),
@@ -82,7 +82,7 @@ impl Pass<'_> {
             Some(r) => rows(r, self.size, band, columns),
             None => [&ZEROS[..columns.len()]; TILE_ROWS],
         };
-        self.kernel.run(&f, &r, self.threshold, sums)
+        compare(&f, &r, self.threshold, sums)
     }
 
     /// The columns beyond the last whole tile, filled up to one.
@@ -95,7 +95,7 @@ impl Pass<'_> {
                 .map_or([&[]; TILE_ROWS], |r| rows(r, self.size, band, columns)),
         );
         let (f, r) = (f.each_ref().map(|p| &p[..]), r.each_ref().map(|p| &p[..]));
-        self.kernel.run(&f, &r, self.threshold, sums)
+        compare(&f, &r, self.threshold, sums)
     }
 }
 
@@ -137,11 +137,6 @@ impl FrameStatistics {
             rows,
             columns,
             sum: 0,
-            sum_x: 0,
-            sum_y: 0,
-            sum_xx: 0,
-            sum_xy: 0,
-            sum_yy: 0,
             least: 0,
             greatest: 0,
             saturated: 0,
@@ -151,16 +146,7 @@ impl FrameStatistics {
 
     /// Adds a strip whose first pixel is that of tile (band, first); the box grows by whole tiles.
     fn add(&mut self, strip: &Strip, band: usize, first: usize) {
-        let x0 = (first * TILE_COLUMNS) as i64;
-        let y0 = (band * TILE_ROWS) as i64 + 4;
         let s = strip;
-        let x = s.x + x0 * s.sum;
-        self.sum += s.sum;
-        self.sum_x += x;
-        self.sum_xx += s.xx + 2 * x0 * s.x + x0 * x0 * s.sum;
-        self.sum_y += s.k + y0 * s.sum;
-        self.sum_yy += s.kk + 2 * y0 * s.k + y0 * y0 * s.sum;
-        self.sum_xy += s.xk + x0 * s.k + y0 * x;
         self.greatest = self.greatest.max(i16::from(s.above));
         self.least = self.least.min(-i16::from(s.below));
         if s.hits[1] > s.hits[0] {
@@ -176,16 +162,6 @@ impl FrameStatistics {
 }
 
 impl FrameStatistics {
-    /// Turns sums over the frame into sums over the difference.
-    pub(super) fn subtract(&mut self, reference: &Self) {
-        self.sum -= reference.sum;
-        self.sum_x -= reference.sum_x;
-        self.sum_y -= reference.sum_y;
-        self.sum_xx -= reference.sum_xx;
-        self.sum_xy -= reference.sum_xy;
-        self.sum_yy -= reference.sum_yy;
-    }
-
     /// The strips give extremes on their own side of zero only; where every difference is on one side, computes them anew.
     pub(super) fn correct_extremes(
         &mut self,

@@ -2,8 +2,6 @@
 
 use ndarray::{ArrayView2, Axis, Slice};
 
-use crate::estimate::Real;
-
 /// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
 ///
 /// ```
@@ -78,23 +76,23 @@ impl BoundingBox {
     }
 }
 
-/// Sums over the signed difference d = frame − reference of a whole frame, exact in integers.
+/// What one pass tells of the signed difference d = frame − reference of a whole frame, exact in integers.
 ///
-/// x is the column and y the row of a pixel, counted from the centre of the first pixel. Differences keep their sign:
-/// clamping the negative ones to zero would turn noise into force.
+/// Differences keep their sign: clamping the negative ones to zero would turn noise into force. Moments are those of a
+/// [`Contact`](crate::Contact); of any image [`ImageMoments`](crate::ImageMoments) has them.
 ///
 /// ```
 /// use ndarray::Array2;
 /// use tactile_force::ReferenceFrame;
 ///
-/// // A bar of 9 × 3 pixels: (n² − 1)/12 along each axis.
-/// let mut frame = Array2::zeros((40, 40));
+/// let mut frame = Array2::from_elem((40, 40), 7_u8);
 /// let reference = ReferenceFrame::new(frame.view())?;
-/// frame.slice_mut(ndarray::s![10..13, 20..29]).fill(100_u8);
+/// frame.slice_mut(ndarray::s![10..13, 20..29]).fill(107);
+/// frame[[0, 0]] = 5;
 /// let statistics = reference.compare(frame.view(), 10)?;
-/// assert_eq!(statistics.centroid_px(), Some([24.0, 11.0]));
-/// let [xx, xy, yy] = statistics.central_moments_px2::<f64>().expect("a signal");
-/// assert!((xx - 80.0 / 12.0).abs() < 1e-12 && xy == 0.0 && (yy - 8.0 / 12.0).abs() < 1e-12);
+/// assert_eq!((statistics.sum, statistics.least, statistics.greatest), (2698, -2, 100));
+/// let found = statistics.bounding_box.expect("pixels above the threshold");
+/// assert_eq!((found.rows(), found.columns()), (3, 9));
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,16 +104,6 @@ pub struct FrameStatistics {
     pub columns: usize,
     /// Σ d.
     pub sum: i64,
-    /// Σ x d.
-    pub sum_x: i64,
-    /// Σ y d.
-    pub sum_y: i64,
-    /// Σ x² d.
-    pub sum_xx: i64,
-    /// Σ x y d.
-    pub sum_xy: i64,
-    /// Σ y² d.
-    pub sum_yy: i64,
     /// Least difference.
     pub least: i16,
     /// Greatest difference.
@@ -124,31 +112,4 @@ pub struct FrameStatistics {
     pub saturated: usize,
     /// Box around every pixel with |d| above the threshold; `None` if there is none.
     pub bounding_box: Option<BoundingBox>,
-}
-
-impl FrameStatistics {
-    /// Σ x d / Σ d and Σ y d / Σ d in pixels (equations (7) and (8) over the whole frame); `None` if Σ d is zero.
-    pub fn centroid_px<T: Real>(&self) -> Option<[T; 2]> {
-        let over = |moment: i64| T::nearest(moment as f64 / self.sum as f64);
-        (self.sum != 0).then(|| [over(self.sum_x), over(self.sum_y)])
-    }
-
-    /// Central second moments [xx, xy, yy] per unit of Σ d, in square pixels; `None` if Σ d is zero.
-    ///
-    /// Computed as (Σd Σx²d − (Σxd)²)/(Σd)² with an exact numerator, so that nothing cancels; signed differences can
-    /// make them negative.
-    pub fn central_moments_px2<T: Real>(&self) -> Option<[T; 3]> {
-        let s = i128::from(self.sum);
-        let central = |second: i64, a: i64, b: i64| {
-            let numerator = s * i128::from(second) - i128::from(a) * i128::from(b);
-            T::nearest(numerator as f64 / (s * s) as f64)
-        };
-        (self.sum != 0).then(|| {
-            [
-                central(self.sum_xx, self.sum_x, self.sum_x),
-                central(self.sum_xy, self.sum_x, self.sum_y),
-                central(self.sum_yy, self.sum_y, self.sum_y),
-            ]
-        })
-    }
 }

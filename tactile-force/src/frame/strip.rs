@@ -1,32 +1,24 @@
 //! The inner loop of the pass: a strip of eight rows, tile by tile.
 //!
-//! All sums are linear, so they are taken over the frame alone; those of the reference are known beforehand and are
-//! subtracted at the end. Only the extremes of the difference need both images. Everything is exact in integers:
-//! x = 32 t + j runs from the strip's first column, k = −4..=3 over its rows.
+//! The sums are linear, so they are taken over the frame alone; those of the reference are known beforehand and are subtracted at the
+//! end. Only the extremes of the difference need both images. Plain loops over the bytes of a tile, which become the widest instructions of the
+//! processor: some eight for every row of a tile.
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-mod plain;
+use super::tiles::{TILE_COLUMNS, TILE_ROWS};
+use crate::simd::vectorized;
 
-use super::tiles::TILE_ROWS;
-
-/// Most tiles of a strip, so that 32-bit sums have room: 64²/2 tiles × 2040 × (31 + 30) < 2³¹.
+/// Most tiles of a strip.
 pub(super) const STRIP_TILES: usize = 64;
 
 /// Eight rows of equal length, a whole number of tiles.
 pub(super) type Rows<'a> = [&'a [u8]; TILE_ROWS];
 
-/// Sums over a strip of a frame f.
+/// A row of a tile.
+type Row = [u8; TILE_COLUMNS];
+
+/// What the pass keeps of a strip of a frame f, beside the sums of its tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Strip {
-    /// Σ f, Σ x f, Σ x² f.
-    pub(super) sum: i64,
-    pub(super) x: i64,
-    pub(super) xx: i64,
-    /// Σ k f, Σ x k f, Σ k² f.
-    pub(super) k: i64,
-    pub(super) xk: i64,
-    pub(super) kk: i64,
     /// Greatest f − r and greatest r − f, zero if negative.
     pub(super) above: u8,
     pub(super) below: u8,
@@ -34,75 +26,73 @@ pub(super) struct Strip {
     pub(super) hits: [usize; 2],
 }
 
-impl Strip {
-    fn hit(&mut self, tile: usize) {
-        if self.hits[1] == 0 {
-            self.hits[0] = tile;
-        }
-        self.hits[1] = tile + 1;
-    }
+/// Compares a strip of the frame with that of the reference; `sums` receives Σ f of every tile.
+pub(super) fn compare(
+    frame: &Rows<'_>,
+    reference: &Rows<'_>,
+    threshold: u8,
+    sums: &mut [i32],
+) -> Strip {
+    vectorized(Comparison {
+        frame,
+        reference,
+        threshold,
+        sums,
+    })
 }
 
-/// Sums a strip with the widest instructions at hand; the result does not depend on them.
-///
-/// `tile_sums` receives Σ f of every tile.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Kernel {
-    Plain,
-    #[cfg(target_arch = "x86_64")]
-    Avx2(pulp::x86::V3),
+struct Comparison<'a, 'b> {
+    frame: &'a Rows<'b>,
+    reference: &'a Rows<'b>,
+    threshold: u8,
+    sums: &'a mut [i32],
 }
 
-impl Kernel {
-    pub(super) fn best() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(simd) = pulp::x86::V3::try_new() {
-            return Self::Avx2(simd);
-        }
-        Self::Plain
-    }
+impl pulp::NullaryFnOnce for Comparison<'_, '_> {
+    type Output = Strip;
 
-    pub(super) fn run(
-        self,
-        frame: &Rows<'_>,
-        reference: &Rows<'_>,
-        threshold: u8,
-        tile_sums: &mut [i32],
-    ) -> Strip {
-        match self {
-            Self::Plain => plain::strip(frame, reference, threshold, tile_sums),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(simd) => avx2::strip(simd, frame, reference, threshold, tile_sums),
+    #[inline(always)]
+    fn call(self) -> Strip {
+        let tiles = self.sums.len();
+        // Row after row, as the memory has them; what is kept of the columns stays in the nearest cache.
+        let mut columns = [[0_u16; TILE_COLUMNS]; STRIP_TILES];
+        let mut above = [[0_u8; TILE_COLUMNS]; STRIP_TILES];
+        let mut below = [[0_u8; TILE_COLUMNS]; STRIP_TILES];
+        for k in 0..TILE_ROWS {
+            let frame: &[Row] = &self.frame[k].as_chunks().0[..tiles];
+            let reference: &[Row] = &self.reference[k].as_chunks().0[..tiles];
+            for t in 0..tiles {
+                let (f, r) = (&frame[t], &reference[t]);
+                let (mut over, mut under, mut column) = (above[t], below[t], columns[t]);
+                // A loop for every width of numbers: mixed, the bytes fill half a register.
+                for j in 0..TILE_COLUMNS {
+                    over[j] = over[j].max(f[j].saturating_sub(r[j]));
+                    under[j] = under[j].max(r[j].saturating_sub(f[j]));
+                }
+                for j in 0..TILE_COLUMNS {
+                    column[j] += u16::from(f[j]);
+                }
+                (above[t], below[t], columns[t]) = (over, under, column);
+            }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::frame::TILE_COLUMNS;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn every_kernel_gives_the_same(
-            tiles in 1..=STRIP_TILES, seed in any::<u64>(), threshold in any::<u8>(), full in any::<bool>()
-        ) {
-            let mut state = seed | 1;
-            let mut byte = || {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                if full { 255 } else { (state >> 56) as u8 }
-            };
-            let mut image = || -> Vec<Vec<u8>> {
-                (0..TILE_ROWS).map(|_| (0..tiles * TILE_COLUMNS).map(|_| byte()).collect()).collect()
-            };
-            let (frame, reference) = (image(), image());
-            let frame: Rows<'_> = std::array::from_fn(|k| &frame[k][..]);
-            let reference: Rows<'_> = std::array::from_fn(|k| &reference[k][..]);
-            let (mut a, mut b) = (vec![0; tiles], vec![0; tiles]);
-            let plain = Kernel::Plain.run(&frame, &reference, threshold, &mut a);
-            prop_assert_eq!(plain, Kernel::best().run(&frame, &reference, threshold, &mut b));
-            prop_assert_eq!(a, b);
+        let mut strip = Strip::default();
+        for t in 0..tiles {
+            let (mut sum, mut highest, mut deepest) = (0, 0, 0);
+            for j in 0..TILE_COLUMNS {
+                sum += i32::from(columns[t][j]);
+                highest = above[t][j].max(highest);
+                deepest = below[t][j].max(deepest);
+            }
+            self.sums[t] = sum;
+            if highest.max(deepest) > self.threshold {
+                if strip.hits[1] == 0 {
+                    strip.hits[0] = t;
+                }
+                strip.hits[1] = t + 1;
+            }
+            strip.above = strip.above.max(highest);
+            strip.below = strip.below.max(deepest);
         }
+        strip
     }
 }

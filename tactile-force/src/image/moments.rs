@@ -30,8 +30,7 @@ pub enum MomentStatus {
 /// Moments of an image over its background, and the statistics of its raw pixels.
 ///
 /// Sums are taken with twice the digits of a double, after the background has been subtracted without rounding: a blob of height
-/// 10⁻⁵ on a pedestal of 10⁹ keeps all the digits its pixels have. Pixels of 8 bits have the faster, exact
-/// [`FrameStatistics`](crate::FrameStatistics).
+/// 10⁻⁵ on a pedestal of 10⁹ keeps all the digits its pixels have.
 ///
 /// ```
 /// use ndarray::array;

@@ -166,12 +166,7 @@ fn calibrations<T: Real>(answers: &mut Answers, scalar: &str) {
 
 fn measurement<T: Real>(answers: &mut Answers, name: &str, m: &ForceMeasurement<T>) {
     answers.estimate(&format!("{name}.force"), m.force_n);
-    for moment in [
-        m.statistics.sum,
-        m.statistics.sum_x,
-        m.statistics.sum_yy,
-        i64::from(m.statistics.greatest),
-    ] {
+    for moment in [m.statistics.sum, i64::from(m.statistics.greatest)] {
         answers.add(&format!("{name}.sums"), moment as f64);
     }
     for c in m.drift.coefficients {
