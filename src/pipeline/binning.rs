@@ -83,8 +83,10 @@ pub(super) fn mean_difference(
     let pairs = |row: usize, columns: Range<usize>, sums: &mut [i32]| {
         let frame = span_of(frame, row, columns.clone());
         let reference = span_of(reference, row, columns);
-        for ((sum, &f), &r) in sums.iter_mut().zip(frame).zip(reference) {
-            *sum += i32::from(f) - i32::from(r);
+        match (frame.to_slice(), reference.to_slice()) {
+            // Slices, where the layout allows, turn into wide instructions.
+            (Some(frame), Some(reference)) => add_differences(sums, frame, reference),
+            _ => add_differences(sums, frame, reference),
         }
     };
     sum_blocks(side, means.view_mut(), pairs, f64::from);
@@ -106,13 +108,33 @@ pub(super) fn block_mask(
     let inside = |row: usize, span: Range<usize>, counts: &mut [i32]| {
         if row < rows {
             let span = span.start.min(columns)..span.end.min(columns);
-            for (count, &inside) in counts.iter_mut().zip(span_of(mask, row, span)) {
-                *count += i32::from(inside);
+            let mask = span_of(mask, row, span);
+            match mask.to_slice() {
+                Some(mask) => add_inside(counts, mask),
+                None => add_inside(counts, mask),
             }
         }
     };
     let three_quarters = |count: i32| 4 * count as usize >= 3 * side * side;
     sum_blocks(side, blocks.view_mut(), inside, three_quarters);
+}
+
+/// Adds frame − reference.
+fn add_differences<'a>(
+    sums: &mut [i32],
+    frame: impl IntoIterator<Item = &'a u8>,
+    reference: impl IntoIterator<Item = &'a u8>,
+) {
+    for ((sum, f), r) in sums.iter_mut().zip(frame).zip(reference) {
+        *sum += i32::from(*f) - i32::from(*r);
+    }
+}
+
+/// Counts the pixels inside.
+fn add_inside<'a>(counts: &mut [i32], mask: impl IntoIterator<Item = &'a bool>) {
+    for (count, inside) in counts.iter_mut().zip(mask) {
+        *count += i32::from(*inside);
+    }
 }
 
 /// Some columns of a row.

@@ -213,7 +213,10 @@ impl Session {
     fn measure(&mut self, number: u64, frame: ArrayView2<'_, u8>) -> Result<(), PipelineError> {
         self.measured = false;
         resize(&mut self.last, frame.dim());
-        self.last.assign(&frame);
+        match (self.last.as_slice_mut(), frame.as_slice()) {
+            (Some(to), Some(from)) => to.copy_from_slice(from),
+            _ => self.last.assign(&frame),
+        }
         self.runner
             .contact(number as usize, frame, None, &mut self.contact)?;
         self.measured = true;

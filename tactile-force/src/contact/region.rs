@@ -5,7 +5,7 @@ use ndarray::ArrayView2;
 use super::every_nth::EveryNth;
 use super::runs::{self, Components, Run, push_runs};
 use crate::drift::{DriftLine, IlluminationDrift};
-use crate::frame::{BoundingBox, ReferenceFrame};
+use crate::frame::{BoundingBox, FlatLine, ReferenceFrame};
 use crate::simd::vectorized;
 
 /// Differences over one box, row-major, and the contact in it as runs.
@@ -51,28 +51,22 @@ impl Region {
     ) {
         self.place = Some(place);
         self.difference.clear();
+        self.difference.resize(place.rows() * place.columns(), 0.0);
         let (frame, mean) = (place.of(frame), place.of(reference.mean()));
         let flat = reference.flat_field();
-        for (y, (f, r)) in frame.rows().into_iter().zip(mean.rows()).enumerate() {
-            let start = self.difference.len();
+        let differences = self.difference.chunks_exact_mut(place.columns());
+        let rows = frame.rows().into_iter().zip(mean.rows()).zip(differences);
+        for (y, ((frame, mean), differences)) in rows.enumerate() {
             let row = place.row_start + y;
-            let line = (!drift.is_zero()).then(|| drift.line(row, place.column_start));
-            // Slices, where the layout allows, turn into wide instructions.
-            match (f.to_slice(), r.to_slice()) {
-                (Some(frame), Some(mean)) => vectorized(RowDifferences {
-                    differences: &mut self.difference,
-                    frame,
-                    mean,
-                    line,
-                    sign,
-                }),
-                _ => extend(&mut self.difference, f.iter().zip(r), line, sign),
-            }
-            if let Some(line) = flat.map(|f| f.line(row, place.column_start)) {
-                self.difference[start..]
-                    .iter_mut()
-                    .enumerate()
-                    .for_each(|(x, d)| *d /= line.at(x));
+            let row = RowDifferences {
+                differences,
+                line: (!drift.is_zero()).then(|| drift.line(row, place.column_start)),
+                flat: flat.map(|flat| flat.line(row, place.column_start)),
+                sign,
+            };
+            match (frame.to_slice(), mean.to_slice()) {
+                (Some(frame), Some(mean)) => row.take(frame, mean),
+                _ => row.take(&frame.to_vec(), &mean.to_vec()),
             }
         }
     }
@@ -153,42 +147,60 @@ impl Region {
     }
 }
 
-/// Appends the differences of a row whose pixels lie side by side.
+/// The differences of a row.
 struct RowDifferences<'a> {
-    differences: &'a mut Vec<f32>,
-    frame: &'a [u8],
-    mean: &'a [f32],
+    differences: &'a mut [f32],
     line: Option<DriftLine>,
+    flat: Option<FlatLine>,
     sign: f32,
 }
 
-impl pulp::NullaryFnOnce for RowDifferences<'_> {
+impl RowDifferences<'_> {
+    /// From the pixels of the frame and the reference's mean, as many.
+    fn take(self, frame: &[u8], mean: &[f32]) {
+        vectorized(Differences {
+            row: self,
+            frame,
+            mean,
+        });
+    }
+}
+
+struct Differences<'a> {
+    row: RowDifferences<'a>,
+    frame: &'a [u8],
+    mean: &'a [f32],
+}
+
+impl pulp::NullaryFnOnce for Differences<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let pixels = self.frame.iter().zip(self.mean);
-        extend(self.differences, pixels, self.line, self.sign);
-    }
-}
-
-/// Appends the differences of one row.
-#[inline(always)]
-fn extend<'a>(
-    differences: &mut Vec<f32>,
-    pixels: impl Iterator<Item = (&'a u8, &'a f32)>,
-    line: Option<DriftLine>,
-    sign: f32,
-) {
-    let pairs = pixels.map(|(f, r)| (f32::from(*f), *r));
-    match line {
-        None => differences.extend(pairs.map(|(f, r)| sign * (f - r))),
-        Some(line) => {
-            differences.extend(
-                pairs
-                    .enumerate()
-                    .map(|(x, (f, r))| sign * line.difference(x, f, r)),
-            );
+        let RowDifferences {
+            differences,
+            line,
+            flat,
+            sign,
+        } = self.row;
+        let n = differences.len();
+        let (frame, mean) = (&self.frame[..n], &self.mean[..n]);
+        match line {
+            None => {
+                for x in 0..n {
+                    differences[x] = sign * (f32::from(frame[x]) - mean[x]);
+                }
+            }
+            Some(line) => {
+                for x in 0..n {
+                    differences[x] = sign * line.difference(x, f32::from(frame[x]), mean[x]);
+                }
+            }
+        }
+        if let Some(flat) = flat {
+            for (x, difference) in differences.iter_mut().enumerate() {
+                *difference /= flat.at(x);
+            }
         }
     }
 }

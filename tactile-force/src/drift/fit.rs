@@ -1,5 +1,6 @@
 //! The fit of a drift to the tiles outside the contact.
 
+use super::median::median;
 use super::{DriftCorrection, DriftOutcome, IlluminationDrift};
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
@@ -13,8 +14,11 @@ const UNEVEN: f64 = 0.01;
 /// Buffers of the fit, which goes over all tiles several times.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FitWorkspace {
-    tiles: Vec<TileSum>,
+    pub(crate) tiles: Vec<TileSum>,
     residuals: Vec<f64>,
+    /// |residual| of a pixel.
+    levels: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     pub(crate) scratch: Vec<f64>,
 }
 
@@ -30,6 +34,8 @@ pub(crate) fn fit(
     let FitWorkspace {
         tiles,
         residuals,
+        levels,
+        values,
         scratch,
     } = workspace;
     tiles.clear();
@@ -45,17 +51,21 @@ pub(crate) fn fit(
     }
     let terms = correction.terms();
     let change = |t: &TileSum| drift.residual(t) / weight(&drift, t);
-    drift.coefficients[0] += median(scratch, tiles.iter().map(change));
+    values.clear();
+    values.extend(tiles.iter().map(change));
+    drift.coefficients[0] += median(values, scratch);
     let mut kept = 0;
     for _ in 0..20 {
         residuals.clear();
         residuals.extend(tiles.iter().map(|t| drift.residual(t)));
-        let both = tiles.iter().zip(residuals.iter().copied());
-        let level = |(tile, residual): &(&TileSum, f64)| (residual / tile.pixels).abs();
-        let spread = 1.4826 * median(scratch, both.clone().map(|b| level(&b)));
+        levels.clear();
+        let both = tiles.iter().zip(&*residuals);
+        levels.extend(both.map(|(tile, residual)| (residual / tile.pixels).abs()));
+        let spread = 1.4826 * median(levels, scratch);
         let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
         let limit = 3.0 * spread.max(noise);
-        let near = both.filter(|b| level(b) <= limit);
+        let both = tiles.iter().zip(residuals.iter().copied()).zip(&*levels);
+        let near = both.filter(|(_, level)| **level <= limit).map(|(b, _)| b);
         let count = match terms {
             1 => drift.step::<1>(near, sd),
             _ => drift.step::<3>(near, sd),
@@ -181,14 +191,4 @@ impl Normal {
         }
         sums
     }
-}
-
-fn median(scratch: &mut Vec<f64>, values: impl Iterator<Item = f64>) -> f64 {
-    scratch.clear();
-    scratch.extend(values);
-    if scratch.is_empty() {
-        return 0.0;
-    }
-    let middle = scratch.len() / 2;
-    *scratch.select_nth_unstable_by(middle, f64::total_cmp).1
 }

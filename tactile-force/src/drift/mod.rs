@@ -2,10 +2,12 @@
 
 mod correction;
 mod fit;
+mod median;
 
 pub use correction::{DriftCorrection, DriftOutcome};
 
 pub(crate) use fit::{FitWorkspace, fit};
+pub(crate) use median::median;
 
 use crate::frame::TileSum;
 
@@ -56,8 +58,10 @@ pub(crate) struct DriftLine {
 
 impl DriftLine {
     /// Corrected difference of the pixel `x` columns from the line's start.
+    #[inline(always)]
     pub(crate) fn difference(&self, x: usize, frame: f32, reference: f32) -> f32 {
-        let level = self.start + self.step * x as f32;
+        // Frames are narrower than 2³¹, and this conversion has wide instructions.
+        let level = self.start + self.step * (x as i32) as f32;
         if self.multiplicative {
             frame / level - reference
         } else {

@@ -13,6 +13,7 @@ pub use noise::{DifferenceNoise, NoiseModel};
 pub use reference::ReferenceFrame;
 pub use statistics::{BoundingBox, FrameStatistics};
 
+pub(crate) use flat_field::FlatLine;
 pub(crate) use noise::trimmed_variance;
 pub(crate) use reference::PassWorkspace;
 pub(crate) use tiles::{TILE_COLUMNS, TILE_ROWS, TileSum, Tiles};

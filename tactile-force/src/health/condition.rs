@@ -1,6 +1,6 @@
 //! Brightness and noise of a frame outside the contact.
 
-use crate::drift::{DriftCorrection, FitWorkspace, IlluminationDrift, fit};
+use crate::drift::{DriftCorrection, FitWorkspace, IlluminationDrift, fit, median};
 use crate::estimate::Estimate;
 use crate::frame::TileSum;
 
@@ -35,38 +35,40 @@ impl FrameCondition {
     /// From the tiles of a frame of the given size; `sd` is the noise of one pixel's difference. `None` without background.
     pub(crate) fn of(
         size: (usize, usize),
-        tiles: impl Iterator<Item = TileSum> + Clone,
+        tiles: impl Iterator<Item = TileSum>,
         sd: f64,
         workspace: &mut FitWorkspace,
     ) -> Option<Self> {
-        let drift = fit(
-            DriftCorrection::Illumination,
-            size,
-            tiles.clone(),
-            sd,
-            workspace,
-        );
-        let scratch = &mut workspace.scratch;
+        let drift = fit(DriftCorrection::Illumination, size, tiles, sd, workspace);
+        let FitWorkspace {
+            tiles,
+            values,
+            scratch,
+            ..
+        } = workspace;
         let (mut grey, mut pixels) = (0.0, 0.0);
-        scratch.clear();
-        for tile in tiles {
-            let residual = drift.residual(&tile) / (sd * tile.pixels.sqrt());
+        values.clear();
+        // Nearly all tiles have the same number of pixels.
+        let (mut number, mut noise) = (1.0, sd);
+        for tile in tiles.iter() {
+            if tile.pixels != number {
+                (number, noise) = (tile.pixels, sd * tile.pixels.sqrt());
+            }
+            let residual = drift.residual(tile) / noise;
             if drift_agrees(residual) {
-                scratch.push(residual.abs());
+                values.push(residual.abs());
                 grey += tile.reference + tile.difference;
                 pixels += tile.pixels;
             }
         }
-        if pixels == 0.0 || scratch.is_empty() {
+        if pixels == 0.0 || values.is_empty() {
             return None;
         }
-        let middle = scratch.len() / 2;
-        let median = *scratch.select_nth_unstable_by(middle, f64::total_cmp).1;
         Some(Self {
             brightness: brightness(&drift),
             background_grey: grey / pixels,
             // The median of |z| of a normal sample is 0.6745.
-            noise_ratio: median / 0.674_489_750_196_081_7,
+            noise_ratio: median(values, scratch) / 0.674_489_750_196_081_7,
         })
     }
 }
