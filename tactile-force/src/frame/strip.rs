@@ -70,7 +70,8 @@ impl pulp::NullaryFnOnce for Comparison<'_, '_> {
                     under[j] = under[j].max(r[j].saturating_sub(f[j]));
                 }
                 for j in 0..TILE_COLUMNS {
-                    column[j] += u16::from(f[j]);
+                    // Eight times 255 fits; checked, the sum would be taken pixel by pixel.
+                    column[j] = column[j].wrapping_add(u16::from(f[j]));
                 }
                 (above[t], below[t], columns[t]) = (over, under, column);
             }
@@ -79,7 +80,7 @@ impl pulp::NullaryFnOnce for Comparison<'_, '_> {
         for t in 0..tiles {
             let (mut sum, mut highest, mut deepest) = (0, 0, 0);
             for j in 0..TILE_COLUMNS {
-                sum += i32::from(columns[t][j]);
+                sum = i32::wrapping_add(sum, i32::from(columns[t][j]));
                 highest = above[t][j].max(highest);
                 deepest = below[t][j].max(deepest);
             }
