@@ -15,7 +15,7 @@ use std::fmt;
 #[non_exhaustive]
 pub enum SimulateError {
     /// A value lies outside the range that has a meaning (NaN always does).
-    #[error("{field} is {}, expected a number in {} to {}", Short(*found), Short(*minimum), Short(*maximum))]
+    #[error("{field} is {}, expected a number in {} to {}", Short(*found), Short(six_digits(*minimum)), Short(six_digits(*maximum)))]
     OutOfRange {
         /// The field's name.
         field: &'static str,
@@ -71,6 +71,11 @@ pub enum SimulateError {
 
 /// Smallest value called positive: far below any length, modulus or count in use.
 const TINY: f64 = f64::MIN_POSITIVE;
+
+/// A limit to six significant digits: more say nothing to a reader.
+fn six_digits(limit: f64) -> f64 {
+    format!("{limit:.5e}").parse().unwrap_or(limit)
+}
 
 /// A number as it is given, but not with hundreds of zeros.
 struct Short(f64);

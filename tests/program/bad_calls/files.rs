@@ -1,0 +1,101 @@
+//! The files that the calls name.
+use std::fs;
+use std::path::Path;
+
+/// Good inputs under short names.
+pub(super) fn good_files(folder: &Path) {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data");
+    for entry in fs::read_dir(&data)
+        .unwrap()
+        .chain(fs::read_dir(data.join("press")).unwrap())
+    {
+        let path = entry.unwrap().path();
+        if path.is_file() {
+            fs::copy(&path, folder.join(path.file_name().unwrap())).unwrap();
+        }
+    }
+}
+
+/// A scene of a block under the guide.
+fn lump_scene() -> String {
+    r#"reference = "reference.png"
+pixel_size_m = [3e-4, 3e-4]
+frames = [
+    { image = "frame_1.png", approach_m = 1e-3, force_N = 0.4 },
+    { image = "frame_2.png", approach_m = 2e-3, force_N = 0.8 },
+]
+[object]
+shape = "block"
+height_m = 30e-3
+radius_m = 40e-3
+interface = "bonded"
+[waveguide]
+radius_m = 16e-3
+layers = [{ thickness_m = 10e-3, youngs_modulus_pa = 60e3, poisson_ratio = 0.495 }]
+"#
+    .to_owned()
+}
+
+/// Files that the calls name, beside the good ones.
+pub(super) fn more_files(folder: &Path) {
+    let put = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
+    put("plain.csv", "x,y\n0,0\n1,0\n0,1\n1,1.5\n");
+    put("space.csv", "0,0,0\n1,0,0\n0,1,0\n1,1,1\n");
+    put("twice.csv", "x,x,y\n0,0,0\n1,1,1\n");
+    put("named.csv", "a,b\n0,0\n1,1\n");
+    put("small.csv", "0,0\n0,0\n");
+    put("holes.csv", &("nan,".repeat(31) + "1\n").repeat(24));
+    put("gramme.csv", "indentation_mm,force (gf)\n0,0\n1,1\n2,3\n");
+    put("three.csv", "0,0,0\n1,1,1\n2,3,4\n");
+    put("two_rows.csv", "indentation_m,force_N\n0,0\n1e-4,1e-3\n");
+    put(
+        "three_depths.csv",
+        "darkness,depth_mm\n4,0.1\n20,0.5\n60,2\n",
+    );
+    put("falling.csv", "darkness,depth_mm\n0,0\n5,1\n3,2\n");
+    put(
+        "equal.csv",
+        "integrated_pixel_value,force_N\n1e5,1\n1e5,1\n1e5,1\n",
+    );
+    let scene = fs::read_to_string(folder.join("scene.toml")).unwrap();
+    put(
+        "wrong_size.toml",
+        &scene.replace("frame_2.png", "dark_frame.pgm"),
+    );
+    put(
+        "misspelt.toml",
+        &scene.replace("reference =", "referense ="),
+    );
+    put("bits.toml", &format!("bits = 99\n{scene}"));
+    let lump = lump_scene();
+    put("lump.toml", &lump);
+    put("lump_sphere.toml", &lump.replace("\"block\"", "\"sphere\""));
+    put(
+        "lump_backwards.toml",
+        &lump.replace("approach_m = 2e-3", "approach_m = 0.5e-3"),
+    );
+    put(
+        "lump_stiff.toml",
+        &lump.replace("youngs_modulus_pa = 60e3", "youngs_modulus_pa = -1"),
+    );
+    put(
+        "lump_narrow.toml",
+        &lump.replace("radius_m = 40e-3", "radius_m = 10e-3"),
+    );
+    put(
+        "lump_dark.toml",
+        &lump.replace("frame_1.png", "reference.png"),
+    );
+    let no_frames = scene.split("[[frames]]").next().unwrap();
+    put("no_frames.toml", no_frames);
+    put(
+        "black.pgm",
+        &format!("P2\n48 48\n255\n{}", "0 ".repeat(48 * 48)),
+    );
+    put("half_units.csv", "x_um,y\n1,2\n3,4\n5,6\n");
+    put("units_later.csv", "x,y_um\n1,2\n3,4\n5,6\n");
+    put("million.csv", &"0.5,0.25\n".repeat(1_000_000));
+    let samples = (0..400_u16).map(|k| 10 * k).collect();
+    let image = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_raw(20, 20, samples);
+    image.unwrap().save(folder.join("unclear.png")).unwrap();
+}

@@ -1,0 +1,103 @@
+//! A table of calls that cannot work: each ends with the right code and one sentence, and leaves everything as it was.
+mod files;
+mod table;
+
+use super::bad_files;
+use super::harness::{run, text};
+use files::{good_files, more_files};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use table::{CALLS, IMAGES, TABLES};
+
+/// The bytes of all regular files of the folder but the huge one.
+fn state(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
+    entries
+        .map(|entry| {
+            let regular = entry.file_type().unwrap().is_file();
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let small = regular && entry.metadata().unwrap().len() < 1 << 24;
+            let bytes = if small {
+                fs::read(entry.path()).unwrap()
+            } else {
+                Vec::new()
+            };
+            (name, bytes)
+        })
+        .collect()
+}
+
+/// What is wrong with how a call ended; `None` where all is as it should be.
+fn complaint(folder: &Path, call: &str, says: &str) -> Option<String> {
+    let arguments: Vec<&str> = call.split_whitespace().collect();
+    let output = run(folder, &arguments);
+    let (out, errors) = (text(&output.stdout), text(&output.stderr));
+    let one_sentence = errors.lines().count() == 1 && errors.starts_with("tactile: ");
+    // Names of types and fields are for programmers.
+    let debug = ["panicked", "Error", "Some(", " { ", "unwrap", "Mismatch"];
+    let wrong = if output.status.code() != Some(2) {
+        format!("ended with {}", output.status)
+    } else if !one_sentence {
+        "does not say what is wrong in one sentence".into()
+    } else if let Some(word) = debug.iter().find(|word| errors.contains(**word)) {
+        format!("says `{word}`")
+    } else if !errors.contains(says) {
+        format!("does not say `{says}`")
+    } else if !out.is_empty() {
+        "prints results".into()
+    } else {
+        return None;
+    };
+    Some(format!(
+        "tactile {call}\n    {wrong}: {}{}",
+        errors.trim_end(),
+        out.trim_end()
+    ))
+}
+
+#[test]
+fn every_bad_call_is_refused_in_one_sentence_and_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    good_files(folder);
+    let (images, tables) = bad_files::write(folder);
+    more_files(folder);
+    let before = state(folder);
+    let mut calls: Vec<(String, String)> = Vec::new();
+    for (places, files) in [(&IMAGES[..], &images), (&TABLES[..], &tables)] {
+        for place in places {
+            for file in files {
+                let is_case_file = place.starts_with("match");
+                // A matrix has any number of columns, and a point as many as the file has.
+                let fits =
+                    place.starts_with("integrate") && matches!(*file, "wide.csv" | "infinite.csv");
+                if fits && !is_case_file {
+                    continue;
+                }
+                let name = file.trim_start_matches("/dev/").trim_end_matches("_a");
+                calls.push((place.replace('@', file), name.to_owned()));
+            }
+        }
+    }
+    calls.extend(
+        CALLS
+            .iter()
+            .map(|(call, says)| ((*call).to_owned(), (*says).to_owned())),
+    );
+    assert!(calls.len() >= 120, "{} calls", calls.len());
+    let complaints: Vec<String> = (calls.iter())
+        .filter_map(|(call, says)| complaint(folder, call, says))
+        .collect();
+    assert!(
+        complaints.is_empty(),
+        "{} of {} calls:\n{}",
+        complaints.len(),
+        calls.len(),
+        complaints.join("\n")
+    );
+    assert!(
+        state(folder) == before,
+        "a file was changed, made or removed"
+    );
+}
