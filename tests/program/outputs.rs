@@ -78,3 +78,35 @@ fn a_stage_without_an_answer_does_not_hide_the_others() {
     );
     assert!(folder.path().join("results/pairs.csv").exists());
 }
+
+#[test]
+fn tables_of_a_strain_name_units_and_whole_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = |stretch: f64| -> String {
+        (0..36)
+            .map(|k| format!("{},{}\n", stretch * f64::from(k % 6), k / 6))
+            .collect()
+    };
+    for (heading, suffix) in [("x_mm,y_mm", "_m"), ("x,y", "")] {
+        for (name, stretch) in [("before.csv", 1.0), ("after.csv", 1.02)] {
+            let table = format!("{heading}\n{}", grid(stretch));
+            fs::write(folder.path().join(name), table).unwrap();
+        }
+        let output = run(
+            folder.path(),
+            &words("strain before.csv after.csv --out results"),
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let read = |name: &str| fs::read_to_string(folder.path().join("results").join(name));
+        let (pairs, strains) = (read("pairs.csv").unwrap(), read("strain.csv").unwrap());
+        assert!(
+            pairs.starts_with(&format!("row_before,row_after,x{suffix},y{suffix},")),
+            "{pairs}"
+        );
+        assert!(pairs.lines().nth(2).unwrap().starts_with("1,1,"), "{pairs}");
+        assert!(
+            strains.starts_with(&format!("row_before,x{suffix},y{suffix},e_xx,")),
+            "{strains}"
+        );
+    }
+}

@@ -152,7 +152,14 @@ impl Csv {
 
     pub fn row(&mut self, values: impl IntoIterator<Item = impl Debug>) {
         for (i, value) in values.into_iter().enumerate() {
-            let _ = write!(self.text, "{}{value:?}", if i == 0 { "" } else { "," });
+            if i > 0 {
+                self.text.push(',');
+            }
+            let _ = write!(self.text, "{value:?}");
+            // A whole number is written as one.
+            if self.text.ends_with(".0") {
+                self.text.truncate(self.text.len() - 2);
+            }
         }
         self.text.push('\n');
     }

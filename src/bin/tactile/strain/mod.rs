@@ -81,7 +81,11 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
             after.display()
         )));
     }
-    let unit = if metres { "m" } else { "the points' unit" };
+    let unit = if metres {
+        report::METRES
+    } else {
+        "the points' unit"
+    };
     match (a, b) {
         (PointTable::Plane(a), PointTable::Plane(b)) => {
             measured(&a, &b, unit, arguments, context, outputs)
@@ -144,7 +148,7 @@ fn measured<const D: usize>(
     };
     outputs.write(FILES[0], &report.pairs())?;
     if let Ok(strain) = &report.strain {
-        outputs.write(FILES[1], &report::strains(strain))?;
+        outputs.write(FILES[1], &report::strains(strain, unit))?;
         outputs.page(FILES[2], || report::page(strain, unit))?;
     }
     report.print(&mut context.console);

@@ -11,6 +11,9 @@ use tactile_imaging::plot::{Colour, Page, Panel};
 /// Pairs of a smaller weight are left out of the spline.
 const LEAST_WEIGHT: f64 = 1e-3;
 
+/// The unit of points whose headings name one.
+pub const METRES: &str = "m";
+
 /// What was found, as far as it came.
 pub struct Report<'a, const D: usize> {
     pub before: &'a [Point<f64, D>],
@@ -80,10 +83,11 @@ impl<const D: usize> Report<'_, D> {
     /// Rows (counted from 0), positions and displacements of the pairs, and their weights in the spline.
     pub fn pairs(&self) -> Vec<u8> {
         let axes = &["x", "y", "z"][..D];
+        let suffix = suffix(self.unit);
         let mut header = vec!["row_before".to_owned(), "row_after".to_owned()];
-        header.extend(axes.iter().map(|a| (*a).to_owned()));
-        header.extend(axes.iter().map(|a| format!("{a}_after")));
-        header.extend(axes.iter().map(|a| format!("u_{a}")));
+        header.extend(axes.iter().map(|a| format!("{a}{suffix}")));
+        header.extend(axes.iter().map(|a| format!("{a}_after{suffix}")));
+        header.extend(axes.iter().map(|a| format!("u_{a}{suffix}")));
         header.push("weight".to_owned());
         let mut csv = Csv::new(&header);
         for (k, &(i, j)) in self.rows().iter().enumerate() {
@@ -163,10 +167,16 @@ fn strain_json<const D: usize>(found: &Strain<D>, measure: &str) -> Value {
     })
 }
 
+/// What a heading says of the unit; nothing where the points' own is not known.
+fn suffix(unit: &str) -> &'static str {
+    if unit == METRES { "_m" } else { "" }
+}
+
 /// The strain at every point, and its standard error.
-pub fn strains<const D: usize>(found: &Strain<D>) -> Vec<u8> {
+pub fn strains<const D: usize>(found: &Strain<D>, unit: &str) -> Vec<u8> {
+    let suffix = suffix(unit);
     let mut header = vec!["row_before".to_owned()];
-    header.extend(["x", "y", "z"][..D].iter().map(|a| (*a).to_owned()));
+    header.extend(["x", "y", "z"][..D].iter().map(|a| format!("{a}{suffix}")));
     header.extend(components::<D>().iter().map(|c| c.0.to_owned()));
     header.extend(components::<D>().iter().map(|c| format!("se_{}", c.0)));
     let mut csv = Csv::new(&header);
