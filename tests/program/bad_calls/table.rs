@@ -244,7 +244,7 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("measure --polymer steel", "steel"),
     (
         "measure --forces 1e300",
-        "force_n is 1e300, expected a number in 0 to 1.3,",
+        "the force in N is 1e300, expected a number in 0 to 1.3,",
     ),
     (
         "strain half_units.csv half_units.csv",

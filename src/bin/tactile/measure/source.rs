@@ -40,6 +40,8 @@ impl Source {
                 Physics::FiniteElements => ", or try --physics hertz",
                 Physics::Hertz => "",
             };
+            // The library names its field, a user has written --forces.
+            let error = error.to_string().replace("force_n", "the force in N");
             Failure::input(format!("the press cannot be simulated: {error}{hint}"))
         })?;
         Ok(Self::Simulated(Box::new(trial)))
