@@ -41,5 +41,6 @@ pub use waveguide::{Layer, Waveguide};
 
 pub(crate) use layer_kernel::LayerKernel;
 pub(crate) use layer_table::{LayerTable, SharedLayerTable};
+pub(crate) use quadrature::gauss_panels;
 pub(crate) use table::TabulatedForce;
 pub(crate) use tatara::Squeeze;

@@ -221,7 +221,7 @@ fn report(
     let to_modulus = 1.0 - nu * nu;
     let minus_two_log = n as f64 * (best.squares / n as f64).ln();
     let depth = curve.span().1 - best.contact_m;
-    let model_error = indenter.model_error(law, depth);
+    let model_error = indenter.model_error(law, depth, nu);
     let (lower, upper) = widened(limits, best.modulus, model_error);
     let (lower, upper) = (lower * to_modulus, upper * to_modulus);
     let contact_ratio = law.contact_ratio(None, Some(depth));

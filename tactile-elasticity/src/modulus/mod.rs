@@ -26,7 +26,7 @@ pub use estimate::{
 };
 pub use law::LayerTheory;
 pub(crate) use law::{
-    ConeLaw, ContactLaw, LayerLaw, Punch, Sphere, TataraLaw, TipOnBallLaw, WaveguideLaw,
+    ConeLaw, ContactLaw, LayerLaw, NoSlipLaw, Punch, Sphere, TataraLaw, TipOnBallLaw, WaveguideLaw,
 };
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};

@@ -207,6 +207,23 @@ fn a_tip_on_a_ball_on_a_plate() {
     assert!((found.chosen().youngs_modulus_pa / E - 1.0).abs() < 1e-6);
 }
 
+/// A curve does not tell friction from a stiffer sample: the law is named, and what is on a layer has none.
+#[test]
+fn contact_without_slip_is_asked_for() {
+    let nu = 0.3;
+    let c = curve(hertz, 0.0, 0.0, 0);
+    let fit = |kind, thickness, nu| {
+        let options = CurveOptions::default();
+        fit_curve(&c, &sphere(thickness), nu, kind, &options).map(|f| f.youngs_modulus_pa)
+    };
+    let [slides, sticks] = [EstimatorKind::HertzSphere, EstimatorKind::SphereWithoutSlip];
+    let ratio = fit(slides, None, nu).unwrap() / fit(sticks, None, nu).unwrap();
+    // c √(2 I(2)) of Borodich and Keer (2004) at ν = 0.3, integrated apart from the library.
+    assert!((ratio - 1.0162).abs() < 5e-5, "{ratio}");
+    assert!(fit(sticks, Some(2e-3), nu).is_err());
+    assert!(!sphere(None).candidates().contains(&sticks));
+}
+
 #[test]
 fn bad_curves_are_named() {
     use ElasticityError as Bad;

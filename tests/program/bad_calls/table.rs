@@ -164,6 +164,22 @@ pub(super) const CALLS: &[(&str, &str)] = &[
         "--plates",
     ),
     (
+        "indent curve.csv --shape sphere --radius 5e-3 --thickness 2e-3 --no-slip",
+        "--no-slip",
+    ),
+    (
+        "indent curve.csv --shape sphere --ball-radius 5e-3 --no-slip",
+        "--no-slip",
+    ),
+    (
+        "indent curve.csv --shape sphere --radius 5e-3 --ball-radius 5e-3 --on-plate --no-slip",
+        "--no-slip",
+    ),
+    (
+        "indent curve.csv --shape sphere --radius 5e-3 --no-slip --model hertz",
+        "--no-slip",
+    ),
+    (
         "indent curve.csv --shape sphere --radius 5e-3 --poisson 0.6",
         "poisson",
     ),

@@ -42,6 +42,17 @@ impl Arguments {
             with(layer && ball, "--thickness", " with --ball-radius"),
             with(self.sliding && !layer, "--sliding", " without --thickness"),
             with(self.plates && !ball, "--plates", " without --ball-radius"),
+            with(self.no_slip && layer, "--no-slip", " with --thickness"),
+            with(
+                self.no_slip && self.on_plate,
+                "--no-slip",
+                " with --on-plate",
+            ),
+            with(
+                self.no_slip && ball && self.radius.is_none(),
+                "--no-slip",
+                " with --ball-radius alone",
+            ),
             with(
                 self.plates && self.radius.is_some(),
                 "--plates",
@@ -92,6 +103,13 @@ impl Arguments {
 
     pub fn model(&self) -> Model {
         use EstimatorKind as K;
+        if self.no_slip {
+            return Model::Named(match self.shape {
+                Shape::Sphere => K::SphereWithoutSlip,
+                Shape::Punch => K::FlatPunchWithoutSlip,
+                Shape::Cone => K::ConeWithoutSlip,
+            });
+        }
         Model::Named(match self.model {
             Law::Auto => return Model::Auto,
             Law::Hertz => K::HertzSphere,

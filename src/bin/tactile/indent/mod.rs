@@ -26,9 +26,12 @@ Examples:
   tactile indent examples/data/curve.csv --shape sphere --ball-radius 3e-3      a plate on a soft ball
   tactile indent examples/data/curve.csv --shape sphere --radius 5e-3 --ball-radius 3e-3 --on-plate    a tip on it
   tactile indent examples/data/curve.csv --shape cone --half-angle 70.3 --json
+  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3 --poisson 0.3 --no-slip
 Models: hertz, layer (integral equation), layer-series (corrected), layer-published (Dimitriadis 2002, as printed),
   ball (a ball on a rigid flat at finite strain), tatara (squeezed ball), punch, cone; auto fits all that apply and takes the
-  one with the lowest AICc. The interval holds the law's own error as well as the fit's.")]
+  one with the lowest AICc. The interval holds the law's own error as well as the fit's. A curve does not tell whether the
+  surfaces slide: --no-slip (deep samples) says that they stick, which lowers the modulus by 1.6 % at a Poisson's ratio of 0.3
+  and a sphere, 2.8 % under a punch, and not at all at 0.5.")]
 pub struct Arguments {
     /// Table of indentation and force.
     curve: PathBuf,
@@ -56,6 +59,9 @@ pub struct Arguments {
     /// The layer slides on its base instead of sticking to it.
     #[arg(long)]
     sliding: bool,
+    /// The surfaces stick where they touch, instead of sliding without friction.
+    #[arg(long, conflicts_with = "model")]
+    no_slip: bool,
     /// Poisson's ratio of the sample.
     #[arg(long, value_name = "NU", default_value_t = 0.5, value_parser = poisson, allow_negative_numbers = true)]
     poisson: f64,

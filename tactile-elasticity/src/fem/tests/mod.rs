@@ -2,6 +2,7 @@
 
 mod contact;
 mod elements;
+mod indentation;
 mod press;
 mod squeeze;
 mod stick;

@@ -3,6 +3,7 @@
 mod finite_strain;
 mod half_space;
 mod layer;
+mod no_slip;
 mod tatara;
 mod tip_on_ball;
 mod two_contacts;
@@ -11,6 +12,7 @@ mod waveguide;
 pub(crate) use half_space::{ConeLaw, Punch, Sphere};
 pub(crate) use layer::LayerLaw;
 pub use layer::LayerTheory;
+pub(crate) use no_slip::NoSlipLaw;
 pub(crate) use tatara::TataraLaw;
 pub(crate) use tip_on_ball::TipOnBallLaw;
 pub(crate) use two_contacts::TwoContactsLaw;
