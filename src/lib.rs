@@ -17,6 +17,12 @@ pub use tactile_optics as optics;
 pub use tactile_sfs as sfs;
 pub use tactile_tps as tps;
 
+// The program names the library as its users do: tests compile parts of it on their own.
+#[cfg(feature = "cli")]
+extern crate self as tactile_imaging;
+
+#[cfg(feature = "cli")]
+pub mod cli;
 #[cfg(feature = "inclusion")]
 pub mod inclusion;
 #[cfg(feature = "scene")]

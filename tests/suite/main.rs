@@ -7,14 +7,14 @@ mod corpus;
 mod finite_element_presses;
 mod force_on_simulated_frames;
 mod io_properties;
-#[path = "../../src/bin/tactile/strain/measure.rs"]
+#[path = "../../src/cli/strain/measure.rs"]
 #[allow(unreachable_pub, dead_code)]
 mod measure;
 mod modulus_on_simulated_scenes;
 mod pipeline;
 mod press_9dtact;
 mod recorded_answers;
-#[path = "../../src/bin/tactile/strain/robust_spline.rs"]
+#[path = "../../src/cli/strain/robust_spline.rs"]
 #[allow(unreachable_pub, dead_code)]
 mod robust_spline;
 mod scene_files;
