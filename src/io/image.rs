@@ -6,7 +6,9 @@
 //! Levels are on the scale of 8 bits, 0 to 255, and samples of more bits keep their precision as fractions: a sample v
 //! becomes 255 v/m, where m is the largest value that the camera gives. A PGM or PPM says m (its `maxval`). A PNG of 16
 //! bits does not: m is 65535, or 2ᵇ − 1 where the caller gives the bits b. A camera of 12 bits often writes its samples
-//! into 16 as they are; an image without any sample above 4095 is therefore refused until the bits are given.
+//! into 16 as they are; an image without any sample above 4095 is therefore refused until the bits are given, unless all are
+//! multiples of 257, as 8 bits stretched to 16 are.
+use super::depth::{full_scale, is_wide};
 use super::error::{ReadError, read_bytes, write_bytes};
 use super::grey::Grey;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
@@ -19,9 +21,6 @@ pub(crate) const LARGEST_SIDE: u32 = 30_000;
 
 /// Most pixels of an image: 64 million.
 pub(crate) const LARGEST_IMAGE: u64 = 64_000_000;
-
-/// Samples of 16 bits that do not go beyond this may be those of a camera with 12.
-const TWELVE_BITS: u16 = 4095;
 
 /// A grey image, `[row, column]`.
 ///
@@ -186,83 +185,6 @@ pub(crate) fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u
     }
 }
 
-/// The decoded sample that stands for the level 255. The decoder stretches the samples of a PGM, PPM or PAM from the largest
-/// value that the header announces to the full range of 8 or 16 bits.
-fn full_scale(
-    image: &DynamicImage,
-    bytes: &[u8],
-    path: &Path,
-    bits: Option<u8>,
-) -> Result<f64, ReadError> {
-    if !is_wide(image) {
-        return Ok(255.0);
-    }
-    let brightest = brightest(image);
-    let announced = pnm_maxval(bytes);
-    match (bits, announced) {
-        (Some(bits), _) => {
-            let stretch = announced.map_or(1.0, |maxval| FULL_RANGE / f64::from(maxval));
-            let largest = stretch * f64::from((1_u32 << bits.clamp(1, 16)) - 1);
-            // Half a sample for the decoder's rounding.
-            if f64::from(brightest) > largest + 0.5 {
-                return Err(ReadError::TooFewBits {
-                    path: path.into(),
-                    brightest: (f64::from(brightest) / stretch).round() as u16,
-                    bits,
-                });
-            }
-            Ok(largest)
-        }
-        (None, Some(_)) => Ok(FULL_RANGE),
-        (None, None) if brightest > TWELVE_BITS => Ok(FULL_RANGE),
-        (None, None) => Err(ReadError::UnclearBits {
-            path: path.into(),
-            brightest,
-            likely: if brightest > 1023 { 12 } else { 10 },
-        }),
-    }
-}
-
-/// The largest sample of 16 bits.
-const FULL_RANGE: f64 = 65_535.0;
-
-/// The largest value of a sample that the header of a PGM, PPM or PAM announces.
-fn pnm_maxval(bytes: &[u8]) -> Option<u16> {
-    let kind = bytes.strip_prefix(b"P")?.first()?;
-    // No header is longer; words beyond it are samples.
-    let header = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
-    let lines = header
-        .lines()
-        .map(|line| line.split('#').next().unwrap_or(""));
-    let mut words = lines.flat_map(str::split_ascii_whitespace);
-    let word = match kind {
-        b'2' | b'3' | b'5' | b'6' => words.nth(3),
-        b'7' => words.skip_while(|word| *word != "MAXVAL").nth(1),
-        _ => None,
-    };
-    word?.parse().ok().filter(|&maxval| maxval > 0)
-}
-
-fn is_wide(image: &DynamicImage) -> bool {
-    image.color().bytes_per_pixel() / image.color().channel_count() > 1
-}
-
-/// The largest sample of 16 bits, of any colour.
-fn brightest(image: &DynamicImage) -> u16 {
-    let largest = |samples: &[u16], channels: usize, colours: usize| {
-        let pixels = samples.chunks(channels);
-        pixels.flat_map(|p| p.iter().take(colours)).copied().max()
-    };
-    let found = match image {
-        DynamicImage::ImageLuma16(i) => largest(i.as_raw(), 1, 1),
-        DynamicImage::ImageLumaA16(i) => largest(i.as_raw(), 2, 1),
-        DynamicImage::ImageRgb16(i) => largest(i.as_raw(), 3, 3),
-        DynamicImage::ImageRgba16(i) => largest(i.as_raw(), 4, 3),
-        _ => None,
-    };
-    found.unwrap_or(u16::MAX)
-}
-
 /// Writes an 8-bit grey image: PGM where the name ends in `.pgm`, else PNG.
 ///
 /// ```
@@ -373,6 +295,23 @@ mod tests {
         let image = pnm("P5\n2 1\n65535\n", &[0x01, 0x00, 0xff, 0xff]);
         assert_eq!((image.bits, image.colour), (16, false));
         assert_eq!(image.levels.as_slice().unwrap(), [256.0 / 257.0, 255.0]);
+    }
+
+    /// A dark frame of 8 bits that another program saved in 16.
+    #[test]
+    fn eight_bits_stretched_to_sixteen_are_known() {
+        let png = |samples: Vec<u16>| {
+            let image = ::image::ImageBuffer::<::image::Luma<u16>, _>::from_raw(3, 1, samples);
+            let mut bytes = Cursor::new(Vec::new());
+            image
+                .unwrap()
+                .write_to(&mut bytes, ImageFormat::Png)
+                .unwrap();
+            parse_grey_image(bytes.get_ref(), "dark.png")
+        };
+        let levels = png(vec![0, 3 * 257, 11 * 257]).unwrap().levels;
+        assert_eq!(levels.as_slice().unwrap(), [0.0, 3.0, 11.0]);
+        assert!(png(vec![0, 3 * 257, 11 * 257 + 1]).is_err());
     }
 
     #[test]

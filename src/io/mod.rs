@@ -12,6 +12,7 @@
 //! size of the file. Units in the headings of columns are converted to SI or refused ([`Quantity`]). A file that is
 //! written takes the place of an older one only when it is complete.
 pub mod cases;
+mod depth;
 mod error;
 mod files;
 mod grey;
