@@ -2,18 +2,12 @@
 #![allow(clippy::print_stdout)]
 use tactile_optics::surface::Dimple;
 use tactile_optics::trace::{Slab, SlabLayer, TraceOptions, trace};
-use tactile_optics::{AcceptanceAngle, LayerStack, Led, OpticsError};
+use tactile_optics::{Led, OpticsError, acceptance_angle};
 
 fn main() -> Result<(), OpticsError> {
-    let indices = [1.38, 1.39, 1.40, 1.41];
-    let stack = LayerStack::new(&indices, 1.0)?;
-    for (index, answer) in indices.iter().zip(stack.acceptance_angles()) {
-        if let AcceptanceAngle::Below(angle) = answer {
-            println!(
-                "n = {index}: rays within {:.2}° are trapped",
-                angle.degrees()
-            );
-        }
+    for index in [1.38_f64, 1.39, 1.40, 1.41] {
+        let degrees = acceptance_angle(index, 1.0)?.radians.to_degrees();
+        println!("n = {index}: rays within {degrees:.2}° are trapped");
     }
     let layers = [1.40, 1.47].map(|index| SlabLayer {
         index,

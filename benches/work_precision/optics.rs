@@ -14,7 +14,7 @@ pub(crate) fn rays(study: &mut Study) {
     }];
     let slab = Slab::new(&layers, 1.0, 30e-3).expect("valid");
     let guided = |options: &TraceOptions<f64>| {
-        trace(&slab, &Led::lambertian(), &Flat, options, &mut [])
+        trace(&slab, &Led::default(), &Flat, options, &mut [])
             .expect("valid")
             .guided
     };

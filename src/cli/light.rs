@@ -5,12 +5,11 @@ use crate::cli::outputs::Outputs;
 use crate::cli::progress::Progress;
 use clap::Args;
 use serde_json::{Map, Value, json};
+use std::f64::consts::FRAC_2_PI;
 use std::path::PathBuf;
 use tactile_imaging::optics::surface::{Dimple, Flat, TopSurface, Touched, TouchingObject};
 use tactile_imaging::optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, path, trace};
-use tactile_imaging::optics::{
-    AcceptanceAngle, Dispersion, Geometry, LayerStack, Led, OpticsError,
-};
+use tactile_imaging::optics::{Dispersion, Geometry, Led, OpticsError, acceptance_angle, led_cone};
 use tactile_imaging::plot::{Colour, Page, Panel, Scale};
 
 /// Trace the light of an LED through the layered waveguide, at rest and under a press
@@ -100,27 +99,28 @@ fn traced(
 
 /// Prints how each layer traps light.
 fn angles(context: &mut Context) -> Result<Vec<Value>, OpticsError> {
-    let indices = [1.38, 1.39, 1.40, 1.41];
-    let stack = LayerStack::new(&indices, 1.0)?;
+    let indices: [f64; 4] = [1.38, 1.39, 1.40, 1.41];
     let console = &mut context.console;
     console.line("layer index   trapped within (of its plane)   share of a Lambertian LED trapped");
     let mut values = Vec::new();
-    for (n, answer) in indices.iter().zip(stack.acceptance_angles()) {
-        let share = 100.0 * Led::lambertian().trapped_share(answer, Geometry::Volume);
-        let (angle, text) = match answer {
-            AcceptanceAngle::Below(angle) => {
-                (Some(angle.degrees()), format!("{:.2}°", angle.degrees()))
-            }
-            AcceptanceAngle::AllTrapped => (Some(90.0), "every ray".to_owned()),
-            AcceptanceAngle::NoneTrapped => (None, "none".to_owned()),
+    for n in indices {
+        let acceptance = acceptance_angle(n, 1.0)?;
+        let share = 100.0 * Led::default().trapped_share(acceptance, Geometry::Volume);
+        let degrees = acceptance.radians.to_degrees();
+        let (angle, text) = if acceptance.radians == 0.0 {
+            (None, "none".to_owned())
+        } else if acceptance.complement == 0.0 {
+            (Some(90.0), "every ray".to_owned())
+        } else {
+            (Some(degrees), format!("{degrees:.2}°"))
         };
         console.line(format!("  {n:.2}        {text:>10} {share:33.2} %"));
         values.push(json!({ "index": n, "angle_degrees": angle, "trapped_percent": share }));
     }
-    let cone = stack.led_cone(140_f64.to_radians())?;
+    let cone = led_cone(&indices, 1.0, 140_f64.to_radians())?;
     console.line(format!(
         "an LED cone of 140° is trapped by every layer: {}",
-        if cone.is_trapped() { "yes" } else { "no" }
+        if cone.trapped { "yes" } else { "no" }
     ));
     Ok(values)
 }
@@ -255,7 +255,8 @@ impl Scenes<'_> {
             let mut curve = Vec::new();
             for step in 0..=24 {
                 let slope = 0.025 * f64::from(step);
-                let surface = Dimple::of_slope(CENTRE_M, HALF_WIDTH_M, slope)?;
+                // The steepest slope of a dimple of depth d and half width w is πd/2w.
+                let surface = dimple(slope * HALF_WIDTH_M * FRAC_2_PI)?;
                 curve.push([slope, 100.0 * self.budget(&surface, geometry)?.camera]);
             }
             panel = panel.line(curve, colour, name);

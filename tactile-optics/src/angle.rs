@@ -12,26 +12,29 @@
 //! digits where the textbook ones lose half of them: nᵢ near n₀ and near √2 n₀. Whether nᵢ² ≥ 2n₀² is decided exactly.
 
 use crate::error::OpticsError;
-use crate::real::{Real, index, real, twice_square_minus_square};
+use crate::real::{index, real, twice_square_minus_square};
+use num_traits::{Float, FloatConst};
 
 /// An angle between 0 and π/2 together with its complement, both to full precision.
 ///
 /// ```
-/// use tactile_optics::{CriticalAngle, critical_angle};
+/// use tactile_optics::critical_angle;
 ///
 /// // An index 10⁻¹⁴ above the ambient's: the complement keeps the digits that π/2 minus the angle has lost.
-/// let CriticalAngle::Beyond(angle) = critical_angle(1.0 + 1e-14_f64, 1.0)? else { unreachable!() };
-/// assert!((angle.complement() / 1.4136e-7 - 1.0).abs() < 1e-2);
-/// assert!((angle.degrees() - angle.radians().to_degrees()).abs() < 1e-12);
+/// let angle = critical_angle(1.0 + 1e-14_f64, 1.0)?.expect("denser than its ambient");
+/// assert!((angle.complement / 1.4136e-7 - 1.0).abs() < 1e-2);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Angle<T> {
-    radians: T,
-    complement: T,
+    /// The angle in radians.
+    pub radians: T,
+    /// π/2 minus the angle, accurate also near a right angle.
+    pub complement: T,
 }
 
-impl<T: Real> Angle<T> {
+impl<T: Float + FloatConst> Angle<T> {
     /// The angle of the right-angled triangle with these two legs.
     pub(crate) fn from_legs(opposite: T, adjacent: T) -> Self {
         Self {
@@ -40,137 +43,79 @@ impl<T: Real> Angle<T> {
         }
     }
 
-    /// The angle in radians.
-    pub fn radians(&self) -> T {
-        self.radians
-    }
-
-    /// The angle in degrees.
-    pub fn degrees(&self) -> T {
-        self.radians.to_degrees()
-    }
-
-    /// π/2 minus the angle, accurate also near a right angle.
-    pub fn complement(&self) -> T {
-        self.complement
-    }
-}
-
-/// The angle of incidence beyond which light is totally reflected.
-///
-/// ```
-/// use tactile_optics::{CriticalAngle, critical_angle};
-///
-/// let describe = |n: f64| match critical_angle(n, 1.0)? {
-///     CriticalAngle::Beyond(angle) => Ok::<_, tactile_optics::OpticsError>(format!("beyond {:.1}°", angle.degrees())),
-///     CriticalAngle::Never => Ok("never".to_string()),
-/// };
-/// assert_eq!(describe(1.41)?, "beyond 45.2°");
-/// assert_eq!(describe(0.9)?, "never");
-/// # Ok::<(), tactile_optics::OpticsError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum CriticalAngle<T> {
-    /// Light is totally reflected beyond this angle.
-    Beyond(Angle<T>),
-    /// No angle: the layer's index does not exceed its ambient's.
-    Never,
-}
-
-/// The set of rays entering through a layer's edge that total reflection traps.
-///
-/// ```
-/// use tactile_optics::{AcceptanceAngle, acceptance_angle};
-///
-/// assert_eq!(acceptance_angle(1.3_f64, 1.33)?, AcceptanceAngle::NoneTrapped);
-/// assert_eq!(acceptance_angle(1.5_f64, 1.0)?, AcceptanceAngle::AllTrapped);
-/// assert_eq!(acceptance_angle(1.5_f64, 1.0)?.radians(), std::f64::consts::FRAC_PI_2);
-/// assert!(matches!(acceptance_angle(1.38_f64, 1.0)?, AcceptanceAngle::Below(angle) if angle.degrees() < 72.0));
-/// # Ok::<(), tactile_optics::OpticsError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum AcceptanceAngle<T> {
-    /// No ray: the layer's index does not exceed its ambient's.
-    NoneTrapped,
-    /// The rays whose angle to the layer's plane, measured in the ambient, is below this one.
-    Below(Angle<T>),
-    /// Every ray: nᵢ² ≥ 2n₀².
-    AllTrapped,
-}
-
-impl<T: Real> AcceptanceAngle<T> {
-    /// The acceptance angle in radians: 0 where no ray is trapped, π/2 where all are.
-    pub fn radians(&self) -> T {
-        match self {
-            Self::NoneTrapped => T::zero(),
-            Self::Below(angle) => angle.radians(),
-            Self::AllTrapped => T::FRAC_PI_2(),
+    /// π/2, with a complement of exactly 0.
+    pub(crate) fn right() -> Self {
+        Self {
+            radians: T::FRAC_PI_2(),
+            complement: T::zero(),
         }
     }
 }
 
-/// The critical angle of light in a layer of index `n` against an ambient of index `ambient`.
+/// The critical angle of light in a layer of index `n` against an ambient of index `ambient`: beyond it light is totally
+/// reflected. `None` if the layer's index does not exceed its ambient's: no light is.
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for an index that is not positive and finite.
 ///
 /// ```
-/// use tactile_optics::{CriticalAngle, critical_angle};
-/// let CriticalAngle::Beyond(angle) = critical_angle(1.40_f64, 1.0)? else { unreachable!() };
-/// assert!((angle.degrees() - 45.5847).abs() < 1e-4);
-/// assert_eq!(critical_angle(1.0, 1.33)?, CriticalAngle::Never);
+/// use tactile_optics::critical_angle;
+/// let angle = critical_angle(1.40_f64, 1.0)?.expect("denser than its ambient");
+/// assert!((angle.radians.to_degrees() - 45.5847).abs() < 1e-4);
+/// assert_eq!(critical_angle(1.0, 1.33)?, None);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
-pub fn critical_angle<T: Real>(n: T, ambient: T) -> Result<CriticalAngle<T>, OpticsError> {
+pub fn critical_angle<T: Float + FloatConst>(
+    n: T,
+    ambient: T,
+) -> Result<Option<Angle<T>>, OpticsError> {
     let (n, n0) = (index(n)?, index(ambient)?);
-    if n <= n0 {
-        return Ok(CriticalAngle::Never);
-    }
     // The root of each factor: the product of two huge indices would overflow.
-    Ok(CriticalAngle::Beyond(Angle::from_legs(
-        n0,
-        (n - n0).sqrt() * (n + n0).sqrt(),
-    )))
+    Ok((n > n0).then(|| Angle::from_legs(n0, (n - n0).sqrt() * (n + n0).sqrt())))
 }
 
-/// The acceptance angle of a layer of index `n` in an ambient of index `ambient`, (1)–(4).
+/// The acceptance angle of a layer of index `n` in an ambient of index `ambient`, (1)–(4): of the rays entering through the
+/// layer's edge those are trapped whose angle to the layer's plane, measured in the ambient, is below it.
+///
+/// 0 radians where no ray is trapped (n ≤ n₀); a complement of 0 where every ray is (n² ≥ 2n₀²); between them both are positive.
 ///
 /// # Errors
 /// [`OpticsError::OutOfRange`] for an index that is not positive and finite.
 ///
 /// ```
-/// use tactile_optics::{AcceptanceAngle, acceptance_angle};
+/// use tactile_optics::acceptance_angle;
 /// // The paper's 71.98°, truncated from 71.9894°.
-/// let AcceptanceAngle::Below(angle) = acceptance_angle(1.38_f64, 1.0)? else { unreachable!() };
-/// assert!((angle.degrees() - 71.9894).abs() < 1e-4);
-/// assert_eq!(acceptance_angle(1.5, 1.0)?, AcceptanceAngle::AllTrapped);
-/// assert_eq!(acceptance_angle(1.3, 1.33)?, AcceptanceAngle::NoneTrapped);
+/// let angle = acceptance_angle(1.38_f64, 1.0)?;
+/// assert!((angle.radians.to_degrees() - 71.9894).abs() < 1e-4);
+/// // Every ray is trapped, and none.
+/// assert_eq!(acceptance_angle(1.5, 1.0)?.complement, 0.0);
+/// assert_eq!(acceptance_angle(1.3, 1.33)?.radians, 0.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
-pub fn acceptance_angle<T: Real>(n: T, ambient: T) -> Result<AcceptanceAngle<T>, OpticsError> {
+pub fn acceptance_angle<T: Float + FloatConst>(n: T, ambient: T) -> Result<Angle<T>, OpticsError> {
     let (n, n0) = (index(n)?, index(ambient)?);
     if n <= n0 {
-        return Ok(AcceptanceAngle::NoneTrapped);
+        return Ok(Angle {
+            radians: T::zero(),
+            complement: T::FRAC_PI_2(),
+        });
     }
     if n >= n0 + n0 {
-        return Ok(AcceptanceAngle::AllTrapped);
+        return Ok(Angle::right());
     }
     // Squares of very small or large indices would leave the scalar's range.
     let scale = power_of_two_near(n0).recip();
     let (n, n0) = (n * scale, n0 * scale);
     let cosine_leg_squared = twice_square_minus_square(n0, n);
     Ok(if cosine_leg_squared > T::zero() {
-        AcceptanceAngle::Below(Angle::from_legs(
-            ((n - n0) * (n + n0)).sqrt(),
-            cosine_leg_squared.sqrt(),
-        ))
+        Angle::from_legs(((n - n0) * (n + n0)).sqrt(), cosine_leg_squared.sqrt())
     } else {
-        AcceptanceAngle::AllTrapped
+        Angle::right()
     })
 }
 
 /// A power of two near `x`, for scaling without rounding; 1 in the range where nothing needs it.
-fn power_of_two_near<T: Real>(x: T) -> T {
+fn power_of_two_near<T: Float + FloatConst>(x: T) -> T {
     if x > real(1e-3) && x < real(1e3) {
         return T::one();
     }

@@ -1,7 +1,8 @@
 //! Refractive index as a function of wavelength, for PDMS and glass.
 
 use crate::error::OpticsError;
-use crate::real::{Real, real, within};
+use crate::real::{real, within};
+use num_traits::{Float, FloatConst};
 
 /// A dispersion formula and the range of wavelengths it was fitted on; λ is in micrometres inside the formulas.
 ///
@@ -95,7 +96,7 @@ impl Dispersion {
     /// assert!(Dispersion::PDMS_10_1.index(850e-9_f64).is_err());
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
-    pub fn index<T: Real>(&self, wavelength_m: T) -> Result<T, OpticsError> {
+    pub fn index<T: Float + FloatConst>(&self, wavelength_m: T) -> Result<T, OpticsError> {
         let [shortest, longest] = self.range_m();
         // The ends themselves may be rounded in a short scalar.
         within(
@@ -135,7 +136,7 @@ impl Dispersion {
     /// assert!((Dispersion::N_BK7.abbe_number::<f64>()? - 64.17).abs() < 0.01);
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
-    pub fn abbe_number<T: Real>(&self) -> Result<T, OpticsError> {
+    pub fn abbe_number<T: Float + FloatConst>(&self) -> Result<T, OpticsError> {
         let [d, f, c] = [587.56e-9, 486.13e-9, 656.27e-9].map(|w| self.index(real::<T>(w)));
         Ok((d? - T::one()) / (f? - c?))
     }

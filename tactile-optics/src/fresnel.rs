@@ -11,7 +11,8 @@
 
 use crate::angle::Angle;
 use crate::error::OpticsError;
-use crate::real::{Real, difference_of_products, index, real, within};
+use crate::real::{difference_of_products, index, real, within};
+use num_traits::{Float, FloatConst};
 
 /// Reflectance, transmittance and refraction of an interface, by polarisation.
 ///
@@ -22,10 +23,11 @@ use crate::real::{Real, difference_of_products, index, real, within};
 /// let glass = fresnel(1.0_f64, 1.5, 1.5_f64.atan())?;
 /// assert!(glass.reflectance_p < 1e-30 && glass.reflectance_s > 0.14);
 /// assert!(glass.refraction.is_some());
-/// assert!((glass.reflectance() + glass.transmittance() - 1.0).abs() < 1e-15);
+/// assert!((glass.reflectance + glass.transmittance - 1.0).abs() < 1e-15);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Fresnel<T> {
     /// Angle of refraction; `None` when reflection is total.
     pub refraction: Option<Angle<T>>,
@@ -37,19 +39,13 @@ pub struct Fresnel<T> {
     pub transmittance_s: T,
     /// Transmittance, in the plane.
     pub transmittance_p: T,
+    /// Reflectance of unpolarised light, the mean of both.
+    pub reflectance: T,
+    /// Transmittance of unpolarised light, the mean of both.
+    pub transmittance: T,
 }
 
-impl<T: Real> Fresnel<T> {
-    /// Reflectance of unpolarised light.
-    pub fn reflectance(&self) -> T {
-        (self.reflectance_s + self.reflectance_p) * real(0.5)
-    }
-
-    /// Transmittance of unpolarised light.
-    pub fn transmittance(&self) -> T {
-        (self.transmittance_s + self.transmittance_p) * real(0.5)
-    }
-
+impl<T: Float + FloatConst> Fresnel<T> {
     fn total() -> Self {
         Self {
             refraction: None,
@@ -57,6 +53,8 @@ impl<T: Real> Fresnel<T> {
             reflectance_p: T::one(),
             transmittance_s: T::zero(),
             transmittance_p: T::zero(),
+            reflectance: T::one(),
+            transmittance: T::zero(),
         }
     }
 }
@@ -69,12 +67,16 @@ impl<T: Real> Fresnel<T> {
 /// ```
 /// use tactile_optics::fresnel;
 /// let glass = fresnel(1.0_f64, 1.5, 0.0)?;
-/// assert!((glass.reflectance() - 0.04).abs() < 1e-15);
+/// assert!((glass.reflectance - 0.04).abs() < 1e-15);
 /// let trapped = fresnel(1.40, 1.0, 0.9)?;
-/// assert!(trapped.refraction.is_none() && trapped.reflectance() == 1.0);
+/// assert!(trapped.refraction.is_none() && trapped.reflectance == 1.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
-pub fn fresnel<T: Real>(n1: T, n2: T, incidence: T) -> Result<Fresnel<T>, OpticsError> {
+pub fn fresnel<T: Float + FloatConst>(
+    n1: T,
+    n2: T,
+    incidence: T,
+) -> Result<Fresnel<T>, OpticsError> {
     // A scalar's π/2 may lie above the true one by rounding.
     within(
         "angle of incidence",
@@ -92,7 +94,12 @@ pub fn fresnel<T: Real>(n1: T, n2: T, incidence: T) -> Result<Fresnel<T>, Optics
 }
 
 /// [`fresnel`] for an incidence given by sine and cosine, as a ray tracer has it.
-pub(crate) fn from_sine_and_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Fresnel<T> {
+pub(crate) fn from_sine_and_cosine<T: Float + FloatConst>(
+    n1: T,
+    n2: T,
+    sine: T,
+    cosine: T,
+) -> Fresnel<T> {
     let Some(b) = refracted_normal(n1, n2, sine, cosine) else {
         return Fresnel::total();
     };
@@ -105,17 +112,22 @@ pub(crate) fn from_sine_and_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) ->
     let brewster = difference_of_products(n2, cosine, n1, sine) * (c + across);
     let r_p = step / (n2 * (c + d)) * (brewster / (n2 * (c + d)));
     let flow = real::<T>(4.0) * a;
+    let (reflectance_s, reflectance_p) = (r_s * r_s, r_p * r_p);
+    let transmittance_s = flow / (a + b) * (b / (a + b));
+    let transmittance_p = flow / (c + d) * (b / (c + d));
     Fresnel {
         refraction: Some(Angle::from_legs(across, b)),
-        reflectance_s: r_s * r_s,
-        reflectance_p: r_p * r_p,
-        transmittance_s: flow / (a + b) * (b / (a + b)),
-        transmittance_p: flow / (c + d) * (b / (c + d)),
+        reflectance_s,
+        reflectance_p,
+        transmittance_s,
+        transmittance_p,
+        reflectance: (reflectance_s + reflectance_p) * real(0.5),
+        transmittance: (transmittance_s + transmittance_p) * real(0.5),
     }
 }
 
 /// n₂ cos θ₂, or `None` when reflection is total.
-fn refracted_normal<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<T> {
+fn refracted_normal<T: Float + FloatConst>(n1: T, n2: T, sine: T, cosine: T) -> Option<T> {
     // n₂ − n₁ sin θ₁; towards grazing incidence the sine has rounded to 1 and the cosine carries the digits.
     let margin = if sine > real(0.8) {
         margin_from_cosine(n1, n2, sine, cosine)
@@ -126,13 +138,13 @@ fn refracted_normal<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<T> {
 }
 
 /// n₂ − n₁ sin θ₁ as (n₂ − n₁) + n₁ cos² θ₁/(1 + sin θ₁), which keeps its digits where sin θ₁ is near 1.
-fn margin_from_cosine<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> T {
+fn margin_from_cosine<T: Float + FloatConst>(n1: T, n2: T, sine: T, cosine: T) -> T {
     (n2 - n1) + n1 * (cosine / (T::one() + sine)) * cosine
 }
 
 /// Transmittance of unpolarised light and n₂ cos θ₂, or `None` when reflection is total: the part of Fresnel's formulas that a
 /// ray tracer needs, without angles and without fused multiply–adds (slow where the processor is not known to have them).
-pub(crate) fn crossing<T: Real>(n1: T, n2: T, sine: T, cosine: T) -> Option<(T, T)> {
+pub(crate) fn crossing<T: Float + FloatConst>(n1: T, n2: T, sine: T, cosine: T) -> Option<(T, T)> {
     let margin = margin_from_cosine(n1, n2, sine, cosine);
     if margin <= T::zero() {
         return None;

@@ -1,8 +1,9 @@
 //! The LED at the slab's edge: its radiation pattern, and the share of its light that a layer traps.
 
-use crate::angle::AcceptanceAngle;
+use crate::angle::Angle;
 use crate::error::OpticsError;
-use crate::real::{Real, real, within};
+use crate::real::{real, within};
+use num_traits::{Float, FloatConst};
 
 /// The directions that light may take: one plane, or all of space.
 ///
@@ -11,7 +12,7 @@ use crate::real::{Real, real, within};
 ///
 /// // In space more of the light slips past the layer's plane sideways, so less of it is lost than in a section.
 /// let acceptance = acceptance_angle(1.38_f64, 1.0)?;
-/// let [section, volume] = [Geometry::Section, Geometry::Volume].map(|g| Led::lambertian().trapped_share(acceptance, g));
+/// let [section, volume] = [Geometry::Section, Geometry::Volume].map(|g| Led::default().trapped_share(acceptance, g));
 /// assert!(section > 0.95 && volume > section && volume < 1.0);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
@@ -32,7 +33,7 @@ pub enum Geometry {
 /// // A data sheet's "half intensity at 60°" is Lambert's law.
 /// let sheet = Led::from_half_intensity_angle(60.0_f64.to_radians())?;
 /// let acceptance = acceptance_angle(1.38, 1.0)?;
-/// let [a, b] = [sheet, Led::lambertian()].map(|led| led.trapped_share(acceptance, Geometry::Volume));
+/// let [a, b] = [sheet, Led::default()].map(|led| led.trapped_share(acceptance, Geometry::Volume));
 /// assert!((a - b).abs() < 1e-12);
 /// // A narrow one keeps more of its light inside.
 /// assert!(Led::new(4.0, 60.0_f64.to_radians())?.trapped_share(acceptance, Geometry::Volume) > a);
@@ -44,8 +45,18 @@ pub struct Led<T> {
     half_angle: T,
 }
 
-impl<T: Real> Led<T> {
-    /// Intensity ∝ cosᵐ θ for θ below `half_angle`; m = 1 is Lambertian, m = 0 even.
+impl<T: Float + FloatConst> Default for Led<T> {
+    /// A Lambertian LED: m = 1 up to a right angle.
+    fn default() -> Self {
+        Self {
+            exponent: T::one(),
+            half_angle: T::FRAC_PI_2(),
+        }
+    }
+}
+
+impl<T: Float + FloatConst> Led<T> {
+    /// Intensity ∝ cosᵐ θ for θ below `half_angle`; m = 1 is Lambertian (the default), m = 0 even.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for an exponent outside 0 to 1000 or a half angle outside (0, π/2].
@@ -61,14 +72,6 @@ impl<T: Real> Led<T> {
             exponent,
             half_angle: half_angle.min(T::FRAC_PI_2()),
         })
-    }
-
-    /// A Lambertian LED: m = 1 up to a right angle.
-    pub fn lambertian() -> Self {
-        Self {
-            exponent: T::one(),
-            half_angle: T::FRAC_PI_2(),
-        }
     }
 
     /// The pattern whose intensity has halved at `angle`, as data sheets state it: m = ln ½ / ln cos(angle).
@@ -87,20 +90,20 @@ impl<T: Real> Led<T> {
     /// quadrature, some 10⁻¹² in `f64`.
     ///
     /// ```
-    /// use tactile_optics::{AcceptanceAngle, acceptance_angle, led::{Geometry, Led}};
-    /// let share = Led::lambertian().trapped_share(acceptance_angle(1.38_f64, 1.0)?, Geometry::Section);
+    /// use tactile_optics::{acceptance_angle, led::{Geometry, Led}};
+    /// let share = Led::default().trapped_share(acceptance_angle(1.38_f64, 1.0)?, Geometry::Section);
     /// assert!((share - (1.38_f64 * 1.38 - 1.0).sqrt()).abs() < 1e-12);
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
-    pub fn trapped_share(&self, acceptance: AcceptanceAngle<T>, geometry: Geometry) -> T {
-        let limit = acceptance.radians().min(self.half_angle);
+    pub fn trapped_share(&self, acceptance: Angle<T>, geometry: Geometry) -> T {
+        let limit = acceptance.radians.min(self.half_angle);
         if geometry == Geometry::Section {
             let intensity = |t: T| t.cos().max(T::zero()).powf(self.exponent);
             return integral(T::zero(), limit, intensity)
                 / integral(T::zero(), self.half_angle, intensity);
         }
         let flux = |t: T| t.cos().max(T::zero()).powf(self.exponent) * t.sin();
-        let slope = acceptance.radians().sin();
+        let slope = acceptance.radians.sin();
         // Beyond θᵢ the trapped part falls with an infinite slope; substituting θ = θᵢ + t² removes it.
         let outer = |t: T| {
             let theta = limit + t * t;
@@ -137,7 +140,7 @@ impl<T: Real> Led<T> {
 }
 
 /// ∫ f from `a` to `b` by the five-point Gauss–Legendre rule on 32 panels.
-fn integral<T: Real>(a: T, b: T, f: impl Fn(T) -> T) -> T {
+fn integral<T: Float + FloatConst>(a: T, b: T, f: impl Fn(T) -> T) -> T {
     const NODES: [(f64, f64); 3] = [
         (0.0, 0.568_888_888_888_888_9),
         (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),

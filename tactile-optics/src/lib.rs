@@ -7,7 +7,7 @@
 //! | [`angle`] | critical and acceptance angles, (1)–(4) |
 //! | [`snell`] | propagation angles through a stack |
 //! | [`mod@fresnel`] | reflectance and transmittance, s, p and unpolarised |
-//! | [`stack`] | a stack of layers in its ambient: acceptance angles, normal incidence, the LED's cone |
+//! | [`stack`] | a stack of layers in its ambient: normal incidence, the LED's cone |
 //! | [`dispersion`] | refractive index as a function of wavelength; PDMS and borosilicate glass |
 //! | [`led`] | radiation pattern and the share of it that is trapped |
 //! | [`surface`] | the slab's deformed top and the object that touches it |
@@ -17,7 +17,7 @@
 //! # Conventions
 //! Angles in radians unless the name says degrees; angles of incidence are measured from the normal of the interface,
 //! the LED's from its axis. Lengths in metres. Layers count from the object's side towards the glass, and their indices
-//! grow that way as in §3.3: 1.38, 1.39, 1.40, glass 1.41. Every function is generic over [`Real`], that is `f32` and `f64`,
+//! grow that way as in §3.3: 1.38, 1.39, 1.40, glass 1.41. Every function is generic over `f32` and `f64`,
 //! allocates nothing, and needs no standard library.
 //!
 //! # Equations
@@ -49,12 +49,11 @@ pub mod stack;
 pub mod surface;
 pub mod trace;
 
-pub use angle::{AcceptanceAngle, Angle, CriticalAngle, acceptance_angle, critical_angle};
+pub use angle::{Angle, acceptance_angle, critical_angle};
 pub use dispersion::Dispersion;
 pub use error::OpticsError;
 pub use fresnel::{Fresnel, fresnel};
 pub use led::{Geometry, Led};
-pub use real::Real;
 pub use sensor::{SensorParameters, SensorSpecification};
-pub use snell::{Propagation, propagation};
-pub use stack::{LayerStack, LedCone, NormalIncidence};
+pub use snell::propagation;
+pub use stack::{LedCone, NormalIncidence, led_cone, normal_incidence};

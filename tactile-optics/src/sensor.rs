@@ -1,7 +1,8 @@
 //! The sensor's figures of merit (§3.4 and Table 1) from its parameters.
 
 use crate::error::OpticsError;
-use crate::real::{Real, within};
+use crate::real::within;
+use num_traits::{Float, FloatConst};
 
 /// The parameters from which a [`SensorSpecification`] follows.
 ///
@@ -86,7 +87,7 @@ impl SensorSpecification<f64> {
     pub const FINGERTIP_FORCE_SENSITIVITY_N: f64 = 2.0e-2;
 }
 
-impl<T: Real> SensorSpecification<T> {
+impl<T: Float + FloatConst> SensorSpecification<T> {
     /// The specification of a sensor whose smallest force stands out by `sigmas` standard deviations of the noise.
     ///
     /// # Errors

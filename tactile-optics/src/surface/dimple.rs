@@ -2,7 +2,8 @@
 
 use super::TopSurface;
 use crate::error::OpticsError;
-use crate::real::{Real, within};
+use crate::real::within;
+use num_traits::{Float, FloatConst};
 
 /// A round dimple z = −d cos²(πr/2w) for r < w, flat beyond; its steepest slope is πd/2w, halfway down.
 ///
@@ -12,8 +13,9 @@ use crate::real::{Real, within};
 /// let dimple = Dimple::new([15e-3_f64, 0.0], 4e-3, 1.5e-3)?;
 /// assert_eq!(dimple.height(15e-3, 0.0), -1.5e-3);
 /// assert_eq!(dimple.height(19.1e-3, 0.0), 0.0);
-/// // By its slope instead of its depth.
-/// assert!((Dimple::of_slope([15e-3_f64, 0.0], 4e-3, 0.3)?.steepest() - 0.3).abs() < 1e-15);
+/// // By its steepest slope s instead of its depth: d = 2ws/π.
+/// let depth_m = 0.3 * 4e-3 * std::f64::consts::FRAC_2_PI;
+/// assert!((Dimple::new([15e-3_f64, 0.0], 4e-3, depth_m)?.steepest() - 0.3).abs() < 1e-15);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +25,7 @@ pub struct Dimple<T> {
     depth: T,
 }
 
-impl<T: Real> Dimple<T> {
+impl<T: Float + FloatConst> Dimple<T> {
     /// A dimple around `centre_m` (x, y) of half width w and depth d in metres.
     ///
     /// # Errors
@@ -42,18 +44,6 @@ impl<T: Real> Dimple<T> {
         })
     }
 
-    /// The dimple of half width w whose steepest slope is `slope`.
-    ///
-    /// # Errors
-    /// As [`Dimple::new`].
-    pub fn of_slope(centre_m: [T; 2], half_width_m: T, slope: T) -> Result<Self, OpticsError> {
-        Self::new(
-            centre_m,
-            half_width_m,
-            slope * half_width_m * T::FRAC_2_PI(),
-        )
-    }
-
     /// πr/2w, and r.
     fn phase(&self, x: T, y: T) -> Option<(T, T)> {
         let r = (x - self.centre[0]).hypot(y - self.centre[1]);
@@ -61,7 +51,7 @@ impl<T: Real> Dimple<T> {
     }
 }
 
-impl<T: Real> TopSurface<T> for Dimple<T> {
+impl<T: Float + FloatConst> TopSurface<T> for Dimple<T> {
     fn height(&self, x: T, y: T) -> T {
         self.phase(x, y)
             .map_or(T::zero(), |(phase, _)| -self.depth * phase.cos().powi(2))

@@ -1,13 +1,14 @@
 //! Intersection of a ray with the deformed top.
 
 use super::TopSurface;
-use crate::real::{Real, real};
+use crate::real::real;
+use num_traits::{Float, FloatConst};
 
 /// The first intersection of a ray with the surface inside its support, at a distance along the ray between `from` and `to`.
 ///
 /// g = height − z is the gap above the ray. It closes no faster than u_z + L·√(u_x² + u_y²) with L the steepest slope, so
 /// a step of gap over that rate never jumps a crossing; steps are taken until the gap is below `tolerance`.
-pub(crate) fn march<T: Real, S: TopSurface<T> + ?Sized>(
+pub(crate) fn march<T: Float + FloatConst, S: TopSurface<T> + ?Sized>(
     surface: &S,
     position: &[T; 3],
     direction: &[T; 3],
@@ -40,7 +41,7 @@ pub(crate) fn march<T: Real, S: TopSurface<T> + ?Sized>(
 
 /// Steps from the distance t, where the gap is g, until the gap is below `tolerance`; it closes no faster than `closing`.
 #[inline]
-fn approach<T: Real>(
+fn approach<T: Float + FloatConst>(
     gap: impl Fn(T) -> T,
     [mut t, mut g]: [T; 2],
     to: T,
@@ -75,7 +76,7 @@ pub(crate) enum Meeting<T> {
 }
 
 /// Gap taken for contact: far below any length that matters, far above rounding.
-pub(crate) fn contact_gap<T: Real>(thickness: T) -> T {
+pub(crate) fn contact_gap<T: Float + FloatConst>(thickness: T) -> T {
     thickness * T::epsilon().powf(real(0.6))
 }
 

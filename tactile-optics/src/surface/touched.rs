@@ -2,7 +2,8 @@
 
 use super::{TopSurface, TouchingObject};
 use crate::error::OpticsError;
-use crate::real::{Real, within};
+use crate::real::within;
+use num_traits::{Float, FloatConst};
 
 /// A surface with an object in optical contact inside a circle.
 ///
@@ -14,7 +15,7 @@ use crate::real::{Real, within};
 /// let slab = Slab::new(&[SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }], 1.0, 30e-3)?;
 /// let dimple = Dimple::new([15e-3, 0.0], 4e-3, 0.2e-3)?;
 /// let finger = Touched::new(dimple, TouchingObject { index: 1.44, albedo: 0.6 }, [15e-3, 0.0], 2e-3)?;
-/// let (led, options) = (Led::lambertian(), TraceOptions::default());
+/// let (led, options) = (Led::default(), TraceOptions::default());
 /// let pressed_by_air = trace(&slab, &led, &dimple, &options, &mut [])?;
 /// let pressed_by_finger = trace(&slab, &led, &finger, &options, &mut [])?;
 /// // The touching object scatters light down to the camera.
@@ -29,7 +30,7 @@ pub struct Touched<S, T> {
     radius: T,
 }
 
-impl<T: Real, S: TopSurface<T>> Touched<S, T> {
+impl<T: Float + FloatConst, S: TopSurface<T>> Touched<S, T> {
     /// `surface` with `object` touching it within `radius_m` of `centre_m`.
     ///
     /// # Errors
@@ -60,7 +61,7 @@ impl<T: Real, S: TopSurface<T>> Touched<S, T> {
     }
 }
 
-impl<T: Real, S: TopSurface<T>> TopSurface<T> for Touched<S, T> {
+impl<T: Float + FloatConst, S: TopSurface<T>> TopSurface<T> for Touched<S, T> {
     fn height(&self, x: T, y: T) -> T {
         self.surface.height(x, y)
     }

@@ -6,8 +6,9 @@ use super::sampling::{hash, unit};
 use super::{Slab, TraceOptions};
 use crate::fresnel::crossing;
 use crate::led::Geometry;
-use crate::real::{Real, real};
+use crate::real::real;
 use crate::surface::{Meeting, TopSurface, march};
+use num_traits::{Float, FloatConst};
 
 /// Reflections after which a ray is given up: a guided ray in a long slab needs thousands at most.
 const MAX_EVENTS: u32 = 20_000;
@@ -41,7 +42,7 @@ pub(super) enum Next {
     Nothing,
 }
 
-impl<T: Real, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
+impl<T: Float + FloatConst, S: TopSurface<T> + ?Sized> Tracer<'_, '_, T, S> {
     /// Follows a ray and all its branches.
     pub(super) fn follow(&mut self, first: Ray<T>) {
         let smallest = first.power * self.options.cutoff;

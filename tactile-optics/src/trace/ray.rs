@@ -1,6 +1,6 @@
 //! A ray and a small stack of them.
 
-use crate::real::Real;
+use num_traits::{Float, FloatConst};
 
 /// A ray in a layer.
 #[derive(Debug, Clone, Copy)]
@@ -12,7 +12,7 @@ pub(crate) struct Ray<T> {
     pub(crate) events: u32,
 }
 
-impl<T: Real> Ray<T> {
+impl<T: Float + FloatConst> Ray<T> {
     /// The point at the distance `t` along the ray.
     pub(crate) fn at(&self, t: T) -> [T; 3] {
         core::array::from_fn(|k| self.position[k] + t * self.direction[k])
@@ -30,17 +30,17 @@ impl<T: Real> Ray<T> {
     }
 }
 
-pub(crate) fn dot<T: Real>(a: &[T; 3], b: &[T; 3]) -> T {
+pub(crate) fn dot<T: Float + FloatConst>(a: &[T; 3], b: &[T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(crate) fn normalised<T: Real>(v: [T; 3]) -> [T; 3] {
+pub(crate) fn normalised<T: Float + FloatConst>(v: [T; 3]) -> [T; 3] {
     let length = dot(&v, &v).sqrt();
     v.map(|c| c / length)
 }
 
 /// Sine of the angle between unit vectors, accurate when small.
-pub(crate) fn sine_between<T: Real>(a: &[T; 3], b: &[T; 3]) -> T {
+pub(crate) fn sine_between<T: Float + FloatConst>(a: &[T; 3], b: &[T; 3]) -> T {
     let x = a[1] * b[2] - a[2] * b[1];
     let y = a[2] * b[0] - a[0] * b[2];
     let z = a[0] * b[1] - a[1] * b[0];
@@ -54,7 +54,7 @@ pub(crate) struct Branches<T> {
     count: usize,
 }
 
-impl<T: Real> Branches<T> {
+impl<T: Float + FloatConst> Branches<T> {
     pub(crate) fn new() -> Self {
         Self {
             rays: [None; 32],

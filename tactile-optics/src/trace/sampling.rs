@@ -4,7 +4,8 @@
 //! effectiveness of quasirandom sequences", 2018), in 64-bit fixed point, so that no precision is lost however many
 //! rays are shot; the seed shifts them.
 
-use crate::real::{Real, real};
+use crate::real::real;
+use num_traits::{Float, FloatConst};
 
 /// Fixed-point steps for two and four dimensions.
 const STEPS_2: [f64; 4] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3, 0.0, 0.0];
@@ -34,7 +35,7 @@ impl Points {
     }
 
     /// The numbers of point `i`, in [0, 1).
-    pub(crate) fn point<T: Real>(&self, i: u64) -> [T; 4] {
+    pub(crate) fn point<T: Float + FloatConst>(&self, i: u64) -> [T; 4] {
         core::array::from_fn(|k| {
             unit(self.shift[k].wrapping_add(self.steps[k].wrapping_mul(i + 1)))
         })
@@ -42,7 +43,7 @@ impl Points {
 }
 
 /// A number in [0, 1) from the top bits.
-pub(crate) fn unit<T: Real>(bits: u64) -> T {
+pub(crate) fn unit<T: Float + FloatConst>(bits: u64) -> T {
     let value = real::<T>((bits >> 11) as f64 / 9_007_199_254_740_992.0);
     // A short scalar may round up to 1.
     value.min(T::one() - T::epsilon())
