@@ -50,7 +50,7 @@ impl Problem {
     }
 
     /// Root mean square error at the queries.
-    fn error<K: Kernel>(&self, spline: &ThinPlateSpline<f64, 3, K>) -> f64 {
+    fn error<K: Kernel + Default>(&self, spline: &ThinPlateSpline<f64, 3, K>) -> f64 {
         let mut values = vec![Point3::origin(); QUERIES];
         spline
             .apply_into(&self.queries, &mut values)
@@ -78,7 +78,7 @@ fn kernels(c: &mut Criterion, name: &str, bench: impl Bench) {
 type Group<'a> = criterion::BenchmarkGroup<'a, criterion::measurement::WallTime>;
 
 trait Bench {
-    fn run<K: Kernel>(
+    fn run<K: Kernel + Default>(
         &self,
         group: &mut Group<'_>,
         problem: &Problem,
@@ -87,11 +87,15 @@ trait Bench {
     );
 }
 
-fn solved<K: Kernel>(problem: &Problem, kernel: K, label: &str) -> ThinPlateSpline<f64, 3, K> {
+fn solved<K: Kernel + Default>(
+    problem: &Problem,
+    kernel: K,
+    label: &str,
+) -> ThinPlateSpline<f64, 3, K> {
     let spline = ThinPlateSpline::fit(&problem.sources, &problem.targets, &FitOptions::new(kernel))
         .expect("a spline");
     let error = problem.error(&spline);
-    let report = spline.report();
+    let report = &spline.report;
     println!(
         "{label}/{}: rms error {error:.3e}, residual {:.1e}, condition {:.1e}, {} steps",
         report.points,
@@ -107,7 +111,13 @@ fn solved<K: Kernel>(problem: &Problem, kernel: K, label: &str) -> ThinPlateSpli
 struct Fit;
 
 impl Bench for Fit {
-    fn run<K: Kernel>(&self, group: &mut Group<'_>, problem: &Problem, name: &str, kernel: K) {
+    fn run<K: Kernel + Default>(
+        &self,
+        group: &mut Group<'_>,
+        problem: &Problem,
+        name: &str,
+        kernel: K,
+    ) {
         solved(problem, kernel.clone(), name);
         let options = FitOptions::new(kernel);
         group.bench_function(BenchmarkId::new(name, problem.sources.len()), |b| {
@@ -121,19 +131,31 @@ impl Bench for Fit {
 struct Refit;
 
 impl Bench for Refit {
-    fn run<K: Kernel>(&self, group: &mut Group<'_>, problem: &Problem, name: &str, kernel: K) {
+    fn run<K: Kernel + Default>(
+        &self,
+        group: &mut Group<'_>,
+        problem: &Problem,
+        name: &str,
+        kernel: K,
+    ) {
         let n = problem.sources.len();
         let expected = solved(problem, kernel.clone(), name);
         let factorization = Factorization::new(&problem.sources, &FitOptions::new(kernel.clone()))
             .expect("a factor");
-        let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(kernel));
+        let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
         factorization
-            .fit_with(&mut workspace, &problem.targets, &mut spline)
+            .refit_with(&mut workspace, &problem.targets, None, None, &mut spline)
             .expect("a fit");
         assert!((problem.error(&spline) / problem.error(&expected) - 1.0).abs() < 1e-3);
         group.bench_function(BenchmarkId::new(format!("{name}/targets"), n), |b| {
             b.iter(|| {
-                factorization.fit_with(&mut workspace, black_box(&problem.targets), &mut spline)
+                factorization.refit_with(
+                    &mut workspace,
+                    black_box(&problem.targets),
+                    None,
+                    None,
+                    &mut spline,
+                )
             });
         });
         if n > 256 {
@@ -148,7 +170,7 @@ impl Bench for Refit {
                         &mut workspace,
                         &problem.targets,
                         weights,
-                        smoothing,
+                        Some(smoothing),
                         &mut spline,
                     )
                 });
@@ -160,7 +182,13 @@ impl Bench for Refit {
 struct Evaluate;
 
 impl Bench for Evaluate {
-    fn run<K: Kernel>(&self, group: &mut Group<'_>, problem: &Problem, name: &str, kernel: K) {
+    fn run<K: Kernel + Default>(
+        &self,
+        group: &mut Group<'_>,
+        problem: &Problem,
+        name: &str,
+        kernel: K,
+    ) {
         let spline = solved(problem, kernel, name);
         let mut values = vec![Point3::origin(); QUERIES];
         group.throughput(Throughput::Elements(QUERIES as u64));
@@ -173,7 +201,13 @@ impl Bench for Evaluate {
 struct Jacobian;
 
 impl Bench for Jacobian {
-    fn run<K: Kernel>(&self, group: &mut Group<'_>, problem: &Problem, name: &str, kernel: K) {
+    fn run<K: Kernel + Default>(
+        &self,
+        group: &mut Group<'_>,
+        problem: &Problem,
+        name: &str,
+        kernel: K,
+    ) {
         let spline = solved(problem, kernel, name);
         let (mut values, mut jacobians) = (
             vec![Point3::origin(); QUERIES],

@@ -156,10 +156,10 @@ fn single(study: &mut Study, p: &Problem) {
 
 fn refit(study: &mut Study, p: &Problem) {
     let factorization = Factorization::new(&p.sources, &FitOptions::new(NegR)).expect("a factor");
-    let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(NegR));
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
     let job = || {
         factorization
-            .fit_with(&mut workspace, &p.targets, &mut spline)
+            .refit_with(&mut workspace, &p.targets, None, None, &mut spline)
             .expect("a fit");
         spline.clone()
     };

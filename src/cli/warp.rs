@@ -13,8 +13,7 @@ use std::time::Instant;
 use tactile_imaging::io::PointTable;
 use tactile_imaging::io::points::read_point_table_in;
 use tactile_imaging::tps::{
-    Factorization, FitOptions, Input, Kernel, NegR, Progress, R2LogR, R3, Smoothing,
-    ThinPlateSpline, TpsError,
+    FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, ThinPlateSpline, TpsError,
 };
 
 /// Fit a thin-plate spline to pairs of points and warp other points by it
@@ -163,7 +162,7 @@ fn warp<const D: usize, K: Kernel>(
     };
     let (fit_ms, evaluate_ms) = (median_ms(&mut fit_times), median_ms(&mut evaluate_times));
     outputs.write(FILE, &table(&values, &jacobians))?;
-    let report = spline.report();
+    let report = &spline.report;
     let console = &mut context.console;
     console.value(&json!({
         "points": report.points, "queries": queries.len(), "lambda": report.lambda,
@@ -219,18 +218,23 @@ fn fit<const D: usize, K: Kernel>(
 ) -> Result<ThinPlateSpline<f64, D, K>, TpsError> {
     let interrupt = &context.interrupt;
     interrupt.hear(true);
-    let watch = |bar: &mut Bar, progress: &Progress| {
+    let n = sources.len();
+    let mut preparing = Bar::of(n, format!("preparing {n} points"));
+    let mut fitting = None;
+    let spline = ThinPlateSpline::fit_watched(sources, targets, options, |progress| {
+        let bar = match progress.residual {
+            None => &mut preparing,
+            Some(_) => {
+                fitting.get_or_insert_with(|| Bar::without_end(format!("fitting {n} points")))
+            }
+        };
         bar.done(progress.done);
         if interrupt.requested() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
-    };
-    let mut bar = Bar::of(sources.len(), format!("preparing {} points", sources.len()));
-    let factorization = Factorization::new_watched(sources, options, |p| watch(&mut bar, p))?;
-    let mut bar = Bar::without_end(format!("fitting {} points", sources.len()));
-    let spline = factorization.fit_watched(targets, |p| watch(&mut bar, p));
+    });
     interrupt.hear(false);
     spline
 }
@@ -252,7 +256,7 @@ fn in_files(arguments: &Arguments, error: TpsError) -> String {
             second + 1,
         ),
         TpsError::NotFinite {
-            input: Input::Targets,
+            input: "target points",
             ..
         } => format!("{targets}: {error}"),
         error => format!("{sources}: {error}"),

@@ -2,14 +2,14 @@
 
 use nalgebra::{Point, SMatrix, SVector};
 
-use crate::{Scalar, TpsError, Warp, centres::finite, error::Input, options::validate_weights};
+use crate::{Scalar, TpsError, Warp, centres::finite, options::validate_weights};
 
-/// The affine map f(x) = A x + b.
+/// The affine map f(x) = A x + b; a rigid motion where A is a rotation.
 ///
 /// ```
 /// # use nalgebra::{Matrix2, Point2, Vector2};
 /// # use tactile_tps::{Affine, Warp};
-/// let shear = Affine::new(Matrix2::new(1.0, 0.5, 0.0, 1.0), Vector2::new(0.0, 2.0));
+/// let shear = Affine { linear: Matrix2::new(1.0, 0.5, 0.0, 1.0), offset: Vector2::new(0.0, 2.0) };
 /// assert_eq!(shear.apply(&Point2::new(1.0, 4.0)), Point2::new(3.0, 6.0));
 /// assert_eq!(shear.jacobian(&Point2::origin()), shear.linear);
 /// ```
@@ -27,18 +27,6 @@ pub struct Affine<T: Scalar, const D: usize> {
 }
 
 impl<T: Scalar, const D: usize> Affine<T, D> {
-    /// The map x ↦ `linear` x + `offset`.
-    ///
-    /// ```
-    /// # use nalgebra::{Matrix2, Point2, Vector2};
-    /// # use tactile_tps::{Affine, Warp};
-    /// let quarter_turn = Affine::new(Matrix2::new(0.0, -1.0, 1.0, 0.0), Vector2::zeros());
-    /// assert_eq!(quarter_turn.apply(&Point2::new(1.0, 0.0)), Point2::new(0.0, 1.0));
-    /// ```
-    pub fn new(linear: SMatrix<T, D, D>, offset: SVector<T, D>) -> Self {
-        Self { linear, offset }
-    }
-
     /// The map that leaves every point where it is.
     ///
     /// ```
@@ -48,7 +36,10 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
     /// assert_eq!(Affine::identity().apply(&point), point);
     /// ```
     pub fn identity() -> Self {
-        Self::new(SMatrix::identity(), SVector::zeros())
+        Self {
+            linear: SMatrix::identity(),
+            offset: SVector::zeros(),
+        }
     }
 
     /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
@@ -85,7 +76,40 @@ impl<T: Scalar, const D: usize> Affine<T, D> {
                 linear += moments.cross * axis * axis.transpose() / value;
             }
         }
-        Ok(Self::new(linear.map(T::narrow), moments.offset(&linear)))
+        Ok(Self {
+            linear: linear.map(T::narrow),
+            offset: moments.offset(&linear),
+        })
+    }
+
+    /// The rigid motion of least Σ wᵢ |R xᵢ + b − yᵢ|², R a rotation (no reflection): the one nearest to C = Σ w y xᵀ
+    /// (Kabsch 1976; Umeyama 1991). O(n).
+    ///
+    /// ```
+    /// # use nalgebra::{Point2, Rotation2};
+    /// # use tactile_tps::Affine;
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let turn = Rotation2::new(0.3);
+    /// let motion = Affine::fit_rigid(&sources, &sources.map(|p| turn * p), None)?;
+    /// assert!((motion.linear - turn.matrix()).norm() < 1e-15);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
+    pub fn fit_rigid(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, D>],
+        weights: Option<&[T]>,
+    ) -> Result<Self, TpsError> {
+        let moments = Moments::new(sources, targets, weights)?;
+        let rotation = nearest_rotation(&moments.cross);
+        Ok(Self {
+            linear: rotation.map(T::narrow),
+            offset: moments.offset(&rotation),
+        })
     }
 }
 
@@ -95,68 +119,6 @@ impl<T: Scalar, const D: usize> Warp<T, D> for Affine<T, D> {
     }
     fn jacobian(&self, _: &Point<T, D>) -> SMatrix<T, D, D> {
         self.linear
-    }
-}
-
-/// The rigid motion f(x) = R x + b with R a rotation (no reflection).
-///
-/// ```
-/// # use nalgebra::{Point2, Rotation2, Vector2};
-/// # use tactile_tps::{Rigid, Warp};
-/// let turn = Rigid { rotation: *Rotation2::new(0.3).matrix(), translation: Vector2::new(1.0, 0.0) };
-/// let (a, b) = (Point2::<f64>::new(0.2, 0.7), Point2::new(3.0, 1.0));
-/// assert!(((turn.apply(&a) - turn.apply(&b)).norm() - (a - b).norm()).abs() < 1e-15);
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound = "T: Scalar + serde::Serialize + serde::de::DeserializeOwned")
-)]
-pub struct Rigid<T: Scalar, const D: usize> {
-    /// The rotation R.
-    pub rotation: SMatrix<T, D, D>,
-    /// The image b of the origin.
-    pub translation: SVector<T, D>,
-}
-
-impl<T: Scalar, const D: usize> Rigid<T, D> {
-    /// The motion of least Σ wᵢ |R xᵢ + b − yᵢ|²: R the rotation nearest to C = Σ w y xᵀ (Kabsch 1976; Umeyama 1991). O(n).
-    ///
-    /// ```
-    /// # use nalgebra::{Point2, Rotation2};
-    /// # use tactile_tps::Rigid;
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// let turn = Rotation2::new(0.3);
-    /// let motion = Rigid::fit(&sources, &sources.map(|p| turn * p), None)?;
-    /// assert!((motion.rotation - turn.matrix()).norm() < 1e-15);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError`] for no points, lengths that differ, or numbers that are not finite.
-    pub fn fit(
-        sources: &[Point<T, D>],
-        targets: &[Point<T, D>],
-        weights: Option<&[T]>,
-    ) -> Result<Self, TpsError> {
-        let moments = Moments::new(sources, targets, weights)?;
-        let rotation = nearest_rotation(&moments.cross);
-        Ok(Self {
-            rotation: rotation.map(T::narrow),
-            translation: moments.offset(&rotation),
-        })
-    }
-}
-
-impl<T: Scalar, const D: usize> Warp<T, D> for Rigid<T, D> {
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
-        Point::from(self.rotation * point.coords + self.translation)
-    }
-    fn jacobian(&self, _: &Point<T, D>) -> SMatrix<T, D, D> {
-        self.rotation
     }
 }
 
@@ -176,7 +138,7 @@ impl<const D: usize> Moments<D> {
     ) -> Result<Self, TpsError> {
         validate(sources, targets, weights)?;
         let weight = |i: usize| weights.map_or(1.0, |w| w[i].widen());
-        let vector = |p: &Point<T, D>| p.coords.map(Scalar::widen);
+        let vector = |p: &Point<T, D>| p.coords.map(T::widen);
         let total: f64 = (0..sources.len()).map(weight).sum();
         let mean = |points: &[Point<T, D>]| {
             let origin = vector(&points[0]);
@@ -210,17 +172,17 @@ fn validate<T: Scalar, const D: usize>(
     weights: Option<&[T]>,
 ) -> Result<(), TpsError> {
     if sources.is_empty() {
-        return Err(TpsError::Empty(Input::Sources));
+        return Err(TpsError::Empty("source points"));
     }
     if targets.len() != sources.len() {
         return Err(TpsError::Length {
-            input: Input::Targets,
+            input: "target points",
             expected: sources.len(),
             found: targets.len(),
         });
     }
-    finite(sources, Input::Sources)?;
-    finite(targets, Input::Targets)?;
+    finite(sources, "source points")?;
+    finite(targets, "target points")?;
     weights.map_or(Ok(()), |weights| validate_weights(weights, sources.len()))
 }
 

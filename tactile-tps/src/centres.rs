@@ -5,7 +5,6 @@ use nalgebra::Point;
 use crate::{
     Scalar, TpsError,
     double_double::{DoubleDouble, two_sum},
-    error::Input,
 };
 
 /// The shift and the scale that bring points to unit size: x̂ = (x − centre) / scale, scale a power of two.
@@ -73,9 +72,9 @@ pub(crate) struct Centres<const D: usize> {
 impl<const D: usize> Centres<D> {
     pub(crate) fn new<T: Scalar>(points: &[Point<T, D>], rescale: bool) -> Result<Self, TpsError> {
         if points.is_empty() {
-            return Err(TpsError::Empty(Input::Sources));
+            return Err(TpsError::Empty("source points"));
         }
-        finite(points, Input::Sources)?;
+        finite(points, "source points")?;
         let frame = Frame::around(points, rescale);
         let (first, centre_of) = merge(points);
         let exact = |i: usize, k: usize| two_sum(points[i][k].widen(), -frame.centre[k]);
@@ -150,7 +149,7 @@ impl<const D: usize> Centres<D> {
 /// Names the first point with a coordinate that is not finite.
 pub(crate) fn finite<T: Scalar, const D: usize>(
     points: &[Point<T, D>],
-    input: Input,
+    input: &'static str,
 ) -> Result<(), TpsError> {
     match points
         .iter()

@@ -77,9 +77,9 @@ impl<K: Kernel, const D: usize> Job<f64> for Fill<'_, K, D> {
         let point = self.column.point.map(L::new);
         for (i, term) in self.terms.iter_mut().enumerate() {
             let d: [L; D] = core::array::from_fn(|k| point[k] - L::new(axes[k][i]));
-            let s = d.iter().fold(L::zero(), |s, d| d.mul_add(*d, s));
+            let s = d.iter().fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s));
             *term = match self.column.axis {
-                None => self.kernel.value(s).get(),
+                None => self.kernel.jet(s).value.get(),
                 Some(axis) => (L::from_f64(2.0) * self.kernel.jet(s).first * d[axis]).get(),
             };
         }

@@ -126,11 +126,6 @@ impl Real for DoubleDouble {
         Self { high: x, low: 0.0 }
     }
 
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        self.high
-    }
-
     /// One step of Heron's rule on the `f64` root.
     fn sqrt(self) -> Self {
         if self.high <= 0.0 {

@@ -2,42 +2,6 @@
 
 use thiserror::Error;
 
-/// The argument that an error is about.
-///
-/// ```
-/// # use nalgebra::Point2;
-/// # use tactile_tps::{FitOptions, Input, ThinPlateSpline, TpsError};
-/// let points = [[0.0, 0.0], [1.0, f64::NAN]].map(Point2::from);
-/// let error = ThinPlateSpline::fit(&points, &points, &FitOptions::default()).unwrap_err();
-/// assert_eq!(error, TpsError::NotFinite { input: Input::Sources, index: 1 });
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Input {
-    /// The source points, the spline's centres.
-    Sources,
-    /// The target points, the values at the centres.
-    Targets,
-    /// The weights, one a point.
-    Weights,
-    /// The places a spline is evaluated at.
-    Queries,
-    /// The slice for the results.
-    Output,
-}
-
-impl core::fmt::Display for Input {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Sources => "source points",
-            Self::Targets => "target points",
-            Self::Weights => "weights",
-            Self::Queries => "query points",
-            Self::Output => "output slice",
-        })
-    }
-}
-
 /// Everything that can go wrong in this crate.
 ///
 /// ```
@@ -54,12 +18,12 @@ impl core::fmt::Display for Input {
 pub enum TpsError {
     /// There is nothing to fit: no point at all, or none with a weight above zero.
     #[error("no {0} to fit")]
-    Empty(Input),
+    Empty(&'static str),
     /// Two arguments that belong together differ in length.
     #[error("{input}: expected {expected} of them, found {found}")]
     Length {
         /// The argument of the wrong length.
-        input: Input,
+        input: &'static str,
         /// How many there should be.
         expected: usize,
         /// How many there are.
@@ -69,7 +33,7 @@ pub enum TpsError {
     #[error("{input}: number {index} (from zero) is not finite")]
     NotFinite {
         /// The argument that holds it.
-        input: Input,
+        input: &'static str,
         /// Its position, counted from zero.
         index: usize,
     },

@@ -81,7 +81,7 @@ impl<T: Scalar, const D: usize, const M: usize, const W: usize> Lanes<T, D, M, W
     ) {
         for k in 0..D {
             for i in 0..=k {
-                let own = if i == k { slope } else { L::zero() };
+                let own = if i == k { slope } else { L::from_f64(0.0) };
                 let curve = (bend * d[k]).mul_add(d[i], own);
                 for m in 0..M {
                     add(&mut self.hessian[m][k][i][l], weight[m], curve);
@@ -118,7 +118,7 @@ impl<T: Scalar, K: Kernel, const D: usize, const M: usize> Sum<'_, T, K, D, M> {
                     s = d[k].mul_add(d[k], s);
                 }
                 if ORDER == 0 {
-                    sums.add_value(l, &weight, self.kernel.value(s));
+                    sums.add_value(l, &weight, self.kernel.jet(s).value);
                 } else {
                     sums.add_jet::<L, ORDER>(l, &weight, &d, self.kernel.jet(s));
                 }

@@ -50,15 +50,15 @@ pub struct Factorization<T: Scalar, const D: usize, K = R2LogR> {
 ///
 /// ```
 /// # use nalgebra::Point2;
-/// # use tactile_tps::{Factorization, FitOptions, R2LogR, Spline, Workspace};
+/// # use tactile_tps::{Factorization, FitOptions, Spline, Workspace};
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// let factorization = Factorization::new(&sources, &FitOptions::default())?;
-/// let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(R2LogR));
+/// let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
 /// for step in 1..=3 {
 ///     // No allocation from the second round on.
 ///     let targets = sources.map(|p| Point2::new(p.x, p.y * f64::from(step)));
-///     factorization.fit_with(&mut workspace, &targets, &mut spline)?;
+///     factorization.refit_with(&mut workspace, &targets, None, None, &mut spline)?;
 ///     assert!((spline.apply(&sources[4]) - targets[4]).norm() < 1e-14);
 /// }
 /// # Ok(())
@@ -80,14 +80,14 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ///
     /// ```
     /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, Input, NegR, TpsError};
+    /// # use tactile_tps::{Factorization, FitOptions, NegR, TpsError};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// let factorization = Factorization::new(&sources, &FitOptions::new(NegR))?;
-    /// assert!(factorization.fit(&sources)?.report().points == 5);
+    /// assert!(factorization.fit(&sources)?.report.points == 5);
     /// let five_weights = FitOptions::new(NegR).with_weights(vec![1.0; 5])?;
     /// let error = Factorization::new(&sources[..4], &five_weights).unwrap_err();
-    /// assert_eq!(error, TpsError::Length { input: Input::Weights, expected: 4, found: 5 });
+    /// assert_eq!(error, TpsError::Length { input: "weights", expected: 4, found: 5 });
     /// # Ok(())
     /// # }
     /// ```
@@ -98,25 +98,8 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Self::new_watched(sources, options, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation to `watch`, which may stop it. A
-    /// direct solver does not report.
-    ///
-    /// ```
-    /// # use core::ops::ControlFlow;
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, Solver, TpsError};
-    /// let sources: Vec<Point2<f64>> =
-    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
-    /// let options = FitOptions::default().with_solver(Solver::Iterative);
-    /// let stopped = Factorization::new_watched(&sources, &options, |progress| {
-    ///     if 2 * progress.done > progress.total { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    /// });
-    /// assert_eq!(stopped.unwrap_err(), TpsError::Stopped);
-    /// ```
-    ///
-    /// # Errors
-    /// Those of [`new`](Self::new), and [`TpsError::Stopped`] if `watch` returns `Break`.
-    pub fn new_watched(
+    /// As [`new`](Self::new), reporting the progress of an iterative solver's preparation to `watch`, which may stop it.
+    pub(crate) fn new_watched(
         sources: &[Point<T, D>],
         options: &FitOptions<T, K>,
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,

@@ -56,7 +56,7 @@ impl Terms {
     pub(crate) fn rounding<T: Scalar, K: Kernel>(&self, kernel: &K, s: f64) -> f64 {
         // The farthest centre lies a unit or so beyond; nearer than two units the terms do not shrink.
         let distance = f64::max(s.sqrt() + 1.0, 2.0);
-        T::UNIT_ROUNDOFF * self.weight * kernel.value(distance * distance).abs()
+        T::UNIT_ROUNDOFF * self.weight * kernel.jet(distance * distance).value.abs()
     }
 
     /// Whether a plain sum that gave values of size `found` at `s` lost too many digits.
@@ -90,9 +90,9 @@ struct Jets<R, const D: usize> {
 impl<R: Real, const D: usize> Jets<R, D> {
     fn zero() -> Self {
         Self {
-            value: R::zero(),
-            gradient: [R::zero(); D],
-            hessian: [[R::zero(); D]; D],
+            value: R::from_f64(0.0),
+            gradient: [R::from_f64(0.0); D],
+            hessian: [[R::from_f64(0.0); D]; D],
         }
     }
 

@@ -17,81 +17,23 @@ use crate::{
 const GROUP: usize = 4;
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
-    /// How much the spline's value at a point follows each target: aⱼ in f(x) = Σⱼ aⱼ yⱼ, one a source point.
+    /// How much the spline's value at each point follows each target, into the caller's memory: aⱼ in f(x) = Σⱼ aⱼ yⱼ, row by row, `n`
+    /// entries (one per source point) a point. Allocates nothing once the workspace has grown.
     ///
     /// The same for every output and all targets, with the weights and λ of the factorisation. Σ aⱼ = 1, and Σ aⱼ xⱼ = x
-    /// where the points span space. Targets with covariances Cⱼ give f(x) the covariance Σ aⱼ² Cⱼ. O(n²).
+    /// where the points span space. Targets with covariances Cⱼ give f(x) the covariance Σ aⱼ² Cⱼ. O(n²) a point.
     ///
     /// ```
     /// use nalgebra::Point2;
-    /// use tactile_tps::{Factorization, FitOptions};
+    /// use tactile_tps::{Factorization, FitOptions, Workspace};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
-    /// let influence = factorization.influence(&Point2::new(0.5, 0.5))?;
-    /// let standard_error = 0.01 * influence.iter().map(|a| a * a).sum::<f64>().sqrt();
-    /// assert!((influence.iter().sum::<f64>() - 1.0).abs() < 1e-14 && standard_error < 0.01);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if the solver is iterative,
-    /// [`TpsError::NotDefinite`] if the points are so
-    /// close to degenerate that plain arithmetic has no factor.
-    pub fn influence(&self, point: &Point<T, D>) -> Result<Vec<T>, TpsError> {
-        let mut influence = vec![T::zero(); self.len()];
-        self.influence_into(
-            &mut Workspace::default(),
-            core::slice::from_ref(point),
-            &mut influence,
-        )?;
-        Ok(influence)
-    }
-
-    /// How much the Jacobian at a point follows each target: bⱼ in J(x) = Σⱼ yⱼ bⱼᵀ, one a source point.
-    ///
-    /// ∂fₘ/∂xₖ = Σⱼ yⱼₘ bⱼₖ, so that Σ bⱼ = 0, and targets with covariances Cⱼ give the entries (m, k) and (m', k') the
-    /// covariance Σⱼ Cⱼₘₘ' bⱼₖ bⱼₖ'. O(D n²).
-    ///
-    /// ```
-    /// use nalgebra::{Matrix2, Point2};
-    /// use tactile_tps::{Factorization, FitOptions};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let (factorization, x) = (Factorization::<f64, 2>::new(&sources, &FitOptions::default())?, Point2::new(0.5, 0.5));
-    /// let influence = factorization.jacobian_influence(&x)?;
-    /// let sum = targets.iter().zip(&influence).fold(Matrix2::zeros(), |j, (y, b)| j + y.coords * b.transpose());
-    /// assert!((factorization.fit(&targets)?.jacobian(&x) - sum).norm() < 1e-14);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// As [`influence`](Self::influence).
-    pub fn jacobian_influence(&self, point: &Point<T, D>) -> Result<Vec<SVector<T, D>>, TpsError> {
-        let mut influence = vec![SVector::zeros(); self.len()];
-        self.jacobian_influence_into(
-            &mut Workspace::default(),
-            core::slice::from_ref(point),
-            &mut influence,
-        )?;
-        Ok(influence)
-    }
-
-    /// [`influence`](Self::influence) at many points, into the caller's memory: row by row, `n` entries (one per source point) a
-    /// point. Allocates nothing once the workspace has grown.
-    ///
-    /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, Workspace};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
     /// let queries = [Point2::new(0.5, 0.5), sources[1]];
     /// let mut influence = [0.0; 2 * 5];
     /// factorization.influence_into(&mut Workspace::default(), &queries, &mut influence)?;
+    /// let standard_error = 0.01 * influence[..5].iter().map(|a| a * a).sum::<f64>().sqrt();
+    /// assert!((influence[..5].iter().sum::<f64>() - 1.0).abs() < 1e-14 && standard_error < 0.01);
     /// // At a source point the spline follows its target alone.
     /// assert!((influence[5 + 1] - 1.0).abs() < 1e-14 && influence[5 + 2].abs() < 1e-14);
     /// # Ok(())
@@ -99,7 +41,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     /// ```
     ///
     /// # Errors
-    /// Those of [`influence`](Self::influence), and [`TpsError::Length`] if `influence` is not of that length.
+    /// [`TpsError::DependsOnTargets`] if λ is left to cross-validation, [`TpsError::NoFactor`] if the solver is iterative,
+    /// [`TpsError::NotDefinite`] if the points are so close to degenerate that plain arithmetic has no factor,
+    /// [`TpsError::Length`] if `influence` is not of that length.
     pub fn influence_into(
         &self,
         workspace: &mut Workspace<D>,
@@ -131,25 +75,26 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         Ok(())
     }
 
-    /// [`jacobian_influence`](Self::jacobian_influence) at many points, into the caller's memory: row by row,
-    /// `n` entries (one per source point) a point. Allocates nothing once the workspace has grown.
+    /// How much the Jacobian at each point follows each target, into the caller's memory: bⱼ in J(x) = Σⱼ yⱼ bⱼᵀ, row by row, `n`
+    /// entries (one per source point) a point. Allocates nothing once the workspace has grown.
     ///
     /// ```
-    /// # use nalgebra::{Point2, Vector2};
-    /// # use tactile_tps::{Factorization, FitOptions, Workspace};
+    /// use nalgebra::{Matrix2, Point2, Vector2};
+    /// use tactile_tps::{Factorization, FitOptions, Workspace};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// let factorization = Factorization::<f64, 2>::new(&sources, &FitOptions::default())?;
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
+    /// let (factorization, x) = (Factorization::<f64, 2>::new(&sources, &FitOptions::default())?, Point2::new(0.5, 0.5));
     /// let mut influence = [Vector2::zeros(); 5];
-    /// factorization.jacobian_influence_into(&mut Workspace::default(), &[Point2::new(0.5, 0.5)], &mut influence)?;
-    /// // Targets moved together leave the Jacobian as it is.
-    /// assert!(influence.iter().sum::<Vector2<f64>>().norm() < 1e-14);
+    /// factorization.jacobian_influence_into(&mut Workspace::default(), &[x], &mut influence)?;
+    /// let sum = targets.iter().zip(&influence).fold(Matrix2::zeros(), |j, (y, b)| j + y.coords * b.transpose());
+    /// assert!((factorization.fit(&targets)?.jacobian(&x) - sum).norm() < 1e-14);
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// Those of [`influence`](Self::influence), and [`TpsError::Length`] if `influence` is not of that length.
+    /// As [`influence_into`](Self::influence_into).
     pub fn jacobian_influence_into(
         &self,
         workspace: &mut Workspace<D>,

@@ -46,12 +46,6 @@ pub trait Kernel: Clone + Send + Sync {
     /// limit is given as 0, which leaves the point's own term out.
     fn jet<R: Real>(&self, s: R) -> Jet<R>;
 
-    /// U alone.
-    #[inline(always)]
-    fn value<R: Real>(&self, s: R) -> R {
-        self.jet(s).value
-    }
-
     /// The degree k if U(c r) = cᵏ U(r), up to a multiple of r², for every c > 0; `None` if there is none.
     ///
     /// Points are scaled to unit size inside when there is one. A kernel with a length scale has none.
@@ -61,7 +55,7 @@ pub trait Kernel: Clone + Send + Sync {
     /// assert_eq!((NegR.degree(), R2LogR.degree()), (Some(1), Some(2)));
     /// // r² ln r at 3 r is 9 r² ln r, up to 9 ln 3 r².
     /// let (s, excess) = (2.0_f64, 9.0 * 3_f64.ln() * 2.0);
-    /// assert!((R2LogR.value(9.0 * s) - 9.0 * R2LogR.value(s) - excess).abs() < 1e-12);
+    /// assert!((R2LogR.jet(9.0 * s).value - 9.0 * R2LogR.jet(s).value - excess).abs() < 1e-12);
     /// ```
     fn degree(&self) -> Option<i32> {
         None
@@ -75,8 +69,8 @@ pub trait Kernel: Clone + Send + Sync {
 /// ```
 /// # use tactile_tps::{Kernel, R2LogR};
 /// let r = 2.0f64;
-/// assert!((R2LogR.value(r * r) - r * r * r.ln()).abs() < 1e-15);
-/// assert_eq!(R2LogR.value(0.0), 0.0);
+/// assert!((R2LogR.jet(r * r).value - r * r * r.ln()).abs() < 1e-15);
+/// assert_eq!(R2LogR.jet(0.0).value, 0.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -86,7 +80,7 @@ pub struct R2LogR;
 ///
 /// ```
 /// # use tactile_tps::{Kernel, NegR};
-/// assert_eq!(NegR.value(9.0), -3.0);
+/// assert_eq!(NegR.jet(9.0).value, -3.0);
 /// assert_eq!(NegR.jet(0.0).first, 0.0); // the cusp, left out
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,7 +91,7 @@ pub struct NegR;
 ///
 /// ```
 /// # use tactile_tps::{Kernel, R3};
-/// assert_eq!((R3.value(4.0), R3.degree()), (8.0, Some(3)));
+/// assert_eq!((R3.jet(4.0).value, R3.degree()), (8.0, Some(3)));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -106,7 +100,11 @@ pub struct R3;
 /// `x` where s > 0, else zero.
 #[inline(always)]
 fn off_centre<R: Real>(s: R, x: R) -> R {
-    if s > R::zero() { x } else { R::zero() }
+    if s > R::from_f64(0.0) {
+        x
+    } else {
+        R::from_f64(0.0)
+    }
 }
 
 impl Kernel for R2LogR {

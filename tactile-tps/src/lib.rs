@@ -7,10 +7,10 @@
 //! | fit once | [`ThinPlateSpline::fit`](Spline::fit), or [`Spline::fit`] for other than D outputs |
 //! | fit repeatedly | [`Factorization`] with a [`Workspace`] |
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
-//! | propagate the targets' uncertainty to values and Jacobians | [`Factorization::influence`], [`Factorization::jacobian_influence`] |
+//! | propagate the targets' uncertainty to values and Jacobians | [`Factorization::influence_into`], [`Factorization::jacobian_influence_into`] |
 //! | see condition, residual and iterations | [`FitReport`] |
-//! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`], [`Rigid`] |
-//! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`], [`RigidModel`] |
+//! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`] |
+//! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`] |
 //!
 //! # Equations
 //! $$f(x) = a_0 + A x + \sum_i w_i U(|x - x_i|), \qquad \sum_i w_i = 0, \quad \sum_i w_i x_i^T = 0$$
@@ -46,8 +46,6 @@ mod models;
 mod null_space;
 mod options;
 mod packed;
-#[cfg(feature = "rayon")]
-mod parallel;
 mod parts;
 mod precise;
 mod product;
@@ -74,13 +72,13 @@ mod triangular;
 mod values;
 mod warp;
 
-pub use affine::{Affine, Rigid};
-pub use error::{Input, TpsError};
+pub use affine::Affine;
+pub use error::TpsError;
 pub use factorization::{Factorization, Workspace};
 pub use kernel::{Jet, Kernel, NegR, R2LogR, R3};
-pub use models::{AffineModel, RigidModel};
+pub use models::AffineModel;
 pub use options::{FitOptions, Solver};
-pub use progress::{Progress, Stage};
+pub use progress::Progress;
 pub use real::{Real, Scalar};
 pub use report::FitReport;
 pub use smoothing::Smoothing;

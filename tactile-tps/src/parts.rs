@@ -10,7 +10,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         self.centres.len() / D
     }
 
-    /// The distinct centres, in the order of the source points.
+    /// The terms of the kernel sum, each with its centre xᵢ and its weight wᵢ in the kernel's units: the distinct source points, in
+    /// their order.
     ///
     /// ```
     /// # use nalgebra::Point2;
@@ -19,39 +20,23 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
-    /// assert_eq!(warp.centres().len(), 5);
-    /// assert!(warp.centres().zip(&sources).all(|(centre, source)| (centre - source).norm() < 1e-15));
+    /// assert!(warp.terms().zip(&sources).all(|((centre, _), source)| (centre - source).norm() < 1e-15));
+    /// let sum: nalgebra::Vector2<f64> = warp.terms().map(|(_, w)| w).sum();
+    /// let moment: nalgebra::Matrix2<f64> = warp.terms().map(|(x, w)| w * x.coords.transpose()).sum();
+    /// assert!(warp.terms().len() == 5 && sum.norm() < 1e-15 && moment.norm() < 1e-15);
     /// # Ok(())
     /// # }
     /// ```
-    pub fn centres(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + '_ {
-        let n = self.count();
+    pub fn terms(&self) -> impl ExactSizeIterator<Item = (Point<T, D>, SVector<f64, M>)> + '_ {
+        let (n, unit) = (self.count(), self.unit());
         (0..n).map(move |j| {
             let inside = |k: usize| self.centres[k * n + j].widen();
-            Point::from(SVector::from_fn(|k, _| {
+            let centre = Point::from(SVector::from_fn(|k, _| {
                 T::narrow(inside(k) * self.frame.scale + self.frame.centre[k])
-            }))
+            }));
+            let weight = SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit);
+            (centre, weight)
         })
-    }
-
-    /// The weight wᵢ of every centre, in the kernel's units.
-    ///
-    /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
-    /// let sum: nalgebra::Vector2<f64> = warp.weights().sum();
-    /// let moment: nalgebra::Matrix2<f64> = warp.weights().zip(warp.centres()).map(|(w, x)| w * x.coords.transpose()).sum();
-    /// assert!(sum.norm() < 1e-15 && moment.norm() < 1e-15);
-    /// # Ok(())
-    /// # }
-    /// ```
-    pub fn weights(&self) -> impl ExactSizeIterator<Item = SVector<f64, M>> + '_ {
-        let (n, unit) = (self.count(), self.unit());
-        (0..n).map(move |j| SVector::from_fn(|k, _| self.weights[k * n + j].widen() / unit))
     }
 
     /// The affine part x ↦ A x + a₀ beside the kernel sum, in the points' units.
@@ -68,8 +53,8 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
     /// let (linear, offset) = warp.affine();
     /// let x = Point2::new(0.7, 0.2);
-    /// let term = |(w, c): (nalgebra::Vector2<f64>, Point2<f64>)| w * R2LogR.value((x - c).norm_squared());
-    /// let by_hand = linear * x.coords + offset + warp.weights().zip(warp.centres()).map(term).sum::<nalgebra::Vector2<f64>>();
+    /// let term = |(c, w): (Point2<f64>, nalgebra::Vector2<f64>)| w * R2LogR.jet((x - c).norm_squared()).value;
+    /// let by_hand = linear * x.coords + offset + warp.terms().map(term).sum::<nalgebra::Vector2<f64>>();
     /// assert!((warp.apply(&x).coords - by_hand).norm() < 1e-14);
     /// # Ok(())
     /// # }
@@ -77,7 +62,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     pub fn affine(&self) -> (SMatrix<f64, M, D>, SVector<f64, M>) {
         let Frame { centre, scale } = self.frame;
         let linear = SMatrix::from_fn(|i, j| self.affine.gradient[i][j].widen() / scale);
-        let kernel = |s: f64| self.kernel.value(s);
+        let kernel = |s: f64| self.kernel.jet(s).value;
         let square = kernel(scale * scale) / self.unit() - kernel(1.0);
         let n = self.count();
         let offset = SVector::from_fn(|i, _| {

@@ -188,7 +188,7 @@ fn kernel_matrix<K: Kernel, const D: usize>(
         for i in j..n {
             let (a, b) = (point(i), point(j));
             let s = (0..D).fold(DoubleDouble::ZERO, |s, c| s + (a[c] - b[c]) * (a[c] - b[c]));
-            let mut value = kernel.value(s) * scale(i) * scale(j);
+            let mut value = kernel.jet(s).value * scale(i) * scale(j);
             if i == j {
                 value = value + DoubleDouble::from_f64(lambda);
             }

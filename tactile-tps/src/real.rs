@@ -32,8 +32,6 @@ pub trait Real:
 {
     /// The nearest number to `x`.
     fn from_f64(x: f64) -> Self;
-    /// The nearest `f64`.
-    fn to_f64(self) -> f64;
     /// √x.
     fn sqrt(self) -> Self;
     /// Natural logarithm of a positive, finite number; anything (but no panic) elsewhere.
@@ -46,17 +44,12 @@ pub trait Real:
     /// use tactile_tps::Real;
     /// /// Length of a vector, one rounding a term.
     /// fn length<R: Real>(components: &[R]) -> R {
-    ///     components.iter().fold(R::zero(), |sum, &c| c.mul_add(c, sum)).sqrt()
+    ///     components.iter().fold(R::from_f64(0.0), |sum, &c| c.mul_add(c, sum)).sqrt()
     /// }
     /// assert_eq!(length(&[3.0_f64, 4.0]), 5.0);
-    /// assert_eq!(length(&[0.6_f32, 0.8]).to_f64(), 1.0);
+    /// assert_eq!(length(&[0.6_f32, 0.8]), 1.0);
     /// ```
     fn mul_add(self, a: Self, b: Self) -> Self;
-    /// The number zero.
-    #[inline(always)]
-    fn zero() -> Self {
-        Self::from_f64(0.0)
-    }
 }
 
 /// A [`Real`] that stands for the scalar `T` in a vectorised loop.
@@ -67,10 +60,16 @@ pub trait Lane<T>: Real {
     fn get(self) -> T;
 }
 
-mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
+/// What the crate does with a scalar inside; seals [`Scalar`].
+pub trait Inner: RealField + Copy + Default {
+    /// Arithmetic without a hardware fused multiply-add.
+    type Plain: Lane<Self>;
+    /// Arithmetic with it.
+    type Fused: Lane<Self>;
+    /// The nearest number to `x`.
+    fn narrow(x: f64) -> Self;
+    /// The same number as `f64`.
+    fn widen(self) -> f64;
 }
 
 /// The scalar type of points: `f32` or `f64`.
@@ -79,22 +78,11 @@ mod sealed {
 ///
 /// ```
 /// # use tactile_tps::Scalar;
-/// assert_eq!(f32::narrow(0.1).widen(), f64::from(0.1f32));
 /// assert_eq!(<f64 as Scalar>::UNIT_ROUNDOFF, 0.5 * f64::EPSILON);
 /// ```
-pub trait Scalar: RealField + Copy + Default + sealed::Sealed {
-    /// Arithmetic without a hardware fused multiply-add.
-    #[doc(hidden)]
-    type Plain: Lane<Self>;
-    /// Arithmetic with it.
-    #[doc(hidden)]
-    type Fused: Lane<Self>;
+pub trait Scalar: Inner {
     /// Unit roundoff, half the distance from one to the next number.
     const UNIT_ROUNDOFF: f64;
-    /// The nearest number to `x`.
-    fn narrow(x: f64) -> Self;
-    /// The same number as `f64`.
-    fn widen(self) -> f64;
 }
 
 /// `f32` or `f64` whose `mul_add` is one hardware instruction.
@@ -104,9 +92,12 @@ pub struct Fused<T>(T);
 macro_rules! real {
     ($t:ident, $unit:expr, $ln:path) => {
         impl Scalar for $t {
+            const UNIT_ROUNDOFF: f64 = $unit;
+        }
+
+        impl Inner for $t {
             type Plain = $t;
             type Fused = Fused<$t>;
-            const UNIT_ROUNDOFF: f64 = $unit;
             #[inline(always)]
             fn narrow(x: f64) -> Self {
                 x as $t
@@ -132,10 +123,6 @@ macro_rules! real {
             #[inline(always)]
             fn from_f64(x: f64) -> Self {
                 x as $t
-            }
-            #[inline(always)]
-            fn to_f64(self) -> f64 {
-                self as f64
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
@@ -170,10 +157,6 @@ macro_rules! real {
             #[inline(always)]
             fn from_f64(x: f64) -> Self {
                 Self(x as $t)
-            }
-            #[inline(always)]
-            fn to_f64(self) -> f64 {
-                self.0 as f64
             }
             #[inline(always)]
             fn sqrt(self) -> Self {

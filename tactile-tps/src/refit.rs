@@ -13,10 +13,11 @@ use crate::{
 const DECOMPOSE_POINTS: usize = 256;
 
 impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
-    /// New targets, weights (`None`: those of the factorisation) and smoothing for the same sources, into a spline that
+    /// New targets, weights and smoothing (`None`: those of the factorisation) for the same sources, into a spline that
     /// is already there; allocates nothing once workspace and spline have grown.
     ///
-    /// The same weights and λ cost two triangular solves; another λ without weights two products once the matrix is
+    /// Unlike [`fit`](Self::fit) it measures no residual, and refines only where the condition number exceeds 10⁸. The same
+    /// weights and λ cost two triangular solves; another λ without weights two products once the matrix is
     /// decomposed into eigenvectors. Positive weights leave an interpolating spline as it is, and cost the two solves. With
     /// λ > 0, up to sixteen weights that differ from the rest are met by a small system of their own, weights near each other
     /// by conjugate gradients on the decomposed matrix, to 1e-13 of the targets; weights far apart, or of zero, cost a
@@ -24,16 +25,16 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     ///
     /// ```
     /// # use nalgebra::Point2;
-    /// # use tactile_tps::{Factorization, FitOptions, R2LogR, Smoothing, Spline, Workspace};
+    /// # use tactile_tps::{Factorization, FitOptions, Smoothing, Spline, Workspace};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
     /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
     /// let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
     /// let factorization = Factorization::new(&sources, &FitOptions::default().with_smoothing(Smoothing::Lambda(0.01))?)?;
-    /// let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(R2LogR));
+    /// let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
     /// let mut miss = |weight: f64| {
     ///     let weights = [1.0, 1.0, 1.0, 1.0, weight];
     ///     factorization
-    ///         .refit_with(&mut workspace, &targets, Some(&weights), Smoothing::Lambda(0.01), &mut spline)
+    ///         .refit_with(&mut workspace, &targets, Some(&weights), None, &mut spline)
     ///         .map(|()| (spline.apply(&sources[4]) - targets[4]).norm())
     /// };
     /// // Trusted more, the point is met more closely.
@@ -49,15 +50,18 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         workspace: &mut Workspace<D>,
         targets: &[Point<T, M>],
         weights: Option<&[T]>,
-        smoothing: Smoothing<T>,
+        smoothing: Option<Smoothing<T>>,
         spline: &mut Spline<T, D, M, K>,
     ) -> Result<(), TpsError> {
+        let smoothing = smoothing.unwrap_or(self.smoothing);
         validate_smoothing(&smoothing)?;
         if let Some(weights) = weights {
             validate_weights(weights, self.len())?;
         }
         if weights.is_none() && smoothing == self.smoothing {
-            return self.fit_with(workspace, targets, spline);
+            return self
+                .finish(&self.task(), &mut workspace.buffers, targets, spline)
+                .map(drop);
         }
         if let Some(weights) = weights {
             let Workspace {

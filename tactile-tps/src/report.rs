@@ -9,7 +9,7 @@
 /// // Three points on a line: nothing is known across it.
 /// let sources = [[0.0, 0.0], [1.0, 1.0], [3.0, 3.0], [3.0, 3.0]].map(Point2::from);
 /// let warp = ThinPlateSpline::fit(&sources, &sources, &FitOptions::default())?;
-/// let report = warp.report();
+/// let report = warp.report;
 /// assert_eq!((report.points, report.merged, report.rank), (4, 1, 2));
 /// assert!(report.extents[1] < 1e-15 && report.residual < Some(1e-14) && report.digits > 14.0);
 /// # Ok(())

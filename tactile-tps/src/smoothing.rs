@@ -14,7 +14,7 @@ use crate::{Scalar, TpsError};
 /// let options = FitOptions::default().with_smoothing(Smoothing::Gcv)?;
 /// let smooth = ThinPlateSpline::fit(&sources, &targets, &options)?;
 /// let through = ThinPlateSpline::fit(&sources, &targets, &options.with_smoothing(Smoothing::None)?)?;
-/// assert!(smooth.report().lambda > 0.0 && smooth.bending_energy() < through.bending_energy());
+/// assert!(smooth.report.lambda > 0.0 && smooth.bending_energy() < through.bending_energy());
 /// # Ok(())
 /// # }
 /// ```

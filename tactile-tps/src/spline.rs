@@ -1,9 +1,11 @@
 //! The fitted spline: its parts, its report, its energy.
 
+use core::ops::ControlFlow;
+
 use nalgebra::Point;
 
 use crate::{
-    Factorization, FitOptions, FitReport, Kernel, R2LogR, Scalar, TpsError,
+    Factorization, FitOptions, FitReport, Kernel, Progress, R2LogR, Scalar, TpsError,
     centres::{Centres, Frame},
     equations::{Buffers, Solution},
     far::Terms,
@@ -14,7 +16,7 @@ use crate::{
 
 /// A thin-plate spline from `D`-space to `M`-space: f(x) = a₀ + A x + Σᵢ wᵢ U(|x − xᵢ|).
 ///
-/// The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw (Wahba 1990).
+/// [`Default`] is the spline that is zero everywhere. The weights satisfy Σ wᵢ = 0 and Σ wᵢ xᵢᵀ = 0 and minimise Σ weightᵢ |f(xᵢ) − yᵢ|² + λ wᵀKw (Wahba 1990).
 #[derive(Clone, Debug)]
 pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     pub(crate) kernel: K,
@@ -25,7 +27,17 @@ pub struct Spline<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
     pub(crate) weights: Vec<T>,
     pub(crate) affine: Linear<T, D, M>,
     pub(crate) terms: Terms,
-    report: FitReport,
+    /// How the fit went.
+    pub report: FitReport,
+}
+
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel + Default> Default
+    for Spline<T, D, M, K>
+{
+    /// A spline that is zero everywhere, to be filled by [`Factorization::refit_with`].
+    fn default() -> Self {
+        Self::zero(K::default())
+    }
 }
 
 /// A spline that maps space onto itself.
@@ -88,15 +100,43 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         Factorization::new(sources, options)?.fit(targets)
     }
 
-    /// A spline that is zero everywhere, to be filled by a refit.
+    /// As [`fit`](Self::fit), reporting the progress of an iterative solver to `watch`, which may stop it; a direct solver does
+    /// not report. Stopped while it iterates, the spline is the best so far and its report says how good it is.
     ///
     /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{R2LogR, ThinPlateSpline};
-    /// let spline = ThinPlateSpline::<f64, 2>::empty(R2LogR);
-    /// assert_eq!(spline.apply(&Point2::new(3.0, 4.0)), Point2::origin());
+    /// use core::ops::ControlFlow;
+    /// use nalgebra::Point2;
+    /// use tactile_tps::{FitOptions, Solver, ThinPlateSpline, TpsError};
+    /// # fn main() -> Result<(), tactile_tps::TpsError> {
+    /// let sources: Vec<Point2<f64>> =
+    ///     (0..900).map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30) + 0.3 * f64::from(i % 7))).collect();
+    /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y.cos())).collect();
+    /// let options = FitOptions::default().with_solver(Solver::Iterative);
+    /// let spline = ThinPlateSpline::fit_watched(&sources, &targets, &options, |progress| match progress.residual {
+    ///     // Good enough for a first look.
+    ///     Some(residual) if residual < 1e-3 => ControlFlow::Break(()),
+    ///     _ => ControlFlow::Continue(()),
+    /// })?;
+    /// assert!(!spline.report.converged && spline.report.residual < Some(1e-2));
+    /// let stopped = ThinPlateSpline::fit_watched(&sources, &targets, &options, |_| ControlFlow::Break(()));
+    /// assert_eq!(stopped.err(), Some(TpsError::Stopped));
+    /// # Ok(())
+    /// # }
     /// ```
-    pub fn empty(kernel: K) -> Self {
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit), and [`TpsError::Stopped`] if `watch` returns `Break` before there is a spline.
+    pub fn fit_watched(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, M>],
+        options: &FitOptions<T, K>,
+        mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Self, TpsError> {
+        Factorization::new_watched(sources, options, &mut watch)?.fit_watched(targets, watch)
+    }
+
+    /// A spline that is zero everywhere, to be filled by a fit.
+    pub(crate) fn zero(kernel: K) -> Self {
         Self {
             kernel,
             frame: Frame {
@@ -187,23 +227,6 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         report.iterations = solution.iterations;
         report.converged = solution.converged;
         report.precise = solution.precise;
-    }
-
-    /// How the fit went.
-    ///
-    /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
-    /// assert!(warp.report().rank == 3 && warp.report().condition < 1e3);
-    /// # Ok(())
-    /// # }
-    /// ```
-    pub fn report(&self) -> &FitReport {
-        &self.report
     }
 
     /// Squared distance from the frame's centre, in the frame.

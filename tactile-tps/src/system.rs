@@ -222,12 +222,12 @@ impl<K: Kernel, const D: usize> Job<f64> for Assemble<'_, K, D> {
                 core::array::from_fn(|k| &self.places[k * stride + j..k * stride + rows.end]);
             let scales = &self.places[D * stride + j..D * stride + rows.end];
             for (i, value) in column[j..rows.end].iter_mut().enumerate() {
-                let mut s = L::zero();
+                let mut s = L::from_f64(0.0);
                 for k in 0..D {
                     let d = L::new(axes[k][i]) - own[k];
                     s = d.mul_add(d, s);
                 }
-                *value = (self.kernel.value(s) * (L::new(scales[i]) * own_scale)).get();
+                *value = (self.kernel.jet(s).value * (L::new(scales[i]) * own_scale)).get();
             }
             Product {
                 column,

@@ -8,7 +8,6 @@ use crate::{
     Factorization, Kernel, Scalar, Smoothing, Spline, TpsError,
     centres::finite,
     equations::{Buffers, Equations, Solution},
-    error::Input,
     iterative::{Iterative, Run},
     progress::Watch,
     reweight::Reweighting,
@@ -97,6 +96,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
             .flat_map(|t| t.iter())
             .fold(0.0, |m, x| f64::max(m, x.widen().abs()));
         let (centres, unit) = (&self.centres, self.unit());
+        spline.kernel.clone_from(&self.kernel);
         spline.assign(
             &Fitted {
                 centres,
@@ -122,12 +122,12 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         if targets.len() != self.len() {
             let (expected, found) = (self.len(), targets.len());
             return Err(TpsError::Length {
-                input: Input::Targets,
+                input: "target points",
                 expected,
                 found,
             });
         }
-        finite(targets, Input::Targets)?;
+        finite(targets, "target points")?;
         if through {
             self.centres.agree(targets, weights)
         } else {

@@ -108,35 +108,6 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         Ok(())
     }
 
-    /// Jacobians at many points, into the caller's memory.
-    ///
-    /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
-    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
-    /// let mut jacobians = [nalgebra::Matrix2::zeros(); 2];
-    /// warp.jacobian_into(&queries, &mut jacobians)?;
-    /// assert_eq!(jacobians[1], warp.jacobian(&queries[1]));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError::Length`] if the slices differ in length.
-    pub fn jacobian_into(
-        &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, M, D>],
-    ) -> Result<(), TpsError> {
-        same_length(points.len(), jacobians.len())?;
-        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
-        Ok(())
-    }
-
     /// Values and Jacobians at many points in one pass, into the caller's memory.
     ///
     /// ```
@@ -169,35 +140,6 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
             values[i] = sample.point();
             jacobians[i] = sample.jacobian();
         });
-        Ok(())
-    }
-
-    /// Hessians of every output at many points, into the caller's memory.
-    ///
-    /// ```
-    /// # use nalgebra::Point2;
-    /// # use tactile_tps::{FitOptions, ThinPlateSpline};
-    /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
-    /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-    /// let warp = ThinPlateSpline::fit(&sources, &targets, &FitOptions::default())?;
-    /// let queries = [Point2::new(0.5, 0.5), Point2::new(0.1, 0.9)];
-    /// let mut hessians = [[nalgebra::Matrix2::zeros(); 2]; 2];
-    /// warp.hessian_into(&queries, &mut hessians)?;
-    /// assert_eq!(hessians[1], warp.hessian(&queries[1]));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// [`TpsError::Length`] if the slices differ in length.
-    pub fn hessian_into(
-        &self,
-        points: &[Point<T, D>],
-        hessians: &mut [[SMatrix<T, D, D>; M]],
-    ) -> Result<(), TpsError> {
-        same_length(points.len(), hessians.len())?;
-        self.each::<2>(points, |i, sample| hessians[i] = sample.hessian());
         Ok(())
     }
 

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::{Point, SMatrix};
 
-use crate::{FitOptions, Kernel, Scalar, Spline, ThinPlateSpline, TpsError, error::Input};
+use crate::{FitOptions, Kernel, Scalar, Spline, ThinPlateSpline, TpsError};
 
 /// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<f64, 3>>` is a warp.
 ///
 /// ```
 /// use nalgebra::{Point2, Matrix2, Vector2};
 /// use tactile_tps::{Affine, Warp};
-/// let warp: Box<dyn Warp<f64, 2>> = Box::new(Affine::new(Matrix2::identity() * 2.0, Vector2::new(1.0, 0.0)));
+/// let warp: Box<dyn Warp<f64, 2>> = Box::new(Affine { linear: Matrix2::identity() * 2.0, offset: Vector2::new(1.0, 0.0) });
 /// assert_eq!(warp.apply(&Point2::new(1.0, 3.0)), Point2::new(3.0, 6.0));
 /// ```
 pub trait Warp<T: Scalar, const D: usize> {
@@ -43,7 +43,7 @@ pub trait Warp<T: Scalar, const D: usize> {
     /// ```
     /// use nalgebra::{Matrix2, Point2, Vector2};
     /// use tactile_tps::{Affine, Warp};
-    /// let shear = Affine::new(Matrix2::new(1.0, 0.2, 0.0, 1.0), Vector2::zeros());
+    /// let shear = Affine { linear: Matrix2::new(1.0, 0.2, 0.0, 1.0), offset: Vector2::zeros() };
     /// let points = [[0.0, 0.0], [1.0, 2.0], [3.0, 1.0]].map(Point2::from);
     /// let (mut images, mut jacobians) = (points, [Matrix2::zeros(); 3]);
     /// shear.apply_into(&points, &mut images)?;
@@ -117,7 +117,7 @@ forward!(Arc);
 /// `Arc<dyn WarpModel<f64, 3> + Send + Sync>`.
 ///
 /// Where the kind of warp is known, fit it by its own type: [`Spline::fit`], [`Affine::fit`](crate::Affine::fit),
-/// [`Rigid::fit`](crate::Rigid::fit).
+/// [`Affine::fit_rigid`](crate::Affine::fit_rigid).
 ///
 /// ```
 /// # use nalgebra::Point2;
@@ -126,7 +126,7 @@ forward!(Arc);
 /// # fn main() -> Result<(), tactile_tps::TpsError> {
 /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
 /// # let targets = sources.map(|p| Point2::new(p.x + 0.1 * p.y * p.y, p.y));
-/// let models: [Arc<dyn WarpModel<f64, 2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()), Arc::new(AffineModel)];
+/// let models: [Arc<dyn WarpModel<f64, 2> + Send + Sync>; 2] = [Arc::new(FitOptions::default()), Arc::new(AffineModel::General)];
 /// let mut misfits = Vec::new();
 /// for model in models {
 ///     let warp = model.fit(&sources, &targets, None)?;
@@ -168,7 +168,9 @@ impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {
         points: &[Point<T, D>],
         jacobians: &mut [SMatrix<T, D, D>],
     ) -> Result<(), TpsError> {
-        Spline::jacobian_into(self, points, jacobians)
+        same_length(points.len(), jacobians.len())?;
+        self.each::<1>(points, |i, sample| jacobians[i] = sample.jacobian());
+        Ok(())
     }
 }
 
@@ -197,7 +199,7 @@ pub(crate) fn same_length(expected: usize, found: usize) -> Result<(), TpsError>
         Ok(())
     } else {
         Err(TpsError::Length {
-            input: Input::Output,
+            input: "output slice",
             expected,
             found,
         })

@@ -16,7 +16,7 @@ use crate::sfs::{
     CurvatureAdaptive, Eikonal, EquallySpaced, FrankotChellappa, Lighting, MaskedLeastSquares,
     Random, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
 };
-use crate::tps::{AffineModel, FitOptions, R3, RigidModel, Smoothing, WarpModel};
+use crate::tps::{AffineModel, FitOptions, R3, Smoothing, WarpModel};
 use std::sync::Arc;
 
 /// How much denser [`SamplerChoice::Curvature`] samples where the surface bends: between even spacing (1) and points at the rim alone.
@@ -92,8 +92,8 @@ pub(super) fn warp(
             let options = FitOptions::new(R3).with_smoothing(Smoothing::Gcv);
             Arc::new(options.map_err(PipelineError::WarpOptions)?)
         }
-        WarpChoice::Affine => Arc::new(AffineModel),
-        WarpChoice::Rigid => Arc::new(RigidModel),
+        WarpChoice::Affine => Arc::new(AffineModel::General),
+        WarpChoice::Rigid => Arc::new(AffineModel::Rigid),
     })
 }
 

@@ -6,7 +6,7 @@
 use super::Motion;
 use super::expectation::{Columns, Posterior};
 use nalgebra::{Point, SMatrix, SVector};
-use tactile_tps::{Affine, Rigid};
+use tactile_tps::Affine;
 
 /// `y ↦ A y + b`, and the memory to find it.
 #[derive(Clone, Debug)]
@@ -81,19 +81,15 @@ impl<const D: usize> GlobalStep<D> {
     }
 
     fn fit_rigid(&mut self, scaled: bool) {
-        let Ok(fit) = Rigid::fit(&self.sources, &self.means, Some(&self.weights)) else {
+        let Ok(fit) = Affine::fit_rigid(&self.sources, &self.means, Some(&self.weights)) else {
             return;
         };
-        let scale = if scaled {
-            self.scale(&fit.rotation)
-        } else {
-            1.0
-        };
+        let scale = if scaled { self.scale(&fit.linear) } else { 1.0 };
         let (source, mean) = (
             self.weighted_mean(&self.sources),
             self.weighted_mean(&self.means),
         );
-        self.linear = fit.rotation * scale;
+        self.linear = fit.linear * scale;
         self.offset = mean - self.linear * source;
     }
 

@@ -87,7 +87,7 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for SparseRelaxationLabelling
 /// The target that has all of a row, so that no other can still come up: what they have is below a hundred roundings.
 fn settled_on<T: Scalar>(row: &[T]) -> Option<usize> {
     let sum = row.iter().fold(T::zero(), |sum, &p| sum + p);
-    let enough = sum * T::narrow(1.0 - 100.0 * T::UNIT_ROUNDOFF);
+    let enough = sum * nalgebra::convert(1.0 - 100.0 * T::UNIT_ROUNDOFF);
     row[..row.len() - 1]
         .iter()
         .position(|&p| p > T::zero() && p >= enough)

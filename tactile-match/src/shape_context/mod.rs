@@ -50,7 +50,7 @@ impl ShapeContexts {
     ) -> Result<Self, MatchError> {
         validate::option_within(
             "radius",
-            radius.widen(),
+            nalgebra::convert_unchecked::<T, f64>(radius),
             f64::MIN_POSITIVE,
             f64::MAX,
             "(0, ∞)",
@@ -60,10 +60,10 @@ impl ShapeContexts {
         }
         let plain: Vec<[f64; D]> = points
             .iter()
-            .map(|p| std::array::from_fn(|k| p[k].widen()))
+            .map(|p| std::array::from_fn(|k| nalgebra::convert_unchecked::<T, f64>(p[k])))
             .collect();
         let mut contexts = Self::default();
-        contexts.build(&plain, radius.widen());
+        contexts.build(&plain, nalgebra::convert_unchecked::<T, f64>(radius));
         Ok(contexts)
     }
 

@@ -86,25 +86,35 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         for i in 0..model.len() {
             row.clear();
             row.extend(
-                finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, T::narrow(p))),
+                finish::soft_row(&workspace.annealer.soft, i)
+                    .map(|(j, p)| (j, nalgebra::convert(p))),
             );
             row.sort_unstable_by_key(|entry| entry.0);
             soft.push_row(row.iter().copied());
         }
         let square = frame.scale * frame.scale;
-        let covariance = |v: &f64| SMatrix::from_diagonal_element(T::narrow(v * square));
+        let covariance = |v: &f64| SMatrix::from_diagonal_element(nalgebra::convert(v * square));
         let (unmatched_model, unmatched_target) =
             unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
             warp,
             warped,
             assignment: answer.assignment.clone(),
-            confidence: answer.confidence.iter().map(|&c| T::narrow(c)).collect(),
+            confidence: answer
+                .confidence
+                .iter()
+                .map(|&c| nalgebra::convert(c))
+                .collect(),
             soft,
             unmatched_model,
             unmatched_target,
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
-            energy: workspace.best.trace.iter().map(|&e| T::narrow(e)).collect(),
+            energy: workspace
+                .best
+                .trace
+                .iter()
+                .map(|&e| nalgebra::convert(e))
+                .collect(),
             report: narrow(&self.report()),
         }
     }
@@ -131,8 +141,8 @@ fn narrow<T: Scalar>(report: &MatchReport<f64>) -> MatchReport<T> {
         stop: report.stop,
         iterations: report.iterations,
         starts: report.starts,
-        residual: T::narrow(report.residual),
-        sigma: T::narrow(report.sigma),
+        residual: nalgebra::convert(report.residual),
+        sigma: nalgebra::convert(report.sigma),
         doubt: report.doubt,
     }
 }

@@ -63,7 +63,7 @@ impl<const D: usize> Frame<D> {
     /// A warped point, which lies among the targets, in the units of the caller.
     pub(crate) fn outward<T: Scalar>(&self, point: &[f64; D]) -> Point<T, D> {
         Point::from(std::array::from_fn(|k| {
-            T::narrow(point[k] * self.scale + self.target[k])
+            nalgebra::convert(point[k] * self.scale + self.target[k])
         }))
     }
 }

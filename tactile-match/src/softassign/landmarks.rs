@@ -49,7 +49,13 @@ impl<T: Scalar, const D: usize> Landmark<T, D> {
     /// assert_eq!(nowhere, Err(MatchError::LandmarkPosition { row: 7 }));
     /// ```
     pub fn new(row: usize, position: Point<T, D>, deviation: T) -> Result<Self, MatchError> {
-        option_within("deviation", deviation.widen(), 0.0, f64::MAX, "[0, ∞)")?;
+        option_within(
+            "deviation",
+            nalgebra::convert_unchecked::<T, f64>(deviation),
+            0.0,
+            f64::MAX,
+            "[0, ∞)",
+        )?;
         if !position.iter().all(|c| c.is_finite()) {
             return Err(MatchError::LandmarkPosition { row });
         }
@@ -115,7 +121,7 @@ impl AnnealedSoftassign {
             Known {
                 row: known.row,
                 position: frame.target(&known.position),
-                variance: (known.deviation.widen() / frame.scale)
+                variance: (nalgebra::convert_unchecked::<T, f64>(known.deviation) / frame.scale)
                     .max(finish::FLOOR)
                     .powi(2),
             }

@@ -59,7 +59,8 @@ impl AnnealedSoftassign {
         let found = SoftassignMatch {
             workspace: &*workspace,
         };
-        let noise = (WORSE * sigma.widen() / frame.scale).max(finish::CLEAN);
+        let noise =
+            (WORSE * nalgebra::convert_unchecked::<T, f64>(sigma) / frame.scale).max(finish::CLEAN);
         let kept = found.assignment().iter().flatten().count() as f64 >= LOST * matched
             && workspace.best.sigma <= noise;
         Ok(kept.then(|| found.interpolated(model, spline)))

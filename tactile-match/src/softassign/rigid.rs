@@ -9,7 +9,7 @@ use super::Transformation;
 use super::axes::Axes;
 use super::regression::Regression;
 use nalgebra::{Matrix3, Point, SMatrix, SVector, Vector3};
-use tactile_tps::Rigid;
+use tactile_tps::Affine;
 
 /// The fit, for a model that it keeps.
 #[derive(Clone, Debug, Default)]
@@ -54,9 +54,9 @@ impl<const D: usize> RigidFit<D> {
             let rows = points.iter().zip(weights);
             rows.map(|(p, w)| p.coords * (w / total)).sum()
         };
-        let fit = Rigid::fit(&self.model, &self.wanted, Some(weights));
+        let fit = Affine::fit_rigid(&self.model, &self.wanted, Some(weights));
         // Nothing matched, or nothing finite: the model stays where it is.
-        let Some(rotation) = fit.ok().filter(|_| total > 0.0).map(|fit| fit.rotation) else {
+        let Some(rotation) = fit.ok().filter(|_| total > 0.0).map(|fit| fit.linear) else {
             regression.set(displacements.0[0].len(), |_| ([0.0; D], 0.0));
             return;
         };

@@ -69,7 +69,12 @@ fn warp_through<T: Scalar, const D: usize>(
     if agrees(&*exact, model, warped) {
         return exact;
     }
-    let warp = hard::spline(model, warped, None, Smoothing::Lambda(T::narrow(SMOOTHING)));
+    let warp = hard::spline(
+        model,
+        warped,
+        None,
+        Smoothing::Lambda(nalgebra::convert(SMOOTHING)),
+    );
     model
         .iter()
         .zip(warped)
@@ -86,7 +91,7 @@ fn agrees<T: Scalar, const D: usize>(
     let size = warped
         .iter()
         .fold(T::zero(), |size, p| size.max(p.coords.amax()));
-    let tolerance = size * T::narrow(T::UNIT_ROUNDOFF.sqrt());
+    let tolerance = size * nalgebra::convert(T::UNIT_ROUNDOFF.sqrt());
     model
         .iter()
         .zip(warped)

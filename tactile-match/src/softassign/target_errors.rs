@@ -148,9 +148,11 @@ impl<const D: usize> SoftassignWorkspace<D> {
             });
         }
         let positive = |s: &f64| *s > 0.0 && s.is_finite();
-        let widened = deviations.iter().map(|s| s.widen());
+        let widened = deviations
+            .iter()
+            .map(|&s| nalgebra::convert_unchecked::<T, f64>(s));
         if let Some(row) = widened.clone().position(|s| !positive(&s)) {
-            let value = deviations[row].widen();
+            let value = nalgebra::convert_unchecked::<T, f64>(deviations[row]);
             return Err(MatchError::TargetDeviation { row, value });
         }
         let scale = self.frame.scale;

@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 
 use super::{Iterative, Vectors};
 use crate::{
-    Kernel, Progress, Stage,
+    Kernel, Progress,
     equations::{Buffers, Solution},
     evaluate::Sum,
     layout::HEAD,
@@ -91,9 +91,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         let (mut size, mut best) = ([0.0; M], (f64::INFINITY, answer.iterations));
         while answer.iterations < STEPS {
             let left = relative(largest(&vectors.residual), &vectors.target);
-            let (stage, done) = (Stage::Iteration, answer.iterations);
+            let done = answer.iterations;
             watch(&Progress {
-                stage,
                 done,
                 total: STEPS,
                 residual: Some(left),

@@ -11,7 +11,7 @@ mod preconditioner;
 use core::ops::ControlFlow;
 
 use crate::{
-    Kernel, Progress, Stage,
+    Kernel, Progress,
     centres::Centres,
     progress::Watch,
     system::{Setting, System},
@@ -77,7 +77,6 @@ impl<const D: usize> Iterative<D> {
         let total = system.active.len();
         let mut tell = |done| {
             watch(&Progress {
-                stage: Stage::Preparation,
                 done,
                 total,
                 residual: None,

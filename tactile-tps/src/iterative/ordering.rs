@@ -77,7 +77,9 @@ impl<const D: usize> Job<f64> for Approach<'_, D> {
 #[inline(always)]
 fn squared<L: Lane<f64>, const D: usize>(axes: [&[f64]; D], i: usize, from: [f64; D]) -> f64 {
     let d: [L; D] = core::array::from_fn(|k| L::new(axes[k][i]) - L::new(from[k]));
-    d.iter().fold(L::zero(), |s, d| d.mul_add(*d, s)).get()
+    d.iter()
+        .fold(L::from_f64(0.0), |s, d| d.mul_add(*d, s))
+        .get()
 }
 
 /// Squared distances of the first points from a place.

@@ -13,24 +13,36 @@ fn refits_and_evaluation_allocate_nothing() {
     let weights: Vec<f64> = (0..105).map(|i| f64::from(i % 5)).collect();
     let near: Vec<f64> = (0..105).map(|i| 1.0 + 1e-4 * f64::from(i % 5)).collect();
     let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
-    let (mut workspace, mut spline) = (Workspace::default(), Spline::<_, 3, 3, _>::empty(NegR));
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::<_, 3, 3, _>::default());
     let (mut values, mut jacobians) = (vec![Point::origin(); 333], vec![Matrix3::zeros(); 333]);
-    let mut hessians = vec![[Matrix3::zeros(); 3]; 333];
+    let mut hessian = [Matrix3::zeros(); 3];
     let (mut influence, mut slopes) = (vec![0.0; 7 * 105], vec![SVector::zeros(); 7 * 105]);
     let mut round = |lambda: f64| {
         factorization
-            .fit_with(&mut workspace, &targets, &mut spline)
+            .refit_with(&mut workspace, &targets, None, None, &mut spline)
             .expect("a fit");
         for weights in [None, Some(&weights[..]), Some(&near)] {
             for smoothing in [Smoothing::None, Smoothing::Lambda(lambda)] {
                 factorization
-                    .refit_with(&mut workspace, &targets, weights, smoothing, &mut spline)
+                    .refit_with(
+                        &mut workspace,
+                        &targets,
+                        weights,
+                        Some(smoothing),
+                        &mut spline,
+                    )
                     .expect("a refit");
             }
         }
-        assert!(spline.report().iterations > 0);
+        assert!(spline.report.iterations > 0);
         factorization
-            .refit_with(&mut workspace, &targets, None, Smoothing::Gcv, &mut spline)
+            .refit_with(
+                &mut workspace,
+                &targets,
+                None,
+                Some(Smoothing::Gcv),
+                &mut spline,
+            )
             .expect("a refit");
         spline
             .apply_into(&queries, &mut values)
@@ -38,9 +50,7 @@ fn refits_and_evaluation_allocate_nothing() {
         spline
             .apply_and_jacobian_into(&queries, &mut values, &mut jacobians)
             .expect("equal lengths");
-        spline
-            .hessian_into(&queries, &mut hessians)
-            .expect("equal lengths");
+        hessian = spline.hessian(&queries[0]);
         values[0] = spline.apply(&queries[0]);
         factorization
             .influence_into(&mut workspace, &queries[..7], &mut influence)

@@ -49,9 +49,6 @@ impl Real for Dual {
     fn from_f64(x: f64) -> Self {
         Self(x, 0.0)
     }
-    fn to_f64(self) -> f64 {
-        self.0
-    }
     fn sqrt(self) -> Self {
         Self(self.0.sqrt(), 0.5 * self.1 / self.0.sqrt())
     }
@@ -80,9 +77,10 @@ fn along<const D: usize, K: Kernel>(
             sum + Dual(linear[(m, i)], 0.0) * place[i]
         })
     });
-    for (centre, weight) in spline.centres().zip(spline.weights()) {
+    for (centre, weight) in spline.terms() {
         let distance = (0..D).map(|i| place[i] - Dual(centre[i], 0.0));
-        let value = kernel.value(distance.fold(Dual(0.0, 0.0), |s, d| s + d * d));
+        let square = distance.fold(Dual(0.0, 0.0), |s, d| s + d * d);
+        let value = kernel.jet(square).value;
         (0..D).for_each(|m| sums[m] = sums[m] + Dual(weight[m], 0.0) * value);
     }
     sums
@@ -96,7 +94,7 @@ fn agrees<const D: usize, K: Kernel>(kernel: K) {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let spline = ThinPlateSpline::fit(&sources, &targets, &FitOptions::new(kernel.clone()))
         .expect("a spline");
-    let weight = spline.weights().map(|w| w.norm()).sum::<f64>();
+    let weight = spline.terms().map(|(_, w)| w.norm()).sum::<f64>();
     for _ in 0..50 {
         let query = place(&random.point());
         let (value, jacobian) = (spline.apply(&query), spline.jacobian(&query));

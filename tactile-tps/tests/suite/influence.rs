@@ -3,12 +3,30 @@
 use crate::common::{Uniform, bend, largest, options};
 use nalgebra::{Matrix3, Point, Point1, SMatrix, SVector};
 use tactile_tps::{
-    Factorization, FitOptions, Input, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError,
-    Workspace,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline, TpsError, Workspace,
 };
 
+type Influences<const D: usize> = (Vec<f64>, Vec<SVector<f64, D>>);
+
+/// How value and Jacobian at one point follow each of `n` targets.
+fn influences<const D: usize, K: Kernel>(
+    factorization: &Factorization<f64, D, K>,
+    n: usize,
+    x: Point<f64, D>,
+) -> Influences<D> {
+    let mut workspace = Workspace::default();
+    let (mut values, mut slopes) = (vec![0.0; n], vec![SVector::zeros(); n]);
+    factorization
+        .influence_into(&mut workspace, &[x], &mut values)
+        .expect("a linear map");
+    factorization
+        .jacobian_influence_into(&mut workspace, &[x], &mut slopes)
+        .expect("a linear map");
+    (values, slopes)
+}
+
 /// Largest difference between influences and the values and Jacobians of refits with unit targets.
-fn against_unit_targets<const D: usize, K: Kernel>(
+fn against_unit_targets<const D: usize, K: Kernel + Default>(
     kernel: K,
     smoothing: Smoothing<f64>,
     weights: Option<&[f64]>,
@@ -19,7 +37,7 @@ fn against_unit_targets<const D: usize, K: Kernel>(
     let sources = random.points::<D>(n);
     let queries: [Point<f64, D>; 7] = core::array::from_fn(|_| random.point::<D>() * 1.3);
     let factorization = Factorization::new(&sources, &options).expect("a factor");
-    let (mut workspace, mut unit) = (Workspace::default(), Spline::empty(kernel));
+    let (mut workspace, mut unit) = (Workspace::default(), Spline::default());
     let mut values = vec![0.0; 7 * n];
     let mut slopes = vec![SVector::zeros(); 7 * n];
     factorization
@@ -34,7 +52,7 @@ fn against_unit_targets<const D: usize, K: Kernel>(
             .map(|i| Point1::new(if i == j { 1.0 } else { 0.0 }))
             .collect();
         factorization
-            .fit_with(&mut workspace, &targets, &mut unit)
+            .refit_with(&mut workspace, &targets, None, None, &mut unit)
             .expect("a fit");
         for (q, query) in queries.iter().enumerate() {
             let value = (values[q * n + j] - unit.apply(query).x).abs();
@@ -79,8 +97,7 @@ fn influences_sum_to_the_spline() {
         let factorization = Factorization::new(&sources, &options).expect("a factor");
         let spline = factorization.fit(&targets).expect("a fit");
         let x = Point::from(random.point::<3>().coords * unit);
-        let a = factorization.influence(&x).expect("a linear map");
-        let b = factorization.jacobian_influence(&x).expect("a linear map");
+        let (a, b) = influences(&factorization, 33, x);
         let value: SVector<f64, 3> = a.iter().zip(&targets).map(|(a, y)| y.coords * *a).sum();
         let slope: Matrix3<f64> = b
             .iter()
@@ -104,8 +121,7 @@ fn influences_have_the_moments_of_the_point() {
             .collect();
         let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
         let x = random.point::<3>();
-        let a = factorization.influence(&x).expect("a linear map");
-        let b = factorization.jacobian_influence(&x).expect("a linear map");
+        let (a, b) = influences(&factorization, 25, x);
         let first: SVector<f64, 3> = a.iter().zip(&sources).map(|(a, p)| p.coords * *a).sum();
         let slope: Matrix3<f64> = b
             .iter()
@@ -128,8 +144,11 @@ fn single_precision_keeps_its_digits() {
     let x = single[7] + SVector::from([0.01f32, 0.02]);
     let single = Factorization::<f32, 2>::new(&single, &FitOptions::default()).expect("a factor");
     let double = Factorization::<f64, 2>::new(&double, &FitOptions::default()).expect("a factor");
-    let a = single.influence(&x).expect("a linear map");
-    let b = double.influence(&x.map(f64::from)).expect("a linear map");
+    let (mut workspace, mut a) = (Workspace::default(), vec![0.0; 30]);
+    single
+        .influence_into(&mut workspace, &[x], &mut a)
+        .expect("a linear map");
+    let (b, _) = influences(&double, 30, x.map(f64::from));
     assert!(largest(a.iter().zip(&b).map(|(a, b)| f64::from(*a) - b)) < 1e-7);
 }
 
@@ -138,10 +157,12 @@ fn what_is_no_linear_map_is_refused() {
     let sources = Uniform(6).points::<2>(12);
     let x = Point::from([0.1, 0.2]);
     let chosen = Factorization::<f64, 2>::new(&sources, &options(R2LogR, Smoothing::Gcv, None));
-    assert_eq!(
-        chosen.expect("a factor").influence(&x),
-        Err(TpsError::DependsOnTargets)
+    let chosen = chosen.expect("a factor").influence_into(
+        &mut Workspace::default(),
+        &[x],
+        &mut vec![0.0; 12],
     );
+    assert_eq!(chosen, Err(TpsError::DependsOnTargets));
     let factorization =
         Factorization::<f64, 2>::new(&sources, &FitOptions::default()).expect("a factor");
     let (mut workspace, mut short) = (Workspace::default(), vec![0.0; 11]);
@@ -149,7 +170,7 @@ fn what_is_no_linear_map_is_refused() {
     assert_eq!(
         found,
         Err(TpsError::Length {
-            input: Input::Output,
+            input: "output slice",
             expected: 12,
             found: 11
         })

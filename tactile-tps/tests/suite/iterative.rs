@@ -5,7 +5,7 @@ use core::ops::ControlFlow;
 use crate::common::{Uniform, bend, largest, options};
 use nalgebra::{Point, Point3};
 use tactile_tps::{
-    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Solver, Spline, Stage,
+    Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Solver, Spline,
     ThinPlateSpline, TpsError, Workspace,
 };
 
@@ -22,12 +22,12 @@ fn compare<const D: usize, K: Kernel>(
             .expect("a fit")
     };
     let (direct, iterative) = (fit(Solver::Direct), fit(Solver::Iterative));
-    let report = iterative.report();
+    let report = &iterative.report;
     assert!(
         report.converged && report.residual <= Some(1e-10),
         "{report:?}"
     );
-    assert_eq!(report.rank, direct.report().rank);
+    assert_eq!(report.rank, direct.report.rank);
     let mut random = Uniform(31);
     let queries: [Point<f64, D>; 60] = core::array::from_fn(|_| random.point());
     (
@@ -105,7 +105,7 @@ fn refits_are_fits() {
     let weights: Vec<f64> = (0..POINTS).map(|i| 0.5 + f64::from(i as u32 % 3)).collect();
     let iterative = FitOptions::new(NegR).with_solver(Solver::Iterative);
     let factorization = Factorization::new(&sources, &iterative).expect("a preconditioner");
-    let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(NegR));
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
     let query = Point3::new(0.1, 0.2, 0.3);
     for (weights, smoothing) in [
         (None, Smoothing::None),
@@ -115,7 +115,13 @@ fn refits_are_fits() {
     ] {
         let refit = weights.map(|w| &w[..]);
         factorization
-            .refit_with(&mut workspace, &targets, refit, smoothing, &mut spline)
+            .refit_with(
+                &mut workspace,
+                &targets,
+                refit,
+                Some(smoothing),
+                &mut spline,
+            )
             .expect("a refit");
         let direct = options(NegR, smoothing, refit).with_solver(Solver::Direct);
         let fitted = ThinPlateSpline::fit(&sources, &targets, &direct).expect("a fit");
@@ -123,11 +129,13 @@ fn refits_are_fits() {
     }
     let again = allocation_counter::measure(|| {
         factorization
-            .fit_with(&mut workspace, &targets, &mut spline)
+            .refit_with(&mut workspace, &targets, None, None, &mut spline)
             .expect("a refit");
     });
     assert_eq!(again.count_total, 0);
-    assert_eq!(factorization.influence(&query), Err(TpsError::NoFactor));
+    let mut influence = vec![0.0; POINTS];
+    let refused = factorization.influence_into(&mut workspace, &[query], &mut influence);
+    assert_eq!(refused, Err(TpsError::NoFactor));
 }
 
 /// The watch hears of both stages, and can stop either.
@@ -137,26 +145,25 @@ fn a_watch_stops_the_fit() {
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let options = FitOptions::default().with_solver(Solver::Iterative);
     let mut heard = 0;
-    let stopped = Factorization::<f64, 2>::new_watched(&sources, &options, |progress| {
+    let stopped = ThinPlateSpline::fit_watched(&sources, &targets, &options, |progress| {
         heard += 1;
-        assert!(progress.stage == Stage::Preparation && progress.done < progress.total);
+        assert!(progress.residual.is_none() && progress.done < progress.total);
         ControlFlow::Break(())
     });
     assert!(matches!(stopped, Err(TpsError::Stopped)) && heard == 1);
-    let factorization = Factorization::new(&sources, &options).expect("a preconditioner");
     let mut residuals = Vec::new();
-    let early = factorization.fit_watched(&targets, |progress| {
-        residuals.push(progress.residual.expect("an iteration has one"));
-        if progress.done == 3 {
+    let early = ThinPlateSpline::fit_watched(&sources, &targets, &options, |progress| {
+        residuals.extend(progress.residual);
+        if progress.residual.is_some() && progress.done == 3 {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
     });
     let early = early.expect("the best so far");
-    assert!(early.report().iterations == 3 && !early.report().converged);
+    assert!(early.report.iterations == 3 && !early.report.converged);
     // What was told is what is reported: the residual carried along and the one formed anew differ by rounding.
-    let (told, reported) = (residuals[3], early.report().residual.expect("measured"));
+    let (told, reported) = (residuals[3], early.report.residual.expect("measured"));
     assert!(
         (told / reported - 1.0).abs() < 1e-6 && reported < 0.01 * residuals[0],
         "{told:e} {reported:e}"
@@ -176,7 +183,7 @@ fn tolerances_are_checked_and_kept() {
         .with_tolerance(1e-4)
         .expect("a tolerance");
     let rough = ThinPlateSpline::fit(&sources, &targets, &rough).expect("a fit");
-    let report = rough.report();
+    let report = rough.report;
     assert!(
         report.converged && report.residual <= Some(1e-4) && report.iterations < 8,
         "{report:?}"

@@ -5,9 +5,9 @@
 #[path = "../../../tests/support/recorded.rs"]
 mod record;
 
-use nalgebra::{Point, Point1};
+use nalgebra::{Point, Point1, SVector};
 use tactile_tps::{
-    Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Rigid, Smoothing, Spline,
+    Affine, Factorization, FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, Spline,
     ThinPlateSpline, Warp, Workspace,
 };
 
@@ -35,7 +35,7 @@ fn spline<const D: usize, const M: usize, K: Kernel>(
         answers.add(format!("{name}/jacobian"), jacobian.iter().copied());
         answers.add(format!("{name}/hessian"), hessian[0].iter().copied());
     }
-    let report = spline.report();
+    let report = &spline.report;
     answers.add(
         format!("{name}/lambda_energy"),
         [report.lambda, spline.bending_energy()],
@@ -46,7 +46,7 @@ fn spline<const D: usize, const M: usize, K: Kernel>(
     );
 }
 
-fn fits<const D: usize, K: Kernel>(answers: &mut Answers, kernel: K, name: &str) {
+fn fits<const D: usize, K: Kernel + Default>(answers: &mut Answers, kernel: K, name: &str) {
     let mut uniform = Uniform(5 + D as u64);
     let sources: Vec<Point<f64, D>> = uniform.points(40);
     let targets: Vec<_> = sources
@@ -73,24 +73,28 @@ fn fits<const D: usize, K: Kernel>(answers: &mut Answers, kernel: K, name: &str)
     let heights: Vec<_> = targets.iter().map(|p| Point1::new(p[0] * p[1])).collect();
     let surface = factorization.fit(&heights).expect("a spline");
     spline(answers, &format!("{name}/height"), &surface);
-    let (mut workspace, mut refitted) = (Workspace::default(), Spline::empty(kernel));
+    let (mut workspace, mut refitted) = (Workspace::default(), Spline::default());
     for (case, lambda) in [("refit", 0.02), ("refit_lambda", 0.3)] {
         factorization
             .refit_with(
                 &mut workspace,
                 &targets,
                 Some(&weights),
-                Smoothing::Lambda(lambda),
+                Some(Smoothing::Lambda(lambda)),
                 &mut refitted,
             )
             .expect("a spline");
         spline(answers, &format!("{name}/{case}"), &refitted);
     }
     let query = uniform.point();
-    let influence = factorization.influence(&query).expect("a linear map");
+    let mut influence = vec![0.0; sources.len()];
+    factorization
+        .influence_into(&mut workspace, &[query], &mut influence)
+        .expect("a linear map");
     answers.add(format!("{name}/influence"), influence);
-    let influence = factorization
-        .jacobian_influence(&query)
+    let mut influence = vec![SVector::zeros(); sources.len()];
+    factorization
+        .jacobian_influence_into(&mut workspace, &[query], &mut influence)
         .expect("a linear map");
     let columns = influence.iter().flat_map(|row| row.iter().copied());
     answers.add(format!("{name}/jacobian_influence"), columns);
@@ -103,7 +107,7 @@ fn models<const D: usize>(answers: &mut Answers) {
     let weights: Vec<f64> = (1..13).map(f64::from).collect();
     let query = uniform.point();
     let affine = Affine::fit(&sources, &targets, Some(&weights));
-    let rigid = Rigid::fit(&sources, &targets, Some(&weights));
+    let rigid = Affine::fit_rigid(&sources, &targets, Some(&weights));
     let (affine, rigid) = (affine.expect("a map"), rigid.expect("a motion"));
     answers.add(format!("affine{D}"), affine.apply(&query).iter().copied());
     answers.add(

@@ -95,7 +95,7 @@ fn check<const D: usize, K: Kernel>(table: &mut Table, case: &Value, kernel: K) 
     }
     let spline = fitted.unwrap_or_else(|error| panic!("{}: {error}", text(case, "id")));
     let rank = case["affine_rank"].as_u64().expect("a rank") as usize;
-    assert_eq!(spline.report().rank, rank, "{}", text(case, "id"));
+    assert_eq!(spline.report.rank, rank, "{}", text(case, "id"));
     queries(table, case, &spline, &sources, &targets);
     coefficients(table, case, &spline, &targets);
 }
@@ -117,7 +117,7 @@ fn singular<const D: usize, K: Kernel>(
         }
         Err(error) => panic!("{}: {error}", text(case, "id")),
         Ok(spline) => {
-            assert_eq!((spline.report().merged, targets[i]), (1, targets[j]));
+            assert_eq!((spline.report.merged, targets[i]), (1, targets[j]));
             for (x, y) in sources.iter().zip(targets) {
                 // Interpolation of values of order one, well conditioned: 1e-10 is generous.
                 assert!((spline.apply(x) - y).norm() < 1e-10, "{}", text(case, "id"));
@@ -199,7 +199,7 @@ fn coefficients<const D: usize, K: Kernel>(
     targets: &[Point<f64, D>],
 ) {
     let sensitivity = &case["sensitivity"]["w"];
-    if sensitivity.is_null() || spline.report().merged > 0 {
+    if sensitivity.is_null() || spline.report.merged > 0 {
         return;
     }
     let rows: Vec<Vec<f64>> = case["expected"]["w"]
@@ -209,9 +209,9 @@ fn coefficients<const D: usize, K: Kernel>(
         .map(numbers)
         .collect();
     let errors = spline
-        .weights()
+        .terms()
         .zip(&rows)
-        .flat_map(|(w, row)| (0..row.len()).map(move |k| w[k] - row[k]));
+        .flat_map(|((_, w), row)| (0..row.len()).map(move |k| w[k] - row[k]));
     let (error, size) = (largest(errors), largest(rows.iter().flatten().copied()));
     if size > 0.0 {
         table.enter(

@@ -10,7 +10,7 @@ use tactile_tps::{
 const POINTS: usize = 150;
 
 /// Largest difference at queries between refit and fit, and the steps the refit took.
-fn compare<const D: usize, K: Kernel>(
+fn compare<const D: usize, K: Kernel + Default>(
     kernel: K,
     weights: &[f64],
     smoothing: Smoothing<f64>,
@@ -20,13 +20,13 @@ fn compare<const D: usize, K: Kernel>(
     let targets: Vec<_> = sources.iter().map(bend).collect();
     let options = FitOptions::new(kernel.clone());
     let factorization = Factorization::new(&sources, &options).expect("a factor");
-    let (mut workspace, mut refitted) = (Workspace::default(), Spline::empty(kernel.clone()));
+    let (mut workspace, mut refitted) = (Workspace::default(), Spline::default());
     factorization
         .refit_with(
             &mut workspace,
             &targets,
             Some(weights),
-            smoothing,
+            Some(smoothing),
             &mut refitted,
         )
         .expect("a refit");
@@ -47,7 +47,7 @@ fn compare<const D: usize, K: Kernel>(
             .iter()
             .map(|q| (fitted.jacobian(q) - refitted.jacobian(q)).norm()),
     );
-    (values.max(1e-2 * slopes), refitted.report().iterations)
+    (values.max(1e-2 * slopes), refitted.report.iterations)
 }
 
 fn weights(weight: impl FnMut(usize) -> f64) -> Vec<f64> {
@@ -117,7 +117,7 @@ fn conflicts_are_found_whatever_the_weights() {
     sources.push(sources[4]);
     targets.push(Point3::origin());
     let factorization = Factorization::new(&sources, &FitOptions::new(NegR)).expect("a factor");
-    let (mut workspace, mut spline) = (Workspace::default(), Spline::empty(NegR));
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
     let mut refit = |weight: f64| {
         let weights: Vec<f64> = (0..21)
             .map(|i| if i == 20 { weight } else { 2.0 })
@@ -126,7 +126,7 @@ fn conflicts_are_found_whatever_the_weights() {
             &mut workspace,
             &targets,
             Some(&weights),
-            Smoothing::None,
+            Some(Smoothing::None),
             &mut spline,
         )
     };

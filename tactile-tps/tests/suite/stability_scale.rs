@@ -89,7 +89,7 @@ fn single_precision(table: &mut Worst) {
         for query in Uniform(10).points::<3>(50) {
             let query = query.map(|x| x as f32) * scale;
             let error = short.apply(&query).map(f64::from) - long.apply(&query.map(f64::from));
-            let units = error.norm() / (f64::from(f32::EPSILON) * long.report().condition);
+            let units = error.norm() / (f64::from(f32::EPSILON) * long.report.condition);
             table.enter("3-D negr: f32 against f64", units, 10.0);
         }
     }
@@ -133,13 +133,12 @@ fn singular_systems_are_said_to_be() {
         let scaled: Vec<_> = line.iter().map(|p| p * scale).collect();
         let spline = ThinPlateSpline::fit(&scaled, &targets, &FitOptions::new(NegR)).unwrap();
         assert_eq!(
-            spline.report().rank,
-            2,
+            spline.report.rank, 2,
             "a line spans one direction at scale {scale}"
         );
     }
     let spline = ThinPlateSpline::fit(&one, &[targets[4]; 5], &FitOptions::new(NegR)).unwrap();
-    assert_eq!((spline.report().rank, spline.report().merged), (1, 4));
+    assert_eq!((spline.report.rank, spline.report.merged), (1, 4));
     let clash = ThinPlateSpline::fit(&one, &targets[..5], &FitOptions::new(NegR));
     assert!(matches!(clash, Err(TpsError::Conflict { .. })));
 }

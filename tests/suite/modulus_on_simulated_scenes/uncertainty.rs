@@ -1,7 +1,7 @@
 //! Errors of the calibration, of the light and of every matched displacement carried through the spline and the strain to
 //! the modulus, against redrawing the whole experiment.
 
-use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Point3, SVector, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::field::{StrainField, mean_strain_covariance};
@@ -11,7 +11,7 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{self, CalibrationPair, LinearCalibration, StressCalibration};
-use tactile_imaging::tps::{Factorization, FitOptions, Smoothing};
+use tactile_imaging::tps::{Factorization, FitOptions, Smoothing, Workspace};
 
 const AREA_M2: f64 = 4e-5;
 /// Integrated pixel values of the two loads, with the noise of the light.
@@ -104,11 +104,11 @@ impl Experiment {
             share[0].powi(2) * quiet[[i, j]] + all[[i, j]] - quiet[[i, j]]
         });
         let gradients = self.gradients(&self.after);
-        let influence: Vec<_> = self
-            .samples
-            .iter()
-            .map(|p| self.spline.jacobian_influence(p).unwrap())
-            .collect();
+        let mut influence = vec![SVector::zeros(); self.samples.len() * self.before.len()];
+        self.spline
+            .jacobian_influence_into(&mut Workspace::default(), &self.samples, &mut influence)
+            .unwrap();
+        let influence: Vec<_> = influence.chunks(self.before.len()).collect();
         let displacement: Vec<_> = self
             .spread
             .iter()

@@ -236,7 +236,10 @@ fn stages_by_name_are_those_given_as_values() {
     let swapped = pipeline.with_sampler(CurvatureAdaptive::new(4.0).unwrap());
     assert_eq!(
         named,
-        measured(&scene, &swapped.with_warp(AffineModel).with_strain(Hencky))
+        measured(
+            &scene,
+            &swapped.with_warp(AffineModel::General).with_strain(Hencky)
+        )
     );
     let ratio = Scene::parse(
         &format!("{text}\n[stages]\nestimator = \"paper-ratio\""),
