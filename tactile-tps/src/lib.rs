@@ -46,6 +46,8 @@ mod models;
 mod null_space;
 mod options;
 mod packed;
+#[cfg(feature = "rayon")]
+mod parallel;
 mod parts;
 mod precise;
 mod product;

@@ -121,3 +121,27 @@ fn far_values_keep_their_digits() {
         );
     }
 }
+
+#[cfg(feature = "rayon")]
+#[test]
+fn threads_do_not_change_a_bit() {
+    let mut random = Uniform(31);
+    let sources = random.points::<3>(40);
+    let targets: Vec<_> = sources.iter().map(bend).collect();
+    let spline = fit(&sources, &targets, &FitOptions::new(NegR));
+    let queries = random.points::<3>(2000);
+    let (mut serial, mut parallel) = (vec![Point::origin(); 2000], vec![Point::origin(); 2000]);
+    let (mut jacobians, mut others) = (vec![SMatrix::zeros(); 2000], vec![SMatrix::zeros(); 2000]);
+    spline
+        .apply_and_jacobian_into(&queries, &mut serial, &mut jacobians)
+        .expect("equal lengths");
+    spline
+        .par_apply_and_jacobian_into(&queries, &mut parallel, &mut others)
+        .expect("equal lengths");
+    assert_eq!((&serial, jacobians), (&parallel, others));
+    parallel.fill(Point::origin());
+    spline
+        .par_apply_into(&queries, &mut parallel)
+        .expect("equal lengths");
+    assert_eq!(serial, parallel);
+}
