@@ -4,21 +4,19 @@ mod hostile;
 mod on_demand;
 mod own_contact_stage;
 mod repeated;
+mod results;
+mod sources;
 mod strain_of_sizes;
 mod strain_stream;
 mod streams;
 mod time;
 
 use nalgebra::Point3;
-use ndarray::{Array2, ArrayView2};
+use ndarray::ArrayView2;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::io::write_grey_image;
-use tactile_imaging::pipeline::{
-    BallFit, FrameSource, ImageFolder, Object, PipelineError, Press, Report, Session, SkipReason,
-    Skips, Stage, Trial, Update, contacts,
-};
+use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Skips, Stage, Trial};
 use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError, Workspace};
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene,
@@ -281,130 +279,4 @@ fn a_flat_field_makes_the_force_the_same_in_a_corner() {
     // The corner loses a tenth; what is left is noise (0.3 %) and the calibration (0.3 %).
     assert!(error(false) < -0.05, "{}", error(false));
     assert!(error(true).abs() < 0.02, "{}", error(true));
-}
-
-#[test]
-fn frames_of_another_size_are_an_error() {
-    let trial = trial(&[0.7], 1);
-    let pipeline = trial.pipeline().unwrap();
-    let small = Array2::zeros((10, 10));
-    let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
-    press.add_frame(small.view());
-    assert!(matches!(
-        press.contact(0),
-        Err(PipelineError::Contact { frame: 0, .. })
-    ));
-}
-
-#[test]
-fn everything_can_cross_threads() {
-    fn crosses<T: Send + Sync>() {}
-    crosses::<tactile_imaging::Pipeline>();
-    crosses::<Session>();
-    crosses::<PipelineError>();
-    crosses::<tactile_imaging::pipeline::Measurement>();
-    crosses::<Press<'_>>();
-    crosses::<Update>();
-    crosses::<Report>();
-    crosses::<ImageFolder>();
-    crosses::<tactile_imaging::simulate::FrameStream>();
-}
-
-/// The sentence of a result; it must be writable as JSON.
-fn told<T: std::fmt::Display + serde::Serialize>(result: &T) -> String {
-    assert!(!serde_json::to_value(result).unwrap().is_null());
-    result.to_string()
-}
-
-#[test]
-fn every_result_can_be_read_by_people_and_programs() {
-    let trial = trial(&[0.7, 1.2], 6);
-    let pipeline = trial.pipeline().unwrap();
-    let mut session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
-    let empty = trial.scene.reference(3);
-    assert_eq!(
-        told(&session.push(empty.view()).unwrap()),
-        "frame 1: no contact"
-    );
-    assert!(
-        told(&session.drift()).ends_with("1 frame without contact"),
-        "{}",
-        session.drift()
-    );
-    let update = session.push(trial.simulation.frames[0].view()).unwrap();
-    let line = told(&update);
-    assert!(
-        line.starts_with("frame 2: force 0.") && line.contains(" ± "),
-        "{line}"
-    );
-    assert!(told(&update.contact.unwrap()).contains(" mm   centroid ("));
-    let mut press = trial.press(&pipeline).unwrap();
-    let measured = press.measure();
-    assert!(told(&measured).contains("cautions:"));
-    assert!(told(measured.youngs_modulus_pa.as_ref().unwrap()).contains(" kPa"));
-    assert!(told(measured.frames[0].as_ref().unwrap()).contains("contact radius"));
-    assert!(told(measured.matching.as_ref().unwrap()).contains("control points matched"));
-    assert!(told(measured.strain.as_ref().unwrap()).contains("e_zz"));
-    assert!(measured.flags.iter().all(|flag| !told(flag).is_empty()));
-    assert!(told(press.report()).contains("surface"));
-    assert!(
-        press
-            .report()
-            .skips
-            .iter()
-            .all(|skip| told(skip).ends_with("saved)"))
-    );
-    let ball = BallFit {
-        radius_m: 3e-3,
-        centre_m: [1e-3, 2e-3],
-        contact_radius_m: 1.5e-3,
-        mean_absolute_error_m: 28e-6,
-        pixels: 900,
-        iterations: 4,
-    };
-    assert!(
-        told(&ball).starts_with("ball of radius 3.000 mm at (1.000, 2.000) mm"),
-        "{ball}"
-    );
-    let truth = trial.truth();
-    assert!(
-        told(&truth).contains("103.0000 kPa")
-            && told(&truth.frames[1]).starts_with("force 1.2000 N")
-    );
-}
-
-#[test]
-fn a_batch_reads_as_frames_one_by_one() {
-    let trial = trial(&[0.2, 0.7, 1.2], 8);
-    let pipeline = trial.pipeline().unwrap();
-    let views: Vec<_> = trial.simulation.frames.iter().map(|f| f.view()).collect();
-    let batch = contacts(&pipeline, trial.simulation.reference.view(), &views).unwrap();
-    let mut press = trial.press(&pipeline).unwrap();
-    for (i, reading) in batch.iter().enumerate() {
-        assert_eq!(
-            reading.as_ref().unwrap().as_ref(),
-            press.contact(i).unwrap()
-        );
-    }
-}
-
-#[test]
-fn a_folder_of_images_streams_as_the_frames_it_was_written_from() {
-    let trial = trial(&[0.4, 0.9], 12);
-    let folder = tempfile::tempdir().unwrap();
-    for (i, frame) in trial.simulation.frames.iter().enumerate() {
-        write_grey_image(folder.path().join(format!("{i}.png")), frame.view()).unwrap();
-    }
-    std::fs::write(folder.path().join("notes.txt"), "no image").unwrap();
-    let mut source = ImageFolder::open(folder.path(), 80.0).unwrap();
-    let mut frame = Array2::zeros((0, 0));
-    for (i, written) in trial.simulation.frames.iter().enumerate() {
-        assert_eq!(
-            source.next_frame(&mut frame).unwrap(),
-            Some(i as f64 / 80.0)
-        );
-        assert_eq!(frame, written);
-    }
-    assert_eq!(source.next_frame(&mut frame).unwrap(), None);
-    assert!(ImageFolder::open(folder.path().join("none"), 80.0).is_err());
 }

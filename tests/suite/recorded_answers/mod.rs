@@ -3,6 +3,7 @@
 //! A change that is meant to leave every answer as it is shows that here. A change that is meant to move answers records them
 //! anew: `RECORD_ANSWERS=1 cargo test --test suite recorded_answers`, and the difference of the text file says what moved.
 
+mod readings;
 #[path = "../../support/recorded.rs"]
 mod record;
 mod scenes;

@@ -188,15 +188,16 @@ fn a_calibration_that_saturates_is_refused_and_says_what_helps() {
         ..small()
     });
     let scene = scene.unwrap();
-    let mut options = CalibrationOptions::default();
+    let options = CalibrationOptions::default();
     let error = scene.calibrate(&options).unwrap_err();
     assert!(
         matches!(error, SimulateError::CalibrationSaturates { force_n } if force_n < 1.0),
         "{error}"
     );
     assert!(error.to_string().contains("a larger indenter"), "{error}");
-    options.indenter.radius_m = 60e-3;
-    assert!(scene.calibrate(&options).is_ok());
+    let larger = scene.unsaturated(options).unwrap();
+    assert!(larger.indenter.radius_m > options.indenter.radius_m);
+    assert!(scene.calibrate(&larger).is_ok());
 }
 
 #[test]

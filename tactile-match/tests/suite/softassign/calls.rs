@@ -1,0 +1,188 @@
+//! How it is called: odd and wrong input, the callback, reused workspaces, batches.
+use super::{bend, cloud, shuffled};
+use nalgebra::{Point, Point2, Point3};
+use std::ops::ControlFlow;
+use tactile_match::{
+    AnnealedSoftassign, MatchError, PointMatcher, PointSet, Rotation, SoftassignOptions,
+    SoftassignWorkspace, StopReason,
+};
+
+/// An answer for every odd input: as many rows as model points, all of them finite, no target twice.
+fn is_sound<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
+    let matcher =
+        AnnealedSoftassign::new(SoftassignOptions::default().with_rotation(Rotation::Any));
+    let found = matcher.match_points(model, target).unwrap();
+    assert_eq!(found.warped.len(), model.len());
+    assert!(found.warped.iter().all(|p| p.iter().all(|v| v.is_finite())));
+    assert!(found.confidence.iter().all(|c| (0.0..=1.0).contains(c)));
+    assert!(
+        found
+            .displacement_covariance
+            .iter()
+            .all(|c| c.iter().all(|v| v.is_finite()))
+    );
+    let mut rows: Vec<usize> = found.assignment.iter().flatten().copied().collect();
+    let matched = rows.len();
+    rows.sort_unstable();
+    rows.dedup();
+    assert_eq!(rows.len(), matched);
+    assert_eq!(matched + found.unmatched_model.len(), model.len());
+    assert_eq!(matched + found.unmatched_target.len(), target.len());
+}
+
+#[test]
+fn degenerate_sets_have_answers() {
+    let (one, few) = (cloud::<2>(1), cloud::<2>(3));
+    let many = cloud::<2>(40);
+    for (a, b) in [
+        (&one, &one),
+        (&one, &many),
+        (&many, &one),
+        (&few, &many),
+        (&many, &few),
+        (&many, &many),
+    ] {
+        is_sound(a, b);
+    }
+    let same = vec![Point3::new(1.0, 2.0, 3.0); 7];
+    is_sound(&same, &same);
+    is_sound(&same, &cloud::<3>(9));
+    is_sound(&cloud::<3>(9), &same);
+    let line: Vec<Point2<f64>> = (0..20)
+        .map(|i| Point2::new(f64::from(i), 2.0 * f64::from(i)))
+        .collect();
+    is_sound(&line, &line);
+    let grid: Vec<Point2<f64>> = (0..49)
+        .map(|i| Point2::new(f64::from(i % 7), f64::from(i / 7)))
+        .collect();
+    is_sound(&grid, &grid);
+    let found = AnnealedSoftassign::default()
+        .match_points(&grid, &grid)
+        .unwrap();
+    assert!(
+        found
+            .assignment
+            .iter()
+            .enumerate()
+            .all(|(i, a)| *a == Some(i)),
+        "a set is matched to itself"
+    );
+}
+
+#[test]
+fn bad_input_is_a_typed_error() {
+    let good = cloud::<2>(5);
+    let mut bad = good.clone();
+    bad[3].y = f64::NAN;
+    let error = |a: &[Point2<f64>], b: &[Point2<f64>]| {
+        AnnealedSoftassign::default()
+            .match_points(a, b)
+            .err()
+            .unwrap()
+    };
+    assert_eq!(
+        error(&bad, &good),
+        MatchError::NotFinite {
+            set: PointSet::Model,
+            row: 3
+        }
+    );
+    assert_eq!(
+        error(&good, &[]),
+        MatchError::Empty {
+            set: PointSet::Target
+        }
+    );
+    for slack in [f64::NAN, 0.0, 1.0, -1.0] {
+        assert!(
+            SoftassignOptions::default()
+                .with_outlier_ratio(slack)
+                .is_err()
+        );
+    }
+    assert!(SoftassignOptions::default().with_max_iterations(0).is_err());
+}
+
+#[test]
+fn the_callback_hears_every_iteration_and_stops_the_search() {
+    let model = cloud::<2>(52);
+    let (target, _) = shuffled(&model);
+    let mut heard = 0;
+    let mut workspace = SoftassignWorkspace::new();
+    let found = AnnealedSoftassign::default()
+        .match_points_with(&mut workspace, &model, &target, |_, energy| {
+            assert!(energy.is_finite());
+            heard += 1;
+            if heard == 4 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })
+        .unwrap();
+    assert_eq!(
+        (heard, found.report().stop, found.report().iterations),
+        (4, StopReason::Callback, 4)
+    );
+}
+
+#[test]
+fn a_used_workspace_gives_the_same_bits() {
+    let (a, b) = (cloud::<2>(52), cloud::<2>(37));
+    let (target_a, target_b) = (shuffled(&a).0, shuffled(&b).0);
+    let matcher = AnnealedSoftassign::default();
+    let go = |_, _| ControlFlow::Continue(());
+    let mut workspace = SoftassignWorkspace::new();
+    matcher
+        .match_points_with(&mut workspace, &b, &target_b, go)
+        .unwrap();
+    let again = matcher
+        .match_points_with(&mut workspace, &a, &target_a, go)
+        .unwrap();
+    let fresh = matcher.match_points(&a, &target_a).unwrap();
+    assert_eq!(again.warped::<f64>().collect::<Vec<_>>(), fresh.warped);
+    assert_eq!(again.assignment(), fresh.assignment);
+}
+
+/// Clean, noisy and unusable pairs of different sizes: a workspace that has seen one must not colour the next.
+#[test]
+fn a_batch_gives_the_bits_of_single_matches() {
+    let models = [cloud::<2>(31), cloud::<2>(24), Vec::new(), cloud::<2>(37)];
+    let targets: Vec<Vec<Point2<f64>>> = models
+        .iter()
+        .enumerate()
+        .map(|(k, model)| {
+            let noise = if k == 1 { 0.02 } else { 0.0 };
+            model
+                .iter()
+                .enumerate()
+                .map(|(i, p)| bend(p).map(|c| c + noise * (7.3 * i as f64).sin()))
+                .collect()
+        })
+        .collect();
+    let pairs: Vec<_> = models
+        .iter()
+        .zip(&targets)
+        .map(|(m, t)| (&m[..], &t[..]))
+        .collect();
+    let matcher = AnnealedSoftassign::default();
+    let check = |batch: Vec<Result<tactile_match::Matching<f64, 2>, MatchError>>| {
+        assert_eq!(batch.len(), pairs.len());
+        for (found, (model, target)) in batch.into_iter().zip(&pairs) {
+            match (found, matcher.match_points(model, target)) {
+                (Ok(found), Ok(single)) => {
+                    assert_eq!(found.warped, single.warped);
+                    assert_eq!(
+                        (found.assignment, found.confidence),
+                        (single.assignment, single.confidence)
+                    );
+                    assert_eq!((found.energy, found.report), (single.energy, single.report));
+                }
+                (found, single) => assert!(found.is_err() && single.is_err() && model.is_empty()),
+            }
+        }
+    };
+    check(matcher.match_all(&pairs));
+    #[cfg(feature = "rayon")]
+    check(matcher.match_all_in_parallel(&pairs));
+}
