@@ -87,8 +87,10 @@ fn moduli(c: &mut Criterion) {
         .map(|k| {
             let f = 1e-3 * f64::from(k);
             let a = (0.75 * f * 4e-3 / 80e3).cbrt();
-            LoadState::new(Estimate::new(f, 1e-2 * f))
-                .with_contact_radius(Estimate::new(a, 1e-3 * a))
+            LoadState {
+                contact_radius_m: Some(Estimate::new(a, 1e-3 * a)),
+                ..LoadState::new(Estimate::new(f, 1e-2 * f))
+            }
         })
         .collect();
     let shared = SharedErrors {

@@ -69,12 +69,7 @@ fn ball_on_guide(is_test: bool) {
         let radii: Vec<f64> = (solution.states.iter())
             .map(|s| s.contact_radius().expect("a contact").radius_m)
             .collect();
-        (
-            radii,
-            seconds,
-            scene.model().element_count(),
-            solution.report,
-        )
+        (radii, seconds, scene.element_count(), solution.report)
     };
     let (fine, ..) = solve(finest);
     for fineness in [3, 4, 5, 7] {
@@ -199,8 +194,10 @@ fn table(is_test: bool) {
     );
     let load = |a: f64| {
         let force = table.force_n(a, 103e3).expect("a force");
-        LoadState::new(Estimate::new(force, 2e-3 * force))
-            .with_contact_radius(Estimate::new(a, 2e-6))
+        LoadState {
+            contact_radius_m: Some(Estimate::new(a, 2e-6)),
+            ..LoadState::new(Estimate::new(force, 2e-3 * force))
+        }
     };
     let loads = LoadSeries::new([load(0.6e-3), load(1.1e-3)]);
     let estimator =

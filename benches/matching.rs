@@ -102,14 +102,14 @@ fn fast<const D: usize>(
                 .unwrap()
         });
     });
-    let mut workspace = SoftassignWorkspace::new();
+    let mut workspace = SoftassignWorkspace::default();
     group.bench_function(BenchmarkId::new("softassign_with", name), |b| {
         b.iter(|| {
             let go = |_, _| ControlFlow::Continue(());
             let found = matcher
                 .match_points_with(&mut workspace, black_box(&scene.model), &scene.target, go)
                 .unwrap();
-            black_box(found.assignment().len())
+            black_box(found.assignment.len())
         });
     });
     group.finish();

@@ -111,8 +111,13 @@ fn standard_case(criterion: &mut Criterion) {
     let quick: [Row<'_>; 4] = [
         ("cpd", Box::new(drift(None)), 0.99, 0.5),
         ("cpd_rank_30", Box::new(drift(Some(30))), 0.99, 0.5),
-        ("assignment", Box::new(LinearAssignment::new()), 0.5, 6.0),
-        ("nearest", Box::new(NearestNeighbour::new()), 0.2, 1e3),
+        (
+            "assignment",
+            Box::new(LinearAssignment::default()),
+            0.5,
+            6.0,
+        ),
+        ("nearest", Box::new(NearestNeighbour::default()), 0.2, 1e3),
     ];
     for (name, matcher, share, bound) in quick {
         check(name, &*matcher, &scene, share, bound);

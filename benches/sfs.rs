@@ -133,7 +133,7 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
     let lighting = Lighting::new(light).unwrap();
     let image = Array2::from_shape_fn(case.z.dim(), |at| lighting.shade(case.p[at], case.q[at]));
     let known = knowledge(case, light);
-    let masked = Domain::pixels().with_mask(case.mask.view());
+    let masked = Domain::default().with_mask(case.mask.view());
     let informed = masked.with_known_heights(known.view());
     let eikonal = Eikonal::new(lighting);
     let rim = eikonal
@@ -160,7 +160,7 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
             Alignment::Offset,
         ),
     ];
-    if lighting.is_frontal() {
+    if lighting.direction() == [0.0, 0.0, 1.0] {
         methods.push(("eikonal-rim", Box::new(rim), &masked, Alignment::None));
     } else {
         methods.push((
@@ -206,7 +206,7 @@ fn survey_error(case: &Case, id: &str, surface: &Surface<f64>, alignment: Alignm
 }
 
 fn check_survey(case: &Case, method: &str, lighting: &Lighting<f64>, error: f64) {
-    match (lighting.is_frontal(), case.name, method) {
+    match (lighting.direction() == [0.0, 0.0, 1.0], case.name, method) {
         (true, "vase", "eikonal-rim") => assert!(error < 0.6),
         (true, "mozart", "eikonal-known") => assert!(error < 1.15),
         _ => {}
@@ -233,11 +233,11 @@ fn contact_share(criterion: &mut Criterion) {
             let (p, q) = (-2.0 * height * x * fy / a, -2.0 * height * y * fx / b);
             (255.0 / (1.0 + p * p + q * q).sqrt()) as u8
         });
-        let lighting = Lighting::frontal().with_normal_intensity(255.0).unwrap();
+        let lighting = Lighting::default().with_normal_intensity(255.0).unwrap();
         // The peak is known, for where the frame is full no rim is in sight.
         let mut known = Array2::from_elem((rows, columns), f64::NAN);
         known[[520, 695]] = height;
-        let domain = Domain::pixels()
+        let domain = Domain::default()
             .with_mask(mask.view())
             .with_known_heights(known.view());
         let method = Eikonal::new(lighting).with_branch(Branch::Concave);
@@ -264,7 +264,7 @@ fn points(criterion: &mut Criterion) {
     });
     let samplers: [(&str, Box<dyn ControlPointSampler<f64>>); 3] = [
         ("equal", Box::new(EquallySpaced)),
-        ("random", Box::new(Random::new(1))),
+        ("random", Box::new(Random { seed: 1 })),
         ("adaptive", Box::new(CurvatureAdaptive::new(2.0).unwrap())),
     ];
     for (name, sampler) in samplers {
@@ -356,7 +356,7 @@ fn integrate_as<T: Scalar>(criterion: &mut Criterion, scalar: &str, rows: usize,
     ];
     for (name, method, bound) in methods {
         let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
-        let domain = Domain::pixels();
+        let domain = Domain::default();
         method
             .integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)
             .unwrap();

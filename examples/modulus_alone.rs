@@ -13,9 +13,9 @@ fn main() -> Result<(), ElasticityError> {
         poisson_ratio: 0.5,
     }])?;
     let measured = [(1e-3, 0.395e-3), (2e-3, 0.497e-3), (4e-3, 0.627e-3)];
-    let loads = measured.map(|(force_n, radius_m)| {
-        LoadState::new(Estimate::new(force_n, 1e-5))
-            .with_contact_radius(Estimate::new(radius_m, 1e-6))
+    let loads = measured.map(|(force_n, radius_m)| LoadState {
+        contact_radius_m: Some(Estimate::new(radius_m, 1e-6)),
+        ..LoadState::new(Estimate::new(force_n, 1e-5))
     });
     // One calibration, known to 0.2 %, is behind all three forces.
     let shared = SharedErrors {

@@ -13,14 +13,14 @@ fn main() -> Result<(), SfsError> {
     });
     let image = truth.mapv(|z| z / 20.0);
     let mask = truth.mapv(|z| z > 0.0);
-    let domain = Domain::pixels().with_mask(mask.view());
-    let light = Lighting::frontal();
+    let domain = Domain::default().with_mask(mask.view());
+    let light = Lighting::default();
     let eikonal = Eikonal::new(light).with_boundary(BoundaryCondition::Height(0.0))?;
     let brooks_horn = BrooksHorn::new(light).with_occluding_boundary(true);
     let methods: [(&str, &dyn SurfaceReconstruction<f64>); 2] =
         [("eikonal", &eikonal), ("Brooks–Horn", &brooks_horn)];
     for (name, method) in methods {
-        let surface = method.reconstruct(image.view(), &domain)?;
+        let surface = method.reconstruct(image.view().into(), &domain)?;
         let top = surface.heights.iter().copied().fold(f64::MIN, f64::max);
         println!("{name}: highest point {top:.2} px, 20 px in truth");
     }

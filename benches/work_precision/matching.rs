@@ -169,7 +169,7 @@ fn others(study: &mut Study, scenes: &[Scene]) {
         "baselines",
         "nearest neighbour",
         false,
-        &NearestNeighbour::new(),
+        &NearestNeighbour::default(),
     );
     run(
         study,
@@ -177,7 +177,7 @@ fn others(study: &mut Study, scenes: &[Scene]) {
         "baselines",
         "linear assignment",
         false,
-        &LinearAssignment::new(),
+        &LinearAssignment::default(),
     );
     for tolerance in [1e-2, 1e-5, 1e-8] {
         let options = DriftOptions::default().with_tolerance(tolerance);

@@ -32,7 +32,7 @@ fn mean_error(
 /// A paraboloid of height 0.4 on a disc of radius 0.8, under frontal light.
 pub(crate) fn surfaces(study: &mut Study) {
     study.error_label = "mean error over the height";
-    let light = Lighting::frontal();
+    let light = Lighting::default();
     let eikonal = Eikonal::new(light)
         .with_boundary(BoundaryCondition::Height(0.0))
         .expect("valid");
@@ -46,16 +46,6 @@ pub(crate) fn surfaces(study: &mut Study) {
             false,
             n,
             &eikonal.with_tolerance(tolerance).expect("valid"),
-        );
-    }
-    for sweeps in [4, 16] {
-        surface(
-            study,
-            "sweeps",
-            &sweeps.to_string(),
-            false,
-            n,
-            &eikonal.with_max_sweeps(sweeps).expect("valid"),
         );
     }
     for n in study.choose(vec![48, 192], vec![24, 48, 192, 384]) {
@@ -112,7 +102,7 @@ fn surface(
         .with_mask(mask.view());
     let job = || {
         method
-            .reconstruct(image.view(), &domain)
+            .reconstruct(image.view().into(), &domain)
             .expect("a surface")
             .heights
     };

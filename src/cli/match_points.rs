@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tactile_imaging::io::{CasePoints, MatchCase, read_cases, write_case_result};
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching,
-    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, SoftassignOptions,
-    SparseRelaxationLabelling, StopReason,
+    AnnealedSoftassign, CoherentPointDrift, LabellingOptions, LinearAssignment, MatchError,
+    Matching, NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation,
+    SoftassignOptions, StopReason,
 };
 
 /// Match the points of two sets, in the plane or in space
@@ -122,7 +122,10 @@ impl Method {
         match self {
             Self::Softassign => Box::new(expectations.matcher()),
             Self::Labelling => Box::new(RelaxationLabelling::default()),
-            Self::SparseLabelling => Box::new(SparseRelaxationLabelling::default()),
+            Self::SparseLabelling => {
+                let options = LabellingOptions::default().with_candidates(10);
+                Box::new(RelaxationLabelling::new(options.expect("some candidates")))
+            }
             Self::Drift => Box::new(CoherentPointDrift::default()),
             Self::Nearest => Box::new(NearestNeighbour::default()),
             Self::Assignment => Box::new(LinearAssignment::default()),

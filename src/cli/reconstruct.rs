@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     if let (None, Some(known)) = (&mask, &known) {
         mask = Some(not_outside(known));
     }
-    let from_rim = mask.is_some() && lighting.is_frontal();
+    let from_rim = mask.is_some() && lighting.direction() == [0.0, 0.0, 1.0];
     let method = arguments.method.unwrap_or(
         if known.is_some() || from_rim || arguments.boundary.is_some() {
             Method::Eikonal
@@ -130,7 +130,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
         }
     }
     images::allow(context, image.dim(), "reconstructing")?;
-    let mut domain = Domain::pixels();
+    let mut domain = Domain::default();
     if let Some(mask) = &mask {
         domain = domain.with_mask(mask.view());
     }
@@ -168,7 +168,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
         "method": method.name(), "time_ms": ms, "stop": stop, "iterations": report.iterations,
         "solved": report.solved, "flagged": report.flagged,
         "reprojection": match &fit {
-            Ok(fit) => json!({ "value": { "rms_grey_levels": fit.error.rms } }),
+            Ok(fit) => json!({ "value": { "rms_grey_levels": fit.1.rms } }),
             Err(error) => json!({ "error": error.to_string() }),
         },
     }));
@@ -185,7 +185,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     console.line(match &fit {
         Ok(fit) => format!(
             "reprojection  {} grey levels rms between the image and the heights shaded again",
-            four_digits(fit.error.rms)
+            four_digits(fit.1.rms)
         ),
         Err(error) => format!("reprojection  none: {error}"),
     });
@@ -261,7 +261,7 @@ fn reconstruction(
         Method::TsaiShah => Box::new(TsaiShah::new(lighting)),
         Method::Pentland => Box::new(Pentland::new(lighting)),
         Method::BrooksHorn => {
-            let occluding = masked && lighting.is_frontal();
+            let occluding = masked && lighting.direction() == [0.0, 0.0, 1.0];
             Box::new(BrooksHorn::new(lighting).with_occluding_boundary(occluding))
         }
     })

@@ -134,7 +134,7 @@ mod tests {
         let mask = heights.mapv(|h| h > 0.0);
         let table = DepthTable::new(&[(0.0, 0.0), (1.0, 1.0)]).unwrap();
         let domain = Domain::new(size).unwrap().with_mask(mask.view());
-        let surface = table.reconstruct(heights.view(), &domain).unwrap();
+        let surface = table.reconstruct(heights.view().into(), &domain).unwrap();
         let region = BoundingBox {
             row_start: 4,
             row_end: 134,

@@ -14,7 +14,7 @@ use crate::matching::StopReason;
 /// use tactile_imaging::elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 /// use tactile_imaging::pipeline::ModulusResult;
 /// // A ball of 3 mm radius under 10 mN, in contact up to 0.5 mm: E = (1 − ν²) 3FR/(4a³) = 135 kPa.
-/// let load = LoadState::new(Estimate::new(10e-3, 0.1e-3)).with_contact_radius(Estimate::new(0.5e-3, 1e-6));
+/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)), ..LoadState::new(Estimate::new(10e-3, 0.1e-3)) };
 /// let modulus = ModulusResult::from(&HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?);
 /// assert!((modulus.value - 135e3).abs() < 1.0);
 /// assert!(modulus.interval_95.0 < modulus.value && modulus.warnings.is_empty());

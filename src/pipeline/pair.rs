@@ -23,7 +23,7 @@ pub(crate) const LEAST_MATCHES: usize = 8;
 /// let pipeline = trial.pipeline()?.with_control_points(60);
 /// let mut press = trial.press(&pipeline)?;
 /// let strain: &PairStrain = press.strain(1)?;
-/// assert_eq!(strain.field.strains().len(), 60, "one at every control point of the first frame");
+/// assert_eq!(strain.field.strains.len(), 60, "one at every control point of the first frame");
 /// let found = strain.summary.mean[(0, 0)];
 /// assert!((found - trial.truth().strain.expect("two frames")[0][0]).abs() < 0.03);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -70,16 +70,12 @@ pub(super) fn of_faces(
     let measure = pipeline.strain();
     let series = LoadSeries::new(loads);
     let uniaxial = UniaxialLoads::new(&series, poisson_ratio, measure).map_err(failed)?;
-    let [first, last] = [0, 1].map(|k| uniaxial.stretches()[k]);
+    let [first, last] = [0, 1].map(|k| uniaxial.stretches[k]);
     let [lateral, axial] = [0, 1].map(|k| last[k] / first[k] - 1.0);
     let gradient = Matrix3::from_diagonal(&[lateral, lateral, axial].into());
     let field = StrainField::from_gradients(&[gradient], None, measure).map_err(failed)?;
     let mut summary = field.summary();
-    let strains = uniaxial
-        .series()
-        .loads()
-        .iter()
-        .map(|load| load.mean_strain);
+    let strains = uniaxial.series.loads().iter().map(|load| load.mean_strain);
     let error = strains
         .flatten()
         .fold(0.0, |sum: f64, strain| sum.hypot(strain.standard_error));

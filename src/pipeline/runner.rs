@@ -144,7 +144,7 @@ impl StageRunner {
 
     /// What the last measured frame shows of the sensor outside the contact; `None` where the contact stage does not look there.
     pub(super) fn condition(&mut self) -> Option<FrameCondition> {
-        self.force.condition(&self.reference)
+        self.force.detector.condition(&self.reference)
     }
 
     /// Reconstructs the surface of a contact. All surfaces that are compared have one grid, so that what the grid does to them leaves no
@@ -308,7 +308,7 @@ impl StageRunner {
         let series = self.load_series(readings)?;
         let measure = self.pipeline.strain();
         let uniaxial = UniaxialLoads::new(&series, poisson_ratio, measure);
-        Ok(uniaxial.map_err(PipelineError::Modulus)?.series().clone())
+        Ok(uniaxial.map_err(PipelineError::Modulus)?.series)
     }
 
     /// What estimators take: the loads, and the errors that all share.

@@ -293,7 +293,7 @@ fn strain_page(press: &mut Press<'_>, last: usize) -> Result<Page, PlotError> {
     let strain = press.strain(last)?;
     let mut page = Page::new(format!("{} strain", strain.measure)).columns(3);
     for (k, name) in ["e_xx", "e_yy", "e_zz"].into_iter().enumerate() {
-        let values = strain.field.strains().iter().map(|e| e[(k, k)]);
+        let values = strain.field.strains.iter().map(|e| e[(k, k)]);
         let title = format!("{name}: mean {:+.4}", strain.summary.mean[(k, k)]);
         let points = model.iter().map(|p| [p.x * MM, p.y * MM]);
         page = page.panel(

@@ -238,7 +238,7 @@ impl SensorCalibration {
             .with_force_error(CURVE_ERROR, of_range)
             .and_then(|options| PressureCurve::fit(&frames, &options))
             .map_err(SensorError::Curve)?;
-        let report = curve.fit_report();
+        let report = &curve.report;
         if report.residual_sd > LARGEST_SCATTER {
             let size = |k: usize| report.residuals_n[k].abs();
             let worst = (0..seen.len()).max_by(|a, b| size(*a).total_cmp(&size(*b)));

@@ -1,21 +1,10 @@
 //! The errors of this crate, with the numbers that explain them.
 
-use std::fmt;
-
 use thiserror::Error;
 
 /// The rule that an option's value has to satisfy.
-///
-/// ```
-/// use tactile_force::{ForceError, HertzFitOptions, Requirement};
-///
-/// let error = HertzFitOptions::default().with_blur_px(f64::NAN).unwrap_err();
-/// assert!(matches!(error, ForceError::InvalidOption { name: "blur_px", expected: Requirement::NonNegative, .. }));
-/// assert_eq!(error.to_string(), "`blur_px` is NaN, expected a finite number that is not negative");
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Requirement {
+pub(crate) enum Requirement {
     /// Finite and greater than zero.
     Positive,
     /// Finite and not negative.
@@ -127,7 +116,7 @@ pub enum ForceError {
         /// The value given.
         found: f64,
         /// The rule it breaks.
-        expected: Requirement,
+        expected: &'static str,
     },
     /// A pixel of a floating-point image is NaN or infinite.
     #[error("pixel (row {row}, column {column}) is not finite")]
@@ -139,9 +128,9 @@ pub enum ForceError {
     },
 }
 
-impl fmt::Display for Requirement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl Requirement {
+    fn text(self) -> &'static str {
+        match self {
             Self::Positive => "a finite number above zero",
             Self::NonNegative => "a finite number that is not negative",
             Self::OpenUnitInterval => "a number above zero and below one",
@@ -149,11 +138,9 @@ impl fmt::Display for Requirement {
             Self::Finite => "a finite number",
             Self::Odd => "an odd whole number",
             Self::AtLeastOne => "a whole number of at least one",
-        })
+        }
     }
-}
 
-impl Requirement {
     /// The value, if it satisfies the rule.
     pub(crate) fn check(self, name: &'static str, value: f64) -> Result<f64, ForceError> {
         let holds = match self {
@@ -171,7 +158,7 @@ impl Requirement {
             Err(ForceError::InvalidOption {
                 name,
                 found: value,
-                expected: self,
+                expected: self.text(),
             })
         }
     }

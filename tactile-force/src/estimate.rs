@@ -9,25 +9,40 @@ use num_traits::{Float, FromPrimitive};
 /// Sums over 8-bit frames are exact integers and fits run in `f64`, so `f32` results are `f64` results rounded once.
 ///
 /// ```
-/// use tactile_force::Real;
+/// use tactile_force::{Estimate, Real};
 ///
-/// assert_eq!(f32::nearest(0.1), 0.1_f32);
-/// assert_eq!(0.5_f32.as_f64(), 0.5);
+/// /// Half the width of a 95 % interval of a normal error.
+/// fn half_width<T: Real>(estimate: Estimate<T>) -> T {
+///     estimate.standard_error * T::from(1.96).unwrap_or_else(T::nan)
+/// }
+/// assert_eq!(half_width(Estimate { value: 1.2, standard_error: 0.5 }), 0.98);
 /// ```
-pub trait Real: Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static {
-    /// The nearest value to an `f64`.
-    fn nearest(value: f64) -> Self {
-        Self::from_f64(value).unwrap_or_else(Self::nan)
-    }
-
-    /// The value as an `f64`.
-    fn as_f64(self) -> f64 {
-        self.to_f64().unwrap_or(f64::NAN)
-    }
+pub trait Real:
+    Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static + convert::Convert
+{
 }
 
 impl<T> Real for T where T: Float + FromPrimitive + Debug + Display + Default + Send + Sync + 'static
 {}
+
+mod convert {
+    use num_traits::{Float, FromPrimitive};
+
+    /// Conversions from and to `f64`, in which all fits run.
+    pub trait Convert: Float + FromPrimitive {
+        /// The nearest value to an `f64`.
+        fn nearest(value: f64) -> Self {
+            Self::from_f64(value).unwrap_or_else(Self::nan)
+        }
+
+        /// The value as an `f64`.
+        fn as_f64(self) -> f64 {
+            self.to_f64().unwrap_or(f64::NAN)
+        }
+    }
+
+    impl<T: Float + FromPrimitive> Convert for T {}
+}
 
 /// A value and its standard error (one standard deviation), both in the unit the field's name states.
 ///

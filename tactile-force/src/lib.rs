@@ -30,6 +30,7 @@
 //! - Noise of a difference: $\sigma^2 = \sigma_0^2 + g d$; of the force: $\sigma_F^2 = (dF/dV)^2 \sigma_V^2 + \sigma_{cal}^2$.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "rayon")]
 mod batch;
 mod calibration;
 mod contact;
@@ -55,7 +56,7 @@ pub use contact::{
     Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
 };
 pub use drift::{DriftCorrection, DriftOutcome, IlluminationDrift};
-pub use error::{ForceError, Requirement};
+pub use error::ForceError;
 pub use estimate::{Estimate, Real};
 pub use frame::{
     BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame,

@@ -71,7 +71,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (0..clutter).map(|_| Point3::from(Vector3::from_fn(|_, _| 2.4 * stream.next() - 1.2))),
     );
 
-    let mut workspace = SoftassignWorkspace::new();
+    let mut workspace = SoftassignWorkspace::default();
     let start = Instant::now();
     let found = AnnealedSoftassign::default().match_points_with(
         &mut workspace,
@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let searched = start.elapsed();
     let is_right = |(i, j): (usize, &Option<usize>)| j.and_then(|j| order.get(j)) == Some(&i);
     let right = found
-        .assignment()
+        .assignment
         .iter()
         .enumerate()
         .filter(|&pair| is_right(pair))
@@ -93,7 +93,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .zip(&truth)
         .filter(|(w, t)| (w - *t).norm() < width)
         .count();
-    let report = found.report();
+    let report = &found.report;
     let share = |count: usize| 100.0 * count as f64 / n as f64;
     println!("{n} points, noise {noise}, {clutter} outliers");
     println!(

@@ -118,7 +118,7 @@ fn solve<const D: usize>(case: &Case, results: &mut String) -> Result<Score, Mat
         points(&case.truth),
     );
     let matcher = AnnealedSoftassign::default();
-    let mut workspace = SoftassignWorkspace::new();
+    let mut workspace = SoftassignWorkspace::default();
     let mut least = Duration::MAX;
     for _ in 0..5 {
         let start = Instant::now();
@@ -135,7 +135,7 @@ fn solve<const D: usize>(case: &Case, results: &mut String) -> Result<Score, Mat
     // Writing to a string cannot fail.
     let _ = writeln!(results, "case {} {milliseconds:.6}", case.name);
     let (mut error, mut right, mut paired) = (0.0, 0.0, 0.0);
-    for (i, (place, assigned)) in warped.iter().zip(found.assignment()).enumerate() {
+    for (i, (place, assigned)) in warped.iter().zip(found.assignment).enumerate() {
         let coordinates: Vec<String> = place.iter().map(|c| format!("{c:?}")).collect();
         let row = assigned.map_or(-1, |j| i64::try_from(j).unwrap_or(-1));
         let _ = writeln!(results, "w {}\na {row}", coordinates.join(" "));
@@ -149,6 +149,6 @@ fn solve<const D: usize>(case: &Case, results: &mut String) -> Result<Score, Mat
         error: error / paired,
         right: right / paired,
         milliseconds,
-        starts: found.report().starts,
+        starts: found.report.starts,
     })
 }

@@ -16,7 +16,7 @@ use tactile_tps::Scalar;
 /// use tactile_match::{LinearAssignment, PointMatcher};
 /// let model = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.5], [3.0, 0.0]].map(Point2::from);
 /// let target = model.map(|p| p + Vector2::new(1.4, 0.0)); // more than the distance between points
-/// let matching = LinearAssignment::new().match_points(&model, &target)?;
+/// let matching = LinearAssignment::default().match_points(&model, &target)?;
 /// assert_eq!(matching.assignment, [Some(0), Some(1), Some(2), Some(3)]);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
@@ -26,12 +26,6 @@ pub struct LinearAssignment {
 }
 
 impl LinearAssignment {
-    /// Without a limit to the distance: `min(I, J)` pairs.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// No pair further apart than `max_distance`, in the units of the points; leaving two points without partner costs as
     /// much as a pair at that distance.
     ///
@@ -40,7 +34,7 @@ impl LinearAssignment {
     /// use tactile_match::{LinearAssignment, PointMatcher};
     /// let model = [[0.0, 0.0], [1.0, 0.0]].map(Point2::from);
     /// let target = [[0.1, 0.0], [9.0, 0.0]].map(Point2::from);
-    /// assert_eq!(LinearAssignment::new().match_points(&model, &target)?.assignment, [Some(0), Some(1)]);
+    /// assert_eq!(LinearAssignment::default().match_points(&model, &target)?.assignment, [Some(0), Some(1)]);
     /// assert_eq!(LinearAssignment::within(2.0)?.match_points(&model, &target)?.assignment, [Some(0), None]);
     /// # Ok::<(), tactile_match::MatchError>(())
     /// ```

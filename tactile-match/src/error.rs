@@ -2,41 +2,14 @@
 
 use thiserror::Error;
 
-/// One of the two point sets of a match.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::{MatchError, NearestNeighbour, PointMatcher, PointSet};
-/// let points = [Point2::new(0.0, f64::NAN)];
-/// let error = NearestNeighbour::new().match_points(&[Point2::origin()], &points).err();
-/// assert_eq!(error, Some(MatchError::NotFinite { set: PointSet::Target, row: 0 }));
-/// assert_eq!(PointSet::Target.to_string(), "target");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PointSet {
-    /// The set that is warped.
-    Model,
-    /// The set it is warped onto.
-    Target,
-}
-
-impl std::fmt::Display for PointSet {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Model => "model",
-            Self::Target => "target",
-        })
-    }
-}
-
 /// Why a match could not be attempted. Not converging is no error: see [`StopReason`](crate::StopReason).
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{MatchError, NearestNeighbour, PointMatcher, PointSet, linear_assignment};
+/// use tactile_match::{MatchError, NearestNeighbour, PointMatcher, linear_assignment};
 /// let points = [Point2::new(1.0, 2.0)];
-/// let empty = NearestNeighbour::new().match_points(&[], &points).err();
-/// assert_eq!(empty, Some(MatchError::Empty { set: PointSet::Model }));
+/// let empty = NearestNeighbour::default().match_points(&[], &points).err();
+/// assert_eq!(empty, Some(MatchError::Empty { set: "model" }));
 /// let error = linear_assignment(&[1.0, 2.0, 3.0], 2, 2).unwrap_err();
 /// assert_eq!(error, MatchError::Shape { what: "costs", expected: 4, found: 3 });
 /// let error = NearestNeighbour::within(-1.0).unwrap_err();
@@ -48,16 +21,16 @@ pub enum MatchError {
     /// A point set has no points.
     #[error("the {set} has no points")]
     Empty {
-        /// The empty set.
-        set: PointSet,
+        /// The empty set, "model" or "target".
+        set: &'static str,
     },
     /// A coordinate is NaN, infinite or so large that its square is (beyond 10¹⁵³ in double, 10¹⁸ in single precision).
     #[error(
         "point {row} of the {set} has a coordinate that is not finite or too large to be squared"
     )]
     NotFinite {
-        /// The set the point belongs to.
-        set: PointSet,
+        /// The set the point belongs to, "model" or "target".
+        set: &'static str,
         /// Its row.
         row: usize,
     },

@@ -88,7 +88,8 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
         .collect();
     let total: f64 = pairs.iter().map(|&(i, j)| distances.squared[(i, j)]).sum();
     let variance = total / (pairs.len().max(1) * D) as f64;
-    let (mut soft, mut confidence, mut covariance) = (SoftMatches::new(), Vec::new(), Vec::new());
+    let (mut soft, mut confidence, mut covariance) =
+        (SoftMatches::default(), Vec::new(), Vec::new());
     for (i, partner) in assignment.iter().enumerate() {
         let p = distances.posterior(i, variance);
         confidence.push(partner.map_or_else(T::zero, |j| nalgebra::convert(p[j])));

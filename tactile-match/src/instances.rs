@@ -5,7 +5,7 @@
 
 use crate::{
     AnnealedSoftassign, CoherentPointDrift, MatchError, Matching, PointMatcher,
-    RelaxationLabelling, SparseRelaxationLabelling, WarmStart,
+    RelaxationLabelling, WarmStart,
 };
 use nalgebra::Point;
 
@@ -31,8 +31,3 @@ static SOFTASSIGN: (Both<AnnealedSoftassign, 2>, Both<AnnealedSoftassign, 3>) = 
 static DRIFT: (Both<CoherentPointDrift, 2>, Both<CoherentPointDrift, 3>) = (both(), both());
 #[used]
 static LABELLING: (Both<RelaxationLabelling, 2>, Both<RelaxationLabelling, 3>) = (both(), both());
-#[used]
-static SPARSE_LABELLING: (
-    Both<SparseRelaxationLabelling, 2>,
-    Both<SparseRelaxationLabelling, 3>,
-) = (both(), both());

@@ -16,7 +16,7 @@ use tactile_tps::{Scalar, Warp};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
 /// let target = model.map(|p| Point2::new(p.x + 0.05 * p.y, p.y));
 /// let matchers: [Box<dyn PointMatcher<f64, 2>>; 3] = [
-///     Box::new(NearestNeighbour::new()),
+///     Box::new(NearestNeighbour::default()),
 ///     Box::new(CoherentPointDrift::default()),
 ///     Box::new(AnnealedSoftassign::default()),
 /// ];
@@ -44,7 +44,7 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
     /// use nalgebra::Point2;
     /// use tactile_match::{LinearAssignment, PointMatcher, WarmStart};
     /// let model = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]].map(Point2::from);
-    /// let (matcher, mut warm) = (LinearAssignment::new(), WarmStart::new());
+    /// let (matcher, mut warm) = (LinearAssignment::default(), WarmStart::default());
     /// for step in [0.1, 0.2] {
     ///     let target = model.map(|p| Point2::new(p.x + step, p.y));
     ///     assert_eq!(matcher.match_next(&mut warm, &model, &target)?.assignment[2], Some(2));
@@ -102,11 +102,11 @@ matcher_behind!(Arc);
 /// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace, StopReason};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
 /// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
-/// let (matcher, mut workspace) = (AnnealedSoftassign::default(), SoftassignWorkspace::new());
+/// let (matcher, mut workspace) = (AnnealedSoftassign::default(), SoftassignWorkspace::default());
 /// let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
-/// assert_eq!(found.report().stop, StopReason::Exact); // no noise: every pair fits to rounding
+/// assert_eq!(found.report.stop, StopReason::Exact); // no noise: every pair fits to rounding
 /// let cut = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Break(()))?;
-/// assert_eq!(cut.report().stop, StopReason::Callback);
+/// assert_eq!(cut.report.stop, StopReason::Callback);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -25,22 +25,6 @@ pub struct NearestNeighbour {
 }
 
 impl NearestNeighbour {
-    /// Without a limit to the distance.
-    ///
-    /// ```
-    /// use nalgebra::Point3;
-    /// use tactile_match::{NearestNeighbour, PointMatcher};
-    /// let model = [[0.0, 0.0, 0.0], [2e-3, 0.0, 0.0]].map(Point3::from); // metres
-    /// let target = [[2.1e-3, 0.0, 0.0], [0.0, 1e-4, 0.0]].map(Point3::from);
-    /// let matching = NearestNeighbour::new().match_points(&model, &target)?;
-    /// assert_eq!(matching.assignment, [Some(1), Some(0)]);
-    /// # Ok::<(), tactile_match::MatchError>(())
-    /// ```
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// No pair further apart than `max_distance`, in the units of the points.
     ///
     /// # Errors

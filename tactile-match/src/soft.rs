@@ -5,13 +5,10 @@
 ///
 /// ```
 /// use tactile_match::SoftMatches;
-/// let mut soft = SoftMatches::new();
-/// soft.push_row([(3, 0.5), (1, 0.25)]); // model point 0: target 3 or 1, or with probability 0.25 none
-/// soft.push_row([]);
-/// assert_eq!((soft.rows(), soft.entries()), (2, 2));
+/// // Model point 0: target 3 or 1, or with probability 0.25 none; model point 1: none.
+/// let soft: SoftMatches<f64> = [vec![(3, 0.5), (1, 0.25)], vec![]].into_iter().collect();
+/// assert_eq!(soft.rows(), 2);
 /// assert_eq!(1.0 - soft.row(0).map(|(_, p)| p).sum::<f64>(), 0.25);
-/// soft.clear();
-/// assert_eq!(soft.rows(), 0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -31,22 +28,18 @@ impl<T> Default for SoftMatches<T> {
     }
 }
 
+impl<T: Copy, R: IntoIterator<Item = (usize, T)>> FromIterator<R> for SoftMatches<T> {
+    /// The matrix of these rows, each the target points of one model point with their weights.
+    fn from_iter<I: IntoIterator<Item = R>>(rows: I) -> Self {
+        let mut soft = Self::default();
+        rows.into_iter().for_each(|row| soft.push_row(row));
+        soft
+    }
+}
+
 impl<T: Copy> SoftMatches<T> {
-    /// A matrix without rows.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Forgets all rows; keeps the memory.
-    pub fn clear(&mut self) {
-        self.starts.truncate(1);
-        self.columns.clear();
-        self.weights.clear();
-    }
-
     /// Appends the row of the next model point.
-    pub fn push_row(&mut self, row: impl IntoIterator<Item = (usize, T)>) {
+    pub(crate) fn push_row(&mut self, row: impl IntoIterator<Item = (usize, T)>) {
         for (column, weight) in row {
             self.columns.push(column);
             self.weights.push(weight);
@@ -58,12 +51,6 @@ impl<T: Copy> SoftMatches<T> {
     #[must_use]
     pub fn rows(&self) -> usize {
         self.starts.len() - 1
-    }
-
-    /// Number of stored entries.
-    #[must_use]
-    pub fn entries(&self) -> usize {
-        self.columns.len()
     }
 
     /// The target rows and weights of model point `row`; nothing for a row that does not exist.
@@ -85,16 +72,12 @@ mod tests {
 
     #[test]
     fn rows_come_back_as_pushed() {
-        let mut soft = SoftMatches::new();
-        soft.push_row([(3, 0.5), (1, 0.25)]);
-        soft.push_row([]);
-        soft.push_row([(0, 1.0)]);
-        assert_eq!((soft.rows(), soft.entries()), (3, 3));
+        let rows = [vec![(3, 0.5), (1, 0.25)], vec![], vec![(0, 1.0)]];
+        let soft: SoftMatches<f64> = rows.into_iter().collect();
+        assert_eq!(soft.rows(), 3);
         assert_eq!(soft.row(0).collect::<Vec<_>>(), [(3, 0.5), (1, 0.25)]);
         assert_eq!(soft.row(1).count(), 0);
         assert_eq!(soft.row(2).collect::<Vec<_>>(), [(0, 1.0)]);
         assert_eq!(soft.row(3).count(), 0);
-        soft.clear();
-        assert_eq!((soft.rows(), soft.entries()), (0, 0));
     }
 }

@@ -16,7 +16,7 @@ use std::any::Any;
 ///     .map(|(r, angle)| Point3::new(r * angle.cos(), r * angle.sin(), 1.0 - 0.5 * r * r))
 ///     .collect();
 /// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near));
-/// let mut warm = WarmStart::new();
+/// let mut warm = WarmStart::default();
 /// // The load rises: the surface grows by a hundredth from frame to frame.
 /// let mut iterations = Vec::new();
 /// for frame in 1..=4 {
@@ -35,12 +35,6 @@ pub struct WarmStart {
 }
 
 impl WarmStart {
-    /// A cold start: nothing is kept yet.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// The state of type `S` that the last match left here; a default one where there is none, or one of another type.
     ///
     /// ```
@@ -50,7 +44,7 @@ impl WarmStart {
     /// struct Follower;
     /// impl PointMatcher<f64, 2> for Follower {
     ///     fn match_points(&self, model: &[Point2<f64>], target: &[Point2<f64>]) -> Result<Matching<f64, 2>, MatchError> {
-    ///         NearestNeighbour::new().match_points(model, target)
+    ///         NearestNeighbour::default().match_points(model, target)
     ///     }
     ///     fn match_next(
     ///         &self, warm: &mut WarmStart, model: &[Point2<f64>], target: &[Point2<f64>],
@@ -62,7 +56,7 @@ impl WarmStart {
     ///     }
     /// }
     /// let model = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].map(Point2::from);
-    /// let mut warm = WarmStart::new();
+    /// let mut warm = WarmStart::default();
     /// for frame in 1..5 { // the sets end 1.6 apart, more than their spacing
     ///     let target = model.map(|p| Point2::new(p.x + 0.4 * f64::from(frame), p.y));
     ///     assert_eq!(Follower.match_next(&mut warm, &model, &target)?.assignment, [Some(0), Some(1), Some(2)]);
@@ -93,7 +87,7 @@ mod tests {
 
     #[test]
     fn a_state_is_kept_until_another_type_is_asked_for() {
-        let mut warm = WarmStart::new();
+        let mut warm = WarmStart::default();
         *warm.state::<usize>() = 7;
         assert_eq!(*warm.state::<usize>(), 7);
         assert!(warm.state::<String>().is_empty());

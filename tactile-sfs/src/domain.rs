@@ -2,14 +2,14 @@
 
 use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
 
-use crate::error::{Input, positive};
+use crate::error::positive;
 use crate::{Scalar, SfsError};
 
 /// The pixels to solve for, their size, and what is known of the heights.
 ///
 /// `mask` selects the pixels whose height is wanted (all without one); nothing outside its bounding box is read or
 /// costs time. `known_heights` fixes heights where it is not NaN, inside the mask or outside it: a height known
-/// outside is a boundary value. Heights have the unit of `pixel_size_m`.
+/// outside is a boundary value. Heights have the unit of `pixel_size_m`; [`Default`] is the whole image with heights in pixels.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -30,6 +30,17 @@ pub struct Domain<'a, T> {
     pub known_heights: Option<ArrayView2<'a, T>>,
 }
 
+impl<T: Scalar> Default for Domain<'_, T> {
+    /// The whole image with heights in pixels.
+    fn default() -> Self {
+        Self {
+            mask: None,
+            pixel_size_m: [T::one(); 2],
+            known_heights: None,
+        }
+    }
+}
+
 impl<'a, T: Scalar> Domain<'a, T> {
     /// The whole image, pixels of the given width and height, nothing known.
     ///
@@ -43,15 +54,6 @@ impl<'a, T: Scalar> Domain<'a, T> {
         };
         domain.check_pixel_size()?;
         Ok(domain)
-    }
-
-    /// The whole image with heights in pixels.
-    pub fn pixels() -> Self {
-        Self {
-            mask: None,
-            pixel_size_m: [T::one(); 2],
-            known_heights: None,
-        }
     }
 
     /// Restricts the solution to the pixels where `mask` is true.
@@ -70,7 +72,7 @@ impl<'a, T: Scalar> Domain<'a, T> {
     /// let (p, q) = (Array2::from_elem((4, 5), 0.5), Array2::zeros((4, 5)));
     /// let mut known = Array2::from_elem((4, 5), f64::NAN);
     /// known[[0, 0]] = 10.0;
-    /// let domain = Domain::pixels().with_known_heights(known.view());
+    /// let domain = Domain::default().with_known_heights(known.view());
     /// let z = CosinePoisson.integrate(p.view(), q.view(), &domain)?.heights;
     /// assert!((z[[0, 0]] - 10.0).abs() < 1e-12 && (z[[3, 4]] - 12.0).abs() < 1e-12);
     /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -94,7 +96,7 @@ impl<'a, T: Scalar> Domain<'a, T> {
             return Err(SfsError::EmptyImage { rows, columns });
         }
         if let Some(known) = self.known_heights {
-            same_shape(Input::KnownHeights, [rows, columns], known.dim())?;
+            same_shape("known heights", [rows, columns], known.dim())?;
         }
         let Some(mask) = self.mask else {
             return Ok(BoundingBox {
@@ -104,7 +106,7 @@ impl<'a, T: Scalar> Domain<'a, T> {
                 columns,
             });
         };
-        same_shape(Input::Mask, [rows, columns], mask.dim())?;
+        same_shape("mask", [rows, columns], mask.dim())?;
         BoundingBox::of(mask).ok_or(SfsError::EmptyMask)
     }
 
@@ -125,7 +127,7 @@ impl<'a, T: Scalar> Domain<'a, T> {
 
 /// Refuses an input of another shape.
 pub(crate) fn same_shape(
-    input: Input,
+    input: &'static str,
     expected: [usize; 2],
     (rows, columns): (usize, usize),
 ) -> Result<(), SfsError> {
@@ -142,28 +144,16 @@ pub(crate) fn same_shape(
 }
 
 /// The smallest rectangle that holds a mask.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{BoundingBox, CosinePoisson, Domain, SlopeIntegrator};
-/// let mut mask = Array2::from_elem((48, 64), false);
-/// (mask[[10, 20]], mask[[14, 22]]) = (true, true);
-/// let slopes = Array2::<f64>::zeros((48, 64));
-/// let domain = Domain::pixels().with_mask(mask.view());
-/// let surface = CosinePoisson.integrate(slopes.view(), slopes.view(), &domain)?;
-/// assert_eq!(surface.bounding_box, BoundingBox { top: 10, left: 20, rows: 5, columns: 3 });
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct BoundingBox {
+pub(crate) struct BoundingBox {
     /// First row.
-    pub top: usize,
+    pub(crate) top: usize,
     /// First column.
-    pub left: usize,
+    pub(crate) left: usize,
     /// Number of rows.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// Number of columns.
-    pub columns: usize,
+    pub(crate) columns: usize,
 }
 
 impl BoundingBox {

@@ -2,49 +2,6 @@
 
 use thiserror::Error;
 
-/// The input that an error is about.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{CosinePoisson, Domain, Input, SfsError, SlopeIntegrator};
-/// let (p, q) = (Array2::<f64>::zeros((4, 5)), Array2::zeros((5, 4)));
-/// let error = CosinePoisson.integrate(p.view(), q.view(), &Domain::pixels()).unwrap_err();
-/// assert_eq!(error, SfsError::ShapeMismatch { input: Input::SlopeY, expected: [4, 5], found: [5, 4] });
-/// assert_eq!(Input::SlopeY.to_string(), "slopes along y");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Input {
-    /// The mask of a [`Domain`](crate::Domain).
-    Mask,
-    /// The known heights of a [`Domain`](crate::Domain).
-    KnownHeights,
-    /// Slopes along y, whose shape must be that of the slopes along x.
-    SlopeY,
-    /// The image of the unpressed sensor.
-    Reference,
-    /// Per-pixel weights.
-    Weights,
-    /// Heights compared with other heights.
-    Truth,
-    /// An image compared with a rendered one.
-    Image,
-}
-
-impl core::fmt::Display for Input {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Input::Mask => "mask",
-            Input::KnownHeights => "known heights",
-            Input::SlopeY => "slopes along y",
-            Input::Reference => "reference image",
-            Input::Weights => "weights",
-            Input::Truth => "true heights",
-            Input::Image => "image",
-        })
-    }
-}
-
 /// Why a surface, a slope field or a set of control points could not be computed.
 ///
 /// ```
@@ -53,7 +10,7 @@ impl core::fmt::Display for Input {
 /// let error = DepthTable::new(&[(0.0, 0.0), (5.0, 1e-3), (3.0, 2e-3)]).unwrap_err();
 /// assert_eq!(error, SfsError::TableNotIncreasing { index: 2 });
 /// let image = Array2::from_elem((8, 8), 0.5);
-/// let result = Pentland::new(Lighting::frontal()).reconstruct(image.view(), &Domain::pixels());
+/// let result = Pentland::new(Lighting::default()).reconstruct(image.view().into(), &Domain::default());
 /// assert!(matches!(result, Err(SfsError::FrontalLight { .. })));
 /// let error = Domain::new([-1.0, 1.0]).unwrap_err();
 /// assert_eq!(error.to_string(), "pixel width is -1, which is not a positive finite number");
@@ -76,7 +33,7 @@ pub enum SfsError {
     #[error("the {input} has shape {found:?} but {expected:?} (rows, columns) is needed")]
     ShapeMismatch {
         /// The input whose shape is wrong.
-        input: Input,
+        input: &'static str,
         /// Rows and columns needed.
         expected: [usize; 2],
         /// Rows and columns found.
@@ -103,12 +60,6 @@ pub enum SfsError {
     NotFinite {
         /// Name of the option.
         option: &'static str,
-        /// The value found.
-        found: f64,
-    },
-    /// A quantile is NaN or outside (0, 1].
-    #[error("the quantile is {found}, which is not in (0, 1]")]
-    Quantile {
         /// The value found.
         found: f64,
     },

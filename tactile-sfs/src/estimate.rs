@@ -10,7 +10,7 @@ const FEWEST: usize = 16;
 /// Assumes a convex object whose normals are spread evenly over the visible half sphere: with μ₁ = ⟨I⟩, μ₂ = ⟨I²⟩ and
 /// γ = √(6π² μ₂ − 48 μ₁²) the albedo is γ/π and cos(slant) = 4 μ₁/γ; the tilt is the mean direction of the image's
 /// gradient. Real objects break the assumption: expect 5° to 20°, and prefer a calibrated light. The slant is kept
-/// at 80° or less. The result has ambient 0 and the estimated albedo at unit intensity.
+/// at 80° or less. The result has ambient 0 and the estimated albedo as its intensity at normal incidence.
 ///
 /// O(pixels of the mask's box).
 ///
@@ -25,7 +25,7 @@ const FEWEST: usize = 16;
 ///     let z = z2(r, c).max(1.0).sqrt();
 ///     light.shade((20.0 - c as f64) / z, (20.0 - r as f64) / z)
 /// });
-/// let domain = Domain::pixels().with_mask(mask.view());
+/// let domain = Domain::default().with_mask(mask.view());
 /// let found = estimate_lighting(Frame::Real(image.view()), &domain)?.direction();
 /// let cosine: f64 = found.iter().zip(light.direction()).map(|(a, b)| a * b).sum();
 /// assert!(cosine > 20.0_f64.to_radians().cos());
@@ -62,7 +62,7 @@ pub fn estimate_lighting<T: Scalar>(
     let light = Lighting::new(direction.map(T::of))?;
     let albedo = gamma / core::f64::consts::PI;
     if albedo > 0.0 {
-        light.with_albedo(T::of(albedo))
+        light.with_normal_intensity(T::of(albedo))
     } else {
         Ok(light)
     }
@@ -134,47 +134,4 @@ fn enough(available: usize) -> Result<(), SfsError> {
     } else {
         Ok(())
     }
-}
-
-/// Estimates the intensity at normal incidence: the given quantile of the intensities above the ambient, which is
-/// right if some part of the surface faces the light. 0.995 leaves out single bright pixels.
-///
-/// In the unit of the image; O(pixels of the mask's box).
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{Domain, Frame, estimate_normal_intensity};
-/// let image = Array2::from_shape_fn((10, 10), |(r, c)| (10 * r + c) as f64);
-/// let found = estimate_normal_intensity(Frame::Real(image.view()), &Domain::pixels(), 9.0, 1.0)?;
-/// assert_eq!(found, 90.0);
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-///
-/// # Errors
-/// Those of a wrong domain; [`SfsError::Quantile`] for a quantile outside (0, 1];
-/// [`SfsError::TooFewPixels`] below 16 finite pixels.
-pub fn estimate_normal_intensity<T: Scalar>(
-    frame: Frame<'_, T>,
-    domain: &Domain<'_, T>,
-    ambient: T,
-    quantile: f64,
-) -> Result<T, SfsError> {
-    if !(quantile > 0.0 && quantile <= 1.0) {
-        return Err(SfsError::Quantile { found: quantile });
-    }
-    let (rows, columns) = frame.dim();
-    let area = domain.validate(rows, columns)?;
-    let value = |(row, column)| (frame.at(row, column) - ambient).as_f64();
-    let inside = area
-        .pixels()
-        .filter(|&(row, column)| domain.contains(row, column));
-    let mut values: Vec<f64> = inside
-        .map(value)
-        .filter(|value| value.is_finite())
-        .collect();
-    enough(values.len())?;
-    let index = ((values.len() - 1) as f64 * quantile).round() as usize;
-    Ok(T::of(
-        *values.select_nth_unstable_by(index, f64::total_cmp).1,
-    ))
 }

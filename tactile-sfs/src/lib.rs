@@ -36,14 +36,15 @@ mod scalar;
 mod surface;
 mod workspace;
 
-pub use domain::{BoundingBox, Domain};
-pub use error::{Input, SfsError};
-pub use estimate::{estimate_lighting, estimate_normal_intensity};
+pub(crate) use domain::BoundingBox;
+pub use domain::Domain;
+pub use error::SfsError;
+pub use estimate::estimate_lighting;
 pub use frame::Frame;
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
 pub use quality::{
-    Alignment, ErrorSummary, HeightError, Reprojection, height_error, render, reprojection, slopes,
+    Alignment, ErrorSummary, HeightError, height_error, render, reprojection, slopes,
 };
 pub use reconstruct::{
     BallCalibration, BoundaryCondition, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Signal,

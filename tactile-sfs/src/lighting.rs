@@ -3,7 +3,9 @@
 use crate::error::{non_negative, positive};
 use crate::{Scalar, SfsError};
 
-/// Distant light on a Lambertian surface: I = ambient + albedo · I₀ · max(0, n·s).
+/// Distant light on a Lambertian surface: I = ambient + I₀ · max(0, n·s), with I₀ the light's intensity times the albedo.
+///
+/// [`Default`] is light from the viewer, ambient 0 and intensity 1 at normal incidence.
 ///
 /// # Convention
 ///
@@ -16,20 +18,30 @@ use crate::{Scalar, SfsError};
 /// use tactile_sfs::Lighting;
 /// let light = Lighting::new([1.0, 0.0, 1.0])?.with_normal_intensity(255.0)?;
 /// assert!(light.shade(-0.5, 0.0) > light.shade(0.5, 0.0)); // falling to the right is bright
-/// assert_eq!(Lighting::<f64>::frontal().shade(0.0, 0.0), 1.0);
+/// assert_eq!(Lighting::<f64>::default().shade(0.0, 0.0), 1.0);
 /// assert!(Lighting::new([1.0, 0.0, -1.0]).is_err());       // light from below
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lighting<T> {
     direction: [T; 3],
-    albedo: T,
     ambient: T,
     normal_intensity: T,
 }
 
+impl<T: Scalar> Default for Lighting<T> {
+    fn default() -> Self {
+        let (zero, one) = (T::zero(), T::one());
+        Self {
+            direction: [zero, zero, one],
+            ambient: zero,
+            normal_intensity: one,
+        }
+    }
+}
+
 impl<T: Scalar> Lighting<T> {
-    /// Light from `direction` (any length), albedo 1, ambient 0 and intensity 1 at normal incidence.
+    /// Light from `direction` (any length), ambient 0 and intensity 1 at normal incidence.
     ///
     /// # Errors
     /// [`SfsError::NotPositive`] for a direction that is zero or not finite, [`SfsError::LightFromBelow`] for z ≤ 0.
@@ -43,28 +55,8 @@ impl<T: Scalar> Lighting<T> {
         let unit = |v: f64| T::of(v / length);
         Ok(Self {
             direction: [unit(x), unit(y), unit(z)],
-            ..Self::frontal()
+            ..Self::default()
         })
-    }
-
-    /// Light from the viewer, albedo 1, ambient 0 and intensity 1 at normal incidence.
-    pub fn frontal() -> Self {
-        let (zero, one) = (T::zero(), T::one());
-        Self {
-            direction: [zero, zero, one],
-            albedo: one,
-            ambient: zero,
-            normal_intensity: one,
-        }
-    }
-
-    /// The share of light the surface reflects, in the unit the caller likes: only albedo · I₀ matters.
-    ///
-    /// # Errors
-    /// [`SfsError::NotPositive`] unless positive and finite.
-    pub fn with_albedo(self, albedo: T) -> Result<Self, SfsError> {
-        positive("albedo", albedo.as_f64())?;
-        Ok(Self { albedo, ..self })
     }
 
     /// The intensity that every pixel has without the light.
@@ -76,7 +68,8 @@ impl<T: Scalar> Lighting<T> {
         Ok(Self { ambient, ..self })
     }
 
-    /// I₀, what a white surface facing the light adds to the ambient: 255 for a full-range 8-bit frame.
+    /// I₀, what the surface facing the light adds to the ambient: 255 for a full-range 8-bit frame. Where some part of the surface
+    /// faces the light, a high quantile of the image (0.995 leaves out single bright pixels) less the ambient.
     ///
     /// # Errors
     /// [`SfsError::NotPositive`] unless positive and finite.
@@ -93,36 +86,36 @@ impl<T: Scalar> Lighting<T> {
         self.direction
     }
 
-    /// Albedo.
-    pub fn albedo(&self) -> T {
-        self.albedo
+    /// I₀, what the surface facing the light adds to the ambient.
+    pub fn normal_intensity(&self) -> T {
+        self.normal_intensity
     }
 
     /// Whether the light comes exactly from the viewer.
-    pub fn is_frontal(&self) -> bool {
+    pub(crate) fn is_frontal(&self) -> bool {
         self.direction[0] == T::zero() && self.direction[1] == T::zero()
     }
 
-    /// Reflectance n·s of an intensity, (I − ambient)/(albedo · I₀): in [0, 1] for a pixel the model explains.
-    ///
-    /// ```
-    /// use tactile_sfs::Lighting;
-    /// let light = Lighting::new([0.0, 0.0, 5.0])?.with_normal_intensity(255.0)?.with_albedo(0.8)?.with_ambient(10.0)?;
-    /// assert_eq!((light.direction(), light.is_frontal(), light.albedo()), ([0.0, 0.0, 1.0], true, 0.8));
-    /// let grey = light.shade(1.0, 0.0); // 45° from the light: 10 + 204/√2
-    /// assert!((light.reflectance(grey) - 0.5_f64.sqrt()).abs() < 1e-12);
-    /// # Ok::<(), tactile_sfs::SfsError>(())
-    /// ```
-    pub fn reflectance(&self, intensity: T) -> T {
-        (intensity - self.ambient) / (self.albedo * self.normal_intensity)
+    /// Reflectance n·s of an intensity, (I − ambient)/I₀: in [0, 1] for a pixel the model explains.
+    pub(crate) fn reflectance(&self, intensity: T) -> T {
+        (intensity - self.ambient) / self.normal_intensity
     }
 
     /// Intensity of a reflectance.
     pub(crate) fn intensity(&self, reflectance: T) -> T {
-        self.ambient + self.albedo * self.normal_intensity * reflectance
+        self.ambient + self.normal_intensity * reflectance
     }
 
     /// Intensity of a surface element with slopes p = ∂z/∂x and q = ∂z/∂y; attached shadows get the ambient.
+    ///
+    /// ```
+    /// use tactile_sfs::Lighting;
+    /// let light = Lighting::new([0.0, 0.0, 5.0])?.with_normal_intensity(204.0)?.with_ambient(10.0)?;
+    /// assert_eq!((light.direction(), light.normal_intensity()), ([0.0, 0.0, 1.0], 204.0));
+    /// let grey = light.shade(1.0, 0.0); // 45° from the light
+    /// assert!((grey - (10.0 + 204.0 * 0.5_f64.sqrt())).abs() < 1e-12);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
     pub fn shade(&self, p: T, q: T) -> T {
         let [x, y, z] = self.direction;
         let cosine = (z - p * x - q * y) / (T::one() + p * p + q * q).sqrt();

@@ -5,7 +5,6 @@ use core::ops::{BitOr, BitOrAssign};
 use ndarray::{Array2, ArrayView2};
 
 use crate::domain::same_shape;
-use crate::error::Input;
 use crate::{BoundingBox, Domain, Scalar, SfsError};
 
 /// Why a computation ended.
@@ -15,12 +14,10 @@ use crate::{BoundingBox, Domain, Scalar, SfsError};
 /// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator, StopReason};
 /// let mask = Array2::from_shape_fn((20, 20), |(r, c)| (r as f64 - 9.5).hypot(c as f64 - 9.5) < 8.0);
 /// let p = Array2::from_shape_fn((20, 20), |(r, c)| ((r * c) as f64).sin());
-/// let (q, domain) = (Array2::zeros((20, 20)), Domain::pixels().with_mask(mask.view()));
-/// let stop = |method: MaskedLeastSquares<f64>| {
-///     method.integrate(p.view(), q.view(), &domain).map(|surface| surface.report.stop)
-/// };
-/// assert_eq!(stop(MaskedLeastSquares::default())?, StopReason::Converged);
-/// assert_eq!(stop(MaskedLeastSquares::default().with_max_iterations(1)?)?, StopReason::IterationLimit);
+/// let (q, method) = (Array2::zeros((20, 20)), MaskedLeastSquares::<f64>::default());
+/// let stop = |domain| method.integrate(p.view(), q.view(), &domain).map(|surface| surface.report.stop);
+/// assert_eq!(stop(Domain::default().with_mask(mask.view()))?, StopReason::Converged);
+/// assert_eq!(stop(Domain::default())?, StopReason::Direct); // the whole rectangle needs no iterations
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,8 +42,8 @@ pub enum StopReason {
 /// use ndarray::array;
 /// use tactile_sfs::{DepthTable, Domain, PixelFlags, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
-/// let surface = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view(), &Domain::new([1e-4, 1e-4])?)?;
-/// assert!(surface.flags[[0, 0]].is_empty());
+/// let surface = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view().into(), &Domain::new([1e-4, 1e-4])?)?;
+/// assert_eq!(surface.flags[[0, 0]], PixelFlags::NONE);
 /// assert!(surface.flags[[0, 1]].contains(PixelFlags::OUT_OF_RANGE)); // the last depth was taken
 /// assert!((PixelFlags::DARK | PixelFlags::UNREACHED).contains(PixelFlags::DARK));
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -87,7 +84,7 @@ impl PixelFlags {
     }
 
     /// Whether no flag is set.
-    pub fn is_empty(self) -> bool {
+    pub(crate) fn is_empty(self) -> bool {
         self.0 == 0
     }
 }
@@ -112,7 +109,7 @@ impl BitOrAssign for PixelFlags {
 /// use tactile_sfs::{Component, Domain, MaskedLeastSquares, SlopeIntegrator};
 /// let mask = array![[true, true, false, true], [true, true, false, true]]; // two contacts
 /// let slopes = Array2::<f64>::zeros((2, 4));
-/// let domain = Domain::pixels().with_mask(mask.view());
+/// let domain = Domain::default().with_mask(mask.view());
 /// let report = MaskedLeastSquares::default().integrate(slopes.view(), slopes.view(), &domain)?.report;
 /// assert_eq!(report.components.len(), 2);
 /// assert_eq!(report.components[1], Component { pixels: 2, first: [0, 3], mean_height: 0.0 });
@@ -134,7 +131,7 @@ pub struct Component<T> {
 /// use ndarray::array;
 /// use tactile_sfs::{DepthTable, Domain, StopReason, SurfaceReconstruction};
 /// let table = DepthTable::new(&[(0.0, 0.0), (10.0, 1e-3)])?;
-/// let report = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view(), &Domain::new([1e-4, 1e-4])?)?.report;
+/// let report = table.reconstruct(array![[5.0, 12.0, f64::NAN]].view().into(), &Domain::new([1e-4, 1e-4])?)?.report;
 /// assert_eq!((report.stop, report.iterations), (StopReason::Direct, 0));
 /// assert_eq!((report.solved, report.flagged), (2, 2)); // one pixel out of range, one without a height
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -166,10 +163,10 @@ pub struct Report<T> {
 /// let mask = array![[true, true, true, false], [true, true, true, false]];
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::zeros((2, 4)));
 /// let (mut workspace, mut surface) = (Workspace::default(), Surface::<f64>::default()); // used again for every frame
-/// let domain = Domain::pixels().with_mask(mask.view());
+/// let domain = Domain::default().with_mask(mask.view());
 /// CosinePoisson.integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
-/// assert!(surface.heights[[0, 3]].is_nan() && surface.filled(0.0)[[0, 3]] == 0.0);
-/// assert_eq!((surface.report.solved, surface.bounding_box.columns), (6, 3));
+/// assert!(surface.heights[[0, 3]].is_nan() && !surface.mask[[0, 3]]);
+/// assert_eq!(surface.report.solved, 6);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -183,16 +180,10 @@ pub struct Surface<T> {
     /// How the heights were found.
     pub report: Report<T>,
     /// The rectangle that holds every pixel with a height or a flag.
-    pub bounding_box: BoundingBox,
+    pub(crate) bounding_box: BoundingBox,
 }
 
 impl<T: Scalar> Surface<T> {
-    /// Heights with `value` where there is none.
-    pub fn filled(&self, value: T) -> Array2<T> {
-        self.heights
-            .mapv(|height| if height.is_nan() { value } else { height })
-    }
-
     /// Where every reconstruction enters: checks the domain against an image of this size, empties the surface for it and
     /// returns the mask's box. On an error the surface is left as it was.
     pub(crate) fn enter(
@@ -214,7 +205,7 @@ impl<T: Scalar> Surface<T> {
     ) -> Result<BoundingBox, SfsError> {
         let (rows, columns) = p.dim();
         domain.validate(rows, columns)?;
-        same_shape(Input::SlopeY, [rows, columns], q.dim())?;
+        same_shape("slopes along y", [rows, columns], q.dim())?;
         self.enter((rows, columns), domain)
     }
 

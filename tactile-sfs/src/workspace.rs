@@ -17,8 +17,8 @@ use crate::{Scalar, StopReason};
 ///     Err(_) => ControlFlow::Break(()), // nobody listens any more
 /// });
 /// let image = Array2::from_elem((8, 8), 0.9);
-/// let method = BrooksHorn::new(Lighting::frontal()).with_iterations(20, 5)?;
-/// method.reconstruct_with(&mut workspace, Frame::Real(image.view()), &Domain::pixels(), &mut Surface::default())?;
+/// let method = BrooksHorn::new(Lighting::default()).with_iterations(20, 5)?;
+/// method.reconstruct_with(&mut workspace, Frame::Real(image.view()), &Domain::default(), &mut Surface::default())?;
 /// let heard: Vec<Progress> = receive.try_iter().collect();
 /// assert!(!heard.is_empty() && heard.iter().all(|p| p.iterations <= p.limit && p.limit == 20));
 /// # Ok::<(), tactile_sfs::SfsError>(())

@@ -97,7 +97,7 @@ fn print(found: &CalibratedSensor, console: &mut Console) {
         }
         None => "  distortion   not identified: there is no target".into(),
     });
-    let report = sensor.curve.fit_report();
+    let report = &sensor.curve.report;
     let [low, high] = report.identified_grey;
     let largest = sensor.pressure_pa(high);
     console.line(format!(
@@ -168,7 +168,7 @@ fn value(found: &CalibratedSensor) -> Result<Value, Failure> {
     Ok(json!({
         "sensor": sensor,
         "lens": found.lens,
-        "identified_grey": found.sensor.curve.fit_report().identified_grey,
+        "identified_grey": found.sensor.curve.report.identified_grey,
         "presses": found.presses.iter().map(press).collect::<Vec<_>>(),
         "layers": found.layers.iter().map(layer).collect::<Vec<_>>(),
     }))

@@ -18,7 +18,7 @@ pub fn page(found: &CalibratedSensor) -> Page {
 
 /// Pressure over grey level with its 95 % band.
 fn curve(found: &CalibratedSensor) -> Panel {
-    let [low, high] = found.sensor.curve.fit_report().identified_grey;
+    let [low, high] = &found.sensor.curve.report.identified_grey;
     let greys: Vec<f64> = (0..=128).map(|k| high * f64::from(k) / 128.0).collect();
     let line = |sds: f64| {
         let point = |grey: &f64| {

@@ -84,14 +84,14 @@ pub fn strain_of<const D: usize>(
         .collect::<Result<Vec<_>, _>>()?;
     let means: Vec<_> = folds.iter().map(|fold| fold.summary().mean).collect();
     let errors_at = |k: usize| {
-        let without: Vec<_> = folds.iter().map(|fold| fold.strains()[k]).collect();
+        let without: Vec<_> = folds.iter().map(|fold| fold.strains[k]).collect();
         jackknife(&without) * robust.response
     };
     Ok(Strain {
         pairs: rows.iter().map(|&(i, j)| [before[i], after[j]]).collect(),
         standard_errors: (0..rows.len()).map(errors_at).collect(),
         rows,
-        strains: field.strains().to_vec(),
+        strains: field.strains.to_vec(),
         summary: field.summary(),
         standard_error: jackknife(&means) * robust.response,
         degrees_of_freedom: means.len() - 1,

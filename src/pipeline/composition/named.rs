@@ -24,7 +24,7 @@ const CURVATURE_EMPHASIS: f64 = 4.0;
 
 /// The default reconstruction: frontal light, height zero on the sub-pixel contour of the profile fitted to the contact.
 pub(super) fn eikonal() -> Result<Eikonal<f64>, PipelineError> {
-    Eikonal::new(Lighting::frontal())
+    Eikonal::new(Lighting::default())
         .with_boundary(BoundaryCondition::Height(0.0))
         .map(|eikonal| eikonal.with_fitted_profile(true))
         .map_err(PipelineError::SurfaceOptions)
@@ -33,7 +33,7 @@ pub(super) fn eikonal() -> Result<Eikonal<f64>, PipelineError> {
 pub(super) fn reconstruction(
     choice: ReconstructionChoice,
 ) -> Result<Arc<dyn SurfaceReconstruction<f64> + Send + Sync>, PipelineError> {
-    let light = Lighting::frontal();
+    let light = Lighting::default();
     Ok(match choice {
         ReconstructionChoice::Eikonal => Arc::new(eikonal()?),
         ReconstructionChoice::TsaiShah => Arc::new(TsaiShah::new(light)),
@@ -64,7 +64,7 @@ pub(super) fn sampler(
         SamplerChoice::Curvature => Arc::new(
             CurvatureAdaptive::new(CURVATURE_EMPHASIS).map_err(PipelineError::SurfaceOptions)?,
         ),
-        SamplerChoice::Random => Arc::new(Random::new(0)),
+        SamplerChoice::Random => Arc::new(Random { seed: 0 }),
     })
 }
 
@@ -79,7 +79,7 @@ pub(super) fn matcher(choice: MatcherChoice) -> Arc<dyn PointMatcher<f64, 3> + S
         MatcherChoice::RelaxationLabelling => Arc::new(RelaxationLabelling::default()),
         MatcherChoice::CoherentPointDrift => Arc::new(CoherentPointDrift::default()),
         MatcherChoice::LinearAssignment => Arc::new(LinearAssignment::default()),
-        MatcherChoice::NearestNeighbour => Arc::new(NearestNeighbour::new()),
+        MatcherChoice::NearestNeighbour => Arc::new(NearestNeighbour::default()),
     }
 }
 

@@ -72,7 +72,7 @@ impl Pipeline {
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::SurfaceInput;
     /// use tactile_imaging::sfs::{BrooksHorn, Lighting};
-    /// let variational = BrooksHorn::new(Lighting::frontal()).with_occluding_boundary(true);
+    /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
     /// let pipeline = trial.pipeline()?.with_surface(variational, SurfaceInput::Shading);
     /// let mut press = trial.press(&pipeline)?;
     /// let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
@@ -109,7 +109,7 @@ impl Pipeline {
     /// let refused = eikonal.clone().with_slope_integrator(MaskedLeastSquares::default());
     /// assert_eq!(refused.unwrap_err(), PipelineError::NoSlopes);
     /// // Brooks and Horn's has; least squares over the contact alone need not take the frame as periodic.
-    /// let variational = BrooksHorn::new(Lighting::frontal()).with_occluding_boundary(true);
+    /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
     /// let fourier = eikonal.with_surface(variational, SurfaceInput::Shading);
     /// let masked = fourier.clone().with_slope_integrator(MaskedLeastSquares::default())?;
     /// let truth = trial.truth().frames[0].surface_height_m;
@@ -187,11 +187,11 @@ impl Pipeline {
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
-    /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::new()).with_control_points(60);
+    /// let pipeline = trial.pipeline()?.with_matcher(LinearAssignment::default()).with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;
     /// let matching = press.matching(1)?;
     /// assert!(matching.assignment.iter().all(Option::is_some), "without a limit to the distance every point has a partner");
-    /// let chosen: Box<dyn PointMatcher<f64, 3> + Send + Sync> = Box::new(LinearAssignment::new());
+    /// let chosen: Box<dyn PointMatcher<f64, 3> + Send + Sync> = Box::new(LinearAssignment::default());
     /// let pipeline = pipeline.with_matcher(chosen);
     /// assert_eq!(trial.press(&pipeline)?.matching(1)?.assignment, matching.assignment);
     /// # Ok::<(), Box<dyn std::error::Error>>(())

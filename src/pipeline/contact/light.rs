@@ -166,7 +166,7 @@ impl ContactStage for LightContact {
             .is_none()
             .then_some(force.statistics.sum as f64 / pixels);
         if contact.reading.is_some()
-            && let Some((region, mask)) = workspace.mask()
+            && let Some((region, mask)) = workspace.detector.mask()
         {
             contact.region = Some(region);
             resize(&mut contact.mask, mask.dim());

@@ -84,15 +84,8 @@ impl Material {
 }
 
 /// How displacement makes strain, and on which geometry contact is judged.
-///
-/// ```
-/// use tactile_elasticity::fem::Kinematics;
-///
-/// assert_eq!(Kinematics::default(), Kinematics::Finite);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Kinematics {
+pub(crate) enum Kinematics {
     /// Finite strain; contact on the deformed surfaces.
     #[default]
     Finite,

@@ -3,17 +3,8 @@
 use std::collections::BTreeMap;
 
 /// Parts of a body's boundary that conditions and contact refer to.
-///
-/// ```
-/// use tactile_elasticity::fem::{Boundary, Mesh};
-///
-/// let mesh = Mesh::rectangle(&[0.0, 1.0, 2.0], &[-1.0, 0.0]);
-/// assert_eq!(mesh.edges(Boundary::Contact).len(), 2);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Boundary {
+pub(crate) enum Boundary {
     /// The surface that may touch another body.
     Contact,
     /// The axis of revolution, r = 0.
@@ -32,17 +23,11 @@ pub enum Boundary {
 ///
 /// Each element belongs to a region, numbered from zero, that has one material. Edges of a boundary
 /// run with the body on their left.
-///
-/// ```
-/// use tactile_elasticity::fem::Mesh;
-///
-/// let mesh = Mesh::rectangle(&[0.0, 1.0, 3.0], &[-2.0, -1.0, 0.0]);
-/// assert_eq!(mesh.elements().len(), 4);
-/// assert_eq!(mesh.nodes().len(), 25);
-/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Mesh {
+pub(crate) struct Mesh {
+    /// Reference coordinates (r, z) of the nodes, in metres.
     pub(crate) nodes: Vec<[f64; 2]>,
+    /// Nodes of each element: corners counter-clockwise, then the middles of the edges in the same order, then the centre.
     pub(crate) elements: Vec<[usize; 9]>,
     pub(crate) regions: Vec<usize>,
     pub(crate) boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
@@ -52,39 +37,15 @@ pub struct Mesh {
 pub(crate) const EDGES: [[usize; 3]; 4] = [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]];
 
 impl Mesh {
-    /// Reference coordinates (r, z) of the nodes, in metres.
-    pub fn nodes(&self) -> &[[f64; 2]] {
-        &self.nodes
-    }
-
-    /// Nodes of each element: corners counter-clockwise, then the middles of the edges in the same
-    /// order, then the centre.
-    pub fn elements(&self) -> &[[usize; 9]] {
-        &self.elements
-    }
-
     /// Number of regions.
     pub(crate) fn region_count(&self) -> usize {
         self.regions.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// Edges of a boundary as their nodes (start, middle, end), with the body on their left; empty where
-    /// the body has no such boundary.
-    ///
-    /// ```
-    /// use tactile_elasticity::fem::{Boundary, Mesh};
-    ///
-    /// let mesh = Mesh::rectangle(&[0.0, 1.0, 2.0], &[-1.0, 0.0]);
-    /// let heights = mesh.edges(Boundary::Contact).iter().map(|edge| mesh.nodes()[edge[1]][1]);
-    /// assert!(heights.into_iter().all(|z| z == 0.0));
-    /// ```
-    pub fn edges(&self, boundary: Boundary) -> &[[usize; 3]] {
-        self.boundaries.get(&boundary).map_or(&[], Vec::as_slice)
-    }
-
     /// A rectangle of one region with elements between the given lines; its top is
     /// [`Boundary::Contact`], its bottom [`Boundary::Base`].
-    pub fn rectangle(r_lines: &[f64], z_lines: &[f64]) -> Self {
+    #[cfg(test)]
+    pub(crate) fn rectangle(r_lines: &[f64], z_lines: &[f64]) -> Self {
         let mut builder = MeshBuilder::default();
         builder.rectangle(r_lines, z_lines, 0);
         let mut mesh = builder.build();

@@ -4,9 +4,9 @@
 //! without slip or bonded: a soft ball on a rigid flat or on a layered guide, a guide's face on a block of tissue
 //! with a stiff inclusion. Loads are forces or approaches; what is not reached ends in a report.
 //!
-//! [`Scene`] has the ready models, [`Press`] balls, half balls, cylinders, plates and cones on a guide or a rigid flat, [`Model`] puts
-//! bodies together freely and [writes](Model::write_vtk) states for ParaView. For three dimensions take a general package: CalculiX,
-//! FEniCSx or MOOSE.
+//! [`Scene`] has the ready models and [writes](Scene::write_vtk) states for ParaView, [`Press`] balls, half balls, cylinders, plates and cones
+//! on a guide or a rigid flat; a rigid indenter is an object of a material a thousand times stiffer than the guide. For three dimensions, or bodies
+//! of another shape, take a general package: CalculiX, FEniCSx or MOOSE.
 //!
 //! # Ready scenes
 //! ```
@@ -101,13 +101,17 @@ mod vtk;
 pub(crate) use change::Found;
 pub use guide::{Guide, Layer};
 pub use load::{Load, Outcome, Report, Solution};
-pub use material::{Kinematics, Material};
-pub use mesh::{Boundary, Mesh};
-pub use model::{Body, Model, Support};
+pub(crate) use material::Kinematics;
+pub use material::Material;
+#[cfg(test)]
+pub(crate) use mesh::{Boundary, Mesh};
+#[cfg(test)]
+pub(crate) use model::{Model, Support};
 pub use press::{Object, Press};
 pub(crate) use pressure::pressure_at;
 pub use pressure::{ContactRadius, PressurePoint};
-pub use rigid::RigidShape;
+#[cfg(test)]
+pub(crate) use rigid::RigidShape;
 pub use scene::{Block, Interface, Lump, Scene};
 pub(crate) use slide::Relaxation;
 pub use state::State;

@@ -12,28 +12,12 @@ use crate::error::Quantity;
 use std::collections::BTreeMap;
 
 /// A body of a [`Model`].
-///
-/// ```
-/// use tactile_elasticity::fem::{Kinematics, Material, Mesh, Model};
-///
-/// let mesh = Mesh::rectangle(&[0.0, 1e-3], &[-1e-3, 0.0]);
-/// let mut model = Model::new(Kinematics::Finite);
-/// let body = model.add(&mesh, &[Material::new(1e5, 0.49).unwrap()]).unwrap();
-/// assert_eq!(model.materials(body)[0].youngs_modulus_pa(), 1e5);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Body(usize);
+pub(crate) struct Body(usize);
 
 /// How a boundary is held.
-///
-/// ```
-/// use tactile_elasticity::fem::Support;
-///
-/// assert_ne!(Support::Bonded, Support::Sliding);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Support {
+pub(crate) enum Support {
     /// No displacement but the support's own: glued to glass or to a stage.
     Bonded,
     /// Free to slide along r: a lubricated stage, or a plane of symmetry.
@@ -59,23 +43,8 @@ pub(crate) struct Part {
 ///
 /// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z.
 /// SI units; the axis of revolution is r = 0; guides lie below z = 0 and objects above.
-///
-/// ```
-/// use tactile_elasticity::fem::{Boundary, Kinematics, Load, Material, Mesh, Model, Support};
-///
-/// // A cylinder of 2 mm, 1 mm high, free to slide between plates, squeezed by a tenth of its height.
-/// let mesh = Mesh::rectangle(&[0.0, 1e-3, 2e-3], &[0.0, 1e-3]);
-/// let mut model = Model::new(Kinematics::Finite);
-/// let body = model.add(&mesh, &[Material::new(1e5, 0.45).unwrap()]).unwrap();
-/// model.drive(body, Boundary::Base, Support::Sliding);
-/// model.hold(body, Boundary::Contact, Support::Sliding);
-/// let solution = model.solve(&[Load::Approach(1e-4)]);
-/// let state = &solution.states[0];
-/// assert!((state.force_n() / (1e5 * 0.1 * 3.1416 * 4e-6) - 1.0).abs() < 0.15);
-/// assert!(model.stress(state, [0.5e-3, 0.5e-3]).unwrap().zz_pa < 0.0);
-/// ```
 #[derive(Debug, Clone)]
-pub struct Model {
+pub(crate) struct Model {
     pub(crate) kinematics: Kinematics,
     pub(crate) nodes: Vec<[f64; 2]>,
     pub(crate) elements: Vec<[usize; 9]>,
@@ -101,7 +70,7 @@ pub struct Model {
 
 impl Model {
     /// An empty model.
-    pub fn new(kinematics: Kinematics) -> Self {
+    pub(crate) fn new(kinematics: Kinematics) -> Self {
         Self {
             kinematics,
             nodes: Vec::new(),
@@ -125,7 +94,11 @@ impl Model {
     ///
     /// # Errors
     /// Materials that are not one a region; an element that is degenerate or turned inside out.
-    pub fn add(&mut self, mesh: &Mesh, materials: &[Material]) -> Result<Body, ElasticityError> {
+    pub(crate) fn add(
+        &mut self,
+        mesh: &Mesh,
+        materials: &[Material],
+    ) -> Result<Body, ElasticityError> {
         if materials.len() != mesh.region_count() {
             return Err(ElasticityError::LengthMismatch {
                 quantity: Quantity::Layers,
@@ -172,18 +145,12 @@ impl Model {
     }
 
     /// Number of elements of all bodies.
-    ///
-    /// ```
-    /// # use tactile_elasticity::fem::{Material, Scene};
-    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
-    /// assert!(scene.model().element_count() > 100);
-    /// ```
-    pub fn element_count(&self) -> usize {
+    pub(crate) fn element_count(&self) -> usize {
         self.elements.len()
     }
 
-    /// Materials of a body, by region; [`Body`] shows them.
-    pub fn materials(&self, body: Body) -> &[Material] {
+    /// Materials of a body, by region.
+    pub(crate) fn materials(&self, body: Body) -> &[Material] {
         &self.materials[self.parts[body.0].regions.clone()]
     }
 
@@ -201,12 +168,12 @@ impl Model {
     }
 
     /// Holds a boundary in its place.
-    pub fn hold(&mut self, body: Body, boundary: Boundary, support: Support) {
+    pub(crate) fn hold(&mut self, body: Body, boundary: Boundary, support: Support) {
         self.support(body, boundary, support, Motion::Zero);
     }
 
     /// Moves a boundary by the approach along +z.
-    pub fn drive(&mut self, body: Body, boundary: Boundary, support: Support) {
+    pub(crate) fn drive(&mut self, body: Body, boundary: Boundary, support: Support) {
         self.support(body, boundary, support, Motion::Driven(1.0));
     }
 
@@ -226,7 +193,7 @@ impl Model {
     ///
     /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
     /// convex of the two.
-    pub fn contact(&mut self, first: Body, second: Body) {
+    pub(crate) fn contact(&mut self, first: Body, second: Body) {
         let curve = SurfaceCurve::new(self.edges(second, Boundary::Contact), &self.nodes);
         let softer = self.softest(first).min(self.softest(second));
         self.add_points(first, Opposite::Surface(curve), softer);
@@ -268,22 +235,8 @@ impl Model {
 
     /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole is
     /// at `height_m` and does not move.
-    ///
-    /// ```
-    /// use tactile_elasticity::fem::*;
-    ///
-    /// // A rigid ball of 20 mm on a gel of 4 mm whose base rises by 0.1 mm.
-    /// let radii: Vec<f64> = (0..=16).map(|k| f64::from(k) * 0.5e-3).collect();
-    /// let heights: Vec<f64> = (0..=8).map(|k| f64::from(k) * 0.5e-3 - 4e-3).collect();
-    /// let mut model = Model::new(Kinematics::Finite);
-    /// let material = Material::new(30e3, 0.49).unwrap();
-    /// let gel = model.add(&Mesh::rectangle(&radii, &heights), &[material]).unwrap();
-    /// model.drive(gel, Boundary::Base, Support::Bonded);
-    /// model.contact_rigid_above(gel, RigidShape::Sphere { radius_m: 20e-3 }, 0.0);
-    /// let solution = model.solve(&[Load::Approach(0.1e-3)]);
-    /// assert!(solution.states[0].force_n() > 0.0);
-    /// ```
-    pub fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+    #[cfg(test)]
+    pub(crate) fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,
             side: 1.0,
@@ -297,7 +250,7 @@ impl Model {
     /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
     /// starts at `height_m` and moves by the approach, as
     /// [`Scene::ball_on_flat`](super::Scene::ball_on_flat) does.
-    pub fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+    pub(crate) fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
         let opposite = Opposite::Rigid {
             shape,
             side: -1.0,
@@ -312,27 +265,7 @@ impl Model {
     ///
     /// Loads are then followed in steps that let the approach grow by a tenth: forces hold to a thousandth and contact radii to two,
     /// whatever loads are asked for on the way. At ν near 0 the radius is up to 1.5 % low: the pressure near the rim is not that of sliding.
-    ///
-    /// ```
-    /// use tactile_elasticity::fem::*;
-    ///
-    /// // A rigid flat punch on a thick gel, ν = 0.1: without slip stiffer by (1 − ν) ln(3 − 4ν) / (1 − 2ν) (Spence 1968).
-    /// let radii: Vec<f64> = (0..=40).map(|k| 0.125e-3 * f64::from(k)).chain([6e-3, 9e-3, 14e-3, 20e-3]).collect();
-    /// let heights: Vec<f64> = [-20e-3, -14e-3, -9e-3, -6e-3, -4e-3].into_iter().chain((-12..=0).map(|k| 0.25e-3 * f64::from(k))).collect();
-    /// let force = |sticks| {
-    ///     let mut model = Model::new(Kinematics::Linear);
-    ///     let gel = model.add(&Mesh::rectangle(&radii, &heights), &[Material::new(30e3, 0.1).unwrap()]).unwrap();
-    ///     model.drive(gel, Boundary::Base, Support::Bonded);
-    ///     model.contact_rigid_above(gel, RigidShape::Punch { radius_m: 1e-3 }, 0.0);
-    ///     if sticks {
-    ///         model.forbid_slip();
-    ///     }
-    ///     model.solve(&[Load::Approach(0.01e-3)]).states[0].force_n()
-    /// };
-    /// let spence = 0.9 * 2.6_f64.ln() / 0.8;
-    /// assert!((force(true) / force(false) / spence - 1.0).abs() < 0.02);
-    /// ```
-    pub fn forbid_slip(&mut self) {
+    pub(crate) fn forbid_slip(&mut self) {
         self.sticks = true;
     }
 

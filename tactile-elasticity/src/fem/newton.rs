@@ -51,7 +51,7 @@ impl Model {
     ///
     /// A load that is not reached ends the solution: its [`Report`] says so. O(n b²) for each Newton
     /// iteration with n unknowns in a system of half-width b.
-    pub fn solve(&self, loads: &[Load]) -> Solution {
+    pub(crate) fn solve(&self, loads: &[Load]) -> Solution {
         self.solve_near(loads, &[])
     }
 

@@ -69,7 +69,7 @@ pub enum Object {
 /// let press = Press::new(Object::HalfBall { radius_m: 3e-3 }, Material::new(60e3, 0.495)?)?.on_guide(guide)?;
 /// let coarse = press.clone().with_fineness(4)?.scene()?;
 /// let fine = press.with_fineness(8)?.scene()?;
-/// assert!(fine.model().element_count() > 2 * coarse.model().element_count());
+/// assert!(fine.element_count() > 2 * coarse.element_count());
 /// let force = |scene: &tactile_elasticity::fem::Scene| scene.solve(&[Load::Approach(0.5e-3)]).states[0].force_n();
 /// // Both meshes are fine enough for half a percent of the force.
 /// assert!((force(&coarse) / force(&fine) - 1.0).abs() < 5e-3);

@@ -9,6 +9,7 @@ use super::mesh::Boundary;
 use super::model::{Model, Support};
 use super::press::{Object, Press};
 use super::state::State;
+use super::stress::Stress;
 use crate::ElasticityError;
 use crate::error::{Quantity, positive};
 
@@ -255,16 +256,35 @@ impl Scene {
         Self { model }
     }
 
-    /// The model, for what the scene does not offer: its size, a point's stress.
+    pub(crate) fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Number of elements of all bodies.
+    ///
+    /// ```
+    /// # use tactile_elasticity::fem::{Material, Scene};
+    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// assert!(scene.element_count() > 100);
+    /// ```
+    pub fn element_count(&self) -> usize {
+        self.model.element_count()
+    }
+
+    /// Cauchy stress at the material point with reference coordinates (r, z) in metres. `None` outside the bodies, or for a state of
+    /// another scene.
+    ///
+    /// From the derivatives of quadratic displacements: second order in the elements' size, discontinuous
+    /// between elements. O(elements).
     ///
     /// ```
     /// # use tactile_elasticity::fem::{Load, Material, Scene};
     /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
     /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
     /// // Pressed along the axis.
-    /// assert!(scene.model().stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);
+    /// assert!(scene.stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);
     /// ```
-    pub fn model(&self) -> &Model {
-        &self.model
+    pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
+        self.model.stress(state, point)
     }
 }

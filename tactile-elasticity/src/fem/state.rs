@@ -52,15 +52,7 @@ impl State {
     }
 
     /// Displacement (r, z) of every node, in metres.
-    ///
-    /// ```
-    /// # use tactile_elasticity::fem::{Load, Material, Scene};
-    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
-    /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
-    /// let highest = state.displacements().iter().map(|u| u[1]).fold(0.0, f64::max);
-    /// assert!((highest / 0.3e-3 - 1.0).abs() < 0.01);
-    /// ```
-    pub fn displacements(&self) -> Vec<[f64; 2]> {
+    pub(crate) fn displacements(&self) -> Vec<[f64; 2]> {
         let pairs = self.fields.displacement.chunks_exact(2);
         pairs.map(|pair| [pair[0], pair[1]]).collect()
     }

@@ -8,17 +8,14 @@ use super::state::State;
 /// The Cauchy stress at a point, in pascals, tension positive; the components rθ and zθ are zero.
 ///
 /// ```
-/// use tactile_elasticity::fem::*;
+/// use tactile_elasticity::fem::{Interface, Load, Material, Scene};
 ///
-/// // A cylinder free to slide between plates, squeezed by a hundredth: σzz = −E/100 nearly.
-/// let mesh = Mesh::rectangle(&[0.0, 1e-3, 2e-3], &[0.0, 1e-3]);
-/// let mut model = Model::new(Kinematics::Linear);
-/// let body = model.add(&mesh, &[Material::new(1e5, 0.45).unwrap()]).unwrap();
-/// model.drive(body, Boundary::Base, Support::Sliding);
-/// model.hold(body, Boundary::Contact, Support::Sliding);
-/// let state = &model.solve(&[Load::Approach(1e-5)]).states[0];
-/// let stress = model.stress(state, [0.7e-3, 0.4e-3]).unwrap();
-/// assert!((stress.zz_pa + 1e3).abs() < 1e-3 && stress.rr_pa.abs() < 1e-3);
+/// // A cylinder free to slide between plates, squeezed by a thousandth: σzz = −E/1000 nearly.
+/// let scene = Scene::cylinder_between_plates(2e-3, 2e-3, Material::new(1e5, 0.45)?, Interface::Frictionless)?;
+/// let state = &scene.solve(&[Load::Approach(1e-6)]).states[0];
+/// let stress = scene.stress(state, [0.7e-3, 0.4e-3]).expect("a point of the cylinder");
+/// assert!((stress.zz_pa / -100.0 - 1.0).abs() < 5e-3 && stress.rr_pa.abs() < 0.5);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -36,10 +33,7 @@ pub struct Stress {
 impl Model {
     /// Cauchy stress at the material point with reference coordinates (r, z) in metres; Hooke's stress in
     /// linear kinematics. `None` outside the bodies, or for a state of another model.
-    ///
-    /// From the derivatives of quadratic displacements: second order in the elements' size, discontinuous
-    /// between elements. O(elements). [`Stress`] has an example.
-    pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
+    pub(crate) fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
         let fields = &state.fields;
         if fields.displacement.len() != 2 * self.nodes.len() {
             return None;

@@ -1,13 +1,13 @@
 //! Meshes and states as files that ParaView, VisIt and meshio read.
 
-use super::model::Model;
+use super::scene::Scene;
 use super::state::State;
 use std::io::{Result, Write};
 
 /// VTK's number of the nine-node quadrilateral; its nodes come in the order of ours.
 const BIQUADRATIC_QUAD: u8 = 28;
 
-impl Model {
+impl Scene {
     /// Writes the undeformed mesh of all bodies with a state's fields in VTK's legacy text format: at the nodes the displacement (m), in the
     /// elements Young's modulus (Pa) and the Cauchy stress at their centres (Pa, tension positive). x is r, y is z.
     ///
@@ -17,18 +17,19 @@ impl Model {
     /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
     /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
     /// let mut file = Vec::new();
-    /// scene.model().write_vtk(state, &mut file)?;
+    /// scene.write_vtk(state, &mut file)?;
     /// let text = String::from_utf8(file).unwrap();
-    /// let cells = format!("CELL_TYPES {}", scene.model().element_count());
+    /// let cells = format!("CELL_TYPES {}", scene.element_count());
     /// assert!(text.starts_with("# vtk DataFile Version 3.0") && text.contains(&cells));
     /// # Ok::<(), std::io::Error>(())
     /// ```
     ///
     /// # Errors
-    /// Those of `out`; [`InvalidInput`](std::io::ErrorKind::InvalidInput) for a state of another model.
+    /// Those of `out`; [`InvalidInput`](std::io::ErrorKind::InvalidInput) for a state of another scene.
     pub fn write_vtk(&self, state: &State, out: &mut impl Write) -> Result<()> {
-        if state.fields.displacement.len() != 2 * self.nodes.len()
-            || state.fields.pressures.len() != self.elements.len()
+        let model = &self.model;
+        if state.fields.displacement.len() != 2 * model.nodes.len()
+            || state.fields.pressures.len() != model.elements.len()
         {
             return Err(std::io::ErrorKind::InvalidInput.into());
         }
@@ -40,13 +41,13 @@ impl Model {
             state.force_n()
         )?;
         writeln!(out, "ASCII\nDATASET UNSTRUCTURED_GRID")?;
-        writeln!(out, "POINTS {} double", self.nodes.len())?;
-        for [r, z] in &self.nodes {
+        writeln!(out, "POINTS {} double", model.nodes.len())?;
+        for [r, z] in &model.nodes {
             writeln!(out, "{r:e} {z:e} 0")?;
         }
-        let count = self.elements.len();
+        let count = model.elements.len();
         writeln!(out, "CELLS {count} {}", 10 * count)?;
-        for nodes in &self.elements {
+        for nodes in &model.elements {
             write!(out, "9")?;
             for node in nodes {
                 write!(out, " {node}")?;
@@ -57,20 +58,20 @@ impl Model {
         for _ in 0..count {
             writeln!(out, "{BIQUADRATIC_QUAD}")?;
         }
-        writeln!(out, "POINT_DATA {}", self.nodes.len())?;
+        writeln!(out, "POINT_DATA {}", model.nodes.len())?;
         writeln!(out, "VECTORS displacement double")?;
         for [u, w] in state.displacements() {
             writeln!(out, "{u:e} {w:e} 0")?;
         }
         writeln!(out, "CELL_DATA {count}")?;
         writeln!(out, "SCALARS youngs_modulus double 1\nLOOKUP_TABLE default")?;
-        for &region in &self.regions {
-            writeln!(out, "{:e}", self.materials[region].youngs_modulus_pa())?;
+        for &region in &model.regions {
+            writeln!(out, "{:e}", model.materials[region].youngs_modulus_pa())?;
         }
         writeln!(out, "TENSORS stress double")?;
         for index in 0..count {
             // A state in equilibrium has no inverted element.
-            let [rr, rz, zz, hoop] = self
+            let [rr, rz, zz, hoop] = model
                 .element_stress(state, index, [0.0; 2])
                 .map_or([f64::NAN; 4], |s| [s.rr_pa, s.rz_pa, s.zz_pa, s.hoop_pa]);
             writeln!(out, "{rr:e} {rz:e} 0\n{rz:e} {zz:e} 0\n0 0 {hoop:e}")?;
@@ -101,12 +102,13 @@ mod tests {
             .unwrap();
         model.drive(body, Boundary::Base, Support::Sliding);
         model.hold(body, Boundary::Contact, Support::Sliding);
-        let state = &model.solve(&[Load::Approach(1e-5)]).states[0];
+        let scene = Scene::from_model(model);
+        let state = &scene.solve(&[Load::Approach(1e-5)]).states[0];
         let mut file = Vec::new();
-        model.write_vtk(state, &mut file).unwrap();
+        scene.write_vtk(state, &mut file).unwrap();
         let text = String::from_utf8(file).unwrap();
         let points: Vec<f64> = block(&text, "POINTS").collect();
-        assert_eq!(points.len(), 3 * mesh.nodes().len());
+        assert_eq!(points.len(), 3 * mesh.nodes.len());
         let displacements: Vec<f64> = block(&text, "VECTORS").collect();
         for (point, u) in points.chunks(3).zip(displacements.chunks(3)) {
             // The base rises by 10 µm, the top stays; the sides spread by ν of the strain. The residual's tolerance is left.
@@ -114,17 +116,17 @@ mod tests {
             assert!((u[0] - 0.45e-2 * point[0]).abs() < 1e-11);
         }
         let stresses: Vec<f64> = block(&text, "TENSORS").collect();
-        assert_eq!(stresses.len(), 9 * model.element_count());
+        assert_eq!(stresses.len(), 9 * scene.element_count());
         assert!(
             stresses
                 .chunks(9)
                 .all(|s| (s[4] + 1e3).abs() < 1e-3 && s[0].abs() < 1e-3)
         );
-        assert_eq!(block(&text, "CELL_TYPES").count(), model.element_count());
+        assert_eq!(block(&text, "CELL_TYPES").count(), scene.element_count());
     }
 
     #[test]
-    fn a_state_of_another_model_is_refused() {
+    fn a_state_of_another_scene_is_refused() {
         let ball = |radius| {
             let gel = Material::new(1e5, 0.495).unwrap();
             let object = Object::Ball { radius_m: radius };
@@ -133,6 +135,6 @@ mod tests {
         let scene = ball(3e-3).with_fineness(3).unwrap().scene().unwrap();
         let other = ball(3e-3).with_fineness(4).unwrap().scene().unwrap();
         let state = &scene.solve(&[Load::Approach(1e-4)]).states[0];
-        assert!(other.model().write_vtk(state, &mut Vec::new()).is_err());
+        assert!(other.write_vtk(state, &mut Vec::new()).is_err());
     }
 }

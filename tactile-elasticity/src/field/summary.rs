@@ -39,10 +39,14 @@ pub struct StrainSummary<T> {
 
 /// Strain at points, with the weight (area, volume) of each.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct StrainField<T> {
-    strains: Vec<Matrix3<T>>,
-    weights: Vec<T>,
-    folded: Vec<usize>,
+    /// The strain at every point; zero where the deformation folds.
+    pub strains: Vec<Matrix3<T>>,
+    /// The weight of every point; zero where the deformation folds.
+    pub weights: Vec<T>,
+    /// The points at which the deformation folds, det F ≤ 0.
+    pub folded: Vec<usize>,
 }
 
 impl<T: RealField + Copy> StrainField<T> {
@@ -124,33 +128,6 @@ impl<T: RealField + Copy> StrainField<T> {
             }
         }
         summary
-    }
-
-    /// Strain at every point; zero where folded.
-    ///
-    /// ```
-    /// use nalgebra::Matrix3;
-    /// use tactile_elasticity::field::StrainField;
-    /// use tactile_elasticity::strain::Infinitesimal;
-    ///
-    /// let gradients = [0.01_f64, 0.03].map(Matrix3::from_diagonal_element);
-    /// let field = StrainField::from_gradients(&gradients, Some(&[1.0, 3.0]), &Infinitesimal)?;
-    /// assert_eq!(field.strains()[1][(0, 0)], 0.03);
-    /// assert_eq!(field.weights(), [1.0, 3.0]);
-    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
-    /// ```
-    pub fn strains(&self) -> &[Matrix3<T>] {
-        &self.strains
-    }
-
-    /// Weight of every point; zero where folded.
-    pub fn weights(&self) -> &[T] {
-        &self.weights
-    }
-
-    /// Points where det F ≤ 0.
-    pub fn folded(&self) -> &[usize] {
-        &self.folded
     }
 
     /// Weighted mean, spread and standard error.

@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// let loads: Vec<_> = [0.01, 0.02, 0.04]
 ///     .map(|f| {
 ///         let a = (0.75 * f * 0.005 / (30e3 / 0.75f64)).cbrt();
-///         LoadState::new(Estimate::new(f, 1e-4)).with_contact_radius(Estimate::new(a, 1e-6))
+///         LoadState { contact_radius_m: Some(Estimate::new(a, 1e-6)), ..LoadState::new(Estimate::new(f, 1e-4)) }
 ///     })
 ///     .to_vec();
 /// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(HertzSphere::new(0.005, 0.5)?);
@@ -183,7 +183,7 @@ impl<T: RealField + Copy> Interval<T> {
 /// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning};
 ///
 /// let contact = HertzContact::from_force(0.05_f64, 3e-3, 40e3)?;
-/// let load = LoadState::new(Estimate::new(0.05, 1e-4)).with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6));
+/// let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..LoadState::new(Estimate::new(0.05, 1e-4)) };
 /// let modulus: ModulusEstimate<f64> = HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!(modulus.interval_95.contains(30e3));
 /// // The number stands, with the warning that a/R = 0.47 is much.
@@ -218,7 +218,7 @@ pub struct ModulusEstimate<T> {
 /// // The second load carries nothing but its force.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
 /// let force = LoadState::new(Estimate::new(1e-3, 1e-5));
-/// let loads = [force.with_contact_radius(Estimate::new(contact.contact_radius_m, 1e-6)), force];
+/// let loads = [LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..force }, force];
 /// let modulus = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new(loads))?;
 /// assert!(modulus.loads[0].used && !modulus.loads[1].used);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -258,7 +258,7 @@ impl<T: RealField + Copy> LoadDiagnostics<T> {
 ///     .map(|force| {
 ///         let contact = HertzContact::from_force(force, 5e-3, 40e3)?;
 ///         let radius = Estimate::new(contact.contact_radius_m, 1e-6);
-///         Ok(LoadState::new(Estimate::new(force, 1e-5)).with_contact_radius(radius))
+///         Ok(LoadState { contact_radius_m: Some(radius), ..LoadState::new(Estimate::new(force, 1e-5)) })
 ///     })
 ///     .collect::<Result<_, tactile_elasticity::ElasticityError>>()?;
 /// let fit = HertzSphere::new(5e-3, 0.5)?.estimate(&LoadSeries::new(loads))?.fit;

@@ -32,7 +32,7 @@ impl<T: RealField + Copy> Estimate<T> {
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio};
     /// let load = |force| {
-    ///     LoadState::new(force).with_contact_area(Estimate::exact(1e-4)).with_mean_strain(Estimate::exact(0.02))
+    ///     LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), mean_strain: Some(Estimate::exact(0.02)), ..LoadState::new(force) }
     /// };
     /// let force = Estimate::new(0.12, 0.001);
     /// let known = PaperRatio::default().estimate(&LoadSeries::new([load(force)]))?;
@@ -83,9 +83,7 @@ impl Estimate<f64> {
 ///
 /// ```
 /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
-/// let load = LoadState::new(Estimate::new(0.7, 0.002))
-///     .with_contact_radius(Estimate::new(1.2e-3, 4e-6))
-///     .with_mean_strain(Estimate::exact(0.021));
+/// let load = LoadState { contact_radius_m: Some(Estimate::new(1.2e-3, 4e-6)), mean_strain: Some(Estimate::exact(0.021)), ..LoadState::new(Estimate::new(0.7, 0.002)) };
 /// assert!((load.stress_pa().unwrap() - 0.7f64 / (std::f64::consts::PI * 1.44e-6)).abs() < 1e-6);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -113,48 +111,6 @@ impl<T: RealField + Copy> LoadState<T> {
             indentation_m: None,
             mean_strain: None,
         }
-    }
-
-    /// With the contact radius (m).
-    pub fn with_contact_radius(mut self, radius_m: Estimate<T>) -> Self {
-        self.contact_radius_m = Some(radius_m);
-        self
-    }
-
-    /// With the contact's area (m²), where it is not a disc.
-    ///
-    /// ```
-    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
-    ///
-    /// // A block of 1 cm²: its stress, and an approach of 0.2 mm.
-    /// let load = LoadState::new(Estimate::exact(0.12))
-    ///     .with_contact_area(Estimate::exact(1e-4))
-    ///     .with_indentation(Estimate::new(0.2e-3, 1e-6));
-    /// assert!((load.stress_pa().unwrap() - 1200.0_f64).abs() < 1e-9);
-    /// ```
-    pub fn with_contact_area(mut self, area_m2: Estimate<T>) -> Self {
-        self.contact_area_m2 = Some(area_m2);
-        self
-    }
-
-    /// With the indentation (m).
-    ///
-    /// ```
-    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
-    ///
-    /// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_indentation(Estimate::new(4e-5, 1e-7));
-    /// assert_eq!(load.indentation_m.map(|d| d.value), Some(4e-5));
-    /// assert_eq!(load.stress_pa(), None); // no area yet
-    /// ```
-    pub fn with_indentation(mut self, indentation_m: Estimate<T>) -> Self {
-        self.indentation_m = Some(indentation_m);
-        self
-    }
-
-    /// With the mean strain e_zz.
-    pub fn with_mean_strain(mut self, strain: Estimate<T>) -> Self {
-        self.mean_strain = Some(strain);
-        self
     }
 
     /// F over the area given, or over πa²; None where neither is known or the area is zero.

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, RealField};
 /// ```
 /// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors};
 ///
-/// let load = LoadState::new(Estimate::new(1e-3, 1e-5)).with_contact_radius(Estimate::new(0.4543e-3_f64, 1e-6));
+/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.4543e-3_f64, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
 /// let series = LoadSeries::new([load; 50]);
 /// let shared = SharedErrors { force_scale: 0.02, ..SharedErrors::default() };
 /// let hertz = HertzSphere::new(5e-3, 0.5)?;
@@ -69,14 +69,13 @@ impl<T: RealField + Copy> SharedErrors<T> {
 /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, SharedErrors};
 ///
 /// let load = |force, radius| {
-///     LoadState::new(Estimate::new(force, 1e-3)).with_contact_radius(Estimate::new(radius, 4e-6))
+///     LoadState { contact_radius_m: Some(Estimate::new(radius, 4e-6)), ..LoadState::new(Estimate::new(force, 1e-3)) }
 /// };
 /// let series = LoadSeries::new([load(0.7, 1.2e-3), load(1.2, 1.4e-3)])
 ///     // The offset of one calibration is in both forces.
 ///     .with_force_covariance(&DMatrix::from_row_slice(2, 2, &[2e-6, 1e-6, 1e-6, 2e-6]))?
 ///     .with_shared_errors(SharedErrors { length_scale: 0.002, ..SharedErrors::default() })?;
 /// assert_eq!((series.loads().len(), series.shared_errors().length_scale), (2, 0.002));
-/// assert!(series.force_covariance().is_some() && series.strain_covariance().is_none());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -138,7 +137,7 @@ impl<T: RealField + Copy> LoadSeries<T> {
     /// use nalgebra::DMatrix;
     /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
     ///
-    /// let load = LoadState::new(Estimate::new(0.12_f64, 1e-3)).with_mean_strain(Estimate::exact(0.02));
+    /// let load = LoadState { mean_strain: Some(Estimate::exact(0.02)), ..LoadState::new(Estimate::new(0.12_f64, 1e-3)) };
     /// let series = LoadSeries::new([load; 2]);
     /// assert!(series.clone().with_strain_covariance(&DMatrix::from_element(3, 3, 1e-8)).is_err());
     /// assert!(series.with_strain_covariance(&DMatrix::from_element(2, 2, 1e-8)).is_ok());
@@ -172,12 +171,12 @@ impl<T: RealField + Copy> LoadSeries<T> {
     }
 
     /// The covariance of the forces, where one was given.
-    pub fn force_covariance(&self) -> Option<&DMatrix<T>> {
+    pub(crate) fn force_covariance(&self) -> Option<&DMatrix<T>> {
         self.force_covariance.as_ref()
     }
 
     /// The covariance of the mean strains, where one was given.
-    pub fn strain_covariance(&self) -> Option<&DMatrix<T>> {
+    pub(crate) fn strain_covariance(&self) -> Option<&DMatrix<T>> {
         self.strain_covariance.as_ref()
     }
 

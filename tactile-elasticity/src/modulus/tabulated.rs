@@ -32,7 +32,7 @@ use std::sync::Arc;
 /// let flat = Waveguide::rigid();
 /// let table = ContactTable::new(3e-3, 0.5, &flat, vec![curve])?;
 ///
-/// let load = LoadState::new(Estimate::new(5e-3, 1e-5)).with_contact_radius(Estimate::new(0.5e-3, 1e-6));
+/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.5e-3, 1e-6)), ..LoadState::new(Estimate::new(5e-3, 1e-5)) };
 /// let estimate = TabulatedContact::new(table.clone(), 3e-3, 0.5, &flat)?.estimate(&LoadSeries::new([load]))?;
 /// let relative_error: f64 = estimate.youngs_modulus_pa / 67.5e3 - 1.0;
 /// assert!(relative_error.abs() < 1e-9);

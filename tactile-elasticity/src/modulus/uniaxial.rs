@@ -40,22 +40,25 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 ///
 /// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1 + e), F = E e λ_z A₀.
 /// let load = |e: f64| {
-///     LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4))
-///         .with_contact_area(Estimate::new(1e-4 * (1.0 + e), 1e-9))
+///     LoadState { contact_area_m2: Some(Estimate::new(1e-4 * (1.0 + e), 1e-9)), ..LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4)) }
 /// };
 /// let uniaxial = UniaxialLoads::new(&LoadSeries::new([load(0.02), load(0.05)]), 0.5, &GreenLagrange)?;
-/// assert!((uniaxial.unloaded_area_m2() / 1e-4 - 1.0).abs() < 1e-9);
-/// let [_lateral, axial] = uniaxial.stretches()[1];
+/// assert!((uniaxial.unloaded_area_m2 / 1e-4 - 1.0).abs() < 1e-9);
+/// let [_lateral, axial] = uniaxial.stretches[1];
 /// assert!((axial - 0.9f64.sqrt()).abs() < 1e-9);
-/// let modulus = StressStrainRegression::default().estimate(uniaxial.series())?;
+/// let modulus = StressStrainRegression::default().estimate(&uniaxial.series)?;
 /// assert!((modulus.youngs_modulus_pa / 100e3 - 1.0).abs() < 1e-9);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct UniaxialLoads<T: RealField> {
-    series: LoadSeries<T>,
-    stretches: Vec<[T; 2]>,
-    unloaded_area_m2: T,
+    /// The loads with their strains, for a [`StressStrainRegression`].
+    pub series: LoadSeries<T>,
+    /// Stretches of the face in its plane and across it, λ_t and λ_z, of every load.
+    pub stretches: Vec<[T; 2]>,
+    /// Area of the unloaded face in m².
+    pub unloaded_area_m2: T,
 }
 
 impl<T: RealField + Copy> UniaxialLoads<T> {
@@ -107,22 +110,6 @@ impl<T: RealField + Copy> UniaxialLoads<T> {
             stretches: found.stretches.iter().map(|s| s.map(narrow)).collect(),
             unloaded_area_m2: narrow(unloaded),
         })
-    }
-
-    /// The loads with strains counted from the unloaded state, positive where squeezed, and the areas A₀ f′(λ_z) by which forces become
-    /// conjugate stresses. An error of Poisson's ratio is one of all strains: δE/E = δν/ν.
-    pub fn series(&self) -> &LoadSeries<T> {
-        &self.series
-    }
-
-    /// λ_t and λ_z of every load, ones where there is no area.
-    pub fn stretches(&self) -> &[[T; 2]] {
-        &self.stretches
-    }
-
-    /// A₀ in square metres.
-    pub fn unloaded_area_m2(&self) -> T {
-        self.unloaded_area_m2
     }
 }
 

@@ -17,16 +17,16 @@ pub struct PrincipalValues<T> {
     pub directions: Matrix3<T>,
 }
 
-impl<T: RealField + Copy> PrincipalValues<T> {
+impl<T: RealField + Copy> From<&Matrix3<T>> for PrincipalValues<T> {
     /// Of a symmetric tensor.
     ///
     /// ```
     /// use nalgebra::Matrix3;
     /// use tactile_elasticity::strain::PrincipalValues;
     /// let shear = Matrix3::new(0.0, 0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0);
-    /// assert_eq!(PrincipalValues::of(&shear).values, [0.5, 0.0, -0.5]);
+    /// assert_eq!(PrincipalValues::from(&shear).values, [0.5, 0.0, -0.5]);
     /// ```
-    pub fn of(tensor: &Matrix3<T>) -> Self {
+    fn from(tensor: &Matrix3<T>) -> Self {
         let (values, directions) = symmetric_eigen(tensor);
         Self { values, directions }
     }
@@ -44,16 +44,16 @@ pub struct Invariants<T> {
     pub third: T,
 }
 
-impl<T: RealField + Copy> Invariants<T> {
+impl<T: RealField + Copy> From<&Matrix3<T>> for Invariants<T> {
     /// Of a tensor.
     ///
     /// ```
     /// use nalgebra::{Matrix3, Vector3};
     /// use tactile_elasticity::strain::Invariants;
-    /// let i = Invariants::of(&Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 3.0)));
+    /// let i = Invariants::from(&Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 3.0)));
     /// assert_eq!((i.first, i.second, i.third), (6.0, 11.0, 6.0));
     /// ```
-    pub fn of(a: &Matrix3<T>) -> Self {
+    fn from(a: &Matrix3<T>) -> Self {
         let minor = |i: usize, j: usize| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(j, i)];
         Self {
             first: a.trace(),

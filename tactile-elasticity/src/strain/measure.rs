@@ -190,7 +190,7 @@ impl<T: RealField + Copy> StrainMeasure<T> for EulerAlmansi {
 impl<T: RealField + Copy> StrainMeasure<T> for Hencky {
     fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
         upright(deformation)?;
-        let principal = PrincipalStretches::of(deformation);
+        let principal = PrincipalStretches::from(deformation);
         Ok(principal.compose(principal.logarithms))
     }
 
@@ -202,7 +202,7 @@ impl<T: RealField + Copy> StrainMeasure<T> for Hencky {
 impl<T: RealField + Copy> StrainMeasure<T> for Biot {
     fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
         upright(deformation)?;
-        let principal = PrincipalStretches::of(deformation);
+        let principal = PrincipalStretches::from(deformation);
         Ok(principal.compose(principal.elongations))
     }
 

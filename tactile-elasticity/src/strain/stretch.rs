@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, RealField, Vector3};
 /// use tactile_elasticity::strain::{Deformation, PrincipalStretches};
 ///
 /// let deformation = Deformation::from_displacement_gradient(Matrix3::from_diagonal(&Vector3::new(0.0, 1e-20, -0.05)));
-/// let principal = PrincipalStretches::of(&deformation);
+/// let principal = PrincipalStretches::from(&deformation);
 /// assert!((principal.elongations[0] / 1e-20_f64 - 1.0).abs() < 1e-12);
 /// assert!((principal.stretches[2] - 0.95).abs() < 1e-15);
 /// assert!((principal.directions.column(2)[2].abs() - 1.0).abs() < 1e-15);
@@ -32,12 +32,12 @@ pub struct PrincipalStretches<T> {
     pub directions: Matrix3<T>,
 }
 
-impl<T: RealField + Copy> PrincipalStretches<T> {
+impl<T: RealField + Copy> From<&Deformation<T>> for PrincipalStretches<T> {
     /// Of a deformation; needs finite entries.
     ///
     /// Near the identity they come from the eigenvalues 2E of C − I, which keeps every digit of a tiny strain;
     /// elsewhere from the singular values of F by one-sided Jacobi, which keeps every digit of a tiny stretch.
-    pub fn of(deformation: &Deformation<T>) -> Self {
+    fn from(deformation: &Deformation<T>) -> Self {
         let e = deformation.green_lagrange();
         let quarter: T = nalgebra::convert(0.25);
         let largest = e.iter().fold(T::zero(), |m, x| m.max(x.abs()));
@@ -48,7 +48,9 @@ impl<T: RealField + Copy> PrincipalStretches<T> {
             Self::from_singular_values(deformation)
         }
     }
+}
 
+impl<T: RealField + Copy> PrincipalStretches<T> {
     fn from_small_strain(e: &Matrix3<T>) -> Self {
         let (values, directions) = symmetric_eigen(e);
         let two: T = nalgebra::convert(2.0);

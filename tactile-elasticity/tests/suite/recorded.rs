@@ -166,10 +166,12 @@ fn loads() -> Vec<LoadState<f64>> {
                 contact.contact_radius_m * factor,
                 contact.indentation_m / factor,
             );
-            LoadState::new(Estimate::new(force, 0.004 * force).with_degrees_of_freedom(9.0))
-                .with_contact_radius(Estimate::new(a, 0.003 * a))
-                .with_indentation(Estimate::new(d, 0.005 * d))
-                .with_mean_strain(Estimate::new(0.6 * force * factor, 1e-4))
+            LoadState {
+                contact_radius_m: Some(Estimate::new(a, 0.003 * a)),
+                indentation_m: Some(Estimate::new(d, 0.005 * d)),
+                mean_strain: Some(Estimate::new(0.6 * force * factor, 1e-4)),
+                ..LoadState::new(Estimate::new(force, 0.004 * force).with_degrees_of_freedom(9.0))
+            }
         })
         .to_vec()
 }

@@ -106,7 +106,7 @@ fn every_scalar_of_every_case() {
         };
         check("J", d.jacobian(), None);
         check("J_minus_1", d.volume_change(), None);
-        let principal = PrincipalStretches::of(&d);
+        let principal = PrincipalStretches::from(&d);
         (0..3).for_each(|i| check("principal_stretches", principal.stretches[i], Some(i)));
         deviatoric("von_mises_infinitesimal", Infinitesimal.of(&d).unwrap());
         deviatoric("von_mises_green_lagrange", GreenLagrange.of(&d).unwrap());

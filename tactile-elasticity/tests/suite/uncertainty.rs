@@ -33,9 +33,11 @@ fn displacements_through_strain_to_the_modulus() {
     let noise = Vector3::new(2e-6, 2e-6, 5e-6);
     let (force, force_error, area) = (0.03, 2e-4, 1e-5);
     let modulus_of = |force: Estimate<f64>, strain: Estimate<f64>| {
-        let load = LoadState::new(force)
-            .with_contact_area(Estimate::exact(area))
-            .with_mean_strain(strain);
+        let load = LoadState {
+            contact_area_m2: Some(Estimate::exact(area)),
+            mean_strain: Some(strain),
+            ..LoadState::new(force)
+        };
         PaperRatio::default().estimate(&LoadSeries::new([load]))
     };
     let gradient = |u: &dyn Fn(usize) -> Vector3<f64>| {
@@ -93,8 +95,10 @@ fn a_calibrations_error_does_not_average_out() {
             let a = HertzContact::from_force(f, 4e-3, reduced)
                 .unwrap()
                 .contact_radius_m;
-            LoadState::new(Estimate::new(f, 0.004 * f))
-                .with_contact_radius(Estimate::new(a, 0.002 * a))
+            LoadState {
+                contact_radius_m: Some(Estimate::new(a, 0.002 * a)),
+                ..LoadState::new(Estimate::new(f, 0.004 * f))
+            }
         })
         .collect();
     let estimator = HertzSphere::new(4e-3, 0.5).unwrap();

@@ -18,8 +18,9 @@ use super::tiles::TileSum;
 ///     (200.0 * (1.0 - 0.1 * (u * u + v * v))).round() as u8
 /// });
 /// let flat = ReferenceFrame::new(image.view())?.with_flat_field()?.flat_field().expect("asked for");
-/// assert!((flat.at(0.0, 0.0) - 0.8).abs() < 3e-3);
-/// assert!((flat.at(159.5, 119.5) - 1.0).abs() < 1e-12);
+/// // L = Σ c_k (1, u, v, u², uv, v²)_k: 0.8 in the corner u = v = −1.
+/// let [c, u, v, uu, uv, vv] = flat.coefficients;
+/// assert!((c - u - v + uu + uv + vv - 0.8).abs() < 3e-3 && c == 1.0);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +88,7 @@ impl FlatField {
     }
 
     /// Relative brightness at a pixel.
-    pub fn at(&self, x: f64, y: f64) -> f64 {
+    pub(crate) fn at(&self, x: f64, y: f64) -> f64 {
         terms(self.middle, x, y)
             .iter()
             .zip(&self.coefficients)

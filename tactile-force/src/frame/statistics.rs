@@ -5,15 +5,12 @@ use ndarray::{ArrayView2, Axis, Slice};
 /// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
 ///
 /// ```
-/// use ndarray::Array2;
 /// use tactile_force::BoundingBox;
 ///
-/// let left = BoundingBox { row_start: 2, row_end: 5, column_start: 0, column_end: 4 };
-/// let right = BoundingBox { row_start: 4, row_end: 6, column_start: 6, column_end: 9 };
-/// let both = left.union(right).grown(1, (6, 20));
-/// assert_eq!((both.rows(), both.columns()), (5, 10));
-/// let image = Array2::from_shape_fn((6, 20), |(row, column)| 100 * row + column);
-/// assert_eq!(right.of(image.view())[[0, 0]], 406);
+/// let seen = BoundingBox { row_start: 2, row_end: 5, column_start: 0, column_end: 4 };
+/// // A margin of one pixel, as far as a frame of 5 × 20 goes.
+/// let wider = seen.grown(1, (5, 20));
+/// assert_eq!((wider.rows(), wider.columns()), (4, 5));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -49,6 +46,15 @@ impl BoundingBox {
     }
 
     /// The part of an image inside the box.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_force::BoundingBox;
+    ///
+    /// let right = BoundingBox { row_start: 4, row_end: 6, column_start: 6, column_end: 9 };
+    /// let image = Array2::from_shape_fn((6, 20), |(row, column)| 100 * row + column);
+    /// assert_eq!(right.of(image.view())[[0, 0]], 406);
+    /// ```
     pub fn of<'a, P>(&self, mut image: ArrayView2<'a, P>) -> ArrayView2<'a, P> {
         image.slice_axis_inplace(Axis(0), Slice::from(self.row_start..self.row_end));
         image.slice_axis_inplace(Axis(1), Slice::from(self.column_start..self.column_end));
@@ -56,7 +62,7 @@ impl BoundingBox {
     }
 
     /// The smallest box that holds both.
-    pub fn union(self, other: Self) -> Self {
+    pub(crate) fn union(self, other: Self) -> Self {
         Self {
             row_start: self.row_start.min(other.row_start),
             row_end: self.row_end.max(other.row_end),

@@ -180,17 +180,7 @@ impl LensGeometry {
     }
 
     /// Distances [x, y] in metres that one pixel step covers at a pixel: h_x and h_y without distortion.
-    ///
-    /// ```
-    /// use tactile_force::LensGeometry;
-    ///
-    /// let lens = LensGeometry::new([20e-6; 2])?.with_distortion([100.0, 100.0], 100.0, [0.1, 0.0])?;
-    /// assert_eq!(lens.pixel_step_m([100.0, 100.0]), [20e-6; 2]);
-    /// let [along, across] = lens.pixel_step_m([150.0, 100.0]);
-    /// assert!((along / 20e-6 - 1.075).abs() < 1e-12 && (across / 20e-6 - 1.025).abs() < 1e-12);
-    /// # Ok::<(), tactile_force::ForceError>(())
-    /// ```
-    pub fn pixel_step_m(&self, pixel: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn pixel_step_m(&self, pixel: [f64; 2]) -> [f64; 2] {
         let [[xu, xv], [yu, yv]] = self.local(pixel).jacobian;
         [xu.hypot(yu), xv.hypot(yv)]
     }

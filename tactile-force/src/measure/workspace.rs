@@ -1,11 +1,10 @@
 //! Buffers of a measurement, and what they still know of the last frame.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 
 use super::local::Local;
 use crate::contact::DetectorWorkspace;
-use crate::frame::{BoundingBox, ReferenceFrame};
-use crate::health::FrameCondition;
+use crate::frame::BoundingBox;
 use crate::hertz::Rings;
 
 /// Buffers that measurements reuse from frame to frame; after the first frames nothing is allocated.
@@ -22,32 +21,23 @@ use crate::hertz::Rings;
 /// let mut workspace = ForceWorkspace::default();
 /// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?;
 /// meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
-/// let (place, mask) = workspace.mask().expect("contact");
+/// let (place, mask) = workspace.detector.mask().expect("contact");
 /// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 20 * 24);
 /// assert!(place.row_start <= 20 && place.row_end >= 40);
 /// // Outside the contact the sensor is as bright as before.
-/// let condition = workspace.condition(&reference).expect("a frame");
+/// let condition = workspace.detector.condition(&reference).expect("a frame");
 /// assert!((condition.brightness.value - 1.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct ForceWorkspace {
-    pub(super) detector: DetectorWorkspace,
+    /// What the detector keeps of the last frame: mask, grey histogram and background.
+    pub detector: DetectorWorkspace,
     pub(super) rings: Rings,
     pub(super) local: Local,
 }
 
 impl ForceWorkspace {
-    /// The last contact's mask (1 inside) over its region, and the region's place in the frame.
-    pub fn mask(&self) -> Option<(BoundingBox, ArrayView2<'_, u8>)> {
-        self.detector.mask()
-    }
-
-    /// Brightness and noise of the last frame outside the contact, as [`DetectorWorkspace::condition`].
-    pub fn condition(&mut self, reference: &ReferenceFrame) -> Option<FrameCondition> {
-        self.detector.condition(reference)
-    }
-
     /// The pressure of the last contact in pascals over its region (zero outside the aperture), and the region's place in the
     /// frame; `None` without contact, or if the calibration had no [local curve](crate::StressCalibration::local). O(pixels of the region).
     ///

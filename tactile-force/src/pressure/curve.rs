@@ -36,7 +36,7 @@ use crate::frame::DifferenceNoise;
 /// let pressure = curve.pressure_pa(100.0);
 /// assert!((pressure.value / 1e4 - 1.0).abs() < 0.01);
 /// assert_eq!(curve.pressure_pa(0.0).value, 0.0);
-/// assert_eq!(curve.fit_report().identified_grey[1], 144.0);
+/// assert_eq!(curve.report.identified_grey[1], 144.0);
 /// // Half of a contact at 40 grey levels, half at 120.
 /// let greys = (0..1000).map(|k| if k < 500 { 40.0 } else { 120.0 });
 /// let noise = DifferenceNoise { background: 2.0, gain: 0.02, common: 0.0, scale: 0.0, flat_field: 0.0 };
@@ -52,7 +52,8 @@ use crate::frame::DifferenceNoise;
 )]
 pub struct PressureCurve {
     coefficients: Coefficients,
-    report: PressureCurveReport,
+    /// How well the curve fits its frames, and which grey levels these determine.
+    pub report: PressureCurveReport,
     /// F(V) of the same frames.
     sums: MonotoneCalibration<f64>,
 }
@@ -103,11 +104,6 @@ impl PressureCurve {
             report,
             sums,
         })
-    }
-
-    /// How well the curve fits its frames, and which grey levels these determine.
-    pub fn fit_report(&self) -> &PressureCurveReport {
-        &self.report
     }
 }
 

@@ -33,7 +33,7 @@ pub struct CurveHysteresis {
 ///     .map(|(grey, h)| CalibrationFrame::new(h, 2e3 * f64::from(grey) * 1e-6, Branch::Loading))
 ///     .collect::<Result<_, _>>()?;
 /// let curve = PressureCurve::fit(&frames, &Default::default())?;
-/// let report = curve.fit_report();
+/// let report = curve.report;
 /// assert_eq!((report.frames, report.hysteresis), (8, None));
 /// assert!(report.residual_sd < 1e-6 && report.identified_grey[1] == 160.0);
 /// # Ok::<(), tactile_force::ForceError>(())

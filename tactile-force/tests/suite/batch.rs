@@ -2,8 +2,8 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
-    CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, HertzProfile, LinearCalibration,
-    PixelGrid, ReferenceFrame, measure_force,
+    CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, HertzProfile,
+    LinearCalibration, PixelGrid, ReferenceFrame, measure_force,
 };
 
 fn frame(radius: f64, x: f64) -> Array2<u8> {
@@ -42,9 +42,10 @@ fn the_same_bits_alone_in_series_and_in_parallel() {
         .map(|v| measure_force(v.view(), dark.view(), [2e-5; 2], &calibration, &options).unwrap())
         .collect();
     assert!(single[0].contact.is_some() && single[1].contact.is_none());
-    let series: Vec<_> = meter
-        .measure_all(&views, &reference, &calibration)
-        .into_iter()
+    let mut workspace = ForceWorkspace::default();
+    let series: Vec<_> = views
+        .iter()
+        .map(|v| meter.measure_with(&mut workspace, v.view(), &reference, &calibration))
         .map(Result::unwrap)
         .collect();
     assert_eq!(series, single);

@@ -32,7 +32,12 @@ fn slow(
                 column_start: x,
                 column_end: x + 1,
             };
-            s.bounding_box = Some(s.bounding_box.map_or(here, |b| b.union(here)));
+            s.bounding_box = Some(s.bounding_box.map_or(here, |b| BoundingBox {
+                row_start: b.row_start.min(y),
+                row_end: b.row_end.max(y + 1),
+                column_start: b.column_start.min(x),
+                column_end: b.column_end.max(x + 1),
+            }));
         }
     }
     s

@@ -97,7 +97,7 @@ fn the_report_says_what_was_learned() {
     };
     let reference = sensor.reference();
     let curve = sensor.curve(&reference, 3);
-    let report = curve.fit_report();
+    let report = &curve.report;
     assert_eq!(report.frames, 24);
     let [low, high] = report.identified_grey;
     let top = sensor.light(1.5 / (std::f64::consts::PI * contact_radius(1.0, 4e-3).powi(2)));

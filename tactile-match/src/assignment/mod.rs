@@ -36,7 +36,7 @@ pub fn linear_assignment<T: RealField + Copy>(
     rows: usize,
     columns: usize,
 ) -> Result<Vec<Option<usize>>, MatchError> {
-    let mut workspace = AssignmentWorkspace::new();
+    let mut workspace = AssignmentWorkspace::default();
     workspace.solve(costs, rows, columns)?;
     Ok(workspace.assignment)
 }
@@ -45,31 +45,26 @@ pub fn linear_assignment<T: RealField + Copy>(
 ///
 /// ```
 /// use tactile_match::AssignmentWorkspace;
-/// let mut workspace = AssignmentWorkspace::new();
+/// let mut workspace = AssignmentWorkspace::default();
 /// assert_eq!(workspace.solve(&[2.0, 1.0, 1.0, 5.0], 2, 2)?, [Some(1), Some(0)]);
-/// assert_eq!(workspace.row_prices().iter().chain(workspace.column_prices()).sum::<f64>(), 2.0);
+/// assert_eq!(workspace.row_prices.iter().chain(&workspace.column_prices).sum::<f64>(), 2.0);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct AssignmentWorkspace<T> {
     assignment: Vec<Option<usize>>,
-    row_prices: Vec<T>,
-    column_prices: Vec<T>,
+    /// `u` of the last solution.
+    pub row_prices: Vec<T>,
+    /// `v` of the last solution.
+    pub column_prices: Vec<T>,
     /// The matrix turned so that it is not taller than wide.
     turned: Vec<T>,
     search: Search<T>,
 }
 
 impl<T: RealField + Copy> Default for AssignmentWorkspace<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<T: RealField + Copy> AssignmentWorkspace<T> {
     /// Without memory yet.
-    #[must_use]
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self {
             assignment: Vec::new(),
             row_prices: Vec::new(),
@@ -78,7 +73,9 @@ impl<T: RealField + Copy> AssignmentWorkspace<T> {
             search: Search::new(),
         }
     }
+}
 
+impl<T: RealField + Copy> AssignmentWorkspace<T> {
     /// As [`linear_assignment`].
     ///
     /// # Errors
@@ -116,18 +113,6 @@ impl<T: RealField + Copy> AssignmentWorkspace<T> {
                 .extend((0..columns).map(|j| self.search.row_price(&self.turned, j)));
         }
         Ok(&self.assignment)
-    }
-
-    /// `u` of the last solution.
-    #[must_use]
-    pub fn row_prices(&self) -> &[T] {
-        &self.row_prices
-    }
-
-    /// `v` of the last solution.
-    #[must_use]
-    pub fn column_prices(&self) -> &[T] {
-        &self.column_prices
     }
 }
 

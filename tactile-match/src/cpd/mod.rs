@@ -27,10 +27,9 @@ mod warp;
 
 pub use options::DriftOptions;
 pub use registration::DriftWorkspace;
-pub use warp::DriftWarp;
 
 use crate::validate::point_sets;
-use crate::{MatchError, Matching, PointMatcher, StopReason};
+use crate::{MatchError, Matching, PointMatcher};
 use nalgebra::Point;
 use tactile_tps::Scalar;
 
@@ -145,7 +144,7 @@ impl CoherentPointDrift {
     /// use nalgebra::{Point2, Vector2};
     /// use tactile_match::{CoherentPointDrift, DriftWorkspace};
     /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor())).collect();
-    /// let (matcher, mut workspace) = (CoherentPointDrift::default(), DriftWorkspace::new());
+    /// let (matcher, mut workspace) = (CoherentPointDrift::default(), DriftWorkspace::default());
     /// for shift in [0.5, 5.0] {
     ///     let target: Vec<_> = model.iter().map(|p| p + Vector2::new(shift, 0.0)).collect();
     ///     let matching = matcher.match_with(&mut workspace, &model, &target)?;
@@ -162,43 +161,14 @@ impl CoherentPointDrift {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        self.register_with(workspace, model, target)?;
+        point_sets(model, target)?;
+        workspace.register(&self.options, model, target);
         Ok(outcome::matching(
             &self.options,
             workspace,
             model.len(),
             target.len(),
         ))
-    }
-
-    /// The registration alone, without pairs and covariances: what it found stays in the workspace.
-    ///
-    /// Non-rigid motion allocates nothing once the workspace has seen sets as large.
-    ///
-    /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_match::{CoherentPointDrift, DriftWorkspace};
-    /// let model = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(Point2::from);
-    /// let target = model.map(|p| Point2::new(p.x + 0.1 * p.y, p.y + 3.0));
-    /// let mut workspace = DriftWorkspace::new();
-    /// CoherentPointDrift::default().register_with(&mut workspace, &model, &target)?;
-    /// let mut warped = model;
-    /// workspace.warped_into(&mut warped)?;
-    /// assert!(warped.iter().zip(&target).all(|(w, t)| (w - t).norm() < 0.01));
-    /// # Ok::<(), tactile_match::MatchError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`PointMatcher::match_points`].
-    pub fn register_with<T: Scalar, const D: usize>(
-        &self,
-        workspace: &mut DriftWorkspace<D>,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<StopReason, MatchError> {
-        point_sets(model, target)?;
-        workspace.register(&self.options, model, target);
-        Ok(workspace.stop)
     }
 }
 
@@ -208,6 +178,32 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for CoherentPointDrift {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        self.match_with(&mut DriftWorkspace::new(), model, target)
+        self.match_with(&mut DriftWorkspace::default(), model, target)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{bend, scattered};
+
+    #[test]
+    fn a_used_workspace_registers_without_allocating() {
+        let options = DriftOptions::default();
+        let mut workspace = DriftWorkspace::default();
+        let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
+            .into_iter()
+            .map(|(n, seed)| scattered::<f64, 3>(n, seed))
+            .map(|model| (bend(&model, 0.05), model))
+            .collect();
+        for (target, model) in &sets {
+            workspace.register(&options, model, target);
+        }
+        let counted = allocation_counter::measure(|| {
+            for (target, model) in &sets {
+                workspace.register(&options, model, target);
+            }
+        });
+        assert_eq!(counted.count_total, 0);
     }
 }

@@ -4,7 +4,7 @@ use super::DriftOptions;
 use super::expectation::gaussians;
 use super::registration::DriftWorkspace;
 use crate::{AssignmentWorkspace, MatchReport, Matching, SoftMatches, unmatched_rows};
-use nalgebra::{Point, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 use tactile_tps::Scalar;
 
 /// Soft matches below this weight are left out.
@@ -30,7 +30,7 @@ fn posterior<const D: usize>(options: &DriftOptions, workspace: &DriftWorkspace<
 /// likely the model point's as an outlier.
 fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<usize>> {
     let costs: Vec<f64> = posterior.iter().map(|p| -p).collect();
-    let mut workspace = AssignmentWorkspace::new();
+    let mut workspace = AssignmentWorkspace::default();
     let mut assignment = vec![None; model_len];
     // The costs are probabilities: finite, and of the right number.
     let columns = workspace
@@ -60,7 +60,8 @@ pub(super) fn matching<T: Scalar, const D: usize>(
     let posterior = posterior(options, workspace);
     let assignment = pairs(&posterior, model_len, target_len);
     let scale = workspace.target_frame.scale;
-    let (mut soft, mut confidence, mut covariance) = (SoftMatches::new(), Vec::new(), Vec::new());
+    let (mut soft, mut confidence, mut covariance) =
+        (SoftMatches::default(), Vec::new(), Vec::new());
     for (m, partner) in assignment.iter().enumerate() {
         let row: Vec<(usize, f64)> = (0..target_len)
             .map(|n| (n, posterior[n * model_len + m]))
@@ -76,12 +77,10 @@ pub(super) fn matching<T: Scalar, const D: usize>(
         confidence.push(nalgebra::convert(sure.clamp(0.0, 1.0)));
         covariance.push((spread(workspace, &row, mass) * (scale * scale)).map(nalgebra::convert));
     }
-    let mut warped = vec![Point::origin(); model_len];
-    workspace.warped_into(&mut warped).unwrap_or_default(); // as many as the model has
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target_len);
     Matching {
         warp: Box::new(workspace.warp()),
-        warped,
+        warped: workspace.warped(),
         confidence,
         soft,
         unmatched_model,

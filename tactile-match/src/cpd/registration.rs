@@ -6,8 +6,8 @@ use super::kernel::KernelFactor;
 use super::non_rigid::NonRigidStep;
 use super::warp::DriftWarp;
 use super::{DriftOptions, Motion, Normalization};
+use crate::StopReason;
 use crate::frame::Frame;
-use crate::{MatchError, StopReason};
 use nalgebra::{Point, RealField, SMatrix, SVector};
 
 /// What is left of the kernel's diagonal when its factorisation ends: far below what the ridge `λσ²` lets through.
@@ -22,7 +22,7 @@ const KERNEL_TOLERANCE: f64 = 1e-12;
 /// use tactile_tps::Warp;
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y + 2.0)).collect();
-/// let mut workspace = DriftWorkspace::new();
+/// let mut workspace = DriftWorkspace::default();
 /// CoherentPointDrift::default().register_with(&mut workspace, &model, &target)?;
 /// assert!(workspace.iterations() > 1 && workspace.sigma2() < 1e-2); // σ² in squared radii of the target
 /// assert!(workspace.kernel_rank() <= 12); // at most one column a model point
@@ -50,14 +50,7 @@ pub struct DriftWorkspace<const D: usize> {
 
 impl<const D: usize> Default for DriftWorkspace<D> {
     fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<const D: usize> DriftWorkspace<D> {
-    /// Without memory yet.
-    #[must_use]
-    pub fn new() -> Self {
+        // Without memory yet.
         let columns = || std::array::from_fn(|_| Vec::new());
         Self {
             model_frame: Frame::default(),
@@ -75,23 +68,12 @@ impl<const D: usize> DriftWorkspace<D> {
             global: GlobalStep::default(),
         }
     }
+}
 
-    /// The variance `σ²` of the last registration, in the frame of the target.
-    #[must_use]
-    pub fn sigma2(&self) -> f64 {
-        self.sigma2
-    }
-
+impl<const D: usize> DriftWorkspace<D> {
     /// Iterations of the last registration.
-    #[must_use]
-    pub fn iterations(&self) -> usize {
+    pub(super) fn iterations(&self) -> usize {
         self.energy.len()
-    }
-
-    /// Numerical rank of the kernel of the last non-rigid registration.
-    #[must_use]
-    pub fn kernel_rank(&self) -> usize {
-        self.kernel.rank()
     }
 
     /// Registers `model` to `target`; both have points and finite coordinates.
@@ -236,32 +218,15 @@ impl<const D: usize> DriftWorkspace<D> {
     }
 
     /// The model points where the last registration left them.
-    ///
-    /// # Errors
-    /// [`MatchError::Shape`] if `warped` has not as many entries as the model.
-    pub fn warped_into<T: RealField + Copy>(
-        &self,
-        warped: &mut [Point<T, D>],
-    ) -> Result<(), MatchError> {
-        let (expected, found) = (self.moved[0].len(), warped.len());
-        if found != expected {
-            return Err(MatchError::Shape {
-                what: "warped",
-                expected,
-                found,
-            });
-        }
-        for (m, point) in warped.iter_mut().enumerate() {
-            *point = self
-                .target_frame
-                .leave(SVector::from_fn(|d, _| self.moved[d][m]));
-        }
-        Ok(())
+    pub(super) fn warped<T: RealField + Copy>(&self) -> Vec<Point<T, D>> {
+        let at = |m: usize| SVector::from_fn(|d, _| self.moved[d][m]);
+        (0..self.moved[0].len())
+            .map(|m| self.target_frame.leave(at(m)))
+            .collect()
     }
 
     /// The map the last registration found, for any point.
-    #[must_use]
-    pub fn warp(&self) -> DriftWarp<D> {
+    pub(super) fn warp(&self) -> DriftWarp<D> {
         let mut warp = DriftWarp {
             model: self.model_frame,
             target: self.target_frame,

@@ -51,6 +51,9 @@ impl RelaxationLabelling {
         target: &[Point<T, D>],
     ) -> MatchMatrix<T> {
         let options = &self.options;
+        if let Some(candidates) = options.candidates {
+            return super::sparse::relax(options, candidates, model, target);
+        }
         let graphs =
             [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
         let compatibilities = Compatibilities::new(&graphs, options.rule(&graphs));
@@ -81,7 +84,7 @@ pub(super) fn relax_with<T: Scalar>(
 }
 
 /// The outer iterations: `relax` gives the match matrix of the warped model and the target, the spline warps the model, and again.
-pub(super) fn match_with<T: Scalar, const D: usize>(
+fn match_with<T: Scalar, const D: usize>(
     options: &LabellingOptions,
     model: &[Point<T, D>],
     target: &[Point<T, D>],

@@ -25,7 +25,7 @@
 //! One sweep costs `O(I J A B)` for `A` and `B` neighbours a point, and with neighbourhoods of the median radius
 //! `A ≈ I/2`, `B ≈ J/2`: fourth order, not the third the paper claims. [`AnnealedSoftassign`](crate::AnnealedSoftassign)
 //! is the matcher to use; [`RelaxationLabelling`] is what to check it against, and
-//! [`SparseRelaxationLabelling`] is the same method over few candidates.
+//! [`LabellingOptions::with_candidates`] runs the same method over few candidates.
 
 mod compatibility;
 mod match_matrix;
@@ -53,7 +53,6 @@ pub use compatibility::{Compatibility, LengthMaximum};
 pub use matcher::RelaxationLabelling;
 pub use neighbourhood::Neighbourhood;
 pub use options::LabellingOptions;
-pub use sparse::SparseRelaxationLabelling;
 
 use compatibility::{CompatibilityRule, gamma};
 use match_matrix::MatchMatrix;

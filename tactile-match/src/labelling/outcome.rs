@@ -113,7 +113,7 @@ impl<T: Scalar, const D: usize> Run<T, D> {
         // The spline's values determine it: interpolating them gives it back in the units of the caller.
         let warp = hard::spline(model, &positions, None, Smoothing::None);
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
-        let mut soft = SoftMatches::new();
+        let mut soft = SoftMatches::default();
         let (mut confidence, mut covariance) = (Vec::new(), Vec::new());
         for (i, partner) in assignment.iter().enumerate() {
             let row = &self.matches.row(i)[..target.len()];

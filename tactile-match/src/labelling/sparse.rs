@@ -1,87 +1,23 @@
 //! The same method over few candidates a point, with the links between them computed once.
 
-use super::matcher::{match_with, relax_with};
+use super::matcher::relax_with;
 use super::{CompatibilityRule, LabellingOptions, MatchMatrix, NeighbourGraph, first_matches};
-use crate::validate::at_least_one;
-use crate::{MatchError, Matching, PointMatcher};
 use nalgebra::Point;
 use tactile_tps::Scalar;
 
-/// The paper's method over the likeliest candidates of every point: [`RelaxationLabelling`](crate::RelaxationLabelling) with the same options, at a fraction of its cost.
-///
-/// Only the `c` pairs of largest first probability of every model point are kept; the others stay zero, which (20) would not change.
-/// What pair `(a, b)` says for pair `(i, j)` in (19) does not depend on M: these links, `I A c²` at most, are computed once an
-/// outer iteration, and a sweep costs one multiplication each instead of `O(I J A B)`. With all candidates
-/// (`candidates ≥ J`) the answer is that of [`RelaxationLabelling`](crate::RelaxationLabelling) to rounding. The other candidates of a
-/// point whose match is settled (to a hundred roundings) leave the sweeps.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::labelling::LabellingOptions;
-/// use tactile_match::{PointMatcher, RelaxationLabelling, SparseRelaxationLabelling};
-/// let model: Vec<_> = (0..16).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.1 * k.sin(), (k / 4.0).floor())).collect();
-/// let target: Vec<_> = model.iter().rev().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
-/// let all = SparseRelaxationLabelling::new(LabellingOptions::default(), 16)?.match_points(&model, &target)?;
-/// let dense = RelaxationLabelling::default().match_points(&model, &target)?;
-/// assert_eq!(all.assignment, dense.assignment);
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseRelaxationLabelling {
-    options: LabellingOptions,
+/// One outer iteration's match matrix, as [`RelaxationLabelling::relax`](super::RelaxationLabelling::relax) with all but the likeliest
+/// candidates at zero.
+pub(super) fn relax<T: Scalar, const D: usize>(
+    options: &LabellingOptions,
     candidates: usize,
-}
-
-impl Default for SparseRelaxationLabelling {
-    /// Ten candidates.
-    fn default() -> Self {
-        Self {
-            options: LabellingOptions::default(),
-            candidates: 10,
-        }
-    }
-}
-
-impl SparseRelaxationLabelling {
-    /// With these options and so many candidates a model point; as many as there are targets, or more, keeps all.
-    ///
-    /// # Errors
-    /// [`MatchError::InvalidOption`] for no candidate.
-    pub fn new(options: LabellingOptions, candidates: usize) -> Result<Self, MatchError> {
-        at_least_one("candidates", candidates)?;
-        Ok(Self {
-            options,
-            candidates,
-        })
-    }
-
-    /// One outer iteration's match matrix, as [`RelaxationLabelling::relax`] with all other pairs at zero.
-    #[must_use]
-    pub(crate) fn relax<T: Scalar, const D: usize>(
-        &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> MatchMatrix<T> {
-        let options = &self.options;
-        let graphs =
-            [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
-        let mut m = first_matches(model, target, options.temperature, options.slack);
-        keep_likeliest(&mut m, self.candidates);
-        let links = Links::new(&m, &graphs, options.rule(&graphs));
-        relax_with(options, m, |m| links.support(m))
-    }
-}
-
-impl<T: Scalar, const D: usize> PointMatcher<T, D> for SparseRelaxationLabelling {
-    fn match_points(
-        &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
-        match_with(&self.options, model, target, |model, target| {
-            self.relax(model, target)
-        })
-    }
+    model: &[Point<T, D>],
+    target: &[Point<T, D>],
+) -> MatchMatrix<T> {
+    let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
+    let mut m = first_matches(model, target, options.temperature, options.slack);
+    keep_likeliest(&mut m, candidates);
+    let links = Links::new(&m, &graphs, options.rule(&graphs));
+    relax_with(options, m, |m| links.support(m))
 }
 
 /// The target that has all of a row, so that no other can still come up: what they have is below a hundred roundings.

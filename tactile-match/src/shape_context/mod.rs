@@ -25,8 +25,9 @@ const LANES: usize = 16;
 /// let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.3, 0.45]].map(Point2::from);
 /// let moved = square.map(|p| Point2::new(p.x + 7.0, p.y - 2.0));
 /// let (a, b) = (ShapeContexts::new(&square, 2.0)?, ShapeContexts::new(&moved, 2.0)?);
-/// assert!(a.cost(4, &b, 4) < 1e-6);
-/// assert!(a.cost(4, &b, 0) > 0.1);
+/// let mut costs = Vec::new();
+/// a.costs_into(4, &b, &mut costs);
+/// assert!(costs[4] < 1e-6 && costs[0] > 0.1);
 /// # Ok(())
 /// # }
 /// ```
@@ -56,7 +57,7 @@ impl ShapeContexts {
             "(0, ∞)",
         )?;
         if !points.is_empty() {
-            validate::point_set(crate::PointSet::Model, points)?;
+            validate::point_set("model", points)?;
         }
         let plain: Vec<[f64; D]> = points
             .iter()
@@ -75,12 +76,12 @@ impl ShapeContexts {
 
     /// χ² distance of the contexts of point `i` here and point `j` of `other`, in [0, 1].
     #[must_use]
-    pub fn cost(&self, i: usize, other: &Self, j: usize) -> f32 {
+    pub(crate) fn cost(&self, i: usize, other: &Self, j: usize) -> f32 {
         let (g, h) = (self.row(i), other.row(j));
         chi_squared(g, h) / (self.totals[i] + other.totals[j]).max(1.0)
     }
 
-    /// The costs of point `i` here and all points of `other`, into `costs`.
+    /// The costs of point `i` here and all points of `other`, into `costs`: the χ² distances of their contexts, in [0, 1].
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -246,13 +247,15 @@ mod tests {
             .map(|i| Point3::new((i as f64).sin(), (2.1 * i as f64).cos(), 0.1 * i as f64))
             .collect();
         let contexts = ShapeContexts::new(&points, 2.0).unwrap();
-        let mut costs = Vec::new();
+        let mut costs = vec![Vec::new(); 20];
         for i in 0..20 {
-            contexts.costs_into(i, &contexts, &mut costs);
-            assert_eq!(costs[i], 0.0);
-            for (j, &cost) in costs.iter().enumerate() {
+            contexts.costs_into(i, &contexts, &mut costs[i]);
+        }
+        for i in 0..20 {
+            assert_eq!(costs[i][i], 0.0);
+            for j in 0..20 {
                 // Sums of 16 lanes in single precision.
-                assert!((cost - contexts.cost(j, &contexts, i)).abs() < 1e-5 && cost <= 1.0);
+                assert!((costs[i][j] - costs[j][i]).abs() < 1e-5 && costs[i][j] <= 1.0);
             }
         }
     }

@@ -14,22 +14,46 @@ use tactile_tps::Scalar;
 /// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
 /// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
-/// let mut workspace = SoftassignWorkspace::new();
+/// let mut workspace = SoftassignWorkspace::default();
 /// let found = AnnealedSoftassign::default()
 ///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
-/// assert_eq!((found.assignment()[2], found.confidence()[2] > 0.9), (Some(2), true));
+/// assert_eq!((found.assignment[2], found.confidence[2] > 0.9), (Some(2), true));
 /// assert!(found.warped::<f64>().zip(&target).all(|(w, t)| (w - t).norm() < 1e-9));
-/// assert!(found.report().residual < 1e-9); // units of the points
+/// assert!(found.report.residual < 1e-9); // units of the points
 /// let matching = found.to_matching(&model);
 /// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6); // areas grow by a tenth
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct SoftassignMatch<'w, const D: usize> {
-    pub(super) workspace: &'w SoftassignWorkspace<D>,
+    workspace: &'w SoftassignWorkspace<D>,
+    /// Target row of every model point.
+    pub assignment: &'w [Option<usize>],
+    /// Probability that each assignment is right.
+    pub confidence: &'w [f64],
+    /// How it went.
+    pub report: MatchReport<f64>,
 }
 
 impl<'w, const D: usize> SoftassignMatch<'w, D> {
+    /// What the workspace holds.
+    pub(super) fn of(workspace: &'w SoftassignWorkspace<D>) -> Self {
+        let scale = workspace.frame.scale;
+        Self {
+            workspace,
+            assignment: &workspace.answer.assignment,
+            confidence: &workspace.answer.confidence,
+            report: MatchReport {
+                stop: stop_reason(workspace),
+                iterations: workspace.best.iterations,
+                starts: workspace.starts,
+                residual: workspace.answer.residual * scale,
+                sigma: workspace.best.sigma * scale,
+                doubt: workspace.doubt(),
+            },
+        }
+    }
+
     /// The warped model points.
     pub fn warped<T: Scalar>(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + use<'w, T, D> {
         let workspace = self.workspace;
@@ -38,32 +62,6 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
             .warped
             .iter()
             .map(|w| workspace.frame.outward(w))
-    }
-
-    /// Target row of every model point.
-    #[must_use]
-    pub fn assignment(&self) -> &'w [Option<usize>] {
-        &self.workspace.answer.assignment
-    }
-
-    /// Probability that each assignment is right.
-    #[must_use]
-    pub fn confidence(&self) -> &'w [f64] {
-        &self.workspace.answer.confidence
-    }
-
-    /// How it went.
-    #[must_use]
-    pub fn report(&self) -> MatchReport<f64> {
-        let (workspace, scale) = (self.workspace, self.workspace.frame.scale);
-        MatchReport {
-            stop: self.stop_reason(),
-            iterations: workspace.best.iterations,
-            starts: workspace.starts,
-            residual: workspace.answer.residual * scale,
-            sigma: workspace.best.sigma * scale,
-            doubt: workspace.doubt(),
-        }
     }
 
     /// The answer with its warp, soft matches and covariances; `model` are the points that were matched.
@@ -82,7 +80,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         let (answer, frame) = (&workspace.answer, &workspace.frame);
         let mut warped: Vec<Point<T, D>> = self.warped().collect();
         let warp = spline.through(model, &mut warped);
-        let (mut soft, mut row) = (SoftMatches::new(), Vec::new());
+        let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
         for i in 0..model.len() {
             row.clear();
             row.extend(
@@ -115,24 +113,23 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
                 .iter()
                 .map(|&e| nalgebra::convert(e))
                 .collect(),
-            report: narrow(&self.report()),
+            report: narrow(&self.report),
         }
     }
+}
 
-    fn stop_reason(&self) -> StopReason {
-        let workspace = self.workspace;
-        match () {
-            () if workspace.stopped => StopReason::Callback,
-            // The floor is reached to rounding.
-            () if workspace.best.sigma <= 1.000_001 * finish::FLOOR
-                && !workspace.annealer.soft.errors.differ()
-                && workspace.doubt().is_none() =>
-            {
-                StopReason::Exact
-            }
-            () if workspace.best.settled => StopReason::Converged,
-            () => StopReason::IterationLimit,
+fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason {
+    match () {
+        () if workspace.stopped => StopReason::Callback,
+        // The floor is reached to rounding.
+        () if workspace.best.sigma <= 1.000_001 * finish::FLOOR
+            && !workspace.annealer.soft.errors.differ()
+            && workspace.doubt().is_none() =>
+        {
+            StopReason::Exact
         }
+        () if workspace.best.settled => StopReason::Converged,
+        () => StopReason::IterationLimit,
     }
 }
 

@@ -19,7 +19,7 @@ use tactile_tps::Scalar;
 ///     (0..12).map(|k| f64::from(k).mul_add(30.0, turn).to_radians()).map(|a| Point2::new(a.cos(), a.sin())).collect()
 /// };
 /// let (model, target) = (ring(0.0), ring(30.0));
-/// let landmarks = [Landmark::new(0, target[0], 0.0)?, Landmark::new(4, target[4], 0.0)?]; // two known pairs
+/// let landmarks = [0, 4].map(|row| Landmark { row, position: target[row], deviation: 0.0 }); // two known pairs
 /// let options = SoftassignOptions::default().with_transformation(Transformation::Rigid);
 /// let found = AnnealedSoftassign::new(options).match_with_landmarks(&model, &target, &landmarks)?;
 /// assert!((0..12).all(|i| found.assignment[i] == Some(i)));
@@ -27,43 +27,27 @@ use tactile_tps::Scalar;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Landmark<T: Scalar, const D: usize> {
-    row: usize,
-    position: Point<T, D>,
-    deviation: T,
+    /// Row of the model point.
+    pub row: usize,
+    /// Where it goes.
+    pub position: Point<T, D>,
+    /// Standard deviation along an axis, in the units of the points; 0 for a hard landmark, which is kept to a thousandth of the model's
+    /// radius, and where its position is a target exactly.
+    pub deviation: T,
 }
 
 impl<T: Scalar, const D: usize> Landmark<T, D> {
-    /// Model point `row` goes to `position`, with the standard deviation `deviation` along an axis, in the units of the points; 0 for a hard
-    /// landmark, which is kept to a thousandth of the model's radius, and where its position is a target exactly.
-    ///
-    /// # Errors
-    /// [`MatchError::InvalidOption`] for a deviation that is negative or not finite, [`MatchError::LandmarkPosition`] for a position
-    /// that is not finite.
-    ///
-    /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_match::{Landmark, MatchError};
-    /// let seen = Landmark::new(7, Point2::new(0.3, 0.1), 0.05); // near there, to 0.05 along each axis
-    /// assert!(seen.is_ok());
-    /// let nowhere = Landmark::new(7, Point2::new(f64::NAN, 0.1), 0.05);
-    /// assert_eq!(nowhere, Err(MatchError::LandmarkPosition { row: 7 }));
-    /// ```
-    pub fn new(row: usize, position: Point<T, D>, deviation: T) -> Result<Self, MatchError> {
-        option_within(
-            "deviation",
-            nalgebra::convert_unchecked::<T, f64>(deviation),
-            0.0,
-            f64::MAX,
-            "[0, ∞)",
-        )?;
-        if !position.iter().all(|c| c.is_finite()) {
+    fn check(&self, points: usize) -> Result<(), MatchError> {
+        let row = self.row;
+        if row >= points {
+            return Err(MatchError::LandmarkRow { row, points });
+        }
+        let deviation = nalgebra::convert_unchecked::<T, f64>(self.deviation);
+        option_within("deviation", deviation, 0.0, f64::MAX, "[0, ∞)")?;
+        if !self.position.iter().all(|c| c.is_finite()) {
             return Err(MatchError::LandmarkPosition { row });
         }
-        Ok(Self {
-            row,
-            position,
-            deviation,
-        })
+        Ok(())
     }
 }
 
@@ -93,28 +77,26 @@ impl AnnealedSoftassign {
     /// use tactile_match::{AnnealedSoftassign, Landmark};
     /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
     /// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
-    /// let known = Landmark::new(2, target[2], 0.01)?;
+    /// let known = Landmark { row: 2, position: target[2], deviation: 0.01 };
     /// let found = AnnealedSoftassign::default().match_with_landmarks(&model, &target, &[known])?;
     /// assert_eq!(found.assignment[2], Some(2));
     /// # Ok::<(), tactile_match::MatchError>(())
     /// ```
     ///
     /// # Errors
-    /// As [`match_points`](crate::PointMatcher::match_points), and [`MatchError::LandmarkRow`] for a landmark of a point that the model does not
-    /// have.
+    /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::LandmarkRow`] for a landmark of a point that the model does not
+    /// have, [`MatchError::LandmarkPosition`] for a position that is not finite, and [`MatchError::InvalidOption`] for a deviation that is
+    /// negative or not finite.
     pub fn match_with_landmarks<T: Scalar, const D: usize>(
         &self,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
         landmarks: &[Landmark<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        if let Some(beyond) = landmarks.iter().find(|known| known.row >= model.len()) {
-            return Err(MatchError::LandmarkRow {
-                row: beyond.row,
-                points: model.len(),
-            });
+        for landmark in landmarks {
+            landmark.check(model.len())?;
         }
-        let mut workspace = SoftassignWorkspace::new();
+        let mut workspace = SoftassignWorkspace::default();
         workspace.take(model, target)?;
         let frame = workspace.frame;
         workspace.known.extend(landmarks.iter().map(|known| {
@@ -127,10 +109,7 @@ impl AnnealedSoftassign {
             }
         }));
         self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
-        let found = SoftassignMatch {
-            workspace: &workspace,
-        };
-        Ok(found.to_matching(model))
+        Ok(SoftassignMatch::of(&workspace).to_matching(model))
     }
 }
 
@@ -165,17 +144,33 @@ mod tests {
     fn landmarks_out_of_range_are_typed_errors() {
         let origin = Point2::new(0.0, 0.0);
         for deviation in [-1.0, f64::NAN, f64::INFINITY] {
+            let landmark = Landmark {
+                row: 0,
+                position: origin,
+                deviation,
+            };
             assert!(matches!(
-                Landmark::new(0, origin, deviation),
+                landmark.check(12),
                 Err(MatchError::InvalidOption {
                     option: "deviation",
                     ..
                 })
             ));
         }
-        let nowhere = Landmark::new(3, Point2::new(f64::NAN, 0.0), 0.1);
-        assert_eq!(nowhere, Err(MatchError::LandmarkPosition { row: 3 }));
-        let beyond = Landmark::new(12, origin, 0.1).expect("a landmark");
+        let nowhere = Landmark {
+            row: 3,
+            position: Point2::new(f64::NAN, 0.0),
+            deviation: 0.1,
+        };
+        assert_eq!(
+            nowhere.check(12),
+            Err(MatchError::LandmarkPosition { row: 3 })
+        );
+        let beyond = Landmark {
+            row: 12,
+            position: origin,
+            deviation: 0.1,
+        };
         let found =
             AnnealedSoftassign::default().match_with_landmarks(&ring(0.0), &ring(0.0), &[beyond]);
         let expected = MatchError::LandmarkRow {
@@ -213,7 +208,11 @@ mod tests {
         let target = &model[..39];
         let away = model[39] + nalgebra::Vector2::new(0.4, 0.0);
         let distance = |deviation: f64| {
-            let landmark = Landmark::new(39, away, deviation).expect("a landmark");
+            let landmark = Landmark {
+                row: 39,
+                position: away,
+                deviation,
+            };
             let found = AnnealedSoftassign::default()
                 .match_with_landmarks(&model, target, &[landmark])
                 .expect("good points");

@@ -21,6 +21,7 @@
 
 mod anneal;
 mod axes;
+#[cfg(feature = "rayon")]
 mod batch;
 mod blocks;
 mod candidate_labels;
@@ -57,7 +58,6 @@ mod starts;
 mod target_errors;
 mod tuples;
 
-pub use batch::PointSets;
 pub use found::SoftassignMatch;
 pub use landmarks::Landmark;
 pub use options::{Outliers, Rotation, Search, SoftassignOptions, Transformation};
@@ -108,12 +108,12 @@ pub struct AnnealedSoftassign {
 /// use std::ops::ControlFlow;
 /// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
-/// let mut workspace = SoftassignWorkspace::new();
+/// let mut workspace = SoftassignWorkspace::default();
 /// for load in [0.02, 0.05, 0.1] { // a sequence of frames: memory is taken once
 ///     let target = model.map(|p| Point2::new(p.x + load * p.y, p.y));
 ///     let matcher = AnnealedSoftassign::default();
 ///     let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
-///     assert!((0..6).all(|i| found.assignment()[i] == Some(i)));
+///     assert!((0..6).all(|i| found.assignment[i] == Some(i)));
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
@@ -157,12 +157,6 @@ const SURE: f64 = 0.965;
 const UNEVEN: f64 = 1.75;
 
 impl<const D: usize> SoftassignWorkspace<D> {
-    /// An empty workspace; it grows at its first use.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Why the answer is not to be relied on.
     fn doubt(&self) -> Option<Doubt> {
         let smaller = self.model.len().min(self.target.len());
@@ -215,18 +209,6 @@ impl AnnealedSoftassign {
         Self { options }
     }
 
-    /// The options.
-    ///
-    /// ```
-    /// use tactile_match::{AnnealedSoftassign, SoftassignOptions, Search};
-    /// let options = SoftassignOptions::default().with_search(Search::Near);
-    /// assert_eq!(AnnealedSoftassign::new(options).options(), &options);
-    /// ```
-    #[must_use]
-    pub fn options(&self) -> &SoftassignOptions {
-        &self.options
-    }
-
     /// As [`PointMatcher::match_points`] in the caller's workspace; nothing is allocated once that has grown.
     ///
     /// `observe` hears the iteration and the energy after every outer iteration and may stop the search: the best answer
@@ -240,10 +222,10 @@ impl AnnealedSoftassign {
     /// let model: Vec<Point2<f64>> =
     ///     (0..30).map(|i| Point2::new(f64::from(i % 6) + 0.1 * f64::from(i * i % 7), f64::from(i / 6))).collect();
     /// let target: Vec<Point2<f64>> = model.iter().rev().map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y)).collect();
-    /// let mut workspace = SoftassignWorkspace::new();
+    /// let mut workspace = SoftassignWorkspace::default();
     /// let found = AnnealedSoftassign::default()
     ///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
-    /// assert_eq!(found.assignment()[3], Some(26));
+    /// assert_eq!(found.assignment[3], Some(26));
     /// # Ok(())
     /// # }
     /// ```
@@ -259,7 +241,7 @@ impl AnnealedSoftassign {
     ) -> Result<SoftassignMatch<'w, D>, MatchError> {
         workspace.take(model, target)?;
         self.solve(workspace, &mut observe);
-        Ok(SoftassignMatch { workspace })
+        Ok(SoftassignMatch::of(workspace))
     }
 }
 
@@ -269,7 +251,7 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for AnnealedSoftassign {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        let mut workspace = SoftassignWorkspace::new();
+        let mut workspace = SoftassignWorkspace::default();
         let found = self.match_points_with(&mut workspace, model, target, |_, _| {
             ControlFlow::Continue(())
         })?;

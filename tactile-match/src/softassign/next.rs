@@ -56,12 +56,10 @@ impl AnnealedSoftassign {
         let start: Vec<[f64; D]> = last.iter().map(|p| frame.target(p)).collect();
         let warmth = MARGIN * apart(&start, &workspace.target);
         self.solve_from(workspace, &start, warmth);
-        let found = SoftassignMatch {
-            workspace: &*workspace,
-        };
+        let found = SoftassignMatch::of(workspace);
         let noise =
             (WORSE * nalgebra::convert_unchecked::<T, f64>(sigma) / frame.scale).max(finish::CLEAN);
-        let kept = found.assignment().iter().flatten().count() as f64 >= LOST * matched
+        let kept = found.assignment.iter().flatten().count() as f64 >= LOST * matched
             && workspace.best.sigma <= noise;
         Ok(kept.then(|| found.interpolated(model, spline)))
     }

@@ -27,7 +27,7 @@ impl<T: Scalar, const D: usize> Default for Series<T, D> {
             last: Vec::new(),
             matched: 0,
             sigma: T::zero(),
-            workspace: SoftassignWorkspace::new(),
+            workspace: SoftassignWorkspace::default(),
             spline: None,
         }
     }

@@ -127,14 +127,11 @@ impl AnnealedSoftassign {
         target: &[Point<T, D>],
         deviations: &[T],
     ) -> Result<Matching<T, D>, MatchError> {
-        let mut workspace = SoftassignWorkspace::new();
+        let mut workspace = SoftassignWorkspace::default();
         workspace.take(model, target)?;
         workspace.take_deviations(deviations)?;
         self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
-        let found = SoftassignMatch {
-            workspace: &workspace,
-        };
-        Ok(found.to_matching(model))
+        Ok(SoftassignMatch::of(&workspace).to_matching(model))
     }
 }
 

@@ -24,13 +24,13 @@ fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
     };
     let targets = [target(0.1, 0.0), target(0.1, 0.05)];
     let matcher = AnnealedSoftassign::default();
-    let mut workspace = SoftassignWorkspace::new();
+    let mut workspace = SoftassignWorkspace::default();
     let mut run = |k: usize| {
         let go = |_, _| ControlFlow::Continue(());
         let found = matcher
             .match_points_with(&mut workspace, &model, &targets[k % 2], go)
             .expect("finite points");
-        assert_eq!(found.assignment().len(), 24);
+        assert_eq!(found.assignment.len(), 24);
     };
     (0..2).for_each(&mut run);
     let info = allocation_counter::measure(|| (0..1000).for_each(&mut run));
@@ -53,13 +53,13 @@ fn a_dense_set_allocates_nothing_the_second_time() {
     let model: Vec<_> = (0..700).map(|i| place(i, 0.0)).collect();
     let target: Vec<_> = (0..700).map(|i| place(i, 0.15)).collect();
     let matcher = AnnealedSoftassign::default();
-    let mut workspace = SoftassignWorkspace::new();
+    let mut workspace = SoftassignWorkspace::default();
     let mut run = || {
         let go = |_, _| ControlFlow::Continue(());
         matcher
             .match_points_with(&mut workspace, &model, &target, go)
             .expect("finite points")
-            .report()
+            .report
             .starts
     };
     assert!(run() > 1);

@@ -105,7 +105,7 @@ fn assert_optimal(
         .filter(|c| c.is_finite())
         .fold(0.0_f64, |m, c| m.max(c.abs()));
     let tolerance = f64::EPSILON * scale * (8 * (rows + columns)) as f64;
-    let (u, v) = (workspace.row_prices(), workspace.column_prices());
+    let (u, v) = (&workspace.row_prices, &workspace.column_prices);
     for i in 0..rows {
         for j in 0..columns {
             let reduced = costs[i * columns + j] - u[i] - v[j];
@@ -152,7 +152,7 @@ proptest! {
 
     #[test]
     fn least_cost_by_the_slow_hungarian_method((rows, columns, costs) in matrix(1..=40)) {
-        let mut workspace = AssignmentWorkspace::new();
+        let mut workspace = AssignmentWorkspace::default();
         let found = workspace.solve(&costs, rows, columns).unwrap().to_vec();
         assert_distinct(&found, columns);
         assert_optimal(&costs, rows, columns, &workspace, &found);
@@ -207,7 +207,7 @@ proptest! {
 
 #[test]
 fn a_workspace_forgets_the_last_matrix() {
-    let mut workspace = AssignmentWorkspace::new();
+    let mut workspace = AssignmentWorkspace::default();
     let large: Vec<f64> = (0..30 * 20).map(|k| f64::from(k * 7919 % 1009)).collect();
     for (rows, columns) in [(30, 20), (2, 3), (20, 30), (1, 1), (3, 2)] {
         let costs = &large[..rows * columns];
@@ -264,7 +264,7 @@ fn unusable_costs_are_typed_errors() {
 #[test]
 fn no_allocation_after_the_first_call() {
     let costs: Vec<f64> = (0..60 * 80).map(|k| f64::from(k * 7919 % 10007)).collect();
-    let mut workspace = AssignmentWorkspace::new();
+    let mut workspace = AssignmentWorkspace::default();
     workspace.solve(&costs, 80, 60).unwrap();
     workspace.solve(&costs, 60, 80).unwrap();
     let counted = allocation_counter::measure(|| {

@@ -113,14 +113,14 @@ fn what_a_workspace_did_before_changes_no_answer() {
         let found = matcher
             .match_points_with(workspace, model, target, go)
             .unwrap();
-        (found.report(), found.assignment().to_vec())
+        (found.report, found.assignment.to_vec())
     };
     // In the first scene patterns are looked at, with a wider spacing than the second's, whose first run is nearly right.
     let (coarse, dense) = (scene(500, 0.01), scene(700, 0.006));
-    let mut used = SoftassignWorkspace::new();
+    let mut used = SoftassignWorkspace::default();
     run(&mut used, &coarse);
     assert_eq!(
         run(&mut used, &dense),
-        run(&mut SoftassignWorkspace::new(), &dense)
+        run(&mut SoftassignWorkspace::default(), &dense)
     );
 }

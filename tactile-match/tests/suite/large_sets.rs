@@ -90,21 +90,21 @@ fn noise_of_a_spacing_leaves_the_field() {
 #[test]
 fn a_caller_who_stops_has_an_answer_for_every_point() {
     let scene = Scene::<2>::new(0.0, 0);
-    let mut workspace = SoftassignWorkspace::new();
+    let mut workspace = SoftassignWorkspace::default();
     let found = AnnealedSoftassign::default()
         .match_points_with(&mut workspace, &scene.model, &scene.target, |_, _| {
             ControlFlow::Break(())
         })
         .expect("good points");
-    assert_eq!(found.report().stop, StopReason::Callback);
-    assert_eq!(found.assignment().len(), POINTS);
+    assert_eq!(found.report.stop, StopReason::Callback);
+    assert_eq!(found.assignment.len(), POINTS);
     assert!(found.warped::<f64>().all(|p| p.coords.norm() < 10.0));
 }
 
 #[test]
 fn a_grown_workspace_allocates_nothing_and_gives_the_same_bits() {
     let scene = Scene::<3>::new(0.0, 0);
-    let mut workspace = SoftassignWorkspace::new();
+    let mut workspace = SoftassignWorkspace::default();
     let matcher = AnnealedSoftassign::default();
     let go = |_, _| ControlFlow::Continue(());
     let first: Vec<Point<f64, 3>> = matcher

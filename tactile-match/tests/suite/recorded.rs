@@ -11,7 +11,7 @@ use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
     AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
     Matching, Motion, NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation,
-    Search, SoftassignOptions, SparseRelaxationLabelling, WarmStart,
+    Search, SoftassignOptions, WarmStart,
 };
 
 /// A model and its target.
@@ -134,7 +134,7 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
         .with_neighbourhood(Neighbourhood::Nearest(6))
         .expect("neighbours");
     let dense = RelaxationLabelling::new(few);
-    let sparse = SparseRelaxationLabelling::new(few, 10).expect("valid options");
+    let sparse = RelaxationLabelling::new(few.with_candidates(10).expect("candidates"));
     let share = options.with_outlier_ratio(0.2).expect("valid share");
     let matchers: [(&str, Box<dyn PointMatcher<f64, D>>); 12] = [
         ("default", fast(options)),
@@ -150,8 +150,8 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
         ("drift", drift(Motion::NON_RIGID)),
         ("rigid drift", drift(Motion::Rigid)),
         ("affine drift", drift(Motion::Affine)),
-        ("assignment", Box::new(LinearAssignment::new())),
-        ("nearest", Box::new(NearestNeighbour::new())),
+        ("assignment", Box::new(LinearAssignment::default())),
+        ("nearest", Box::new(NearestNeighbour::default())),
     ];
     for scene in scenes::<D>() {
         for (name, matcher) in &matchers {
@@ -162,7 +162,7 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
     }
     let scenes = scenes::<D>();
     let (model, matcher) = (&scenes[0].model, fast(options.with_search(Search::Near)));
-    let mut warm = WarmStart::new();
+    let mut warm = WarmStart::default();
     for step in 1..4 {
         let target = bend(model, 0.02 * f64::from(step));
         let found = matcher.match_next(&mut warm, model, &target);

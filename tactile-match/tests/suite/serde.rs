@@ -30,8 +30,7 @@ fn what_a_caller_says_of_a_scene_has_names() {
 
 #[test]
 fn soft_matches_are_written_row_by_row() {
-    let mut soft = SoftMatches::new();
-    soft.push_row([(3, 0.5), (1, 0.25)]);
+    let soft: SoftMatches<f64> = [[(3, 0.5), (1, 0.25)]].into_iter().collect();
     let text = serde_json::to_string(&soft).unwrap();
     assert_eq!(
         text,

@@ -49,7 +49,7 @@ fn agree(one: &Matching<f64, 3>, other: &Matching<f64, 3>, tolerance: f64) {
 fn a_series_agrees_with_matches_made_anew() {
     let model = dome(150);
     for noise in [0.0, 0.01] {
-        let (mut warm, mut saved) = (WarmStart::new(), 0);
+        let (mut warm, mut saved) = (WarmStart::default(), 0);
         for k in 1..8 {
             let target = frame(&model, k, noise);
             let next = near().match_next(&mut warm, &model, &target).unwrap();
@@ -96,7 +96,7 @@ fn a_near_search_finds_what_a_thorough_one_finds() {
 
 #[test]
 fn a_target_far_from_the_last_is_matched_all_the_same() {
-    let (model, mut warm) = (dome(120), WarmStart::new());
+    let (model, mut warm) = (dome(120), WarmStart::default());
     for (k, grown) in [(1, 1.0), (2, 1.25), (1, 0.85)] {
         let squeezed = |p: Point3<f64>| Point3::new(grown * p.x, p.y / grown, p.z);
         let target: Vec<_> = frame(&model, k, 0.0).into_iter().map(squeezed).collect();
@@ -116,7 +116,7 @@ fn a_target_far_from_the_last_is_matched_all_the_same() {
 
 #[test]
 fn another_model_has_no_past() {
-    let (one, other, mut warm) = (dome(60), dome(70), WarmStart::new());
+    let (one, other, mut warm) = (dome(60), dome(70), WarmStart::default());
     let target = frame(&one, 3, 0.0);
     let first = near().match_next(&mut warm, &one, &target).unwrap();
     let target = frame(&other, 2, 0.0);
@@ -131,7 +131,7 @@ fn another_model_has_no_past() {
 
 #[test]
 fn an_error_leaves_the_state_as_it_was() {
-    let (model, mut warm) = (dome(60), WarmStart::new());
+    let (model, mut warm) = (dome(60), WarmStart::default());
     let target = frame(&model, 1, 0.0);
     let first = near().match_next(&mut warm, &model, &target).unwrap();
     assert!(near().match_next(&mut warm, &model, &[]).is_err());
@@ -157,7 +157,7 @@ impl PointMatcher<f64, 2> for Counting {
         model: &[Point2<f64>],
         target: &[Point2<f64>],
     ) -> Result<Matching<f64, 2>, MatchError> {
-        LinearAssignment::new().match_points(model, target)
+        LinearAssignment::default().match_points(model, target)
     }
 
     fn match_next(
@@ -177,14 +177,14 @@ fn every_matcher_keeps_its_own_state() {
     let target: Vec<_> = model.iter().map(|p| Point2::new(1.02 * p.x, p.y)).collect();
     let boxed: Box<dyn PointMatcher<f64, 2> + Send + Sync> = Box::new(Counting);
     let shared: Arc<dyn PointMatcher<f64, 2> + Send + Sync> = Arc::new(boxed);
-    let mut warm = WarmStart::new();
+    let mut warm = WarmStart::default();
     for _ in 0..3 {
         shared.match_next(&mut warm, &model, &target).unwrap();
     }
     assert_eq!(*warm.state::<usize>(), 3);
     // Matchers without a state match anew and leave the other's alone.
     let matchers: [&dyn PointMatcher<f64, 2>; 2] =
-        [&LinearAssignment::new(), &CoherentPointDrift::default()];
+        [&LinearAssignment::default(), &CoherentPointDrift::default()];
     for matcher in matchers {
         let next = matcher.match_next(&mut warm, &model, &target).unwrap();
         let anew = matcher.match_points(&model, &target).unwrap();

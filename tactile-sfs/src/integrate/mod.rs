@@ -31,7 +31,7 @@ use crate::{Domain, Scalar, SfsError, Surface, Workspace};
 /// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
 /// // The plane z = 0.3 x − 0.2 y comes back exactly.
 /// let (p, q) = (Array2::from_elem((5, 7), 0.3), Array2::from_elem((5, 7), -0.2));
-/// let surface = CosinePoisson.integrate(p.view(), q.view(), &Domain::pixels())?;
+/// let surface = CosinePoisson.integrate(p.view(), q.view(), &Domain::default())?;
 /// let z = &surface.heights;
 /// assert!((z[[0, 1]] - z[[0, 0]] - 0.3_f64).abs() < 1e-12);
 /// assert!((z[[1, 0]] - z[[0, 0]] + 0.2).abs() < 1e-12);
@@ -47,7 +47,7 @@ pub trait SlopeIntegrator<T: Scalar> {
     /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson, &FrankotChellappa];
     /// let flat = Array2::zeros((16, 16));
     /// for method in methods {
-    ///     method.integrate_with(&mut workspace, flat.view(), flat.view(), &Domain::pixels(), &mut surface)?;
+    ///     method.integrate_with(&mut workspace, flat.view(), flat.view(), &Domain::default(), &mut surface)?;
     ///     assert!(surface.heights.iter().all(|z| z.abs() < 1e-12));
     /// }
     /// # Ok::<(), tactile_sfs::SfsError>(())

@@ -3,7 +3,6 @@
 use ndarray::ArrayView2;
 
 use crate::domain::same_shape;
-use crate::error::Input;
 use crate::{Scalar, SfsError};
 
 /// What is fitted before heights are compared.
@@ -118,9 +117,9 @@ pub fn height_error<T: Scalar>(
     alignment: Alignment,
 ) -> Result<HeightError, SfsError> {
     let (rows, columns) = heights.dim();
-    same_shape(Input::Truth, [rows, columns], truth.dim())?;
+    same_shape("true heights", [rows, columns], truth.dim())?;
     if let Some(mask) = mask {
-        same_shape(Input::Mask, [rows, columns], mask.dim())?;
+        same_shape("mask", [rows, columns], mask.dim())?;
     }
     let pairs: Vec<(f64, f64)> = heights
         .indexed_iter()

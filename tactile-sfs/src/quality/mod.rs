@@ -5,4 +5,4 @@ mod shading;
 
 pub use compare::{Alignment, ErrorSummary, HeightError, height_error};
 pub(crate) use shading::slopes_at;
-pub use shading::{Reprojection, render, reprojection, slopes};
+pub use shading::{render, reprojection, slopes};

@@ -4,7 +4,6 @@ use ndarray::{Array2, ArrayView2};
 
 use super::ErrorSummary;
 use crate::domain::same_shape;
-use crate::error::Input;
 use crate::{Frame, Lighting, Scalar, SfsError};
 
 /// Slopes p = ∂z/∂x and q = ∂z/∂y: central differences, one-sided next to missing (NaN) heights or the frame's border,
@@ -64,7 +63,7 @@ pub(crate) fn slopes_at<T: Scalar>(
 /// ```
 /// use ndarray::Array2;
 /// use tactile_sfs::{Lighting, render};
-/// let image = render(Array2::<f64>::zeros((3, 3)).view(), [1.0, 1.0], &Lighting::frontal());
+/// let image = render(Array2::<f64>::zeros((3, 3)).view(), [1.0, 1.0], &Lighting::default());
 /// assert_eq!(image[[1, 1]], 1.0);
 /// ```
 pub fn render<T: Scalar>(
@@ -81,27 +80,8 @@ pub fn render<T: Scalar>(
     })
 }
 
-/// How far a surface, shaded again, is from the image.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{Frame, Lighting, Reprojection, reprojection};
-/// let (z, light) = (Array2::<f64>::zeros((3, 4)), Lighting::frontal().with_normal_intensity(200.0)?);
-/// let image = Array2::<u8>::from_elem((3, 4), 190);
-/// let Reprojection { residual, error } = reprojection(z.view(), Frame::Bytes(image.view()), [1e-4, 1e-4], &light)?;
-/// assert_eq!(residual[[1, 2]], 10.0); // a flat surface renders 200: ten grey levels too bright
-/// assert_eq!((error.rms, error.pixels), (10.0, 12));
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-pub struct Reprojection<T> {
-    /// Rendered minus observed intensity, NaN where there is no height.
-    pub residual: Array2<T>,
-    /// Summary of the residual, in the image's unit.
-    pub error: ErrorSummary,
-}
-
-/// Renders a surface and compares it with the image it was made from.
+/// Renders a surface and compares it with the image it was made from: rendered minus observed intensity (NaN where there is no
+/// height), and a summary of it in the image's unit.
 ///
 /// A small residual does not prove the surface right (convex and concave look alike), a large one proves it wrong.
 ///
@@ -112,7 +92,7 @@ pub struct Reprojection<T> {
 /// let bump = Array2::from_shape_fn((9, 9), |(r, c)| -0.05 * ((r as f64 - 4.0).powi(2) + (c as f64 - 4.0).powi(2)));
 /// let image = render(bump.view(), [1.0, 1.0], &light);
 /// let rms = |z: &Array2<f64>| {
-///     Ok::<_, tactile_sfs::SfsError>(reprojection(z.view(), Frame::Real(image.view()), [1.0, 1.0], &light)?.error.rms)
+///     Ok::<_, tactile_sfs::SfsError>(reprojection(z.view(), Frame::Real(image.view()), [1.0, 1.0], &light)?.1.rms)
 /// };
 /// assert!(rms(&bump)? < 1e-12 && rms(&-&bump)? > 0.1); // a hollow shades otherwise under oblique light
 /// # Ok::<(), tactile_sfs::SfsError>(())
@@ -125,9 +105,9 @@ pub fn reprojection<T: Scalar>(
     frame: Frame<'_, T>,
     pixel_size_m: [T; 2],
     lighting: &Lighting<T>,
-) -> Result<Reprojection<T>, SfsError> {
+) -> Result<(Array2<T>, ErrorSummary), SfsError> {
     let (rows, columns) = heights.dim();
-    same_shape(Input::Image, [rows, columns], frame.dim())?;
+    same_shape("image", [rows, columns], frame.dim())?;
     let mut residual = render(heights, pixel_size_m, lighting);
     for ((row, column), value) in residual.indexed_iter_mut() {
         *value -= frame.at(row, column);
@@ -141,6 +121,6 @@ pub fn reprojection<T: Scalar>(
     if error.pixels == 0 {
         Err(SfsError::EmptyMask)
     } else {
-        Ok(Reprojection { residual, error })
+        Ok((residual, error))
     }
 }

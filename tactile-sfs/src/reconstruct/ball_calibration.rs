@@ -63,7 +63,7 @@ impl<T: Scalar> DepthTable<T> {
     /// let depth = |r, c| (1600.0 - square(r, c)).sqrt() - 1200.0_f64.sqrt();
     /// let image = Array2::from_shape_fn((61, 61), |(r, c)| 20.0 * depth(r, c).max(0.0));
     /// let (frame, circle) = (Frame::Real(image.view()), ([30.0, 30.0], 20.0));
-    /// let found = DepthTable::from_ball(frame, Signal::Intensity, &Domain::pixels(), 40.0, 1.0, Some(circle))?;
+    /// let found = DepthTable::from_ball(frame, Signal::Intensity, &Domain::default(), 40.0, 1.0, Some(circle))?;
     /// assert!((found.table.depth(60.0).0 - 3.0).abs() < 0.05 && found.mean_residual_m < 0.05);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```

@@ -13,8 +13,6 @@ mod tsai_shah;
 
 use std::sync::Arc;
 
-use ndarray::ArrayView2;
-
 pub use ball_calibration::BallCalibration;
 pub use brooks_horn::BrooksHorn;
 pub(crate) use brooks_horn::SlopeBuffers;
@@ -42,8 +40,8 @@ use crate::{Domain, Frame, Scalar, SfsError, SlopeIntegrator, Surface, Workspace
 /// let distance = |r: usize, c: usize| (r as f64 - 20.0).hypot(c as f64 - 20.0);
 /// let mask = Array2::from_shape_fn((size, size), |(r, c)| distance(r, c) < radius);
 /// let image = Array2::from_elem((size, size), 0.5_f64.sqrt());
-/// let method = Eikonal::new(Lighting::frontal()).with_boundary(BoundaryCondition::Height(0.0))?;
-/// let surface = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?;
+/// let method = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
+/// let surface = method.reconstruct(image.view().into(), &Domain::default().with_mask(mask.view()))?;
 /// assert!((surface.heights[[20, 20]] - radius).abs() < 1.5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -60,33 +58,14 @@ pub trait SurfaceReconstruction<T: Scalar> {
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError>;
 
-    /// Reconstructs from real intensities.
-    ///
-    /// # Errors
-    /// As [`reconstruct_with`](Self::reconstruct_with).
-    fn reconstruct(
-        &self,
-        image: ArrayView2<'_, T>,
-        domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::default();
-        self.reconstruct_with(
-            &mut Workspace::default(),
-            Frame::Real(image),
-            domain,
-            &mut surface,
-        )?;
-        Ok(surface)
-    }
-
-    /// Reconstructs from the grey levels of an 8-bit camera.
+    /// Reconstructs from an image: real intensities, or the grey levels of an 8-bit camera.
     ///
     /// ```
     /// use ndarray::array;
     /// use tactile_sfs::{DepthTable, Domain, Frame, Surface, SurfaceReconstruction, Workspace};
     /// let table = DepthTable::new(&[(0.0, 0.0), (200.0, 1e-3)])?;
     /// let (image, domain) = (array![[0_u8, 50, 100]], Domain::new([1e-4, 1e-4])?);
-    /// let once = table.reconstruct_u8(image.view(), &domain)?;
+    /// let once = table.reconstruct(image.view().into(), &domain)?;
     /// assert_eq!(once.heights, array![[0.0, 0.25e-3, 0.5e-3]]);
     /// // The same for a stream of frames: no allocation after the first.
     /// let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
@@ -97,18 +76,13 @@ pub trait SurfaceReconstruction<T: Scalar> {
     ///
     /// # Errors
     /// As [`reconstruct_with`](Self::reconstruct_with).
-    fn reconstruct_u8(
+    fn reconstruct(
         &self,
-        image: ArrayView2<'_, u8>,
+        frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError> {
         let mut surface = Surface::default();
-        self.reconstruct_with(
-            &mut Workspace::default(),
-            Frame::Bytes(image),
-            domain,
-            &mut surface,
-        )?;
+        self.reconstruct_with(&mut Workspace::default(), frame, domain, &mut surface)?;
         Ok(surface)
     }
 
@@ -124,17 +98,17 @@ pub trait SurfaceReconstruction<T: Scalar> {
     ///     (100.0 - (r as f64 - 12.0).powi(2) - (c as f64 - 12.0).powi(2)).max(0.0).sqrt()
     /// });
     /// let (image, mask) = (z.mapv(|z| z / 10.0), z.mapv(|z| z > 0.0));
-    /// let domain = Domain::pixels().with_mask(mask.view());
-    /// let fourier = BrooksHorn::new(Lighting::frontal()).with_occluding_boundary(true);
+    /// let domain = Domain::default().with_mask(mask.view());
+    /// let fourier = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
     /// let masked = fourier.with_slope_integrator(Arc::new(MaskedLeastSquares::default())).expect("slopes");
     /// let error = |heights: &Array2<f64>| ((heights[[12, 12]] - heights[[12, 5]]) / (z[[12, 12]] - z[[12, 5]]) - 1.0).abs();
     /// let [periodic, least_squares] = [
-    ///     fourier.reconstruct(image.view(), &domain)?.heights,
-    ///     masked.reconstruct(image.view(), &domain)?.heights,
+    ///     fourier.reconstruct(image.view().into(), &domain)?.heights,
+    ///     masked.reconstruct(image.view().into(), &domain)?.heights,
     /// ];
     /// assert!(error(&least_squares) < 0.1 && error(&least_squares) < error(&periodic));
     /// // The eikonal equation is solved for heights: there are no slopes to integrate.
-    /// let eikonal = Eikonal::<f64>::new(Lighting::frontal());
+    /// let eikonal = Eikonal::<f64>::new(Lighting::default());
     /// assert!(eikonal.with_slope_integrator(Arc::new(MaskedLeastSquares::default())).is_none());
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```

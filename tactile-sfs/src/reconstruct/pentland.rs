@@ -20,9 +20,9 @@ use crate::{Domain, Frame, Lighting, Scalar, SfsError, Surface, SurfaceReconstru
 /// let light = Lighting::new([1.0, 0.0, 1.0])?;
 /// let wave = core::f64::consts::TAU / 32.0;
 /// let image = Array2::from_shape_fn((8, 32), |(_, c)| light.shade(1e-3 * wave * (wave * c as f64).cos(), 0.0));
-/// let z = Pentland::new(light).reconstruct(image.view(), &Domain::pixels())?.heights;
+/// let z = Pentland::new(light).reconstruct(image.view().into(), &Domain::default())?.heights;
 /// assert!((z[[0, 8]] - z[[0, 24]] - 2e-3).abs() < 1e-5);
-/// assert!(Pentland::new(Lighting::frontal()).reconstruct(image.view(), &Domain::pixels()).is_err());
+/// assert!(Pentland::new(Lighting::default()).reconstruct(image.view().into(), &Domain::default()).is_err());
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl<T: Scalar> Pentland<T> {
     /// let wave = core::f64::consts::TAU / 32.0;
     /// let image = Array2::from_shape_fn((8, 32), |(_, c)| light.shade(1e-3 * wave * (wave * c as f64).cos(), 0.0));
     /// let height = |epsilon| {
-    ///     let z = Pentland::new(light).with_regularisation(epsilon)?.reconstruct(image.view(), &Domain::pixels())?.heights;
+    ///     let z = Pentland::new(light).with_regularisation(epsilon)?.reconstruct(image.view().into(), &Domain::default())?.heights;
     ///     Ok::<f64, tactile_sfs::SfsError>(z[[0, 8]] - z[[0, 24]])
     /// };
     /// assert!((height(1e-3)? - 2e-3).abs() < 1e-5);

@@ -3,7 +3,6 @@
 use ndarray::Array2;
 
 use crate::domain::same_shape;
-use crate::error::Input;
 use crate::{Frame, Scalar, SfsError};
 
 /// What is looked up in a [`DepthTable`](crate::DepthTable).
@@ -14,7 +13,7 @@ use crate::{Frame, Scalar, SfsError};
 /// let (reference, image) = (Array2::from_elem((1, 2), 200.0), array![[200.0, 180.0]]);
 /// let table = DepthTable::new(&[(0.0, 0.0), (40.0, 1e-3)])?; // a millimetre darkens by 40 grey levels
 /// let method = table.with_signal(Signal::Darkening(reference));
-/// let depth = method.reconstruct(image.view(), &Domain::new([1e-4, 1e-4])?)?.heights;
+/// let depth = method.reconstruct(image.view().into(), &Domain::new([1e-4, 1e-4])?)?.heights;
 /// assert_eq!(depth, array![[0.0, 0.5e-3]]);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -34,7 +33,7 @@ impl<T: Scalar> Signal<T> {
         match self {
             Signal::Intensity => Ok(()),
             Signal::Darkening(reference) | Signal::Brightening(reference) => {
-                same_shape(Input::Reference, [rows, columns], reference.dim())
+                same_shape("reference image", [rows, columns], reference.dim())
             }
         }
     }

@@ -32,7 +32,7 @@ use crate::{
 /// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
 /// let image = Array2::from_shape_fn((32, 32), |(_, c)| if c < 16 { 0.6 } else { 0.8 });
 /// let method = TsaiShah::new(Lighting::new([1.0, 0.0, 1.0])?).with_iterations(5)?;
-/// assert_eq!(method.reconstruct(image.view(), &Domain::pixels())?.report.iterations, 5);
+/// assert_eq!(method.reconstruct(image.view().into(), &Domain::default())?.report.iterations, 5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,15 +74,6 @@ impl<T: Scalar> TsaiShah<T> {
         positive("noise variance", noise.as_f64())?;
         Ok(Self { noise, ..self })
     }
-
-    /// Largest slope used in the residual.
-    ///
-    /// # Errors
-    /// [`SfsError::NotPositive`] unless positive and finite.
-    pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
-        positive("steepest slope", max_slope.as_f64())?;
-        Ok(Self { max_slope, ..self })
-    }
 }
 
 impl<T: Scalar> TsaiShah<T> {
@@ -94,8 +85,8 @@ impl<T: Scalar> TsaiShah<T> {
     /// use tactile_sfs::{Domain, Lighting, SurfaceReconstruction, TsaiShah};
     /// let image = Array2::from_shape_fn((17, 17), |(r, c)| 1.0 - 1e-3 * ((r as f64 - 8.0).powi(2) + (c as f64 - 8.0).powi(2)));
     /// let top = |start_slope| {
-    ///     let method = TsaiShah::new(Lighting::frontal()).with_noise(0.05)?.with_max_slope(2.0)?.with_start_slope(start_slope)?;
-    ///     let z = method.reconstruct(image.view(), &Domain::pixels())?.heights;
+    ///     let method = TsaiShah::new(Lighting::default()).with_noise(0.05)?.with_start_slope(start_slope)?;
+    ///     let z = method.reconstruct(image.view().into(), &Domain::default())?.heights;
     ///     Ok::<f64, tactile_sfs::SfsError>(z[[8, 8]] - z[[8, 1]])
     /// };
     /// assert!(top(0.5)? > 0.0 && top(-0.5)? < 0.0); // bump or hollow: the caller's choice under frontal light

@@ -45,7 +45,7 @@ pub trait ControlPointSampler<T: Scalar> {
     /// use tactile_sfs::{ControlPointSampler, Random, Workspace};
     /// let (z, mut workspace, mut points) = (Array2::<f64>::zeros((9, 9)), Workspace::default(), Vec::new());
     /// for count in [20, 5] {
-    ///     Random::new(1).sample_with(&mut workspace, z.view(), None, [1.0, 1.0], count, &mut points)?;
+    ///     Random { seed: 1 }.sample_with(&mut workspace, z.view(), None, [1.0, 1.0], count, &mut points)?;
     ///     assert_eq!(points.len(), count);
     /// }
     /// # Ok::<(), tactile_sfs::SfsError>(())

@@ -15,21 +15,15 @@ use crate::{Scalar, SfsError, Workspace};
 /// use ndarray::Array2;
 /// use tactile_sfs::{ControlPointSampler, Random};
 /// let flat = Array2::<f32>::zeros((20, 20));
-/// let a = Random::new(7).sample(flat.view(), None, [1.0, 1.0], 50)?;
-/// assert_eq!(a, Random::new(7).sample(flat.view(), None, [1.0, 1.0], 50)?);
-/// assert_ne!(a, Random::new(8).sample(flat.view(), None, [1.0, 1.0], 50)?);
+/// let a = Random { seed: 7 }.sample(flat.view(), None, [1.0, 1.0], 50)?;
+/// assert_eq!(a, Random { seed: 7 }.sample(flat.view(), None, [1.0, 1.0], 50)?);
+/// assert_ne!(a, Random { seed: 8 }.sample(flat.view(), None, [1.0, 1.0], 50)?);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Random {
-    seed: u64,
-}
-
-impl Random {
-    /// The sampler with a seed.
-    pub fn new(seed: u64) -> Self {
-        Self { seed }
-    }
+    /// The seed.
+    pub seed: u64,
 }
 
 impl<T: Scalar> ControlPointSampler<T> for Random {

@@ -20,7 +20,7 @@ fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
     for (name, method) in reconstructions() {
         let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
         for case in [&large, &small, &large] {
-            let domain = Domain::pixels().with_mask(case.mask.view());
+            let domain = Domain::default().with_mask(case.mask.view());
             method
                 .reconstruct_with(
                     &mut workspace,
@@ -32,12 +32,14 @@ fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
             assert!(
                 same(
                     &surface,
-                    &method.reconstruct(case.image.view(), &domain).unwrap()
+                    &method
+                        .reconstruct(case.image.view().into(), &domain)
+                        .unwrap()
                 ),
                 "{name}"
             );
         }
-        let domain = Domain::pixels().with_mask(large.mask.view());
+        let domain = Domain::default().with_mask(large.mask.view());
         let counted = allocation_counter::measure(|| {
             method
                 .reconstruct_with(
@@ -52,7 +54,7 @@ fn a_reused_workspace_changes_nothing_and_does_not_allocate() {
     }
     for (name, method) in integrators() {
         let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
-        let domain = Domain::pixels().with_mask(large.mask.view());
+        let domain = Domain::default().with_mask(large.mask.view());
         let mut run = |surface: &mut Surface<f64>| {
             method
                 .integrate_with(
@@ -93,11 +95,11 @@ fn nothing_outside_the_mask_matters() {
             }
         })
     };
-    let domain = Domain::pixels().with_mask(case.mask.view());
+    let domain = Domain::default().with_mask(case.mask.view());
     for (name, method) in reconstructions() {
         let (a, b) = (
-            method.reconstruct(case.image.view(), &domain),
-            method.reconstruct(spoiled.view(), &domain),
+            method.reconstruct(case.image.view().into(), &domain),
+            method.reconstruct(spoiled.view().into(), &domain),
         );
         assert!(same(&a.unwrap(), &b.unwrap()), "{name}");
     }
@@ -136,12 +138,15 @@ fn frames_of_any_position_give_the_same_contact() {
     for (name, method) in reconstructions() {
         let a = method
             .reconstruct(
-                case.image.view(),
-                &Domain::pixels().with_mask(case.mask.view()),
+                case.image.view().into(),
+                &Domain::default().with_mask(case.mask.view()),
             )
             .unwrap();
         let b = method
-            .reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))
+            .reconstruct(
+                image.view().into(),
+                &Domain::default().with_mask(mask.view()),
+            )
             .unwrap();
         for ((r, c), z) in a.heights.indexed_iter() {
             let moved = b.heights[[r + 7, c + 21]];
@@ -162,10 +167,10 @@ fn bytes_are_grey_levels() {
     let method = Eikonal::new(light)
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
-    let domain = Domain::pixels().with_mask(case.mask.view());
+    let domain = Domain::default().with_mask(case.mask.view());
     let (a, b) = (
-        method.reconstruct(floats.view(), &domain),
-        method.reconstruct_u8(bytes.view(), &domain),
+        method.reconstruct(floats.view().into(), &domain),
+        method.reconstruct(bytes.view().into(), &domain),
     );
     assert!(same(&a.unwrap(), &b.unwrap()));
 }
@@ -177,17 +182,20 @@ fn single_precision_agrees() {
     let wide = Eikonal::new(frontal())
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
-    let narrow = Eikonal::new(Lighting::<f32>::frontal())
+    let narrow = Eikonal::new(Lighting::<f32>::default())
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
     let a = wide
         .reconstruct(
-            case.image.view(),
-            &Domain::pixels().with_mask(case.mask.view()),
+            case.image.view().into(),
+            &Domain::default().with_mask(case.mask.view()),
         )
         .unwrap();
     let b = narrow
-        .reconstruct(image.view(), &Domain::pixels().with_mask(case.mask.view()))
+        .reconstruct(
+            image.view().into(),
+            &Domain::default().with_mask(case.mask.view()),
+        )
         .unwrap();
     let error = height_error(
         b.heights.mapv(f64::from).view(),
@@ -212,10 +220,10 @@ fn single_precision_agrees() {
         ),
     ] {
         let a = method
-            .integrate(case.p.view(), case.q.view(), &Domain::pixels())
+            .integrate(case.p.view(), case.q.view(), &Domain::default())
             .unwrap();
         let b = narrow
-            .integrate(p.view(), q.view(), &Domain::pixels())
+            .integrate(p.view(), q.view(), &Domain::default())
             .unwrap();
         let error = height_error(
             b.heights.mapv(f64::from).view(),
@@ -236,7 +244,7 @@ fn progress_can_stop_a_solve() {
     workspace.on_progress(|_| core::ops::ControlFlow::Break(()));
     let mut surface = Surface::default();
     // A rectangle would be solved directly.
-    let domain = Domain::pixels().with_mask(case.mask.view());
+    let domain = Domain::default().with_mask(case.mask.view());
     MaskedLeastSquares::default()
         .integrate_with(
             &mut workspace,

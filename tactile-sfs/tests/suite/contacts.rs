@@ -49,16 +49,16 @@ fn contact(radius: f64, centre: [f64; 2], bend: f64) -> (Array2<f64>, Array2<boo
 }
 
 fn eikonal() -> Eikonal<f64> {
-    Eikonal::new(Lighting::frontal())
+    Eikonal::new(Lighting::default())
         .with_boundary(BoundaryCondition::Height(0.0))
         .expect("a height")
 }
 
 fn surface(method: &Eikonal<f64>, radius: f64, centre: [f64; 2]) -> Surface<f64> {
     let (image, mask) = contact(radius, centre, 0.0);
-    let domain = Domain::pixels().with_mask(mask.view());
+    let domain = Domain::default().with_mask(mask.view());
     method
-        .reconstruct(image.view(), &domain)
+        .reconstruct(image.view().into(), &domain)
         .expect("a surface")
 }
 
@@ -106,9 +106,9 @@ fn a_bent_profile_keeps_the_height() {
     for bend in [-0.3, -0.1, 0.05] {
         let (radius, centre) = (60.0, [66.2, 65.7]);
         let (image, mask) = contact(radius, centre, bend);
-        let domain = Domain::pixels().with_mask(mask.view());
+        let domain = Domain::default().with_mask(mask.view());
         let surface = eikonal().with_fitted_profile(true);
-        let surface = surface.reconstruct(image.view(), &domain).unwrap();
+        let surface = surface.reconstruct(image.view().into(), &domain).unwrap();
         let height = surface.heights[[66, 66]] / middle_height(radius, bend);
         // Half a pixel of the blur, and half a grey level at the top: a slope of 0.07 over a tenth of the radius and more where it is flat.
         assert!((height - 1.0).abs() < 0.02, "{bend}: {height}");
@@ -120,10 +120,10 @@ fn a_contact_that_is_no_ellipse_is_taken_as_it_is() {
     let inside = |at: (usize, usize)| (at.0 as f64 - 20.0).abs().max(at.1 as f64 - 20.0) < 12.0;
     let mask = Array2::from_shape_fn((41, 41), inside);
     let image = mask.mapv(|inside| if inside { 0.8 } else { 0.0 });
-    let domain = Domain::pixels().with_mask(mask.view());
-    let plain = eikonal().reconstruct(image.view(), &domain).unwrap();
+    let domain = Domain::default().with_mask(mask.view());
+    let plain = eikonal().reconstruct(image.view().into(), &domain).unwrap();
     let fitted = eikonal().with_fitted_profile(true);
-    let fitted = fitted.reconstruct(image.view(), &domain).unwrap();
+    let fitted = fitted.reconstruct(image.view().into(), &domain).unwrap();
     assert_eq!(plain.mask, fitted.mask);
     assert!(
         plain

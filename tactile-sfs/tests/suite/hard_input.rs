@@ -11,16 +11,18 @@ fn bad_pixels_are_flagged_and_do_little_harm() {
     image[[20, 20]] = f64::NAN;
     image[[24, 30]] = 1.7;
     image[[30, 18]] = 0.0;
-    let domain = Domain::pixels().with_mask(case.mask.view());
+    let domain = Domain::default().with_mask(case.mask.view());
     let method = Eikonal::new(frontal())
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
-    let surface = method.reconstruct(image.view(), &domain).unwrap();
+    let surface = method.reconstruct(image.view().into(), &domain).unwrap();
     assert!(surface.flags[[20, 20]].contains(PixelFlags::NON_FINITE));
     assert!(surface.flags[[24, 30]].contains(PixelFlags::SATURATED));
     assert!(surface.flags[[30, 18]].contains(PixelFlags::DARK));
     assert_eq!(surface.report.flagged, 3);
-    let clean = method.reconstruct(case.image.view(), &domain).unwrap();
+    let clean = method
+        .reconstruct(case.image.view().into(), &domain)
+        .unwrap();
     let error = height_error(
         surface.heights.view(),
         clean.heights.view(),
@@ -50,12 +52,15 @@ fn noise_at_the_rim_does_not_draw_the_surface_down() {
     let image = z
         .mapv(|z| 200.0 * z / radius + (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
         .mapv(|v| v.round() as u8);
-    let lighting = Lighting::frontal().with_normal_intensity(200.0).unwrap();
+    let lighting = Lighting::default().with_normal_intensity(200.0).unwrap();
     let method = Eikonal::new(lighting)
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
     let surface = method
-        .reconstruct_u8(image.view(), &Domain::pixels().with_mask(mask.view()))
+        .reconstruct(
+            image.view().into(),
+            &Domain::default().with_mask(mask.view()),
+        )
         .unwrap();
     let error = height_error(
         surface.heights.view(),
@@ -78,14 +83,14 @@ fn narrow_domains_are_right() {
     let image = Array2::from_elem((1, 9), 0.5_f64.sqrt());
     let mut known = Array2::from_elem((1, 9), f64::NAN);
     known[[0, 0]] = 2.0;
-    let domain = Domain::pixels().with_known_heights(known.view());
+    let domain = Domain::default().with_known_heights(known.view());
     let method = Eikonal::new(frontal()).with_branch(Branch::Convex);
-    let surface = method.reconstruct(image.view(), &domain).unwrap();
+    let surface = method.reconstruct(image.view().into(), &domain).unwrap();
     assert!((surface.heights[[0, 8]] - 10.0).abs() < 1e-9);
     for (name, method) in integrators() {
         let (p, q) = (Array2::from_elem((1, 8), 0.5), Array2::zeros((1, 8)));
         let surface = method
-            .integrate(p.view(), q.view(), &Domain::pixels())
+            .integrate(p.view(), q.view(), &Domain::default())
             .unwrap();
         let rise = surface.heights[[0, 7]] - surface.heights[[0, 0]];
         // The periodic method cannot hold a ramp: its mean slope is lost.
@@ -102,7 +107,7 @@ fn narrow_domains_are_right() {
         Array2::from_elem((20, 20), 1.0),
         Array2::from_elem((20, 20), 2.0),
     );
-    let domain = Domain::pixels().with_mask(mask.view());
+    let domain = Domain::default().with_mask(mask.view());
     let surface = MaskedLeastSquares::default()
         .integrate(p.view(), q.view(), &domain)
         .unwrap();
@@ -115,28 +120,35 @@ fn nonsense_is_refused() {
     let empty = Array2::from_elem((4, 5), false);
     let wrong = Array2::from_elem((5, 4), true);
     for (name, method) in reconstructions() {
-        let run = |domain: Domain<'_, f64>| method.reconstruct(image.view(), &domain).unwrap_err();
+        let run = |domain: Domain<'_, f64>| {
+            method
+                .reconstruct(image.view().into(), &domain)
+                .unwrap_err()
+        };
         assert_eq!(
-            run(Domain::pixels().with_mask(empty.view())),
+            run(Domain::default().with_mask(empty.view())),
             SfsError::EmptyMask,
             "{name}"
         );
         let shape = SfsError::ShapeMismatch {
-            input: Input::Mask,
+            input: "mask",
             expected: [4, 5],
             found: [5, 4],
         };
         assert_eq!(
-            run(Domain::pixels().with_mask(wrong.view())),
+            run(Domain::default().with_mask(wrong.view())),
             shape,
             "{name}"
         );
         let size = Domain {
             pixel_size_m: [f64::NAN, 1.0],
-            ..Domain::pixels()
+            ..Domain::default()
         };
         assert!(matches!(run(size), SfsError::NotPositive { .. }), "{name}");
-        let none = method.reconstruct(Array2::zeros((0, 3)).view(), &Domain::pixels());
+        let none = method.reconstruct(
+            Array2::<f64>::zeros((0, 3)).view().into(),
+            &Domain::default(),
+        );
         assert_eq!(
             none.unwrap_err(),
             SfsError::EmptyImage {
@@ -148,7 +160,7 @@ fn nonsense_is_refused() {
     }
     assert_eq!(
         Eikonal::new(frontal())
-            .reconstruct(image.view(), &Domain::pixels())
+            .reconstruct(image.view().into(), &Domain::default())
             .unwrap_err(),
         SfsError::NoKnownHeight
     );
@@ -157,10 +169,8 @@ fn nonsense_is_refused() {
         Err(SfsError::LightFromBelow { .. })
     ));
     for bad in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
-        assert!(frontal().with_albedo(bad).is_err());
         assert!(frontal().with_normal_intensity(bad).is_err());
         assert!(Eikonal::new(frontal()).with_tolerance(bad).is_err());
-        assert!(Eikonal::new(frontal()).with_max_slope(bad).is_err());
         assert!(TsaiShah::new(frontal()).with_noise(bad).is_err());
         assert!(BrooksHorn::new(frontal()).with_smoothness(bad).is_err());
         assert!(Pentland::new(frontal()).with_regularisation(bad).is_err());

@@ -68,7 +68,7 @@ fn vase() -> (Array2<f64>, [Array2<f64>; 2], Array2<bool>) {
 #[test]
 fn survey_vase_from_its_rim() {
     let (z, [p, q], mask) = vase();
-    let light = Lighting::frontal().with_normal_intensity(255.0).unwrap();
+    let light = Lighting::default().with_normal_intensity(255.0).unwrap();
     let image = Array2::from_shape_fn(z.dim(), |at| {
         if mask[at] {
             light.shade(p[at], q[at]).round() as u8
@@ -80,7 +80,10 @@ fn survey_vase_from_its_rim() {
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
     let surface = method
-        .reconstruct_u8(image.view(), &Domain::pixels().with_mask(mask.view()))
+        .reconstruct(
+            image.view().into(),
+            &Domain::default().with_mask(mask.view()),
+        )
         .unwrap();
     let error = height_error(
         surface.heights.view(),
@@ -183,7 +186,9 @@ impl PressedBall {
     /// Mean absolute error of a table's surface within a mask, in metres.
     fn error(&self, table: &DepthTable<f64>, mask: &Array2<bool>) -> f64 {
         let domain = Domain::new([PIXEL, PIXEL]).unwrap().with_mask(mask.view());
-        let surface = table.reconstruct(self.pressed.view(), &domain).unwrap();
+        let surface = table
+            .reconstruct(self.pressed.view().into(), &domain)
+            .unwrap();
         height_error(
             surface.heights.view(),
             self.cap.view(),
@@ -288,9 +293,9 @@ fn tsai_shah_errors(
     [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [5.0, 5.0, 7.0]].map(|light| {
         let lighting = Lighting::new(light).unwrap();
         let image = Array2::from_shape_fn(z.dim(), |at| lighting.shade(p[at], q[at]));
-        let domain = Domain::pixels().with_mask(mask.view());
+        let domain = Domain::default().with_mask(mask.view());
         let surface = TsaiShah::new(lighting)
-            .reconstruct(image.view(), &domain)
+            .reconstruct(image.view().into(), &domain)
             .unwrap();
         let error = |alignment| {
             height_error(

@@ -2,7 +2,7 @@
 use tactile_sfs::*;
 
 pub(crate) fn frontal() -> Lighting<f64> {
-    Lighting::frontal()
+    Lighting::default()
 }
 
 pub(crate) fn oblique() -> Lighting<f64> {

@@ -23,12 +23,12 @@ fn rising(n: usize, shape: Shape) -> f64 {
     let domain = Domain::new([sampled.pixel; 2])
         .unwrap()
         .with_mask(sampled.mask.view());
-    let method = Eikonal::new(Lighting::frontal())
+    let method = Eikonal::new(Lighting::default())
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
     let surface = method
         .with_branch(Branch::Convex)
-        .reconstruct(sampled.image.view(), &domain)
+        .reconstruct(sampled.image.view().into(), &domain)
         .unwrap();
     let error = height_error(
         surface.heights.view(),
@@ -53,8 +53,10 @@ fn falling(n: usize, shape: Shape) -> f64 {
         .unwrap()
         .with_mask(sampled.mask.view())
         .with_known_heights(known.view());
-    let method = Eikonal::new(Lighting::frontal()).with_branch(Branch::Concave);
-    let surface = method.reconstruct(sampled.image.view(), &domain).unwrap();
+    let method = Eikonal::new(Lighting::default()).with_branch(Branch::Concave);
+    let surface = method
+        .reconstruct(sampled.image.view().into(), &domain)
+        .unwrap();
     let error = height_error(
         surface.heights.view(),
         sampled.z.view(),
@@ -141,10 +143,10 @@ fn pixels_need_not_be_square() {
     let mask = Array2::from_shape_fn(shape, |(r, c)| at(r, c).is_some());
     let image = z.mapv(|z| z / 0.8);
     let domain = Domain::new([wide, high]).unwrap().with_mask(mask.view());
-    let method = Eikonal::new(Lighting::frontal())
+    let method = Eikonal::new(Lighting::default())
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap();
-    let surface = method.reconstruct(image.view(), &domain).unwrap();
+    let surface = method.reconstruct(image.view().into(), &domain).unwrap();
     let error = height_error(
         surface.heights.view(),
         z.view(),

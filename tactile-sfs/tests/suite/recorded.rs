@@ -33,7 +33,7 @@ fn add_surface(answers: &mut Answers, name: &str, surface: &Surface<f64>) {
 
 fn reconstructions(answers: &mut Answers) {
     let oblique = Lighting::new([0.3, -0.2, 1.0]).expect("a light");
-    let frontal = Lighting::frontal();
+    let frontal = Lighting::default();
     let steep = Eikonal::new(frontal)
         .with_boundary(BoundaryCondition::Height(0.1))
         .expect("a height");
@@ -47,7 +47,7 @@ fn reconstructions(answers: &mut Answers) {
         let domain = domain.with_mask(scene.mask.view());
         let solve = |method: &dyn SurfaceReconstruction<f64>, image: &Array2<f64>| {
             method
-                .reconstruct(image.view(), &domain)
+                .reconstruct(image.view().into(), &domain)
                 .expect("a surface")
         };
         add_surface(
@@ -85,7 +85,10 @@ fn reconstructions(answers: &mut Answers) {
         let found = estimate_lighting(Frame::Real(lit.view()), &domain).expect("a light");
         answers.add(
             format!("estimate/{name}"),
-            found.direction().into_iter().chain([found.albedo()]),
+            found
+                .direction()
+                .into_iter()
+                .chain([found.normal_intensity()]),
         );
     }
     both_branches(answers, frontal);
@@ -105,7 +108,9 @@ fn both_branches(answers: &mut Answers, frontal: Lighting<f64>) {
     let image = render(scene.z.view(), [scene.pixel; 2], &lit);
     for (name, light, image) in [("frontal", frontal, &scene.image), ("oblique", lit, &image)] {
         let method = Eikonal::new(light).with_branch(Branch::Auto);
-        let surface = method.reconstruct(image.view(), &domain).expect("heights");
+        let surface = method
+            .reconstruct(image.view().into(), &domain)
+            .expect("heights");
         add_surface(answers, &format!("eikonal_known/{name}"), &surface);
     }
 }
@@ -126,7 +131,7 @@ fn depth_table(answers: &mut Answers) {
     answers.add("ball", numbers);
     let surface = found
         .table
-        .reconstruct(image.view(), &domain)
+        .reconstruct(image.view().into(), &domain)
         .expect("depths");
     add_surface(answers, "depth_table", &surface);
 }
@@ -164,7 +169,7 @@ fn integrators(answers: &mut Answers) {
 fn samplers(answers: &mut Answers) {
     let scene = Sampled::new(SIDE, ellipsoid);
     let adaptive = CurvatureAdaptive::new(4.0).expect("an emphasis");
-    let (even, random) = (EquallySpaced, Random::new(11));
+    let (even, random) = (EquallySpaced, Random { seed: 11 });
     let samplers: [(&str, &dyn ControlPointSampler<f64>); 3] = [
         ("equally_spaced", &even),
         ("adaptive", &adaptive),
@@ -211,7 +216,7 @@ fn quality(answers: &mut Answers) {
     let image = render(scene.z.view(), [scene.pixel; 2], &light);
     let frame = Frame::Real(image.view());
     let found = reprojection(other.z.view(), frame, [scene.pixel; 2], &light).expect("errors");
-    answers.add("reprojection", [found.error.rms]);
+    answers.add("reprojection", [found.1.rms]);
 }
 
 #[test]

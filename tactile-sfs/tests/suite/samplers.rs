@@ -7,7 +7,7 @@ use tactile_sfs::*;
 fn samplers() -> [Box<dyn ControlPointSampler<f64>>; 3] {
     [
         Box::new(EquallySpaced),
-        Box::new(Random::new(3)),
+        Box::new(Random { seed: 3 }),
         Box::new(CurvatureAdaptive::new(2.0).unwrap()),
     ]
 }

@@ -89,7 +89,7 @@ fn integrals_have_no_unit() {
 #[test]
 fn saturated_and_constant_images_have_surfaces() {
     let scene = Sampled::new(24, sphere);
-    let light = Lighting::frontal();
+    let light = Lighting::default();
     let methods: [(&str, Box<dyn SurfaceReconstruction<f64>>); 4] = [
         (
             "eikonal",
@@ -124,7 +124,7 @@ fn saturated_and_constant_images_have_surfaces() {
     for (name, method) in &methods {
         for (what, image) in &images {
             let domain = Domain::new([1e-5; 2]).unwrap().with_mask(scene.mask.view());
-            let Ok(surface) = method.reconstruct(image.view(), &domain) else {
+            let Ok(surface) = method.reconstruct(image.view().into(), &domain) else {
                 continue;
             };
             let inside = surface

@@ -28,7 +28,7 @@ fn worst(signal_of: impl Fn(f64) -> f64, threshold: f64) -> [f64; 2] {
     let table = found.table.with_contact_threshold(threshold).unwrap();
     let zeroed = table.clone().zeroed().unwrap();
     [table, zeroed].map(|table| {
-        let surface = table.reconstruct(image.view(), &domain).unwrap();
+        let surface = table.reconstruct(image.view().into(), &domain).unwrap();
         let both = surface.heights.iter().zip(&truth).zip(&image);
         let seen = both.filter(|(_, signal)| **signal > threshold + 1.0);
         seen.map(|((h, z), _)| (h - z).abs()).fold(0.0, f64::max)

@@ -86,7 +86,10 @@ fn loads(first: f64, forces: &[Estimate<f64>; 2], lateral: Estimate<f64>) -> [Lo
     // Second Piola–Kirchhoff: force over λ_z A₀.
     let load = |i: usize| {
         let area = (1.0 - 2.0 * strains[i]).sqrt() * FACE_M * FACE_M;
-        LoadState::new(forces[i]).with_contact_area(Estimate::exact(area))
+        LoadState {
+            contact_area_m2: Some(Estimate::exact(area)),
+            ..LoadState::new(forces[i])
+        }
     };
     let (value, standard_error) = (squeeze(lateral.value), squeeze(lateral.standard_error));
     let strain = Estimate {
@@ -94,7 +97,13 @@ fn loads(first: f64, forces: &[Estimate<f64>; 2], lateral: Estimate<f64>) -> [Lo
         standard_error,
         ..lateral
     };
-    [load(0), load(1).with_mean_strain(strain)]
+    [
+        load(0),
+        LoadState {
+            mean_strain: Some(strain),
+            ..load(1)
+        },
+    ]
 }
 
 /// Stress over strain; the first load's own strain follows from the modulus found so far.

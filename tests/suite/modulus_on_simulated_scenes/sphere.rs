@@ -157,8 +157,9 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
         })
         .collect();
     let loads: Vec<_> = (measured.iter())
-        .map(|m| {
-            LoadState::new(force(m)).with_contact_radius(estimate(m.contact_radius_m.unwrap()))
+        .map(|m| LoadState {
+            contact_radius_m: Some(estimate(m.contact_radius_m.unwrap())),
+            ..LoadState::new(force(m))
         })
         .collect();
     let estimator = HertzSphere::new(presses.radius, NU)

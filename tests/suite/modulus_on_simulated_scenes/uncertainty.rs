@@ -161,8 +161,15 @@ fn ratio() -> PaperRatio {
 }
 
 fn loads(forces: [f64; 2], squeeze: Estimate<f64>) -> LoadSeries<f64> {
-    let load = |f| LoadState::new(Estimate::exact(f)).with_contact_area(Estimate::exact(AREA_M2));
-    LoadSeries::new([load(forces[0]), load(forces[1]).with_mean_strain(squeeze)])
+    let load = |f| LoadState {
+        contact_area_m2: Some(Estimate::exact(AREA_M2)),
+        ..LoadState::new(Estimate::exact(f))
+    };
+    let last = LoadState {
+        mean_strain: Some(squeeze),
+        ..load(forces[1])
+    };
+    LoadSeries::new([load(forces[0]), last])
 }
 
 /// The standard deviation of 4000 redrawn moduli is itself known to 1.1 %; 5 % is four and a half of its standard deviations.

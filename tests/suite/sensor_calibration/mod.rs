@@ -47,7 +47,7 @@ fn study(exponents: &[f64], camera: Camera, sensors: u64, presses: u32) -> Study
         };
         let mut simulated = Simulated::new(effects, camera, 1000 + seed);
         let calibrated = simulated.calibration().run().unwrap();
-        let report = calibrated.sensor.curve.fit_report();
+        let report = &calibrated.sensor.curve.report;
         println!(
             "sensor {seed}, p^{}: scatter {:.2}, layers {:?}",
             effects.exponent,

@@ -25,9 +25,7 @@ use nalgebra::RealField;
 /// // Stress that starts at 300 Pa: a gauge that was not tared.
 /// let loads = [0.01, 0.02, 0.03, 0.04]
 ///     .map(|strain: f64| {
-///         LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
-///             .with_contact_area(Estimate::exact(1e-4))
-///             .with_mean_strain(Estimate::exact(strain))
+///         LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), mean_strain: Some(Estimate::exact(strain)), ..LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4)) }
 ///     });
 /// let loads = LoadSeries::new(loads);
 /// let tested = StressStrainRegression::default().estimate(&loads)?;
@@ -55,9 +53,11 @@ pub enum Intercept {
 /// ```
 /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression};
 /// let load = |stress: f64, strain: f64| {
-///     LoadState::new(Estimate::new(stress * 1e-6, 1e-5)) // on one square millimetre
-///         .with_contact_area(Estimate::exact(1e-6))
-///         .with_mean_strain(Estimate::new(strain, 1e-4))
+///     LoadState {
+///         contact_area_m2: Some(Estimate::exact(1e-6)), // one square millimetre
+///         mean_strain: Some(Estimate::new(strain, 1e-4)),
+///         ..LoadState::new(Estimate::new(stress * 1e-6, 1e-5))
+///     }
 /// };
 /// let loads = LoadSeries::new([load(600.0, 0.01), load(1200.0, 0.02), load(2400.0, 0.04)]);
 /// let modulus = StressStrainRegression::default().estimate(&loads)?;
@@ -76,9 +76,7 @@ impl StressStrainRegression {
     /// use tactile_elasticity::modulus::{Estimate, Intercept, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression};
     ///
     /// let load = |strain: f64| {
-    ///     LoadState::new(Estimate::new(60e3 * strain * 1e-4, 1e-4))
-    ///         .with_contact_area(Estimate::exact(1e-4))
-    ///         .with_mean_strain(Estimate::exact(strain))
+    ///     LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), mean_strain: Some(Estimate::exact(strain)), ..LoadState::new(Estimate::new(60e3 * strain * 1e-4, 1e-4)) }
     /// };
     /// let line = StressStrainRegression::default().with_intercept(Intercept::Zero);
     /// assert!((line.estimate(&LoadSeries::new([load(0.01), load(0.02)]))?.youngs_modulus_pa - 60e3).abs() < 1e-6);

@@ -17,11 +17,13 @@ fn intervals_cover_what_they_promise() {
         let loads: Vec<_> = (clean.iter())
             .map(|l| {
                 let (f, a) = (l.force_n.value, l.contact_radius_m.unwrap().value);
-                LoadState::new(Estimate::new(
-                    f * scale * (1.0 + 0.005 * normal()),
-                    0.005 * f,
-                ))
-                .with_contact_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
+                LoadState {
+                    contact_radius_m: Some(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a)),
+                    ..LoadState::new(Estimate::new(
+                        f * scale * (1.0 + 0.005 * normal()),
+                        0.005 * f,
+                    ))
+                }
             })
             .collect();
         let series = LoadSeries::new(loads).with_shared_errors(force_scale(0.01));
@@ -66,10 +68,10 @@ fn one_load_without_errors_has_no_interval() {
 
 #[test]
 fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
-    let load = |force: f64, strain: f64| {
-        LoadState::new(Estimate::new(force, 0.01 * force))
-            .with_contact_area(exact(1e-4))
-            .with_mean_strain(exact(strain))
+    let load = |force: f64, strain: f64| LoadState {
+        contact_area_m2: Some(exact(1e-4)),
+        mean_strain: Some(exact(strain)),
+        ..LoadState::new(Estimate::new(force, 0.01 * force))
     };
     let loads = LoadSeries::new([load(0.02, 0.0), load(0.08, 0.01)]);
     let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
@@ -102,9 +104,11 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
 #[test]
 fn errors_learnt_from_few_repetitions_widen_the_interval() {
     let load = |force: Estimate<f64>, strain: Estimate<f64>| {
-        LoadSeries::new([LoadState::new(force)
-            .with_contact_area(exact(1e-4))
-            .with_mean_strain(strain)])
+        LoadSeries::new([LoadState {
+            contact_area_m2: Some(exact(1e-4)),
+            mean_strain: Some(strain),
+            ..LoadState::new(force)
+        }])
     };
     let half_width = |loads: &LoadSeries<f64>| {
         let found = PaperRatio::default().estimate(loads).unwrap();
@@ -134,13 +138,15 @@ fn twenty_thousand_loads_are_one_linear_regression() {
         .map(|l| {
             let (f, a) = (l.force_n.value, l.contact_radius_m.unwrap().value);
             let d = l.indentation_m.unwrap().value;
-            LoadState::new(Estimate::new(f * (1.0 + 0.005 * normal()), 0.005 * f))
-                .with_contact_radius(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a))
-                .with_indentation(Estimate::new(d * (1.0 + 0.01 * normal()), 0.01 * d))
-                .with_mean_strain(Estimate::new(
+            LoadState {
+                contact_radius_m: Some(Estimate::new(a * (1.0 + 0.004 * normal()), 0.004 * a)),
+                indentation_m: Some(Estimate::new(d * (1.0 + 0.01 * normal()), 0.01 * d)),
+                mean_strain: Some(Estimate::new(
                     f / (std::f64::consts::PI * a * a) / SAMPLE,
                     1e-4,
-                ))
+                )),
+                ..LoadState::new(Estimate::new(f * (1.0 + 0.005 * normal()), 0.005 * f))
+            }
         })
         .collect();
     let series = LoadSeries::new(loads)

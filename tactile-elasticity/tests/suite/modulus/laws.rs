@@ -13,9 +13,9 @@ fn every_law_inverts_itself() {
         .unwrap()
         .with_waveguide(&waveguide());
     finds(&on_waveguide, &hertz_loads(waveguide().as_body(), &forces));
-    let punch = |d: f64| {
-        LoadState::new(exact(flat_punch(reduced(), 2e-3, d).unwrap().force_n))
-            .with_indentation(exact(d))
+    let punch = |d: f64| LoadState {
+        indentation_m: Some(exact(d)),
+        ..LoadState::new(exact(flat_punch(reduced(), 2e-3, d).unwrap().force_n))
     };
     finds(
         &FlatPunch::new(2e-3, NU).unwrap(),
@@ -24,14 +24,19 @@ fn every_law_inverts_itself() {
     let angle = 1.2f64;
     let cone = |d: f64| {
         let c = cone(reduced(), angle.tan(), d).unwrap();
-        LoadState::new(exact(c.force_n))
-            .with_indentation(exact(d))
-            .with_contact_radius(exact(c.contact_radius_m))
+        LoadState {
+            indentation_m: Some(exact(d)),
+            contact_radius_m: Some(exact(c.contact_radius_m)),
+            ..LoadState::new(exact(c.force_n))
+        }
     };
     finds(&Cone::new(angle, NU).unwrap(), &[cone(1e-5), cone(3e-5)]);
     let squeezed = |a: f64| {
         let d = tatara_indentation_m(a, 3e-3, NU).unwrap();
-        LoadState::new(exact(4.0 / 3.0 * reduced() * a.powi(3) / 3e-3)).with_indentation(exact(d))
+        LoadState {
+            indentation_m: Some(exact(d)),
+            ..LoadState::new(exact(4.0 / 3.0 * reduced() * a.powi(3) / 3e-3))
+        }
     };
     finds(
         &TataraSphere::new(3e-3, NU).unwrap(),
@@ -53,9 +58,11 @@ fn layers_invert_themselves_thick_or_thin() {
         let c = layer.solve(a_over_h).unwrap();
         let (a, d) = (a_over_h * h, (c.chi * h).powi(2) / r);
         let force = 4.0 / 3.0 * reduced() * r.sqrt() * d.powf(1.5) * c.force_ratio;
-        LoadState::new(exact(force))
-            .with_contact_radius(exact(a))
-            .with_indentation(exact(d))
+        LoadState {
+            contact_radius_m: Some(exact(a)),
+            indentation_m: Some(exact(d)),
+            ..LoadState::new(exact(force))
+        }
     };
     let loads = [load(0.05), load(0.4), load(1.3)];
     let theory = |t| BondedLayer::new(r, h, NU, Bond::Bonded, t).unwrap();
@@ -95,9 +102,11 @@ fn layered_loads(guide: &Waveguide<f64>, contact_radii_m: &[f64]) -> Vec<LoadSta
         .map(|&a| {
             let contact = layers.solve(a / guide.thickness_m()).unwrap();
             let force = 4.0 / 3.0 / total * a.powi(3) / r * contact.force_ratio_same_radius;
-            LoadState::new(exact(force))
-                .with_contact_radius(exact(a))
-                .with_indentation(exact(a * a / r * contact.indentation_ratio))
+            LoadState {
+                contact_radius_m: Some(exact(a)),
+                indentation_m: Some(exact(a * a / r * contact.indentation_ratio)),
+                ..LoadState::new(exact(force))
+            }
         })
         .collect()
 }
@@ -156,7 +165,10 @@ fn far_stiffer_samples_are_bounded_from_below_only() {
             .unwrap()
             .contact_radius_m
             * (1.0 + error);
-        LoadState::new(exact(f)).with_contact_radius(Estimate::new(a, 0.01 * a))
+        LoadState {
+            contact_radius_m: Some(Estimate::new(a, 0.01 * a)),
+            ..LoadState::new(exact(f))
+        }
     };
     let estimator = HertzSphere::new(4e-3, NU).unwrap().with_waveguide(&guide);
     let found = estimator
@@ -189,9 +201,9 @@ fn f32_agrees_with_f64() {
     let narrow = |e: Estimate<f64>| Estimate::new(e.value as f32, e.standard_error as f32);
     let single: Vec<LoadState<f32>> = loads
         .iter()
-        .map(|l| {
-            LoadState::new(narrow(l.force_n))
-                .with_contact_radius(narrow(l.contact_radius_m.unwrap()))
+        .map(|l| LoadState {
+            contact_radius_m: Some(narrow(l.contact_radius_m.unwrap())),
+            ..LoadState::new(narrow(l.force_n))
         })
         .collect();
     let found = HertzSphere::new(4e-3f32, NU as f32)
@@ -224,8 +236,10 @@ fn loads_choose_their_law() {
         let (h, contact) = (2e-3, equation.solve(ratio).unwrap());
         let hertz = 4.0 / 3.0 * reduced() * (ratio * h).powi(3) / 4e-3;
         let depth = (contact.chi * h).powi(2) / 4e-3;
-        LoadState::new(exact(hertz * contact.force_ratio_same_radius))
-            .with_indentation(Estimate::new(depth, 0.003 * depth))
+        LoadState {
+            indentation_m: Some(Estimate::new(depth, 0.003 * depth)),
+            ..LoadState::new(exact(hertz * contact.force_ratio_same_radius))
+        }
     };
     let candidates = BestOf::sphere_on_sample(4e-3, NU, Some(2e-3)).unwrap();
     let series = LoadSeries::new([0.2, 0.5, 0.9, 1.3].map(load));
@@ -284,8 +298,10 @@ fn balls_of_every_stiffness_and_size_invert_on_layers() {
                     }
                     let contact = layers.solve(a / guide.thickness_m()).unwrap();
                     let hertz = 4.0 / 3.0 * reduced * a.powi(3) / radius;
-                    let load = LoadState::new(exact(hertz * contact.force_ratio_same_radius))
-                        .with_contact_radius(exact(a));
+                    let load = LoadState {
+                        contact_radius_m: Some(exact(a)),
+                        ..LoadState::new(exact(hertz * contact.force_ratio_same_radius))
+                    };
                     let found = estimator.estimate(&LoadSeries::new([load])).unwrap();
                     let gap = found.youngs_modulus_pa / modulus - 1.0;
                     // The table's 5·10⁻⁶ in ln F, times what the guide's own compliance makes of it.

@@ -47,9 +47,11 @@ fn hertz_loads(other: Body<f64>, forces: &[f64]) -> Vec<LoadState<f64>> {
     (forces.iter())
         .map(|&f| {
             let c = HertzContact::from_force(f, 4e-3, e).unwrap();
-            LoadState::new(exact(f))
-                .with_contact_radius(exact(c.contact_radius_m))
-                .with_indentation(exact(c.indentation_m))
+            LoadState {
+                contact_radius_m: Some(exact(c.contact_radius_m)),
+                indentation_m: Some(exact(c.indentation_m)),
+                ..LoadState::new(exact(f))
+            }
         })
         .collect()
 }
@@ -63,12 +65,14 @@ fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState<f64>> {
     .map(|(near, far)| {
         let indentation = near.indentation_m.unwrap().value + far.indentation_m.unwrap().value;
         let a = near.contact_radius_m.unwrap().value;
-        LoadState::new(Estimate::new(
-            near.force_n.value,
-            relative * near.force_n.value,
-        ))
-        .with_contact_radius(Estimate::new(a, relative * a))
-        .with_indentation(Estimate::new(indentation, relative * indentation))
+        LoadState {
+            contact_radius_m: Some(Estimate::new(a, relative * a)),
+            indentation_m: Some(Estimate::new(indentation, relative * indentation)),
+            ..LoadState::new(Estimate::new(
+                near.force_n.value,
+                relative * near.force_n.value,
+            ))
+        }
     })
     .collect()
 }

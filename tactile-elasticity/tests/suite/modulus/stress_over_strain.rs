@@ -3,9 +3,11 @@
 use super::*;
 
 fn strained(stress: f64, strain: f64) -> LoadState<f64> {
-    LoadState::new(exact(stress * 1e-4))
-        .with_contact_area(exact(1e-4))
-        .with_mean_strain(exact(strain))
+    LoadState {
+        contact_area_m2: Some(exact(1e-4)),
+        mean_strain: Some(exact(strain)),
+        ..LoadState::new(exact(stress * 1e-4))
+    }
 }
 
 #[test]
@@ -80,7 +82,10 @@ fn bad_input_is_named() {
         }
     );
     for area in [0.0, -1e-6] {
-        let load = strained(100.0, 0.1).with_contact_area(exact(area));
+        let load = LoadState {
+            contact_area_m2: Some(exact(area)),
+            ..strained(100.0, 0.1)
+        };
         assert_eq!(
             fail(load),
             E::NotPositive {
@@ -108,7 +113,10 @@ fn bad_input_is_named() {
             found: 0
         }
     );
-    let bare = LoadState::new(exact(1.0)).with_mean_strain(exact(0.1));
+    let bare = LoadState {
+        mean_strain: Some(exact(0.1)),
+        ..LoadState::new(exact(1.0))
+    };
     assert_eq!(
         fail(bare),
         E::Missing {
@@ -154,7 +162,10 @@ fn bad_input_is_named() {
             found: 0
         }
     );
-    let pulled = LoadState::new(exact(-1.0)).with_contact_radius(exact(1e-3));
+    let pulled = LoadState {
+        contact_radius_m: Some(exact(1e-3)),
+        ..LoadState::new(exact(-1.0))
+    };
     assert!(matches!(
         sphere.estimate(&LoadSeries::new([pulled])),
         Err(E::NotPositive {
@@ -162,7 +173,10 @@ fn bad_input_is_named() {
             ..
         })
     ));
-    let flat = LoadState::new(exact(1.0)).with_contact_radius(exact(0.0));
+    let flat = LoadState {
+        contact_radius_m: Some(exact(0.0)),
+        ..LoadState::new(exact(1.0))
+    };
     assert!(matches!(
         sphere.estimate(&LoadSeries::new([flat])),
         Err(E::NotPositive {

@@ -267,12 +267,9 @@ fn options_out_of_range_are_typed_errors() {
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
         refused(good.with_temperature(bad), "temperature");
         refused(good.with_slack(bad), "slack");
-        refused(good.with_tolerance(bad), "tolerance");
         refused(good.with_smoothing(bad), "smoothing");
     }
     refused(good.with_temperature(0.0), "temperature");
-    refused(good.with_sweeps(0), "sweeps");
-    refused(good.with_sinkhorn_sweeps(0), "sinkhorn_sweeps");
     refused(good.with_max_iterations(0), "max_iterations");
     refused(
         good.with_neighbourhood(Neighbourhood::Nearest(0)),

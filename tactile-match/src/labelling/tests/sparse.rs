@@ -1,7 +1,7 @@
 //! The paper's method over candidates, all of them kept, is the dense one.
 use crate::common::{Stream, bend, reordered, scattered};
 use crate::labelling::{LabellingOptions, LengthMaximum, Neighbourhood};
-use crate::{MatchError, Matching, PointMatcher, RelaxationLabelling, SparseRelaxationLabelling};
+use crate::{MatchError, Matching, PointMatcher, RelaxationLabelling};
 use nalgebra::Point;
 use proptest::prelude::*;
 
@@ -27,7 +27,8 @@ fn all_candidates_give_the_dense_answer<const D: usize>(
     options: LabellingOptions,
 ) -> Result<(), TestCaseError> {
     let dense = RelaxationLabelling::new(options);
-    let all = SparseRelaxationLabelling::new(options, target.len()).expect("valid options");
+    let few = options.with_candidates(target.len()).expect("candidates");
+    let all = RelaxationLabelling::new(few);
     // The same positive terms in the same order of magnitude, summed in another order: rounding, grown by ten sweeps.
     prop_assert!(
         dense
@@ -54,8 +55,8 @@ fn ten_candidates_do_no_worse_than_all_and_none_is_refused() {
     let [model, target] = scene::<2>(60, 60, 5);
     let order = Stream::new(5).permutation(60);
     let right = [10, 60].map(|candidates| {
-        let sparse = SparseRelaxationLabelling::new(LabellingOptions::default(), candidates)
-            .expect("valid options");
+        let options = LabellingOptions::default().with_candidates(candidates);
+        let sparse = RelaxationLabelling::new(options.expect("candidates"));
         let found = sparse.match_points(&model, &target).expect("finite points");
         found
             .assignment
@@ -69,7 +70,7 @@ fn ten_candidates_do_no_worse_than_all_and_none_is_refused() {
         right[0] >= right[1] && right[1] >= 57,
         "{right:?} of 60 right"
     );
-    let none = SparseRelaxationLabelling::new(LabellingOptions::default(), 0);
+    let none = LabellingOptions::default().with_candidates(0);
     assert!(matches!(
         none,
         Err(MatchError::InvalidOption {

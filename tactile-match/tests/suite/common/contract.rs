@@ -5,7 +5,6 @@ use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
     AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
     Matching, Motion, NearestNeighbour, PointMatcher, RelaxationLabelling,
-    SparseRelaxationLabelling,
 };
 use tactile_tps::Scalar;
 
@@ -25,10 +24,14 @@ pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
         ("dense relaxation", Box::new(dense)),
         (
             "sparse relaxation",
-            Box::new(SparseRelaxationLabelling::default()),
+            Box::new(RelaxationLabelling::new(
+                LabellingOptions::default()
+                    .with_candidates(10)
+                    .expect("candidates"),
+            )),
         ),
-        ("nearest neighbour", Box::new(NearestNeighbour::new())),
-        ("linear assignment", Box::new(LinearAssignment::new())),
+        ("nearest neighbour", Box::new(NearestNeighbour::default())),
+        ("linear assignment", Box::new(LinearAssignment::default())),
         (
             "coherent point drift",
             Box::new(CoherentPointDrift::default()),

@@ -16,7 +16,7 @@ use ndarray::ArrayView2;
 
 use super::{CosinePoisson, SlopeIntegrator};
 use crate::domain::same_shape;
-use crate::error::{Input, positive};
+use crate::error::positive;
 use crate::{BoundingBox, Component, Domain, Scalar, SfsError, Surface, Workspace};
 use components::Components;
 use multigrid::Hierarchy;
@@ -36,7 +36,7 @@ use system::System;
 /// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator};
 /// let mask = array![[true, true, false, true], [false, true, false, true]];
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::from_elem((2, 4), 2.0));
-/// let domain = Domain::pixels().with_mask(mask.view());
+/// let domain = Domain::default().with_mask(mask.view());
 /// let surface = MaskedLeastSquares::default().integrate(p.view(), q.view(), &domain)?;
 /// assert_eq!(surface.report.components.len(), 2);
 /// assert!((surface.heights[[1, 3]] - surface.heights[[0, 3]] - 2.0_f64).abs() < 1e-9);
@@ -72,18 +72,6 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
         Ok(Self { tolerance, ..self })
     }
 
-    /// Most steps of conjugate gradients.
-    ///
-    /// # Errors
-    /// [`SfsError::NotPositive`] for 0.
-    pub fn with_max_iterations(self, max_iterations: usize) -> Result<Self, SfsError> {
-        positive("most iterations", max_iterations as f64)?;
-        Ok(Self {
-            max_iterations,
-            ..self
-        })
-    }
-
     fn limits(&self) -> Limits {
         Limits {
             tolerance: self.tolerance.as_f64(),
@@ -104,10 +92,10 @@ impl<'a, T: Scalar> MaskedLeastSquares<'a, T> {
     /// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator};
     /// let (mut p, mut weights) = (Array2::from_elem((6, 6), 0.5), Array2::from_elem((6, 6), 1.0));
     /// (p[[2, 3]], weights[[2, 3]]) = (40.0, 0.0); // a false slope, known to be one
-    /// let method = MaskedLeastSquares::default().with_weights(weights.view()).with_tolerance(1e-10)?.with_max_iterations(100)?;
-    /// let surface = method.integrate(p.view(), Array2::zeros((6, 6)).view(), &Domain::pixels())?;
+    /// let method = MaskedLeastSquares::default().with_weights(weights.view()).with_tolerance(1e-10)?;
+    /// let surface = method.integrate(p.view(), Array2::zeros((6, 6)).view(), &Domain::default())?;
     /// let z = &surface.heights;
-    /// assert!((z[[2, 5]] - z[[2, 0]] - 2.5_f64).abs() < 0.1 && surface.report.iterations <= 100);
+    /// assert!((z[[2, 5]] - z[[2, 0]] - 2.5_f64).abs() < 0.1);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     pub fn with_weights(self, weights: ArrayView2<'a, T>) -> Self {
@@ -159,7 +147,7 @@ impl<T: Scalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
         let (rows, columns) = p.dim();
         let area = domain.validate(rows, columns)?;
         if let Some(weights) = self.weights {
-            same_shape(Input::Weights, [rows, columns], weights.dim())?;
+            same_shape("weights", [rows, columns], weights.dim())?;
         }
         if self.is_plain(domain, area) && solve_directly(workspace, [p, q], domain, surface)? {
             return Ok(());

@@ -14,7 +14,7 @@ pub(crate) use project::SlopeBuffers;
 use project::{Integrated, follow};
 
 use super::FieldBuffers;
-use crate::error::{non_negative, positive};
+use crate::error::positive;
 use crate::integrate::shift::write_levelled;
 use crate::{BoundingBox, Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface};
 use crate::{SlopeIntegrator, SurfaceReconstruction, Workspace};
@@ -28,7 +28,7 @@ use crate::{SlopeIntegrator, SurfaceReconstruction, Workspace};
 /// use ndarray::Array2;
 /// use tactile_sfs::{BrooksHorn, Domain, Lighting, SurfaceReconstruction};
 /// let image = Array2::from_elem((16, 16), 1.0);
-/// let surface = BrooksHorn::new(Lighting::frontal()).reconstruct(image.view(), &Domain::pixels())?;
+/// let surface = BrooksHorn::new(Lighting::default()).reconstruct(image.view().into(), &Domain::default())?;
 /// assert!(surface.heights.iter().all(|z: &f64| z.abs() < 1e-9)); // facing the light everywhere: flat
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -93,12 +93,11 @@ impl<T: Scalar> BrooksHorn<T> {
     ///     (100.0 - (r as f64 - 12.0).powi(2) - (c as f64 - 12.0).powi(2)).max(0.0).sqrt()
     /// });
     /// let (image, mask) = (z.mapv(|z| z / 10.0), z.mapv(|z| z > 0.0));
-    /// let method = BrooksHorn::new(Lighting::frontal())
+    /// let method = BrooksHorn::new(Lighting::default())
     ///     .with_occluding_boundary(true)
     ///     .with_smoothness(0.05)?
-    ///     .with_iterations(100, 20)?
-    ///     .with_max_slope(5.0)?;
-    /// let heights = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?.heights;
+    ///     .with_iterations(100, 20)?;
+    /// let heights = method.reconstruct(image.view().into(), &Domain::default().with_mask(mask.view()))?.heights;
     /// assert!(heights[[12, 12]] - heights[[12, 4]] > 2.0); // a bump: the boundary says so, the light does not
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
@@ -107,15 +106,6 @@ impl<T: Scalar> BrooksHorn<T> {
             occluding_boundary,
             ..self
         }
-    }
-
-    /// Largest slope handed to the projection.
-    ///
-    /// # Errors
-    /// [`SfsError::Negative`] if negative or not finite.
-    pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
-        non_negative("steepest slope", max_slope.as_f64())?;
-        Ok(Self { max_slope, ..self })
     }
 }
 

@@ -46,11 +46,11 @@ use load::Input;
 /// use ndarray::Array2;
 /// use tactile_sfs::{Domain, Eikonal, Lighting, BoundaryCondition, SfsError, SurfaceReconstruction};
 /// let mask = Array2::from_shape_fn((21, 21), |(r, c)| (r as f64 - 10.0).hypot(c as f64 - 10.0) < 8.0);
-/// let (image, domain) = (Array2::from_elem((21, 21), 0.5_f64.sqrt()), Domain::pixels().with_mask(mask.view()));
-/// let method = Eikonal::new(Lighting::frontal());
-/// let heights = method.with_boundary(BoundaryCondition::Height(3.0))?.reconstruct(image.view(), &domain)?.heights;
+/// let (image, domain) = (Array2::from_elem((21, 21), 0.5_f64.sqrt()), Domain::default().with_mask(mask.view()));
+/// let method = Eikonal::new(Lighting::default());
+/// let heights = method.with_boundary(BoundaryCondition::Height(3.0))?.reconstruct(image.view().into(), &domain)?.heights;
 /// assert!((heights[[10, 10]] - 11.0).abs() < 1.0); // slope 1 from the boundary, 8 px away
-/// let free = method.with_boundary(BoundaryCondition::Free)?.reconstruct(image.view(), &domain);
+/// let free = method.with_boundary(BoundaryCondition::Free)?.reconstruct(image.view().into(), &domain);
 /// assert_eq!(free, Err(SfsError::NoKnownHeight));
 /// # Ok::<(), SfsError>(())
 /// ```
@@ -72,8 +72,8 @@ pub enum BoundaryCondition<T> {
 /// let image = Array2::from_elem((15, 15), 0.5_f64.sqrt());
 /// let known = Array2::from_shape_fn((15, 15), |at| if at == (7, 7) { 10.0 } else { f64::NAN });
 /// let border = |branch| {
-///     let method = Eikonal::new(Lighting::frontal()).with_branch(branch);
-///     let surface = method.reconstruct(image.view(), &Domain::pixels().with_known_heights(known.view()))?;
+///     let method = Eikonal::new(Lighting::default()).with_branch(branch);
+///     let surface = method.reconstruct(image.view().into(), &Domain::default().with_known_heights(known.view()))?;
 ///     Ok::<_, tactile_sfs::SfsError>(surface.heights[[7, 12]])
 /// };
 /// assert!((border(Branch::Convex)? - 15.0).abs() < 0.1); // a funnel
@@ -110,8 +110,8 @@ pub enum Branch {
 ///     (400.0 - (r as f64 - 22.0).powi(2) - (c as f64 - 22.0).powi(2)).max(0.0).sqrt()
 /// });
 /// let (image, mask) = (z.mapv(|z| z / 20.0), z.mapv(|z| z > 0.0));
-/// let method = Eikonal::new(Lighting::frontal()).with_boundary(BoundaryCondition::Height(0.0))?;
-/// let surface = method.reconstruct(image.view(), &Domain::pixels().with_mask(mask.view()))?;
+/// let method = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
+/// let surface = method.reconstruct(image.view().into(), &Domain::default().with_mask(mask.view()))?;
 /// assert!((surface.heights[[22, 22]] - 20.0).abs() < 0.3);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
@@ -169,10 +169,10 @@ impl<T: Scalar> Eikonal<T> {
     /// let sharp = Array2::from_shape_fn((52, 52), |(r, c)| (400.0 - square(r, c)).max(0.0).sqrt() / 20.0);
     /// let image = Array2::from_shape_fn((50, 50), |(r, c)| sharp.slice(ndarray::s![r..r + 3, c..c + 3]).sum() / 9.0);
     /// let mask = image.mapv(|light| light > 0.1);
-    /// let domain = Domain::pixels().with_mask(mask.view());
-    /// let plain = Eikonal::new(Lighting::frontal()).with_boundary(BoundaryCondition::Height(0.0))?;
+    /// let domain = Domain::default().with_mask(mask.view());
+    /// let plain = Eikonal::new(Lighting::default()).with_boundary(BoundaryCondition::Height(0.0))?;
     /// let error = |method: Eikonal<f64>| {
-    ///     let surface = method.reconstruct(image.view(), &domain)?;
+    ///     let surface = method.reconstruct(image.view().into(), &domain)?;
     ///     Ok::<_, tactile_sfs::SfsError>((surface.heights[[24, 24]] - 20.0).abs())
     /// };
     /// let (fitted, plain) = (error(plain.with_fitted_profile(true))?, error(plain)?);
@@ -186,15 +186,6 @@ impl<T: Scalar> Eikonal<T> {
         }
     }
 
-    /// Steepest slope: pixels darker than 1/√(1 + slope²) are cut to it and flagged `DARK`.
-    ///
-    /// # Errors
-    /// [`SfsError::NotPositive`] unless positive and finite.
-    pub fn with_max_slope(self, max_slope: T) -> Result<Self, SfsError> {
-        positive("steepest slope", max_slope.as_f64())?;
-        Ok(Self { max_slope, ..self })
-    }
-
     /// Sweeping ends when no height changes by more than `tolerance` pixels (widths of a pixel).
     ///
     /// # Errors
@@ -202,31 +193,6 @@ impl<T: Scalar> Eikonal<T> {
     pub fn with_tolerance(self, tolerance: T) -> Result<Self, SfsError> {
         positive("tolerance", tolerance.as_f64())?;
         Ok(Self { tolerance, ..self })
-    }
-
-    /// Most sweeps of one solve (four directions are four sweeps).
-    ///
-    /// ```
-    /// use ndarray::array;
-    /// use tactile_sfs::{Branch, Domain, Eikonal, Lighting, PixelFlags, SurfaceReconstruction};
-    /// let known = array![[0.0, f64::NAN, f64::NAN, f64::NAN]];
-    /// let method = Eikonal::new(Lighting::frontal())
-    ///     .with_branch(Branch::Convex)
-    ///     .with_max_slope(2.0)? // black would be infinitely steep
-    ///     .with_tolerance(1e-6)?
-    ///     .with_max_sweeps(50)?;
-    /// let domain = Domain::pixels().with_known_heights(known.view());
-    /// let surface = method.reconstruct(array![[1.0, 1.0, 0.0, 1.0]].view(), &domain)?;
-    /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK));
-    /// assert!(surface.heights[[0, 3]].is_finite() && surface.report.iterations <= 100);
-    /// # Ok::<(), tactile_sfs::SfsError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`SfsError::NotPositive`] for 0.
-    pub fn with_max_sweeps(self, max_sweeps: usize) -> Result<Self, SfsError> {
-        positive("most sweeps", max_sweeps as f64)?;
-        Ok(Self { max_sweeps, ..self })
     }
 }
 
