@@ -102,7 +102,7 @@ fn pipeline() {
     let measured =
         counted(|| trial.press(&stages).map(|mut press| press.measure())).expect("a press");
     let modulus = measured.youngs_modulus_pa.expect("a modulus").value;
-    let error = modulus / trial.truth().youngs_modulus_pa - 1.0;
+    let error = modulus / trial.simulation.youngs_modulus_pa - 1.0;
     // The paper's own error.
     assert!(error.abs() < 0.0538, "{error}");
 }

@@ -17,10 +17,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         camera,
         ..PressOptions::default()
     })?;
-    let calibration = CalibrationOptions {
+    let calibration = scene.calibrate(&CalibrationOptions {
         steps: 8,
         ..CalibrationOptions::default()
-    };
+    })?;
     write_folder(&scene, &calibration, &PathBuf::from(folder))?;
     Ok(())
 }

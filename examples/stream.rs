@@ -2,7 +2,7 @@
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
 use std::error::Error;
-use tactile_imaging::pipeline::{FrameSource, Session, Trial, with_error};
+use tactile_imaging::pipeline::{FrameSource, Session, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, LoadCycle, PressOptions};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..LoadCycle::default()
     })?;
     let reference = trial.scene.reference(1);
-    let mut session = Session::new(&trial.pipeline()?, reference.view())?;
+    let mut session = Session::new(&trial.pipeline()?, &[reference.view()])?;
     let mut frame = Array2::zeros((0, 0));
     while let Some(time_s) = source.next_frame(&mut frame)? {
         let update = session.push(frame.view())?;
@@ -28,7 +28,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         // Two loads are needed before there is a modulus.
         let modulus = session.modulus().map_or("-".to_owned(), |m| {
-            with_error(m.youngs_modulus_pa, m.standard_error_pa, 1e-3)
+            let [value, error] = [m.youngs_modulus_pa, m.standard_error_pa].map(|pa| pa * 1e-3);
+            format!("{value:.2} ± {error:.2}")
         });
         println!("{time_s:6.3} s   {:.4} N   {modulus} kPa", force.value);
     }

@@ -7,10 +7,10 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::{
-    Branch, CalibrationFrame, ForceOptions, GreyHistogram, LensGeometry, PressureCurve,
+    Branch, CalibrationFrame, ContactOptions, DriftCorrection, ForceOptions, GreyHistogram,
+    LensGeometry, PressureCurve,
 };
 use tactile_imaging::pipeline::{LightContact, Object, Session, Trial};
-use tactile_imaging::sensor::Sensor;
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, Gain, Load, PressOptions, PressScene, PressSimulation,
 };
@@ -47,7 +47,8 @@ fn histogram(made: &PressSimulation, load: usize) -> CalibrationFrame {
     let frame = &made.frames[load];
     let pixels = frame.indexed_iter().filter(|(at, _)| inside(*at));
     let above = pixels.map(|(at, grey)| f32::from(*grey) - f32::from(made.reference[at]));
-    let histogram = GreyHistogram::from_differences(above, camera.pixel_area_m2());
+    let histogram =
+        GreyHistogram::from_differences(above, camera.pixel_size_m.iter().product::<f64>());
     CalibrationFrame::new(histogram, truth.contact.force_n, Branch::Loading).expect("a contact")
 }
 
@@ -56,7 +57,7 @@ fn histogram(made: &PressSimulation, load: usize) -> CalibrationFrame {
 fn sensor(trial: &Trial) -> [Pipeline; 2] {
     let forces = [0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3];
     let made = PressScene::new(PressOptions {
-        gain: Gain::GreyPerPascal(trial.scene.grey_per_pascal()),
+        gain: Gain::GreyPerPascal(trial.scene.truth(0).grey_per_pascal),
         ..options(forces.map(Load::normal).to_vec())
     });
     let made = made.expect("a scene").simulate();
@@ -67,12 +68,15 @@ fn sensor(trial: &Trial) -> [Pipeline; 2] {
     let lens = LensGeometry::new(camera.pixel_size_m)
         .and_then(|lens| lens.with_distortion([columns, rows], columns.hypot(rows), [BARREL, 0.0]))
         .expect("a lens");
-    [ForceOptions::default(), Sensor::force_options()].map(|options| {
+    let drift = ContactOptions::default().with_drift(DriftCorrection::Automatic);
+    let corrected = ForceOptions::default().with_contact(drift);
+    [ForceOptions::default(), corrected].map(|options| {
         let contact = LightContact::new(curve.clone(), camera.pixel_size_m, &options);
         let contact = contact.expect("a stage").with_lens(lens);
         let object = Object::sphere(trial.scene.options().object.radius_m);
         let pipeline = Pipeline::new(contact, object).expect("an object");
-        pipeline.with_flat_field(true)
+        let pipeline = pipeline.with_settings(|settings| settings.flat_field = true);
+        pipeline.expect("a valid setting")
     })
 }
 
@@ -100,7 +104,7 @@ pub(crate) fn calibrated(group: &mut BenchmarkGroup<'_, WallTime>) {
     let line = trial.pipeline().expect("a calibrated sensor");
     let [steady, corrected] = sensor(&trial);
     let reference = trial.simulation.reference.view();
-    let session = |pipeline: &Pipeline| Session::new(pipeline, reference).expect("a session");
+    let session = |pipeline: &Pipeline| Session::new(pipeline, &[reference]).expect("a session");
     let frames = &trial.simulation.frames;
     let mut sessions = [&line, &steady, &corrected].map(session);
     let names = ["line", "calibrated", "calibrated_drift"];

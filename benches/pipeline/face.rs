@@ -25,7 +25,8 @@ pub(crate) fn flat_faces(c: &mut Criterion) {
         });
         let scene = scene.expect("a face");
         let camera = scene.options().camera;
-        let newtons_per_grey = camera.pixel_area_m2() / scene.grey_per_pascal();
+        let newtons_per_grey =
+            camera.pixel_size_m.iter().product::<f64>() / scene.grey_per_pascal();
         let pairs = [0.0, 1e7, 2e7, 3e7, 4e7]
             .map(|sum| CalibrationPair::loading(sum, newtons_per_grey * sum));
         let block = Object::Block { poisson_ratio: 0.5 };

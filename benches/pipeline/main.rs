@@ -27,7 +27,7 @@ fn press(c: &mut Criterion) {
     let trial = Trial::new(PressOptions::default(), &CalibrationOptions::default())
         .expect("default options");
     let pipeline = trial.pipeline().expect("a calibrated sensor");
-    let truth = trial.truth().youngs_modulus_pa;
+    let truth = trial.simulation.youngs_modulus_pa;
     let measured = trial
         .press(&pipeline)
         .map(|mut p| p.measure())
@@ -125,7 +125,7 @@ fn scene(trial: &Trial, number: u64) -> PressScene {
         .loads
         .iter_mut()
         .for_each(|load| load.force_n *= strength);
-    options.gain = Gain::GreyPerPascal(trial.scene.grey_per_pascal());
+    options.gain = Gain::GreyPerPascal(trial.scene.truth(0).grey_per_pascal);
     options.seed = 1000 + number;
     PressScene::new(options).expect("a scene")
 }
@@ -271,7 +271,8 @@ fn scenes(_: &mut Criterion) {
         let pipeline = trial
             .pipeline()
             .expect("a calibrated sensor")
-            .with_flat_field(true);
+            .with_settings(|settings| settings.flat_field = true)
+            .expect("a valid setting");
         let reference =
             ReferenceFrame::new(trial.simulation.reference.view()).expect("a reference");
         let reference = Arc::new(reference.with_flat_field().expect("stray light"));
@@ -320,7 +321,8 @@ fn papers_presses(_: &mut Criterion) {
         let pipeline = trial
             .pipeline()
             .expect("a calibrated sensor")
-            .with_flat_field(true);
+            .with_settings(|settings| settings.flat_field = true)
+            .expect("a valid setting");
         let error = |number: u64| {
             let options = PressOptions {
                 seed: 5000 + number,

@@ -9,7 +9,8 @@ pub(crate) fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {
     let (one, two) = (&trial.simulation.frames[0], &trial.simulation.frames[1]);
     let empty = trial.scene.reference(9);
     let pipeline = trial.pipeline().expect("a calibrated sensor");
-    let session = || Session::new(&pipeline, trial.simulation.reference.view()).expect("a session");
+    let session =
+        || Session::new(&pipeline, &[trial.simulation.reference.view()]).expect("a session");
     let mut turn = session();
     let mut side = false;
     group.bench_function("force_of_a_frame", |b| {

@@ -5,7 +5,7 @@ use tactile_imaging::elasticity::contact::{Bond, Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::{
     Bootstrap, Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereOnWaveguide,
 };
-use tactile_imaging::simulate::{self, Elastic, PressOptions, PressScene, Sphere};
+use tactile_imaging::simulate::{self, ContactLaw, Elastic, PressOptions, PressScene, Sphere};
 
 /// A cube of a normal number, as the modulus is of the contact radius: E ∝ a⁻³ with 1 % in a, whose spread is known by a long run.
 fn cube(normal: &mut dyn FnMut() -> f64) -> Option<f64> {
@@ -79,7 +79,8 @@ pub(crate) fn laws(study: &mut Study) {
         };
         let options = PressOptions {
             object,
-            ..PressOptions::finite_elements()
+            law: ContactLaw::FiniteElements,
+            ..PressOptions::default()
         };
         let scene = PressScene::new(options).expect("a scene");
         let loads = [0, 1].map(|load| {

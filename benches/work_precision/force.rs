@@ -27,8 +27,9 @@ pub(crate) fn frame(study: &mut Study) {
         })
         .expect("valid");
     let pairs: Vec<_> = series
-        .pairs()
-        .map(|(v, f)| CalibrationPair::loading(v, f))
+        .pairs
+        .iter()
+        .map(|p| CalibrationPair::loading(p.integrated_pixel_value, p.force_n))
         .collect();
     let calibration =
         LinearCalibration::fit(&pairs, &CalibrationOptions::default()).expect("enough pairs");

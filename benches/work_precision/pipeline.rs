@@ -50,9 +50,10 @@ fn run(
     };
     study.run(knob, setting, is_default, job, |found| {
         let worst = |(mean, trial): (&[[f64; 3]; 3], &Trial)| {
-            let truth = trial.truth().strain.expect("two loads");
+            let frames = &trial.simulation.truth;
+            let truth = frames[0].scaling_to(&frames[1]).green_lagrange_strain();
             (0..3)
-                .map(|k| (mean[k][k] / truth[k][k] - 1.0).abs())
+                .map(|k| (mean[k][k] / truth[(k, k)] - 1.0).abs())
                 .fold(0.0, f64::max)
         };
         let squares: f64 = found.iter().zip(trials).map(worst).map(|e| e * e).sum();
@@ -93,7 +94,11 @@ pub(crate) fn strain(study: &mut Study) {
     }
     for width in [1, 3, 11] {
         let changed = with(
-            |pipeline, width| pipeline.with_smoothing(width).expect("odd"),
+            |pipeline, width| {
+                pipeline
+                    .with_settings(|settings| settings.smoothing_px = width)
+                    .expect("odd")
+            },
             width,
         );
         run(
@@ -109,7 +114,7 @@ pub(crate) fn strain(study: &mut Study) {
         let changed = with(
             |pipeline, side| {
                 pipeline
-                    .with_binning(Binning::Blocks(side))
+                    .with_settings(|settings| settings.binning = Binning::Blocks(side))
                     .expect("a block")
             },
             side,

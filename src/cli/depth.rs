@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use ndarray::Array2;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{Column, Grey, Quantity, read_grey_image_as, read_table};
+use tactile_imaging::io::{Grey, read_columns, read_grey_image};
 use tactile_imaging::pipeline::{
     BallFit, ContactReading, ContactSurface, DarkContact, Object, Pipeline, PipelineError,
     SurfaceInput, with_error,
@@ -79,7 +79,7 @@ impl Arguments {
             GreyOf::Rec709 => Grey::Rec709,
             GreyOf::Mean => Grey::Mean,
         };
-        Ok(read_grey_image_as(path, grey, self.bits)?.to_u8())
+        Ok(read_grey_image(path, grey, self.bits)?.to_u8())
     }
 
     fn pixel_m(&self) -> [f64; 2] {
@@ -200,17 +200,8 @@ fn result_name(frame: &Path, kind: &str) -> String {
 
 /// (darkness in grey levels, depth in metres).
 fn depth_table(path: &Path) -> Result<Vec<(f64, f64)>, Failure> {
-    let darkness = Column {
-        names: &["darkness"],
-        quantity: Quantity::Number,
-        unit: "grey_levels",
-    };
-    let depth = Column {
-        names: &["depth"],
-        quantity: Quantity::Length,
-        unit: "mm",
-    };
-    let [darkness, depth] = read_table(path)?.columns([darkness, depth], path)?;
+    let [darkness, depth] =
+        read_columns(path, [(&["darkness"], "grey_levels"), (&["depth"], "mm")])?;
     Ok(darkness.into_iter().zip(depth).collect())
 }
 
@@ -327,7 +318,7 @@ fn value(found: Option<&Found>) -> Value {
 
 /// Mean measured depth and the ball's by distance from the ball's centre, in mm: distance, measured, ball.
 fn profile(surface: &ContactSurface, ball: &BallFit, pixel_m: [f64; 2]) -> Vec<[f64; 3]> {
-    let origin = surface.origin_m();
+    let origin = surface.origin_m;
     let width = ball.contact_radius_m * 1.2 / 20.0;
     let mut rings = [[0.0; 4]; 20];
     for ((row, column), h) in surface.surface.heights.indexed_iter() {
@@ -366,7 +357,7 @@ fn page(
     let depth = surface.surface.heights.mapv(|h| h * MM);
     let size = surface.pixel_size_m.map(|m| m * MM);
     let map = HeatMap::of_pixels(depth.view(), size, "depth (mm)")
-        .origin(surface.origin_m().map(|o| o * MM));
+        .origin(surface.origin_m.map(|o| o * MM));
     let (mut frame, mut depth) = (axes("Frame").heat_map(frame), axes("Depth").heat_map(map));
     let mut page = Page::new("Depth of the contact");
     if let Some(ball) = ball {

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use tactile_imaging::force::{
     Estimate, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame,
 };
-use tactile_imaging::pipeline::with_error;
+use tactile_imaging::pipeline::{PipelineError, clear_step, with_error};
 
 /// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter where it is pressed
 ///
@@ -82,9 +82,11 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
         context.console.line(format!("{name}:"));
         match found {
             Ok(measurement) => {
-                let lines = lines(&measurement);
+                let step = clear_step(frame.view(), image.view());
+                let warnings = warnings(&measurement, step);
+                let lines = lines(&measurement, &warnings);
                 lines.iter().for_each(|line| context.console.line(line));
-                values.push(json!({ "frame": name, "value": value(&measurement) }));
+                values.push(json!({ "frame": name, "value": value(&measurement, &warnings) }));
                 csv.row(row(k, &measurement));
             }
             Err(error) => {
@@ -106,8 +108,8 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
     Ok(exit)
 }
 
-/// What casts doubt on a measurement.
-fn warnings(m: &ForceMeasurement<f64>) -> Vec<&'static str> {
+/// What casts doubt on a measurement; `step_grey` is how far the frame is from the reference where they differ most, if that is no noise.
+fn warnings(m: &ForceMeasurement<f64>, step_grey: Option<f64>) -> Vec<String> {
     let edge = m.contact.is_some_and(|contact| contact.touches_edge);
     let outside = m.reading.is_some_and(|reading| reading.out_of_range);
     let warnings = [
@@ -118,13 +120,21 @@ fn warnings(m: &ForceMeasurement<f64>) -> Vec<&'static str> {
         (outside, "the force is outside the calibrated range"),
     ];
     let raised = warnings.into_iter().filter(|(raised, _)| *raised);
-    raised.map(|(_, text)| text).collect()
+    let opposite = step_grey.filter(|_| m.contact.is_none()).map(|grey| {
+        let error = PipelineError::OppositeSignal { frame: 0, grey };
+        error.to_string().replacen("frame 1 shows ", "", 1)
+    });
+    let raised = raised.map(|(_, text)| text.to_owned());
+    raised.chain(opposite).collect()
 }
 
-fn lines(m: &ForceMeasurement<f64>) -> Vec<String> {
+fn lines(m: &ForceMeasurement<f64>, warnings: &[String]) -> Vec<String> {
+    let warnings = warnings.iter().map(|w| format!("  warning      {w}"));
     let estimate = |e: Estimate<f64>, scale| with_error(e.value, e.standard_error, scale);
     let Some([x, y]) = m.centroid_m else {
-        return vec!["  no contact".to_owned()];
+        return std::iter::once("  no contact".to_owned())
+            .chain(warnings)
+            .collect();
     };
     let mut lines = vec![format!("  force        {} N", estimate(m.force_n, 1.0))];
     if let Some(radius) = m.contact_radius_m {
@@ -139,11 +149,11 @@ fn lines(m: &ForceMeasurement<f64>) -> Vec<String> {
         let (mean, peak) = (estimate(mean, 1e-3), estimate(peak, 1e-3));
         lines.push(format!("  stress       {mean} kPa mean, {peak} kPa peak"));
     }
-    lines.extend(warnings(m).iter().map(|w| format!("  warning      {w}")));
+    lines.extend(warnings);
     lines
 }
 
-fn value(m: &ForceMeasurement<f64>) -> Value {
+fn value(m: &ForceMeasurement<f64>, warnings: &[String]) -> Value {
     let estimate = |e: Estimate<f64>| [e.value, e.standard_error];
     json!({
         "contact": m.contact.is_some(),
@@ -152,7 +162,7 @@ fn value(m: &ForceMeasurement<f64>) -> Value {
         "centroid_m": m.centroid_m.map(|c| c.map(estimate)),
         "mean_stress_pa": m.mean_stress_pa.map(estimate),
         "peak_stress_pa": m.peak_stress_pa.map(estimate),
-        "warnings": warnings(m),
+        "warnings": warnings,
     })
 }
 

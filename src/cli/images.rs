@@ -7,7 +7,7 @@ use crate::cli::progress::Progress as Bar;
 use ndarray::Array2;
 use std::ops::ControlFlow;
 use std::path::Path;
-use tactile_imaging::io::{read_grey_image, read_grey_image_of_bits, read_grid};
+use tactile_imaging::io::{Grey, read_grey_image, read_grid};
 use tactile_imaging::sfs::{StopReason, Workspace};
 
 /// Rows and columns of a file.
@@ -30,10 +30,7 @@ pub fn same_shape(
 
 /// A grey image, of a camera with so many bits where that is given.
 pub fn read(path: &Path, bits: Option<u8>) -> Result<Array2<f64>, Failure> {
-    Ok(match bits {
-        Some(bits) => read_grey_image_of_bits(path, bits)?.levels,
-        None => read_grey_image(path)?.levels,
-    })
+    Ok(read_grey_image(path, Grey::default(), bits)?.levels)
 }
 
 /// The bright pixels of an image of the first file's shape.
@@ -44,7 +41,7 @@ pub fn optional_mask(
     let Some(path) = path else {
         return Ok(None);
     };
-    let levels = read_grey_image(path)?.levels;
+    let levels = read(path, None)?;
     same_shape((path, levels.dim()), first)?;
     let mask = levels.mapv(|level| level > 127.0);
     if !mask.iter().any(|&inside| inside) {
@@ -133,8 +130,5 @@ pub fn stop_reason(stop: StopReason) -> &'static str {
 
 /// An image in 8 bits, of a camera with so many bits where that is given.
 pub fn eight_bits(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, Failure> {
-    Ok(match bits {
-        Some(bits) => read_grey_image_of_bits(path, bits)?.to_u8(),
-        None => read_grey_image(path)?.to_u8(),
-    })
+    Ok(read_grey_image(path, Grey::default(), bits)?.to_u8())
 }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::ffi::OsStr;
 use std::fmt::{Debug, Write as _};
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{ReadError, write_file};
+use tactile_imaging::io::{ReadError, write_bytes};
 use tactile_imaging::plot::Page;
 
 /// A folder for results, or none.
@@ -75,7 +75,7 @@ impl Outputs {
     pub fn write(&mut self, name: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Failure> {
         if let Some(folder) = &self.folder {
             let path = folder.join(name);
-            write_file(&path, bytes).map_err(|error| match error {
+            write_bytes(&path, bytes).map_err(|error| match error {
                 // A path that the system refuses (a name too long, say) was given by the user as well.
                 ReadError::Write { .. } => Failure::output(error),
                 error => error.into(),

@@ -10,8 +10,7 @@ use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
-use tactile_imaging::io::PointTable;
-use tactile_imaging::io::points::read_point_table_in;
+use tactile_imaging::io::{PointTable, read_point_table};
 use tactile_imaging::tps::{
     FitOptions, Kernel, NegR, R2LogR, R3, Smoothing, ThinPlateSpline, TpsError,
 };
@@ -78,7 +77,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
         &[FILE],
         &inputs.map(PathBuf::as_path),
     )?;
-    let [sources, targets, queries] = inputs.map(read_point_table_in);
+    let [sources, targets, queries] = inputs.map(read_point_table);
     let ((sources, metres), targets, queries) = (sources?, targets?, queries?);
     for (path, unit) in [
         (&arguments.targets, targets.1),

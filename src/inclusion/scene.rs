@@ -4,7 +4,7 @@ use super::rings::{RingMeans, ring_means};
 use crate::elasticity::fem::{Guide, Interface, Layer, Material};
 use crate::elasticity::inclusion::{PressureProfile, Specimen};
 use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
-use crate::io::{read_bytes, read_grey_image};
+use crate::io::{Grey, read_bytes, read_grey_image};
 use crate::scene::fields::{Fields, poisson, positive};
 use crate::scene::{SceneError, parse_table, read_pairs};
 use ndarray::Array2;
@@ -15,6 +15,9 @@ use std::path::{Path, PathBuf};
 /// ```
 /// use tactile_imaging::inclusion::InclusionScene;
 ///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("scene.toml");
 /// let text = r#"
 ///     reference = "reference.png"            # the sensor without contact
 ///     pixel_size_m = [86e-6, 86e-6]          # x, y, on the face
@@ -32,22 +35,23 @@ use std::path::{Path, PathBuf};
 ///     radius_m = 16e-3
 ///     layers = [{ thickness_m = 10e-3, youngs_modulus_pa = 60e3, poisson_ratio = 0.495 }]
 /// "#;
-/// let scene = InclusionScene::parse(text, "press/scene.toml")?;
-/// assert_eq!(scene.frames().len(), 2);
-/// assert_eq!((scene.specimen().height_m(), scene.guide().radius_m()), (30e-3, 16e-3));
-/// // From a file, with its images; this one is not there.
-/// assert!(InclusionScene::read("press/absent.toml").and_then(|scene| scene.load()).is_err());
-/// # Ok::<(), tactile_imaging::scene::SceneError>(())
+/// std::fs::write(&path, text)?;
+/// let scene = InclusionScene::read(&path)?;
+/// assert_eq!((scene.specimen.height_m(), scene.guide.radius_m()), (30e-3, 16e-3));
+/// assert!(scene.load().is_err(), "the images are not there");
+/// # Ok(()) }
 /// ```
 #[derive(Clone, Debug)]
 pub struct InclusionScene {
+    /// What is known of the block.
+    pub specimen: Specimen,
+    /// The guide.
+    pub guide: Guide,
     file: PathBuf,
     reference: PathBuf,
     pixel_size_m: [f64; 2],
     calibration: Option<PathBuf>,
     frames: Vec<Frame>,
-    specimen: Specimen,
-    guide: Guide,
 }
 
 #[derive(Clone, Debug)]
@@ -87,10 +91,7 @@ impl InclusionScene {
     }
 
     /// Checks the text of a scene file; relative paths are relative to the folder of `file`.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
-    pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
+    fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
         let file = file.as_ref();
         let table = parse_table(text, file)?;
         let fields = Fields::new(file, &table);
@@ -118,22 +119,10 @@ impl InclusionScene {
         })
     }
 
-    /// The images and approaches, in metres, in the order of the file.
-    pub fn frames(&self) -> Vec<(&Path, f64)> {
-        let frames = self.frames.iter();
-        frames
-            .map(|frame| (frame.image.as_path(), frame.approach_m))
-            .collect()
-    }
-
-    /// What is known of the block.
-    pub fn specimen(&self) -> &Specimen {
-        &self.specimen
-    }
-
-    /// The guide.
-    pub fn guide(&self) -> &Guide {
-        &self.guide
+    /// The images, in the order of the file.
+    #[cfg(feature = "cli")]
+    pub(crate) fn images(&self) -> Vec<&Path> {
+        self.frames.iter().map(|f| f.image.as_path()).collect()
     }
 
     /// Reads the images and takes their ring means.
@@ -225,11 +214,12 @@ impl InclusionScene {
     }
 
     fn image(&self, field: String, path: &Path) -> Result<Array2<f64>, SceneError> {
-        let image = read_grey_image(path).map_err(|source| SceneError::File {
-            file: self.file.clone(),
-            field,
-            source: Box::new(source),
-        })?;
+        let image =
+            read_grey_image(path, Grey::default(), None).map_err(|source| SceneError::File {
+                file: self.file.clone(),
+                field,
+                source: Box::new(source),
+            })?;
         Ok(image.to_u8().mapv(f64::from))
     }
 }

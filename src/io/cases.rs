@@ -11,14 +11,18 @@ use std::path::Path;
 /// The two point sets of a case, in the plane or in space.
 ///
 /// ```
-/// use tactile_imaging::io::{CasePoints, cases::parse_cases};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{CasePoints, read_cases};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("two.txt");
 /// let text = b"case flat 2 1 1\nm 0 1\nt 0.5 1\ncase solid 3 1 1\nm 0 1 2\nt 0 1 2.5\n";
-/// let moved = parse_cases(text, "two.txt")?.into_iter().map(|case| match case.points {
+/// std::fs::write(&path, text)?;
+/// let moved = read_cases(&path)?.into_iter().map(|case| match case.points {
 ///     CasePoints::Plane { model, target } => (target[0] - model[0]).norm(),
 ///     CasePoints::Space { model, target } => (target[0] - model[0]).norm(),
 /// });
 /// assert_eq!(moved.collect::<Vec<_>>(), [0.5, 0.5]);
-/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// # Ok(()) }
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum CasePoints {
@@ -41,11 +45,14 @@ pub enum CasePoints {
 /// One matching problem with its name.
 ///
 /// ```
-/// use tactile_imaging::io::{CasePoints, MatchCase, cases::parse_cases};
-/// let cases = parse_cases(b"case shift 2 1 1\nm 0 1\nt 0.5 1\n", "shift.txt")?;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{CasePoints, MatchCase, read_cases};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("shift.txt");
+/// std::fs::write(&path, "case shift 2 1 1\nm 0 1\nt 0.5 1\n")?;
 /// let points = CasePoints::Plane { model: vec![[0.0, 1.0].into()], target: vec![[0.5, 1.0].into()] };
-/// assert_eq!(cases, [MatchCase { name: "shift".into(), points }]);
-/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// assert_eq!(read_cases(&path)?, [MatchCase { name: "shift".into(), points }]);
+/// # Ok(()) }
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct MatchCase {
@@ -56,6 +63,9 @@ pub struct MatchCase {
 }
 
 /// Reads all cases of a file.
+///
+/// A case is a line `case NAME D n_model n_target`, then rows `m` (a model point) and `t` (a target point). Rows `g` and `p`, which hold the truth
+/// for a scorer, are passed over unread.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -78,18 +88,12 @@ pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, ReadError> {
 
 /// Parses cases from the bytes of a file; `name` stands for the file in errors.
 ///
-/// ```
-/// use tactile_imaging::io::cases::parse_cases;
-/// let cases = parse_cases(b"# D = 2\ncase a 2 1 1\nm 0 1\nt 0 2\ncase b 2 1 0\nm 3 4\n", "cases.txt")?;
-/// assert_eq!(cases.iter().map(|case| case.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
-/// let short = parse_cases(b"case a 2 2 0\nm 0 1\n", "short.txt").unwrap_err();
-/// assert_eq!(short.to_string(), "short.txt, line 1: expected 2 rows tagged m, found 1");
-/// # Ok::<(), tactile_imaging::io::ReadError>(())
-/// ```
-///
 /// # Errors
 /// As [`read_cases`].
-pub fn parse_cases(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<MatchCase>, ReadError> {
+pub(crate) fn parse_cases(
+    bytes: &[u8],
+    name: impl AsRef<Path>,
+) -> Result<Vec<MatchCase>, ReadError> {
     let path = name.as_ref();
     let text = String::from_utf8_lossy(bytes);
     let mut cases = Vec::new();
@@ -126,22 +130,12 @@ pub fn parse_cases(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<MatchCase
 
 /// Writes the answer to one case.
 ///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_imaging::io::write_case_result;
-/// let warped = [Point2::new(0.5, 1.0), Point2::new(2.5, 3.0)];
-/// let mut out = Vec::new();
-/// write_case_result(&mut out, "shift", 1.25, &warped, &[Some(0), None])?;
-/// assert_eq!(out, b"case shift 1.25\nw 0.5 1.0\nw 2.5 3.0\na 0\na -1\n");
-/// # Ok::<(), std::io::Error>(())
-/// ```
-///
 /// # Errors
 /// Those of the writer.
 ///
 /// # Panics
 /// Where `warped` and `assignment` differ in length.
-pub fn write_case_result<const D: usize>(
+pub(crate) fn write_case_result<const D: usize>(
     out: &mut impl Write,
     name: &str,
     time_ms: f64,

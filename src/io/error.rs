@@ -5,11 +5,16 @@ use std::path::PathBuf;
 /// What a reader wanted to find at the place that [`ReadError`] names.
 ///
 /// ```
-/// use tactile_imaging::io::{Expected, ReadError, points::parse_points};
-/// let error = parse_points::<2>(b"0.5,1.5\n2,x\n", "points.csv").unwrap_err();
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{Expected, ReadError, read_points};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("points.csv");
+/// std::fs::write(&path, "0.5,1.5\n2,x\n")?;
+/// let error = read_points::<2>(&path).unwrap_err();
 /// let ReadError::Field { line, column, expected, .. } = error else { unreachable!() };
 /// assert_eq!((line, column, expected), (2, 2, Expected::FiniteNumber));
 /// assert_eq!(Expected::TaggedRows('m', 3).to_string(), "3 rows tagged m");
+/// # Ok(()) }
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -57,12 +62,17 @@ impl fmt::Display for Expected {
 /// Why a file could not be read or written. Every message names the file.
 ///
 /// ```
-/// use tactile_imaging::io::{ReadError, grid::parse_grid, read_grid};
-/// let ragged = parse_grid(b"0.1,0.2\n0.3\n", "depth.csv").unwrap_err();
-/// assert_eq!(ragged.to_string(), "depth.csv, line 2: expected 2 columns, found 1");
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{ReadError, read_grid};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("depth.csv");
+/// std::fs::write(&path, "0.1,0.2\n0.3\n")?;
+/// let ragged = read_grid(&path).unwrap_err();
+/// assert!(ragged.to_string().ends_with("depth.csv, line 2: expected 2 columns, found 1"));
 /// let absent = read_grid("nowhere/depth.csv").unwrap_err();
 /// assert!(matches!(absent, ReadError::Open { .. }));
 /// assert!(absent.to_string().starts_with("cannot read nowhere/depth.csv: "));
+/// # Ok(()) }
 /// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

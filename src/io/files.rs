@@ -47,23 +47,8 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 /// The bytes go to a temporary file in the same folder, which then takes the name: whoever reads finds the old file or
 /// the new one, and a full disk leaves the old one. What is no file (`/dev/stdout`) is written to as it is.
 ///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("made/for/it/result.csv");
-/// tactile_imaging::io::write_file(&path, b"x,y\n1,2\n")?;
-/// assert_eq!(std::fs::read(&path)?, b"x,y\n1,2\n");
-/// assert!(tactile_imaging::io::write_file(folder.path(), b"").is_err(), "a folder is no file");
-/// # Ok(()) }
-/// ```
-///
 /// # Errors
 /// [`ReadError::Write`], which names the file.
-pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), ReadError> {
-    write_bytes(path.as_ref(), bytes)
-}
-
-/// As [`write_file`].
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
     replace_file(path, bytes).map_err(|source| ReadError::Write {
         path: path.into(),

@@ -6,11 +6,11 @@
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{Grey, read_grey_image_as};
+/// use tactile_imaging::io::{Grey, read_grey_image};
 /// # let folder = tempfile::tempdir()?;
 /// # let path = folder.path().join("blue.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\x00\x00\x5a")?; // 90 levels of blue
-/// let levels = |grey| read_grey_image_as(&path, grey, None).map(|image| image.to_u8()[[0, 0]]);
+/// let levels = |grey| read_grey_image(&path, grey, None).map(|image| image.to_u8()[[0, 0]]);
 /// assert_eq!((levels(Grey::Mean)?, levels(Grey::default())?), (30, 10));
 /// # Ok(()) }
 /// ```

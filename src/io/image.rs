@@ -1,13 +1,4 @@
 //! Grey images from PNG, PGM and JPEG files.
-//!
-//! Colour is turned to grey by the luma of Rec. 601, Y = 0.299 R + 0.587 G + 0.114 B, on the stored (gamma-coded) values,
-//! as OpenCV and most camera software do, or by other weights that are asked for ([`Grey`]); alpha is ignored.
-//!
-//! Levels are on the scale of 8 bits, 0 to 255, and samples of more bits keep their precision as fractions: a sample v
-//! becomes 255 v/m, where m is the largest value that the camera gives. A PGM or PPM says m (its `maxval`). A PNG of 16
-//! bits does not: m is 65535, or 2ᵇ − 1 where the caller gives the bits b. A camera of 12 bits often writes its samples
-//! into 16 as they are; an image without any sample above 4095 is therefore refused until the bits are given, unless all are
-//! multiples of 257, as 8 bits stretched to 16 are.
 use super::depth::{full_scale, is_wide};
 use super::error::{ReadError, read_bytes, write_bytes};
 use super::grey::Grey;
@@ -25,12 +16,16 @@ pub(crate) const LARGEST_IMAGE: u64 = 64_000_000;
 /// A grey image, `[row, column]`.
 ///
 /// ```
-/// use tactile_imaging::io::image::parse_grey_image;
-/// let image = parse_grey_image(b"P6\n2 1\n255\n\xff\x00\x00\x0a\x0a\x0a", "red_and_grey.ppm")?;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::io::{Grey, read_grey_image};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("red_and_grey.ppm");
+/// std::fs::write(&path, b"P6\n2 1\n255\n\xff\x00\x00\x0a\x0a\x0a")?;
+/// let image = read_grey_image(&path, Grey::Rec601, None)?;
 /// assert!(image.colour && image.bits == 8);
 /// assert!((image.levels[[0, 0]] - 0.299 * 255.0).abs() < 1e-12);
 /// assert_eq!(image.to_u8(), ndarray::array![[76, 10]]);
-/// # Ok::<(), tactile_imaging::io::ReadError>(())
+/// # Ok(()) }
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct GreyImage {
@@ -52,93 +47,45 @@ impl GreyImage {
 
 /// Reads a grey image; the kind of file is told from its content, not its name.
 ///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{read_grey_image, write_grey_image};
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("frame.png");
-/// let frame = ndarray::array![[0u8, 10], [200, 255]];
-/// write_grey_image(&path, frame.view())?;
-/// assert_eq!(read_grey_image(&path)?.to_u8(), frame);
-/// # Ok(()) }
-/// ```
-///
-/// # Errors
-/// [`ReadError`] where the file cannot be read or decoded, is too large, or its depth is not clear.
-pub fn read_grey_image(path: impl AsRef<Path>) -> Result<GreyImage, ReadError> {
-    let path = path.as_ref();
-    parse_grey_image(&read_bytes(path)?, path)
-}
-
-/// Reads a grey image of a camera with this many bits, 1 to 16: samples of 16 bits in the file are scaled by 2ᵇ − 1.
+/// Colour is turned to grey by the weights of `grey`, on the stored (gamma-coded) values; alpha is ignored. Levels are on the scale of 8 bits,
+/// and samples of more bits keep their precision as fractions: a sample v becomes 255 v/m, where m is the largest value that the camera
+/// gives. A PGM or PPM says m (its `maxval`). A PNG of 16 bits does not: m is 65535, or 2ᵇ − 1 where the caller gives the `bits` b, 1 to 16. A
+/// camera of 12 bits often writes its samples into 16 as they are; an image without any sample above 4095 is therefore refused until the
+/// bits are given, unless all are multiples of 257, as 8 bits stretched to 16 are. Images of 8 bits are not scaled.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{ReadError, read_grey_image, read_grey_image_of_bits};
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("frame.png");
-/// let samples = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![4095, 819]);
-/// samples.ok_or("two samples")?.save(&path)?;
-/// assert!(matches!(read_grey_image(&path), Err(ReadError::UnclearBits { likely: 12, .. })));
-/// assert_eq!(read_grey_image_of_bits(&path, 12)?.levels, ndarray::array![[255.0, 51.0]]);
-/// assert!(matches!(read_grey_image_of_bits(&path, 10), Err(ReadError::TooFewBits { .. })));
-/// # Ok(()) }
-/// ```
-///
-/// # Errors
-/// As [`read_grey_image`]; [`ReadError::TooFewBits`] where a sample needs more bits. Images of 8 bits are not scaled.
-pub fn read_grey_image_of_bits(path: impl AsRef<Path>, bits: u8) -> Result<GreyImage, ReadError> {
-    let path = path.as_ref();
-    parse(&read_bytes(path)?, path, Some(bits))
-}
-
-/// Reads a grey image as [`read_grey_image`], colours weighted as asked for; samples of 16 bits as
-/// [`read_grey_image_of_bits`] where `bits` is given.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::{Grey, read_grey_image_as};
+/// use tactile_imaging::io::{Grey, ReadError, read_grey_image};
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("frame.ppm");
 /// std::fs::write(&path, b"P6\n1 1\n255\n\x1e\x3c\x00")?;
 /// // Red 30, green 60, blue 0.
-/// assert_eq!(read_grey_image_as(&path, Grey::Mean, None)?.levels, ndarray::array![[30.0]]);
-/// assert_eq!(read_grey_image_as(&path, Grey::Rec601, None)?.to_u8(), ndarray::array![[44]]);
+/// assert_eq!(read_grey_image(&path, Grey::Mean, None)?.levels, ndarray::array![[30.0]]);
+/// assert_eq!(read_grey_image(&path, Grey::Rec601, None)?.to_u8(), ndarray::array![[44]]);
+/// let path = folder.path().join("frame.png");
+/// let samples = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![4095, 819]);
+/// samples.ok_or("two samples")?.save(&path)?;
+/// let read = |bits| read_grey_image(&path, Grey::default(), bits);
+/// assert!(matches!(read(None), Err(ReadError::UnclearBits { likely: 12, .. })));
+/// assert_eq!(read(Some(12))?.levels, ndarray::array![[255.0, 51.0]]);
+/// assert!(matches!(read(Some(10)), Err(ReadError::TooFewBits { .. })));
 /// # Ok(()) }
 /// ```
 ///
 /// # Errors
-/// As [`read_grey_image_of_bits`].
-pub fn read_grey_image_as(
+/// [`ReadError`] where the file cannot be read or decoded, is too large, its depth is not clear, or a sample needs more bits than given.
+pub fn read_grey_image(
     path: impl AsRef<Path>,
     grey: Grey,
     bits: Option<u8>,
 ) -> Result<GreyImage, ReadError> {
     let path = path.as_ref();
-    let (image, largest) = decode(&read_bytes(path)?, path, bits)?;
-    Ok(to_grey(image, largest, grey))
+    parse(&read_bytes(path)?, path, grey, bits)
 }
 
-/// Decodes a grey image from the bytes of a file; `name` stands for the file in errors.
-///
-/// ```
-/// use tactile_imaging::io::image::parse_grey_image;
-/// let image = parse_grey_image(b"P5\n2 1\n65535\n\x80\x80\xff\xff", "frame.pgm")?;
-/// assert_eq!((image.bits, image.levels), (16, ndarray::array![[128.0, 255.0]]));
-/// let error = parse_grey_image(b"force_N\n0.7\n", "frame.png").unwrap_err();
-/// assert!(error.to_string().starts_with("cannot decode the image frame.png"));
-/// # Ok::<(), tactile_imaging::io::ReadError>(())
-/// ```
-///
-/// # Errors
-/// As [`read_grey_image`].
-pub fn parse_grey_image(bytes: &[u8], name: impl AsRef<Path>) -> Result<GreyImage, ReadError> {
-    parse(bytes, name.as_ref(), None)
-}
-
-fn parse(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<GreyImage, ReadError> {
+fn parse(bytes: &[u8], path: &Path, grey: Grey, bits: Option<u8>) -> Result<GreyImage, ReadError> {
     let (image, largest) = decode(bytes, path, bits)?;
-    Ok(to_grey(image, largest, Grey::default()))
+    Ok(to_grey(image, largest, grey))
 }
 
 /// The image, and the sample that stands for the level 255.
@@ -276,7 +223,8 @@ mod tests {
     use super::*;
 
     fn pnm(header: &str, samples: &[u8]) -> GreyImage {
-        parse_grey_image(&[header.as_bytes(), samples].concat(), "i").unwrap()
+        let bytes = [header.as_bytes(), samples].concat();
+        parse(&bytes, Path::new("i"), Grey::default(), None).unwrap()
     }
 
     #[test]
@@ -307,7 +255,8 @@ mod tests {
                 .unwrap()
                 .write_to(&mut bytes, ImageFormat::Png)
                 .unwrap();
-            parse_grey_image(bytes.get_ref(), "dark.png")
+            let path = Path::new("dark.png");
+            parse(bytes.get_ref(), path, Grey::default(), None)
         };
         let levels = png(vec![0, 3 * 257, 11 * 257]).unwrap().levels;
         assert_eq!(levels.as_slice().unwrap(), [0.0, 3.0, 11.0]);
@@ -316,7 +265,7 @@ mod tests {
 
     #[test]
     fn a_text_file_is_an_error_that_names_it() {
-        let error = parse_grey_image(b"hello", "frame.png")
+        let error = parse(b"hello", Path::new("frame.png"), Grey::default(), None)
             .unwrap_err()
             .to_string();
         assert!(
@@ -342,12 +291,13 @@ mod tests {
     fn bits_given_beside_an_announced_largest_value_count_in_its_samples() {
         let bytes = [b"P5\n2 1\n4095\n".as_slice(), &[0x03, 0xff, 0x01, 0x55]].concat();
         let path = Path::new("frame.pgm");
-        let image = parse(&bytes, path, Some(10)).unwrap();
+        let read = |bits| parse(&bytes, path, Grey::default(), Some(bits));
+        let image = read(10).unwrap();
         // 1023 of ten bits is 255, 341 a third of it; the decoder rounds to one part in 65535.
         assert!((image.levels[[0, 0]] - 255.0).abs() < 255.0 / 16_000.0);
         assert!((image.levels[[0, 1]] - 85.0).abs() < 255.0 / 16_000.0);
         assert!(matches!(
-            parse(&bytes, path, Some(9)),
+            read(9),
             Err(ReadError::TooFewBits {
                 brightest: 1023,
                 bits: 9,

@@ -1,37 +1,45 @@
-//! Files in and out: points, grids, case files, grey images.
+//! Files in and out: points, columns, grids, case files, grey images.
 //!
-//! | module | reads | writes |
-//! |---|---|---|
-//! | [`points`] | CSV of points, columns by name or two or three without a header | the same |
-//! | [`grid`] | CSV matrices, empty cells and `nan` as NaN | the same |
-//! | [`cases`] | point-matching case files (`m` and `t` rows) | result files (`w` and `a` rows) |
-//! | [`image`] | PNG, PGM, JPEG; grey or colour; 8 or 16 bits | 8-bit PNG and PGM |
+//! | read by | what |
+//! |---|---|
+//! | [`read_points`] | CSV of points, columns by name or two or three without a header |
+//! | [`read_columns`] | CSV columns by name, in SI units |
+//! | [`read_grid`] | CSV matrices, empty cells and `nan` as NaN |
+//! | [`read_cases`] | point-matching case files (`m` and `t` rows) |
+//! | [`read_grey_image`] | PNG, PGM, JPEG; grey or colour; 8 or 16 bits; [`write_grey_image`] writes 8-bit PNG and PGM |
+//!
+//! In CSV, fields are separated by commas, semicolons or tabs; a first line without any number is a header; empty lines and lines that start
+//! with `#` are passed over.
 //!
 //! Whatever is wrong with a file is a [`ReadError`] that names the file, the line and column, what was expected
 //! and what was found. No content makes a reader panic, and none makes it ask for more memory than a few times the
-//! size of the file. Units in the headings of columns are converted to SI or refused ([`Quantity`]). A file that is
+//! size of the file. Units in the headings of columns are converted to SI (m, N, Pa, s) or refused. A file that is
 //! written takes the place of an older one only when it is complete.
-pub mod cases;
+// Some formats are read and written by the program alone.
+#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
+
+mod cases;
 mod depth;
 mod error;
 mod files;
 mod grey;
-pub mod grid;
-pub mod image;
-pub mod points;
-pub mod table;
+mod grid;
+mod image;
+mod points;
+mod table;
 mod units;
 
-pub use cases::{CasePoints, MatchCase, read_cases, write_case_result};
+pub(crate) use cases::write_case_result;
+pub use cases::{CasePoints, MatchCase, read_cases};
 pub(crate) use error::shorten;
 pub use error::{Expected, ReadError};
-pub(crate) use files::read_bytes;
-pub use files::write_file;
+pub(crate) use files::{read_bytes, write_bytes};
 pub use grey::Grey;
-pub use grid::{read_grid, write_grid};
-pub use image::{
-    GreyImage, read_grey_image, read_grey_image_as, read_grey_image_of_bits, write_grey_image,
-};
-pub use points::{PointTable, read_point_table, read_points, write_points};
-pub use table::{Column, Table, read_table};
-pub use units::Quantity;
+pub use grid::read_grid;
+pub(crate) use image::read_grey_levels;
+pub use image::{GreyImage, read_grey_image, write_grey_image};
+pub use points::read_points;
+pub(crate) use points::{PointTable, read_point_table};
+pub use table::read_columns;
+pub(crate) use table::{Column, read_table};
+pub(crate) use units::Quantity;

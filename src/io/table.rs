@@ -9,21 +9,8 @@ use ndarray::Array2;
 use std::path::Path;
 
 /// A column that a reader looks for.
-///
-/// ```
-/// use std::path::Path;
-/// use tactile_imaging::io::{Column, Quantity, Table};
-/// let values = ndarray::array![[0.0, 5.0, 1.5], [0.1, 10.0, 4.2]];
-/// let header = ["time_s", "indentation (µm)", "force_mN"].map(String::from).to_vec();
-/// let table = Table { header, values };
-/// let indentation = Column { names: &["indentation", "depth"], quantity: Quantity::Length, unit: "m" };
-/// let force = Column { names: &["force"], quantity: Quantity::Force, unit: "N" };
-/// let [z, f] = table.columns([indentation, force], Path::new("curve.csv"))?;
-/// assert_eq!((z[1], f[1]), (10.0 * 1e-6, 4.2 * 1e-3), "found by name, in SI");
-/// # Ok::<(), tactile_imaging::io::ReadError>(())
-/// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Column<'a> {
+pub(crate) struct Column<'a> {
     /// Names that it may have, the usual one first, without the unit.
     pub names: &'a [&'a str],
     /// What it measures.
@@ -33,23 +20,8 @@ pub struct Column<'a> {
 }
 
 /// A rectangular table of numbers with the names of its columns, if it has a header.
-///
-/// ```
-/// use std::path::Path;
-/// use tactile_imaging::io::{Column, Quantity, ReadError, Table};
-/// let path = Path::new("calibration.csv");
-/// let values = ndarray::array![[5e4, 0.5], [1e5, 1.0]];
-/// let table = Table { header: vec!["integrated_pixel_value".into(), "force_N".into()], values };
-/// assert_eq!(table.column("force_n", 0, path)?, [0.5, 1.0], "a header counts, whatever its case");
-/// let bare = Table { header: vec![], ..table.clone() };
-/// assert_eq!(bare.column("force_n", 1, path)?, [0.5, 1.0], "without one the position does");
-/// assert!(matches!(table.column("depth_mm", 0, path), Err(ReadError::MissingColumn { .. })));
-/// let force = Column { names: &["force"], quantity: Quantity::Force, unit: "N" };
-/// assert_eq!(table.columns([force], path)?, [[0.5, 1.0]], "by name without its unit");
-/// # Ok::<(), ReadError>(())
-/// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub(crate) struct Table {
     /// Names of the columns; empty where the file has no header line.
     pub header: Vec<String>,
     /// The numbers, `[row, column]`.
@@ -57,30 +29,13 @@ pub struct Table {
 }
 
 impl Table {
-    /// The column with this name, or, in a table without a header, the column at `position`.
-    ///
-    /// # Errors
-    /// [`ReadError::MissingColumn`] where neither exists; `path` is the name it gives to the file.
-    pub fn column(&self, name: &str, position: usize, path: &Path) -> Result<Vec<f64>, ReadError> {
-        let found = if self.header.is_empty() {
-            Some(position).filter(|&i| i < self.values.ncols())
-        } else {
-            self.header
-                .iter()
-                .position(|h| h.eq_ignore_ascii_case(name))
-        };
-        found
-            .map(|i| self.values.column(i).to_vec())
-            .ok_or_else(|| self.missing(name, path))
-    }
-
     /// The wanted columns in SI units: by name where the file has a header, whatever other columns it has; by position
     /// in a file without one, which must then have exactly these.
     ///
     /// # Errors
     /// [`ReadError::MissingColumn`], [`ReadError::Unit`], [`ReadError::Overflow`] and, where the number of columns is wrong,
     /// [`ReadError::Line`]; `path` is the name they give to the file.
-    pub fn columns<const N: usize>(
+    pub(crate) fn columns<const N: usize>(
         &self,
         wanted: [Column<'_>; N],
         path: &Path,
@@ -149,23 +104,46 @@ impl Table {
     }
 }
 
-/// Reads a table of finite numbers.
+/// Reads columns of a CSV file in SI units, each by the names it may have (the usual one first, without the unit) and the unit it is in where the
+/// file names none.
+///
+/// A file with a header may have other columns, and units in its headings (`depth_um`, `force (mN)`); a unit of another quantity than the given
+/// one is an error. Without a header it has exactly these columns, in this order.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::io::read_table;
+/// use tactile_imaging::io::{ReadError, read_columns};
 /// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("calibration.csv");
-/// std::fs::write(&path, "# sensor 3\nintegrated_pixel_value\tforce_N\n5e4\t0.5\n1e5\t1\n")?;
-/// let table = read_table(&path)?;
-/// assert_eq!(table.header, ["integrated_pixel_value", "force_N"]);
-/// assert_eq!(table.values, ndarray::array![[5e4, 0.5], [1e5, 1.0]]);
+/// let path = folder.path().join("curve.csv");
+/// std::fs::write(&path, "# probe 3\ntime_s,indentation (µm),force_mN\n0,5,1.5\n0.1,10,4.2\n")?;
+/// let [z, f] = read_columns(&path, [(&["indentation", "depth"], "m"), (&["force"], "N")])?;
+/// assert_eq!((z[1], f[1]), (10.0 * 1e-6, 4.2 * 1e-3));
+/// let pressure = read_columns(&path, [(&["pressure"], "Pa")]);
+/// assert!(matches!(pressure, Err(ReadError::MissingColumn { .. })));
 /// # Ok(()) }
 /// ```
 ///
 /// # Errors
+/// [`ReadError`] where the file cannot be read, a field is no finite number, rows differ in length, a column is not there or there twice, or its
+/// unit is not one of its quantity.
+pub fn read_columns<const N: usize>(
+    path: impl AsRef<Path>,
+    wanted: [(&[&str], &str); N],
+) -> Result<[Vec<f64>; N], ReadError> {
+    let path = path.as_ref();
+    let wanted = wanted.map(|(names, unit)| Column {
+        names,
+        quantity: Quantity::of_unit(unit),
+        unit,
+    });
+    read_table(path)?.columns(wanted, path)
+}
+
+/// Reads a table of finite numbers.
+///
+/// # Errors
 /// [`ReadError`] where the file cannot be read, a field is no finite number, rows differ in length, or there are none.
-pub fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
+pub(crate) fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
     let path = path.as_ref();
     parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)
 }
@@ -275,23 +253,16 @@ mod tests {
     #[test]
     fn a_header_is_recognised_and_columns_found_by_name() {
         let table = parse("# note\nforce_N, pixel\n1, 2\n\n3,4\n").unwrap();
-        assert_eq!(
-            table.column("FORCE_n", 1, Path::new("")).unwrap(),
-            [1.0, 3.0]
-        );
+        assert_eq!(table.header, ["force_N", "pixel"]);
+        assert_eq!(table.values, ndarray::array![[1.0, 2.0], [3.0, 4.0]]);
+        let force = |table: &Table| table.columns([FORCE], Path::new(""));
+        assert_eq!(force(&table).unwrap(), [[1.0, 3.0]]);
         assert!(
             matches!(
-                table.column("x", 0, Path::new("")),
+                force(&parse("depth_m\n1\n").unwrap()),
                 Err(ReadError::MissingColumn { .. })
             ),
             "a header decides, not the position"
-        );
-        assert_eq!(
-            parse("1;2\n3;4")
-                .unwrap()
-                .column("any", 1, Path::new(""))
-                .unwrap(),
-            [2.0, 4.0]
         );
     }
 

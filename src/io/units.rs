@@ -7,16 +7,9 @@ use std::path::Path;
 ///
 /// Values are converted to SI: m, N, Pa and s. A unit of another quantity, or one that is not known, is an error and
 /// never read as if it were SI.
-///
-/// ```
-/// use tactile_imaging::io::Quantity;
-/// assert_eq!(Quantity::Length.in_si("um"), Some(1e-6));
-/// assert_eq!(Quantity::Force.in_si("mN"), Some(1e-3));
-/// assert_eq!(Quantity::Force.in_si("mm"), None, "a force is not measured in millimetres");
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// nm, um (µm), mm, cm, m.
     Length,
     /// nN, uN (µN), mN, N, kN.
@@ -64,11 +57,18 @@ const UNITS: [(Quantity, &[(&str, f64)]); 5] = [
 
 impl Quantity {
     /// The value of one `unit` in SI; `None` where the quantity has no such unit. Both signs for micro are `u`.
-    pub fn in_si(self, unit: &str) -> Option<f64> {
+    pub(crate) fn in_si(self, unit: &str) -> Option<f64> {
         let plain = unit.replace(['µ', 'μ'], "u");
         let units = UNITS.iter().find(|(quantity, _)| *quantity == self)?.1;
         let found = units.iter().find(|(name, _)| *name == plain)?;
         Some(found.1)
+    }
+
+    /// The quantity that `unit` measures; a number where none has it.
+    pub(crate) fn of_unit(unit: &str) -> Self {
+        let has = |quantity: &Self| quantity.in_si(unit).is_some();
+        let quantities = UNITS.iter().map(|(quantity, _)| *quantity);
+        quantities.filter(has).next().unwrap_or(Self::Number)
     }
 
     /// The units that are known, for messages.

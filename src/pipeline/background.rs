@@ -4,7 +4,7 @@ use ndarray::{ArrayView2, Axis, Slice};
 use std::ops::Range;
 
 /// Difference in grey levels of a block's mean that is no noise: a camera's 1 to 3 grey levels are a tenth of it in a block.
-pub(super) const CLEAR_STEP_GREY: f64 = 4.0;
+const CLEAR_STEP_GREY: f64 = 4.0;
 
 /// Side of the blocks in pixels: smaller than contacts that can be measured, and large enough to average noise.
 const BLOCK: usize = 8;
@@ -13,7 +13,7 @@ const BLOCK: usize = 8;
 const ROWS: usize = 24;
 
 /// The mean of frame minus reference, in grey levels, of the block where it is greatest.
-pub(super) fn greatest_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> f64 {
+fn greatest_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> f64 {
     if image.dim() != reference.dim() {
         return 0.0;
     }
@@ -36,6 +36,12 @@ pub(super) fn greatest_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_,
             greatest
         }
     })
+}
+
+/// The step of a frame without contact that is not the reference's: other light, or the two swapped.
+pub(crate) fn clear_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
+    let grey = greatest_step(image, reference);
+    (grey.abs() > CLEAR_STEP_GREY).then_some(grey)
 }
 
 /// The median of frame minus reference outside a contact's box, in grey levels; None where hardly a pixel is outside.

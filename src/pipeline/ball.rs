@@ -5,12 +5,20 @@ use nalgebra::{Matrix3, Vector3};
 /// A spherical cap z = √(R² − ρ²) − √(R² − a²), ρ the distance from the centre, fitted to a surface.
 ///
 /// ```
-/// use tactile_imaging::pipeline::BallFit;
-/// // A ball of 4 mm radius in contact up to 2.4 mm from its axis: 4 − √(4² − 2.4²) = 0.8 mm deep.
-/// let (radius_m, centre_m, contact_radius_m) = (4e-3, [5e-3, 6e-3], 2.4e-3);
-/// let fit = BallFit { radius_m, centre_m, contact_radius_m, mean_absolute_error_m: 0.0, pixels: 0, iterations: 0 };
-/// assert!((fit.depth_m(centre_m) - 0.8e-3).abs() < 1e-15);
-/// assert_eq!(fit.depth_m([8e-3, 6e-3]), 0.0);
+/// use ndarray::Array2;
+/// use tactile_imaging::pipeline::{BallFit, DarkContact, Object, Pipeline, SurfaceInput};
+/// // A grey level is 5 µm, a pixel 0.1 mm. A ball of 4 mm radius in contact up to 2.4 mm from its axis: 4 − √(4² − 2.4²) = 0.8 mm deep.
+/// let table = [(0.0, 0.0), (200.0, 1e-3)];
+/// let depth_mm = |x: f64, y: f64| (16.0 - 0.01 * (x * x + y * y)).sqrt() - 3.2;
+/// let grey = |(r, c): (usize, usize)| 220 - (depth_mm(c as f64 - 32.0, r as f64 - 32.0) / 5e-3).round() as u8;
+/// let (reference, frame) = (Array2::from_elem((64, 64), 220_u8), Array2::from_shape_fn((64, 64), grey));
+/// let pipeline = Pipeline::new(DarkContact::new(&table, [1e-4; 2])?, Object::sphere(4e-3))?
+///     .with_surface(DarkContact::depth_table(&table)?, SurfaceInput::Signal);
+/// let mut press = pipeline.press(reference.view())?;
+/// press.add_frame(frame.view());
+/// let fit: BallFit = press.surface(0)?.fit_ball(4e-3).expect("a cap");
+/// assert!((fit.contact_radius_m - 2.4e-3).abs() < 5e-6 && fit.mean_absolute_error_m < 5e-6);
+/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -31,7 +39,7 @@ pub struct BallFit {
 
 impl BallFit {
     /// Depth of the cap in metres at (x, y) in metres; zero outside the circle.
-    pub fn depth_m(&self, [x, y]: [f64; 2]) -> f64 {
+    pub(crate) fn depth_m(&self, [x, y]: [f64; 2]) -> f64 {
         let square = (x - self.centre_m[0]).powi(2) + (y - self.centre_m[1]).powi(2);
         if square >= self.contact_radius_m.powi(2) {
             return 0.0;
@@ -44,7 +52,7 @@ impl BallFit {
 impl ContactSurface {
     /// Pixels of the surface as (x, y, height) in metres.
     fn pixels(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
-        let ([x0, y0], [hx, hy]) = (self.origin_m(), self.pixel_size_m);
+        let ([x0, y0], [hx, hy]) = (self.origin_m, self.pixel_size_m);
         let heights = self.surface.heights.indexed_iter();
         let inside = heights.filter(|(at, h)| self.surface.mask[*at] && h.is_finite());
         inside.map(move |((row, column), h)| [x0 + column as f64 * hx, y0 + row as f64 * hy, *h])
@@ -146,6 +154,7 @@ mod tests {
             region,
             binning: 1,
             pixel_size_m: size,
+            origin_m: [10.0 * size[0], 4.0 * size[1]],
         }
         .fit_ball(4e-3)
         .unwrap();

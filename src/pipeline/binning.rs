@@ -25,7 +25,7 @@ const PIXELS_PER_POINT: usize = 16;
 /// let ten = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(10);
 /// let (reference, frame) = (hertz(0.0), hertz(120.0));
 /// for (binning, side) in [(Binning::Auto, 2), (Binning::Blocks(4), 4)] {
-///     let pipeline = ten.clone().with_binning(binning)?;
+///     let pipeline = ten.clone().with_settings(|settings| settings.binning = binning)?;
 ///     let mut press = pipeline.press(reference.view())?;
 ///     press.add_frame(frame.view());
 ///     assert_eq!(press.surface(0)?.binning, side);

@@ -154,13 +154,13 @@ choice! {
     /// assert_eq!(WarpChoice::Affine.to_string(), "affine");
     /// ```
     WarpChoice, "warp":
-    /// [`StrainSpline`](super::StrainSpline): thin-plate, kernel −r, smoothed by blocked cross-validation.
+    /// A [spline](crate::tps::ThinPlateSpline), thin-plate, kernel −r, smoothed by blocked cross-validation.
     ThinPlateSpline = "thin-plate-spline",
     /// The spline of kernel r³, smoothed by cross-validation.
     CubicSpline = "cubic-spline",
-    /// [`AffineModel`](crate::tps::AffineModel).
+    /// [`AffineModel::General`](crate::tps::AffineModel::General).
     Affine = "affine",
-    /// [`RigidModel`](crate::tps::RigidModel).
+    /// [`AffineModel::Rigid`](crate::tps::AffineModel::Rigid).
     Rigid = "rigid",
 }
 

@@ -7,19 +7,16 @@ use crate::matching::StopReason;
 use std::fmt::{self, Display, Formatter};
 
 /// A value with its standard error, scaled to a unit: two significant digits of the error decide the decimals.
-///
-/// ```
-/// use tactile_imaging::pipeline::with_error;
-/// assert_eq!(with_error(3.27124e-3, 4.1e-8, 1e3), "3.271240 ± 0.000041");
-/// assert_eq!(with_error(103_384.0, 140.0, 1e-3), "103.38 ± 0.14");
-/// assert_eq!(with_error(0.7, 0.0, 1.0), "0.7000");
-/// ```
-pub fn with_error(value: f64, error: f64, scale: f64) -> String {
+pub(crate) fn with_error(value: f64, error: f64, scale: f64) -> String {
     let (value, error) = (value * scale, error * scale);
     if !(error > 0.0 && error.is_finite()) {
         return format!("{value:.4}");
     }
-    let decimals = (1 - error.log10().floor() as i32).clamp(0, 12) as usize;
+    let decimals = (1 - error.log10().floor() as i32).max(0) as usize;
+    // Beyond the twelfth decimal it is rounding.
+    if decimals > 12 {
+        return format!("{value:.4}");
+    }
     format!("{value:.decimals$} ± {error:.decimals$}")
 }
 
@@ -163,7 +160,9 @@ impl Display for Measurement {
         }
         line(f, "match", &self.matching)?;
         line(f, "strain", &self.strain)?;
-        writeln!(f, "all estimators:")?;
+        if !self.estimators.is_empty() {
+            writeln!(f, "all estimators:")?;
+        }
         for estimate in &self.estimators {
             writeln!(f, "  {estimate}")?;
         }
@@ -172,5 +171,22 @@ impl Display for Measurement {
             cautions(f, &self.flags)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_error;
+
+    #[test]
+    fn a_value_has_the_digits_that_its_error_allows() {
+        assert_eq!(with_error(3.27124e-3, 4.1e-8, 1e3), "3.271240 ± 0.000041");
+        assert_eq!(with_error(103_384.0, 140.0, 1e-3), "103.38 ± 0.14");
+        assert_eq!(with_error(0.7, 0.0, 1.0), "0.7000");
+        assert_eq!(
+            with_error(0.7, 3e-17, 1.0),
+            "0.7000",
+            "rounding is no error"
+        );
     }
 }

@@ -1,13 +1,9 @@
-//! What a person at a bench wants to read of single frames, streams, fits and truths.
+//! What a person at a bench wants to read of single frames, streams, and fits.
 use super::ball::BallFit;
 use super::contact::ContactReading;
 use super::display::estimate;
-#[cfg(feature = "simulate")]
-use super::display::with_error;
 use super::report::{Skip, Stage, Work};
 use super::session::{DriftWatch, Update};
-#[cfg(feature = "simulate")]
-use super::trial::{FrameTruth, Truth};
 use std::fmt::{self, Display, Formatter};
 
 impl Display for ContactReading {
@@ -59,6 +55,7 @@ impl Display for DriftWatch {
             frames,
             last_grey,
             greatest_grey,
+            ..
         } = self;
         let s = if *frames == 1 { "" } else { "s" };
         write!(
@@ -113,46 +110,5 @@ impl Display for Work {
             self.time.as_secs_f64() * 1e3,
             self.runs
         )
-    }
-}
-
-#[cfg(feature = "simulate")]
-impl Display for FrameTruth {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let [x, y] = self.centroid_px;
-        let (a, depth) = (self.contact_radius_m * 1e3, self.indentation_m * 1e3);
-        write!(
-            f,
-            "force {:.4} N   contact radius {a:.4} mm   a/R {:.3}",
-            self.force_n, self.contact_ratio
-        )?;
-        write!(
-            f,
-            "   indentation {depth:.4} mm   centroid ({x:.2}, {y:.2}) px"
-        )
-    }
-}
-
-#[cfg(feature = "simulate")]
-impl Display for Truth {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "Young's modulus  {} kPa",
-            with_error(self.youngs_modulus_pa, 0.0, 1e-3)
-        )?;
-        for (i, frame) in self.frames.iter().enumerate() {
-            write!(f, "\nframe {:<10} {frame}", i + 1)?;
-        }
-        match self.strain {
-            Some(e) => {
-                write!(
-                    f,
-                    "\nstrain           e_xx {:.4}  e_yy {:.4}  e_zz {:.4}",
-                    e[0][0], e[1][1], e[2][2]
-                )
-            }
-            None => Ok(()),
-        }
     }
 }

@@ -55,8 +55,8 @@ impl fmt::Display for ErrorSource {
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::{ErrorShare, ErrorSource};
 /// // A ball of 3 mm whose radius is known to 0.3 mm.
-/// let pipeline = trial.pipeline()?.with_object_errors(0.3e-3, 0.0)?;
-/// let budget: Vec<ErrorShare> = trial.press(&pipeline)?.error_budget()?;
+/// let pipeline = trial.pipeline()?.with_settings(|settings| settings.object_radius_error_m = 0.3e-3)?;
+/// let budget: Vec<ErrorShare> = trial.press(&pipeline)?.measure().error_budget;
 /// assert_eq!(budget[0].source, ErrorSource::ObjectRadius, "the largest first");
 /// assert!(budget[0].relative_error > 0.1, "E is proportional to R, and the guide takes a part of the compliance");
 /// # Ok::<(), Box<dyn std::error::Error>>(())

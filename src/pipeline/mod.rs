@@ -59,6 +59,8 @@ mod time;
 #[cfg(feature = "simulate")]
 mod trial;
 
+#[cfg(feature = "cli")]
+pub(crate) use background::clear_step;
 pub use ball::BallFit;
 pub use batch::contacts;
 pub use binning::Binning;
@@ -70,7 +72,7 @@ pub use composition::Pipeline;
 pub use config::StagesConfig;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
-pub use display::with_error;
+pub(crate) use display::with_error;
 pub use error::PipelineError;
 pub use error_budget::{ErrorShare, ErrorSource};
 pub use face::{FaceReading, ShapeProblem};
@@ -80,13 +82,12 @@ pub use object::Object;
 pub use pair::PairStrain;
 pub use press::Press;
 pub use report::{Report, Skip, SkipReason, Stage, Work};
-pub use session::{DriftWatch, SESSION_LOADS, Session, SessionStrain, Update};
+pub use session::{DriftWatch, Session, SessionStrain, Update};
 pub use settings::{Settings, Skips, SurfaceInput};
 pub use source::FrameSource;
 #[cfg(feature = "scene")]
 pub use source::ImageFolder;
-pub use strain_spline::StrainSpline;
 pub use surface::ContactSurface;
 pub use time::TimeResult;
 #[cfg(feature = "simulate")]
-pub use trial::{FrameTruth, Trial, Truth};
+pub use trial::Trial;

@@ -25,7 +25,8 @@ pub(crate) const LEAST_MATCHES: usize = 8;
 /// let strain: &PairStrain = press.strain(1)?;
 /// assert_eq!(strain.field.strains.len(), 60, "one at every control point of the first frame");
 /// let found = strain.summary.mean[(0, 0)];
-/// assert!((found - trial.truth().strain.expect("two frames")[0][0]).abs() < 0.03);
+/// let [first, last] = [&trial.simulation.truth[0], &trial.simulation.truth[1]];
+/// assert!((found - first.scaling_to(last).green_lagrange_strain()[(0, 0)]).abs() < 0.03);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -170,12 +170,10 @@ pub struct Work {
 /// let pipeline = trial.pipeline()?;
 /// let mut press = trial.press(&pipeline)?;
 /// press.surface(1)?;
-/// let mut report = press.report().clone();
+/// let report: &Report = press.report();
 /// // The second surface has the grid of the first, which needs both contacts.
 /// assert_eq!((report.work(Stage::Contact).runs, report.work(Stage::Surface).runs), (2, 1));
 /// assert!(report.to_string().contains("in 2 runs"));
-/// report.clear();
-/// assert_eq!(report, Report::default());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -189,12 +187,6 @@ impl Report {
     /// How often a stage ran, and for how long.
     pub fn work(&self, stage: Stage) -> Work {
         self.work[stage as usize]
-    }
-
-    /// Forgets everything, keeping the memory.
-    pub fn clear(&mut self) {
-        self.work = Default::default();
-        self.skips.clear();
     }
 
     pub(crate) fn ran(&mut self, stage: Stage, time: Duration) {

@@ -1,5 +1,7 @@
 //! What a pipeline knows beside its stages.
 use super::binning::Binning;
+use super::error::PipelineError;
+use super::guide_error::LAYER_PARAMETERS;
 use super::object::Object;
 use crate::elasticity::contact::Waveguide;
 use nalgebra::DMatrix;
@@ -14,7 +16,8 @@ pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Skips;
-/// let everything = trial.pipeline()?.with_skips(Skips { equal_frames: false, outside_contact: false, last_answer: false });
+/// let none = Skips { equal_frames: false, outside_contact: false, last_answer: false };
+/// let everything = trial.pipeline()?.with_settings(|settings| settings.skips = none)?;
 /// let mut press = trial.press(&everything)?;
 /// let region = press.surface(0)?.region;
 /// assert_eq!((region.rows(), region.columns()), (130, 174), "the whole frame");
@@ -67,13 +70,16 @@ pub enum SurfaceInput {
     Signal,
 }
 
-/// What a pipeline knows beside its stages.
+/// What a pipeline knows beside its stages; [`Pipeline::with_settings`](super::Pipeline::with_settings) changes it.
 ///
 /// ```
 /// use tactile_imaging::pipeline::{Binning, Object, Pipeline, Settings};
 /// # use tactile_imaging::force::CalibrationPair;
 /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80).with_smoothing(3)?;
+/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_settings(|settings| {
+///     settings.control_points = 80;
+///     settings.smoothing_px = 3;
+/// })?;
 /// let settings: &Settings = pipeline.settings();
 /// assert_eq!((settings.control_points, settings.smoothing_px), (80, 3));
 /// assert_eq!(settings.binning, Binning::Auto);
@@ -130,6 +136,47 @@ impl Settings {
             poisson_ratio_error: 0.0,
             layer_covariance: None,
             skips: Skips::default(),
+        }
+    }
+
+    /// Refuses what has no meaning.
+    pub(super) fn check(&self) -> Result<(), PipelineError> {
+        self.object.checked()?;
+        if self.smoothing_px.is_multiple_of(2) {
+            return Err(PipelineError::EvenSmoothing {
+                found: self.smoothing_px,
+            });
+        }
+        if self.binning == Binning::Blocks(0) {
+            return Err(PipelineError::EmptyBlocks);
+        }
+        let is_error = |found: &f64| *found >= 0.0 && found.is_finite();
+        let scales = [self.force_scale_error, self.length_scale_error];
+        if let Some(&found) = scales.iter().find(|e| !is_error(e)) {
+            return Err(PipelineError::ScaleError { found });
+        }
+        let inputs = [self.object_radius_error_m, self.poisson_ratio_error];
+        if let Some(&found) = inputs.iter().find(|e| !is_error(e)) {
+            return Err(PipelineError::InputError { found });
+        }
+        match &self.layer_covariance {
+            Some(covariance) => self.check_covariance(covariance),
+            None => Ok(()),
+        }
+    }
+
+    fn check_covariance(&self, covariance: &DMatrix<f64>) -> Result<(), PipelineError> {
+        let layers = self.waveguide.as_ref().map_or(0, |w| w.layers().len());
+        let expected = LAYER_PARAMETERS * layers;
+        let found = covariance.shape();
+        if found != (expected, expected) {
+            return Err(PipelineError::LayerCovariance { expected, found });
+        }
+        let broken = |c: &&f64| !c.is_finite();
+        let negative = covariance.diagonal().iter().copied().find(|v| *v < 0.0);
+        match covariance.iter().find(broken).copied().or(negative) {
+            Some(found) => Err(PipelineError::InputError { found }),
+            None => Ok(()),
         }
     }
 }

@@ -113,7 +113,7 @@ impl FrameSource for ImageFolder {
         let Some(path) = self.files.next() else {
             return Ok(None);
         };
-        *frame = crate::io::read_grey_image(path)?.to_u8();
+        *frame = crate::io::read_grey_image(path, crate::io::Grey::default(), None)?.to_u8();
         let time_s = self.next_s;
         self.next_s += self.period_s;
         Ok(Some(time_s))

@@ -28,25 +28,8 @@ type Spline = ThinPlateSpline<f64, 3, NegR>;
 /// Points must come with neighbours following each other, as samplers of control points give them. Runs of ten points
 /// are dealt to two halves, each of which predicts the other for eight values of λ. O(n³), a tenth of what
 /// [`Smoothing::Gcv`] takes at 200 points; with fewer than 40 that is used.
-///
-/// ```
-/// use nalgebra::Point3;
-/// use tactile_imaging::{pipeline::StrainSpline, tps::{Warp, WarpModel}};
-/// # fn main() -> Result<(), tactile_imaging::tps::TpsError> {
-/// // Points of a dome, and where they come to lie when it grows by a fifth.
-/// let dome = |i: usize| {
-///     let (r, angle) = (0.07 * (i as f64).sqrt(), 2.4 * i as f64);
-///     Point3::new(r * angle.cos(), r * angle.sin(), 1.0 - r * r)
-/// };
-/// let sources: Vec<_> = (0..100).map(dome).collect();
-/// let targets: Vec<_> = sources.iter().map(|p| p * 1.2).collect();
-/// let warp = StrainSpline.fit(&sources, &targets, None)?;
-/// assert!((warp.jacobian(&sources[50])[(2, 2)] - 1.2).abs() < 1e-9);
-/// # Ok(())
-/// # }
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StrainSpline;
+pub(super) struct StrainSpline;
 
 impl WarpModel<f64, 3> for StrainSpline {
     fn fit(

@@ -26,7 +26,7 @@ use std::sync::{Mutex, PoisonError};
 /// let surface = press.surface(0)?;
 /// let ball = surface.fit_ball(4e-3).expect("a cap");
 /// assert!((ball.contact_radius_m - 2.4e-3).abs() < 5e-6);
-/// assert!((ball.centre_m[0] - 3.2e-3).abs() < 5e-6 && surface.origin_m()[0] < 0.9e-3);
+/// assert!((ball.centre_m[0] - 3.2e-3).abs() < 5e-6 && surface.origin_m[0] < 0.9e-3);
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -39,22 +39,22 @@ pub struct ContactSurface {
     pub binning: usize,
     /// The size of one of the grid's pixels in metres, x and y.
     pub pixel_size_m: [f64; 2],
+    /// Position (x, y) in metres of the grid's first pixel: from the middle of the frame's first pixel to that of the block.
+    pub origin_m: [f64; 2],
 }
 
-impl ContactSurface {
-    /// Position (x, y) in metres of the grid's first pixel: from the middle of the frame's first pixel to that of the block.
-    pub fn origin_m(&self) -> [f64; 2] {
-        let side = self.binning as f64;
-        let middle = 0.5 * (side - 1.0);
-        let first = [
-            self.region.column_start as f64 + middle,
-            self.region.row_start as f64 + middle,
-        ];
-        [
-            first[0] * self.pixel_size_m[0] / side,
-            first[1] * self.pixel_size_m[1] / side,
-        ]
-    }
+/// Position (x, y) in metres of the grid's first pixel.
+fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f64; 2] {
+    let side = binning as f64;
+    let middle = 0.5 * (side - 1.0);
+    let first = [
+        region.column_start as f64 + middle,
+        region.row_start as f64 + middle,
+    ];
+    [
+        first[0] * pixel_size_m[0] / side,
+        first[1] * pixel_size_m[1] / side,
+    ]
 }
 
 /// What the surface stage reuses from frame to frame.
@@ -168,6 +168,7 @@ pub(super) fn reconstruct(
         .reconstruct_with(sfs, frame, &domain, &mut surface)?;
     Ok(ContactSurface {
         surface,
+        origin_m: origin_m(&region, side, pixel_size_m),
         region,
         binning: side,
         pixel_size_m,
@@ -195,7 +196,7 @@ pub(super) fn sample(
     let mut points = pipeline
         .sampler()
         .sample(heights.view(), Some(mask.view()), size, count)?;
-    let [x, y] = surface.origin_m();
+    let [x, y] = surface.origin_m;
     for p in &mut points {
         p.x += x;
         p.y += y;

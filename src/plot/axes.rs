@@ -92,7 +92,7 @@ fn ranges(panel: &Panel) -> [[f64; 2]; 2] {
         .iter()
         .any(|layer| matches!(layer, Layer::Heat(_)));
     let margin = if tight { 0.0 } else { 0.04 };
-    let fixed = [panel.x_range, panel.y_range];
+    let fixed = [None, panel.y_range];
     [0, 1].map(|k| match fixed[k] {
         Some(range) => widen(range.map(|v| panel.scales[k].forward(v)), 0.0),
         None => widen(bounds[k], margin),

@@ -1,40 +1,31 @@
 //! Colours for categories (readable for the colour-blind) and perceptually uniform colour maps.
 
 /// An opaque sRGB colour.
-///
-/// ```
-/// use tactile_imaging::plot::{Colour, Page, Panel};
-/// let line = [[0.0, 0.0], [1.0, 2.0]];
-/// let panel = Panel::new("").line(line, Colour(18, 52, 86), "").line(line, Colour::CATEGORIES[0], "");
-/// let svg = Page::new("").panel(panel).to_svg()?;
-/// assert!(svg.contains("#123456") && svg.contains("#0072B2"), "the second is Colour::BLUE");
-/// # Ok::<(), tactile_imaging::plot::PlotError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Colour(pub u8, pub u8, pub u8);
+pub(crate) struct Colour(pub u8, pub u8, pub u8);
 
 impl Colour {
     /// Black.
-    pub const BLACK: Self = Self(0, 0, 0);
+    pub(crate) const BLACK: Self = Self(0, 0, 0);
     /// Mid grey.
-    pub const GREY: Self = Self(130, 130, 130);
+    pub(crate) const GREY: Self = Self(130, 130, 130);
     /// Blue of the Okabe–Ito palette.
-    pub const BLUE: Self = Self(0, 114, 178);
+    pub(crate) const BLUE: Self = Self(0, 114, 178);
     /// Vermilion of the Okabe–Ito palette.
-    pub const RED: Self = Self(213, 94, 0);
+    pub(crate) const RED: Self = Self(213, 94, 0);
     /// Orange of the Okabe–Ito palette.
-    pub const ORANGE: Self = Self(230, 159, 0);
+    pub(crate) const ORANGE: Self = Self(230, 159, 0);
     /// Bluish green of the Okabe–Ito palette.
-    pub const GREEN: Self = Self(0, 158, 115);
+    pub(crate) const GREEN: Self = Self(0, 158, 115);
     /// Reddish purple of the Okabe–Ito palette.
-    pub const PURPLE: Self = Self(204, 121, 167);
+    pub(crate) const PURPLE: Self = Self(204, 121, 167);
     /// Sky blue of the Okabe–Ito palette.
-    pub const SKY: Self = Self(86, 180, 233);
+    pub(crate) const SKY: Self = Self(86, 180, 233);
     /// White.
-    pub const WHITE: Self = Self(255, 255, 255);
+    pub(crate) const WHITE: Self = Self(255, 255, 255);
 
     /// Colours told apart by people with any colour vision (Okabe & Ito 2008), in the order to take them.
-    pub const CATEGORIES: [Self; 6] = [
+    pub(crate) const CATEGORIES: [Self; 6] = [
         Self::BLUE,
         Self::ORANGE,
         Self::GREEN,
@@ -45,27 +36,14 @@ impl Colour {
 }
 
 /// A map from values to colours; NaN is light grey.
-///
-/// ```
-/// use tactile_imaging::plot::{ColorMap, HeatMap, Page, Panel};
-/// let strain = ndarray::array![[-0.02, 0.0, 0.02]];
-/// let svg = |map| {
-///     let heat = HeatMap::of_pixels(strain.view(), [1.0, 1.0], "strain").colours(map);
-///     Page::new("").panel(Panel::new("").heat_map(heat)).to_svg()
-/// };
-/// assert_ne!(svg(ColorMap::Diverging)?, svg(ColorMap::Viridis)?);
-/// # Ok::<(), tactile_imaging::plot::PlotError>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum ColorMap {
+pub(crate) enum ColorMap {
     /// Viridis (van der Walt & Smith 2015): perceptually uniform, dark blue to yellow.
     #[default]
     Viridis,
     /// Linear grey, black to white: for camera frames.
     Grey,
-    /// Blue–white–red for signed values.
-    Diverging,
 }
 
 /// Viridis at 17 equally spaced values; linear between them, within 2 levels of the 256-entry table.
@@ -89,14 +67,6 @@ const VIRIDIS: [[f64; 3]; 17] = [
     [253., 231., 37.],
 ];
 
-const DIVERGING: [[f64; 3]; 5] = [
-    [33., 102., 172.],
-    [146., 197., 222.],
-    [247., 247., 247.],
-    [244., 165., 130.],
-    [178., 24., 43.],
-];
-
 impl ColorMap {
     /// The colour at `t`, held to [0, 1]; light grey where `t` is NaN.
     pub(super) fn at(self, t: f64) -> Colour {
@@ -106,7 +76,6 @@ impl ColorMap {
         match self {
             Self::Viridis => between(&VIRIDIS, t),
             Self::Grey => between(&[[0.0; 3], [255.0; 3]], t),
-            Self::Diverging => between(&DIVERGING, t),
         }
     }
 }
@@ -130,7 +99,6 @@ mod tests {
         assert_eq!(ColorMap::Viridis.at(0.0), Colour(68, 1, 84));
         assert_eq!(ColorMap::Viridis.at(7.0), Colour(253, 231, 37));
         assert_eq!(ColorMap::Grey.at(0.5), Colour(128, 128, 128));
-        assert_eq!(ColorMap::Diverging.at(0.5), Colour(247, 247, 247));
         assert_eq!(ColorMap::Viridis.at(f64::NAN), Colour(235, 235, 235));
     }
 }

@@ -5,25 +5,8 @@ use ndarray::{Array2, ArrayView2};
 use std::ops::Range;
 
 /// Values on a regular grid, `[row, column]`; NaN is left light grey.
-///
-/// ```
-/// use tactile_imaging::plot::{ColorMap, HeatMap, Page, Panel};
-/// let strain = ndarray::array![[-0.02, 0.0, 0.01], [f64::NAN, 0.01, 0.02]];
-/// let map = HeatMap::of_pixels(strain.view(), [0.5, 0.5], "strain e_zz")
-///     .origin([10.0, 20.0])
-///     .colours(ColorMap::Diverging)
-///     .range([-0.05, 0.05]);
-/// let frame = ndarray::Array2::from_elem((8, 8), 15_u8);
-/// let frame = HeatMap::of_frame(frame.view(), [0.1, 0.1]);
-/// let page = Page::new("").panel(Panel::new("").heat_map(map)).panel(Panel::new("").heat_map(frame));
-/// let svg = page.to_svg()?;
-/// for label in ["strain e_zz", "-0.04", "10.5", "grey level", "250"] {
-///     assert!(svg.contains(label), "{label}");
-/// }
-/// # Ok::<(), tactile_imaging::plot::PlotError>(())
-/// ```
 #[derive(Clone, Debug)]
-pub struct HeatMap {
+pub(crate) struct HeatMap {
     pub(super) values: Array2<f64>,
     pub(super) x: [f64; 2],
     pub(super) y: [f64; 2],
@@ -36,7 +19,11 @@ impl HeatMap {
     /// An image with pixels of `pixel_size` (x, y), in the unit of the axes; the first pixel's centre is the origin.
     ///
     /// The label names the values with their unit. The colours span the finite values; see [`range`](Self::range).
-    pub fn of_pixels(values: ArrayView2<'_, f64>, pixel_size: [f64; 2], label: &str) -> Self {
+    pub(crate) fn of_pixels(
+        values: ArrayView2<'_, f64>,
+        pixel_size: [f64; 2],
+        label: &str,
+    ) -> Self {
         let (rows, columns) = values.dim();
         let span = |n: usize, size: f64| [-0.5 * size, (n as f64 - 0.5) * size];
         Self {
@@ -50,7 +37,7 @@ impl HeatMap {
     }
 
     /// An 8-bit frame in grey, black to white over the whole scale.
-    pub fn of_frame(frame: ArrayView2<'_, u8>, pixel_size: [f64; 2]) -> Self {
+    pub(crate) fn of_frame(frame: ArrayView2<'_, u8>, pixel_size: [f64; 2]) -> Self {
         let values = frame.mapv(f64::from);
         Self::of_pixels(values.view(), pixel_size, "grey level")
             .colours(ColorMap::Grey)
@@ -72,7 +59,7 @@ impl HeatMap {
 
     /// Puts the grid's first pixel centre at `origin` instead of (0, 0).
     #[must_use]
-    pub fn origin(mut self, origin: [f64; 2]) -> Self {
+    pub(crate) fn origin(mut self, origin: [f64; 2]) -> Self {
         self.x = self.x.map(|v| v + origin[0]);
         self.y = self.y.map(|v| v + origin[1]);
         self
@@ -80,14 +67,14 @@ impl HeatMap {
 
     /// Takes other colours.
     #[must_use]
-    pub fn colours(mut self, map: ColorMap) -> Self {
+    pub(crate) fn colours(mut self, map: ColorMap) -> Self {
         self.map = map;
         self
     }
 
     /// Sets the values at the two ends of the colours.
     #[must_use]
-    pub fn range(mut self, range: [f64; 2]) -> Self {
+    pub(crate) fn range(mut self, range: [f64; 2]) -> Self {
         self.range = range;
         self
     }

@@ -4,51 +4,20 @@ use super::heat::HeatMap;
 use super::scale::range_of;
 
 /// The shape of a point.
-///
-/// ```
-/// use tactile_imaging::plot::{Colour, Marker, Page, Panel};
-/// let svg = |marker| {
-///     let panel = Panel::new("").marked([[0.5, 2.0]], marker, Colour::RED, "");
-///     Page::new("").panel(panel).to_svg()
-/// };
-/// let filled = r##"fill="#D55E00""##;
-/// assert!(svg(Marker::Disc)?.contains(filled) && !svg(Marker::Ring)?.contains(filled));
-/// assert!(!svg(Marker::Cross)?.contains("<circle"));
-/// # Ok::<(), tactile_imaging::plot::PlotError>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Marker {
+pub(crate) enum Marker {
     /// A filled disc.
     #[default]
     Disc,
     /// An open circle.
     Ring,
-    /// A diagonal cross.
-    Cross,
 }
 
 /// One layer of a panel; layers are drawn in the order in which they were added. An empty label keeps a layer out of the legend.
-///
-/// ```
-/// use tactile_imaging::plot::{Colour, Layer, Marker, Page, Panel};
-/// let points = vec![[0.2, 1.9], [0.7, 3.3], [1.2, 3.9]]; // force (N), contact radius (mm)
-/// let line = Layer::Line { points: points.clone(), colour: Colour::GREY, dashed: true, label: "guide".into() };
-/// let dots = Layer::Points {
-///     points,
-///     colour: Colour::BLUE,
-///     marker: Marker::Ring,
-///     radius: 6.0,
-///     label: String::new(), // not in the legend
-/// };
-/// let svg = Page::new("").panel(Panel::new("").layer(line).layer(dots)).to_svg()?;
-/// assert_eq!(svg.matches(r#"r="6""#).count(), 3);
-/// assert!(svg.contains("guide"));
-/// # Ok::<(), tactile_imaging::plot::PlotError>(())
-/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub enum Layer {
+pub(crate) enum Layer {
     /// Separate points.
     Points {
         /// Positions.

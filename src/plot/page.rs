@@ -12,9 +12,14 @@ use std::path::{Path, PathBuf};
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::plot::{Page, PlotError};
+/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, Load, PressOptions}};
+/// # let camera = Camera::default().coarser(16);
+/// # let options = PressOptions { camera, loads: vec![Load::normal(0.7)], ..PressOptions::default() };
+/// # let trial = Trial::new(options, &CalibrationOptions::default())?;
+/// # let pipeline = trial.pipeline()?;
+/// use tactile_imaging::plot::{PlotError, save_press_pages};
 /// let file = tempfile::NamedTempFile::new()?;
-/// let error = Page::new("Frames").save(file.path().join("frames.svg")).unwrap_err();
+/// let error = save_press_pages(&mut trial.press(&pipeline)?, file.path()).unwrap_err();
 /// assert!(matches!(error, PlotError::Write { .. }), "a file is no folder");
 /// assert!(error.to_string().starts_with("cannot write "));
 /// # Ok(()) }
@@ -44,23 +49,8 @@ pub enum PlotError {
 }
 
 /// Panels in rows and columns under one title.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::plot::{Colour, Page, Panel};
-/// let panel = |k: u32| Panel::new(format!("frame {k}")).points([[0.0, f64::from(k)]], Colour::BLUE, "");
-/// let page = Page::new("Frames").columns(2).panel_size(300, 200);
-/// let page = (1..=3).fold(page, |page, k| page.panel(panel(k)));
-/// let svg = page.to_svg()?;
-/// let size = [r#"width="600""#, r#"height="444""#];
-/// assert!(size.iter().all(|part| svg.contains(part)), "two rows under a title of 44 px");
-/// let folder = tempfile::tempdir()?;
-/// page.save(folder.path().join("plots/frames.svg"))?;
-/// assert_eq!(std::fs::read_to_string(folder.path().join("plots/frames.svg"))?, svg);
-/// # Ok(()) }
-/// ```
 #[derive(Clone, Debug)]
-pub struct Page {
+pub(crate) struct Page {
     title: String,
     panels: Vec<Panel>,
     columns: usize,
@@ -69,7 +59,7 @@ pub struct Page {
 
 impl Page {
     /// An empty page, one column, panels of 560 × 420 pixels.
-    pub fn new(title: impl Into<String>) -> Self {
+    pub(crate) fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
             panels: Vec::new(),
@@ -80,21 +70,21 @@ impl Page {
 
     /// Sets the number of columns (at least one).
     #[must_use]
-    pub fn columns(mut self, columns: usize) -> Self {
+    pub(crate) fn columns(mut self, columns: usize) -> Self {
         self.columns = columns.max(1);
         self
     }
 
     /// Sets the size of every panel in pixels (at least 200 × 150).
     #[must_use]
-    pub fn panel_size(mut self, width: u32, height: u32) -> Self {
+    pub(crate) fn panel_size(mut self, width: u32, height: u32) -> Self {
         self.panel_size = (width.max(200), height.max(150));
         self
     }
 
     /// Adds a panel: panels fill the rows from left to right.
     #[must_use]
-    pub fn panel(mut self, panel: Panel) -> Self {
+    pub(crate) fn panel(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
     }
@@ -103,7 +93,7 @@ impl Page {
     ///
     /// # Errors
     /// [`PlotError::Encode`].
-    pub fn to_svg(&self) -> Result<String, PlotError> {
+    pub(crate) fn to_svg(&self) -> Result<String, PlotError> {
         self.draw().map_err(|source| PlotError::Encode {
             title: self.title.clone(),
             source,
@@ -114,7 +104,7 @@ impl Page {
     ///
     /// # Errors
     /// [`PlotError`].
-    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
+    pub(crate) fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
         let path = path.as_ref();
         replace_file(path, self.to_svg()?.as_bytes()).map_err(|source| PlotError::Write {
             path: path.into(),

@@ -11,30 +11,27 @@ use std::path::{Path, PathBuf};
 const MM: f64 = 1e3;
 const UM: f64 = 1e6;
 
-/// Writes every page that the press has results for to `folder`, as SVG; returns their paths. The lines of `summary` (a tab
-/// between name and value) make the last page.
+/// Writes every page that the press has results for to `folder`, as SVG: frames, surfaces, matches, displacement and strain between the
+/// first and the last frame, and a summary of [`Press::measure`]. Returns their paths.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_imaging::force::CalibrationPair;
 /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
-/// use tactile_imaging::Pipeline;
-/// use tactile_imaging::pipeline::{LightContact, Object};
-/// use tactile_imaging::plot::{save_press_pages, summary_lines};
+/// use tactile_imaging::{Object, Pipeline};
+/// use tactile_imaging::plot::save_press_pages;
 /// # let camera = Camera::default().coarser(16);
 /// # let scene = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
 /// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
-/// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
 /// # let made = scene.simulate();
-/// let contact = LightContact::from_pairs(&pairs, made.pixel_size_m)?;
-/// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?.with_control_points(40);
+/// let pipeline = Pipeline::from_pairs(&calibration.pairs, made.pixel_size_m, Object::sphere(3e-3))?.with_control_points(40);
 /// let mut press = pipeline.press(made.reference.view())?;
 /// press.add_frame(made.frames[0].view());
-/// let summary = summary_lines(&press.measure());
 /// let folder = tempfile::tempdir()?;
-/// let paths = save_press_pages(&mut press, summary, folder.path())?;
+/// let paths = save_press_pages(&mut press, folder.path())?;
 /// let names: Vec<_> = paths.iter().filter_map(|p| p.file_name()).collect();
 /// assert_eq!(names, ["frames.svg", "surfaces.svg", "summary.svg"], "strain takes two frames");
+/// let summary = std::fs::read_to_string(folder.path().join("summary.svg"))?;
+/// assert!(summary.contains("Young's modulus") && summary.contains("force 1"));
 /// # Ok(()) }
 /// ```
 ///
@@ -42,8 +39,17 @@ const UM: f64 = 1e6;
 /// [`PlotError`].
 pub fn save_press_pages(
     press: &mut Press<'_>,
-    summary: Vec<String>,
     folder: impl AsRef<Path>,
+) -> Result<Vec<PathBuf>, PlotError> {
+    let summary = summary_lines(&press.measure());
+    save_pages(press, summary, folder.as_ref())
+}
+
+/// As [`save_press_pages`], with these lines in the summary: a tab stands between name and value.
+pub(crate) fn save_pages(
+    press: &mut Press<'_>,
+    summary: Vec<String>,
+    folder: &Path,
 ) -> Result<Vec<PathBuf>, PlotError> {
     let mut pages = vec![
         ("frames", frames_page(press)?),
@@ -58,7 +64,7 @@ pub fn save_press_pages(
     pages.push(("summary", summary_page(press, summary)?));
     let mut paths = Vec::with_capacity(pages.len());
     for (name, page) in pages {
-        let path = folder.as_ref().join(format!("{name}.svg"));
+        let path = folder.join(format!("{name}.svg"));
         page.save(&path)?;
         paths.push(path);
     }
@@ -66,28 +72,7 @@ pub fn save_press_pages(
 }
 
 /// What every measurement says, as lines for the summary page.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_imaging::force::CalibrationPair;
-/// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene};
-/// use tactile_imaging::Pipeline;
-/// use tactile_imaging::pipeline::{LightContact, Object};
-/// use tactile_imaging::plot::summary_lines;
-/// # let camera = Camera::default().coarser(16);
-/// # let scene = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
-/// # let calibration = scene.calibrate(&CalibrationOptions { steps: 8, ..Default::default() })?;
-/// # let pairs: Vec<_> = calibration.pairs().map(|(v, f)| CalibrationPair::loading(v, f)).collect();
-/// # let made = scene.simulate();
-/// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, made.pixel_size_m)?, Object::sphere(3e-3))?;
-/// let mut press = pipeline.press(made.reference.view())?;
-/// press.add_frame(made.frames[0].view());
-/// let lines = summary_lines(&press.measure());
-/// assert!(lines[0].starts_with("Young's modulus\t") && lines[0].ends_with(" kPa"));
-/// assert!(lines.iter().any(|line| line.starts_with("force 1\t0.7")));
-/// # Ok(()) }
-/// ```
-pub fn summary_lines(measurement: &Measurement) -> Vec<String> {
+pub(crate) fn summary_lines(measurement: &Measurement) -> Vec<String> {
     let mut lines = Vec::new();
     match &measurement.youngs_modulus_pa {
         Ok(modulus) => {
@@ -181,7 +166,7 @@ fn surfaces_page(press: &mut Press<'_>) -> Result<Page, PlotError> {
         let title = force_title(press, frame)?;
         let points = press.control_points(frame)?.to_vec();
         let surface = press.surface(frame)?;
-        let (origin, size) = (surface.origin_m(), surface.pixel_size_m.map(|s| s * MM));
+        let (origin, size) = (surface.origin_m, surface.pixel_size_m.map(|s| s * MM));
         let masked = |(at, h): ((usize, usize), &f64)| {
             if surface.surface.mask[at] {
                 *h * MM

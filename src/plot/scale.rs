@@ -1,19 +1,9 @@
 //! How axes count, and what values span.
 
 /// How an axis counts.
-///
-/// ```
-/// use tactile_imaging::plot::{Colour, Page, Panel, Scale};
-/// let decades = [[0.0, 1e2], [1.0, 1e4], [2.0, 1e8]]; // depth (mm), modulus (Pa)
-/// let panel = Panel::new("").y_label("modulus (Pa)").line(decades, Colour::BLUE, "");
-/// let svg = |y| Page::new("").panel(panel.clone().scales(Scale::Linear, y)).to_svg();
-/// assert!(svg(Scale::Linear)?.contains("0.2×10⁸"));
-/// assert!(svg(Scale::Log10)?.contains("1×10⁶"));
-/// # Ok::<(), tactile_imaging::plot::PlotError>(())
-/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Scale {
+pub(crate) enum Scale {
     /// Equal steps for equal differences.
     #[default]
     Linear,

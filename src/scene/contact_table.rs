@@ -1,17 +1,17 @@
 //! Contact tables as files, and from the description of a ball and a guide.
-#[cfg(feature = "fem")]
+#[cfg(feature = "cli")]
 use super::fields::Fields;
-#[cfg(feature = "fem")]
+#[cfg(feature = "cli")]
 use super::tables;
 use super::{SceneError, SceneLayer};
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
-#[cfg(feature = "fem")]
+#[cfg(feature = "cli")]
 use crate::elasticity::contact::{TableOptions, TableProgress};
-use crate::io::{ReadError, read_bytes, write_file};
-#[cfg(feature = "fem")]
+use crate::io::{ReadError, read_bytes, write_bytes};
+#[cfg(feature = "cli")]
 use crate::pipeline::{Object, PipelineError};
-#[cfg(feature = "fem")]
+#[cfg(feature = "cli")]
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -64,26 +64,16 @@ pub fn write_contact_table(path: impl AsRef<Path>, table: &ContactTable) -> Resu
         path: path.into(),
         source: std::io::Error::other(error),
     })?;
-    write_file(path, text.as_bytes())
+    write_bytes(path, text.as_bytes())
 }
 
 /// Computes the contact table of the ball and the waveguide that a file describes: a scene file, or one with its tables `object` and
 /// `waveguide` alone. `progress` is called before each modulus and after the last.
 ///
-/// ```no_run
-/// use std::ops::ControlFlow;
-/// use tactile_imaging::elasticity::contact::TableOptions;
-/// use tactile_imaging::scene::{solve_contact_table, write_contact_table};
-///
-/// let table = solve_contact_table("guide.toml", &TableOptions::default(), |_| ControlFlow::Continue(()))?;
-/// write_contact_table("table.toml", &table)?;
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
 /// # Errors
 /// Those of a scene's `object` and `waveguide`; [`SceneError::Measure`] where the object is no ball, or the table cannot be computed.
-#[cfg(feature = "fem")]
-pub fn solve_contact_table(
+#[cfg(feature = "cli")]
+pub(crate) fn solve_contact_table(
     path: impl AsRef<Path>,
     options: &TableOptions,
     progress: impl FnMut(TableProgress) -> ControlFlow<()>,

@@ -2,8 +2,7 @@
 use super::{CalibrationSource, Scene, SceneError, read_contact_table};
 use crate::elasticity::contact::ContactTable;
 use crate::force::CalibrationPair;
-use crate::io::image::read_grey_levels;
-use crate::io::{Column, Quantity, ReadError, read_table};
+use crate::io::{ReadError, read_columns, read_grey_levels};
 use crate::sensor::Sensor;
 use ndarray::{Array2, ArrayView2};
 use std::path::Path;
@@ -45,7 +44,7 @@ pub enum LoadedCalibration {
 /// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// # let folder = tempfile::tempdir()?;
 /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
-/// # let path = write_folder(&made, &calibration, folder.path())?;
+/// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
 /// let data = Scene::read(&path)?.load()?; // a calibration up to 2 N in 8 steps and back
 /// assert!(data.frames.iter().all(|frame| frame.dim() == data.reference.dim()));
 /// let LoadedCalibration::Pairs(pairs) = &data.calibration else { unreachable!() };
@@ -65,7 +64,8 @@ pub struct SceneData {
 }
 
 impl Scene {
-    /// Reads the images and the calibration, and checks that the images have one size.
+    /// Reads the images and the calibration, and checks that the images have one size. Where the frames are too many for the memory,
+    /// [`measure_file`](Self::measure_file) keeps none of them.
     ///
     /// # Errors
     /// [`SceneError::File`] and [`SceneError::SizeMismatch`], naming the field and the file.
@@ -77,29 +77,9 @@ impl Scene {
         Ok(data)
     }
 
-    /// As [`load`](Self::load) without the frames: a [`press`](Self::press) then reads each when it is added and again when a
-    /// stage needs it, so that any number of them fits into memory.
-    ///
-    /// ```
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
-    /// use tactile_imaging::scene::Scene;
-    /// # let camera = Camera::default().coarser(16);
-    /// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-    /// # let folder = tempfile::tempdir()?;
-    /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
-    /// # let path = write_folder(&made, &calibration, folder.path())?;
-    /// let scene = Scene::read(&path)?;
-    /// let (whole, part) = (scene.load()?, scene.load_without_frames()?);
-    /// let pipeline = scene.pipeline(&whole)?;
-    /// let modulus = scene.press(&pipeline, &whole)?.modulus()?;
-    /// assert_eq!(scene.press(&pipeline, &part)?.modulus()?, modulus);
-    /// # Ok(()) }
-    /// ```
-    ///
-    /// # Errors
-    /// As [`load`](Self::load), but for the frames' own.
-    pub fn load_without_frames(&self) -> Result<SceneData, SceneError> {
+    /// As [`load`](Self::load) without the frames: a [`press`](Self::press) then reads each when it is added and again when a stage needs it, so
+    /// that any number of them fits into memory.
+    pub(crate) fn load_without_frames(&self) -> Result<SceneData, SceneError> {
         Ok(SceneData {
             reference: self.image("reference", &self.reference)?,
             frames: Vec::new(),
@@ -137,13 +117,6 @@ impl Scene {
     }
 
     fn load_calibration(&self) -> Result<LoadedCalibration, SceneError> {
-        let columns = |field: &str, path: &Path, wanted: [Column<'_>; 2]| {
-            let read = || {
-                let [first, second] = read_table(path)?.columns(wanted, path)?;
-                Ok(first.into_iter().zip(second))
-            };
-            read().map_err(|source| self.file_error(field, source))
-        };
         match &self.calibration {
             CalibrationSource::Gauge => Ok(LoadedCalibration::Gauge),
             CalibrationSource::Sensor(path) => {
@@ -155,18 +128,13 @@ impl Scene {
                 Ok(LoadedCalibration::Pairs(pairs))
             }
             CalibrationSource::DepthTable(path) => {
-                let darkness = Column {
-                    names: &["darkness"],
-                    quantity: Quantity::Number,
-                    unit: "grey_levels",
-                };
-                let depth = Column {
-                    names: &["depth"],
-                    quantity: Quantity::Length,
-                    unit: "mm",
-                };
-                let rows = columns("calibration.depth_table", path, [darkness, depth])?;
-                Ok(LoadedCalibration::DepthTable(rows.collect()))
+                let wanted: [(&[&str], &str); 2] =
+                    [(&["darkness"], "grey_levels"), (&["depth"], "mm")];
+                let field = "calibration.depth_table";
+                let columns = read_columns(path, wanted);
+                let [darkness, depth] = columns.map_err(|source| self.file_error(field, source))?;
+                let rows = darkness.into_iter().zip(depth).collect();
+                Ok(LoadedCalibration::DepthTable(rows))
             }
         }
     }
@@ -187,17 +155,8 @@ pub(super) fn read_image(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, Re
 
 /// Pairs of integrated pixel value and force from a CSV file.
 pub(crate) fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair<f64>>, ReadError> {
-    let value = Column {
-        names: &["integrated_pixel_value"],
-        quantity: Quantity::Number,
-        unit: "grey_levels",
-    };
-    let force = Column {
-        names: &["force"],
-        quantity: Quantity::Force,
-        unit: "N",
-    };
-    let [values, forces] = read_table(path)?.columns([value, force], path)?;
+    let value = (&["integrated_pixel_value"][..], "grey_levels");
+    let [values, forces] = read_columns(path, [value, (&["force"], "N")])?;
     let pairs = values.into_iter().zip(forces);
     Ok(pairs.map(|(v, f)| CalibrationPair::loading(v, f)).collect())
 }

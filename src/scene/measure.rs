@@ -22,7 +22,7 @@ impl Scene {
     /// # let made = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
     /// # let folder = tempfile::tempdir()?;
     /// # let calibration = CalibrationOptions { steps: 8, ..CalibrationOptions::default() };
-    /// # let path = write_folder(&made, &calibration, folder.path())?;
+    /// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
     /// let measured = Scene::measure_file(&path)?; // one frame, of a ball pressed with 0.7 N
     /// let force = measured.frames[0].as_ref().expect("a contact").force_n.as_ref().expect("a calibration").value;
     /// assert!((force / 0.7 - 1.0).abs() < 0.03);
@@ -130,9 +130,10 @@ impl Scene {
             LoadedCalibration::Sensor(sensor) => {
                 let contact = sensor.contact(&self.force_options())?;
                 let pipeline = Pipeline::new(contact, self.object)?.with_stages(&self.stages)?;
-                return sensor
-                    .configured(pipeline)?
-                    .with_object_errors(self.radius_error_m, self.poisson_ratio_error);
+                return sensor.configured(pipeline)?.with_settings(|settings| {
+                    settings.object_radius_error_m = self.radius_error_m;
+                    settings.poisson_ratio_error = self.poisson_ratio_error;
+                });
             }
             LoadedCalibration::DepthTable(table) => {
                 let contact = DarkContact::new(table, self.pixel_size_m)?;
@@ -141,9 +142,11 @@ impl Scene {
                     .with_surface(DarkContact::depth_table(table)?, SurfaceInput::Signal)
             }
         };
-        let pipeline = pipeline
-            .with_flat_field(self.flat_field)
-            .with_object_errors(self.radius_error_m, self.poisson_ratio_error)?;
+        let pipeline = pipeline.with_settings(|settings| {
+            settings.flat_field = self.flat_field;
+            settings.object_radius_error_m = self.radius_error_m;
+            settings.poisson_ratio_error = self.poisson_ratio_error;
+        })?;
         let guide = guide(&self.layers).map_err(PipelineError::Material)?;
         let pipeline = match (&data.contact_table, self.stages.estimator) {
             (Some(table), EstimatorChoice::Best | EstimatorChoice::TabulatedContact) => {
@@ -166,7 +169,7 @@ impl Scene {
         if self.layers.is_empty() {
             return Ok(pipeline);
         }
-        Ok(pipeline.with_waveguide(guide))
+        pipeline.with_settings(|settings| settings.waveguide = Some(guide))
     }
 
     /// The pipeline's error with the field that it comes from.

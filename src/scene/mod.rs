@@ -59,7 +59,7 @@
 //!                                        # "sphere-between-plates", "tatara-sphere"; "bonded-layer", "cone", "flat-punch"; "least-akaike" of a ball's or a layer's laws
 //! ```
 //!
-//! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`io::image`](crate::io::image)).
+//! Images are PNG, PGM or JPEG; colour becomes grey by the luma of Rec. 601 (see [`read_grey_image`](crate::io::read_grey_image)).
 //! Relative paths are relative to the scene file. Fields counted in errors (`frames[2]`) start at 1.
 mod contact_table;
 mod error;
@@ -71,8 +71,8 @@ mod measure;
 mod stages;
 mod tables;
 
-#[cfg(feature = "fem")]
-pub use contact_table::solve_contact_table;
+#[cfg(feature = "cli")]
+pub(crate) use contact_table::solve_contact_table;
 pub use contact_table::{read_contact_table, write_contact_table};
 pub use error::SceneError;
 pub use load::{LoadedCalibration, SceneData};
@@ -193,7 +193,7 @@ pub struct SceneLayer {
 /// # let folder = tempfile::tempdir()?;
 /// # let indenter = Sphere { radius_m: 60e-3, material: Elastic::RIGID };
 /// # let calibration = CalibrationOptions { steps: 8, indenter, ..CalibrationOptions::default() };
-/// # let path = write_folder(&made, &calibration, folder.path())?;
+/// # let path = write_folder(&made, &made.calibrate(&calibration)?, folder.path())?;
 /// let scene = Scene::read(&path)?; // a CL2000X ball, E = 103 kPa, at 0.7 N and 1.2 N
 /// let data = scene.load()?;
 /// let mut press = scene.press(&scene.pipeline(&data)?, &data)?;

@@ -3,8 +3,8 @@ use super::error::SensorError;
 use super::toml_error;
 use crate::elasticity::contact::{Layer, Waveguide};
 use crate::force::{
-    ContactOptions, DriftCorrection, ForceOptions, LensGeometry, LocalCalibration, NoiseModel,
-    PressureCurve, ShearCalibration,
+    ContactOptions, DriftCorrection, ForceOptions, LensGeometry, NoiseModel, PressureCurve,
+    ShearCalibration,
 };
 use crate::io::read_bytes;
 use crate::pipeline::{LightContact, Object, Pipeline, PipelineError};
@@ -16,18 +16,11 @@ use std::path::Path;
 
 /// Where the camera sees what, and how well that is known.
 ///
-/// ```
-/// use tactile_imaging::force::LensGeometry;
-/// use tactile_imaging::sensor::SensorGeometry;
-/// let geometry = SensorGeometry {
-///     frame_px: [1392, 1042],
-///     lens: LensGeometry::new([21.55e-6; 2])?,
-///     // Both sizes are known to 0.1 %, independently of one another.
-///     covariance: [[4.64e-16, 0.0, 0.0, 0.0], [0.0, 4.64e-16, 0.0, 0.0], [0.0; 4], [0.0; 4]],
-///     target_error: 0.0,
-/// };
-/// assert!((geometry.length_scale_error() / (1e-3 / 2.0_f64.sqrt()) - 1.0).abs() < 1e-3);
-/// # Ok::<(), tactile_imaging::force::ForceError>(())
+/// ```no_run
+/// use tactile_imaging::sensor::{Sensor, SensorGeometry};
+/// let SensorGeometry { lens, covariance, .. } = Sensor::read("sensor.toml")?.geometry;
+/// println!("a pixel is {} ± {} m wide", lens.pixel_size_m()[0], covariance[0][0].sqrt());
+/// # Ok::<(), tactile_imaging::scene::SceneError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -45,7 +38,7 @@ pub struct SensorGeometry {
 impl SensorGeometry {
     /// Relative standard error that all lengths share: that of √(h_x h_y), of the distortion at half the frame's diagonal (ρ² = ¼) and
     /// of the target.
-    pub fn length_scale_error(&self) -> f64 {
+    pub(crate) fn length_scale_error(&self) -> f64 {
         let [hx, hy] = self.lens.pixel_size_m();
         // ln √(h_x h_y (1 + 4 k₁ρ² + 6 k₂ρ⁴)) to first order, at ρ² = ¼.
         let slopes = [0.5 / hx, 0.5 / hy, 0.5, 0.1875];
@@ -62,13 +55,13 @@ impl SensorGeometry {
 /// A calibrated sensor.
 ///
 /// ```no_run
-/// use tactile_imaging::{pipeline::{Object, Pipeline}, sensor::Sensor};
+/// use tactile_imaging::{force::{ForceOptions, LocalCalibration}, pipeline::{Object, Pipeline}, sensor::Sensor};
 /// let sensor = Sensor::read("sensor.toml")?;
-/// let pipeline = sensor.pipeline(Object::sphere(3e-3))?.with_object_errors(5e-6, 0.002)?;
+/// let pipeline = sensor.pipeline(Object::sphere(3e-3))?.with_settings(|settings| settings.object_radius_error_m = 5e-6)?;
 /// // Its parts, for a pipeline that is put together by hand.
-/// let (contact, guide) = (sensor.contact(&Sensor::force_options())?, sensor.waveguide()?);
-/// let by_hand = Pipeline::new(contact, Object::sphere(3e-3))?.with_waveguide(guide);
-/// println!("100 grey levels are {} Pa", sensor.pressure_pa(100.0));
+/// let (contact, guide) = (sensor.contact(&ForceOptions::default())?, sensor.waveguide()?);
+/// let by_hand = Pipeline::new(contact, Object::sphere(3e-3))?.with_settings(|settings| settings.waveguide = Some(guide))?;
+/// println!("100 grey levels are {} Pa", sensor.curve.pressure_pa(100.0));
 /// sensor.write("copy.toml")?;
 /// # let _ = (pipeline, by_hand);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -77,9 +70,14 @@ impl SensorGeometry {
 /// A file that cannot be used is refused in one sentence:
 ///
 /// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use tactile_imaging::sensor::Sensor;
-/// let error = Sensor::parse("date = \"2026-11-22\"\nflat_field = 3\n", "sensor.toml").unwrap_err();
-/// assert!(error.to_string().starts_with("sensor.toml: field `flat_field`: invalid type: integer `3`, expected"));
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("sensor.toml");
+/// std::fs::write(&path, "date = \"2026-11-22\"\nflat_field = 3\n")?;
+/// let error = Sensor::read(&path).unwrap_err();
+/// assert!(error.to_string().contains("sensor.toml: field `flat_field`: invalid type: integer `3`, expected"));
+/// # Ok(()) }
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -125,7 +123,7 @@ impl Sensor {
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
+    fn parse(text: &str, file: impl AsRef<Path>) -> Result<Self, SceneError> {
         let file = file.as_ref();
         let sensor: Self =
             toml::from_str(text).map_err(|error| toml_error::sentence(file, text, &error))?;
@@ -165,7 +163,7 @@ impl Sensor {
     }
 
     /// The options that contacts are found with: changes of the illumination are divided out where they can be told.
-    pub fn force_options() -> ForceOptions {
+    pub(crate) fn force_options() -> ForceOptions {
         let contact = ContactOptions::default().with_drift(DriftCorrection::Automatic);
         ForceOptions::default().with_contact(contact)
     }
@@ -192,26 +190,21 @@ impl Sensor {
 
     /// A pipeline with this sensor's layers, flat field and errors.
     pub(crate) fn configured(&self, pipeline: Pipeline) -> Result<Pipeline, PipelineError> {
-        let pipeline = pipeline
-            .with_flat_field(self.flat_field)
-            .with_scale_errors(self.gauge_error, self.geometry.length_scale_error())?;
-        if self.layers.is_empty() {
-            return Ok(pipeline);
-        }
-        let pipeline = pipeline.with_waveguide(self.waveguide()?);
-        if self.layer_covariance.is_empty() {
-            return Ok(pipeline);
-        }
+        let guide = (!self.layers.is_empty())
+            .then(|| self.waveguide())
+            .transpose()?;
         let n = self.layer_covariance.len();
-        let covariance = DMatrix::from_fn(n, n, |i, j| {
-            self.layer_covariance[i].get(j).copied().unwrap_or(f64::NAN)
-        });
-        pipeline.with_layer_covariance(covariance)
-    }
-
-    /// Pressure in pascals of a grey-level difference, and its standard error.
-    pub fn pressure_pa(&self, grey: f64) -> crate::force::Estimate<f64> {
-        self.curve.pressure_pa(grey)
+        let entry = |i: usize, j: usize| self.layer_covariance[i].get(j).copied();
+        let covariance = DMatrix::from_fn(n, n, |i, j| entry(i, j).unwrap_or(f64::NAN));
+        pipeline.with_settings(|settings| {
+            settings.flat_field = self.flat_field;
+            settings.force_scale_error = self.gauge_error;
+            settings.length_scale_error = self.geometry.length_scale_error();
+            if guide.is_some() {
+                settings.waveguide = guide;
+                settings.layer_covariance = (n > 0).then_some(covariance);
+            }
+        })
     }
 
     fn check(&self, file: &Path) -> Result<(), SceneError> {

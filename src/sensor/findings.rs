@@ -43,8 +43,9 @@ pub struct PressFinding {
 ///     parameter: "youngs_modulus_pa",
 ///     stated: Estimate { value: 120e3, standard_error: 15e3 },
 ///     fitted: Estimate { value: 135e3, standard_error: 3e3 },
+///     identified: true,
 /// };
-/// assert!(modulus.is_identified());
+/// assert!(modulus.fitted.standard_error < 0.7 * modulus.stated.standard_error);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerFinding {
@@ -56,13 +57,8 @@ pub struct LayerFinding {
     pub stated: Estimate<f64>,
     /// What the presses and the statement say together.
     pub fitted: Estimate<f64>,
-}
-
-impl LayerFinding {
     /// Whether the presses told of it: its error fell below 0.7 times the stated one. What was not identified is the statement.
-    pub fn is_identified(&self) -> bool {
-        self.fitted.standard_error < 0.7 * self.stated.standard_error
-    }
+    pub identified: bool,
 }
 
 /// A calibrated sensor and how it was found; made by [`SensorCalibration::run`](super::SensorCalibration::run).
@@ -71,7 +67,7 @@ impl LayerFinding {
 /// use tactile_imaging::sensor::{CalibratedSensor, SensorCalibration};
 /// let found: CalibratedSensor = SensorCalibration::read("calibration.toml")?.run()?;
 /// println!("{} of {} layers' parameters were identified",
-///     found.layers.iter().filter(|layer| layer.is_identified()).count(), found.layers.len());
+///     found.layers.iter().filter(|layer| layer.identified).count(), found.layers.len());
 /// # Ok::<(), tactile_imaging::sensor::SensorError>(())
 /// ```
 #[derive(Clone, Debug)]

@@ -43,4 +43,3 @@ pub use error::SensorError;
 pub use file::{Sensor, SensorGeometry};
 pub use findings::{CalibratedSensor, LayerFinding, PressFinding};
 pub use input::{Indenter, LayerInput};
-pub use target::find_dots;

@@ -16,26 +16,12 @@ const CAPTURE: f64 = 0.25;
 /// touch the edge left out, and their centres weighted with the level. The grid is followed from dot to dot out of the middle, each
 /// next place from its neighbours', so that distortion does no harm. O(pixels).
 ///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_imaging::sensor::find_dots;
-/// // Dots of 6 px, 20 px apart, dark on bright.
-/// let target = Array2::from_shape_fn((200, 300), |(r, c)| {
-///     let near = |v: usize| (v as f64 - 10.0).rem_euclid(20.0).min(20.0 - (v as f64 - 10.0).rem_euclid(20.0));
-///     if near(r).hypot(near(c)) < 6.0 { 40 } else { 200 }
-/// });
-/// let dots = find_dots(target.view(), 1e-3)?;
-/// assert_eq!(dots.len(), 10 * 15);
-/// let (first, second) = (dots[0], dots[1]);
-/// let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-/// assert!((apart(first.pixel, second.pixel) - 20.0).abs() < 1e-6);
-/// assert!((apart(first.target_m, second.target_m) - 1e-3).abs() < 1e-12);
-/// # Ok::<(), tactile_imaging::sensor::SensorError>(())
-/// ```
-///
 /// # Errors
 /// [`SensorError::Target`] for fewer than twenty dots on the grid.
-pub fn find_dots(frame: ArrayView2<'_, u8>, pitch_m: f64) -> Result<Vec<DotPair>, SensorError> {
+pub(super) fn find_dots(
+    frame: ArrayView2<'_, u8>,
+    pitch_m: f64,
+) -> Result<Vec<DotPair>, SensorError> {
     let dots = centres(frame);
     let placed = on_grid(&dots, frame.dim());
     if placed.len() < FEWEST_DOTS {
@@ -178,4 +164,32 @@ fn nearest(dots: &[[f64; 2]], place: [f64; 2], within: f64) -> Option<usize> {
         .enumerate()
         .min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
     (distance(dot) <= within).then_some(k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    #[test]
+    fn dots_are_paired_with_their_places_on_the_grid() {
+        // Dots of 6 px, 20 px apart, dark on bright.
+        let near = |v: usize| {
+            let past = (v as f64 - 10.0).rem_euclid(20.0);
+            past.min(20.0 - past)
+        };
+        let target = Array2::from_shape_fn((200, 300), |(r, c)| {
+            if near(r).hypot(near(c)) < 6.0 {
+                40
+            } else {
+                200
+            }
+        });
+        let dots = find_dots(target.view(), 1e-3).unwrap();
+        assert_eq!(dots.len(), 10 * 15);
+        let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        // The dots are symmetric: rounding alone moves their centres.
+        assert!((apart(dots[0].pixel, dots[1].pixel) - 20.0).abs() < 1e-6);
+        assert!((apart(dots[0].target_m, dots[1].target_m) - 1e-3).abs() < 1e-12);
+    }
 }

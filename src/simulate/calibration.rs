@@ -3,6 +3,8 @@
 use ndarray::Array2;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::force::{Branch, CalibrationPair};
+
 use super::contact_law::ContactLaw;
 use super::error::{SimulateError, not_negative, positive, within};
 use super::light::Illumination;
@@ -18,7 +20,7 @@ use super::random::{Purpose, row_stream};
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let options = CalibrationOptions { largest_force_n: 1.0, steps: 4, ..CalibrationOptions::default() };
-/// let forces: Vec<_> = scene.calibrate(&options)?.points.iter().map(|p| p.true_force_n).collect();
+/// let forces = scene.calibrate(&options)?.true_forces_n;
 /// assert_eq!(forces, [0.0, 0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0]);
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
@@ -55,54 +57,6 @@ impl Default for CalibrationOptions {
     }
 }
 
-/// Whether the force was rising or falling.
-///
-/// ```
-/// use tactile_imaging::simulate::{Branch, CalibrationOptions, Camera, PressOptions, PressScene};
-/// let camera = Camera::default().coarser(16);
-/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// let options = CalibrationOptions { steps: 2, hysteresis: 0.1, ..CalibrationOptions::default() };
-/// let series = scene.calibrate(&options)?;
-/// let half = |branch| series.points.iter().find(|p| p.branch == branch && p.true_force_n == 1.0);
-/// let [up, down] = [Branch::Loading, Branch::Unloading].map(|b| half(b).map_or(0.0, |p| p.integrated_pixel_value));
-/// assert!((down / up - 1.2).abs() < 0.02, "a tenth of the range of 2 N more light on the way back");
-/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Branch {
-    /// Rising force.
-    Loading,
-    /// Falling force.
-    Unloading,
-}
-
-/// One reading of camera and gauge.
-///
-/// ```
-/// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
-/// let camera = Camera::default().coarser(16);
-/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// let options = CalibrationOptions { steps: 4, gauge_noise_n: 2e-3, ..CalibrationOptions::default() };
-/// for point in scene.calibrate(&options)?.points {
-///     let error_n = point.force_n - point.true_force_n;
-///     assert!(error_n != 0.0 && error_n.abs() < 5.0 * 2e-3, "the gauge's noise");
-/// }
-/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct CalibrationPoint {
-    /// Rising or falling.
-    pub branch: Branch,
-    /// Sum over the pixels of frame minus reference, in 8-bit grey levels.
-    pub integrated_pixel_value: f64,
-    /// The gauge's reading in newton, with its noise.
-    pub force_n: f64,
-    /// The force itself.
-    pub true_force_n: f64,
-}
-
 /// A whole calibration.
 ///
 /// ```
@@ -110,7 +64,7 @@ pub struct CalibrationPoint {
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
-/// let (light, force) = series.pairs().fold((0.0, 0.0), |sum, (v, f)| (sum.0 + v, sum.1 + f));
+/// let (light, force) = series.pairs.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.integrated_pixel_value, sum.1 + p.force_n));
 /// let lens = 1.0 - camera.vignetting; // the most that the corners lose
 /// let slope = force / light / series.newton_per_grey;
 /// assert!((0.99..1.01 / lens).contains(&slope));
@@ -119,19 +73,13 @@ pub struct CalibrationPoint {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CalibrationSeries {
-    /// Readings in the order they were taken.
-    pub points: Vec<CalibrationPoint>,
+    /// Sum over the pixels of frame minus reference in 8-bit grey levels, and the gauge's reading with its noise, in the order they were taken: up
+    /// and down again.
+    pub pairs: Vec<CalibrationPair<f64>>,
+    /// The force itself of every pair, in newton.
+    pub true_forces_n: Vec<f64>,
     /// Force over integrated pixel value in newton, without noise: exact for a linear response.
     pub newton_per_grey: f64,
-}
-
-impl CalibrationSeries {
-    /// (integrated pixel value, gauge force) of every reading.
-    pub fn pairs(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        self.points
-            .iter()
-            .map(|p| (p.integrated_pixel_value, p.force_n))
-    }
 }
 
 /// The camera's largest grey level.
@@ -145,15 +93,12 @@ impl PressScene {
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// use tactile_imaging::Pipeline;
-    /// use tactile_imaging::force::CalibrationPair;
-    /// use tactile_imaging::pipeline::{LightContact, Object};
+    /// use tactile_imaging::{Object, Pipeline};
     /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
     /// let camera = Camera::default().coarser(16);
     /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
     /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
-    /// let pairs: Vec<_> = series.pairs().map(|(light, force)| CalibrationPair::loading(light, force)).collect();
-    /// let pipeline = Pipeline::new(LightContact::from_pairs(&pairs, camera.pixel_size_m)?, Object::sphere(3e-3))?;
+    /// let pipeline = Pipeline::from_pairs(&series.pairs, camera.pixel_size_m, Object::sphere(3e-3))?;
     /// let (reference, frame) = (scene.reference(0), scene.frame(0, 0));
     /// let mut press = pipeline.press(reference.view())?;
     /// press.add_frame(frame.view());
@@ -178,7 +123,8 @@ impl PressScene {
         };
         let reference = exposure(dark.view(), 0);
         let mut gauge = row_stream(seed, Purpose::Gauge, 0, 0);
-        let mut points = Vec::with_capacity(2 * options.steps + 1);
+        let mut pairs = Vec::with_capacity(2 * options.steps + 1);
+        let mut true_forces_n = Vec::with_capacity(2 * options.steps + 1);
         for (k, (branch, true_force_n)) in options.forces().enumerate() {
             let lit = options.lit_force_n(branch, true_force_n);
             let light = self.calibration_light(options.indenter, lit)?;
@@ -189,15 +135,16 @@ impl PressScene {
             let sum = exposure(light.view(), k + 1);
             let normal: f64 = StandardNormal.sample(&mut gauge);
             let force_n = true_force_n + options.gauge_noise_n * normal;
-            points.push(CalibrationPoint {
-                branch,
+            pairs.push(CalibrationPair {
                 integrated_pixel_value: sum - reference,
                 force_n,
-                true_force_n,
+                branch,
             });
+            true_forces_n.push(true_force_n);
         }
         Ok(CalibrationSeries {
-            points,
+            pairs,
+            true_forces_n,
             newton_per_grey: camera.pixel_area_m2() / self.grey_per_pascal(),
         })
     }

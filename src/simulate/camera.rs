@@ -27,9 +27,8 @@ struct NoiseLaw {
 /// ```
 /// use tactile_imaging::simulate::Camera;
 /// let camera = Camera { shape: [200, 300], ..Camera::default() };
-/// assert!((camera.pixel_area_m2() - 4.644e-10).abs() < 1e-13, "21.55 µm square");
-/// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5.
-/// assert!((camera.noise_sd_grey(200.0) - 1.911).abs() < 1e-3);
+/// assert!((camera.pixel_size_m[0] - 21.55e-6).abs() < 1e-8);
+/// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5, rounding; together 1.93.
 /// let light = ndarray::Array2::from_elem((200, 300), 200.0);
 /// let mean = |camera: Camera| camera.expose(light.view(), 1, 0).mapv(f64::from).mean();
 /// assert_eq!(mean(camera.ideal()), Some(200.0));
@@ -104,13 +103,8 @@ impl Camera {
         }
     }
 
-    /// Standard deviation of the noise, before rounding, of a pixel with `grey` expected grey levels.
-    pub fn noise_sd_grey(&self, grey: f64) -> f64 {
-        (grey / self.electrons_per_grey() + self.read_noise_grey * self.read_noise_grey).sqrt()
-    }
-
     /// Area of a pixel on the sensing surface in square metres.
-    pub fn pixel_area_m2(&self) -> f64 {
+    pub(super) fn pixel_area_m2(&self) -> f64 {
         self.pixel_size_m[0] * self.pixel_size_m[1]
     }
 

@@ -20,6 +20,9 @@ use super::material::{Sphere, Waveguide};
 /// assert_eq!(hertz.indentation_m, hertz.contact_radius_m.powi(2) / hertz.sphere_radius_m);
 /// assert_eq!(tatara.contact_radius_m, hertz.contact_radius_m);
 /// assert!(tatara.indentation_m < hertz.indentation_m);
+/// // 0.7 N: a/R is 0.92. Springs in series make the layers too soft.
+/// let solved = contact(ContactLaw::FiniteElements)?;
+/// assert!((solved.contact_radius_m / 2.75e-3 - 1.0).abs() < 0.01 && hertz.contact_radius_m > 1.15 * solved.contact_radius_m);
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]

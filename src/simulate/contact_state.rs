@@ -38,7 +38,7 @@ pub(super) const EQUAL_FORCES: f64 = 1e-9;
 ///     ..PressOptions::default()
 /// };
 /// let truth = PressScene::new(options)?.truth(1);
-/// let force_n = truth.pressure_pa().sum() * camera.pixel_area_m2();
+/// let force_n = truth.pressure_pa().sum() * camera.pixel_size_m.iter().product::<f64>();
 /// assert!((force_n / 1.2 - 1.0).abs() < 2e-3, "{force_n}");
 /// let [middle, off] = [truth.contact.pressure_pa(0.0), truth.contact.pressure_pa(1.5e-3)];
 /// assert!((off / middle - 1.0).abs() < 1e-12, "level in the middle");

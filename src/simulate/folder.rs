@@ -2,54 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use image::{ImageBuffer, Luma};
-use ndarray::ArrayView2;
 use toml::{Table, Value};
 
-use super::calibration::CalibrationOptions;
+use super::calibration::CalibrationSeries;
 use super::contact_law::ContactLaw;
-use super::error::SimulateError;
 use super::press::PressScene;
+use crate::io::{ReadError, write_bytes, write_grey_image};
 
-/// A scene could not be written.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use tactile_imaging::simulate::{CalibrationOptions, Camera, FolderError, PressOptions, PressScene, write_folder};
-/// let camera = Camera::default().coarser(16);
-/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
-/// let (file, few) = (tempfile::NamedTempFile::new()?, CalibrationOptions { steps: 1, ..Default::default() });
-/// assert!(matches!(write_folder(&scene, &few, file.path()), Err(FolderError::Write { .. })), "not a folder");
-/// let none = CalibrationOptions { steps: 0, ..few };
-/// let error = write_folder(&scene, &none, file.path()).unwrap_err();
-/// assert!(matches!(error, FolderError::Calibration(_)) && error.to_string().starts_with("steps is 0"));
-/// # Ok(()) }
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FolderError {
-    /// A file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// An image could not be encoded.
-    #[error("cannot write the image {}: {source}", path.display())]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: image::ImageError,
-    },
-    /// The calibration's options have no meaning.
-    #[error(transparent)]
-    Calibration(#[from] SimulateError),
-}
-
-/// Writes `reference.png`, `frame_1.png` …, `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml`
+/// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …, `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml`
 /// to `folder`, which is made if need be. Returns the path of `scene.toml`.
 ///
 /// ```
@@ -59,7 +19,7 @@ pub enum FolderError {
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let folder = tempfile::tempdir()?;
-/// let calibration = CalibrationOptions { steps: 4, ..CalibrationOptions::default() };
+/// let calibration = scene.calibrate(&CalibrationOptions { steps: 4, ..CalibrationOptions::default() })?;
 /// let path = write_folder(&scene, &calibration, folder.path())?;
 /// let (read, data) = (Scene::read(&path)?, Scene::read(&path)?.load()?);
 /// assert_eq!(read.frames[1].force_n, Some(1.2));
@@ -68,48 +28,28 @@ pub enum FolderError {
 /// ```
 ///
 /// # Errors
-/// [`FolderError`] naming the file that could not be written.
+/// [`ReadError::Write`] and [`ReadError::Image`], naming the file that could not be written.
 pub fn write_folder(
     scene: &PressScene,
-    calibration: &CalibrationOptions,
+    calibration: &CalibrationSeries,
     folder: &Path,
-) -> Result<PathBuf, FolderError> {
-    let series = scene.calibrate(calibration)?;
-    std::fs::create_dir_all(folder).map_err(|source| FolderError::Write {
-        path: folder.into(),
-        source,
-    })?;
+) -> Result<PathBuf, ReadError> {
     let made = scene.simulate();
-    write_image(&folder.join("reference.png"), made.reference.view())?;
+    write_grey_image(folder.join("reference.png"), made.reference.view())?;
     for (k, frame) in made.frames.iter().enumerate() {
-        write_image(&folder.join(format!("frame_{}.png", k + 1)), frame.view())?;
+        write_grey_image(folder.join(format!("frame_{}.png", k + 1)), frame.view())?;
     }
     let mut table = String::from("integrated_pixel_value,force_N\n");
-    for (value, force) in series.pairs() {
-        table.push_str(&format!("{value},{force}\n"));
+    for pair in &calibration.pairs {
+        table.push_str(&format!(
+            "{},{}\n",
+            pair.integrated_pixel_value, pair.force_n
+        ));
     }
-    write_text(&folder.join("calibration.csv"), &table)?;
+    write_bytes(&folder.join("calibration.csv"), table.as_bytes())?;
     let path = folder.join("scene.toml");
-    write_text(&path, &description(scene).to_string())?;
+    write_bytes(&path, description(scene).to_string().as_bytes())?;
     Ok(path)
-}
-
-fn write_text(path: &Path, text: &str) -> Result<(), FolderError> {
-    std::fs::write(path, text).map_err(|source| FolderError::Write {
-        path: path.into(),
-        source,
-    })
-}
-
-fn write_image(path: &Path, frame: ArrayView2<'_, u8>) -> Result<(), FolderError> {
-    let (rows, cols) = frame.dim();
-    let image = ImageBuffer::from_fn(cols as u32, rows as u32, |x, y| {
-        Luma([frame[[y as usize, x as usize]]])
-    });
-    image.save(path).map_err(|source| FolderError::Image {
-        path: path.into(),
-        source,
-    })
 }
 
 /// The scene's description as the command line reads it.

@@ -5,13 +5,16 @@ use super::error::{SimulateError, at_least, positive, within};
 /// A linear elastic, isotropic material.
 ///
 /// ```
-/// use tactile_imaging::simulate::{Elastic, PressOptions, PressScene, Waveguide};
-/// assert_eq!(Elastic::CL2000X.plane_strain_compliance(), 0.75 / 103e3);
-/// assert_eq!(Elastic::RIGID.plane_strain_compliance(), 0.0);
-/// let contact = PressScene::new(PressOptions::default())?.truth(0).contact;
-/// let waveguide = Waveguide::default().series();
-/// let sum = Elastic::CL2000X.plane_strain_compliance() + waveguide.plane_strain_compliance();
-/// assert!((contact.effective_modulus_pa * sum - 1.0).abs() < 1e-12, "1/E* of both bodies");
+/// use tactile_imaging::simulate::{Elastic, PressOptions, PressScene, Sphere};
+/// let contact = |material| {
+///     let object = Sphere { radius_m: 3e-3, material };
+///     let scene = PressScene::new(PressOptions { object, ..PressOptions::default() })?;
+///     Ok::<_, tactile_imaging::simulate::SimulateError>(scene.truth(0).contact)
+/// };
+/// // 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂; the second of the guide's layers in series.
+/// let [soft, rigid] = [contact(Elastic::CL2000X)?, contact(Elastic::RIGID)?];
+/// let of_the_ball = 1.0 / soft.effective_modulus_pa - 1.0 / rigid.effective_modulus_pa;
+/// assert!((of_the_ball / (0.75 / 103e3) - 1.0).abs() < 1e-12);
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +44,7 @@ impl Elastic {
     };
 
     /// (1 − ν²)/E in 1/Pa: what the body adds to 1/E*. Zero for a rigid body.
-    pub fn plane_strain_compliance(&self) -> f64 {
+    pub(super) fn plane_strain_compliance(&self) -> f64 {
         (1.0 - self.poisson_ratio) * (1.0 + self.poisson_ratio) / self.youngs_modulus_pa
     }
 
@@ -92,14 +95,19 @@ impl Sphere {
 /// One layer of the waveguide.
 ///
 /// ```
-/// use tactile_imaging::simulate::{Elastic, Waveguide, WaveguideLayer};
+/// use tactile_imaging::simulate::{Elastic, PressOptions, PressScene, Waveguide, WaveguideLayer};
 /// let layer = |thickness_m, youngs_modulus_pa| WaveguideLayer {
 ///     refractive_index: 1.41,
 ///     thickness_m,
 ///     material: Elastic { youngs_modulus_pa, poisson_ratio: 0.5 },
 /// };
 /// let waveguide = Waveguide { layers: vec![layer(1e-3, 200e3), layer(3e-3, 100e3)] };
-/// assert!((waveguide.series().youngs_modulus_pa - 4e-3 / (1e-3 / 200e3 + 3e-3 / 100e3)).abs() < 1e-6);
+/// let radius = |waveguide| {
+///     let scene = PressScene::new(PressOptions { waveguide, ..PressOptions::default() })?;
+///     Ok::<_, tactile_imaging::simulate::SimulateError>(scene.truth(0).contact.contact_radius_m)
+/// };
+/// assert!(radius(waveguide)? < radius(Waveguide::default())?, "stiffer layers, a smaller contact");
+/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -146,12 +154,7 @@ impl Default for Waveguide {
 impl Waveguide {
     /// The stack seen as one material: the layers in series, E = Σh / Σ(h/E), and Poisson's ratio averaged by
     /// thickness (0.5 for the paper's stack).
-    ///
-    /// ```
-    /// let e = tactile_imaging::simulate::Waveguide::default().series().youngs_modulus_pa;
-    /// assert!((e - 50184.5).abs() < 0.1);
-    /// ```
-    pub fn series(&self) -> Elastic {
+    pub(super) fn series(&self) -> Elastic {
         let height = self.thickness_m();
         let compliance: f64 = self
             .layers

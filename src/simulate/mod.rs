@@ -16,7 +16,6 @@
 //! | [`calibration`](CalibrationSeries) | light against gauge force, loading and unloading |
 //! | [`stream`](FrameStream) | frames of loading cycles at camera rate, with drifting illumination |
 //! | [`uniaxial`](UniaxialScene) | a patterned block squeezed between plates: stress over strain is the modulus exactly |
-//! | [`hostile`](Hostile) | scenes on which a measurement must end with a flag or an error |
 //! | `folder` | a scene written as files (feature `scene`) |
 //!
 //! # Conventions
@@ -43,7 +42,6 @@ mod error;
 mod finite_elements;
 #[cfg(feature = "scene")]
 mod folder;
-mod hostile;
 mod leak;
 mod light;
 mod material;
@@ -61,15 +59,14 @@ mod uniaxial;
 mod uniaxial_options;
 mod uniaxial_state;
 
-pub use calibration::{Branch, CalibrationOptions, CalibrationPoint, CalibrationSeries};
+pub use calibration::{CalibrationOptions, CalibrationSeries};
 pub use camera::Camera;
 pub use contact::Contact;
 pub use contact_law::ContactLaw;
 pub use contact_state::ContactState;
 pub use error::SimulateError;
 #[cfg(feature = "scene")]
-pub use folder::{FolderError, write_folder};
-pub use hostile::Hostile;
+pub use folder::write_folder;
 pub use light::{Illumination, Response};
 pub use material::{Elastic, Sphere, Waveguide, WaveguideLayer};
 pub use press::PressScene;
@@ -80,4 +77,4 @@ pub use stream::{FrameStream, LoadCycle, StreamedFrame};
 pub use truth::{PressTruth, SurfaceScaling};
 pub use uniaxial::UniaxialScene;
 pub use uniaxial_options::UniaxialOptions;
-pub use uniaxial_state::{UniaxialIncrement, UniaxialState};
+pub use uniaxial_state::UniaxialState;

@@ -16,11 +16,14 @@ use super::press_options::Load;
 /// let camera = Camera::default().coarser(16);
 /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
 /// let (truth, later) = (scene.truth(0), scene.truth(1));
-/// assert!((truth.pressure_pa().sum() * camera.pixel_area_m2() - 0.7).abs() < 1e-9, "the force");
+/// assert!((truth.pressure_pa().sum() * camera.pixel_size_m.iter().product::<f64>() - 0.7).abs() < 1e-9, "the force");
 /// let middle = [32, 43];
 /// assert_eq!(truth.apparent_height_m()[middle], truth.contact.contact_radius_m);
 /// assert!(later.waveguide_height_m()[middle] < truth.waveguide_height_m()[middle], "pressed deeper");
-/// assert_eq!(truth.centre_m(), later.centre_m());
+/// assert_eq!(truth.centre_px, later.centre_px);
+/// // The light above the background, over the grey levels of a pascal, times the area of a pixel: 0.7 N.
+/// let seen_n = truth.integrated_pixel_value / truth.grey_per_pascal * camera.pixel_size_m.iter().product::<f64>();
+/// assert!((seen_n / 0.7 - 1.0).abs() < 1e-9);
 /// assert!((truth.scaling_to(&later).scale - (1.2_f64 / 0.7).cbrt()).abs() < 1e-12);
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
@@ -117,7 +120,7 @@ impl PressTruth {
     }
 
     /// The contact's centre (x, y) in metres from the first pixel's centre.
-    pub fn centre_m(&self) -> [f64; 2] {
+    pub(crate) fn centre_m(&self) -> [f64; 2] {
         std::array::from_fn(|k| self.centre_px[k] * self.pixel_size_m[k])
     }
 

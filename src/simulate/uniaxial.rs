@@ -22,7 +22,7 @@ use super::light::Illumination;
 use super::pixel_average::{Patch, touched};
 use super::relief::{FaceOutline, Relief};
 use super::uniaxial_options::UniaxialOptions;
-use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
+use super::uniaxial_state::UniaxialState;
 
 /// A checked scene of uniaxial compression.
 ///
@@ -31,8 +31,10 @@ use super::uniaxial_state::{UniaxialIncrement, UniaxialState};
 ///
 /// let camera = Camera::default().coarser(4);
 /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
-/// let step = scene.increment(0, 1);
-/// assert!((step.stress_zz_pa / step.strain_zz / 103e3 - 1.0).abs() < 1e-12);
+/// let [first, second] = [scene.states()[0], scene.states()[1]];
+/// // Counted from the first state, both are less by it, over λ₁².
+/// let (stress, strain) = (second.second_piola_zz_pa - first.second_piola_zz_pa, second.strain_zz - first.strain_zz);
+/// assert!((stress / strain / 103e3 - 1.0).abs() < 1e-12);
 /// let frame = scene.frame(1, 0);
 /// assert_eq!(frame.dim(), (260, 348));
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
@@ -92,14 +94,6 @@ impl UniaxialScene {
         &self.states
     }
 
-    /// Strain and stress from state `from` to state `to`.
-    ///
-    /// # Panics
-    /// If there is no such state.
-    pub fn increment(&self, from: usize, to: usize) -> UniaxialIncrement {
-        UniaxialIncrement::between(&self.states[from], &self.states[to])
-    }
-
     /// An exposure without contact; each `repeat` has its own noise.
     pub fn reference(&self, repeat: u32) -> Array2<u8> {
         self.options
@@ -125,9 +119,9 @@ impl UniaxialScene {
     /// let camera = Camera::default().coarser(16).ideal();
     /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;
     /// let (light, dark) = (scene.expected_frame(1), scene.reference(0).mapv(f64::from));
-    /// let seen_n = (&light - &dark).sum() / scene.grey_per_pascal() * camera.pixel_area_m2();
+    /// let seen_n = (&light - &dark).sum() / scene.grey_per_pascal() * camera.pixel_size_m.iter().product::<f64>();
     /// assert!((seen_n - scene.options().forces_n[1]).abs() < 1e-9);
-    /// assert!((scene.pressure_pa(1).sum() * camera.pixel_area_m2() - 0.7).abs() < 1e-9);
+    /// assert!((scene.pressure_pa(1).sum() * camera.pixel_size_m.iter().product::<f64>() - 0.7).abs() < 1e-9);
     /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
     /// ```
     ///

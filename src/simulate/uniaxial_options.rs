@@ -17,8 +17,8 @@ use super::relief::{FaceOutline, SurfacePattern};
 ///     camera: Camera::default().coarser(16),
 ///     ..UniaxialOptions::default()
 /// };
-/// let step = UniaxialScene::new(options)?.increment(0, 1);
-/// assert!((step.stress_zz_pa / step.strain_zz - 62e3).abs() < 1e-6, "Young's modulus");
+/// let state = UniaxialScene::new(options)?.states()[1];
+/// assert!((state.second_piola_zz_pa / state.strain_zz - 62e3).abs() < 1e-6, "Young's modulus");
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,6 @@
 //! Stretch, strain and stress of the squeezed block in closed form; the equations are in [`uniaxial`](super::uniaxial).
 use super::error::SimulateError;
 use super::material::Elastic;
-use nalgebra::Matrix3;
 
 /// Stretch, strain and stress at one force. Compression is negative.
 ///
@@ -34,29 +33,6 @@ pub struct UniaxialState {
     pub area_m2: f64,
 }
 
-/// From one state to another, the first being the reference.
-///
-/// ```
-/// use nalgebra::Matrix3;
-/// use tactile_imaging::simulate::{UniaxialOptions, UniaxialScene};
-/// let scene = UniaxialScene::new(UniaxialOptions::default())?;
-/// let step = scene.increment(0, 2);
-/// let f = step.displacement_gradient + Matrix3::identity();
-/// let strain = 0.5 * (f.transpose() * f - Matrix3::identity());
-/// assert!((strain[(2, 2)] - step.strain_zz).abs() < 1e-12, "e = ½(FᵀF − I)");
-/// assert!((step.stress_zz_pa / step.strain_zz / 103e3 - 1.0).abs() < 1e-12);
-/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UniaxialIncrement {
-    /// F₁₂ − I, the displacement gradient.
-    pub displacement_gradient: Matrix3<f64>,
-    /// Green–Lagrange strain e₁₂ in zz.
-    pub strain_zz: f64,
-    /// S₁₂ in pascal: over `strain_zz` it is Young's modulus exactly.
-    pub stress_zz_pa: f64,
-}
-
 impl UniaxialState {
     pub(super) fn new(
         material: &Elastic,
@@ -87,18 +63,5 @@ impl UniaxialState {
             cauchy_zz_pa: -force_n / area_m2,
             area_m2,
         })
-    }
-}
-
-impl UniaxialIncrement {
-    pub(super) fn between(a: &UniaxialState, b: &UniaxialState) -> Self {
-        let square = a.stretch_z * a.stretch_z;
-        let lateral = b.stretch_lateral / a.stretch_lateral - 1.0;
-        let axial = b.stretch_z / a.stretch_z - 1.0;
-        Self {
-            displacement_gradient: Matrix3::from_diagonal(&[lateral, lateral, axial].into()),
-            strain_zz: (b.strain_zz - a.strain_zz) / square,
-            stress_zz_pa: (b.second_piola_zz_pa - a.second_piola_zz_pa) / square,
-        }
     }
 }

@@ -4,7 +4,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use tactile_imaging::io::{read_grey_image, write_grey_image};
+use tactile_imaging::io::{Grey, read_grey_image, write_grey_image};
 
 /// The frames of the examples' press: without contact, at the lower and at the higher load.
 const REFERENCE: &str = "examples/data/press/reference.png";
@@ -87,7 +87,7 @@ fn a_sample_too_stiff_to_measure_has_a_bound_or_a_reason() {
 fn thousands_of_frames_are_one_measurement() {
     const FRAMES: usize = 1_000;
     let folder = folder_with_examples();
-    let read = |path| read_grey_image(folder.path().join(path)).unwrap();
+    let read = |path| read_grey_image(folder.path().join(path), Grey::default(), None).unwrap();
     let pressed = [LOWER, HIGHER].map(|path| read(path).to_u8());
     let names: Vec<String> = (0..FRAMES).map(|k| format!("{k}.pgm")).collect();
     for (k, name) in names.iter().enumerate() {

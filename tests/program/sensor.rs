@@ -2,6 +2,7 @@
 use super::harness::{run, text, words};
 use std::fs;
 use std::path::Path;
+use tactile_imaging::force::LocalCalibration;
 use tactile_imaging::sensor::Sensor;
 use tempfile::TempDir;
 
@@ -44,7 +45,7 @@ fn a_calibration_writes_a_sensor_and_a_report_and_says_what_was_learned() {
     let sensor = Sensor::read(folder.path().join("made/sensor.toml")).unwrap();
     assert_eq!(sensor.layers[0].youngs_modulus_pa, fitted);
     // 0.012 grey levels a pascal, to the error that the curve states.
-    let pressure = sensor.pressure_pa(120.0);
+    let pressure = sensor.curve.pressure_pa(120.0);
     assert!((pressure.value - 1e4).abs() < 4.0 * pressure.standard_error.max(25.0));
     let report = fs::read_to_string(folder.path().join("made/sensor.svg")).unwrap();
     assert!(report.contains("not identified, stays as stated"));

@@ -11,8 +11,8 @@ use tactile_imaging::elasticity::modulus::{HertzSphere, ModulusEstimate, Tabulat
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Object, Pipeline, Trial};
 use tactile_imaging::simulate::{
-    CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, PressScene,
-    Sphere, Waveguide, WaveguideLayer,
+    CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, Sphere,
+    Waveguide, WaveguideLayer,
 };
 
 struct Ball {
@@ -142,13 +142,10 @@ impl Ball {
             gauge_noise_n: 1e-3 * pair[1].force_n,
             ..CalibrationOptions::default()
         };
-        // A soft ball's gain is high.
-        let scene = PressScene::new(options.clone()).unwrap();
-        let calibration = scene.unsaturated(calibration).unwrap();
         let trial = Trial::new(options, &calibration).unwrap();
         let size = trial.simulation.pixel_size_m;
         // The rigid ball that calibrates leaves no contact on a rigid flat: there the light of a pascal is given.
-        let grey_per_newton = trial.scene.grey_per_pascal() / (size[0] * size[1]);
+        let grey_per_newton = trial.scene.truth(0).grey_per_pascal / (size[0] * size[1]);
         let known = |k: u8| {
             let force_n = 0.15 * f64::from(k) * pair[1].force_n;
             CalibrationPair::loading(grey_per_newton * force_n, force_n)
@@ -161,7 +158,9 @@ impl Ball {
         let guide = self.guide();
         let pipeline = match self.layers.is_empty() {
             true => pipeline,
-            false => pipeline.with_waveguide(guide.clone()),
+            false => pipeline
+                .with_settings(|settings| settings.waveguide = Some(guide.clone()))
+                .unwrap(),
         };
         let mut press = trial.press(&pipeline).unwrap();
         let layered = match press.modulus() {

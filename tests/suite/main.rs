@@ -6,6 +6,8 @@ mod assumptions;
 mod corpus;
 mod finite_element_presses;
 mod force_on_simulated_frames;
+#[path = "../support/hostile.rs"]
+mod hostile;
 mod io_properties;
 #[path = "../../src/cli/strain/measure.rs"]
 #[allow(unreachable_pub, dead_code)]

@@ -2,7 +2,7 @@
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{Grey, read_grey_image_as, read_table};
+use tactile_imaging::io::{Grey, read_columns, read_grey_image};
 use tactile_imaging::pipeline::{ContactSurface, DarkContact, Object, Pipeline, SurfaceInput};
 
 const PIXEL_M: f64 = 0.0510151e-3;
@@ -11,17 +11,13 @@ const BALL_M: f64 = 4.0e-3;
 /// The sensor with its makers' table, as it stands or zeroed, and its images without and with the ball.
 fn sensor(folder: &Path, grey: Grey, zeroed: bool) -> (Pipeline, [Array2<u8>; 2]) {
     let images = ["rectify_crop_ref.png", "rectify_crop_sample.png"].map(|name| {
-        let image = read_grey_image_as(folder.join(name), grey, None);
+        let image = read_grey_image(folder.join(name), grey, None);
         image.unwrap().to_u8()
     });
     let path = folder.join("grey_to_depth_mm.csv");
-    let table = read_table(&path).unwrap();
-    let darkness = table.column("darkness_grey_levels", 0, &path).unwrap();
-    let depth = table.column("depth_mm", 1, &path).unwrap();
-    let entries: Vec<_> = darkness
-        .into_iter()
-        .zip(depth.into_iter().map(|z| z * 1e-3))
-        .collect();
+    let wanted: [(&[&str], &str); 2] = [(&["darkness"], "grey_levels"), (&["depth"], "mm")];
+    let [darkness, depth] = read_columns(&path, wanted).unwrap();
+    let entries: Vec<_> = darkness.into_iter().zip(depth).collect();
     let mut contact = DarkContact::new(&entries, [PIXEL_M; 2]).unwrap();
     let mut depths = DarkContact::depth_table(&entries).unwrap();
     if zeroed {
@@ -127,7 +123,7 @@ fn stated_cap_m(r: f64) -> f64 {
 
 /// Mean absolute error of the heights over the stated contact circle; where no contact was found the height is zero.
 fn stated_cap_error_m(surface: &ContactSurface) -> f64 {
-    let [left, top] = surface.origin_m().map(|m| m / PIXEL_M);
+    let [left, top] = surface.origin_m.map(|m| m / PIXEL_M);
     let (mut sum, mut count) = (0.0, 0.0);
     for row in 0..345 {
         for column in 0..460 {
@@ -149,7 +145,7 @@ fn stated_cap_error_m(surface: &ContactSurface) -> f64 {
 
 /// Beyond the stated circle there is no depth, but for the pixel that its outline may be off by.
 fn check_outside(surface: &ContactSurface) {
-    let origin = surface.origin_m();
+    let origin = surface.origin_m;
     for ((row, column), h) in surface.surface.heights.indexed_iter() {
         let dx = origin[0] / PIXEL_M + column as f64 - 243.9;
         let dy = origin[1] / PIXEL_M + row as f64 - 188.5;
@@ -170,7 +166,7 @@ fn check_empty(pipeline: &Pipeline, reference: &Array2<u8>) {
 
 /// The cap's profile, ring by ring of 10 px, against the stated geometry: within 0.1 mm of 1.98 mm everywhere.
 fn check_profile(surface: &ContactSurface) {
-    let origin = surface.origin_m();
+    let origin = surface.origin_m;
     let mut rings = [[0.0; 3]; 6];
     for ((row, column), h) in surface.surface.heights.indexed_iter() {
         let dx = origin[0] / PIXEL_M + column as f64 - 243.9;

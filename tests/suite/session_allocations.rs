@@ -1,5 +1,5 @@
 //! A session allocates nothing per frame once its buffers have their size.
-use tactile_imaging::pipeline::{SESSION_LOADS, Session, Trial};
+use tactile_imaging::pipeline::{Session, Trial};
 use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
 #[test]
@@ -14,10 +14,10 @@ fn pushing_frames_allocates_nothing_after_warm_up() {
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let empty = trial.scene.reference(5);
     let pipeline = trial.pipeline().unwrap();
-    let mut session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
+    let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
     let mut frames: Vec<_> = trial.simulation.frames.iter().collect();
     frames.push(&empty);
-    for frame in frames.iter().cycle().take(4 * SESSION_LOADS) {
+    for frame in frames.iter().cycle().take(4 * Session::MOST_LOADS) {
         session.push(frame.view()).unwrap();
     }
     let count = allocation_counter::measure(|| {

@@ -2,10 +2,11 @@
 //!
 //! The frames are integers, so a last digit of a system's `exp` or `sin` almost never shows. A change that is meant to
 //! change frames records the new checksums (each failing line prints them) and says so in its commit.
+use crate::hostile::Hostile;
 use ndarray::Array2;
 use tactile_imaging::simulate::{
-    CalibrationOptions, Camera, ContactLaw, Gain, Hostile, Illumination, Load, LoadCycle,
-    PressOptions, PressScene, Response, UniaxialOptions, UniaxialScene,
+    CalibrationOptions, Camera, ContactLaw, Gain, Illumination, Load, LoadCycle, PressOptions,
+    PressScene, Response, UniaxialOptions, UniaxialScene,
 };
 
 const CAMERA: [usize; 2] = [130, 174];
@@ -121,8 +122,8 @@ fn calibrations_and_streams_keep_their_frames() {
         hysteresis: 0.02,
         ..CalibrationOptions::default()
     };
-    let points = scene.calibrate(&options).unwrap().points;
-    let light: Vec<f64> = points.iter().map(|p| p.integrated_pixel_value).collect();
+    let pairs = scene.calibrate(&options).unwrap().pairs;
+    let light: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value).collect();
     let recorded = [
         -78.0, 72238.0, 143850.0, 215607.0, 287714.0, 359440.0, 292283.0, 222584.0, 150727.0,
         76458.0, 55.0,

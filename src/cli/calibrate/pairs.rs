@@ -10,7 +10,7 @@ use tactile_imaging::force::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, LinearCalibration,
     StressCalibration,
 };
-use tactile_imaging::io::{Column, Quantity, read_table};
+use tactile_imaging::io::read_columns;
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::plot::{Colour, Legend, Page, Panel};
 
@@ -35,17 +35,12 @@ pub fn run(
 }
 
 pub fn read_pairs(path: &Path, there_and_back: bool) -> Result<Vec<CalibrationPair<f64>>, Failure> {
-    let value = Column {
-        names: &["integrated_pixel_value", "pixel_value"],
-        quantity: Quantity::Number,
-        unit: "grey_levels",
-    };
-    let force = Column {
-        names: &["force", "load"],
-        quantity: Quantity::Force,
-        unit: "N",
-    };
-    let [values, forces] = read_table(path)?.columns([value, force], path)?;
+    let value = (
+        &["integrated_pixel_value", "pixel_value"][..],
+        "grey_levels",
+    );
+    let force = (&["force", "load"][..], "N");
+    let [values, forces] = read_columns(path, [value, force])?;
     let largest = (0..forces.len()).max_by(|&a, &b| forces[a].total_cmp(&forces[b]));
     let branch = |k: usize| {
         if there_and_back && largest.is_some_and(|largest| k > largest) {

@@ -7,6 +7,7 @@ use crate::cli::numbers::{digits, four_digits};
 use crate::cli::outputs::Outputs;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use tactile_imaging::force::LocalCalibration;
 use tactile_imaging::force::{Branch, Estimate};
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::sensor::{
@@ -99,7 +100,7 @@ fn print(found: &CalibratedSensor, console: &mut Console) {
     });
     let report = &sensor.curve.report;
     let [low, high] = report.identified_grey;
-    let largest = sensor.pressure_pa(high);
+    let largest = sensor.curve.pressure_pa(high);
     console.line(format!(
         "  light        identified from {low:.0} to {high:.0} grey levels, {} kPa there",
         with_error(largest.value, largest.standard_error, 1e-3)
@@ -131,7 +132,7 @@ pub fn layer_words(finding: &LayerFinding) -> [String; 2] {
     };
     let text = |e: Estimate<f64>| with_error(e.value, e.standard_error, scale);
     let (stated, fitted) = (text(finding.stated), text(finding.fitted));
-    let says = if finding.is_identified() {
+    let says = if finding.identified {
         format!("{fitted}{unit} (stated {stated})")
     } else if finding.stated.standard_error > 0.0 {
         format!("not identified, stays as stated: {fitted}{unit}")
@@ -161,7 +162,7 @@ fn value(found: &CalibratedSensor) -> Result<Value, Failure> {
     let layer = |l: &LayerFinding| {
         json!({
             "layer": l.layer + 1, "parameter": l.parameter, "stated": pair(l.stated),
-            "fitted": pair(l.fitted), "identified": l.is_identified(),
+            "fitted": pair(l.fitted), "identified": l.identified,
         })
     };
     let sensor = serde_json::to_value(&found.sensor).map_err(Failure::output)?;

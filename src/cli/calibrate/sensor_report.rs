@@ -1,6 +1,7 @@
 //! The report of a calibrated sensor: curve, residuals, contact radii, and what was identified.
 use super::sensor::layer_words;
 use tactile_imaging::force::Branch;
+use tactile_imaging::force::LocalCalibration;
 use tactile_imaging::plot::{Colour, Legend, Page, Panel};
 use tactile_imaging::sensor::{CalibratedSensor, PressFinding};
 
@@ -22,7 +23,7 @@ fn curve(found: &CalibratedSensor) -> Panel {
     let greys: Vec<f64> = (0..=128).map(|k| high * f64::from(k) / 128.0).collect();
     let line = |sds: f64| {
         let point = |grey: &f64| {
-            let pressure = found.sensor.pressure_pa(*grey);
+            let pressure = found.sensor.curve.pressure_pa(*grey);
             [
                 *grey,
                 1e-3 * (pressure.value + sds * pressure.standard_error),

@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
         None => None,
     };
     if let Some(scene) = &scene {
-        outputs.check(&source::images(scene))?;
+        outputs.check(&scene.images())?;
     }
     if arguments.design {
         return plan(arguments, scene.as_ref(), context);
@@ -134,7 +134,7 @@ fn plan(
 ) -> Result<Exit, Failure> {
     let file = arguments.scene.as_deref();
     let (specimen, guide) = match scene {
-        Some(scene) => (*scene.specimen(), scene.guide().clone()),
+        Some(scene) => (scene.specimen, scene.guide.clone()),
         None => source::simulated_block().map_err(|error| unusable(file, &error))?,
     };
     let sizes = (specimen.height_m(), guide.radius_m());

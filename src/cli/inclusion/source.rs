@@ -2,7 +2,6 @@
 use crate::cli::failure::Failure;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
-use std::path::Path;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::fem::{
     Block, Guide, Interface, Layer, Load, Lump, Material, Scene,
@@ -27,8 +26,8 @@ impl Source {
         let loaded = scene.load().map_err(Failure::input)?;
         let asymmetry = loaded.rings.iter().map(|rings| rings.asymmetry);
         Ok(Self {
-            specimen: *scene.specimen(),
-            guide: scene.guide().clone(),
+            specimen: scene.specimen,
+            guide: scene.guide.clone(),
             radii_m: loaded.rings[0].radii_m.clone(),
             asymmetry: asymmetry.fold(0.0, f64::max),
             profiles: loaded.profiles,
@@ -103,9 +102,4 @@ pub fn simulated_block() -> Result<(Specimen, Guide), ElasticityError> {
     let layers = vec![layer(2e-3, 136e3)?, layer(3e-3, 80e3)?, layer(5e-3, 34e3)?];
     let specimen = Specimen::new(30e-3, 40e-3)?.with_interface(Interface::Bonded);
     Ok((specimen, Guide::new(layers, 16e-3)?))
-}
-
-/// The images of a scene, which outputs must not overwrite.
-pub fn images(scene: &InclusionScene) -> Vec<&Path> {
-    scene.frames().into_iter().map(|(image, _)| image).collect()
 }

@@ -1,6 +1,7 @@
 //! The curve and the indenter that the arguments describe.
 use super::{Arguments, Law, Shape};
 use crate::cli::failure::Failure;
+use clap::ValueEnum;
 use tactile_imaging::elasticity::contact::{Bond, relative_radius_m, tangent_of_degrees};
 use tactile_imaging::elasticity::curve::{IndentationCurve, Indenter, Model};
 use tactile_imaging::elasticity::modulus::EstimatorKind;
@@ -62,6 +63,15 @@ impl Arguments {
         if let Some(failure) = wrong.into_iter().flatten().next() {
             return Err(failure);
         }
+        if let Some(needs) = self.law_needs() {
+            return Err(Failure::input(format!(
+                "--model {} is a law for {needs}: leave it out, or name another",
+                self.model
+                    .to_possible_value()
+                    .as_ref()
+                    .map_or("", |v| v.get_name())
+            )));
+        }
         match shape {
             Shape::Punch if self.radius.is_none() => {
                 Err(Failure::input("--shape punch needs --radius, in m"))
@@ -71,6 +81,29 @@ impl Arguments {
             )),
             _ => Ok(()),
         }
+    }
+
+    /// What the asked law is for, where that is not what is pressed.
+    fn law_needs(&self) -> Option<&'static str> {
+        let sphere = self.shape == Shape::Sphere;
+        let (fits, needs) = match self.model {
+            Law::Auto => return None,
+            Law::Hertz => (
+                sphere && !self.on_plate,
+                "--shape sphere without --on-plate",
+            ),
+            Law::Layer | Law::LayerSeries | Law::LayerPublished => (
+                sphere && self.thickness.is_some(),
+                "--shape sphere with --thickness",
+            ),
+            Law::Ball | Law::Tatara => (
+                sphere && self.ball_radius.is_some() && self.radius.is_none(),
+                "--shape sphere with --ball-radius alone",
+            ),
+            Law::Punch => (self.shape == Shape::Punch, "--shape punch"),
+            Law::Cone => (self.shape == Shape::Cone, "--shape cone"),
+        };
+        (!fits).then_some(needs)
     }
 
     pub fn indenter(&self) -> Result<Indenter, tactile_imaging::elasticity::ElasticityError> {

@@ -2,6 +2,7 @@
 mod report;
 mod source;
 mod timing;
+mod truth;
 
 use crate::cli::context::Context;
 use crate::cli::failure::{Exit, Failure};
@@ -10,11 +11,13 @@ use crate::cli::outputs::Outputs;
 use crate::cli::progress::{Progress, waiting_or_interrupted};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+
 use source::Source;
 use std::path::PathBuf;
-use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press, Truth};
-use tactile_imaging::plot::{save_press_pages, summary_lines};
+use tactile_imaging::pipeline::{ContactReading, Measurement, PipelineError, Press};
+use tactile_imaging::plot::{PlotError, save_pages, summary_lines};
 use timing::Timing;
+use truth::Truth;
 
 /// Measure the Young's modulus of an object from frames at two or more loads
 ///
@@ -196,12 +199,12 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
                 report::percent(modulus.value, truth.youngs_modulus_pa)
             ));
         }
-        match save_press_pages(&mut press, lines, folder) {
+        match save_pages(&mut press, lines, folder) {
             Ok(paths) => {
                 let names: Vec<_> = paths.iter().map(|p| p.display().to_string()).collect();
                 context.console.line(format!("wrote {}", names.join(", ")));
             }
-            Err(error @ tactile_imaging::plot::PlotError::Write { .. }) => {
+            Err(error @ PlotError::Write { .. }) => {
                 return Err(Failure::output(error));
             }
             Err(error) => {

@@ -1,9 +1,10 @@
 //! What is known of a press, as text and JSON, and beside the truth.
 use super::Contact;
 use super::timing::Timing;
+use super::truth::Truth;
 use crate::cli::console::Console;
 use serde_json::json;
-use tactile_imaging::pipeline::{Measurement, Truth, with_error};
+use tactile_imaging::pipeline::{Measurement, with_error};
 
 pub fn percent(found: f64, truth: f64) -> f64 {
     100.0 * (found / truth - 1.0)

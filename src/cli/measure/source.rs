@@ -1,14 +1,19 @@
 //! Where the frames come from: the simulator or a scene file.
+use super::truth::Truth;
 use super::{Arguments, Physics, Polymer, Simulation};
 use crate::cli::context::Context;
 use crate::cli::failure::Failure;
+use crate::cli::numbers::four_digits;
 use crate::cli::progress::waiting;
 use crate::cli::simulated::trial;
 use std::path::Path;
 use tactile_imaging::Pipeline;
-use tactile_imaging::pipeline::{PipelineError, Press, Trial, Truth};
+use tactile_imaging::io::{Grey, read_grey_image};
+use tactile_imaging::pipeline::{PipelineError, Press, Trial};
 use tactile_imaging::scene::{Scene, SceneData};
-use tactile_imaging::simulate::{Camera, Elastic, Load, PressOptions, Sphere};
+use tactile_imaging::simulate::{
+    Camera, ContactLaw, Elastic, Load, PressOptions, SimulateError, Sphere,
+};
 
 /// Frames with all that is needed to measure them.
 pub enum Source {
@@ -40,10 +45,16 @@ impl Source {
                 Physics::FiniteElements => ", or try --physics hertz",
                 Physics::Hertz => "",
             };
-            // The library names its field, a user has written --forces.
-            let error = error.to_string().replace("force_n", "the force in N");
+            let error = match error {
+                SimulateError::CalibrationSaturates { .. } => {
+                    "the gain that suits so small --forces saturates the camera in the calibration up to 2 N: give larger ones".to_owned()
+                }
+                // The library names its field, a user has written --forces.
+                error => error.to_string().replace("force_n", "the force in N"),
+            };
             Failure::input(format!("the press cannot be simulated: {error}{hint}"))
         })?;
+        within_frame(&trial)?;
         Ok(Self::Simulated(Box::new(trial)))
     }
 
@@ -87,9 +98,26 @@ impl Source {
 
     pub fn truth(&self) -> Option<Truth> {
         match self {
-            Self::Simulated(trial) => Some(trial.truth()),
+            Self::Simulated(trial) => Some(Truth::of(&trial.simulation)),
             Self::Scene(_) => None,
         }
+    }
+}
+
+/// Refuses contacts beyond which the camera sees nothing of the sensor.
+fn within_frame(trial: &Trial) -> Result<(), Failure> {
+    let camera = trial.scene.options().camera;
+    let [rows, columns] = camera.shape.map(|pixels| pixels as f64);
+    let [width, height] = camera.pixel_size_m;
+    let corner_m = 0.5 * (columns * width).hypot(rows * height);
+    let contacts = trial.simulation.truth.iter().map(|truth| &truth.contact);
+    match contacts.max_by(|a, b| a.contact_radius_m.total_cmp(&b.contact_radius_m)) {
+        Some(largest) if largest.contact_radius_m > corner_m => Err(Failure::input(format!(
+            "at {} N the contact has a radius of {} mm and covers the whole frame: give smaller --forces",
+            largest.force_n,
+            four_digits(1e3 * largest.contact_radius_m),
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -102,7 +130,7 @@ const BYTES_OF_A_FRAME: f64 = 4e3;
 
 /// Refuses a scene whose results do not fit into memory.
 fn allow(scene: &Scene, context: &Context) -> Result<(), Failure> {
-    let Ok(reference) = tactile_imaging::io::read_grey_image(&scene.reference) else {
+    let Ok(reference) = read_grey_image(&scene.reference, Grey::default(), None) else {
         // Loading will say what is wrong with it.
         return Ok(());
     };
@@ -141,7 +169,10 @@ fn options(simulation: &Simulation) -> PressOptions {
         camera,
         seed: simulation.seed,
         ..match simulation.physics {
-            Physics::FiniteElements => PressOptions::finite_elements(),
+            Physics::FiniteElements => PressOptions {
+                law: ContactLaw::FiniteElements,
+                ..PressOptions::default()
+            },
             Physics::Hertz => PressOptions::default(),
         }
     }

@@ -16,8 +16,7 @@ use std::path::PathBuf;
 use tactile_imaging::elasticity::strain::{
     Biot, EulerAlmansi, GreenLagrange, Hencky, Infinitesimal, StrainMeasure,
 };
-use tactile_imaging::io::PointTable;
-use tactile_imaging::io::points::read_point_table_in;
+use tactile_imaging::io::{PointTable, read_point_table};
 use tactile_imaging::matching::PointMatcher;
 
 /// Match the points before and after a deformation and measure the strain between them
@@ -72,8 +71,8 @@ const FILES: [&str; 3] = ["pairs.csv", "strain.csv", "strain.svg"];
 pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure> {
     let (before, after) = (&arguments.before, &arguments.after);
     let outputs = Outputs::plan(arguments.out.as_deref(), &FILES, &[before, after])?;
-    let (a, metres) = read_point_table_in(before)?;
-    let (b, also_metres) = read_point_table_in(after)?;
+    let (a, metres) = read_point_table(before)?;
+    let (b, also_metres) = read_point_table(after)?;
     if metres != also_metres {
         return Err(Failure::input(format!(
             "only one of {} and {} names the unit of its coordinates: name it in both headers or in none",

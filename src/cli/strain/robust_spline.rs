@@ -23,6 +23,9 @@ const LAMBDAS: [f64; 9] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e8];
 /// Pairs the smoothing is chosen on; the noise-to-signal ratio λ does not depend on their number.
 const CHOICE_PAIRS: usize = 700;
 
+/// Noise that is rounding, over the radius of the points: of sets without any, what differs from what is predicted by so little is not misplaced.
+const ROUNDING: f64 = 1e-12;
+
 pub struct RobustSpline<const D: usize> {
     pub spline: ThinPlateSpline<f64, D>,
     /// Splines without one part each, for the jackknife.
@@ -51,7 +54,7 @@ pub fn fit<const D: usize>(
     let (mut folds, mut sigma, mut response) = (Vec::new(), 0.0, 1.0);
     for _ in 0..3 {
         let held_out = hold_out(sources, targets, &weights, lambda)?;
-        sigma = noise::<D>(&held_out.distances);
+        sigma = noise::<D>(&held_out.distances).max(ROUNDING * square.sqrt());
         let scaled: Vec<f64> = held_out
             .distances
             .iter()

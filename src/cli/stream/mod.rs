@@ -106,7 +106,8 @@ fn finish(
         Err(reason) => console.line(format!("modulus none: {reason}")),
     }
     console.line(live.session.report());
-    let caution = live.session.drift_flag().map(|flag| flag.to_string());
+    let caution = live.session.drift().caution.as_ref();
+    let caution = caution.map(ToString::to_string);
     if let Some(caution) = &caution {
         console.line(format!("caution: {caution}"));
     }

@@ -39,7 +39,7 @@ pub fn run(
     outputs.check(&inputs)?;
     let data = waiting("reading the scene", || scene.load()).map_err(Failure::input)?;
     let pipeline = scene.pipeline(&data).map_err(Failure::input)?;
-    let session = Session::new(&pipeline, data.reference.view())
+    let session = Session::new(&pipeline, &[data.reference.view()])
         .map_err(|error| Failure::input(scene.measure_error(error)))?;
     let strained_above_n = arguments
         .force

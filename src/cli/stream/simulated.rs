@@ -38,8 +38,8 @@ pub fn run(
     let references: Vec<_> = (1..5).map(|k| trial.scene.reference(k)).collect();
     let views: Vec<_> = references.iter().map(|r| r.view()).collect();
     let pipeline = trial.pipeline().map_err(Failure::no_answer)?;
-    let session = Session::from_frames(&pipeline, &views).map_err(Failure::no_answer)?;
-    let truth_pa = trial.truth().youngs_modulus_pa;
+    let session = Session::new(&pipeline, &views).map_err(Failure::no_answer)?;
+    let truth_pa = trial.simulation.youngs_modulus_pa;
     let strained_above_n = arguments.strain.then(|| largest_force_n(arguments) / 3.0);
     let mut live = Live::new(session, Some(truth_pa), strained_above_n);
     play(&mut live, &frames, arguments.rate, context).map_err(Failure::no_answer)?;

@@ -28,7 +28,7 @@ use std::sync::Arc;
 /// | slopes to heights, inside a reconstruction that has slopes | [`with_slope_integrator`](Self::with_slope_integrator) | the reconstruction's own |
 /// | surface to control points | [`with_sampler`](Self::with_sampler) | [`ContactSampler`]; [`EquallySpaced`] where the surface is read from a signal |
 /// | points to matches | [`with_matcher`](Self::with_matcher) | [`AnnealedSoftassign`](crate::matching::AnnealedSoftassign), searching near by |
-/// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | [`StrainSpline`]: thin-plate, kernel −r, smoothed by blocked cross-validation |
+/// | weighted matches to the warp whose gradient is strained | [`with_warp`](Self::with_warp) | a [spline](crate::tps::ThinPlateSpline), thin-plate, kernel −r, smoothed by blocked cross-validation |
 /// | displacement gradient to strain | [`with_strain`](Self::with_strain) | [`GreenLagrange`] |
 /// | loads to the modulus | [`with_estimator`](Self::with_estimator) | the layered law for a ball, else stress over strain; see [`EstimatorChoice::Best`] |
 ///
@@ -116,7 +116,7 @@ impl Pipeline {
     }
 
     /// The contact stage.
-    pub fn contact(&self) -> &dyn ContactStage {
+    pub(crate) fn contact(&self) -> &dyn ContactStage {
         self.contact.as_ref()
     }
 

@@ -47,15 +47,19 @@ impl Pipeline {
     /// Takes another way from frame to contact and force.
     ///
     /// ```
-    /// use tactile_imaging::force::Polarity;
-    /// use tactile_imaging::pipeline::{ContactStage, DarkContact, Object, Pipeline};
+    /// use tactile_imaging::pipeline::{DarkContact, Object, Pipeline};
     /// # use tactile_imaging::force::CalibrationPair;
     /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
     /// let light = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?.with_control_points(80);
-    /// assert_eq!(light.contact().polarity(), Polarity::Brighter);
     /// let dark = light.with_contact(DarkContact::new(&[(0.0, 0.0), (100.0, 0.5e-3)], [0.1e-3; 2])?);
-    /// assert_eq!((dark.contact().polarity(), dark.contact().pixel_size_m()), (Polarity::Darker, [0.1e-3; 2]));
     /// assert_eq!(dark.settings().control_points, 80, "the rest stays");
+    /// let [reference, darker] = [200, 150].map(|grey| ndarray::Array2::from_shape_fn((40, 40), |(r, c)| {
+    ///     if (10..30).contains(&r) && (10..30).contains(&c) { grey } else { 200_u8 }
+    /// }));
+    /// let mut press = dark.press(reference.view())?;
+    /// press.add_frame(darker.view());
+    /// let depth = press.contact(0)?.and_then(|contact| contact.indentation_m).expect("a depth");
+    /// assert!((depth.value - 0.25e-3).abs() < 1e-9, "half of the darkness that is 0.5 mm deep");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     #[must_use]
@@ -78,7 +82,7 @@ impl Pipeline {
     /// let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
     /// // Its heights have mean zero: from the rim to the top they are those of the truth.
     /// let (low, high) = heights.fold((0.0, 0.0), |(low, high): (f64, f64), h| (low.min(h), high.max(h)));
-    /// assert!(((high - low) / trial.truth().frames[0].surface_height_m - 1.0).abs() < 0.1);
+    /// assert!(((high - low) / trial.simulation.truth[0].contact.apparent_height_m(0.0) - 1.0).abs() < 0.1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
@@ -112,7 +116,7 @@ impl Pipeline {
     /// let variational = BrooksHorn::new(Lighting::default()).with_occluding_boundary(true);
     /// let fourier = eikonal.with_surface(variational, SurfaceInput::Shading);
     /// let masked = fourier.clone().with_slope_integrator(MaskedLeastSquares::default())?;
-    /// let truth = trial.truth().frames[0].surface_height_m;
+    /// let truth = trial.simulation.truth[0].contact.apparent_height_m(0.0);
     /// for pipeline in [fourier, masked] {
     ///     let mut press = trial.press(&pipeline)?;
     ///     let heights = press.surface(0)?.surface.heights.iter().copied().filter(|h| h.is_finite());
@@ -233,7 +237,7 @@ impl Pipeline {
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::tps::AffineModel;
-    /// let pipeline = trial.pipeline()?.with_warp(AffineModel).with_control_points(60);
+    /// let pipeline = trial.pipeline()?.with_warp(AffineModel::General).with_control_points(60);
     /// let mut press = trial.press(&pipeline)?;
     /// let strain = press.strain(1)?;
     /// assert!(strain.summary.spread.amax() < 1e-9, "one gradient for all points");

@@ -119,22 +119,9 @@ impl Pipeline {
 
 impl<'a> Press<'a> {
     /// The same frames on the same reference, of which nothing is computed yet: to time it again.
-    ///
-    /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
-    /// # let camera = Camera::default().coarser(8);
-    /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-    /// use tactile_imaging::pipeline::Stage;
-    /// let pipeline = trial.pipeline()?;
-    /// let mut press = trial.press(&pipeline)?;
-    /// let modulus = press.modulus()?;
-    /// let mut again = press.renewed();
-    /// assert_eq!((again.frames(), again.report().work(Stage::Contact).runs), (2, 0));
-    /// assert_eq!(again.modulus()?, modulus);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
+    #[cfg(feature = "cli")]
     #[must_use]
-    pub fn renewed(&self) -> Self {
+    pub(crate) fn renewed(&self) -> Self {
         let reference = Arc::clone(self.runner.reference());
         let mut press = self.pipeline().press_on(reference);
         for (index, frame) in self.frames.iter().enumerate() {
@@ -257,7 +244,7 @@ impl<'a> Press<'a> {
     }
 
     /// The pipeline.
-    pub fn pipeline(&self) -> &Pipeline {
+    pub(crate) fn pipeline(&self) -> &Pipeline {
         self.runner.pipeline()
     }
 

@@ -51,7 +51,7 @@ impl Press<'_> {
     ///
     /// # Errors
     /// Those of [`modulus`](Self::modulus).
-    pub fn error_budget(&mut self) -> Result<Vec<ErrorShare>, PipelineError> {
+    pub(super) fn error_budget(&mut self) -> Result<Vec<ErrorShare>, PipelineError> {
         let estimator = self.pipeline().estimator()?;
         let loads = self.loads(estimator.needs_strain())?;
         Ok(error_budget::of(&estimator, &loads))

@@ -71,11 +71,10 @@ impl<'a> Press<'a> {
             return Ok(*reading);
         }
         let image = self.frames[self.twin(frame)?].image.get(frame)?;
-        let grey = background::greatest_step(image.view(), self.runner.reference().image());
-        Err(if grey.abs() > background::CLEAR_STEP_GREY {
-            PipelineError::OppositeSignal { frame, grey }
-        } else {
-            PipelineError::NoContact { frame }
+        let reference = self.runner.reference().image();
+        Err(match background::clear_step(image.view(), reference) {
+            Some(grey) => PipelineError::OppositeSignal { frame, grey },
+            None => PipelineError::NoContact { frame },
         })
     }
 
@@ -90,7 +89,7 @@ impl<'a> Press<'a> {
     /// let surface = press.surface(0)?;
     /// let top = surface.surface.heights.iter().copied().filter(|h| h.is_finite()).fold(0.0, f64::max);
     /// // Hertz's pressure read as shading is a hemisphere as high as the contact's radius.
-    /// let radius = trial.truth().frames[0].contact_radius_m;
+    /// let radius = trial.simulation.truth[0].contact.contact_radius_m;
     /// assert!((top / radius - 1.0).abs() < 0.1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -143,7 +142,7 @@ impl<'a> Press<'a> {
     /// let points = press.control_points(0)?;
     /// assert_eq!(points.len(), 60);
     /// // All within the contact, whose middle is the frame's: (86.5, 64.5) pixels.
-    /// let radius = 1.1 * trial.truth().frames[0].contact_radius_m;
+    /// let radius = 1.1 * trial.simulation.truth[0].contact.contact_radius_m;
     /// assert!(points.iter().all(|p| (p.x - 86.5 * 172.4e-6).hypot(p.y - 64.5 * 172.4e-6) < radius));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

@@ -66,7 +66,7 @@ impl Press<'_> {
     ///
     /// # Errors
     /// Those of [`modulus`](Self::modulus) but for its estimator's: what gives no modulus is left out.
-    pub fn time_dependence(&mut self) -> Result<Option<TimeResult>, PipelineError> {
+    pub(super) fn time_dependence(&mut self) -> Result<Option<TimeResult>, PipelineError> {
         let times_s: Vec<Option<f64>> = self.frames.iter().map(|frame| frame.time_s).collect();
         if times_s.iter().flatten().count() < 2 {
             return Ok(None);

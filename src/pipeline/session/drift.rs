@@ -9,7 +9,7 @@ pub(crate) const DRIFT_LIMIT_GREY: f64 = 0.5;
 ///
 /// ```
 /// use std::sync::Arc;
-/// use tactile_imaging::pipeline::{DriftWatch, Object, Pipeline, Session};
+/// use tactile_imaging::pipeline::{DriftWatch, Flag, Object, Pipeline, Session};
 /// # use tactile_imaging::force::CalibrationPair;
 /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
 /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
@@ -17,15 +17,15 @@ pub(crate) const DRIFT_LIMIT_GREY: f64 = 0.5;
 /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
 /// # });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
+/// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
 /// // The light fades by two grey levels and recovers by one.
 /// for loss in [0, 2, 1] {
 ///     session.push(hertz(0.0).mapv(|v| v - loss).view())?;
 /// }
-/// assert_eq!(session.drift(), DriftWatch { frames: 3, last_grey: -1.0, greatest_grey: -2.0 });
+/// assert_eq!(session.drift(), &DriftWatch { frames: 3, last_grey: -1.0, greatest_grey: -2.0, caution: Some(Flag::LightDrifted { grey: -1.0 }) });
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct DriftWatch {
     /// Frames without contact so far.
@@ -34,20 +34,18 @@ pub struct DriftWatch {
     pub last_grey: f64,
     /// The greatest so far, with its sign.
     pub greatest_grey: f64,
+    /// The light had drifted by more than half a grey level when the sensor was last free: the reference should be taken anew, or the contact
+    /// stage told to correct drift.
+    pub caution: Option<Flag>,
 }
 
 impl DriftWatch {
     pub(super) fn watch(&mut self, grey: f64) {
         self.frames += 1;
         self.last_grey = grey;
+        self.caution = (grey.abs() > DRIFT_LIMIT_GREY).then_some(Flag::LightDrifted { grey });
         if grey.abs() > self.greatest_grey.abs() {
             self.greatest_grey = grey;
         }
-    }
-
-    /// A caution if the light had drifted by more than half a grey level when the sensor was last free.
-    pub(super) fn flag(&self) -> Option<Flag> {
-        let grey = self.last_grey;
-        (grey.abs() > DRIFT_LIMIT_GREY).then_some(Flag::LightDrifted { grey })
     }
 }

@@ -4,25 +4,7 @@ use crate::pipeline::contact::ContactReading;
 use crate::pipeline::load_reading::{LoadReading, area_with_floor, radius_with_floor};
 
 /// Loads that a session keeps apart; more are merged.
-///
-/// ```
-/// use std::sync::Arc;
-/// use tactile_imaging::pipeline::{Object, Pipeline, SESSION_LOADS, Session};
-/// # use tactile_imaging::force::CalibrationPair;
-/// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-/// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-/// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-/// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-/// # });
-/// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
-/// for k in 0..40 {
-///     session.push(hertz(100.0 + f64::from(k)).view())?;
-/// }
-/// assert_eq!(session.loads(), SESSION_LOADS, "forty forces, the closest merged");
-/// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-/// ```
-pub const SESSION_LOADS: usize = 32;
+pub(super) const MOST_LOADS: usize = 32;
 
 /// Force and radius at one load, averaged over the frames taken there.
 #[derive(Clone, Copy, Debug)]
@@ -100,13 +82,13 @@ impl MergedLoad {
     }
 }
 
-/// At most [`SESSION_LOADS`] loads in rising order of force.
+/// At most [`MOST_LOADS`] loads in rising order of force.
 #[derive(Clone, Debug)]
 pub(super) struct SeenLoads(Vec<MergedLoad>);
 
 impl SeenLoads {
     pub(super) fn new() -> Self {
-        Self(Vec::with_capacity(SESSION_LOADS + 1))
+        Self(Vec::with_capacity(MOST_LOADS + 1))
     }
 
     pub(super) fn len(&self) -> usize {
@@ -134,7 +116,7 @@ impl SeenLoads {
         };
         let at = self.0.partition_point(|l| l.force_n < load.force_n);
         self.0.insert(at, load);
-        if self.0.len() > SESSION_LOADS {
+        if self.0.len() > MOST_LOADS {
             self.merge_closest();
         }
     }

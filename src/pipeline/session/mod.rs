@@ -16,15 +16,13 @@ use super::composition::Pipeline;
 use super::contact::{ContactReading, FrameContact, resize};
 use super::error::PipelineError;
 use super::face;
-use super::flag::Flag;
 use super::report::{Report, SkipReason, Stage};
 use super::runner::{SkipRecords, StageRunner};
 use super::same_image::is_same_image;
 use crate::force::{HealthOptions, HealthReport, ShearCalibration, ShearTracker};
 pub use drift::DriftWatch;
 use health::SensorHealth;
-pub use loads::SESSION_LOADS;
-use loads::SeenLoads;
+use loads::{MOST_LOADS, SeenLoads};
 use ndarray::{Array2, ArrayView2};
 use std::sync::Arc;
 use strain::FollowedStrain;
@@ -39,7 +37,7 @@ pub use update::Update;
 /// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
 /// let camera = Camera::default().coarser(8);
 /// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-/// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
+/// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
 /// for frame in &trial.simulation.frames {
 ///     assert!(session.push(frame.view())?.contact.is_some());
 /// }
@@ -65,15 +63,10 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session whose reference is one frame without contact.
-    ///
-    /// # Errors
-    /// [`PipelineError::Sensor`].
-    pub fn new(pipeline: &Pipeline, reference: ArrayView2<'_, u8>) -> Result<Self, PipelineError> {
-        Self::from_frames(pipeline, &[reference])
-    }
+    /// Loads that a session keeps apart; more are merged.
+    pub const MOST_LOADS: usize = MOST_LOADS;
 
-    /// A session whose reference is the mean of frames without contact, from which the noise is measured too.
+    /// A session whose reference is the mean of one or more frames without contact; of more, the noise is measured too.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -86,7 +79,7 @@ impl Session {
     /// # });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let empty = hertz(0.0);
-    /// let mut session = Session::from_frames(&pipeline, &[empty.view(), empty.view(), empty.view()])?;
+    /// let mut session = Session::new(&pipeline, &[empty.view(), empty.view(), empty.view()])?;
     /// let force = session.push(hertz(60.0).view())?.contact.and_then(|c| c.force_n).expect("a force");
     /// assert!((force.value / 0.503 - 1.0).abs() < 0.01);
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
@@ -94,7 +87,7 @@ impl Session {
     ///
     /// # Errors
     /// [`PipelineError::Sensor`] for no frames, or frames that differ in size.
-    pub fn from_frames(
+    pub fn new(
         pipeline: &Pipeline,
         references: &[ArrayView2<'_, u8>],
     ) -> Result<Self, PipelineError> {
@@ -131,7 +124,7 @@ impl Session {
     /// });
     /// let stiffness_n_per_m = [Estimate { value: 400.0, standard_error: 4.0 }; 2];
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(&pipeline, Array2::from_elem((64, 64), 10).view())?
+    /// let mut session = Session::new(&pipeline, &[Array2::from_elem((64, 64), 10).view()])?
     ///     .with_shear(ShearCalibration { stiffness_n_per_m, residual_sd_n: [0.0; 2] });
     /// session.push(press(32.0).view())?;
     /// let shear = session.push(press(34.0).view())?.shear.expect("stiffnesses are known");
@@ -157,7 +150,7 @@ impl Session {
     ///     (grey + (7 * r + 13 * c + 5 * k) % 4) as u8
     /// });
     /// let options = HealthOptions::default().with_baseline_frames(50)?;
-    /// let mut session = Session::new(&pipeline, frame(0, 40).view())?.with_health(options);
+    /// let mut session = Session::new(&pipeline, &[frame(0, 40).view()])?.with_health(options);
     /// for k in 0..60 {
     ///     session.push(frame(k, 40).view())?;
     /// }
@@ -252,7 +245,7 @@ impl Session {
         self.frames
     }
 
-    /// Loads kept apart so far, at most [`SESSION_LOADS`](super::SESSION_LOADS).
+    /// Loads kept apart so far, at most [`MOST_LOADS`](Self::MOST_LOADS).
     ///
     /// ```
     /// # use std::sync::Arc;
@@ -264,12 +257,16 @@ impl Session {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
+    /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
     /// for peak in [120.0, 60.0, 120.0] {
     ///     session.push(hertz(peak).view())?;
     ///     session.push(hertz(0.0).view())?;
     /// }
     /// assert_eq!((session.frames(), session.loads()), (6, 3), "frames without contact are no load");
+    /// for k in 0..40 {
+    ///     session.push(hertz(100.0 + f64::from(k)).view())?;
+    /// }
+    /// assert_eq!(session.loads(), Session::MOST_LOADS, "forty forces, the closest merged");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     pub fn loads(&self) -> usize {
@@ -277,30 +274,6 @@ impl Session {
     }
 
     /// What frames without contact say of the light.
-    ///
-    /// ```
-    /// # use std::sync::Arc;
-    /// # use tactile_imaging::pipeline::{Object, Pipeline, Session};
-    /// # use tactile_imaging::force::CalibrationPair;
-    /// # let pairs = [0.0, 1.0, 2.0].map(|n| CalibrationPair::loading(1e5 * n, n));
-    /// # let hertz = |peak: f64| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
-    /// #     let d = ((r as f64 - 32.0).hypot(c as f64 - 32.0) / 20.0).min(1.0);
-    /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
-    /// # });
-    /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
-    /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
-    /// session.push(hertz(120.0).view())?;
-    /// let drift = session.drift();
-    /// assert_eq!((drift.frames, drift.last_grey), (1, -2.0), "contacts say nothing of the light");
-    /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
-    /// ```
-    pub fn drift(&self) -> DriftWatch {
-        self.drift
-    }
-
-    /// A caution if the light has drifted by more than half a grey level when the sensor was last free: the reference
-    /// should be taken anew, or the contact stage told to correct drift.
     ///
     /// ```
     /// use tactile_imaging::pipeline::Flag;
@@ -313,15 +286,18 @@ impl Session {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// # let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
+    /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
     /// session.push(hertz(0.0).mapv(|v| v - 2).view())?;
-    /// assert_eq!(session.drift_flag(), Some(Flag::LightDrifted { grey: -2.0 }));
+    /// session.push(hertz(120.0).view())?;
+    /// let drift = session.drift();
+    /// assert_eq!((drift.frames, drift.last_grey), (1, -2.0), "contacts say nothing of the light");
+    /// assert_eq!(drift.caution, Some(Flag::LightDrifted { grey: -2.0 }));
     /// session.push(hertz(0.0).view())?;
-    /// assert_eq!(session.drift_flag(), None, "the light is back");
+    /// assert_eq!(session.drift().caution, None, "the light is back");
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
-    pub fn drift_flag(&self) -> Option<Flag> {
-        self.drift.flag()
+    pub fn drift(&self) -> &DriftWatch {
+        &self.drift
     }
 
     /// Gain and noise of the sensor as its background shows them, contacts or not, against the session's first frames
@@ -341,7 +317,7 @@ impl Session {
     /// let frame = |k: usize| ndarray::Array2::from_shape_fn((64, 64), |(r, c)| {
     ///     if (r, c) == (12, 30) { 44 } else { (40 + (7 * r + 13 * c + k / 64) % 4) as u8 }
     /// });
-    /// let mut session = Session::new(&pipeline, frame(0).view())?;
+    /// let mut session = Session::new(&pipeline, &[frame(0).view()])?;
     /// for k in 0..1024 {
     ///     session.push(frame(k).view())?;
     /// }
@@ -364,7 +340,7 @@ impl Session {
     /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
     /// # });
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-    /// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
+    /// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
     /// for peak in [0.0, 120.0, 120.0, 120.0] {
     ///     session.push(hertz(peak).view())?;
     /// }

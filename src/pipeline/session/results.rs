@@ -17,7 +17,7 @@ impl Session {
     /// let camera = Camera::default().coarser(4);
     /// let loads = [0.7, 1.0, 1.2].map(Load::normal).to_vec();
     /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationOptions::default())?;
-    /// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
+    /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
     /// let mut across = Vec::new();
     /// for frame in &trial.simulation.frames {
     ///     session.push(frame.view())?;
@@ -55,7 +55,7 @@ impl Session {
     /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-    /// # let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
+    /// # let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
     /// session.push(trial.simulation.frames[0].view())?;
     /// assert!(session.strain()?.is_none());
     /// session.push(trial.simulation.frames[1].view())?;

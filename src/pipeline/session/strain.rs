@@ -19,7 +19,7 @@ use ndarray::ArrayView2;
 /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
-/// let mut session = Session::new(&trial.pipeline()?, trial.simulation.reference.view())?;
+/// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
 /// for frame in &trial.simulation.frames {
 ///     session.push(frame.view())?;
 ///     if let Some(found) = session.strain()? {

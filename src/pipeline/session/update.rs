@@ -14,7 +14,7 @@ use crate::pipeline::contact::ContactReading;
 /// #     10 + (peak * (1.0 - d * d).sqrt()).round() as u8
 /// # });
 /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
-/// let mut session = Session::new(&pipeline, hertz(0.0).view())?;
+/// let mut session = Session::new(&pipeline, &[hertz(0.0).view()])?;
 /// let first: Update = session.push(hertz(120.0).view())?;
 /// let again = session.push(hertz(120.0).view())?;
 /// assert_eq!((again.frame, again.repeated), (1, true), "the same image: not measured again");

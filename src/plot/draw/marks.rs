@@ -54,16 +54,9 @@ pub(super) fn draw_layer(svg: &mut Svg, axes: &Axes, layer: &Layer) {
 }
 
 fn draw_marker(svg: &mut Svg, at: [f64; 2], marker: Marker, radius: f64, colour: Colour) {
-    let [x, y] = at;
-    let stroke = Stroke::new(colour, 1.0);
     match marker {
         Marker::Disc => svg.disc(at, radius, colour),
-        Marker::Ring => svg.ring(at, radius, stroke),
-        Marker::Cross => {
-            for side in [-radius, radius] {
-                svg.line(&[[x - radius, y - side], [x + radius, y + side]], stroke);
-            }
-        }
+        Marker::Ring => svg.ring(at, radius, Stroke::new(colour, 1.0)),
     }
 }
 

@@ -122,6 +122,7 @@ impl SensorCalibration {
                     parameter,
                     stated,
                     fitted,
+                    identified: fitted.standard_error < 0.7 * stated.standard_error,
                 });
             }
         }

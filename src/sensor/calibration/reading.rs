@@ -1,7 +1,7 @@
 //! A calibration's TOML file, with the images that it names.
 use super::{SensorCalibration, SensorPress};
 use crate::force::Branch;
-use crate::io::{read_bytes, read_grey_image};
+use crate::io::{Grey, read_bytes, read_grey_image};
 use crate::scene::SceneError;
 use crate::scene::SceneLayer;
 use crate::scene::fields::{Fields, poisson, positive};
@@ -145,11 +145,12 @@ struct Images<'a> {
 impl Images<'_> {
     fn read(&self, field: &str, name: &str) -> Result<Array2<u8>, SceneError> {
         let path = self.file.parent().unwrap_or(Path::new("")).join(name);
-        let image = read_grey_image(&path).map_err(|source| SceneError::File {
-            file: self.file.into(),
-            field: field.into(),
-            source: Box::new(source),
-        })?;
+        let image =
+            read_grey_image(&path, Grey::default(), None).map_err(|source| SceneError::File {
+                file: self.file.into(),
+                field: field.into(),
+                source: Box::new(source),
+            })?;
         Ok(image.to_u8())
     }
 }

@@ -139,6 +139,26 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("indent curve.csv --shape sphere", "--radius"),
     ("indent curve.csv --shape punch", "--radius"),
     ("indent curve.csv --shape egg", "egg"),
+    (
+        "indent curve.csv --shape sphere --radius 5e-3 --model cone",
+        "--model cone is a law for --shape cone",
+    ),
+    (
+        "indent curve.csv --shape sphere --radius 5e-3 --model layer-series",
+        "--thickness",
+    ),
+    (
+        "indent curve.csv --shape sphere --radius 5e-3 --model tatara",
+        "--ball-radius alone",
+    ),
+    (
+        "indent curve.csv --shape punch --radius 5e-3 --model hertz",
+        "--shape sphere",
+    ),
+    (
+        "indent curve.csv --shape cone --model punch",
+        "--shape punch",
+    ),
     ("indent curve.csv --shape sphere --radius 0", "radius"),
     ("indent curve.csv --shape sphere --radius nan", "radius"),
     (
@@ -255,6 +275,11 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("measure scene.toml --memory-gb 1e-5", "memory-gb"),
     ("measure --forces 0.7,-1", "forces"),
     ("measure --forces 0", "forces"),
+    (
+        "measure --forces 0.7,1e300 --physics hertz",
+        "covers the whole frame",
+    ),
+    ("measure --forces 1e-12 --physics hertz", "give larger ones"),
     ("measure --radius-mm nan", "radius-mm"),
     ("measure --modulus-kpa 0", "modulus-kpa"),
     ("measure --polymer steel", "steel"),

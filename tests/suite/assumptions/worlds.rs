@@ -7,7 +7,7 @@ use tactile_imaging::pipeline::{
 };
 use tactile_imaging::simulate::{
     CalibrationOptions, Camera, ContactLaw, ContactState, Illumination, Load, PressOptions,
-    PressScene, Response,
+    Response,
 };
 
 pub(super) const RADIUS_M: f64 = 3e-3;
@@ -152,7 +152,8 @@ impl World {
             },
             loads: LOADS_N.into_iter().zip(self.levels).map(load).collect(),
             seed,
-            ..PressOptions::finite_elements()
+            law: ContactLaw::FiniteElements,
+            ..PressOptions::default()
         };
         assert_eq!(options.object.material.youngs_modulus_pa, MODULUS_PA);
         if let Some(states) = self.sample.states(&options) {
@@ -162,9 +163,6 @@ impl World {
             hysteresis: self.hysteresis,
             ..CalibrationOptions::default()
         };
-        // A gain that suits a face's low pressure takes a larger ball, whose middle does not saturate.
-        let scene = PressScene::new(options.clone()).unwrap();
-        let calibration = scene.unsaturated(calibration).unwrap();
         let mut trial = Trial::new(options, &calibration).unwrap();
         for pair in &mut trial.pairs {
             pair.force_n *= self.gauge;
@@ -199,12 +197,14 @@ impl Stated {
         let size = trial.simulation.pixel_size_m.map(|p| self.pixel_size * p);
         let pipeline = Pipeline::from_pairs(&trial.pairs, size, self.object).unwrap();
         pipeline
-            .with_waveguide(guide)
-            .with_layer_covariance(covariance)
-            .unwrap()
-            .with_scale_errors(self.force_error, self.length_error)
-            .unwrap()
-            .with_object_errors(self.radius_error * RADIUS_M, self.poisson_error)
+            .with_settings(|settings| {
+                settings.waveguide = Some(guide);
+                settings.layer_covariance = Some(covariance);
+                settings.force_scale_error = self.force_error;
+                settings.length_scale_error = self.length_error;
+                settings.object_radius_error_m = self.radius_error * RADIUS_M;
+                settings.poisson_ratio_error = self.poisson_error;
+            })
             .unwrap()
             .with_stages(&stages)
             .unwrap()

@@ -4,10 +4,8 @@
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use tactile_imaging::io::{CasePoints, PointTable};
 use tactile_imaging::io::{
-    Column, GreyImage, Quantity, cases::parse_cases, grid::parse_grid, image::parse_grey_image,
-    points::parse_points, points::read_point_table_in, read_grey_image_of_bits, read_table,
+    CasePoints, Grey, read_cases, read_columns, read_grey_image, read_grid, read_points,
 };
 use tactile_imaging::scene::{Scene, read_contact_table};
 use tactile_imaging::sensor::{Sensor, SensorCalibration};
@@ -16,42 +14,23 @@ use tactile_imaging::sensor::{Sensor, SensorCalibration};
 pub(crate) fn table(bytes: &[u8]) {
     let file = Scratch::new("table.csv", bytes);
     let finite = |values: &[f64]| assert!(values.iter().all(|v| v.is_finite()), "{values:?}");
-    for point in answer(parse_points::<2>(bytes, "table.csv")).unwrap_or_default() {
+    for point in answer(read_points::<2>(&file.path)).unwrap_or_default() {
         finite(point.coords.as_slice());
     }
-    for point in answer(parse_points::<3>(bytes, "table.csv")).unwrap_or_default() {
+    for point in answer(read_points::<3>(&file.path)).unwrap_or_default() {
         finite(point.coords.as_slice());
     }
-    // The dimension that the table is found to have is one that it can be read in.
-    match answer(read_point_table_in(&file.path)) {
-        Some((PointTable::Plane(points), _)) => {
-            assert_eq!(parse_points::<2>(bytes, "table.csv").unwrap(), points);
-        }
-        Some((PointTable::Space(points), _)) => {
-            assert_eq!(parse_points::<3>(bytes, "table.csv").unwrap(), points);
-        }
-        None => {}
-    }
-    if let Some(grid) = answer(parse_grid(bytes, "table.csv")) {
+    if let Some(grid) = answer(read_grid(&file.path)) {
         assert!(!grid.is_empty() && grid.iter().all(|v| !v.is_infinite()));
     }
-    let Some(table) = answer(read_table(&file.path)) else {
-        return;
-    };
-    finite(table.values.as_slice().expect("rows one after another"));
-    for (names, quantity, unit) in [
-        (["x", "indentation"], Quantity::Length, "m"),
-        (["force", "f"], Quantity::Force, "N"),
-        (["pressure", "p"], Quantity::Pressure, "Pa"),
-        (["time", "t"], Quantity::Time, "s"),
-        (["y", "value"], Quantity::Number, "1"),
+    for (names, unit) in [
+        (["x", "indentation"], "m"),
+        (["force", "f"], "N"),
+        (["pressure", "p"], "Pa"),
+        (["time", "t"], "s"),
+        (["y", "value"], "1"),
     ] {
-        let column = Column {
-            names: &names,
-            quantity,
-            unit,
-        };
-        if let Some([values]) = answer(table.columns([column], &file.path)) {
+        if let Some([values]) = answer(read_columns(&file.path, [(&names, unit)])) {
             finite(&values);
         }
     }
@@ -59,7 +38,8 @@ pub(crate) fn table(bytes: &[u8]) {
 
 /// A file of matching cases.
 pub(crate) fn case(bytes: &[u8]) {
-    for case in answer(parse_cases(bytes, "cases.txt")).unwrap_or_default() {
+    let file = Scratch::new("cases.txt", bytes);
+    for case in answer(read_cases(&file.path)).unwrap_or_default() {
         let finite = match &case.points {
             CasePoints::Plane { model, target } => {
                 let mut points = model.iter().chain(target);
@@ -76,20 +56,15 @@ pub(crate) fn case(bytes: &[u8]) {
 
 /// An image file, with and without the number of bits of its camera.
 pub(crate) fn image(bytes: &[u8]) {
-    let levels_are_grey = |image: GreyImage| {
+    let file = Scratch::new("image.png", bytes);
+    for bits in [None, Some(1), Some(12), Some(16)] {
+        let Some(image) = answer(read_grey_image(&file.path, Grey::default(), bits)) else {
+            continue;
+        };
         // Half a level: where the caller says how many bits there are, the decoder's rounding may pass the largest level.
         let grey = |level: &f64| (0.0..=255.5).contains(level);
         assert!(image.levels.iter().all(grey) && [8, 16].contains(&image.bits));
         assert_eq!(image.to_u8().dim(), image.levels.dim());
-    };
-    if let Some(image) = answer(parse_grey_image(bytes, "image.png")) {
-        levels_are_grey(image);
-    }
-    let file = Scratch::new("image.png", bytes);
-    for bits in [1, 12, 16] {
-        if let Some(image) = answer(read_grey_image_of_bits(&file.path, bits)) {
-            levels_are_grey(image);
-        }
     }
 }
 
@@ -97,12 +72,12 @@ pub(crate) fn image(bytes: &[u8]) {
 pub(crate) fn toml(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     answer(Scene::parse(&text, "file.toml"));
-    if let Some(sensor) = answer(Sensor::parse(&text, "file.toml")) {
+    let file = Scratch::new("file.toml", bytes);
+    if let Some(sensor) = answer(Sensor::read(&file.path)) {
         let again = Scratch::new("file.toml", b"");
         sensor.write(&again.path).expect("a sensor can be written");
         Sensor::read(&again.path).expect("what was read and written is read again");
     }
-    let file = Scratch::new("file.toml", bytes);
     answer(SensorCalibration::read(&file.path));
     answer(read_contact_table(&file.path));
 }

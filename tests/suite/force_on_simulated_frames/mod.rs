@@ -5,6 +5,7 @@
 
 mod study;
 
+use crate::hostile::Hostile;
 use ndarray::{Array2, ArrayView2};
 use study::{study, study_with};
 use tactile_imaging::force::{
@@ -13,7 +14,7 @@ use tactile_imaging::force::{
     ShearTracker, StressCalibration, measure_force,
 };
 use tactile_imaging::simulate::{
-    Camera, Gain, Hostile, Illumination, Load, PressOptions, PressScene, PressTruth,
+    Camera, Gain, Illumination, Load, PressOptions, PressScene, PressTruth,
 };
 
 /// A quarter of the default resolution, so that a thousand frames take seconds.
@@ -36,7 +37,8 @@ fn press(camera: Camera) -> PressOptions {
 /// The sensor's true calibration, with its error left out: what is tested is the frames' share of the error.
 fn calibration(scene: &PressScene) -> LinearCalibration<f64> {
     let camera = scene.options().camera;
-    let newton_per_grey = camera.pixel_area_m2() / scene.grey_per_pascal();
+    let newton_per_grey =
+        camera.pixel_size_m.iter().product::<f64>() / scene.truth(0).grey_per_pascal;
     let pairs: Vec<_> = (0..11)
         .map(|k| 0.2 * f64::from(k))
         .map(|f| CalibrationPair::loading(f / newton_per_grey, f))
@@ -334,6 +336,8 @@ fn check(kind: Hostile, result: &Result<ForceMeasurement<f64>, ForceError>, trut
         Hostile::CutByEdge | Hostile::InCorner | Hostile::FillsFrame => {
             assert!(contact.unwrap().touches_edge, "{kind:?}");
         }
-        _ => assert!(result.is_ok(), "{kind:?}"),
+        Hostile::SubPixelContact | Hostile::BrighterLamps | Hostile::MovedLamps => {
+            assert!(result.is_ok(), "{kind:?}");
+        }
     }
 }

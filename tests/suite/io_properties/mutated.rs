@@ -5,6 +5,7 @@
 
 use nalgebra::Point;
 use proptest::prelude::*;
+use std::path::Path;
 use tactile_imaging::elasticity::curve::{
     CurveOptions, IndentationCurve, Indenter, Model, select_model,
 };
@@ -13,8 +14,7 @@ use tactile_imaging::force::{
     PolynomialCalibration, StressCalibration,
 };
 use tactile_imaging::io::{
-    cases::parse_cases, grid::parse_grid, image::parse_grey_image, points::parse_points,
-    read_table, write_grey_image,
+    Grey, read_cases, read_columns, read_grey_image, read_grid, read_points, write_grey_image,
 };
 use tactile_imaging::scene::Scene;
 use tactile_imaging::tps::ThinPlateSpline;
@@ -123,15 +123,27 @@ fn image(name: &str) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// Two columns of a table written to a file and read back.
-fn columns(bytes: &[u8], names: [&str; 2]) -> Option<[Vec<f64>; 2]> {
+/// What a reader says of a file with these bytes; an error must name the file.
+fn read<T, E: std::fmt::Display>(
+    bytes: &[u8],
+    name: &str,
+    reader: impl FnOnce(&Path) -> Result<T, E>,
+) -> Option<T> {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("table.csv");
+    let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    let table = answer(read_table(&path), "table.csv")?;
-    let column = |k: usize| answer(table.column(names[k], k, &path), "table.csv");
-    Some([column(0)?, column(1)?])
+    answer(reader(&path), name)
 }
+
+/// Two columns of a table.
+fn columns(bytes: &[u8], [first, second]: [(&str, &str); 2]) -> Option<[Vec<f64>; 2]> {
+    read(bytes, "table.csv", |path| {
+        read_columns(path, [(&[first.0], first.1), (&[second.0], second.1)])
+    })
+}
+
+const PAIRS: [(&str, &str); 2] = [("integrated_pixel_value", "grey_levels"), ("force", "N")];
+const DEPTHS: [(&str, &str); 2] = [("indentation", "m"), ("force", "N")];
 
 proptest! {
     #[test]
@@ -143,8 +155,8 @@ proptest! {
     /// The readable ones go on into a spline, whatever values their points have.
     #[test]
     fn points(edits in edits()) {
-        answer(parse_points::<3>(&mutated(POINTS, &edits), "a.csv"), "a.csv");
-        let Some(points) = answer(parse_points::<2>(&mutated(POINTS, &edits), "a.csv"), "a.csv") else { return Ok(()) };
+        read(&mutated(POINTS, &edits), "a.csv", |path| read_points::<3>(path));
+        let Some(points) = read(&mutated(POINTS, &edits), "a.csv", |path| read_points::<2>(path)) else { return Ok(()) };
         let targets: Vec<Point<f64, 2>> = points.iter().map(|p| p * 1.01).collect();
         if let Ok(spline) = ThinPlateSpline::<f64, 2>::fit(&points, &targets, &Default::default()) {
             let _ = spline.apply(&points[0]);
@@ -153,8 +165,8 @@ proptest! {
 
     #[test]
     fn grids_and_cases(edits in edits()) {
-        answer(parse_grid(&mutated(b"1,2,nan\n,5,6\n7,8,-9e9\n", &edits), "grid.csv"), "grid.csv");
-        answer(parse_cases(&mutated(CASES, &edits), "cases.txt"), "cases.txt");
+        read(&mutated(b"1,2,nan\n,5,6\n7,8,-9e9\n", &edits), "grid.csv", |path| read_grid(path));
+        read(&mutated(CASES, &edits), "cases.txt", |path| read_cases(path));
     }
 }
 
@@ -164,7 +176,7 @@ proptest! {
     #[test]
     fn images(edits in edits()) {
         for name in ["a.png", "a.pgm"] {
-            answer(parse_grey_image(&mutated(&image(name), &edits), name), name);
+            read(&mutated(&image(name), &edits), name, |path| read_grey_image(path, Grey::default(), None));
         }
     }
 
@@ -185,7 +197,7 @@ proptest! {
     /// A table from a file goes into every calibration; one that is made gives no NaN within its range.
     #[test]
     fn calibration_tables(edits in edits()) {
-        let Some([values, forces]) = columns(&mutated(TABLE, &edits), ["integrated_pixel_value", "force_N"]) else { return Ok(()) };
+        let Some([values, forces]) = columns(&mutated(TABLE, &edits), PAIRS) else { return Ok(()) };
         let pairs: Vec<_> = values.iter().zip(&forces).map(|(&v, &f)| CalibrationPair::loading(v, f)).collect();
         let options = CalibrationOptions::default();
         let fitted: [Option<Box<dyn StressCalibration<f64>>>; 3] = [
@@ -200,7 +212,7 @@ proptest! {
 
     #[test]
     fn indentation_curves(edits in edits()) {
-        let Some([depths, forces]) = columns(&mutated(CURVE, &edits), ["indentation_m", "force_N"]) else { return Ok(()) };
+        let Some([depths, forces]) = columns(&mutated(CURVE, &edits), DEPTHS) else { return Ok(()) };
         let Ok(curve) = IndentationCurve::new(&depths, &forces) else { return Ok(()) };
         let punch = Indenter::Punch { radius_m: 1e-3 };
         if let Ok(selection) = select_model(&curve, &punch, 0.5, Model::Auto, &CurveOptions::default()) {
@@ -212,13 +224,14 @@ proptest! {
 #[test]
 fn the_unchanged_files_are_read() {
     assert!(Scene::parse(std::str::from_utf8(SCENE).unwrap(), "scene.toml").is_ok());
-    assert_eq!(parse_points::<2>(POINTS, "a").unwrap().len(), 6);
-    assert_eq!(parse_cases(CASES, "a").unwrap().len(), 1);
-    let [depths, forces] = columns(CURVE, ["indentation_m", "force_N"]).unwrap();
+    let points = read(POINTS, "a", |path| read_points::<2>(path));
+    assert_eq!(points.unwrap().len(), 6);
+    assert_eq!(read(CASES, "a", |path| read_cases(path)).unwrap().len(), 1);
+    let [depths, forces] = columns(CURVE, DEPTHS).unwrap();
     assert!(IndentationCurve::new(&depths, &forces).is_ok());
-    assert!(parse_grey_image(&image("a.png"), "a").is_ok());
-    assert_eq!(
-        columns(TABLE, ["integrated_pixel_value", "force_N"]).unwrap()[0][3],
-        150_000.0
-    );
+    let image = read(&image("a.png"), "a", |path| {
+        read_grey_image(path, Grey::default(), None)
+    });
+    assert!(image.is_some());
+    assert_eq!(columns(TABLE, PAIRS).unwrap()[0][3], 150_000.0);
 }

@@ -49,7 +49,7 @@ impl Presses {
             poisson_ratio: NU,
         };
         let compliance = waveguide().as_body().compliance_per_pa();
-        let reduced = 1.0 / (compliance + soft.plane_strain_compliance());
+        let reduced = 1.0 / (compliance + (1.0 - NU) * (1.0 + NU) / modulus);
         let force_at = |ratio: f64| 4.0 / 3.0 * reduced * radius * radius * ratio.powi(3);
         let ratio = |k: u32| 0.1 + 0.2 * f64::from(k) / 11.0;
         let pixel_size_m = [0.3 * radius / 96.0; 2];
@@ -85,7 +85,7 @@ impl Presses {
             loads: (1..=GAUGE_LOADS)
                 .map(|k| Load::normal(largest_force * f64::from(k) / f64::from(GAUGE_LOADS)))
                 .collect(),
-            gain: Gain::GreyPerPascal(sphere.grey_per_pascal()),
+            gain: Gain::GreyPerPascal(sphere.truth(0).grey_per_pascal),
             seed: seed + 1_000_000,
             ..options
         });

@@ -29,7 +29,9 @@ struct Answer {
 
 fn answer(trial: &Trial, binning: Binning) -> Answer {
     let pipeline = trial.pipeline().unwrap().with_control_points(60);
-    let pipeline = pipeline.with_binning(binning).unwrap();
+    let pipeline = pipeline
+        .with_settings(|settings| settings.binning = binning)
+        .unwrap();
     let mut press = trial.press(&pipeline).unwrap();
     let surface = press.surface(0).unwrap().clone();
     let found = press.strain(1).unwrap();

@@ -1,13 +1,14 @@
 //! Hostile presses: a typed error or a flagged answer, never a panic, never a silent NaN.
 //!
 //! 500 presses are some three of every pair of troubles; `HOSTILE=10000` takes more, as `.ci/run studies` does in an optimised build.
+use crate::hostile::Hostile;
 use ndarray::{Array2, s};
 use proptest::prelude::*;
 use std::sync::OnceLock;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Flag, Measurement, Object, Session};
-use tactile_imaging::simulate::{Camera, Hostile, PressOptions};
+use tactile_imaging::simulate::{Camera, PressOptions};
 
 const SHAPE: [usize; 2] = [36, 44];
 const SEEDS: usize = 24;
@@ -125,7 +126,7 @@ fn assert_sound(m: &Measurement) {
 
 /// Every frame through a session, in which no error may stick.
 fn stream(pipeline: &Pipeline, reference: &Array2<u8>, frames: [&Array2<u8>; 2]) {
-    let mut session = Session::new(pipeline, reference.view()).unwrap();
+    let mut session = Session::new(pipeline, &[reference.view()]).unwrap();
     for frame in frames.into_iter().chain(frames) {
         if let Ok(update) = session.push(frame.view())
             && let Some(contact) = update.contact

@@ -173,7 +173,11 @@ fn equal_frames_are_measured_once_with_the_same_bits() {
         equal_frames: false,
         ..Skips::default()
     };
-    let without = trial.pipeline().unwrap().with_skips(skips);
+    let without = trial
+        .pipeline()
+        .unwrap()
+        .with_settings(|settings| settings.skips = skips)
+        .unwrap();
     let (a, few) = answers(&trial, &with, true);
     let (b, many) = answers(&trial, &without, true);
     assert_eq!(a, b);
@@ -189,7 +193,11 @@ fn surfaces_of_the_box_alone_equal_those_of_the_whole_frame() {
         outside_contact: false,
         ..Skips::default()
     };
-    let whole = trial.pipeline().unwrap().with_skips(skips);
+    let whole = trial
+        .pipeline()
+        .unwrap()
+        .with_settings(|settings| settings.skips = skips)
+        .unwrap();
     let (mut a, mut b) = (trial.press(&inside).unwrap(), trial.press(&whole).unwrap());
     let (a, b) = (a.surface(0).unwrap(), b.surface(0).unwrap());
     assert!(
@@ -266,13 +274,17 @@ fn a_flat_field_makes_the_force_the_same_in_a_corner() {
     // The sensor is calibrated in the frame's middle.
     let series = scene.calibrate(&CalibrationOptions::default()).unwrap();
     let pairs: Vec<_> = series
-        .pairs()
-        .map(|(sum, force)| CalibrationPair::loading(sum, force))
+        .pairs
+        .iter()
+        .map(|p| CalibrationPair::loading(p.integrated_pixel_value, p.force_n))
         .collect();
     let error = |flat: bool| {
         let pipeline =
             Pipeline::from_pairs(&pairs, corner.simulation.pixel_size_m, Object::sphere(3e-3));
-        let pipeline = pipeline.unwrap().with_flat_field(flat);
+        let pipeline = pipeline
+            .unwrap()
+            .with_settings(|settings| settings.flat_field = flat)
+            .unwrap();
         let mut press = corner.press(&pipeline).unwrap();
         press.contact(0).unwrap().unwrap().force_n.unwrap().value / 0.5 - 1.0
     };

@@ -28,14 +28,14 @@ fn told<T: std::fmt::Display + serde::Serialize>(result: &T) -> String {
 fn every_result_can_be_read_by_people_and_programs() {
     let trial = trial(&[0.7, 1.2], 6);
     let pipeline = trial.pipeline().unwrap();
-    let mut session = Session::new(&pipeline, trial.simulation.reference.view()).unwrap();
+    let mut session = Session::new(&pipeline, &[trial.simulation.reference.view()]).unwrap();
     let empty = trial.scene.reference(3);
     assert_eq!(
         told(&session.push(empty.view()).unwrap()),
         "frame 1: no contact"
     );
     assert!(
-        told(&session.drift()).ends_with("1 frame without contact"),
+        told(session.drift()).ends_with("1 frame without contact"),
         "{}",
         session.drift()
     );
@@ -73,10 +73,5 @@ fn every_result_can_be_read_by_people_and_programs() {
     assert!(
         told(&ball).starts_with("ball of radius 3.000 mm at (1.000, 2.000) mm"),
         "{ball}"
-    );
-    let truth = trial.truth();
-    assert!(
-        told(&truth).contains("103.0000 kPa")
-            && told(&truth.frames[1]).starts_with("force 1.2000 N")
     );
 }

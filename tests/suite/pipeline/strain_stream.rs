@@ -12,12 +12,14 @@ use tactile_imaging::pipeline::{
 };
 
 fn session(trial: &Trial, pipeline: &Pipeline) -> Session {
-    Session::new(pipeline, trial.simulation.reference.view()).unwrap()
+    Session::new(pipeline, &[trial.simulation.reference.view()]).unwrap()
 }
 
 /// Mean strains of all frames against the first, and what the matches took.
 fn strains(trial: &Trial, skips: Skips) -> (Vec<Matrix3<f64>>, usize, Session) {
-    let mut session = session(trial, &trial.pipeline().unwrap().with_skips(skips));
+    let pipeline = trial.pipeline().unwrap();
+    let pipeline = pipeline.with_settings(|settings| settings.skips = skips);
+    let mut session = session(trial, &pipeline.unwrap());
     let (mut means, mut iterations) = (Vec::new(), 0);
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();

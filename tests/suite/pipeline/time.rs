@@ -31,7 +31,7 @@ fn frame(trial: &Trial, modulus_pa: f64, force_n: f64, gain: f64, repeat: u32) -
         object,
         law: ContactLaw::Hertz,
         loads: vec![Load::normal(force_n)],
-        gain: Gain::GreyPerPascal(gain * trial.scene.grey_per_pascal()),
+        gain: Gain::GreyPerPascal(gain * trial.scene.truth(0).grey_per_pascal),
         ..options.clone()
     });
     scene.unwrap().frame(0, repeat)
@@ -172,8 +172,9 @@ fn few_frames_or_no_times_claim_nothing() {
     for frame in &frames {
         press.add_frame(frame.view());
     }
-    assert_eq!(press.time_dependence().unwrap(), None);
-    assert!(!press.measure().flags.iter().any(confounded));
+    let measurement = press.measure();
+    assert_eq!(measurement.time, None);
+    assert!(!measurement.flags.iter().any(confounded));
 }
 
 #[test]
@@ -202,8 +203,5 @@ fn times_that_cannot_be_are_refused() {
     };
     assert_eq!(error, before);
     press.set_time_s(0, 2.0).unwrap();
-    assert_eq!(
-        press.renewed().time_dependence().unwrap().unwrap().to_s,
-        2.0
-    );
+    assert_eq!(press.measure().time.unwrap().to_s, 2.0);
 }

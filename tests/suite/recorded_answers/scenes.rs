@@ -71,7 +71,8 @@ fn block() -> Vec<Answer> {
         ..UniaxialOptions::default()
     })
     .expect("a scene");
-    let per_grey = scene.options().camera.pixel_area_m2() / scene.grey_per_pascal();
+    let per_grey =
+        scene.options().camera.pixel_size_m.iter().product::<f64>() / scene.grey_per_pascal();
     let pairs = [0.0, 1e5, 2e5, 3e5].map(|value| CalibrationPair::loading(value, per_grey * value));
     let object = Object::Unknown { poisson_ratio: 0.5 };
     let pixel_size_m = scene.options().camera.pixel_size_m;
@@ -130,7 +131,10 @@ fn dark() -> Vec<Answer> {
         let mut pipeline = Pipeline::new(contact.clone(), object)
             .expect("a pipeline")
             .with_surface(depths.clone(), SurfaceInput::Signal)
-            .with_scale_errors(0.01, 0.002)
+            .with_settings(|settings| {
+                settings.force_scale_error = 0.01;
+                settings.length_scale_error = 0.002;
+            })
             .expect("errors")
             .with_control_points(80);
         pipeline = if name == "punch/" {
@@ -248,8 +252,8 @@ fn stream() -> Vec<Answer> {
     let ratio = ratio.with_sphere_radius(3e-3).expect("a ball");
     let ratio = pipeline.clone().with_estimator(ratio);
     let reference = || trial.simulation.reference.view();
-    let mut session = Session::new(&pipeline, reference()).expect("a session");
-    let mut by_strain = Session::new(&ratio, reference()).expect("a session");
+    let mut session = Session::new(&pipeline, &[reference()]).expect("a session");
+    let mut by_strain = Session::new(&ratio, &[reference()]).expect("a session");
     session
         .push(trial.scene.reference(9).view())
         .expect("an update");
@@ -304,6 +308,7 @@ fn scene_file() -> Vec<Answer> {
     // A ball as small as the object would saturate.
     let calibration = made
         .unsaturated(CalibrationOptions::default())
+        .and_then(|options| made.calibrate(&options))
         .expect("an indenter that does not saturate");
     let path = write_folder(&made, &calibration, folder.path()).expect("files");
     let scene = Scene::read(&path).expect("a scene");

@@ -38,12 +38,9 @@ fn scene_of(material: Elastic, seed: u64) -> PressScene {
 fn a_simulated_scene_on_disk_gives_the_polymers_moduli() {
     for (material, seed) in [(Elastic::CL2000X, 3), (Elastic::CL2003X, 4)] {
         let folder = tempfile::tempdir().unwrap();
-        let path = write_folder(
-            &scene_of(material, seed),
-            &CalibrationOptions::default(),
-            folder.path(),
-        )
-        .unwrap();
+        let scene = scene_of(material, seed);
+        let calibration = scene.calibrate(&CalibrationOptions::default()).unwrap();
+        let path = write_folder(&scene, &calibration, folder.path()).unwrap();
         let measured = Scene::measure_file(path).unwrap();
         let modulus = measured.youngs_modulus_pa.unwrap();
         let error = modulus.value / material.youngs_modulus_pa - 1.0;
@@ -214,7 +211,8 @@ fn stages_by_name_are_those_given_as_values() {
         ..PressOptions::default()
     })
     .unwrap();
-    let path = write_folder(&made, &CalibrationOptions::default(), folder.path()).unwrap();
+    let calibration = made.calibrate(&CalibrationOptions::default()).unwrap();
+    let path = write_folder(&made, &calibration, folder.path()).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     // Without the simulator's own choice of an estimator.
     let text = text.replace("[stages]\nestimator = \"sphere\"\n", "");
@@ -229,7 +227,10 @@ fn stages_by_name_are_those_given_as_values() {
     };
     let of_scene = scene.pipeline(&scene.load().unwrap()).unwrap();
     let pipeline = Pipeline::from_pairs(&pairs, scene.pixel_size_m, scene.object).unwrap();
-    let pipeline = pipeline.with_waveguide(of_scene.settings().waveguide.clone().unwrap());
+    let waveguide = of_scene.settings().waveguide.clone();
+    let pipeline = pipeline
+        .with_settings(|settings| settings.waveguide = waveguide)
+        .unwrap();
     // `{:?}` prints every bit of a number.
     assert_eq!(by_name(""), measured(&scene, &pipeline));
     let named = by_name("sampler = \"curvature\"\nwarp = \"affine\"\nstrain = \"hencky\"");

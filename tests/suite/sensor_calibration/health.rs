@@ -2,7 +2,6 @@
 use super::sensors::{Effects, SAMPLE_RADIUS_M, Simulated};
 use tactile_imaging::force::{ChartState, HealthOptions};
 use tactile_imaging::pipeline::{LightContact, Object, Pipeline, Session};
-use tactile_imaging::sensor::Sensor;
 use tactile_imaging::simulate::Camera;
 
 const BASELINE: usize = 100;
@@ -11,7 +10,7 @@ const BASELINE: usize = 100;
 fn a_change_of_gain_is_found_within_fifty_frames_and_not_before() {
     let stage = LightContact::gauged(
         Camera::default().coarser(4).pixel_size_m,
-        &Sensor::force_options(),
+        &super::drift_corrected(),
     )
     .unwrap();
     let pipeline = Pipeline::new(stage, Object::sphere(SAMPLE_RADIUS_M)).unwrap();
@@ -26,7 +25,7 @@ fn a_change_of_gain_is_found_within_fifty_frames_and_not_before() {
     for (seed, gain) in [(1, 1.02), (2, 0.98)] {
         let mut simulated = Simulated::new(flicker, Camera::default().coarser(4), seed);
         let reference = simulated.reference();
-        let mut session = Session::new(&pipeline, reference.view())
+        let mut session = Session::new(&pipeline, &[reference.view()])
             .unwrap()
             .with_health(health);
         let mut number = 0;

@@ -283,10 +283,9 @@ impl Simulated {
             for (k, (force, branch)) in all.into_iter().enumerate() {
                 let (load, place) = (self.load(force), self.place());
                 let law = ContactLaw::Tabulated(states.clone());
-                let scene = self
-                    .scene
-                    .with_object(rigid(self.balls[ball]), law, vec![load]);
-                let scene = scene.unwrap().with_centre(place);
+                let scene = centred(&self.scene, place);
+                let scene = scene.with_object(rigid(self.balls[ball]), law, vec![load]);
+                let scene = scene.unwrap();
                 let noise = GAUGE_NOISE_N * normal(&mut self.rng);
                 presses.push(SensorPress {
                     frame: scene.frame(0, (100 * (ball + 1) + k) as u32),
@@ -330,8 +329,8 @@ impl Simulated {
         let place = self.place();
         let law = ContactLaw::Tabulated(states);
         let object = Sphere { radius_m, material };
-        let scene = self.scene.with_object(object, law, loads).unwrap();
-        let scene = scene.with_centre(place);
+        let scene = centred(&self.scene, place);
+        let scene = scene.with_object(object, law, loads).unwrap();
         (0..LOADS_N.len()).map(|k| scene.frame(k, repeat)).collect()
     }
 }
@@ -341,4 +340,13 @@ fn rigid(radius_m: f64) -> Sphere {
         radius_m,
         material: Elastic::RIGID,
     }
+}
+
+/// The same scene with its contact centred elsewhere, in pixels: its light does not depend on the place.
+fn centred(scene: &PressScene, place: [f64; 2]) -> PressScene {
+    PressScene::new(PressOptions {
+        centre_px: Some(place),
+        ..scene.options().clone()
+    })
+    .unwrap()
 }

@@ -115,19 +115,22 @@ fn pipeline(calibration: &SensorCalibration, sensor: &Sensor, left_out: LeftOut)
             .unwrap()
             .with_lens(lens),
         LeftOut::Drift => sensor.contact(&ForceOptions::default()).unwrap(),
-        _ => sensor.contact(&Sensor::force_options()).unwrap(),
+        _ => sensor.contact(&super::drift_corrected()).unwrap(),
     };
+    let whole = sensor.pipeline(object()).unwrap();
     let n = sensor.layer_covariance.len();
     let covariance = nalgebra::DMatrix::from_fn(n, n, |i, j| sensor.layer_covariance[i][j]);
     Pipeline::new(stage, object())
         .unwrap()
-        .with_flat_field(sensor.flat_field)
-        .with_scale_errors(sensor.gauge_error, sensor.geometry.length_scale_error())
-        .unwrap()
-        .with_waveguide(sensor.waveguide().unwrap())
-        .with_layer_covariance(covariance)
-        .unwrap()
-        .with_object_errors(BALL_ERROR * SAMPLE_RADIUS_M, POISSON_ERROR)
+        .with_settings(|settings| {
+            settings.waveguide = Some(sensor.waveguide().unwrap());
+            settings.flat_field = sensor.flat_field;
+            settings.force_scale_error = sensor.gauge_error;
+            settings.length_scale_error = whole.settings().length_scale_error;
+            settings.layer_covariance = Some(covariance);
+            settings.object_radius_error_m = BALL_ERROR * SAMPLE_RADIUS_M;
+            settings.poisson_ratio_error = POISSON_ERROR;
+        })
         .unwrap()
         .with_estimator(estimator(
             SAMPLE_RADIUS_M,

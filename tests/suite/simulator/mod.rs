@@ -34,9 +34,9 @@ fn the_light_of_an_ideal_frame_sums_to_the_force() {
     for (k, force) in [(0, 0.7), (1, 1.2)] {
         let truth = scene.truth(k);
         let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
-        let area = scene.options().camera.pixel_area_m2();
+        let area = scene.options().camera.pixel_size_m.iter().product::<f64>();
         // 10⁵ pixels of up to 215 grey levels, each rounded to 1 ulp (3e-14), against a sum of 10⁶: below 1e-13.
-        assert!(relative(light * area / scene.grey_per_pascal(), force) < 1e-12);
+        assert!(relative(light * area / scene.truth(0).grey_per_pascal, force) < 1e-12);
         assert!(relative(light, truth.integrated_pixel_value) < 1e-12);
         assert!(relative(truth.visible_force_n, force) < 1e-12);
         assert!(relative(truth.pressure_pa().sum() * area, force) < 1e-12);
@@ -54,7 +54,7 @@ fn the_bent_response_integrates_exactly() {
     options.camera = options.camera.ideal();
     options.response = Response::Quadratic { droop: 0.2 };
     let (area, background) = (
-        options.camera.pixel_area_m2(),
+        options.camera.pixel_size_m.iter().product::<f64>(),
         options.camera.background_grey,
     );
     let scene = PressScene::new(options).unwrap();
@@ -66,7 +66,7 @@ fn the_bent_response_integrates_exactly() {
         // The response bends relative to the largest load's peak: κ/p_max.
         let droop_per_pascal = 0.2 / scene.truth(1).contact.peak_pressure_pa;
         let expected =
-            scene.grey_per_pascal() * (contact.force_n - droop_per_pascal * squared) / area;
+            scene.truth(0).grey_per_pascal * (contact.force_n - droop_per_pascal * squared) / area;
         let light: f64 = scene.expected_frame(k).iter().map(|v| v - background).sum();
         assert!(relative(light, expected) < 1e-12);
         assert!(relative(scene.truth(k).integrated_pixel_value, expected) < 1e-12);
@@ -83,7 +83,7 @@ fn light_as_a_power_of_the_pressure_integrates_as_hertz_says() {
         options.camera = options.camera.ideal();
         options.response = Response::Power { exponent };
         let scene = PressScene::new(options).unwrap();
-        let area = scene.options().camera.pixel_area_m2();
+        let area = scene.options().camera.pixel_size_m.iter().product::<f64>();
         let largest = scene.truth(1).contact.peak_pressure_pa;
         for k in 0..2 {
             let contact = scene.truth(k).contact;
@@ -91,7 +91,7 @@ fn light_as_a_power_of_the_pressure_integrates_as_hertz_says() {
             // ∫ (1 − r²/a²)^{n/2} dS = πa²/(1 + n/2).
             let disc = std::f64::consts::PI * a * a / (1.0 + 0.5 * exponent);
             let peak = largest * (contact.peak_pressure_pa / largest).powf(exponent);
-            let expected = scene.grey_per_pascal() * peak * disc / area;
+            let expected = scene.truth(0).grey_per_pascal * peak * disc / area;
             let found = scene.truth(k).integrated_pixel_value;
             assert!(
                 relative(found, expected) < 1e-4,
@@ -145,7 +145,7 @@ fn shear_moves_the_contact_by_force_over_stiffness() {
     ];
     options.shear_stiffness_n_per_m = [400.0, 500.0];
     let scene = PressScene::new(options).unwrap();
-    let (before, after) = (scene.truth(0).centre_m(), scene.truth(1).centre_m());
+    let (before, after) = (centre_m(&scene.truth(0)), centre_m(&scene.truth(1)));
     assert!(relative(after[0] - before[0], 0.2 / 400.0) < 1e-12);
     assert!(relative(after[1] - before[1], -0.1 / 500.0) < 1e-12);
 }
@@ -329,4 +329,9 @@ fn every_meaningless_value_is_named() {
         })
         .is_ok()
     );
+}
+
+/// The contact's centre (x, y) in metres from the first pixel's centre.
+fn centre_m(truth: &tactile_imaging::simulate::PressTruth) -> [f64; 2] {
+    std::array::from_fn(|k| truth.centre_px[k] * truth.pixel_size_m[k])
 }

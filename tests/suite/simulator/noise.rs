@@ -24,7 +24,8 @@ fn noise_has_the_stated_mean_and_variance() {
         if grey < 4.0 {
             continue;
         }
-        let expected = camera.noise_sd_grey(grey).powi(2) + 1.0 / 12.0;
+        let photons = grey * 255.0 / camera.full_well_electrons;
+        let expected = photons + camera.read_noise_grey.powi(2) + 1.0 / 12.0;
         // Five standard errors: a false alarm in 10⁶.
         assert!(
             (mean - grey).abs() < 5.0 * (expected / n).sqrt() + 0.02,

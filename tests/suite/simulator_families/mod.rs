@@ -2,10 +2,12 @@
 
 mod uniaxial;
 
+use crate::hostile::Hostile;
 use proptest::prelude::*;
+use tactile_imaging::force::Branch;
 use tactile_imaging::simulate::{
-    Branch, CalibrationOptions, Camera, Elastic, Gain, Hostile, LoadCycle, PressOptions,
-    PressScene, Response, SimulateError, Sphere, write_folder,
+    CalibrationOptions, Camera, Elastic, Gain, LoadCycle, PressOptions, PressScene, Response,
+    SimulateError, Sphere, write_folder,
 };
 
 fn camera(rows: usize, cols: usize) -> Camera {
@@ -37,18 +39,14 @@ fn the_calibration_is_linear_and_holds_for_the_object_as_well() {
         ..CalibrationOptions::default()
     };
     let series = scene.calibrate(&quiet).unwrap();
-    assert_eq!(series.points.len(), 41);
-    assert_eq!(series.points[20].true_force_n, 2.0);
-    assert_eq!(series.points[21].branch, Branch::Unloading);
+    assert_eq!((series.pairs.len(), series.true_forces_n.len()), (41, 41));
+    assert_eq!(series.true_forces_n[20], 2.0);
+    assert_eq!(series.pairs[21].branch, Branch::Unloading);
     // 90 828 pixels of about 0.8 grey levels of noise, twice; five standard errors.
     let noise = 5.0 * (2.0 * 90828.0_f64).sqrt() * 1.2 * series.newton_per_grey;
-    for point in &series.points {
-        let found = point.integrated_pixel_value * series.newton_per_grey;
-        assert!(
-            (found - point.true_force_n).abs() < noise,
-            "{found} N of {}",
-            point.true_force_n
-        );
+    for (pair, force_n) in series.pairs.iter().zip(&series.true_forces_n) {
+        let found = pair.integrated_pixel_value * series.newton_per_grey;
+        assert!((found - force_n).abs() < noise, "{found} N of {force_n}");
     }
     let made = scene.simulate();
     let sum = |k: usize| {
@@ -73,18 +71,16 @@ fn gauge_noise_and_hysteresis_are_as_asked() {
         ..CalibrationOptions::default()
     };
     let series = scene.calibrate(&options).unwrap();
-    let errors: Vec<f64> = series
-        .points
-        .iter()
-        .map(|p| p.force_n - p.true_force_n)
-        .collect();
+    let both = series.pairs.iter().zip(&series.true_forces_n);
+    let errors: Vec<f64> = both.map(|(pair, force)| pair.force_n - force).collect();
     let n = errors.len() as f64;
     let sd = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
     // Five standard errors of a standard deviation from 201 readings.
     assert!(relative(sd, 0.02) < 5.0 / (2.0 * n).sqrt(), "{sd}");
     // At half load the branches differ by the stated tenth of the range.
-    let (up, down) = (&series.points[50], &series.points[150]);
-    assert_eq!((up.true_force_n, down.true_force_n), (1.0, 1.0));
+    let (up, down) = (&series.pairs[50], &series.pairs[150]);
+    let forces = [series.true_forces_n[50], series.true_forces_n[150]];
+    assert_eq!(forces, [1.0, 1.0]);
     let gap = (down.integrated_pixel_value - up.integrated_pixel_value) * series.newton_per_grey;
     assert!((gap - 0.2).abs() < 0.01, "{gap}");
 }
@@ -101,10 +97,10 @@ fn a_bent_response_bends_the_calibration_below_the_line() {
         ..CalibrationOptions::default()
     };
     let series = scene.calibrate(&quiet).unwrap();
-    let value = |k: usize| series.points[k].integrated_pixel_value;
+    let value = |k: usize| series.pairs[k].integrated_pixel_value;
     assert!(value(20) < 2.0 * value(10) * 0.99);
     assert!(
-        series.points[..21]
+        series.pairs[..21]
             .windows(2)
             .all(|w| w[1].integrated_pixel_value > w[0].integrated_pixel_value)
     );
@@ -130,7 +126,8 @@ fn a_stream_rests_rises_and_falls_at_the_frame_rate() {
     assert!(forces[88].abs() < 1e-12);
     assert!(relative(frames[16].truth.load.illumination.level, 1.1) < 1e-12);
     assert_eq!(frames[16].time_s, 0.2);
-    let moved = frames[48].truth.centre_m()[0] - frames[0].truth.centre_m()[0];
+    let moved_px = frames[48].truth.centre_px[0] - frames[0].truth.centre_px[0];
+    let moved = moved_px * frames[0].truth.pixel_size_m[0];
     assert!(relative(moved, 0.1 / scene.options().shear_stiffness_n_per_m[0]) < 1e-9);
     let again: Vec<_> = scene.stream(cycle).unwrap().map(|f| f.frame).collect();
     assert!(frames.iter().zip(&again).all(|(a, b)| a.frame == *b));
@@ -152,12 +149,8 @@ fn a_stream_rests_rises_and_falls_at_the_frame_rate() {
 fn a_scene_on_disk_has_the_files_its_description_names() {
     let folder = tempfile::tempdir().unwrap();
     let scene = PressScene::new(press(66, 87)).unwrap();
-    let path = write_folder(
-        &scene,
-        &CalibrationOptions::default(),
-        &folder.path().join("scene"),
-    )
-    .unwrap();
+    let calibration = scene.calibrate(&CalibrationOptions::default()).unwrap();
+    let path = write_folder(&scene, &calibration, &folder.path().join("scene")).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let table: toml::Table = text.parse().unwrap();
     let home = path.parent().unwrap();
@@ -180,7 +173,7 @@ fn a_scene_on_disk_has_the_files_its_description_names() {
     assert_eq!(table["waveguide"]["layers"].as_array().unwrap().len(), 3);
     assert_eq!(table["object"]["shape"].as_str(), Some("sphere"));
     let blocked = home.join("reference.png").join("below_a_file");
-    assert!(write_folder(&scene, &CalibrationOptions::default(), &blocked).is_err());
+    assert!(write_folder(&scene, &calibration, &blocked).is_err());
 }
 
 #[test]
@@ -258,12 +251,12 @@ proptest! {
         let truth = &made.truth[0];
         prop_assert!(truth.visible_force_n >= 0.0 && truth.visible_force_n <= force * (1.0 + 1e-9));
         let light: f64 = scene.expected_frame(0).iter().map(|v| v - camera.background_grey).sum();
-        let carried = light * camera.pixel_area_m2();
+        let carried = light * camera.pixel_size_m.iter().product::<f64>();
         // Blur moves light over the edge, but makes none.
-        let most = force * scene.grey_per_pascal();
+        let most = force * scene.truth(0).grey_per_pascal;
         prop_assert!(carried >= -1e-9 * most.max(1e-12) && carried <= most * (1.0 + 1e-9) + 1e-12);
         if blur == 0.0 {
-            prop_assert!((carried - truth.visible_force_n * scene.grey_per_pascal()).abs() <= 1e-9 * most);
+            prop_assert!((carried - truth.visible_force_n * scene.truth(0).grey_per_pascal).abs() <= 1e-9 * most);
         }
     }
 

@@ -141,7 +141,10 @@ fn pipelines() -> Vec<Pipeline> {
             .unwrap()
             .with_control_points(24)
     });
-    let flat = made[0].clone().with_flat_field(true);
+    let flat = made[0]
+        .clone()
+        .with_settings(|settings| settings.flat_field = true)
+        .unwrap();
     made.into_iter().chain([flat]).collect()
 }
 
@@ -261,7 +264,7 @@ fn measured_is_sound(case: &str, measured: &Measurement) {
 
 /// A stream of the same frames, twice, in which no error may stick: a sound frame pushed after an error is measured as ever.
 fn stream(case: &str, pipeline: &Pipeline, [reference, first, second]: &[Array2<u8>; 3]) {
-    let Ok(mut session) = Session::new(pipeline, reference.view()) else {
+    let Ok(mut session) = Session::new(pipeline, &[reference.view()]) else {
         return;
     };
     let finite = |s: &SessionStrain| {

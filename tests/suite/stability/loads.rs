@@ -4,9 +4,7 @@ use super::table::{EXACT, Table};
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::pipeline::{
-    EstimatorChoice, PipelineError, SESSION_LOADS, Session, StagesConfig, Trial,
-};
+use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, Session, StagesConfig, Trial};
 
 /// Rising by 35 mN from 0.2 N: the last within the calibration.
 fn steps(loads: usize) -> Vec<f64> {
@@ -21,12 +19,15 @@ pub(crate) fn many(table: &mut Table) {
         ("one load", vec![0.7]),
         ("eight equal loads", vec![0.7; 8]),
         ("eight falling loads", falling),
-        ("a session full of loads", steps(SESSION_LOADS)),
-        ("a session overfull of loads", steps(SESSION_LOADS + 3)),
+        ("a session full of loads", steps(Session::MOST_LOADS)),
+        (
+            "a session overfull of loads",
+            steps(Session::MOST_LOADS + 3),
+        ),
     ] {
         let trial = trial(coarse_camera(), 200.0, &forces);
         let pipeline = pipeline(&trial, SI);
-        let truth = trial.truth().youngs_modulus_pa;
+        let truth = trial.simulation.youngs_modulus_pa;
         let press = trial.press(&pipeline).unwrap().modulus().unwrap();
         let session = streamed(&trial, &pipeline);
         let gap = relative(
@@ -35,7 +36,7 @@ pub(crate) fn many(table: &mut Table) {
             1.0,
         );
         // A session has its loads in rising order; those that it merges are 3 % apart and follow one law, of which they are means.
-        let allowed = if forces.len() > SESSION_LOADS {
+        let allowed = if forces.len() > Session::MOST_LOADS {
             0.1 * press.standard_error_pa / truth
         } else {
             EXACT
@@ -59,7 +60,7 @@ pub(crate) fn many(table: &mut Table) {
 
 fn streamed(trial: &Trial, pipeline: &Pipeline) -> ModulusEstimate<f64> {
     let reference = trial.simulation.reference.view();
-    let mut session = Session::new(pipeline, reference).unwrap();
+    let mut session = Session::new(pipeline, &[reference]).unwrap();
     for frame in &trial.simulation.frames {
         session.push(frame.view()).unwrap();
     }

@@ -79,7 +79,8 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
     let waveguide = Waveguide::new(layers.collect()).expect("layers");
     Pipeline::from_pairs(&pairs, size, object)
         .expect("a calibration")
-        .with_waveguide(waveguide)
+        .with_settings(|settings| settings.waveguide = Some(waveguide))
+        .unwrap()
         .with_stages(&StagesConfig {
             // The law that the simulated contacts obey.
             estimator: EstimatorChoice::Sphere,

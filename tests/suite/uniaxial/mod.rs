@@ -100,7 +100,10 @@ fn a_ball_said_to_be_a_block_or_of_unknown_shape_is_refused_with_what_to_say() {
         Object::Unknown { poisson_ratio: 0.5 },
         Object::Block { poisson_ratio: 0.5 },
     ] {
-        let pipeline = trial.pipeline().unwrap().with_object(object).unwrap();
+        let pipeline = trial.pipeline().unwrap();
+        let pipeline = pipeline
+            .with_settings(|settings| settings.object = object)
+            .unwrap();
         let pipeline = pipeline.with_stages(&Default::default()).unwrap();
         let error = trial.press(&pipeline).unwrap().modulus().unwrap_err();
         assert!(
@@ -117,7 +120,7 @@ fn a_session_reads_a_block_as_a_press_does() {
     let scene = face.scene(5);
     let pipeline: Pipeline = face.pipeline(&scene, Object::Block { poisson_ratio: 0.5 });
     let reference = scene.reference(0);
-    let mut session = Session::new(&pipeline, reference.view()).unwrap();
+    let mut session = Session::new(&pipeline, &[reference.view()]).unwrap();
     let mut press = pipeline.press(reference.view()).unwrap();
     let frames: Vec<_> = (0..3).map(|load| scene.frame(load, 0)).collect();
     for frame in &frames {

@@ -83,7 +83,7 @@ impl Face {
 
     /// A pipeline whose calibration is exact.
     pub(super) fn pipeline(&self, scene: &UniaxialScene, object: Object) -> Pipeline {
-        let per_grey = self.camera.pixel_area_m2() / scene.grey_per_pascal();
+        let per_grey = self.camera.pixel_size_m.iter().product::<f64>() / scene.grey_per_pascal();
         let pairs = exact_pairs(per_grey);
         Pipeline::from_pairs(&pairs, self.camera.pixel_size_m, object).unwrap()
     }

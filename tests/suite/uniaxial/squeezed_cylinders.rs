@@ -43,7 +43,7 @@ fn measured(
         ..PressOptions::default()
     })
     .unwrap();
-    let per_grey = camera.pixel_area_m2() / scene.grey_per_pascal();
+    let per_grey = camera.pixel_size_m.iter().product::<f64>() / scene.truth(0).grey_per_pascal;
     let pipeline =
         Pipeline::from_pairs(&exact_pairs(per_grey), camera.pixel_size_m, object).unwrap();
     let pipeline = match hencky {

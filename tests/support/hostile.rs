@@ -1,32 +1,13 @@
 //! Scenes on which a measurement must end with a flag, an error or a value, never a panic.
 
 use ndarray::Array2;
-
-use super::camera::Camera;
-use super::light::Illumination;
-use super::pixel_average::Patch;
-use super::press::PressScene;
-use super::press_options::{Gain, Load, PressOptions};
-use super::simulation::PressSimulation;
+use tactile_imaging::simulate::{
+    Gain, Illumination, Load, PressOptions, PressScene, PressSimulation, SimulateError,
+};
 
 /// What is wrong with the scene.
-///
-/// ```
-/// use tactile_imaging::simulate::{Camera, Hostile, PressOptions};
-/// let camera = Camera::default().coarser(16);
-/// let base = PressOptions { camera, ..PressOptions::default() };
-/// let bright = Hostile::SaturatedContact.simulate(&base)?;
-/// assert!(bright.truth[0].saturated_pixels > 0 && bright.frames[0].iter().any(|&v| v == 255));
-/// let cut = &Hostile::CutByEdge.simulate(&base)?.truth[0];
-/// assert!((cut.visible_force_n / cut.contact.force_n - 0.5).abs() < 0.01);
-/// for kind in Hostile::ALL {
-///     assert_eq!(kind.simulate(&base)?.frames.len(), 1);
-/// }
-/// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Hostile {
+pub(crate) enum Hostile {
     /// Nothing touches the sensor.
     NoiseOnly,
     /// Every pixel of frame and reference is 255.
@@ -55,7 +36,7 @@ pub enum Hostile {
 
 impl Hostile {
     /// All kinds.
-    pub const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::NoiseOnly,
         Self::AllSaturated,
         Self::AllBlack,
@@ -73,9 +54,7 @@ impl Hostile {
     /// Reference, one frame and truth of the scene on `base` (camera, object, waveguide, seed), whose loads, gain and
     /// centre are replaced.
     ///
-    /// # Errors
-    /// As [`PressScene::new`] for a `base` without meaning.
-    pub fn simulate(self, base: &PressOptions) -> Result<PressSimulation, super::SimulateError> {
+    pub(crate) fn simulate(self, base: &PressOptions) -> Result<PressSimulation, SimulateError> {
         let (options, force_n) = self.options(base)?;
         if self == Self::SeveralContacts {
             return several(&options, force_n);
@@ -93,16 +72,16 @@ impl Hostile {
     }
 
     /// The scene's options, and the force of its common contact: a fifth of the frame's shorter side in radius.
-    fn options(self, base: &PressOptions) -> Result<(PressOptions, f64), super::SimulateError> {
+    fn options(self, base: &PressOptions) -> Result<(PressOptions, f64), SimulateError> {
         let camera = base.camera;
-        let middle = camera.middle_px();
+        let middle = [camera.shape[1], camera.shape[0]].map(|n| (n as f64 - 1.0) / 2.0);
         let side = (camera.shape[0] as f64 * camera.pixel_size_m[1])
             .min(camera.shape[1] as f64 * camera.pixel_size_m[0]);
         let unit = PressScene::new(PressOptions {
             loads: vec![Load::normal(1.0)],
             ..base.clone()
         })?;
-        let unit_radius = unit.contact(0).contact_radius_m;
+        let unit_radius = unit.truth(0).contact.contact_radius_m;
         // F = 4E*a³/(3R).
         let force = |radius_m: f64| (radius_m / unit_radius).powi(3);
         let mut options = PressOptions {
@@ -131,7 +110,7 @@ impl Hostile {
 }
 
 /// Three contacts of falling force, side by side along a diagonal.
-fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, super::SimulateError> {
+fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, SimulateError> {
     let [rows, cols] = base.camera.shape.map(|n| n as f64);
     let mut scenes = Vec::new();
     let first = PressScene::new(base.clone())?;
@@ -143,12 +122,12 @@ fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, super::
         let options = PressOptions {
             loads: vec![Load::normal(share * force_n)],
             centre_px: Some([at[0] * cols, at[1] * rows]),
-            gain: Gain::GreyPerPascal(first.grey_per_pascal()),
+            gain: Gain::GreyPerPascal(first.truth(0).grey_per_pascal),
             ..base.clone()
         };
         scenes.push(PressScene::new(options)?);
     }
-    let light = superposed(&base.camera, &scenes);
+    let light = superposed(&first, &scenes)?;
     Ok(PressSimulation {
         reference: first.reference(0),
         frames: vec![base.camera.expose(light.view(), base.seed, 1)],
@@ -158,8 +137,17 @@ fn several(base: &PressOptions, force_n: f64) -> Result<PressSimulation, super::
     })
 }
 
-/// Expected grey levels of the first loads of several scenes seen in one frame.
-fn superposed(camera: &Camera, scenes: &[PressScene]) -> Array2<f64> {
-    let patches: Vec<Patch> = scenes.iter().filter_map(|s| s.leaked_light(0)).collect();
-    camera.compose(&patches, &Illumination::default())
+/// Expected grey levels of the first loads of several scenes seen in one frame: their light above that of the sensor alone, added up.
+fn superposed(sensor: &PressScene, scenes: &[PressScene]) -> Result<Array2<f64>, SimulateError> {
+    let free = PressScene::new(PressOptions {
+        loads: vec![Load {
+            illumination: Illumination::default(),
+            ..Load::normal(0.0)
+        }],
+        gain: Gain::GreyPerPascal(sensor.truth(0).grey_per_pascal),
+        ..sensor.options().clone()
+    })?;
+    let dark = free.expected_frame(0);
+    let add = |sum: Array2<f64>, scene: &PressScene| sum + (scene.expected_frame(0) - &dark);
+    Ok(scenes.iter().fold(dark.clone(), add))
 }
