@@ -132,7 +132,7 @@ impl StageRunner {
             let place = reading.centroid_px.map(|c| c.value);
             let radius_px = (face.area_m2.value / (std::f64::consts::PI * hx * hy)).sqrt();
             let growth = lens.mean_pixel_area_m2(place, radius_px) / (hx * hy);
-            face.area_m2 = face.area_m2.scaled(growth);
+            face.area_m2 = face.area_m2 * growth;
         }
         if let Some(reading) = &mut contact.reading {
             reading.face = face;

@@ -1,6 +1,7 @@
 //! A number with its standard error, and the scalar all of the crate is generic over.
 
 use std::fmt::{self, Debug, Display};
+use std::ops::Mul;
 
 use num_traits::{Float, FromPrimitive};
 
@@ -50,6 +51,9 @@ mod convert {
 /// use tactile_force::Estimate;
 /// let force_n = Estimate { value: 1.2, standard_error: 0.003 };
 /// assert_eq!(format!("{force_n} N"), "1.2 ± 0.003 N");
+/// // In another unit: pixels of a quarter of a metre.
+/// let metres = Estimate { value: 400.0_f64, standard_error: 8.0 } * 0.25;
+/// assert_eq!(metres, Estimate { value: 100.0, standard_error: 2.0 });
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -67,16 +71,13 @@ impl<T: Real> Estimate<T> {
             standard_error: T::nearest(variance.max(0.0).sqrt()),
         }
     }
+}
+
+impl<T: Real> Mul<T> for Estimate<T> {
+    type Output = Self;
 
     /// The value and its error in another unit.
-    ///
-    /// ```
-    /// use tactile_force::Estimate;
-    ///
-    /// let metres = Estimate { value: 400.0_f64, standard_error: 8.0 }.scaled(0.25);
-    /// assert_eq!(metres, Estimate { value: 100.0, standard_error: 2.0 });
-    /// ```
-    pub fn scaled(self, factor: T) -> Self {
+    fn mul(self, factor: T) -> Self {
         Self {
             value: self.value * factor,
             standard_error: self.standard_error * factor.abs(),

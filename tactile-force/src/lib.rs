@@ -65,9 +65,7 @@ pub use health::{
     ChartState, FrameCondition, HealthMonitor, HealthOptions, HealthReport, StuckPixels,
 };
 pub use hertz::{HertzFit, HertzFitOptions, ProfileShape};
-pub use image::{
-    GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,
-};
+pub use image::{GaussianProfile, HertzProfile, ImageMoments, PixelGrid, ProfileMoments};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use pressure::{

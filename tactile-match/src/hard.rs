@@ -148,11 +148,11 @@ fn through<T: Scalar, const D: usize>(
     if let Some(warped) = finite(&spline) {
         return (spline, warped);
     }
-    let affine = Affine::fit(sources, images, None).unwrap_or_else(|_| Affine::identity());
+    let affine = Affine::fit(sources, images, None).unwrap_or_else(|_| Affine::default());
     if let Some(warped) = finite(&affine) {
         return (Box::new(affine), warped);
     }
-    (Box::new(Affine::identity()), model.to_vec())
+    (Box::new(Affine::default()), model.to_vec())
 }
 
 /// The factorised thin-plate system of some sources: `r² ln r²` in the plane, `−r` in space.
@@ -224,7 +224,7 @@ impl<T: Scalar, const D: usize> Interpolation<T, D> {
             .filter(|spline| follows(&**spline, sources, images, exact))
             .unwrap_or_else(|| {
                 let affine = Affine::fit(sources, images, self.weights.as_deref());
-                Box::new(affine.unwrap_or_else(|_| Affine::identity()))
+                Box::new(affine.unwrap_or_else(|_| Affine::default()))
             })
     }
 }

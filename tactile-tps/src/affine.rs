@@ -4,7 +4,7 @@ use nalgebra::{Point, SMatrix, SVector};
 
 use crate::{Scalar, TpsError, Warp, centres::finite, options::validate_weights};
 
-/// The affine map f(x) = A x + b; a rigid motion where A is a rotation.
+/// The affine map f(x) = A x + b; a rigid motion where A is a rotation. [`Default`] is the identity.
 ///
 /// ```
 /// # use nalgebra::{Matrix2, Point2, Vector2};
@@ -26,22 +26,17 @@ pub struct Affine<T: Scalar, const D: usize> {
     pub offset: SVector<T, D>,
 }
 
-impl<T: Scalar, const D: usize> Affine<T, D> {
+impl<T: Scalar, const D: usize> Default for Affine<T, D> {
     /// The map that leaves every point where it is.
-    ///
-    /// ```
-    /// # use nalgebra::Point3;
-    /// # use tactile_tps::{Affine, Warp};
-    /// let point = Point3::new(1.0, 2.0, 3.0);
-    /// assert_eq!(Affine::identity().apply(&point), point);
-    /// ```
-    pub fn identity() -> Self {
+    fn default() -> Self {
         Self {
             linear: SMatrix::identity(),
             offset: SVector::zeros(),
         }
     }
+}
 
+impl<T: Scalar, const D: usize> Affine<T, D> {
     /// The map of least Σ wᵢ |A xᵢ + b − yᵢ|²: A = C S⁺ with S = Σ w x xᵀ and C = Σ w y xᵀ about the weighted means.
     ///
     /// Along directions that the points do not span the map moves points with their mean (the pseudo-inverse S⁺). O(n).

@@ -106,7 +106,7 @@ impl ContactReading {
             centroid_px: contact.centroid_px,
             area_m2: force.contact_area_m2?,
             peak_grey: force.profile.map_or(contact.peak, |p| p.peak.value),
-            saturated_share: contact.saturated_share(),
+            saturated_share: contact.saturated_px as f64 / contact.area_px as f64,
             out_of_calibration: reading.out_of_range,
             touches_edge: contact.touches_edge,
             other_contacts: contact.other_contacts,

@@ -190,7 +190,7 @@ impl Session {
         }
         let contact = self.contact.reading;
         let size = self.runner.pipeline().contact().pixel_size_m();
-        let centroid = contact.map(|c| std::array::from_fn(|k| c.centroid_px[k].scaled(size[k])));
+        let centroid = contact.map(|c| std::array::from_fn(|k| c.centroid_px[k] * size[k]));
         let shear = self
             .shear
             .as_mut()

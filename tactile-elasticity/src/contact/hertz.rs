@@ -12,7 +12,7 @@ use nalgebra::RealField;
 /// use tactile_elasticity::contact::HertzContact;
 /// let contact = HertzContact::from_force(0.05, 0.003, 26_666.7)?;
 /// assert!((contact.contact_radius_m - 1.6158e-3f64).abs() < 1e-7);
-/// assert!(contact.contact_ratio() > 0.5); // far too large for Hertz: squeezed, not touched
+/// assert!(contact.contact_radius_m / contact.radius_m > 0.5); // far too large for Hertz: squeezed, not touched
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,11 +66,6 @@ impl<T: RealField + Copy> HertzContact<T> {
             mean_pressure_pa: mean,
             stiffness_n_per_m: reduced_modulus_pa * a * narrow(2.0),
         })
-    }
-
-    /// a/R: the theory's small parameter.
-    pub fn contact_ratio(&self) -> T {
-        self.contact_radius_m / self.radius_m
     }
 
     /// Pressure at distance r (m) from the centre, p₀√(1 − r²/a²), zero outside.

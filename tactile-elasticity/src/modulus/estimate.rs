@@ -183,7 +183,10 @@ impl<T: RealField + Copy> Interval<T> {
 /// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator, Warning};
 ///
 /// let contact = HertzContact::from_force(0.05_f64, 3e-3, 40e3)?;
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..LoadState::new(Estimate::new(0.05, 1e-4)) };
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
+///     ..LoadState::new(Estimate::new(0.05, 1e-4))
+/// };
 /// let modulus: ModulusEstimate<f64> = HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!(modulus.interval_95.contains(30e3));
 /// // The number stands, with the warning that a/R = 0.47 is much.

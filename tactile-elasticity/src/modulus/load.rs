@@ -32,7 +32,11 @@ impl<T: RealField + Copy> Estimate<T> {
     /// ```
     /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio};
     /// let load = |force| {
-    ///     LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), mean_strain: Some(Estimate::exact(0.02)), ..LoadState::new(force) }
+    ///     LoadState {
+    ///         contact_area_m2: Some(Estimate::exact(1e-4)),
+    ///         mean_strain: Some(Estimate::exact(0.02)),
+    ///         ..LoadState::new(force)
+    ///     }
     /// };
     /// let force = Estimate::new(0.12, 0.001);
     /// let known = PaperRatio::default().estimate(&LoadSeries::new([load(force)]))?;
@@ -83,7 +87,11 @@ impl Estimate<f64> {
 ///
 /// ```
 /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState};
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(1.2e-3, 4e-6)), mean_strain: Some(Estimate::exact(0.021)), ..LoadState::new(Estimate::new(0.7, 0.002)) };
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(1.2e-3, 4e-6)),
+///     mean_strain: Some(Estimate::exact(0.021)),
+///     ..LoadState::new(Estimate::new(0.7, 0.002))
+/// };
 /// assert!((load.stress_pa().unwrap() - 0.7f64 / (std::f64::consts::PI * 1.44e-6)).abs() < 1e-6);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -30,7 +30,7 @@ pub(crate) use law::{
 };
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
-pub use regression::{Intercept, StressStrainRegression};
+pub use regression::StressStrainRegression;
 pub use select::{BestOf, ModulusSelection};
 pub use series::{LoadSeries, SharedErrors};
 pub(crate) use statistics::quantile_95;

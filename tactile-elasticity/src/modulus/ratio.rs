@@ -23,7 +23,11 @@ pub(crate) const LINEAR_STRAIN: f64 = 0.1;
 ///
 /// // Two pressed frames: the strain between them belongs to the difference of their stresses.
 /// let load = |force, strain| {
-///     LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), mean_strain: Some(Estimate::exact(strain)), ..LoadState::new(Estimate::new(force, 1e-4)) }
+///     LoadState {
+///         contact_area_m2: Some(Estimate::exact(1e-4)),
+///         mean_strain: Some(Estimate::exact(strain)),
+///         ..LoadState::new(Estimate::new(force, 1e-4))
+///     }
 /// };
 /// let loads = LoadSeries::new([load(0.7, 0.0), load(1.2, 0.05)]);
 /// let modulus = PaperRatio::default().with_reference(StrainReference::FirstLoad).estimate(&loads)?;
@@ -55,7 +59,12 @@ pub enum StrainReference {
 ///     Estimate, LoadSeries, LoadState, ModulusEstimator, PaperRatio, SharedErrors, StrainReference, Warning,
 /// };
 ///
-/// let load = LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), contact_radius_m: Some(Estimate::exact(5.64e-3)), mean_strain: Some(Estimate::new(0.02, 1e-4)), ..LoadState::new(Estimate::new(0.12, 0.001)) };
+/// let load = LoadState {
+///     contact_area_m2: Some(Estimate::exact(1e-4)),
+///     contact_radius_m: Some(Estimate::exact(5.64e-3)),
+///     mean_strain: Some(Estimate::new(0.02, 1e-4)),
+///     ..LoadState::new(Estimate::new(0.12, 0.001))
+/// };
 /// let series = LoadSeries::new([load]);
 /// let plain = PaperRatio::default().with_reference(StrainReference::Unloaded).estimate(&series)?;
 /// assert!((plain.youngs_modulus_pa - 60e3_f64).abs() < 1e-6);

@@ -19,7 +19,10 @@ use std::sync::Arc;
 ///
 /// // One load cannot tell laws apart: the most general candidate is the answer.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
+///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+/// };
 /// let candidates = BestOf::new(TataraSphere::new(5e-3, 0.5)?).or(HertzSphere::new(5e-3, 0.5)?);
 /// let selection: ModulusSelection<f64> = candidates.select(&LoadSeries::new([load]))?;
 /// assert_eq!(selection.chosen().estimator, EstimatorKind::TataraSphere);
@@ -132,7 +135,10 @@ impl<T: RealField + Copy> BestOf<T> {
     ///
     /// let gel = Waveguide::new(vec![Layer { thickness_m: 10e-3, youngs_modulus_pa: 50e3_f64, poisson_ratio: 0.5 }])?;
     /// let contact = HertzContact::from_force(1e-3, 3e-3, 30e3)?;
-    /// let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+    /// let load = LoadState {
+    ///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
+    ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+    /// };
     /// let modulus = BestOf::sphere_as_sample(3e-3, 0.5, &gel)?.estimate(&LoadSeries::new([load]))?;
     /// assert_eq!(modulus.estimator, EstimatorKind::SphereOnWaveguide);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())

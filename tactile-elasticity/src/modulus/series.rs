@@ -11,7 +11,10 @@ use nalgebra::{DMatrix, RealField};
 /// ```
 /// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SharedErrors};
 ///
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(0.4543e-3_f64, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(0.4543e-3_f64, 1e-6)),
+///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+/// };
 /// let series = LoadSeries::new([load; 50]);
 /// let shared = SharedErrors { force_scale: 0.02, ..SharedErrors::default() };
 /// let hertz = HertzSphere::new(5e-3, 0.5)?;

@@ -40,7 +40,10 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 ///
 /// // A face of 1 cm² of 100 kPa and ν = ½, squeezed by e = 2 % and 5 %: λ_z = √(1 − 2e), A = A₀(1 + e), F = E e λ_z A₀.
 /// let load = |e: f64| {
-///     LoadState { contact_area_m2: Some(Estimate::new(1e-4 * (1.0 + e), 1e-9)), ..LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4)) }
+///     LoadState {
+///         contact_area_m2: Some(Estimate::new(1e-4 * (1.0 + e), 1e-9)),
+///         ..LoadState::new(Estimate::new(100e3 * e * (1.0 - 2.0 * e).sqrt() * 1e-4, 1e-4))
+///     }
 /// };
 /// let uniaxial = UniaxialLoads::new(&LoadSeries::new([load(0.02), load(0.05)]), 0.5, &GreenLagrange)?;
 /// assert!((uniaxial.unloaded_area_m2 / 1e-4 - 1.0).abs() < 1e-9);

@@ -224,10 +224,9 @@ fn estimators(answers: &mut Answers) {
     answers.estimate("stress over strain", &ratio, &strained.unwrap());
     let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     answers.estimate("stress over strain from the first load", &ratio, &series);
-    for intercept in [Intercept::Tested, Intercept::Zero] {
-        let line = StressStrainRegression::default().with_intercept(intercept);
-        answers.estimate(&format!("regression {intercept:?}"), &line, &scaled);
-    }
+    let line = StressStrainRegression::default();
+    answers.estimate("regression Tested", &line, &scaled);
+    answers.estimate("regression Zero", &line.with_zero_at_origin(), &scaled);
     let selection = BestOf::sphere_as_sample(radius, nu, &gel)
         .unwrap()
         .select(&series)

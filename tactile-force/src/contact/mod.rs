@@ -26,7 +26,7 @@ pub(crate) use region::Region;
 pub(crate) use runs::Run;
 
 use crate::drift::IlluminationDrift;
-use crate::estimate::{Estimate, Real};
+use crate::estimate::Estimate;
 use crate::frame::{BoundingBox, DifferenceNoise, FrameStatistics};
 
 /// Whether pressing makes the image brighter (light leaks out) or darker (light is blocked).
@@ -77,7 +77,7 @@ impl Polarity {
 ///     .detect_with(&mut Default::default(), frame.view(), &reference)?;
 /// let contact = found.contact.expect("contact");
 /// assert_eq!((contact.area_px, contact.peak, contact.touches_edge), (400, 243.0, false));
-/// assert_eq!(contact.saturated_share(), 1.0 / 400.0);
+/// assert_eq!(contact.saturated_px, 1);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,11 +130,4 @@ pub struct Detection<T> {
     pub noise: Option<DifferenceNoise>,
     /// The contact, if there is one.
     pub contact: Option<Contact<T>>,
-}
-
-impl<T: Real> Contact<T> {
-    /// Share of the mask that is saturated.
-    pub fn saturated_share(&self) -> T {
-        T::nearest(self.saturated_px as f64 / self.area_px as f64)
-    }
 }

@@ -311,7 +311,7 @@ impl HertzFitter {
         Some(HertzFit {
             centre_px: [centre(0), centre(1)],
             radius_px,
-            radius_m: radius_px.scaled(T::nearest(pixel_size_m[0])),
+            radius_m: radius_px * T::nearest(pixel_size_m[0]),
             peak: Estimate::nearest(s.peak, covariance[(0, 0)]),
             background: Estimate::nearest(s.background, covariance[(1, 1)]),
             blur_px: T::nearest((s.blur - PIXEL).max(0.0).sqrt()),

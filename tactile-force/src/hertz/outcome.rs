@@ -97,9 +97,9 @@ pub struct HertzFit<T> {
 impl<T: Real> HertzFit<T> {
     /// The fit of a profile in other units of its level, as pressures for grey levels.
     pub(crate) fn with_levels_scaled(mut self, factor: T) -> Self {
-        self.peak = self.peak.scaled(factor);
-        self.background = self.background.scaled(factor);
-        self.integrated_pixel_value = self.integrated_pixel_value.scaled(factor);
+        self.peak = self.peak * factor;
+        self.background = self.background * factor;
+        self.integrated_pixel_value = self.integrated_pixel_value * factor;
         for k in 0..2 {
             self.covariance[k].iter_mut().for_each(|c| *c = *c * factor);
             self.covariance

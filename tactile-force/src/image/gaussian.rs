@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 use super::quadrature::Gauss;
-use super::{PixelGrid, ProfileMoments, Rectangle};
+use super::{PixelGrid, ProfileMoments};
 use crate::error::{ForceError, Requirement};
 use crate::estimate::Real;
 
@@ -51,29 +51,29 @@ impl<T: Real> GaussianProfile<T> {
         }
     }
 
-    /// Moments over a rectangle; `None` where the profile is zero in double precision.
+    /// Moments over the rectangle of these ranges [from, to] along x and along y; `None` where the profile is zero in double precision.
     ///
     /// ```
-    /// use tactile_force::{GaussianProfile, Rectangle};
+    /// use tactile_force::GaussianProfile;
     ///
     /// // Far out on the tail the digits are still there.
     /// let blob = GaussianProfile::new([0.0_f64, 0.0], 1.0, 1.0)?;
-    /// let tail = blob.within(&Rectangle { x: [20.0, 21.0], y: [-40.0, 40.0] }).expect("not dark");
+    /// let tail = blob.within([[20.0, 21.0], [-40.0, 40.0]]).expect("not dark");
     /// assert!(tail.integral > 0.0 && tail.integral < 1e-87);
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
-    pub fn within(&self, part: &Rectangle<T>) -> Option<ProfileMoments<T>> {
+    pub fn within(&self, [x_range, y_range]: [[T; 2]; 2]) -> Option<ProfileMoments<T>> {
         let gauss = Gauss::new();
-        let x = self.along(&gauss, 0, part.x.map(T::as_f64), 0.0);
-        let y = self.along(&gauss, 1, part.y.map(T::as_f64), 0.0);
+        let x = self.along(&gauss, 0, x_range.map(T::as_f64), 0.0);
+        let y = self.along(&gauss, 1, y_range.map(T::as_f64), 0.0);
         let integral = self.peak.as_f64() * x[0] * y[0];
         if integral == 0.0 {
             return None;
         }
         let centroid = [x[1] / x[0], y[1] / y[0]];
         // A second time about the centroid, where no second moment cancels.
-        let x = self.along(&gauss, 0, part.x.map(T::as_f64), centroid[0]);
-        let y = self.along(&gauss, 1, part.y.map(T::as_f64), centroid[1]);
+        let x = self.along(&gauss, 0, x_range.map(T::as_f64), centroid[0]);
+        let y = self.along(&gauss, 1, y_range.map(T::as_f64), centroid[1]);
         Some(ProfileMoments {
             integral: T::nearest(integral),
             centroid: centroid.map(T::nearest),

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 use super::quadrature::Gauss;
-use super::{PixelGrid, ProfileMoments, Rectangle};
+use super::{PixelGrid, ProfileMoments};
 use crate::error::{ForceError, Requirement};
 use crate::estimate::Real;
 
@@ -52,22 +52,22 @@ impl<T: Real> HertzProfile<T> {
         }
     }
 
-    /// Moments over a rectangle; `None` if it does not meet the contact.
+    /// Moments over the rectangle of these ranges [from, to] along x and along y; `None` if it does not meet the contact.
     ///
     /// ```
-    /// use tactile_force::{HertzProfile, Rectangle};
+    /// use tactile_force::HertzProfile;
     ///
     /// let contact = HertzProfile::new([0.0_f64, 0.0], 2.0, 1.0)?;
-    /// let half = contact.within(&Rectangle { x: [0.0, 5.0], y: [-5.0, 5.0] }).expect("they meet");
+    /// let half = contact.within([[0.0, 5.0], [-5.0, 5.0]]).expect("they meet");
     /// assert!((half.integral - 0.5 * contact.whole().integral).abs() < 1e-13);
-    /// assert!(contact.within(&Rectangle { x: [3.0, 5.0], y: [-5.0, 5.0] }).is_none());
+    /// assert!(contact.within([[3.0, 5.0], [-5.0, 5.0]]).is_none());
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
-    pub fn within(&self, part: &Rectangle<T>) -> Option<ProfileMoments<T>> {
+    pub fn within(&self, [x_range, y_range]: [[T; 2]; 2]) -> Option<ProfileMoments<T>> {
         let gauss = Gauss::new();
         let (c, a) = (self.centre.map(T::as_f64), self.radius.as_f64());
         let scaled = |ends: [T; 2], c: f64| ends.map(|e| (e.as_f64() - c) / a);
-        let (x, y) = (scaled(part.x, c[0]), scaled(part.y, c[1]));
+        let (x, y) = (scaled(x_range, c[0]), scaled(y_range, c[1]));
         let along = |x: [f64; 2], y: [f64; 2], origin: f64, about: f64| {
             strip(&gauss, x, y, [origin, about])
         };
@@ -79,7 +79,7 @@ impl<T: Real> HertzProfile<T> {
         }
         let local = [mx / volume, my / volume];
         let square = along(x, y, x[0], x[0] + local[0])[2] + along(y, x, y[0], y[0] + local[1])[2];
-        let corner = [part.x[0].as_f64(), part.y[0].as_f64()];
+        let corner = [x_range[0].as_f64(), y_range[0].as_f64()];
         Some(ProfileMoments {
             integral: T::nearest(volume * a * a * self.peak.as_f64()),
             centroid: std::array::from_fn(|k| T::nearest(corner[k] + a * local[k])),
@@ -92,11 +92,8 @@ impl<T: Real> HertzProfile<T> {
         let gauss = Gauss::new();
         let (c, a) = (self.centre.map(T::as_f64), self.radius.as_f64());
         Array2::from_shape_fn((grid.rows, grid.columns), |(row, column)| {
-            let pixel = grid.pixel(row, column);
-            let (x, y) = (
-                pixel.x.map(|e| (e - c[0]) / a),
-                pixel.y.map(|e| (e - c[1]) / a),
-            );
+            let [x, y] = grid.pixel(row, column);
+            let (x, y) = (x.map(|e| (e - c[0]) / a), y.map(|e| (e - c[1]) / a));
             let volume = strip(&gauss, x, y, [0.0; 2])[0];
             T::nearest(self.peak.as_f64() * volume / ((x[1] - x[0]) * (y[1] - y[0])))
         })

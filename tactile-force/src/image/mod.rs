@@ -8,29 +8,9 @@ mod quadrature;
 
 pub use gaussian::GaussianProfile;
 pub use hemisphere::HertzProfile;
-pub use moments::{ImageMoments, MomentStatus};
+pub use moments::ImageMoments;
 
 use crate::estimate::Real;
-
-/// An axis-parallel rectangle of the image plane.
-///
-/// ```
-/// use tactile_force::{GaussianProfile, Rectangle};
-///
-/// // A quarter of the plane holds a quarter of a blob around the origin.
-/// let blob = GaussianProfile::new([0.0_f64, 0.0], 1.5, 100.0)?;
-/// let quarter = blob.within(&Rectangle { x: [0.0, 60.0], y: [0.0, 60.0] }).expect("not dark");
-/// assert!((quarter.integral / blob.whole().integral - 0.25).abs() < 1e-12);
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Rectangle<T> {
-    /// From and to along x.
-    pub x: [T; 2],
-    /// From and to along y.
-    pub y: [T; 2],
-}
 
 /// Integral, centroid and spread of a profile over part of the plane.
 ///
@@ -84,11 +64,11 @@ impl<T: Real> PixelGrid<T> {
         self.first[axis].as_f64() + (2.0 * k as f64 - 1.0) * (0.5 * self.size[axis].as_f64())
     }
 
-    /// The pixel's rectangle.
-    fn pixel(&self, row: usize, column: usize) -> Rectangle<f64> {
-        Rectangle {
-            x: [self.edge(0, column), self.edge(0, column + 1)],
-            y: [self.edge(1, row), self.edge(1, row + 1)],
-        }
+    /// The pixel's rectangle, from and to along x and y.
+    fn pixel(&self, row: usize, column: usize) -> [[f64; 2]; 2] {
+        [
+            [self.edge(0, column), self.edge(0, column + 1)],
+            [self.edge(1, row), self.edge(1, row + 1)],
+        ]
     }
 }

@@ -6,27 +6,6 @@ use super::double::Double;
 use crate::error::{ForceError, Requirement};
 use crate::estimate::Real;
 
-/// Whether centroid and spread exist.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{ImageMoments, MomentStatus};
-///
-/// let even = ImageMoments::of(Array2::from_elem((4, 4), 7.0).view(), 7.0)?;
-/// assert_eq!((even.status, even.centroid_px), (MomentStatus::Empty, None));
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum MomentStatus {
-    /// Sum, centroid and spread exist.
-    Ok,
-    /// The sum over the background is zero: no centroid, no spread.
-    Empty,
-    /// The second moment has the other sign than the sum: a centroid, but no spread.
-    NegativeSecondMoment,
-}
-
 /// Moments of an image over its background, and the statistics of its raw pixels.
 ///
 /// Sums are taken with twice the digits of a double, after the background has been subtracted without rounding: a blob of height
@@ -46,9 +25,10 @@ pub enum MomentStatus {
 pub struct ImageMoments<T> {
     /// Σ (I − background).
     pub sum: T,
-    /// Σ (I − background) (x, y) / sum, in pixels.
+    /// Σ (I − background) (x, y) / sum, in pixels; `None` where the sum is zero.
     pub centroid_px: Option<[T; 2]>,
-    /// √(Σ (I − background) |x − centroid|² / sum) over pixel centres, in pixels.
+    /// √(Σ (I − background) |x − centroid|² / sum) over pixel centres, in pixels; `None` where the sum is zero or the second
+    /// moment negative, as pixels below the background can make it.
     pub radius_of_gyration_px: Option<T>,
     /// Least raw pixel.
     pub least: T,
@@ -58,8 +38,6 @@ pub struct ImageMoments<T> {
     pub mean: T,
     /// Population variance of the raw pixels.
     pub variance: T,
-    /// Whether centroid and spread exist.
-    pub status: MomentStatus,
 }
 
 /// Second moments below this share of the sum of their sizes are rounding: some thousand terms of 2⁻¹⁰⁴.
@@ -86,7 +64,7 @@ impl<T: Real> ImageMoments<T> {
         let n = Double::from(image.len() as f64);
         let shift = raw[0].over(n);
         let variance = (raw[1].over(n) - shift * shift).value().max(0.0);
-        let (centroid, spread, status) = s.finish(middle);
+        let (centroid, spread) = s.finish(middle);
         Ok(Self {
             sum: T::nearest(s.sum.value()),
             centroid_px: centroid.map(|c| c.map(T::nearest)),
@@ -95,7 +73,6 @@ impl<T: Real> ImageMoments<T> {
             greatest,
             mean: T::nearest((shift + first.into()).value()),
             variance: T::nearest(variance),
-            status,
         })
     }
 }
@@ -134,10 +111,10 @@ impl Sums {
         self.size = self.size + square.abs();
     }
 
-    /// Centroid, radius of gyration and status.
-    fn finish(&self, middle: [f64; 2]) -> (Option<[f64; 2]>, Option<f64>, MomentStatus) {
+    /// Centroid and radius of gyration.
+    fn finish(&self, middle: [f64; 2]) -> (Option<[f64; 2]>, Option<f64>) {
         if self.sum.value() == 0.0 {
-            return (None, None, MomentStatus::Empty);
+            return (None, None);
         }
         let [x, y] = [self.x.over(self.sum), self.y.over(self.sum)];
         let centroid = Some([
@@ -148,9 +125,9 @@ impl Sums {
         let rounding =
             NOTHING * (self.size.value() / self.sum.value().abs() + (x * x + y * y).value());
         match spread {
-            s if s.abs() <= rounding => (centroid, Some(0.0), MomentStatus::Ok),
-            s if s < 0.0 => (centroid, None, MomentStatus::NegativeSecondMoment),
-            s => (centroid, Some(s.sqrt()), MomentStatus::Ok),
+            s if s.abs() <= rounding => (centroid, Some(0.0)),
+            s if s < 0.0 => (centroid, None),
+            s => (centroid, Some(s.sqrt())),
         }
     }
 }

@@ -219,7 +219,7 @@ impl<T: Real> ForceMeter<T> {
             per_grey_pa,
         } = stress;
         let [x, y] = contact.centroid_px;
-        let mut centroid_m = [x.scaled(pixel.step[0]), y.scaled(pixel.step[1])];
+        let mut centroid_m = [x * pixel.step[0], y * pixel.step[1]];
         let mut profile = profile;
         if let Some(lens) = &self.lens {
             let aspect = (pixel.step[1] / pixel.step[0]).as_f64();
@@ -230,7 +230,7 @@ impl<T: Real> ForceMeter<T> {
             centroid_m[1].value = T::nearest(place[1]);
             if let Some(profile) = &mut profile {
                 let undistorted = T::nearest(radius_m) / profile.radius_m.value;
-                profile.radius_m = profile.radius_m.scaled(undistorted);
+                profile.radius_m = profile.radius_m * undistorted;
             }
         }
         let radius = contact_radius(&contact, profile, pixel.area.sqrt());
@@ -246,7 +246,7 @@ impl<T: Real> ForceMeter<T> {
             contact_area_m2: Some(T::nearest(contact.area_px as f64) * pixel.area),
             contact_radius_m: Some(radius),
             mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
-            peak_stress_pa: Some(peak.scaled(per_grey_pa)),
+            peak_stress_pa: Some(peak * per_grey_pa),
             contact: Some(contact),
             profile,
             elongation: None,

@@ -11,8 +11,8 @@ use tactile_force::{
     CalibrationOptions, CalibrationPair, ContactOptions, DriftCorrection, Estimate,
     ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, GaussianProfile, HertzFitOptions,
     HertzProfile, ImageMoments, LinearCalibration, MonotoneCalibration, NoiseModel, PixelGrid,
-    Polarity, PolynomialCalibration, Real, Rectangle, ReferenceFrame, Robustness, ShearCalibration,
-    ShearPair, StressCalibration,
+    Polarity, PolynomialCalibration, Real, ReferenceFrame, Robustness, ShearCalibration, ShearPair,
+    StressCalibration,
 };
 
 const RECORDED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded/answers.txt");
@@ -341,22 +341,19 @@ fn others(answers: &mut Answers) {
         size: [1.5, 2.0],
         first: [-2.0, -3.0],
     };
-    let part = Rectangle {
-        x: [-1.2, 2.4],
-        y: [0.3, 3.1],
-    };
+    let part = [[-1.2, 2.4], [0.3, 3.1]];
     let hertz = HertzProfile::new([0.4, 0.7], 3.2, 11.0).unwrap();
     let gaussian = GaussianProfile::new([0.4, 0.7], 1.3, 11.0).unwrap();
     for (image, whole, within) in [
         (
             hertz.image(&grid),
             hertz.whole(),
-            hertz.within(&part).unwrap(),
+            hertz.within(part).unwrap(),
         ),
         (
             gaussian.image(&grid),
             gaussian.whole(),
-            gaussian.within(&part).unwrap(),
+            gaussian.within(part).unwrap(),
         ),
     ] {
         image.iter().for_each(|v| answers.add("image", *v));

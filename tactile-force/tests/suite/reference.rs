@@ -3,9 +3,7 @@
 
 use ndarray::Array2;
 use serde_json::Value;
-use tactile_force::{
-    GaussianProfile, HertzProfile, ImageMoments, MomentStatus, PixelGrid, ProfileMoments, Rectangle,
-};
+use tactile_force::{GaussianProfile, HertzProfile, ImageMoments, PixelGrid, ProfileMoments};
 
 const EPS: f64 = f64::EPSILON;
 
@@ -102,10 +100,10 @@ impl Moments<'_> {
         // An alternating image of 1e16 has a mean of 9: the condition of the mean of exact pixels is 1 in double-double.
         self.relative(score, "mean", m.mean, condition);
         self.variance(score, &m);
-        let status = match m.status {
-            MomentStatus::Ok => "ok",
-            MomentStatus::Empty => "empty",
-            MomentStatus::NegativeSecondMoment => "negative_second_moment",
+        let status = match (m.centroid_px, m.radius_of_gyration_px) {
+            (None, _) => "empty",
+            (Some(_), None) => "negative_second_moment",
+            (Some(_), Some(_)) => "ok",
         };
         assert_eq!(
             status,
@@ -224,7 +222,7 @@ impl Blob {
             first: [0.5 * pitch; 2],
         };
         let side = [0.0, size as f64 * pitch];
-        let frame = Rectangle { x: side, y: side };
+        let frame = [side, side];
         if case["kind"] == "gaussian" {
             let sd = number(&p["sigma"]);
             let blob = GaussianProfile::new(centre, sd, peak).unwrap();
@@ -232,7 +230,7 @@ impl Blob {
             Self {
                 pixels: blob.image(&grid),
                 whole: blob.whole(),
-                within: blob.within(&frame),
+                within: blob.within(frame),
                 condition,
             }
         } else {
@@ -242,7 +240,7 @@ impl Blob {
             Self {
                 pixels: blob.image(&grid),
                 whole: blob.whole(),
-                within: blob.within(&frame),
+                within: blob.within(frame),
                 condition,
             }
         }

@@ -40,7 +40,10 @@ pub type FlatPunch = ContactEstimator<Punch>;
 /// use tactile_elasticity::modulus::{Cone, Estimate, LoadSeries, LoadState, ModulusEstimator};
 ///
 /// let contact = cone(40e3_f64, 1.0, 0.2e-3)?;
-/// let load = LoadState { indentation_m: Some(Estimate::new(0.2e-3, 1e-7)), ..LoadState::new(Estimate::new(contact.force_n, 1e-6)) };
+/// let load = LoadState {
+///     indentation_m: Some(Estimate::new(0.2e-3, 1e-7)),
+///     ..LoadState::new(Estimate::new(contact.force_n, 1e-6))
+/// };
 /// let modulus = Cone::new(std::f64::consts::FRAC_PI_4, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -54,7 +57,10 @@ pub type Cone = ContactEstimator<ConeLaw>;
 ///
 /// // Read as a half-space, a sample 1 mm thin looks far too stiff.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadSeries::new([LoadState { indentation_m: Some(Estimate::new(contact.indentation_m, 1e-7)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) }]);
+/// let load = LoadSeries::new([LoadState {
+///     indentation_m: Some(Estimate::new(contact.indentation_m, 1e-7)),
+///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+/// }]);
 /// let layer = BondedLayer::new(5e-3, 1e-3, 0.5, Bond::Bonded, LayerTheory::IntegralEquation)?.estimate(&load)?;
 /// assert!(layer.youngs_modulus_pa < 0.7 * HertzSphere::new(5e-3, 0.5)?.estimate(&load)?.youngs_modulus_pa);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -69,7 +75,10 @@ pub type BondedLayer = ContactEstimator<LayerLaw>;
 /// // A ball of 3 mm squeezed to a/R = 0.5: Hertz's force for E* = 40 kPa at that radius, and Tatara's indentation.
 /// let (radius, a) = (3e-3_f64, 1.5e-3_f64);
 /// let force = 4.0 / 3.0 * 40e3 * a.powi(3) / radius;
-/// let load = LoadState { indentation_m: Some(Estimate::new(tatara_indentation_m(a, radius, 0.5)?, 1e-7)), ..LoadState::new(Estimate::new(force, 1e-5)) };
+/// let load = LoadState {
+///     indentation_m: Some(Estimate::new(tatara_indentation_m(a, radius, 0.5)?, 1e-7)),
+///     ..LoadState::new(Estimate::new(force, 1e-5))
+/// };
 /// let modulus = TataraSphere::new(radius, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa / 30e3 - 1.0).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -83,7 +92,10 @@ pub type TataraSphere = ContactEstimator<TataraLaw>;
 ///
 /// // Between two rigid plates each contact takes half of the approach.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState { indentation_m: Some(Estimate::new(2.0 * contact.indentation_m, 1e-7)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+/// let load = LoadState {
+///     indentation_m: Some(Estimate::new(2.0 * contact.indentation_m, 1e-7)),
+///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+/// };
 /// let modulus = SphereBetweenPlates::new(5e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -106,7 +118,10 @@ pub type SphereBetweenPlates = ContactEstimator<TwoContactsLaw>;
 ///
 /// // On a gel of 2 mm the depth is felt: as on a deep one the ball would be called stiffer.
 /// let gel = Waveguide::new(vec![Layer { thickness_m: 2e-3, youngs_modulus_pa: 100e3, poisson_ratio: 0.5 }])?;
-/// let load = LoadSeries::new([LoadState { contact_radius_m: Some(Estimate::new(0.8e-3_f64, 1e-6)), ..LoadState::new(Estimate::new(5e-3, 1e-5)) }]);
+/// let load = LoadSeries::new([LoadState {
+///     contact_radius_m: Some(Estimate::new(0.8e-3_f64, 1e-6)),
+///     ..LoadState::new(Estimate::new(5e-3, 1e-5))
+/// }]);
 /// let layered = SphereOnWaveguide::new(5e-3, 0.5, &gel, Bond::Bonded)?.estimate(&load)?;
 /// let deep = HertzSphere::new(5e-3, 0.5)?.with_waveguide(&gel).estimate(&load)?;
 /// assert!(layered.youngs_modulus_pa < deep.youngs_modulus_pa);
@@ -239,7 +254,10 @@ impl ContactEstimator<WaveguideLaw> {
     ///
     /// // On a rigid flat the linear contact is Hertz's.
     /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-    /// let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+    /// let load = LoadState {
+    ///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
+    ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+    /// };
     /// let estimator = SphereOnWaveguide::new(5e-3, 0.5, &Waveguide::rigid(), Bond::Bonded)?.without_finite_strain();
     /// let modulus = estimator.estimate(&LoadSeries::new([load]))?;
     /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);

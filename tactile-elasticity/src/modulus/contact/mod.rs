@@ -27,7 +27,11 @@ use nalgebra::RealField;
 ///
 /// // The indentation was measured with a wrong zero: use the radius alone.
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), indentation_m: Some(Estimate::new(contact.indentation_m + 2e-5, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
+///     indentation_m: Some(Estimate::new(contact.indentation_m + 2e-5, 1e-6)),
+///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+/// };
 /// let modulus = HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::ContactRadius).estimate(&LoadSeries::new([load]))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
@@ -51,7 +55,10 @@ pub enum Evidence {
 /// use tactile_elasticity::modulus::*;
 ///
 /// let contact = HertzContact::from_force(1e-3_f64, 5e-3, 40e3)?;
-/// let load = LoadState { contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+/// let load = LoadState {
+///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
+///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+/// };
 /// let loads = LoadSeries::new([load]);
 /// let rigid = HertzSphere::new(5e-3, 0.5)?;
 /// let plain = rigid.estimate(&loads)?;
@@ -109,7 +116,10 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// use tactile_elasticity::modulus::{Estimate, Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
     ///
     /// // Only the radius was measured, and only the indentation is to be used.
-    /// let load = LoadState { contact_radius_m: Some(Estimate::new(0.45e-3_f64, 1e-6)), ..LoadState::new(Estimate::new(1e-3, 1e-5)) };
+    /// let load = LoadState {
+    ///     contact_radius_m: Some(Estimate::new(0.45e-3_f64, 1e-6)),
+    ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
+    /// };
     /// assert!(HertzSphere::new(5e-3, 0.5)?.with_evidence(Evidence::Indentation).estimate(&LoadSeries::new([load])).is_err());
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```

@@ -15,7 +15,10 @@ use nalgebra::RealField;
 ///
 /// // √(Rδ)/h = 0.75: the published series is 15 % low in force, so its modulus is that much too high.
 /// let delta = (0.75_f64 * 2e-3).powi(2) / 5e-3;
-/// let load = LoadSeries::new([LoadState { indentation_m: Some(Estimate::new(delta, 1e-8)), ..LoadState::new(Estimate::new(1e-2, 1e-5)) }]);
+/// let load = LoadSeries::new([LoadState {
+///     indentation_m: Some(Estimate::new(delta, 1e-8)),
+///     ..LoadState::new(Estimate::new(1e-2, 1e-5))
+/// }]);
 /// let modulus = |theory| {
 ///     BondedLayer::new(5e-3, 2e-3, 0.5, Bond::Bonded, theory)?.estimate(&load).map(|m| m.youngs_modulus_pa)
 /// };

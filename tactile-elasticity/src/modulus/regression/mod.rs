@@ -15,35 +15,6 @@ use crate::scalar::narrow;
 use line::{Line, Point};
 use nalgebra::RealField;
 
-/// Whether the line may miss the origin.
-///
-/// ```
-/// use tactile_elasticity::modulus::{
-///     Estimate, Intercept, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, Warning,
-/// };
-///
-/// // Stress that starts at 300 Pa: a gauge that was not tared.
-/// let loads = [0.01, 0.02, 0.03, 0.04]
-///     .map(|strain: f64| {
-///         LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), mean_strain: Some(Estimate::exact(strain)), ..LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4)) }
-///     });
-/// let loads = LoadSeries::new(loads);
-/// let tested = StressStrainRegression::default().estimate(&loads)?;
-/// assert!(tested.warnings.iter().any(|w| matches!(w, Warning::Intercept { .. })));
-/// let forced = StressStrainRegression::default().with_intercept(Intercept::Zero).estimate(&loads)?;
-/// assert!(forced.youngs_modulus_pa > tested.youngs_modulus_pa);
-/// # Ok::<(), tactile_elasticity::ElasticityError>(())
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Intercept {
-    /// It may; whether it does is tested, and a significant intercept is warned of.
-    #[default]
-    Tested,
-    /// It goes through the origin.
-    Zero,
-}
-
 /// S_i = S₀ + E e_i over many loads, with errors in both.
 ///
 /// Each load weighs 1/(σ_S² + E²σ_e²) (York's effective variance without correlation); without any
@@ -66,24 +37,30 @@ pub enum Intercept {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StressStrainRegression {
-    intercept: Intercept,
+    zero_at_origin: bool,
 }
 
 impl StressStrainRegression {
-    /// How the intercept is treated; by default it is tested.
+    /// The line goes through the origin. By default it has an intercept, which is tested: a significant one is warned of.
     ///
     /// ```
-    /// use tactile_elasticity::modulus::{Estimate, Intercept, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression};
+    /// use tactile_elasticity::modulus::{Estimate, LoadSeries, LoadState, ModulusEstimator, StressStrainRegression, Warning};
     ///
-    /// let load = |strain: f64| {
-    ///     LoadState { contact_area_m2: Some(Estimate::exact(1e-4)), mean_strain: Some(Estimate::exact(strain)), ..LoadState::new(Estimate::new(60e3 * strain * 1e-4, 1e-4)) }
-    /// };
-    /// let line = StressStrainRegression::default().with_intercept(Intercept::Zero);
-    /// assert!((line.estimate(&LoadSeries::new([load(0.01), load(0.02)]))?.youngs_modulus_pa - 60e3).abs() < 1e-6);
+    /// // Stress that starts at 300 Pa: a gauge that was not tared.
+    /// let loads = [0.01, 0.02, 0.03, 0.04].map(|strain: f64| LoadState {
+    ///     contact_area_m2: Some(Estimate::exact(1e-4)),
+    ///     mean_strain: Some(Estimate::exact(strain)),
+    ///     ..LoadState::new(Estimate::new((300.0 + 60e3 * strain) * 1e-4, 1e-4))
+    /// });
+    /// let (loads, line) = (LoadSeries::new(loads), StressStrainRegression::default());
+    /// let tested = line.estimate(&loads)?;
+    /// assert!(tested.warnings.iter().any(|w| matches!(w, Warning::Intercept { .. })));
+    /// let forced = line.with_zero_at_origin().estimate(&loads)?;
+    /// assert!(forced.youngs_modulus_pa > tested.youngs_modulus_pa);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn with_intercept(mut self, intercept: Intercept) -> Self {
-        self.intercept = intercept;
+    pub fn with_zero_at_origin(mut self) -> Self {
+        self.zero_at_origin = true;
         self
     }
 
@@ -114,7 +91,7 @@ impl StressStrainRegression {
     fn line(&self, points: &[Point]) -> Result<Line, ElasticityError> {
         let known = Self::known(points);
         self.check(points, known)?;
-        let line = Line::fit(points, self.intercept == Intercept::Tested, known);
+        let line = Line::fit(points, !self.zero_at_origin, known);
         if line.slope <= 0.0 || !line.slope.is_finite() {
             let p = points
                 .last()
@@ -135,7 +112,7 @@ impl StressStrainRegression {
     }
 
     fn check(&self, points: &[Point], known: bool) -> Result<(), ElasticityError> {
-        let through_origin = self.intercept == Intercept::Zero;
+        let through_origin = self.zero_at_origin;
         let expected = match (through_origin, known) {
             (true, true) => 1,
             (false, false) => 3,

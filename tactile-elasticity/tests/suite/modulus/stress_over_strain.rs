@@ -16,7 +16,7 @@ fn stress_over_strain() {
     finds(&PaperRatio::default(), &line);
     finds(&StressStrainRegression::default(), &line);
     finds(
-        &StressStrainRegression::default().with_intercept(Intercept::Zero),
+        &StressStrainRegression::default().with_zero_at_origin(),
         &line,
     );
     // An offset biases the ratio, not the slope, and is found.
