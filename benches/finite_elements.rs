@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, TableOptions, Waveguide};
-use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Outcome, Press, Scene};
+use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Outcome, Press};
 use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact,
 };
@@ -136,11 +136,12 @@ fn another_program() {
     for press in presses {
         let Published { name, loads, .. } = &press;
         let (radius, ball) = (press.radius_m, material(press.youngs_modulus_pa));
-        let scene = if press.on_flat {
-            Scene::ball_on_flat(radius, ball)
-        } else {
-            Scene::ball_on_guide(radius, ball, &paper_guide())
-        };
+        let object = Object::Ball { radius_m: radius };
+        let mut on = Press::new(object, ball).expect("a ball");
+        if !press.on_flat {
+            on = on.on_guide(paper_guide()).expect("a wide guide");
+        }
+        let scene = on.scene();
         let forces: Vec<Load> = loads.iter().map(|l| Load::Force(l[0])).collect();
         let states = scene.expect("a scene").solve(&forces).states;
         assert_eq!(states.len(), loads.len());

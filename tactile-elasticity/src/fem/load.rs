@@ -74,7 +74,7 @@ pub struct Report {
 /// ```
 /// use tactile_elasticity::fem::{Load, Material, Outcome, Scene};
 ///
-/// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
 /// let solution = scene.solve(&[Load::Approach(0.3e-3), Load::Approach(f64::NAN)]);
 /// assert_eq!(solution.states.len(), 1);
 /// assert!(matches!(solution.report.outcome, Outcome::Stopped { load: 1, .. }));

@@ -104,7 +104,23 @@ impl Press {
         })
     }
 
-    /// On this guide instead of a rigid flat.
+    /// On this guide instead of a rigid flat. Contact radii reach 1.3 ball radii and more, until the ball's equator or the guide's thickness ends
+    /// what the bodies take: the solution then ends with [`Outcome::Stopped`](super::Outcome::Stopped).
+    ///
+    /// ```
+    /// use tactile_elasticity::fem::{Guide, Layer, Load, Material, Object, Press};
+    ///
+    /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+    /// let layer = Layer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
+    /// let guide = Guide::new(vec![layer], 25e-3)?;
+    /// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495)?)?.on_guide(guide)?;
+    /// let state = &press.scene()?.solve(&[Load::Approach(1e-3)]).states[0];
+    /// // Softer than a rigid flat: less force, at the same approach, than six tenths of Hertz's.
+    /// let hertz = 4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
+    /// assert!(state.force_n() > 0.0 && state.force_n() < 0.6 * hertz);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// [`ElasticityError::OutOfRange`] for a guide that is not wider than the object, unless this is a cylinder.

@@ -3,9 +3,9 @@
 /// Pressure at a point of a contact or of a bonded interface.
 ///
 /// ```
-/// use tactile_elasticity::fem::{Load, Material, Scene};
+/// use tactile_elasticity::fem::{Load, Material, Object, Press};
 ///
-/// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
 /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
 /// assert!(state.pressure()[0].pressure_pa > state.pressure()[5].pressure_pa);
 /// ```
@@ -23,9 +23,9 @@ pub struct PressurePoint {
 /// A contact radius and how far the mesh leaves it open.
 ///
 /// ```
-/// use tactile_elasticity::fem::{Load, Material, Scene};
+/// use tactile_elasticity::fem::{Load, Material, Object, Press};
 ///
-/// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
 /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
 /// let radius = state.contact_radius().unwrap();
 /// assert!(radius.uncertainty_m < 0.01 * radius.radius_m);

@@ -92,9 +92,9 @@ const BLOCK_FINENESS: usize = 5;
 /// A model ready to be solved, with the pressure between guide and object as its result.
 ///
 /// ```
-/// use tactile_elasticity::fem::{Load, Material, Scene};
+/// use tactile_elasticity::fem::{Load, Material, Object, Press};
 ///
-/// let scene = Scene::ball_on_flat(3e-3, Material::new(103e3, 0.495).unwrap()).unwrap();
+/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
 /// let solution = scene.solve(&[Load::Force(0.2)]);
 /// let radius = solution.states[0].contact_radius().unwrap();
 /// assert!((radius.radius_m - 1.51e-3).abs() < 0.02e-3);
@@ -110,35 +110,16 @@ impl Scene {
     ///
     /// # Errors
     /// A radius that is not positive.
-    pub fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
+    pub(crate) fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
         Press::new(Object::Ball { radius_m }, material)?.scene()
     }
 
     /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
     /// height, the glass moves by the approach. [`Press`] has other objects.
     ///
-    /// Contact radii reach 1.3 ball radii and more, until the ball's equator or the guide's thickness ends
-    /// what the bodies take: the solution then ends with [`Outcome::Stopped`](super::Outcome::Stopped).
-    ///
-    /// ```
-    /// use tactile_elasticity::fem::{Guide, Layer, Load, Material, Scene};
-    ///
-    /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
-    /// let layer = Layer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
-    /// let guide = Guide::new(vec![layer], 25e-3)?;
-    /// let scene = Scene::ball_on_guide(3e-3, Material::new(103e3, 0.495)?, &guide)?;
-    /// let solution = scene.solve(&[Load::Approach(1e-3)]);
-    /// let state = &solution.states[0];
-    /// // Softer than a rigid flat: less force, at the same approach, than six tenths of Hertz's.
-    /// let hertz = 4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
-    /// assert!(state.force_n() > 0.0 && state.force_n() < 0.6 * hertz);
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
     /// # Errors
     /// A radius that is not positive; a guide that is not wider than the ball.
-    pub fn ball_on_guide(
+    pub(crate) fn ball_on_guide(
         radius_m: f64,
         material: Material,
         guide: &Guide,
@@ -263,8 +244,8 @@ impl Scene {
     /// Number of elements of all bodies.
     ///
     /// ```
-    /// # use tactile_elasticity::fem::{Material, Scene};
-    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// # use tactile_elasticity::fem::{Material, Object, Press};
+    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
     /// assert!(scene.element_count() > 100);
     /// ```
     pub fn element_count(&self) -> usize {
@@ -278,8 +259,8 @@ impl Scene {
     /// between elements. O(elements).
     ///
     /// ```
-    /// # use tactile_elasticity::fem::{Load, Material, Scene};
-    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// # use tactile_elasticity::fem::{Load, Material, Object, Press};
+    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
     /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
     /// // Pressed along the axis.
     /// assert!(scene.stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);

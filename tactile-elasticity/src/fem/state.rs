@@ -8,9 +8,9 @@ use super::radius::ContactProfile;
 /// The deformed bodies at one load.
 ///
 /// ```
-/// use tactile_elasticity::fem::{Load, Material, Scene};
+/// use tactile_elasticity::fem::{Load, Material, Object, Press};
 ///
-/// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
 /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
 /// assert_eq!(state.approach_m(), 0.3e-3);
 /// assert!(state.force_n() > 0.0);
@@ -67,8 +67,8 @@ impl State {
     /// points of [`Self::pressure`]; constant beyond the last, zero without contact.
     ///
     /// ```
-    /// # use tactile_elasticity::fem::{Load, Material, Scene};
-    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// # use tactile_elasticity::fem::{Load, Material, Object, Press};
+    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
     /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
     /// assert!(state.pressure_at(0.1e-3) > state.pressure_at(0.5e-3));
     /// ```

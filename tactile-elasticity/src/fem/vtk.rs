@@ -12,9 +12,9 @@ impl Scene {
     /// elements Young's modulus (Pa) and the Cauchy stress at their centres (Pa, tension positive). x is r, y is z.
     ///
     /// ```
-    /// use tactile_elasticity::fem::{Load, Material, Scene};
+    /// use tactile_elasticity::fem::{Load, Material, Object, Press};
     ///
-    /// let scene = Scene::ball_on_flat(3e-3, Material::new(1e5, 0.495).unwrap()).unwrap();
+    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
     /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
     /// let mut file = Vec::new();
     /// scene.write_vtk(state, &mut file)?;

@@ -1,7 +1,10 @@
 //! What a caller may say about a scene.
 
 use super::schedule::Slack;
-use crate::{MatchError, validate::option_within};
+use crate::{
+    MatchError,
+    validate::{at_least_one, option_within},
+};
 
 /// Weight of the slack on a side where no outliers are expected.
 const RARE: f64 = 0.01;
@@ -134,7 +137,8 @@ pub enum Transformation {
 ///     .with_rotation(Rotation::Any)
 ///     .with_outliers(Outliers::Model)
 ///     .with_search(Search::Thorough)
-///     .with_outlier_ratio(0.3)?; // three in ten points are out of sight
+///     .with_outlier_ratio(0.3)? // three in ten points are out of sight
+///     .with_max_iterations(100)?;
 /// assert_ne!(options, SoftassignOptions::default());
 /// assert!(matches!(options.with_outlier_ratio(0.95), Err(MatchError::InvalidOption { option: "outlier_ratio", .. })));
 /// # Ok::<(), tactile_match::MatchError>(())
@@ -199,6 +203,16 @@ impl SoftassignOptions {
     pub fn with_outlier_ratio(mut self, share: f64) -> Result<Self, MatchError> {
         option_within("outlier_ratio", share, 1e-6, 0.9, "[1e-6, 0.9]")?;
         self.share = share;
+        Ok(self)
+    }
+
+    /// Sets the most outer iterations of one start, at least 1 (default 200).
+    ///
+    /// # Errors
+    /// [`MatchError::InvalidOption`] for 0.
+    pub fn with_max_iterations(mut self, limit: usize) -> Result<Self, MatchError> {
+        at_least_one("max_iterations", limit)?;
+        self.max_iterations = limit;
         Ok(self)
     }
 

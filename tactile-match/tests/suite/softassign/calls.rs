@@ -95,6 +95,7 @@ fn bad_input_is_a_typed_error() {
                 .is_err()
         );
     }
+    assert!(SoftassignOptions::default().with_max_iterations(0).is_err());
 }
 
 #[test]
