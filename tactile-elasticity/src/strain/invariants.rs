@@ -4,6 +4,13 @@ use super::stretch::symmetric_eigen;
 use nalgebra::{Matrix3, RealField};
 
 /// Principal values, largest first, and their directions.
+///
+/// ```
+/// use nalgebra::Matrix3;
+/// use tactile_elasticity::strain::PrincipalValues;
+/// let shear = Matrix3::new(0.0, 0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0);
+/// assert_eq!(PrincipalValues::from(&shear).values, [0.5, 0.0, -0.5]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(
@@ -19,13 +26,6 @@ pub struct PrincipalValues<T> {
 
 impl<T: RealField + Copy> From<&Matrix3<T>> for PrincipalValues<T> {
     /// Of a symmetric tensor.
-    ///
-    /// ```
-    /// use nalgebra::Matrix3;
-    /// use tactile_elasticity::strain::PrincipalValues;
-    /// let shear = Matrix3::new(0.0, 0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0);
-    /// assert_eq!(PrincipalValues::from(&shear).values, [0.5, 0.0, -0.5]);
-    /// ```
     fn from(tensor: &Matrix3<T>) -> Self {
         let (values, directions) = symmetric_eigen(tensor);
         Self { values, directions }
@@ -33,6 +33,13 @@ impl<T: RealField + Copy> From<&Matrix3<T>> for PrincipalValues<T> {
 }
 
 /// I₁ = tr A, I₂ = ½(tr² A − tr A²), I₃ = det A.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tactile_elasticity::strain::Invariants;
+/// let i = Invariants::from(&Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 3.0)));
+/// assert_eq!((i.first, i.second, i.third), (6.0, 11.0, 6.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Invariants<T> {
@@ -46,13 +53,6 @@ pub struct Invariants<T> {
 
 impl<T: RealField + Copy> From<&Matrix3<T>> for Invariants<T> {
     /// Of a tensor.
-    ///
-    /// ```
-    /// use nalgebra::{Matrix3, Vector3};
-    /// use tactile_elasticity::strain::Invariants;
-    /// let i = Invariants::from(&Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 3.0)));
-    /// assert_eq!((i.first, i.second, i.third), (6.0, 11.0, 6.0));
-    /// ```
     fn from(a: &Matrix3<T>) -> Self {
         let minor = |i: usize, j: usize| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(j, i)];
         Self {

@@ -188,6 +188,18 @@ impl<T: Scalar> Eikonal<T> {
 
     /// Sweeping ends when no height changes by more than `tolerance` pixels (widths of a pixel).
     ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::{Branch, Domain, Eikonal, Lighting, PixelFlags, SurfaceReconstruction};
+    /// let known = array![[0.0, f64::NAN, f64::NAN, f64::NAN]];
+    /// let method = Eikonal::new(Lighting::default()).with_branch(Branch::Convex).with_tolerance(1e-6)?;
+    /// let domain = Domain::default().with_known_heights(known.view());
+    /// let surface = method.reconstruct(array![[1.0, 1.0, 0.0, 1.0]].view().into(), &domain)?;
+    /// assert!(surface.flags[[0, 2]].contains(PixelFlags::DARK)); // black would be infinitely steep
+    /// assert!(surface.heights[[0, 3]].is_finite());
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SfsError::NotPositive`] unless positive and finite.
     pub fn with_tolerance(self, tolerance: T) -> Result<Self, SfsError> {
