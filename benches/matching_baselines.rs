@@ -9,8 +9,8 @@ use std::hint::black_box;
 use std::time::Duration;
 use tactile_imaging::matching::labelling::Neighbourhood;
 use tactile_imaging::matching::{
-    CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment, Motion, NearestNeighbour,
-    PointMatcher, RelaxationLabelling,
+    CoherentPointDrift, LinearAssignment, Motion, NearestNeighbour, PointMatcher,
+    RelaxationLabelling,
 };
 
 type Point3 = nalgebra::Point3<f64>;
@@ -104,8 +104,8 @@ fn standard_case(criterion: &mut Criterion) {
             lambda: 3.0,
             rank,
         };
-        let options = DriftOptions::default().with_motion(motion);
-        CoherentPointDrift::new(options.expect("a valid motion"))
+        let options = CoherentPointDrift::default().with_motion(motion);
+        options.expect("a valid motion")
     };
     let mut group = criterion.benchmark_group("match/105x105");
     let quick: [Row<'_>; 4] = [
@@ -131,15 +131,15 @@ fn standard_case(criterion: &mut Criterion) {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(1));
     group.measurement_time(Duration::from_millis(1));
-    let eight = LabellingOptions::default()
+    let eight = RelaxationLabelling::default()
         .with_neighbourhood(Neighbourhood::Nearest(8))
         .expect("neighbours");
     let labelling = [
         ("labelling_8_neighbours", eight),
-        ("labelling", LabellingOptions::default()),
+        ("labelling", RelaxationLabelling::default()),
     ];
     for (name, options) in labelling {
-        let matcher = RelaxationLabelling::new(options);
+        let matcher = options;
         check(name, &matcher, &scene, 0.99, 0.5);
         group.bench_function(name, |b| {
             b.iter(|| matcher.match_points(black_box(&scene.model), &scene.target))

@@ -5,8 +5,8 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::matching::labelling::Neighbourhood;
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
-    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, SoftassignOptions,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, Outliers,
+    PointMatcher, RelaxationLabelling, Rotation,
 };
 
 struct Scene {
@@ -109,14 +109,14 @@ pub(crate) fn outliers(study: &mut Study) {
 }
 
 fn every(study: &mut Study, scenes: &[Scene]) {
-    let options = SoftassignOptions::default();
+    let options = AnnealedSoftassign::default();
     run(
         study,
         scenes,
         "annealed softassign",
         "default",
         true,
-        &AnnealedSoftassign::new(options),
+        &options,
     );
     for limit in [1, 3, 10, 30] {
         let options = options.with_max_iterations(limit).expect("valid");
@@ -126,7 +126,7 @@ fn every(study: &mut Study, scenes: &[Scene]) {
             "iterations",
             &format!("at most {limit}"),
             false,
-            &AnnealedSoftassign::new(options),
+            &options,
         );
     }
     for share in [0.01, 0.3] {
@@ -137,11 +137,11 @@ fn every(study: &mut Study, scenes: &[Scene]) {
             "outlier ratio",
             &format!("{share}"),
             false,
-            &AnnealedSoftassign::new(options),
+            &options,
         );
     }
     for side in [Outliers::None, Outliers::Target] {
-        let matcher = AnnealedSoftassign::new(options.with_outliers(side));
+        let matcher = options.with_outliers(side);
         run(
             study,
             scenes,
@@ -157,7 +157,7 @@ fn every(study: &mut Study, scenes: &[Scene]) {
         "rotation",
         "any",
         false,
-        &AnnealedSoftassign::new(options.with_rotation(Rotation::Any)),
+        &options.with_rotation(Rotation::Any),
     );
     others(study, scenes);
 }
@@ -180,8 +180,8 @@ fn others(study: &mut Study, scenes: &[Scene]) {
         &LinearAssignment::default(),
     );
     for tolerance in [1e-2, 1e-5, 1e-8] {
-        let options = DriftOptions::default().with_tolerance(tolerance);
-        let drift = CoherentPointDrift::new(options.expect("valid"));
+        let options = CoherentPointDrift::default().with_tolerance(tolerance);
+        let drift = options.expect("valid");
         run(
             study,
             scenes,
@@ -192,8 +192,8 @@ fn others(study: &mut Study, scenes: &[Scene]) {
         );
     }
     for k in study.choose(vec![5], vec![5, 8, 12, 20]) {
-        let options = LabellingOptions::default().with_neighbourhood(Neighbourhood::Nearest(k));
-        let labelling = RelaxationLabelling::new(options.expect("valid"));
+        let options = RelaxationLabelling::default().with_neighbourhood(Neighbourhood::Nearest(k));
+        let labelling = options.expect("valid");
         run(
             study,
             scenes,

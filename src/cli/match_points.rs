@@ -13,9 +13,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tactile_imaging::io::{CasePoints, MatchCase, read_cases, write_case_result};
 use tactile_imaging::matching::{
-    AnnealedSoftassign, CoherentPointDrift, LabellingOptions, LinearAssignment, MatchError,
-    Matching, NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation,
-    SoftassignOptions, StopReason,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching,
+    NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation, StopReason,
 };
 
 /// Match the points of two sets, in the plane or in space
@@ -96,11 +95,9 @@ impl Expectations {
             Unmatched::Target => Outliers::Target,
             Unmatched::None => Outliers::None,
         };
-        AnnealedSoftassign::new(
-            SoftassignOptions::default()
-                .with_rotation(rotation)
-                .with_outliers(outliers),
-        )
+        AnnealedSoftassign::default()
+            .with_rotation(rotation)
+            .with_outliers(outliers)
     }
 
     fn are_default(self) -> bool {
@@ -123,8 +120,8 @@ impl Method {
             Self::Softassign => Box::new(expectations.matcher()),
             Self::Labelling => Box::new(RelaxationLabelling::default()),
             Self::SparseLabelling => {
-                let options = LabellingOptions::default().with_candidates(10);
-                Box::new(RelaxationLabelling::new(options.expect("some candidates")))
+                let options = RelaxationLabelling::default().with_candidates(10);
+                Box::new(options.expect("some candidates"))
             }
             Self::Drift => Box::new(CoherentPointDrift::default()),
             Self::Nearest => Box::new(NearestNeighbour::default()),

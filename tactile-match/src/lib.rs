@@ -49,15 +49,15 @@ extern crate self as tactile_match;
 
 pub use assignment::{AssignmentWorkspace, linear_assignment};
 pub use assignment_matcher::LinearAssignment;
-pub use cpd::{CoherentPointDrift, DriftOptions, DriftWorkspace, Motion, Normalization};
+pub use cpd::{CoherentPointDrift, DriftWorkspace, Motion, Normalization};
 pub use error::MatchError;
-pub use labelling::{LabellingOptions, RelaxationLabelling};
+pub use labelling::RelaxationLabelling;
 pub use matching::{Doubt, MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
 pub use nearest::NearestNeighbour;
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;
 pub use softassign::{
-    AnnealedSoftassign, Landmark, Outliers, Rotation, Search, SoftassignMatch, SoftassignOptions,
-    SoftassignWorkspace, Transformation,
+    AnnealedSoftassign, Landmark, Outliers, Rotation, Search, SoftassignMatch, SoftassignWorkspace,
+    Transformation,
 };
 pub use warm_start::WarmStart;

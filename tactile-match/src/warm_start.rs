@@ -9,13 +9,13 @@ use std::any::Any;
 ///
 /// ```
 /// use nalgebra::Point3;
-/// use tactile_match::{PointMatcher, AnnealedSoftassign, SoftassignOptions, Search, WarmStart};
+/// use tactile_match::{PointMatcher, AnnealedSoftassign, Search, WarmStart};
 /// # fn main() -> Result<(), tactile_match::MatchError> {
 /// let model: Vec<Point3<f64>> = (0..60)
 ///     .map(|i| (0.13 * f64::from(i).sqrt(), 2.4 * f64::from(i)))
 ///     .map(|(r, angle)| Point3::new(r * angle.cos(), r * angle.sin(), 1.0 - 0.5 * r * r))
 ///     .collect();
-/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near));
+/// let matcher = AnnealedSoftassign::default().with_search(Search::Near);
 /// let mut warm = WarmStart::default();
 /// // The load rises: the surface grows by a hundredth from frame to frame.
 /// let mut iterations = Vec::new();

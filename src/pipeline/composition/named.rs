@@ -4,7 +4,7 @@ use crate::elasticity::strain::{
 };
 use crate::matching::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, NearestNeighbour, PointMatcher,
-    RelaxationLabelling, Search, SoftassignOptions,
+    RelaxationLabelling, Search,
 };
 use crate::pipeline::choice::{
     IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice,
@@ -70,7 +70,7 @@ pub(super) fn sampler(
 
 /// The default matcher. Two loads of one contact lie near each other: one run from where they are.
 pub(super) fn near_by() -> AnnealedSoftassign {
-    AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near))
+    AnnealedSoftassign::default().with_search(Search::Near)
 }
 
 pub(super) fn matcher(choice: MatcherChoice) -> Arc<dyn PointMatcher<f64, 3> + Send + Sync> {

@@ -25,7 +25,7 @@ mod outcome;
 mod registration;
 mod warp;
 
-pub use options::DriftOptions;
+pub use options::CoherentPointDrift;
 pub use registration::DriftWorkspace;
 
 use crate::validate::point_sets;
@@ -37,11 +37,11 @@ use tactile_tps::Scalar;
 ///
 /// ```
 /// use nalgebra::{Point2, Vector2};
-/// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, PointMatcher};
+/// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
 /// let model: Vec<_> = (0..20).map(f64::from).map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k)).collect();
 /// let target: Vec<_> = model.iter().map(|p| p * 1.2 + Vector2::new(0.0, 3.0)).collect(); // swollen by a fifth
 /// let residual = |motion| {
-///     let matcher = CoherentPointDrift::new(DriftOptions::default().with_motion(motion)?);
+///     let matcher = CoherentPointDrift::default().with_motion(motion)?;
 ///     Ok::<_, tactile_match::MatchError>(matcher.match_points(&model, &target)?.report.residual)
 /// };
 /// assert!(residual(Motion::Similarity)? < 1e-6);
@@ -81,12 +81,12 @@ impl Motion {
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, Normalization, PointMatcher};
+/// use tactile_match::{CoherentPointDrift, Motion, Normalization, PointMatcher};
 /// let model: Vec<_> = (0..24).map(f64::from).map(|k| Point2::new(k % 6.0 + 0.2 * k.sin(), (k / 6.0).floor())).collect();
 /// let target: Vec<_> = model[..18].iter().map(|p| Point2::new(p.x + 0.1, p.y)).collect(); // the last row is out of sight
 /// let (motion, normalization) = (Motion::Rigid, Normalization::Model);
-/// let options = DriftOptions::default().with_motion(motion)?.with_normalization(normalization);
-/// let matching = CoherentPointDrift::new(options).match_points(&model, &target)?;
+/// let options = CoherentPointDrift::default().with_motion(motion)?.with_normalization(normalization);
+/// let matching = options.match_points(&model, &target)?;
 /// assert!((0..18).all(|i| matching.assignment[i] == Some(i)));
 /// assert_eq!(matching.unmatched_model, [18, 19, 20, 21, 22, 23]);
 /// # Ok::<(), tactile_match::MatchError>(())
@@ -107,37 +107,7 @@ pub enum Normalization {
     Off,
 }
 
-/// Coherent point drift as a [`PointMatcher`].
-///
-/// Where the sets are far apart in rotation it finds a local optimum, as every method of its kind does. The time is
-/// `O((M N + M r²) · iterations)`, with `r` the rank of the kernel.
-///
-/// ```
-/// use nalgebra::{Point2, Rotation2, Vector2};
-/// use tactile_match::{CoherentPointDrift, DriftOptions, Motion, PointMatcher};
-///
-/// let model: Vec<_> = (0..40).map(|k| f64::from(k)).map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k)).collect();
-/// let motion = Rotation2::new(0.2);
-/// let target: Vec<_> = model.iter().rev().map(|p| motion * p + Vector2::new(7.0, -2.0)).collect();
-///
-/// let matcher = CoherentPointDrift::new(DriftOptions::default().with_motion(Motion::Rigid)?);
-/// let matching = matcher.match_points(&model, &target)?;
-/// assert!((0..40).all(|m| matching.assignment[m] == Some(39 - m)));
-/// assert!(matching.warped.iter().zip(target.iter().rev()).all(|(w, t)| (w - t).norm() < 1e-6));
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CoherentPointDrift {
-    options: DriftOptions,
-}
-
 impl CoherentPointDrift {
-    /// With these options.
-    #[must_use]
-    pub fn new(options: DriftOptions) -> Self {
-        Self { options }
-    }
-
     /// [`PointMatcher::match_points`] with the memory of the iterations kept between calls.
     ///
     /// ```
@@ -162,9 +132,9 @@ impl CoherentPointDrift {
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
         point_sets(model, target)?;
-        workspace.register(&self.options, model, target);
+        workspace.register(self, model, target);
         Ok(outcome::matching(
-            &self.options,
+            self,
             workspace,
             model.len(),
             target.len(),
@@ -189,7 +159,7 @@ mod tests {
 
     #[test]
     fn a_used_workspace_registers_without_allocating() {
-        let options = DriftOptions::default();
+        let options = CoherentPointDrift::default();
         let mut workspace = DriftWorkspace::default();
         let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
             .into_iter()

@@ -4,28 +4,49 @@ use super::{Motion, Normalization};
 use crate::MatchError;
 use crate::validate::{at_least_one, option_within};
 
-/// Options of [`CoherentPointDrift`](super::CoherentPointDrift); all are independent of the units of the points.
+/// Coherent point drift as a [`PointMatcher`](crate::PointMatcher).
+///
+/// Where the sets are far apart in rotation it finds a local optimum, as every method of its kind does. The time is
+/// `O((M N + M r²) · iterations)`, with `r` the rank of the kernel.
+///
+/// ```
+/// use nalgebra::{Point2, Rotation2, Vector2};
+/// use tactile_match::{CoherentPointDrift, Motion, PointMatcher};
+///
+/// let model: Vec<_> = (0..40).map(|k| f64::from(k)).map(|k| Point2::new(k.cos() * k, (1.3 * k).sin() * k)).collect();
+/// let motion = Rotation2::new(0.2);
+/// let target: Vec<_> = model.iter().rev().map(|p| motion * p + Vector2::new(7.0, -2.0)).collect();
+///
+/// let matcher = CoherentPointDrift::default().with_motion(Motion::Rigid)?;
+/// let matching = matcher.match_points(&model, &target)?;
+/// assert!((0..40).all(|m| matching.assignment[m] == Some(39 - m)));
+/// assert!(matching.warped.iter().zip(target.iter().rev()).all(|(w, t)| (w - t).norm() < 1e-6));
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+///
+/// # Options
+/// All are independent of the units of the points.
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{CoherentPointDrift, DriftOptions, MatchError, Motion, Normalization, PointMatcher};
+/// use tactile_match::{CoherentPointDrift, MatchError, Motion, Normalization, PointMatcher};
 /// // About a fifth of the target points are outliers, and the object may bend, but gently.
 /// let motion = Motion::NonRigid { beta: 2.0, lambda: 10.0, rank: Some(30) };
-/// let options = DriftOptions::default()
+/// let options = CoherentPointDrift::default()
 ///     .with_motion(motion)?
 ///     .with_normalization(Normalization::Model)
 ///     .with_outlier_weight(0.2)?
 ///     .with_tolerance(1e-6)?
 ///     .with_max_iterations(50)?;
 /// let points = [[0.0, 0.0], [1.0, 0.1], [2.5, 0.0], [0.3, 2.0], [1.6, 1.4]].map(Point2::from);
-/// let found = CoherentPointDrift::new(options).match_points(&points, &points)?;
+/// let found = options.match_points(&points, &points)?;
 /// assert!((0..5).all(|i| found.assignment[i] == Some(i)) && found.report.iterations <= 50);
 /// let all_outliers = options.with_outlier_weight(1.0);
 /// assert!(matches!(all_outliers, Err(MatchError::InvalidOption { option: "outlier_weight", .. })));
 /// # Ok::<(), MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DriftOptions {
+pub struct CoherentPointDrift {
     pub(super) motion: Motion,
     pub(super) outlier_weight: f64,
     pub(super) tolerance: f64,
@@ -33,7 +54,7 @@ pub struct DriftOptions {
     pub(super) normalization: Normalization,
 }
 
-impl Default for DriftOptions {
+impl Default for CoherentPointDrift {
     fn default() -> Self {
         Self {
             motion: Motion::NON_RIGID,
@@ -45,7 +66,7 @@ impl Default for DriftOptions {
     }
 }
 
-impl DriftOptions {
+impl CoherentPointDrift {
     /// Sets how the model may move (default [`Motion::NON_RIGID`]).
     ///
     /// # Errors

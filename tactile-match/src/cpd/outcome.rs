@@ -1,6 +1,6 @@
 //! From the mixture at its end to a [`Matching`]: posterior, pairs, confidences, covariances.
 
-use super::DriftOptions;
+use super::CoherentPointDrift;
 use super::expectation::gaussians;
 use super::registration::DriftWorkspace;
 use crate::{AssignmentWorkspace, MatchReport, Matching, SoftMatches, unmatched_rows};
@@ -11,7 +11,10 @@ use tactile_tps::Scalar;
 const NEGLIGIBLE: f64 = 1e-4;
 
 /// The posterior `P` at the end, a row of `M` entries per target point.
-fn posterior<const D: usize>(options: &DriftOptions, workspace: &DriftWorkspace<D>) -> Vec<f64> {
+fn posterior<const D: usize>(
+    options: &CoherentPointDrift,
+    workspace: &DriftWorkspace<D>,
+) -> Vec<f64> {
     let (model_len, target_len) = (workspace.moved[0].len(), workspace.target[0].len());
     let sigma2 = workspace.sigma2.max(f64::MIN_POSITIVE);
     let uniform = workspace.uniform(options);
@@ -52,7 +55,7 @@ fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<u
 
 /// Assembles the result; lengths are those of the model and the target.
 pub(super) fn matching<T: Scalar, const D: usize>(
-    options: &DriftOptions,
+    options: &CoherentPointDrift,
     workspace: &DriftWorkspace<D>,
     model_len: usize,
     target_len: usize,

@@ -5,7 +5,7 @@ use super::global::GlobalStep;
 use super::kernel::KernelFactor;
 use super::non_rigid::NonRigidStep;
 use super::warp::DriftWarp;
-use super::{DriftOptions, Motion, Normalization};
+use super::{CoherentPointDrift, Motion, Normalization};
 use crate::StopReason;
 use crate::frame::Frame;
 use nalgebra::{Point, RealField, SMatrix, SVector};
@@ -79,7 +79,7 @@ impl<const D: usize> DriftWorkspace<D> {
     /// Registers `model` to `target`; both have points and finite coordinates.
     pub(super) fn register<T: RealField + Copy>(
         &mut self,
-        options: &DriftOptions,
+        options: &CoherentPointDrift,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) {
@@ -113,7 +113,7 @@ impl<const D: usize> DriftWorkspace<D> {
 
     fn enter_frames<T: RealField + Copy>(
         &mut self,
-        options: &DriftOptions,
+        options: &CoherentPointDrift,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) {
@@ -153,7 +153,7 @@ impl<const D: usize> DriftWorkspace<D> {
     }
 
     /// One E-step and one M-step.
-    fn iterate(&mut self, options: &DriftOptions) {
+    fn iterate(&mut self, options: &CoherentPointDrift) {
         let uniform = self.uniform(options);
         self.posterior
             .update(&self.moved, &self.target, self.sigma2, uniform);
@@ -177,7 +177,7 @@ impl<const D: usize> DriftWorkspace<D> {
     }
 
     /// Weight of the uniform component at the present variance.
-    pub(super) fn uniform(&self, options: &DriftOptions) -> f64 {
+    pub(super) fn uniform(&self, options: &CoherentPointDrift) -> f64 {
         uniform_weight::<D>(
             self.sigma2,
             options.outlier_weight,

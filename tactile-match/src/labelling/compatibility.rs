@@ -7,13 +7,13 @@ use nalgebra::{RealField, SVector};
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::labelling::{LabellingOptions, LengthMaximum};
+/// use tactile_match::labelling::LengthMaximum;
 /// use tactile_match::{PointMatcher, RelaxationLabelling};
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
 /// for maximum in [LengthMaximum::PerPair, LengthMaximum::Global] {
-///     let options = LabellingOptions::default().with_length_maximum(maximum);
-///     let found = RelaxationLabelling::new(options).match_points(&model, &target)?;
+///     let options = RelaxationLabelling::default().with_length_maximum(maximum);
+///     let found = options.match_points(&model, &target)?;
 ///     assert!((0..12).all(|i| found.assignment[i] == Some(i)));
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())
@@ -31,13 +31,13 @@ pub enum LengthMaximum {
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::labelling::{Compatibility, LabellingOptions};
+/// use tactile_match::labelling::Compatibility;
 /// use tactile_match::{PointMatcher, RelaxationLabelling};
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
 /// for compatibility in [Compatibility::LengthDirection, Compatibility::Printed, Compatibility::Full] {
-///     let options = LabellingOptions::default().with_compatibility(compatibility);
-///     let found = RelaxationLabelling::new(options).match_points(&model, &target)?;
+///     let options = RelaxationLabelling::default().with_compatibility(compatibility);
+///     let found = options.match_points(&model, &target)?;
 ///     assert!((0..12).all(|i| found.assignment[i] == Some(i)));
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())

@@ -1,7 +1,7 @@
 //! The whole method: first probabilities, relaxation, spline, and again.
 
 use super::{
-    CompatibilityRule, LabellingOptions, MatchMatrix, NeighbourGraph, first_matches, sinkhorn,
+    CompatibilityRule, MatchMatrix, NeighbourGraph, RelaxationLabelling, first_matches, sinkhorn,
     support_by, update,
 };
 use crate::frame::Frame;
@@ -13,33 +13,7 @@ use tactile_tps::{Scalar, Smoothing};
 /// Edge pairs whose compatibilities are kept between sweeps; more than these are computed anew every time.
 const TABLE_LIMIT: usize = 1 << 25;
 
-/// The paper's matching method (13)–(20) as printed: relaxation labelling, then a thin-plate spline, in turn.
-///
-/// Every outer iteration joins the warped model and the target to graphs, compares their shape contexts for the first M, relaxes M by
-/// (19), (20) and Sinkhorn's normalisation until it no longer changes, and fits a thin-plate spline to the mean partners. Each sweep costs
-/// `O(I J A B)`, seconds for 105 points with neighbourhoods of the median radius; use it to check, not to work.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::{PointMatcher, RelaxationLabelling};
-/// let model: Vec<_> = (0..16).map(|k| f64::from(k)).map(|k| Point2::new(k % 4.0 + 0.1 * k.sin(), (k / 4.0).floor())).collect();
-/// let target: Vec<_> = model.iter().rev().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
-/// let matching = RelaxationLabelling::default().match_points(&model, &target)?;
-/// assert!((0..16).all(|i| matching.assignment[i] == Some(15 - i)));
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RelaxationLabelling {
-    options: LabellingOptions,
-}
-
 impl RelaxationLabelling {
-    /// With these options.
-    #[must_use]
-    pub fn new(options: LabellingOptions) -> Self {
-        Self { options }
-    }
-
     /// One outer iteration's match matrix: first probabilities of `model` (as warped so far) and `target`, then relaxation.
     ///
     /// # Panics
@@ -50,7 +24,7 @@ impl RelaxationLabelling {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> MatchMatrix<T> {
-        let options = &self.options;
+        let options = self;
         if let Some(candidates) = options.candidates {
             return super::sparse::relax(options, candidates, model, target);
         }
@@ -66,7 +40,7 @@ impl RelaxationLabelling {
 
 /// (19), (20) and normalisation in turn until M no longer changes.
 pub(super) fn relax_with<T: Scalar>(
-    options: &LabellingOptions,
+    options: &RelaxationLabelling,
     mut m: MatchMatrix<T>,
     support: impl Fn(&MatchMatrix<T>) -> Vec<T>,
 ) -> MatchMatrix<T> {
@@ -85,7 +59,7 @@ pub(super) fn relax_with<T: Scalar>(
 
 /// The outer iterations: `relax` gives the match matrix of the warped model and the target, the spline warps the model, and again.
 fn match_with<T: Scalar, const D: usize>(
-    options: &LabellingOptions,
+    options: &RelaxationLabelling,
     model: &[Point<T, D>],
     target: &[Point<T, D>],
     relax: impl Fn(&[Point<T, D>], &[Point<T, D>]) -> MatchMatrix<T>,
@@ -158,7 +132,7 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for RelaxationLabelling {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        match_with(&self.options, model, target, |model, target| {
+        match_with(self, model, target, |model, target| {
             self.relax(model, target)
         })
     }

@@ -25,7 +25,7 @@
 //! One sweep costs `O(I J A B)` for `A` and `B` neighbours a point, and with neighbourhoods of the median radius
 //! `A ≈ I/2`, `B ≈ J/2`: fourth order, not the third the paper claims. [`AnnealedSoftassign`](crate::AnnealedSoftassign)
 //! is the matcher to use; [`RelaxationLabelling`] is what to check it against, and
-//! [`LabellingOptions::with_candidates`] runs the same method over few candidates.
+//! [`RelaxationLabelling::with_candidates`] runs the same method over few candidates.
 
 mod compatibility;
 mod match_matrix;
@@ -50,9 +50,8 @@ mod tests;
 mod update;
 
 pub use compatibility::{Compatibility, LengthMaximum};
-pub use matcher::RelaxationLabelling;
 pub use neighbourhood::Neighbourhood;
-pub use options::LabellingOptions;
+pub use options::RelaxationLabelling;
 
 use compatibility::{CompatibilityRule, gamma};
 use match_matrix::MatchMatrix;

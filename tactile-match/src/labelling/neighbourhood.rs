@@ -7,13 +7,13 @@ use nalgebra::{Point, RealField, SVector};
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::labelling::{LabellingOptions, Neighbourhood};
+/// use tactile_match::labelling::Neighbourhood;
 /// use tactile_match::{PointMatcher, RelaxationLabelling};
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
 /// for neighbourhood in [Neighbourhood::MedianRadius, Neighbourhood::Nearest(4)] {
-///     let options = LabellingOptions::default().with_neighbourhood(neighbourhood)?;
-///     let found = RelaxationLabelling::new(options).match_points(&model, &target)?;
+///     let options = RelaxationLabelling::default().with_neighbourhood(neighbourhood)?;
+///     let found = options.match_points(&model, &target)?;
 ///     assert!((0..12).all(|i| found.assignment[i] == Some(i)));
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())

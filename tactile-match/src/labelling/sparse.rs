@@ -1,14 +1,14 @@
 //! The same method over few candidates a point, with the links between them computed once.
 
 use super::matcher::relax_with;
-use super::{CompatibilityRule, LabellingOptions, MatchMatrix, NeighbourGraph, first_matches};
+use super::{CompatibilityRule, MatchMatrix, NeighbourGraph, RelaxationLabelling, first_matches};
 use nalgebra::Point;
 use tactile_tps::Scalar;
 
 /// One outer iteration's match matrix, as [`RelaxationLabelling::relax`](super::RelaxationLabelling::relax) with all but the likeliest
 /// candidates at zero.
 pub(super) fn relax<T: Scalar, const D: usize>(
-    options: &LabellingOptions,
+    options: &RelaxationLabelling,
     candidates: usize,
     model: &[Point<T, D>],
     target: &[Point<T, D>],

@@ -13,15 +13,15 @@ use tactile_tps::Scalar;
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{AnnealedSoftassign, Landmark, SoftassignOptions, Transformation};
+/// use tactile_match::{AnnealedSoftassign, Landmark, Transformation};
 /// // Twelve points of a regular ring: only landmarks can tell that it was turned.
 /// let ring = |turn: f64| -> Vec<Point2<f64>> {
 ///     (0..12).map(|k| f64::from(k).mul_add(30.0, turn).to_radians()).map(|a| Point2::new(a.cos(), a.sin())).collect()
 /// };
 /// let (model, target) = (ring(0.0), ring(30.0));
 /// let landmarks = [0, 4].map(|row| Landmark { row, position: target[row], deviation: 0.0 }); // two known pairs
-/// let options = SoftassignOptions::default().with_transformation(Transformation::Rigid);
-/// let found = AnnealedSoftassign::new(options).match_with_landmarks(&model, &target, &landmarks)?;
+/// let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
+/// let found = options.match_with_landmarks(&model, &target, &landmarks)?;
 /// assert!((0..12).all(|i| found.assignment[i] == Some(i)));
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```

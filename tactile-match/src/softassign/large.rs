@@ -101,8 +101,7 @@ impl AnnealedSoftassign {
         ws.state.tail = ws.annealer.tail(NOTICED * ws.spacing);
         ws.best.copy_from(&ws.state);
         if !self.is_exact(ws) {
-            ws.annealer
-                .evaluate(&mut ws.state, self.options.share, RESOLUTION);
+            ws.annealer.evaluate(&mut ws.state, self.share, RESOLUTION);
             ws.best.copy_from(&ws.state);
         }
         flow
@@ -142,9 +141,7 @@ impl AnnealedSoftassign {
         ws.annealer
             .soft
             .set_targets(&levels.target, &levels.deviations);
-        ws.annealer
-            .rigid
-            .set(self.options.transformation, &levels.model);
+        ws.annealer.rigid.set(self.transformation, &levels.model);
         // Rows of samples are others: landmarks count at all points alone.
         ws.annealer.known.clear();
         if stride == 1 {
@@ -166,11 +163,10 @@ impl AnnealedSoftassign {
         ws.state.warped.clone_from(&ws.state.base);
         let run = self.sampled(ws, FAST.sigma);
         refine(ws, run, ControlFlow::Continue(()), observe)?;
-        if self.options.rotation == Rotation::Limited {
+        if self.rotation == Rotation::Limited {
             return ControlFlow::Continue(());
         }
-        ws.annealer
-            .evaluate(&mut ws.state, self.options.share, RESOLUTION);
+        ws.annealer.evaluate(&mut ws.state, self.share, RESOLUTION);
         ws.best.copy_from(&ws.state);
         let mut base = levels.base.clone();
         for rotation in starts::rotations::<D>(starts::ANY) {
@@ -184,8 +180,7 @@ impl AnnealedSoftassign {
             ws.state.warped.clone_from(&ws.state.base);
             let run = self.sampled(ws, FAST.sigma);
             refine(ws, run, ControlFlow::Continue(()), observe)?;
-            ws.annealer
-                .evaluate(&mut ws.state, self.options.share, RESOLUTION);
+            ws.annealer.evaluate(&mut ws.state, self.share, RESOLUTION);
             if ws.state.energy < ws.best.energy {
                 ws.best.copy_from(&ws.state);
                 base.clone_from(&levels.base);

@@ -60,7 +60,7 @@ mod tuples;
 
 pub use found::SoftassignMatch;
 pub use landmarks::Landmark;
-pub use options::{Outliers, Rotation, Search, SoftassignOptions, Transformation};
+pub use options::{AnnealedSoftassign, Outliers, Rotation, Search, Transformation};
 
 use crate::{Doubt, MatchError, Matching, PointMatcher, WarmStart, validate};
 use anneal::Annealer;
@@ -77,29 +77,6 @@ use schedule::State;
 use std::ops::ControlFlow;
 use tactile_tps::Scalar;
 use tuples::Tuples;
-
-/// The default matcher: annealed softassign, with a Gaussian-process prior on the warp and leave-one-out prediction.
-///
-/// One default setting serves deformation, noise, outliers and missing points; say [`Rotation::Any`] where the target may be
-/// turned by more than half a right angle. Two and three dimensions.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use tactile_match::{PointMatcher, AnnealedSoftassign};
-/// # fn main() -> Result<(), tactile_match::MatchError> {
-/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
-/// let mut target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y + 0.05 * p.x));
-/// target.reverse();
-/// let found = AnnealedSoftassign::default().match_points(&model, &target)?;
-/// assert_eq!(found.assignment[0], Some(5));
-/// assert!((found.warp.apply(&model[2]) - target[3]).norm() < 1e-9);
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AnnealedSoftassign {
-    options: SoftassignOptions,
-}
 
 /// Memory that matches use again and again.
 ///
@@ -203,12 +180,6 @@ impl<const D: usize> SoftassignWorkspace<D> {
 }
 
 impl AnnealedSoftassign {
-    /// A matcher with these options.
-    #[must_use]
-    pub fn new(options: SoftassignOptions) -> Self {
-        Self { options }
-    }
-
     /// As [`PointMatcher::match_points`] in the caller's workspace; nothing is allocated once that has grown.
     ///
     /// `observe` hears the iteration and the energy after every outer iteration and may stop the search: the best answer

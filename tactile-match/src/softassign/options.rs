@@ -13,10 +13,10 @@ const RARE: f64 = 0.01;
 ///
 /// ```
 /// use nalgebra::{Point2, Rotation2};
-/// use tactile_match::{PointMatcher, AnnealedSoftassign, SoftassignOptions, Rotation};
+/// use tactile_match::{PointMatcher, AnnealedSoftassign, Rotation};
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(|p| Rotation2::new(2.5) * p).collect(); // turned by 143°
-/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_rotation(Rotation::Any));
+/// let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
 /// let matching = matcher.match_points(&model, &target)?;
 /// assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
 /// # Ok::<(), tactile_match::MatchError>(())
@@ -39,11 +39,11 @@ pub enum Rotation {
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{Outliers, PointMatcher, AnnealedSoftassign, SoftassignOptions};
+/// use tactile_match::{Outliers, PointMatcher, AnnealedSoftassign};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
 /// let mut target = model.map(|p| Point2::new(1.05 * p.x, p.y)).to_vec();
 /// target.push(Point2::new(6.0, 5.0)); // clutter
-/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_outliers(Outliers::Target));
+/// let matcher = AnnealedSoftassign::default().with_outliers(Outliers::Target);
 /// let matching = matcher.match_points(&model, &target)?;
 /// assert!(matching.unmatched_model.is_empty());
 /// assert_eq!(matching.unmatched_target, [6]);
@@ -71,11 +71,11 @@ pub enum Outliers {
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::{PointMatcher, AnnealedSoftassign, SoftassignOptions, Search};
+/// use tactile_match::{PointMatcher, AnnealedSoftassign, Search};
 /// let loaded = |p: &Point2<f64>| Point2::new(1.02 * p.x, p.y + 0.01 * p.x * p.x); // the same contact at a higher load
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(loaded).collect();
-/// let matcher = AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near));
+/// let matcher = AnnealedSoftassign::default().with_search(Search::Near);
 /// let matching = matcher.match_points(&model, &target)?;
 /// assert!((0..12).all(|i| matching.assignment[i] == Some(i)));
 /// assert_eq!(matching.report.starts, 1);
@@ -101,12 +101,12 @@ pub enum Search {
 ///
 /// ```
 /// use nalgebra::{Point2, Rotation2};
-/// use tactile_match::{AnnealedSoftassign, PointMatcher, SoftassignOptions, Transformation};
+/// use tactile_match::{AnnealedSoftassign, PointMatcher, Transformation};
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.3 * k.sin(), (k / 4.0).floor())).collect();
 /// let mut target: Vec<_> = model.iter().map(|p| Rotation2::new(0.3) * p).collect();
 /// target[5].x += 0.1; // a point that has moved against the others
-/// let options = SoftassignOptions::default().with_transformation(Transformation::Rigid);
-/// let matching = AnnealedSoftassign::new(options).match_points(&model, &target)?;
+/// let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
+/// let matching = options.match_points(&model, &target)?;
 /// assert!((0..12).filter(|&i| i != 5).all(|i| matching.assignment[i] == Some(i)), "{:?}", matching.assignment);
 /// let distance = |points: &[Point2<f64>]| (points[0] - points[11]).norm();
 /// assert!((distance(&matching.warped) - distance(&model)).abs() < 1e-9);
@@ -128,23 +128,43 @@ pub enum Transformation {
     Rigid,
 }
 
-/// Options of [`AnnealedSoftassign`](crate::AnnealedSoftassign); all of them have defaults that suit every scene tried.
+/// The default matcher: annealed softassign, with a Gaussian-process prior on the warp and leave-one-out prediction.
+///
+/// One default setting serves deformation, noise, outliers and missing points; say [`Rotation::Any`] where the target may be
+/// turned by more than half a right angle. Two and three dimensions.
 ///
 /// ```
-/// use tactile_match::{MatchError, Outliers, SoftassignOptions, Rotation, Search, Transformation};
-/// let options = SoftassignOptions::default()
+/// use nalgebra::Point2;
+/// use tactile_match::{PointMatcher, AnnealedSoftassign};
+/// # fn main() -> Result<(), tactile_match::MatchError> {
+/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+/// let mut target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y + 0.05 * p.x));
+/// target.reverse();
+/// let found = AnnealedSoftassign::default().match_points(&model, &target)?;
+/// assert_eq!(found.assignment[0], Some(5));
+/// assert!((found.warp.apply(&model[2]) - target[3]).norm() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Options
+/// All of them have defaults that suit every scene tried.
+///
+/// ```
+/// use tactile_match::{MatchError, Outliers, AnnealedSoftassign, Rotation, Search, Transformation};
+/// let options = AnnealedSoftassign::default()
 ///     .with_transformation(Transformation::Similarity) // the set only moves, turns and grows
 ///     .with_rotation(Rotation::Any)
 ///     .with_outliers(Outliers::Model)
 ///     .with_search(Search::Thorough)
 ///     .with_outlier_ratio(0.3)? // three in ten points are out of sight
 ///     .with_max_iterations(100)?;
-/// assert_ne!(options, SoftassignOptions::default());
+/// assert_ne!(options, AnnealedSoftassign::default());
 /// assert!(matches!(options.with_outlier_ratio(0.95), Err(MatchError::InvalidOption { option: "outlier_ratio", .. })));
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SoftassignOptions {
+pub struct AnnealedSoftassign {
     pub(crate) rotation: Rotation,
     pub(crate) outliers: Outliers,
     pub(crate) search: Search,
@@ -153,7 +173,7 @@ pub struct SoftassignOptions {
     pub(crate) max_iterations: usize,
 }
 
-impl Default for SoftassignOptions {
+impl Default for AnnealedSoftassign {
     fn default() -> Self {
         Self {
             rotation: Rotation::Limited,
@@ -166,7 +186,7 @@ impl Default for SoftassignOptions {
     }
 }
 
-impl SoftassignOptions {
+impl AnnealedSoftassign {
     /// Says how far the target may be turned.
     #[must_use]
     pub fn with_rotation(mut self, rotation: Rotation) -> Self {

@@ -4,19 +4,17 @@ use crate::common::{Stream, bend, reordered, rotation, scattered};
 use nalgebra::{DMatrix, Point, Point2, Point3, SVector, Vector3};
 use proptest::prelude::*;
 use tactile_match::{
-    CoherentPointDrift, DriftOptions, DriftWorkspace, MatchError, Matching, Motion, Normalization,
-    PointMatcher, StopReason,
+    CoherentPointDrift, DriftWorkspace, MatchError, Matching, Motion, Normalization, PointMatcher,
+    StopReason,
 };
 use tactile_tps::Warp;
 
 fn drift<const D: usize>(
-    options: DriftOptions,
+    options: CoherentPointDrift,
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
 ) -> Matching<f64, D> {
-    CoherentPointDrift::new(options)
-        .match_points(model, target)
-        .expect("valid points")
+    options.match_points(model, target).expect("valid points")
 }
 
 /// Eq. 22–23 and figure 4 of Myronenko & Song with whole matrices and an LU factorisation in every iteration. Ends early where σ²
@@ -99,7 +97,7 @@ fn check_against_slow<const D: usize>(
         lambda,
         rank: None,
     };
-    let options = DriftOptions::default()
+    let options = CoherentPointDrift::default()
         .with_motion(motion)
         .and_then(|options| options.with_outlier_weight(w))
         .and_then(|options| options.with_tolerance(0.0))
@@ -133,7 +131,7 @@ proptest! {
     ) {
         let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
         let normalization = if each { Normalization::Each } else { Normalization::Model };
-        let options = DriftOptions::default().with_motion(motion).unwrap().with_normalization(normalization);
+        let options = CoherentPointDrift::default().with_motion(motion).unwrap().with_normalization(normalization);
         let model = scattered::<f64, 3>(30, seed);
         let target = bend(&model, 0.05);
         let scale = 10_f64.powi(exponent);
@@ -149,7 +147,7 @@ proptest! {
     #[test]
     fn a_common_rotation_turns_the_answer(seed in 0..1000_u64, angle in -3.0..3.0_f64, motion in 0..4_usize) {
         let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
-        let options = DriftOptions::default().with_motion(motion).unwrap();
+        let options = CoherentPointDrift::default().with_motion(motion).unwrap();
         let model = scattered::<f64, 2>(30, seed);
         let target = bend(&model, 0.05);
         let turn = rotation::<f64, 2>(angle);
@@ -166,7 +164,7 @@ proptest! {
         let shear = nalgebra::Matrix3::new(1.0, 0.2, 0.0, 0.0, 0.9, 0.1, 0.1, 0.0, 1.1);
         for (motion, map) in [(Motion::Rigid, turn), (Motion::Similarity, turn * size), (Motion::Affine, shear)] {
             let target: Vec<_> = model.iter().map(|p| map * p + Vector3::new(3.0, -1.0, 0.5)).collect();
-            let options = DriftOptions::default().with_motion(motion).unwrap().with_tolerance(1e-12).unwrap();
+            let options = CoherentPointDrift::default().with_motion(motion).unwrap().with_tolerance(1e-12).unwrap();
             let order = Stream::new(seed).permutation(40);
             let found = drift(options, &model, &reordered(&target, &order));
             prop_assert!(largest_step(&found.warped, &target) <= 1e-5, "{:?}: {}", motion, largest_step(&found.warped, &target));
@@ -185,7 +183,7 @@ fn single_precision_gives_the_same_answer() {
             .map(|p| p.map(|c| c as f32))
             .collect::<Vec<_>>()
     };
-    let double = drift(DriftOptions::default(), &model, &target);
+    let double = drift(CoherentPointDrift::default(), &model, &target);
     let found = CoherentPointDrift::default()
         .match_points(&single(&model), &single(&target))
         .unwrap();
@@ -208,7 +206,9 @@ fn a_low_rank_kernel_is_close() {
     };
     let [whole, thirty] = [None, Some(30)].map(|rank| {
         drift(
-            DriftOptions::default().with_motion(motion(rank)).unwrap(),
+            CoherentPointDrift::default()
+                .with_motion(motion(rank))
+                .unwrap(),
             &model,
             &target,
         )
@@ -227,7 +227,7 @@ fn outliers_are_left_without_a_partner() {
     let mut target = bend(&model, 0.03);
     let mut stream = Stream::new(4);
     target.extend((0..15).map(|_| Point2::new(1.5 + stream.next(), 3.0 * stream.next())));
-    let options = DriftOptions::default()
+    let options = CoherentPointDrift::default()
         .with_outlier_weight(0.2)
         .unwrap()
         .with_normalization(Normalization::Model);
@@ -273,8 +273,8 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
         Motion::Affine,
         Motion::NON_RIGID,
     ] {
-        let options = DriftOptions::default().with_motion(motion).unwrap();
-        let matcher = CoherentPointDrift::new(options);
+        let options = CoherentPointDrift::default().with_motion(motion).unwrap();
+        let matcher = options;
         let found = matcher.match_with(&mut workspace, &model, &target).unwrap();
         let warp = &found.warp;
         let images: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
@@ -299,9 +299,9 @@ fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
 
 #[test]
 fn options_out_of_range_are_typed_errors() {
-    let good = DriftOptions::default();
+    let good = CoherentPointDrift::default();
     let non_rigid = |beta, lambda, rank| good.with_motion(Motion::NonRigid { beta, lambda, rank });
-    let refused = |set: Result<DriftOptions, MatchError>, name| {
+    let refused = |set: Result<CoherentPointDrift, MatchError>, name| {
         let error = set.unwrap_err();
         assert!(
             matches!(error, MatchError::InvalidOption { option, .. } if option == name),
@@ -325,17 +325,21 @@ fn options_out_of_range_are_typed_errors() {
 fn the_report_says_why_it_stopped() {
     let model = scattered::<f64, 2>(20, 8);
     let target = bend(&model, 0.05);
-    let few = DriftOptions::default().with_max_iterations(2).unwrap();
+    let few = CoherentPointDrift::default()
+        .with_max_iterations(2)
+        .unwrap();
     assert_eq!(
         drift(few, &model, &target).report.stop,
         StopReason::IterationLimit
     );
     assert_eq!(
-        drift(DriftOptions::default(), &model, &target).report.stop,
+        drift(CoherentPointDrift::default(), &model, &target)
+            .report
+            .stop,
         StopReason::Converged
     );
     assert_eq!(
-        drift(DriftOptions::default(), &model[..1], &target[..1])
+        drift(CoherentPointDrift::default(), &model[..1], &target[..1])
             .report
             .stop,
         StopReason::Exact

@@ -9,9 +9,8 @@ use std::fmt::Write;
 use std::path::Path;
 use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
-    AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
-    Matching, Motion, NearestNeighbour, Outliers, PointMatcher, RelaxationLabelling, Rotation,
-    Search, SoftassignOptions, WarmStart,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, Motion, NearestNeighbour,
+    Outliers, PointMatcher, RelaxationLabelling, Rotation, Search, WarmStart,
 };
 
 /// A model and its target.
@@ -124,17 +123,17 @@ fn answers() -> String {
 }
 
 fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
-    let options = SoftassignOptions::default();
-    let fast = |options| Box::new(AnnealedSoftassign::new(options));
+    let options = AnnealedSoftassign::default();
+    let fast = |options| Box::new(options);
     let drift = |motion| {
-        let options = DriftOptions::default().with_motion(motion);
-        Box::new(CoherentPointDrift::new(options.expect("a valid motion")))
+        let options = CoherentPointDrift::default().with_motion(motion);
+        Box::new(options.expect("a valid motion"))
     };
-    let few = LabellingOptions::default()
+    let few = RelaxationLabelling::default()
         .with_neighbourhood(Neighbourhood::Nearest(6))
         .expect("neighbours");
-    let dense = RelaxationLabelling::new(few);
-    let sparse = RelaxationLabelling::new(few.with_candidates(10).expect("candidates"));
+    let dense = few;
+    let sparse = few.with_candidates(10).expect("candidates");
     let share = options.with_outlier_ratio(0.2).expect("valid share");
     let matchers: [(&str, Box<dyn PointMatcher<f64, D>>); 12] = [
         ("default", fast(options)),

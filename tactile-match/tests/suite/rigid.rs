@@ -2,9 +2,7 @@
 
 use crate::common::{Stream, reordered, rotation, scattered};
 use nalgebra::{Point, SVector};
-use tactile_match::{
-    AnnealedSoftassign, Matching, PointMatcher, SoftassignOptions, Transformation,
-};
+use tactile_match::{AnnealedSoftassign, Matching, PointMatcher, Transformation};
 use tactile_tps::Warp;
 
 const POINTS: usize = 80;
@@ -52,8 +50,8 @@ impl<const D: usize> Scene<D> {
     }
 
     fn matched(&self) -> Matching<f64, D> {
-        let options = SoftassignOptions::default().with_transformation(self.transformation);
-        AnnealedSoftassign::new(options)
+        let options = AnnealedSoftassign::default().with_transformation(self.transformation);
+        options
             .match_points(&self.model, &self.target)
             .expect("good points")
     }
@@ -141,10 +139,8 @@ fn shapes_are_kept() {
         .iter()
         .map(|p| Point::from([1.05 * p.x, p.y]))
         .collect();
-    let options = SoftassignOptions::default().with_transformation(Transformation::Rigid);
-    let found = AnnealedSoftassign::new(options)
-        .match_points(&model, &target)
-        .expect("good points");
+    let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
+    let found = options.match_points(&model, &target).expect("good points");
     for i in 1..POINTS {
         let (before, after) = (model[i] - model[0], found.warped[i] - found.warped[0]);
         // Rounding.
@@ -160,10 +156,8 @@ fn few_and_coincident_points_are_answered() {
         vec![Point::from([0.0, 0.0])],
     ] {
         for transformation in [Transformation::Rigid, Transformation::Similarity] {
-            let options = SoftassignOptions::default().with_transformation(transformation);
-            let found = AnnealedSoftassign::new(options)
-                .match_points(&points, &points)
-                .expect("good points");
+            let options = AnnealedSoftassign::default().with_transformation(transformation);
+            let found = options.match_points(&points, &points).expect("good points");
             assert!(found.warped.iter().all(|p| p.coords.norm() < 10.0));
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use nalgebra::{Point2, Point3, Vector3};
 use tactile_match::{
     AnnealedSoftassign, CoherentPointDrift, LinearAssignment, MatchError, Matching, PointMatcher,
-    Search, SoftassignOptions, WarmStart,
+    Search, WarmStart,
 };
 
 /// A number of (−1, 1), without pattern and the same on every machine.
@@ -35,7 +35,7 @@ fn frame(model: &[Point3<f64>], k: usize, noise: f64) -> Vec<Point3<f64>> {
 }
 
 fn near() -> AnnealedSoftassign {
-    AnnealedSoftassign::new(SoftassignOptions::default().with_search(Search::Near))
+    AnnealedSoftassign::default().with_search(Search::Near)
 }
 
 fn agree(one: &Matching<f64, 3>, other: &Matching<f64, 3>, tolerance: f64) {

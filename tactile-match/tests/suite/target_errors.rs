@@ -2,9 +2,7 @@
 
 use crate::common::{Stream, bend, reordered, scattered};
 use nalgebra::{Point, SVector};
-use tactile_match::{
-    AnnealedSoftassign, MatchError, Matching, PointMatcher, SoftassignOptions, Transformation,
-};
+use tactile_match::{AnnealedSoftassign, MatchError, Matching, PointMatcher, Transformation};
 
 /// A normal deviate, nearly: the sum of twelve uniform ones.
 fn deviate(stream: &mut Stream) -> f64 {
@@ -162,8 +160,8 @@ fn standard_deviations_hold_where_errors_differ() {
 /// A rigid motion follows the precise points.
 #[test]
 fn a_rigid_fit_counts_precise_targets_more() {
-    let options = SoftassignOptions::default().with_transformation(Transformation::Rigid);
-    let matcher = AnnealedSoftassign::new(options);
+    let options = AnnealedSoftassign::default().with_transformation(Transformation::Rigid);
+    let matcher = options;
     let (mut weighted, mut plain) = (0.0, 0.0);
     for seed in 0..8 {
         let bent = Scene::<2>::new(60, &[0.03, 0.15], seed);

@@ -9,7 +9,6 @@ use super::super::shape_context::first_matches;
 use super::super::support::{energy, support};
 use super::super::update::{sinkhorn, sweep, update};
 use crate::common::{Stream, bend, reordered, rotation, scattered};
-use crate::labelling::LabellingOptions;
 use crate::{MatchError, PointMatcher, RelaxationLabelling};
 use nalgebra::{Point, Point2, Point3, Vector3};
 use proptest::prelude::*;
@@ -209,14 +208,12 @@ fn every_option_solves_a_smooth_deformation() {
                 Compatibility::Printed,
                 Compatibility::Full,
             ] {
-                let options = LabellingOptions::default()
+                let options = RelaxationLabelling::default()
                     .with_neighbourhood(neighbourhood)
                     .unwrap()
                     .with_length_maximum(maximum)
                     .with_compatibility(compatibility);
-                let found = RelaxationLabelling::new(options)
-                    .match_points(&model, &target)
-                    .unwrap();
+                let found = options.match_points(&model, &target).unwrap();
                 let right = (0..30)
                     .filter(|&i| found.assignment[i].is_some_and(|j| order[j] == i))
                     .count();
@@ -247,17 +244,17 @@ fn gamma_is_that_of_the_model_or_of_both_edges() {
 #[test]
 fn one_energy_is_kept_for_every_iteration() {
     let model = scattered::<f64, 2>(12, 7);
-    let options = LabellingOptions::default().with_max_iterations(2).unwrap();
-    let found = RelaxationLabelling::new(options)
-        .match_points(&model, &bend(&model, 0.1))
+    let options = RelaxationLabelling::default()
+        .with_max_iterations(2)
         .unwrap();
+    let found = options.match_points(&model, &bend(&model, 0.1)).unwrap();
     assert!(found.report.iterations <= 2 && found.energy.len() == found.report.iterations);
 }
 
 #[test]
 fn options_out_of_range_are_typed_errors() {
-    let good = LabellingOptions::default();
-    let refused = |set: Result<LabellingOptions, MatchError>, name| {
+    let good = RelaxationLabelling::default();
+    let refused = |set: Result<RelaxationLabelling, MatchError>, name| {
         let error = set.unwrap_err();
         assert!(
             matches!(error, MatchError::InvalidOption { option, .. } if option == name),

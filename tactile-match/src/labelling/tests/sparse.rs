@@ -1,6 +1,6 @@
 //! The paper's method over candidates, all of them kept, is the dense one.
 use crate::common::{Stream, bend, reordered, scattered};
-use crate::labelling::{LabellingOptions, LengthMaximum, Neighbourhood};
+use crate::labelling::{LengthMaximum, Neighbourhood};
 use crate::{MatchError, Matching, PointMatcher, RelaxationLabelling};
 use nalgebra::Point;
 use proptest::prelude::*;
@@ -24,11 +24,11 @@ fn difference<const D: usize>(a: &Matching<f64, D>, b: &Matching<f64, D>, column
 /// The whole matcher with all candidates gives the dense one's M in one outer iteration and its answer at the end.
 fn all_candidates_give_the_dense_answer<const D: usize>(
     [model, target]: [Vec<Point<f64, D>>; 2],
-    options: LabellingOptions,
+    options: RelaxationLabelling,
 ) -> Result<(), TestCaseError> {
-    let dense = RelaxationLabelling::new(options);
+    let dense = options;
     let few = options.with_candidates(target.len()).expect("candidates");
-    let all = RelaxationLabelling::new(few);
+    let all = few;
     // The same positive terms in the same order of magnitude, summed in another order: rounding, grown by ten sweeps.
     prop_assert!(
         dense
@@ -55,8 +55,8 @@ fn ten_candidates_do_no_worse_than_all_and_none_is_refused() {
     let [model, target] = scene::<2>(60, 60, 5);
     let order = Stream::new(5).permutation(60);
     let right = [10, 60].map(|candidates| {
-        let options = LabellingOptions::default().with_candidates(candidates);
-        let sparse = RelaxationLabelling::new(options.expect("candidates"));
+        let options = RelaxationLabelling::default().with_candidates(candidates);
+        let sparse = options.expect("candidates");
         let found = sparse.match_points(&model, &target).expect("finite points");
         found
             .assignment
@@ -70,7 +70,7 @@ fn ten_candidates_do_no_worse_than_all_and_none_is_refused() {
         right[0] >= right[1] && right[1] >= 57,
         "{right:?} of 60 right"
     );
-    let none = LabellingOptions::default().with_candidates(0);
+    let none = RelaxationLabelling::default().with_candidates(0);
     assert!(matches!(
         none,
         Err(MatchError::InvalidOption {
@@ -86,13 +86,13 @@ proptest! {
     #[test]
     fn the_whole_matcher_in_the_plane(rows in 3..20_usize, columns in 3..20_usize, seed in 0..1000_u64, k in 0..9_usize) {
         let neighbourhood = if k == 0 { Neighbourhood::MedianRadius } else { Neighbourhood::Nearest(k) };
-        let options = LabellingOptions::default().with_neighbourhood(neighbourhood).unwrap();
+        let options = RelaxationLabelling::default().with_neighbourhood(neighbourhood).unwrap();
         all_candidates_give_the_dense_answer::<2>(scene(rows, columns, seed), options)?;
     }
 
     #[test]
     fn the_whole_matcher_in_space(rows in 4..20_usize, columns in 4..20_usize, seed in 0..1000_u64) {
-        let options = LabellingOptions::default().with_length_maximum(LengthMaximum::Global);
+        let options = RelaxationLabelling::default().with_length_maximum(LengthMaximum::Global);
         all_candidates_give_the_dense_answer::<3>(scene(rows, columns, seed), options)?;
     }
 }

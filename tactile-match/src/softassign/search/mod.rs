@@ -61,7 +61,7 @@ impl AnnealedSoftassign {
             self.solve_coarse_to_fine(ws, observe)
         } else {
             self.begin(ws);
-            match self.options.search {
+            match self.search {
                 Search::Near => self.run(ws, Start::Centred, NEAR, observe),
                 Search::Thorough => self.search(ws, observe),
             }
@@ -76,9 +76,7 @@ impl AnnealedSoftassign {
         ws.annealer.volume = bounding_volume(&ws.target);
         ws.annealer.prior.build(&ws.model, SCALES);
         ws.annealer.soft.set_targets(&ws.target, &ws.deviations);
-        ws.annealer
-            .rigid
-            .set(self.options.transformation, &ws.model);
+        ws.annealer.rigid.set(self.transformation, &ws.model);
         ws.annealer.known.clone_from(&ws.known);
     }
 
@@ -105,7 +103,7 @@ impl AnnealedSoftassign {
 
     /// Reads the answer from the best run.
     fn conclude<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
-        ws.expected_share = self.options.share;
+        ws.expected_share = self.share;
         if ws.starts > 1 || !self.is_exact(ws) {
             // Later runs have left their own fit behind.
             let schedule = self.schedule(Cooling {
@@ -114,7 +112,7 @@ impl AnnealedSoftassign {
             });
             ws.annealer.restore(&ws.best, &mut ws.state, &schedule);
         }
-        let slack = self.options.slack();
+        let slack = self.slack();
         let gain = ws.gain().unwrap_or(f64::INFINITY);
         let spread = &ws.scales.spread;
         ws.answer
@@ -153,7 +151,7 @@ impl AnnealedSoftassign {
         if dense && !self.is_done(ws) {
             self.follow_patterns(ws, observe)?;
         }
-        let limited = self.options.rotation == Rotation::Limited;
+        let limited = self.rotation == Rotation::Limited;
         let rotations = if limited {
             starts::LIMITED
         } else {
@@ -199,7 +197,7 @@ impl AnnealedSoftassign {
     /// Two runs have ended in the best answer: whether noise explains how far its soft partners spread.
     fn confirm<const D: usize>(&self, ws: &mut SoftassignWorkspace<D>) {
         let variance = ws.best.sigma * ws.best.sigma;
-        let slack = self.options.slack();
+        let slack = self.slack();
         ws.confirmed = ws.best.ambiguity <= ws.annealer.spread_of(&ws.target, variance, slack);
     }
 
@@ -271,8 +269,7 @@ impl AnnealedSoftassign {
             ws.spacing = ws.patterns.typical_spacing(&ws.target);
         }
         ws.state.tail = ws.annealer.tail(NOTICED * ws.spacing);
-        ws.annealer
-            .evaluate(&mut ws.state, self.options.share, RESOLUTION);
+        ws.annealer.evaluate(&mut ws.state, self.share, RESOLUTION);
         if ws.state.energy + cooling.margin < ws.best.energy || ws.starts == 1 {
             ws.best.copy_from(&ws.state);
         }
@@ -311,7 +308,7 @@ impl AnnealedSoftassign {
 
     pub(super) fn schedule(&self, cooling: Cooling) -> Schedule {
         // A motion without bending stands still while it turns into place.
-        let bends = self.options.transformation == Transformation::NonRigid;
+        let bends = self.transformation == Transformation::NonRigid;
         Schedule {
             sigma: cooling.sigma,
             floor: finish::FLOOR,
@@ -324,12 +321,12 @@ impl AnnealedSoftassign {
             } else {
                 cooling.patience
             },
-            limit: self.options.max_iterations,
+            limit: self.max_iterations,
             sweeps: cooling.sweeps,
             still: cooling.still,
             collapse: 0.0,
             partners: f64::INFINITY,
-            slack: self.options.slack(),
+            slack: self.slack(),
         }
     }
 }

@@ -50,7 +50,7 @@ impl AnnealedSoftassign {
                 starts::moments(model, target, &rotation, &mut state.base);
             }
             Start::Tuples => {
-                let limited = self.options.rotation == Rotation::Limited;
+                let limited = self.rotation == Rotation::Limited;
                 if !ws.tuples.find(model, target, ws.spacing, limited) {
                     return false;
                 }

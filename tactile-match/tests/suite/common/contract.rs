@@ -3,8 +3,8 @@
 use nalgebra::Point;
 use tactile_match::labelling::Neighbourhood;
 use tactile_match::{
-    AnnealedSoftassign, CoherentPointDrift, DriftOptions, LabellingOptions, LinearAssignment,
-    Matching, Motion, NearestNeighbour, PointMatcher, RelaxationLabelling,
+    AnnealedSoftassign, CoherentPointDrift, LinearAssignment, Matching, Motion, NearestNeighbour,
+    PointMatcher, RelaxationLabelling,
 };
 use tactile_tps::Scalar;
 
@@ -13,22 +13,22 @@ pub(crate) type Matchers<T, const D: usize> = Vec<(&'static str, Box<dyn PointMa
 /// The matchers that every test file runs; a new one is added here and nowhere else.
 pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
     let drift = |motion| {
-        let options = DriftOptions::default().with_motion(motion);
-        CoherentPointDrift::new(options.expect("a valid motion"))
+        let options = CoherentPointDrift::default().with_motion(motion);
+        options.expect("a valid motion")
     };
     // Eight neighbours instead of half of all points: what is checked here does not need the time of the latter.
-    let options = LabellingOptions::default().with_neighbourhood(Neighbourhood::Nearest(8));
-    let dense = RelaxationLabelling::new(options.expect("neighbours"));
+    let options = RelaxationLabelling::default().with_neighbourhood(Neighbourhood::Nearest(8));
+    let dense = options.expect("neighbours");
     vec![
         ("relaxation", Box::new(AnnealedSoftassign::default())),
         ("dense relaxation", Box::new(dense)),
         (
             "sparse relaxation",
-            Box::new(RelaxationLabelling::new(
-                LabellingOptions::default()
+            Box::new(
+                RelaxationLabelling::default()
                     .with_candidates(10)
                     .expect("candidates"),
-            )),
+            ),
         ),
         ("nearest neighbour", Box::new(NearestNeighbour::default())),
         ("linear assignment", Box::new(LinearAssignment::default())),

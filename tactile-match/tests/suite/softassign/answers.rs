@@ -2,9 +2,7 @@
 use super::{bend, cloud, scatter, shuffled};
 use crate::common;
 use nalgebra::{Point2, Point3, Rotation2};
-use tactile_match::{
-    AnnealedSoftassign, Outliers, PointMatcher, Rotation, SoftassignOptions, StopReason,
-};
+use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher, Rotation, StopReason};
 
 fn all_right<const D: usize>(n: usize) {
     let model = cloud::<D>(n);
@@ -137,8 +135,7 @@ fn units_and_origin_do_not_matter() {
 fn any_rotation_is_found_when_asked_for() {
     let model = cloud::<2>(52);
     let (target, partner) = shuffled(&model);
-    let matcher =
-        AnnealedSoftassign::new(SoftassignOptions::default().with_rotation(Rotation::Any));
+    let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
     for degrees in [75.0_f64, 180.0, -120.0] {
         let turn = Rotation2::new(degrees.to_radians());
         let turned: Vec<Point2<f64>> = target.iter().map(|p| turn * p).collect();
@@ -197,10 +194,8 @@ fn the_outliers_option_says_which_side_may_stay_alone() {
     let (mut target, partner) = shuffled(&model);
     target.push(Point2::new(2.5, 2.5));
     for side in [Outliers::Both, Outliers::Target] {
-        let options = SoftassignOptions::default().with_outliers(side);
-        let found = AnnealedSoftassign::new(options)
-            .match_points(&model, &target)
-            .unwrap();
+        let options = AnnealedSoftassign::default().with_outliers(side);
+        let found = options.match_points(&model, &target).unwrap();
         assert_eq!(
             found.assignment,
             partner.iter().map(|&j| Some(j)).collect::<Vec<_>>()
@@ -212,10 +207,8 @@ fn the_outliers_option_says_which_side_may_stay_alone() {
         } else {
             side
         };
-        let options = SoftassignOptions::default().with_outliers(other);
-        let found = AnnealedSoftassign::new(options)
-            .match_points(&target, &model)
-            .unwrap();
+        let options = AnnealedSoftassign::default().with_outliers(other);
+        let found = options.match_points(&target, &model).unwrap();
         assert_eq!(
             (found.unmatched_model, found.unmatched_target),
             (vec![31], vec![])

@@ -3,14 +3,12 @@ use super::{bend, cloud, shuffled};
 use nalgebra::{Point, Point2, Point3};
 use std::ops::ControlFlow;
 use tactile_match::{
-    AnnealedSoftassign, MatchError, PointMatcher, Rotation, SoftassignOptions, SoftassignWorkspace,
-    StopReason,
+    AnnealedSoftassign, MatchError, PointMatcher, Rotation, SoftassignWorkspace, StopReason,
 };
 
 /// An answer for every odd input: as many rows as model points, all of them finite, no target twice.
 fn is_sound<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
-    let matcher =
-        AnnealedSoftassign::new(SoftassignOptions::default().with_rotation(Rotation::Any));
+    let matcher = AnnealedSoftassign::default().with_rotation(Rotation::Any);
     let found = matcher.match_points(model, target).unwrap();
     assert_eq!(found.warped.len(), model.len());
     assert!(found.warped.iter().all(|p| p.iter().all(|v| v.is_finite())));
@@ -90,12 +88,16 @@ fn bad_input_is_a_typed_error() {
     assert_eq!(error(&good, &[]), MatchError::Empty { set: "target" });
     for slack in [f64::NAN, 0.0, 1.0, -1.0] {
         assert!(
-            SoftassignOptions::default()
+            AnnealedSoftassign::default()
                 .with_outlier_ratio(slack)
                 .is_err()
         );
     }
-    assert!(SoftassignOptions::default().with_max_iterations(0).is_err());
+    assert!(
+        AnnealedSoftassign::default()
+            .with_max_iterations(0)
+            .is_err()
+    );
 }
 
 #[test]
