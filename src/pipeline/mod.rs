@@ -72,6 +72,7 @@ pub use composition::Pipeline;
 pub use config::StagesConfig;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
+#[cfg(any(feature = "cli", feature = "plot"))]
 pub(crate) use display::with_error;
 pub use error::PipelineError;
 pub use error_budget::{ErrorShare, ErrorSource};

@@ -126,6 +126,7 @@ impl Contact {
     }
 
     /// a/R: Hertz's law holds while this is small (warn beyond 0.3).
+    #[cfg(feature = "cli")]
     pub(crate) fn contact_ratio(&self) -> f64 {
         self.contact_radius_m / self.sphere_radius_m
     }
