@@ -125,15 +125,20 @@ impl<T: Scalar> Field<T> {
         let [width, height] = domain.pixel_size_m.map(T::as_f64);
         let (rows, columns) = (area.rows + 2, area.columns + 2);
         squares.clear();
-        squares.resize(rows * columns, f64::NAN);
-        let usable = |&(row, column): &(usize, usize)| {
-            domain.contains(row, column) && surface[[row, column]].is_finite()
-        };
-        let plane = area
-            .pixels()
-            .filter(usable)
-            .map(|(row, column)| surface[[row, column]].as_f64() / width)
-            .fold(0.0, f64::min);
+        // A row more, which is never filled: what lies above and below the field.
+        squares.resize((rows + 1) * columns, f64::NAN);
+        let (mut plane, mut solved) = (0.0_f64, 0);
+        for (row, column) in area.pixels() {
+            let height = surface[[row, column]].as_f64() / width;
+            if height.is_finite() && domain.contains(row, column) {
+                squares[(row - area.top + 1) * columns + column - area.left + 1] = height;
+                plane = plane.min(height);
+                solved += 1;
+            }
+        }
+        for height in &mut squares {
+            *height = (*height - plane).powi(2);
+        }
         let mut field = Self {
             squares,
             columns,
@@ -142,13 +147,8 @@ impl<T: Scalar> Field<T> {
             pixel_size_m: domain.pixel_size_m,
             aspect: height / width,
             plane,
-            solved: 0,
+            solved,
         };
-        for at @ (row, column) in area.pixels().filter(usable) {
-            let place = (row - area.top + 1) * columns + column - area.left + 1;
-            field.squares[place] = (surface[[at.0, at.1]].as_f64() / width - plane).powi(2);
-            field.solved += 1;
-        }
         field.continue_outwards(spare);
         field
     }
@@ -180,8 +180,11 @@ impl<T: Scalar> Field<T> {
                 let (mut sum, mut nearest, mut total) = (0.0, 0.0, 0.0);
                 for (down, right, weight) in NEIGHBOURS {
                     let near = at(r + down, c + right);
+                    if near.is_nan() {
+                        continue;
+                    }
                     let far = at(r + 2 * down, c + 2 * right);
-                    if near.is_nan() || far.is_nan() {
+                    if far.is_nan() {
                         continue;
                     }
                     let step = (down as f64 * self.aspect).powi(2) + (right * right) as f64;
@@ -213,20 +216,27 @@ impl<T: Scalar> Field<T> {
         }
     }
 
+    /// A row of the field, or what lies above and below it.
+    fn line(&self, row: usize) -> &[f64] {
+        &self.squares[row.min(self.rows) * self.columns..][..self.columns]
+    }
+
     /// Area of the surface over the part of every pixel inside the contour, per area of a pixel.
     fn weigh<'a>(&self, weight: &'a mut Vec<f64>) -> Weights<'a> {
         weight.clear();
         let (mut covered, mut filled) = (0.0, 0);
-        for row in 0..self.rows as isize {
+        for row in 0..self.rows {
             let before = covered;
-            for column in 0..self.columns as isize {
-                let here = self.square(row, column);
+            let [above, line, below] =
+                [row.wrapping_sub(1), row, row + 1].map(|row| self.line(row));
+            for (column, &here) in line.iter().enumerate() {
                 if here.is_nan() {
                     weight.push(0.0);
                     continue;
                 }
-                let along = [self.square(row, column - 1), self.square(row, column + 1)];
-                let down = [self.square(row - 1, column), self.square(row + 1, column)];
+                let beside = |column: usize| line.get(column).copied().unwrap_or(f64::NAN);
+                let along = [beside(column.wrapping_sub(1)), beside(column + 1)];
+                let down = [above[column], below[column]];
                 let (gx, gy) = (difference(here, along), difference(here, down));
                 // The contour crosses the pixel where |square| is below half of what it changes over the pixel.
                 let change = (gx.abs() + gy.abs()).max(f64::MIN_POSITIVE);

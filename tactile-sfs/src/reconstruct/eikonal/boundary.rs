@@ -34,6 +34,7 @@ pub(super) fn measure<T: Scalar>(grid: &mut EikonalBuffers<T>) {
 /// Sets the values that sweeps start from: known heights, and boundary heights with their offsets.
 pub(super) fn start<T: Scalar>(grid: &mut EikonalBuffers<T>, convex: bool) {
     let sign = if convex { T::one() } else { -T::one() };
+    grid.busy.fill(true);
     for i in grid.width..grid.node.len() - grid.width {
         grid.active[i] = grid.node[i] == Node::Unknown;
         grid.value[i] = match grid.node[i] {

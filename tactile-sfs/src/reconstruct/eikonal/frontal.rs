@@ -15,16 +15,32 @@ pub(super) fn sweep<T: Scalar>(grid: &mut EikonalBuffers<T>, order: usize, toler
     let mut change = T::zero();
     for r in 1..rows - 1 {
         let r = if order & 1 == 1 { rows - 1 - r } else { r };
-        let start = r * width;
-        let line = start + 1..start + width - 1;
+        if !core::mem::take(&mut grid.busy[r]) {
+            continue;
+        }
+        let mut lines = Lines::around(grid, r);
+        let columns = 1..width - 1;
         if order == 0 || order == 3 {
-            line.for_each(|i| change = change.max(visit(grid, i, width, tolerance)));
+            columns.for_each(|c| change = change.max(lines.visit(c, tolerance)));
         } else {
-            line.rev()
-                .for_each(|i| change = change.max(visit(grid, i, width, tolerance)));
+            columns
+                .rev()
+                .for_each(|c| change = change.max(lines.visit(c, tolerance)));
         }
     }
     change
+}
+
+/// Visits the nodes in the order of the front; returns whether any may still improve.
+pub(super) fn march<T: Scalar>(grid: &mut EikonalBuffers<T>, tolerance: T) -> bool {
+    let front = core::mem::take(&mut grid.front);
+    for &[row, column] in &front.nodes {
+        if grid.active[row as usize * grid.width + column as usize] {
+            Lines::around(grid, row as usize).visit(column as usize, tolerance);
+        }
+    }
+    grid.front = front;
+    grid.active.contains(&true)
 }
 
 /// Stores cos²φ of the solution's gradient for the second solve. Next to the boundary, where one-sided differences of a
@@ -56,47 +72,90 @@ struct Edge<T> {
     along_x: T,
 }
 
-/// Updates a node if it may improve, and wakes the neighbours its new value can lower.
-#[inline(always)]
-fn visit<T: Scalar>(grid: &mut EikonalBuffers<T>, i: usize, width: usize, tolerance: T) -> T {
-    if !grid.active[i] {
-        return T::zero();
-    }
-    grid.active[i] = false;
-    let EikonalBuffers {
-        value,
-        edges,
-        along_x,
-        ..
-    } = grid;
-    let edge = |j: usize, metric: T| Edge {
-        value: value[j],
-        metric,
-        along_x: along_x[j],
-    };
-    let x = upwind(edge(i - 1, edges[i - 1][0]), edge(i + 1, edges[i][0]));
-    let y = upwind(
-        edge(i - width, edges[i - width][1]),
-        edge(i + width, edges[i][1]),
-    );
-    let k = if grid.corrected {
-        correction(x, y)
-    } else {
-        T::one()
-    };
-    let (old, new) = (value[i], update(x, y, k));
-    if new >= old {
-        return T::zero();
-    }
-    value[i] = new;
-    let change = old - new;
-    if change > tolerance {
-        for j in [i - 1, i + 1, i - width, i + width] {
-            // Known and outside nodes never wake: they are not unknown.
-            grid.active[j] |= grid.value[j] > new && grid.node[j] == Node::Unknown;
+/// A row of the grid between its neighbours, all of one length: no index of a node has to be checked.
+struct Lines<'a, T> {
+    corrected: bool,
+    value: [&'a mut [T]; 3],
+    active: [&'a mut [bool]; 3],
+    /// Whether a row has active nodes.
+    busy: &'a mut [bool],
+    node: [&'a [Node]; 3],
+    along_x: [&'a [T]; 3],
+    /// Of the row above and the row itself.
+    edges: [&'a [[T; 2]]; 2],
+}
+
+impl<'a, T: Scalar> Lines<'a, T> {
+    #[inline(always)]
+    fn around(grid: &'a mut EikonalBuffers<T>, row: usize) -> Self {
+        let (start, width) = ((row - 1) * grid.width, grid.width);
+        let three = start..start + 3 * width;
+        Self {
+            corrected: grid.corrected,
+            value: thirds_mut(&mut grid.value[three.clone()], width),
+            active: thirds_mut(&mut grid.active[three.clone()], width),
+            busy: &mut grid.busy[row - 1..=row + 1],
+            node: thirds(&grid.node[three.clone()], width),
+            along_x: thirds(&grid.along_x[three.clone()], width),
+            edges: {
+                let [above, here, _] = thirds(&grid.edges[three], width);
+                [above, here]
+            },
         }
     }
-    change
+
+    /// Updates a node if it may improve, and wakes the neighbours its new value can lower.
+    #[inline(always)]
+    fn visit(&mut self, c: usize, tolerance: T) -> T {
+        if !self.active[1][c] {
+            return T::zero();
+        }
+        self.active[1][c] = false;
+        let edge = |line: usize, c: usize, metric: T| Edge {
+            value: self.value[line][c],
+            metric,
+            along_x: self.along_x[line][c],
+        };
+        let [above, here] = self.edges;
+        let x = upwind(edge(1, c - 1, here[c - 1][0]), edge(1, c + 1, here[c][0]));
+        let y = upwind(edge(0, c, above[c][1]), edge(2, c, here[c][1]));
+        let k = if self.corrected {
+            correction(x, y)
+        } else {
+            T::one()
+        };
+        let (old, new) = (self.value[1][c], update(x, y, k));
+        if new >= old {
+            return T::zero();
+        }
+        self.value[1][c] = new;
+        let change = old - new;
+        if change > tolerance {
+            for (line, c) in [(1, c - 1), (1, c + 1), (0, c), (2, c)] {
+                // Known and outside nodes never wake: they are not unknown.
+                let wakes = self.value[line][c] > new && self.node[line][c] == Node::Unknown;
+                self.active[line][c] |= wakes;
+                self.busy[line] |= wakes;
+            }
+        }
+        change
+    }
+}
+
+#[inline(always)]
+fn thirds<A>(all: &[A], width: usize) -> [&[A]; 3] {
+    [
+        &all[..width],
+        &all[width..][..width],
+        &all[2 * width..][..width],
+    ]
+}
+
+#[inline(always)]
+fn thirds_mut<A>(all: &mut [A], width: usize) -> [&mut [A]; 3] {
+    let (above, rest) = all.split_at_mut(width);
+    let (here, below) = rest.split_at_mut(width);
+    [&mut above[..width], &mut here[..width], &mut below[..width]]
 }
 
 /// k of the second solve, from means of the node and its neighbours: half of the difference of the neighbours is left. Where

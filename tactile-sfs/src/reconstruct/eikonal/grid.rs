@@ -1,5 +1,6 @@
 //! The padded grid of the mask's bounding box the sweeps run on, in units of a pixel's width.
 
+use super::front::Front;
 use crate::{Domain, PixelFlags, Scalar, Surface};
 
 /// What a node of the grid is.
@@ -24,6 +25,8 @@ pub(crate) struct EikonalBuffers<T> {
     pub(super) node: Vec<Node>,
     /// Nodes whose value may still improve.
     pub(super) active: Vec<bool>,
+    /// Rows that may have active nodes.
+    pub(super) busy: Vec<bool>,
     /// Reflectance R = cos of the angle between normal and light.
     pub(super) cosine: Vec<T>,
     /// sin of that angle.
@@ -43,6 +46,8 @@ pub(crate) struct EikonalBuffers<T> {
     pub(super) corrected: bool,
     /// Nodes whose intensity is not finite.
     pub(super) holes: Vec<usize>,
+    /// Unknown nodes in the order in which the front is expected to reach them; none where nothing is expected.
+    pub(super) front: Front,
 }
 
 impl<T: Scalar> EikonalBuffers<T> {
@@ -51,6 +56,7 @@ impl<T: Scalar> EikonalBuffers<T> {
         let length = self.width * (rows + 2);
         fill(&mut self.node, length, Node::Outside);
         fill(&mut self.active, length, false);
+        fill(&mut self.busy, rows + 2, false);
         fill(&mut self.cosine, length, T::one());
         fill(&mut self.sine, length, T::zero());
         fill(&mut self.given, length, T::nan());
@@ -59,6 +65,7 @@ impl<T: Scalar> EikonalBuffers<T> {
         fill(&mut self.edges, length, [T::one(); 2]);
         fill(&mut self.along_x, length, T::nan());
         self.corrected = false;
+        self.front.nodes.clear();
         self.holes.clear();
     }
 

@@ -25,6 +25,7 @@
 
 mod boundary;
 mod branch;
+mod front;
 mod frontal;
 mod grid;
 mod load;
@@ -39,6 +40,7 @@ use crate::error::{finite, positive};
 use crate::{Domain, Frame, Lighting, Scalar, SfsError, Surface};
 use crate::{SurfaceReconstruction, Workspace};
 use load::Input;
+use profile::Profile;
 
 /// The height at the border of the mask.
 ///
@@ -217,23 +219,27 @@ impl<T: Scalar> SurfaceReconstruction<T> for Eikonal<T> {
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
         let Some(mask) = domain.mask.filter(|_| self.fitted_profile) else {
-            return self.reconstruct_as_given(workspace, &frame, domain, surface);
+            return self.reconstruct_as_given(workspace, &frame, domain, None, surface);
         };
         let (rows, columns) = frame.dim();
         let area = domain.validate(rows, columns)?;
-        let mut profile = core::mem::take(&mut workspace.profile);
-        let fitted = self.lighting.is_frontal() && profile.fill(&frame, mask, area, &self.lighting);
-        let result = if fitted {
-            let frame = Frame::Real(profile.image.view());
+        let mut buffers = core::mem::take(&mut workspace.profile);
+        let profile = if self.lighting.is_frontal() {
+            buffers.fill(&frame, mask, area, &self.lighting)
+        } else {
+            None
+        };
+        let result = if profile.is_some() {
+            let frame = Frame::Real(buffers.image.view());
             let domain = Domain {
-                mask: Some(profile.mask.view()),
+                mask: Some(buffers.mask.view()),
                 ..*domain
             };
-            self.reconstruct_as_given(workspace, &frame, &domain, surface)
+            self.reconstruct_as_given(workspace, &frame, &domain, profile.as_ref(), surface)
         } else {
-            self.reconstruct_as_given(workspace, &frame, domain, surface)
+            self.reconstruct_as_given(workspace, &frame, domain, None, surface)
         };
-        workspace.profile = profile;
+        workspace.profile = buffers;
         result
     }
 }
@@ -244,6 +250,7 @@ impl<T: Scalar> Eikonal<T> {
         workspace: &mut Workspace<T>,
         frame: &Frame<'_, T>,
         domain: &Domain<'_, T>,
+        profile: Option<&Profile>,
         surface: &mut Surface<T>,
     ) -> Result<(), SfsError> {
         surface.enter(frame.dim(), domain)?;
@@ -259,6 +266,9 @@ impl<T: Scalar> Eikonal<T> {
             },
         };
         let known = workspace.eikonal.load(&input, surface)?;
+        if let Some(profile) = profile {
+            workspace.eikonal.follow(profile, surface.bounding_box);
+        }
         let outcome = self.choose(workspace, known.inside > 0);
         let width = domain.pixel_size_m[0];
         surface.report.stop = outcome.stop;

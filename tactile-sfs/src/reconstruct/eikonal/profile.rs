@@ -10,8 +10,10 @@
 //! simulates by finite elements the heights came out 10 and 14 % too high. So c is fitted too where that explains most of what the quadratic leaves.
 
 mod bend;
+mod discs;
 
 use bend::{Bend, RadialMeans};
+use discs::Discs;
 use nalgebra::{Matrix6, Vector6};
 use ndarray::{Array2, ArrayView2};
 
@@ -19,10 +21,9 @@ use crate::{BoundingBox, Frame, Lighting, Scalar};
 
 /// Pixels nearer than this to the mask's border are replaced: three standard deviations of a lens's blur of 0.8 pixels.
 /// With 1.5 and 3.2 the strain of simulated presses is off by a fifth to a half more (frames of 174 to 696 pixels).
+///
+/// As far outside the mask pixels may come to lie inside the fitted contour.
 const RING_PX: f64 = 2.3;
-
-/// Pixels outside the mask that may come to lie inside the fitted contour.
-const REACH_PX: f64 = 2.3;
 
 /// Fewest pixels that six coefficients are fitted to.
 const FEWEST: usize = 24;
@@ -39,50 +40,57 @@ const WEIGHT_FLOOR: f64 = 0.05;
 pub(crate) struct ProfileBuffers<T> {
     pub(super) image: Array2<T>,
     pub(super) mask: Array2<bool>,
-    inner: Array2<bool>,
+    discs: Discs,
+    samples: Vec<Sample>,
 }
 
 impl<T: Scalar> ProfileBuffers<T> {
-    /// Fits the profile and fills `image` and `mask`; `false` where the contact is no ellipse, and nothing is replaced.
+    /// Fits the profile and fills `image` and `mask`; `None` where the contact is no ellipse, and nothing is replaced.
     pub(super) fn fill(
         &mut self,
         frame: &Frame<'_, T>,
         mask: ArrayView2<'_, bool>,
         area: BoundingBox,
         lighting: &Lighting<T>,
-    ) -> bool {
+    ) -> Option<Profile> {
         if self.mask.dim() != mask.dim() {
             self.image = Array2::from_elem(mask.dim(), T::zero());
             self.mask = Array2::from_elem(mask.dim(), false);
-            self.inner = Array2::from_elem(mask.dim(), false);
         }
         let area = grown(area, mask.dim());
-        for (row, column) in area.pixels() {
-            self.inner[[row, column]] =
-                mask[[row, column]] && !near(mask, [row, column], RING_PX, false);
-        }
-        let Some(profile) = Profile::fit(frame, &self.inner, area, lighting) else {
-            return false;
-        };
+        self.discs.load(mask, area);
         self.mask.fill(false);
-        for (row, column) in area.pixels() {
-            let at = [row, column];
-            if self.inner[at] {
-                self.image[at] = frame.at(row, column);
-                self.mask[at] = true;
-            } else if mask[at] || near(mask, at, REACH_PX, true) {
-                let squared = profile.squared_reflectance(at);
-                self.mask[at] = squared > 0.0;
-                self.image[at] = lighting.intensity(T::of(squared.clamp(0.0, 1.0).sqrt()));
+        self.samples.clear();
+        for row in area.top..area.top + area.rows {
+            let inner = self.discs.inside(row - area.top);
+            for (column, _) in (area.left..).zip(inner).filter(|(_, inner)| **inner) {
+                let light = frame.at(row, column);
+                self.image[[row, column]] = light;
+                self.mask[[row, column]] = true;
+                let reflectance = lighting.reflectance(light).as_f64();
+                self.samples
+                    .extend(Sample::new([row, column], reflectance * reflectance.abs()));
             }
         }
-        true
+        let profile = Profile::fit(&self.samples, area)?;
+        for row in area.top..area.top + area.rows {
+            let reached = self.discs.reached(row - area.top);
+            for (column, _) in (area.left..).zip(reached).filter(|(_, near)| **near) {
+                let at = [row, column];
+                if !self.mask[at] {
+                    let squared = profile.squared_reflectance(at);
+                    self.mask[at] = squared > 0.0;
+                    self.image[at] = lighting.intensity(T::of(squared.clamp(0.0, 1.0).sqrt()));
+                }
+            }
+        }
+        Some(profile)
     }
 }
 
-/// The box and [`REACH_PX`] around it, as far as the frame goes.
+/// The box and [`RING_PX`] around it, as far as the frame goes.
 fn grown(area: BoundingBox, (rows, columns): (usize, usize)) -> BoundingBox {
-    let reach = REACH_PX as usize;
+    let reach = RING_PX as usize;
     let (top, left) = (
         area.top.saturating_sub(reach),
         area.left.saturating_sub(reach),
@@ -95,23 +103,29 @@ fn grown(area: BoundingBox, (rows, columns): (usize, usize)) -> BoundingBox {
     }
 }
 
-/// Whether a pixel of this kind, or for `false` the frame's border, lies within `distance` pixels.
-fn near(mask: ArrayView2<'_, bool>, [row, column]: [usize; 2], distance: f64, kind: bool) -> bool {
-    let reach = distance as isize;
-    (-reach..=reach).any(|down| {
-        (-reach..=reach).any(|right| {
-            let close = ((down * down + right * right) as f64) <= distance * distance;
-            let place = [
-                row.wrapping_add_signed(down),
-                column.wrapping_add_signed(right),
-            ];
-            close && mask.get(place).copied().unwrap_or(false) == kind
+/// A pixel that the profile is fitted to.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    at: [usize; 2],
+    /// R², with the sign of R.
+    squared: f64,
+    weight: f64,
+}
+
+impl Sample {
+    fn new(at: [usize; 2], squared: f64) -> Option<Self> {
+        let weight = 1.0 / (squared.abs() + WEIGHT_FLOOR);
+        squared.is_finite().then_some(Self {
+            at,
+            squared,
+            weight,
         })
-    })
+    }
 }
 
 /// R² = c·(1, x, y, x², xy, y²), x and y from the middle of the box in units of its longer side.
-struct Profile {
+#[derive(Debug)]
+pub(super) struct Profile {
     coefficients: Vector6<f64>,
     middle: [f64; 2],
     unit: f64,
@@ -119,14 +133,15 @@ struct Profile {
     bend: Option<Bend>,
 }
 
+/// Powers of x and y of the coefficients.
+const POWERS: [[usize; 2]; 6] = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
+
 impl Profile {
-    /// Weighted least squares over the finite inner pixels; `None` for too few pixels or too poor a fit.
-    fn fit<T: Scalar>(
-        frame: &Frame<'_, T>,
-        inner: &Array2<bool>,
-        area: BoundingBox,
-        lighting: &Lighting<T>,
-    ) -> Option<Self> {
+    /// Weighted least squares over the samples, row by row; `None` for too few pixels or too poor a fit.
+    fn fit(samples: &[Sample], area: BoundingBox) -> Option<Self> {
+        if samples.len() < FEWEST {
+            return None;
+        }
         let mut profile = Self {
             coefficients: Vector6::zeros(),
             middle: [
@@ -136,49 +151,50 @@ impl Profile {
             unit: area.rows.max(area.columns) as f64,
             bend: None,
         };
-        let samples = || {
-            area.pixels()
-                .filter(|&at| inner[at])
-                .filter_map(|(row, column)| {
-                    let reflectance = lighting.reflectance(frame.at(row, column)).as_f64();
-                    let squared = reflectance * reflectance.abs();
-                    squared.is_finite().then_some((
-                        [row, column],
-                        squared,
-                        1.0 / (squared.abs() + WEIGHT_FLOOR),
-                    ))
-                })
-        };
-        let (mut matrix, mut side) = (Matrix6::zeros(), Vector6::zeros());
-        let (mut count, mut total, mut sum) = (0_usize, 0.0, 0.0);
-        for (at, squared, weight) in samples() {
-            let basis = profile.basis(at);
-            matrix += basis * basis.transpose() * weight;
-            side += basis * (weight * squared);
-            count += 1;
-            total += weight;
-            sum += weight * squared;
-        }
-        if count < FEWEST {
-            return None;
-        }
+        let moments = profile.moments(samples);
+        let matrix = Matrix6::from_fn(|i, j| {
+            moments.plain[POWERS[i][1] + POWERS[j][1]][POWERS[i][0] + POWERS[j][0]]
+        });
+        let side = Vector6::from_fn(|i, _| moments.weighted[POWERS[i][1]][POWERS[i][0]]);
         profile.coefficients = matrix.cholesky()?.solve(&side);
         let curved_down = profile.coefficients[3] < 0.0 && profile.coefficients[5] < 0.0;
         let top = profile.top().filter(|top| curved_down && *top > 0.0)?;
-        let mean = sum / total;
+        let mean = side[0] / matrix[(0, 0)];
         let (mut left, mut variance) = (0.0, 0.0);
         let mut means = RadialMeans::default();
-        for (at, squared, weight) in samples() {
-            let quadratic = profile.quadratic(at);
-            left += weight * (squared - quadratic).powi(2);
-            variance += weight * (squared - mean).powi(2);
-            means.add(1.0 - quadratic / top, squared, weight);
+        for sample in samples {
+            let quadratic = profile.quadratic(sample.at);
+            left += sample.weight * (sample.squared - quadratic).powi(2);
+            variance += sample.weight * (sample.squared - mean).powi(2);
+            means.add(1.0 - quadratic / top, sample.squared, sample.weight);
         }
         if left > (1.0 - EXPLAINED) * variance {
             return None;
         }
         profile.bend = Bend::fit(&means, top, left);
         Some(profile)
+    }
+
+    /// Sums over the samples; those of a row are of powers of x alone.
+    fn moments(&self, samples: &[Sample]) -> Moments {
+        let mut moments = Moments::default();
+        for row in samples.chunk_by(|a, b| a.at[0] == b.at[0]) {
+            let [_, y] = self.place(row[0].at);
+            let (mut plain, mut weighted) = ([0.0; 5], [0.0; 3]);
+            for sample in row {
+                let [x, _] = self.place(sample.at);
+                let mut power = sample.weight;
+                for k in 0..5 {
+                    plain[k] += power;
+                    if k < 3 {
+                        weighted[k] += power * sample.squared;
+                    }
+                    power *= x;
+                }
+            }
+            moments.add(y, plain, weighted);
+        }
+        moments
     }
 
     /// The quadratic's greatest value; `None` without one.
@@ -189,18 +205,47 @@ impl Profile {
         (determinant > 0.0).then_some(c[0] - drop)
     }
 
-    fn basis(&self, [row, column]: [usize; 2]) -> Vector6<f64> {
-        let x = (column as f64 - self.middle[1]) / self.unit;
-        let y = (row as f64 - self.middle[0]) / self.unit;
-        Vector6::new(1.0, x, y, x * x, x * y, y * y)
+    /// A pixel's x and y.
+    fn place(&self, [row, column]: [usize; 2]) -> [f64; 2] {
+        [
+            (column as f64 - self.middle[1]) / self.unit,
+            (row as f64 - self.middle[0]) / self.unit,
+        ]
     }
 
-    fn quadratic(&self, at: [usize; 2]) -> f64 {
-        self.coefficients.dot(&self.basis(at))
+    pub(super) fn quadratic(&self, at: [usize; 2]) -> f64 {
+        let [x, y] = self.place(at);
+        let c = &self.coefficients;
+        c[0] + y * (c[2] + y * c[5]) + x * (c[1] + y * c[4] + x * c[3])
     }
 
     fn squared_reflectance(&self, at: [usize; 2]) -> f64 {
         let quadratic = self.quadratic(at);
         (self.bend.as_ref()).map_or(quadratic, |bend| bend.squared_reflectance(quadratic))
+    }
+}
+
+/// Σ w xⁱ yʲ and Σ w R² xⁱ yʲ over pixels, at [j][i].
+#[derive(Default)]
+struct Moments {
+    plain: [[f64; 5]; 5],
+    weighted: [[f64; 3]; 3],
+}
+
+impl Moments {
+    /// Adds a row's sums of powers of x.
+    fn add(&mut self, y: f64, plain: [f64; 5], weighted: [f64; 3]) {
+        let mut power = 1.0;
+        for j in 0..5 {
+            for (sum, term) in self.plain[j].iter_mut().zip(plain) {
+                *sum += power * term;
+            }
+            if j < 3 {
+                for (sum, term) in self.weighted[j].iter_mut().zip(weighted) {
+                    *sum += power * term;
+                }
+            }
+            power *= y;
+        }
     }
 }

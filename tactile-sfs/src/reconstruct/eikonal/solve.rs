@@ -3,6 +3,9 @@
 use super::{Branch, Eikonal, boundary, frontal, oblique};
 use crate::{Scalar, StopReason, Workspace};
 
+/// Passes along an expected front before sweeps in four directions, which any front is reached by.
+const MARCHES: usize = 3;
+
 /// How one branch was solved.
 #[derive(Clone, Copy)]
 pub(super) struct Outcome<T> {
@@ -44,7 +47,8 @@ impl<T: Scalar> Eikonal<T> {
         self.sweep(workspace, convex, first.sweeps)
     }
 
-    /// Sweeps until nothing changes.
+    /// Sweeps until nothing changes; the first solve along the expected front before. (With the corrected slopes the least of all values that a
+    /// node ever had is kept, which depends on the order by some 10⁻³ of the height: sweeps alone.)
     fn sweep(&self, workspace: &mut Workspace<T>, convex: bool, done: usize) -> Outcome<T> {
         boundary::start(&mut workspace.eikonal, convex);
         let light = self.lighting.direction();
@@ -54,6 +58,20 @@ impl<T: Scalar> Eikonal<T> {
             sweeps: done,
             change: T::infinity(),
         };
+        let grid = &workspace.eikonal;
+        let marched = convex && !grid.corrected && !grid.front.nodes.is_empty();
+        for _ in 0..if marched {
+            self.max_sweeps.min(MARCHES)
+        } else {
+            0
+        } {
+            outcome.sweeps += 1;
+            if !frontal::march(&mut workspace.eikonal, self.tolerance) {
+                outcome.change = T::zero();
+                outcome.stop = StopReason::Converged;
+                return outcome;
+            }
+        }
         while outcome.sweeps < done + self.max_sweeps {
             let buffers = &mut workspace.eikonal;
             outcome.change = T::zero();
