@@ -26,7 +26,7 @@ type Spline = ThinPlateSpline<f64, 3, NegR>;
 /// A thin-plate spline (kernel −r) that smooths as much as blocked cross-validation allows.
 ///
 /// Points must come with neighbours following each other, as samplers of control points give them. Runs of ten points
-/// are dealt to two halves, each of which predicts the other for eight values of λ. O(n³), a tenth of what
+/// are dealt to two halves, each of which predicts the other for eight values of λ. O(n³), a twentieth of what
 /// [`Smoothing::Gcv`] takes at 200 points; with fewer than 40 that is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct StrainSpline;
@@ -68,17 +68,24 @@ struct Pairs {
 }
 
 impl Pairs {
-    fn fit(&self, lambda: f64) -> Option<Spline> {
-        let smoothing = Smoothing::Lambda(lambda);
-        fit_spline(smoothing, &self.sources, &self.targets, Some(&self.weights)).ok()
-    }
-
-    /// Squared distances from where `spline` puts the sources to the targets, times the weights.
-    fn errors_of(&self, spline: &Spline, found: &mut Vec<f64>) {
-        let pairs = self.sources.iter().zip(&self.targets).zip(&self.weights);
-        found.extend(pairs.map(|((source, target), weight)| {
-            weight * (Warp::apply(spline, source) - target).norm_squared()
-        }));
+    /// Squared distances from where the splines through these pairs put the sources of others to their targets, times the weights; for each
+    /// of the `lambdas`.
+    fn errors_of(&self, others: &Self, lambdas: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let options = FitOptions::new(NegR).with_weights(self.weights.clone());
+        let values = Spline::values_of_each(
+            &self.sources,
+            &self.targets,
+            &options.ok()?,
+            lambdas,
+            &others.sources,
+        );
+        let errors = |values: Vec<Point3<f64>>| {
+            let pairs = values.iter().zip(&others.targets).zip(&others.weights);
+            pairs
+                .map(|((value, target), weight)| weight * (value - target).norm_squared())
+                .collect()
+        };
+        Some(values.ok()?.into_iter().map(errors).collect())
     }
 }
 
@@ -93,19 +100,20 @@ fn stiffest_as_good(
     if n < LEAST_PAIRS || targets.len() != n || weights.is_some_and(|w| w.len() != n) {
         return None;
     }
-    let halves = halves(sources, targets, weights);
+    let [one, other] = halves(sources, targets, weights);
     let unit = mean_radius(sources) * n as f64 / USUAL_POINTS;
-    let mut scores = Vec::with_capacity(POWERS.count());
-    let mut errors = Vec::with_capacity(n);
-    for power in POWERS {
-        let lambda = unit * 8_f64.powi(power);
-        errors.clear();
-        for (known, left_out) in [(&halves[0], &halves[1]), (&halves[1], &halves[0])] {
-            // The sum of squares has half its terms.
-            left_out.errors_of(&known.fit(0.5 * lambda)?, &mut errors);
-        }
-        scores.push((lambda, mean_with_error(&errors)));
-    }
+    let lambdas: Vec<_> = POWERS.map(|power| unit * 8_f64.powi(power)).collect();
+    // The sum of squares of a half has half its terms.
+    let of_half: Vec<_> = lambdas.iter().map(|lambda| 0.5 * lambda).collect();
+    let errors = one.errors_of(&other, &of_half)?.into_iter();
+    let errors = errors.zip(other.errors_of(&one, &of_half)?);
+    let scores: Vec<_> = lambdas
+        .into_iter()
+        .zip(errors.map(|(mut errors, more)| {
+            errors.extend(more);
+            mean_with_error(&errors)
+        }))
+        .collect();
     let &(_, (least, error)) = scores.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     scores
         .iter()

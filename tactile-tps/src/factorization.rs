@@ -133,7 +133,10 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// The distinct centres and the options, without a factor.
-    fn unfactored(sources: &[Point<T, D>], options: &FitOptions<T, K>) -> Result<Self, TpsError> {
+    pub(crate) fn unfactored(
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+    ) -> Result<Self, TpsError> {
         let kernel = options.kernel.clone();
         let centres = Centres::new(sources, kernel.degree().is_some())?;
         let mut centre_weights = Vec::new();

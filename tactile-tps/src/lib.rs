@@ -49,6 +49,7 @@ mod packed;
 #[cfg(feature = "rayon")]
 mod parallel;
 mod parts;
+mod path;
 mod precise;
 mod product;
 mod progress;
@@ -71,6 +72,7 @@ mod targets;
 mod task;
 mod tiles;
 mod triangular;
+mod tridiagonal;
 mod values;
 mod warp;
 

@@ -161,7 +161,7 @@ impl<const D: usize> System<D> {
     }
 
     /// Row `k` of Q₁ᵀSQ₂.
-    fn coupling(&self, k: usize) -> &[f64] {
+    pub(crate) fn coupling(&self, k: usize) -> &[f64] {
         let (n, q, stride) = (self.active.len(), self.null.q, self.null.stride);
         &self.cholesky.l[(HEAD - q + k) * stride + HEAD..][..n - q]
     }
@@ -182,7 +182,7 @@ impl<const D: usize> System<D> {
     }
 
     /// The values at the active centres, each times its scale.
-    fn scaled(&self, y: &[f64], column: &mut [f64]) {
+    pub(crate) fn scaled(&self, y: &[f64], column: &mut [f64]) {
         self.active
             .iter()
             .zip(column.iter_mut())

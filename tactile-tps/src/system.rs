@@ -100,7 +100,7 @@ impl<const D: usize> System<D> {
     }
 
     /// Writes the lower triangle of QᵀSQ without λ; returns its Frobenius norm.
-    fn assemble<K: Kernel>(
+    pub(crate) fn assemble<K: Kernel>(
         &mut self,
         setting: &Setting<'_, K, D>,
         weights: &[f64],
@@ -154,6 +154,12 @@ impl<const D: usize> System<D> {
         null.factor(n, q, layout(n, q), |c, column| {
             span.fill(centres, active, scales, c, column)
         });
+    }
+
+    /// The coordinates of the active centres, axis by axis, and their scales.
+    pub(crate) fn places(&self, centres: &Centres<D>, places: &mut [f64]) {
+        let rows = 0..self.active.len();
+        gather(centres, &self.active, &self.scales, rows, places);
     }
 
     /// Centres of positive weight, heaviest first so that the reflectors keep light rows apart.

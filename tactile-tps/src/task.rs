@@ -113,7 +113,7 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
     }
 
     /// One finite target for each source, and the same one for coinciding sources if the spline is to go `through` them.
-    fn check<const M: usize>(
+    pub(crate) fn check<const M: usize>(
         &self,
         targets: &[Point<T, M>],
         weights: Option<&[T]>,

@@ -8,6 +8,7 @@ mod influence;
 mod input;
 mod iterative;
 mod models;
+mod path;
 mod properties;
 mod recorded;
 mod reference;

@@ -1,0 +1,118 @@
+//! Values for many λ against one fit after the other.
+
+use nalgebra::{Point2, Point3};
+use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, Smoothing, Spline, TpsError};
+
+const LAMBDAS: [f64; 4] = [1e-4, 0.02, 1.0, 300.0];
+
+/// Points of a jittered dome, flattened towards a plane by `height`.
+fn dome(n: usize, height: f64) -> Vec<Point3<f64>> {
+    let point = |i: usize| {
+        let (r, angle) = (0.1 * (i as f64).sqrt(), 2.4 * i as f64);
+        let jitter = 0.02 * ((i * i) as f64).sin();
+        Point3::new(
+            r * angle.cos() + jitter,
+            r * angle.sin() - jitter,
+            height * (1.0 - r * r),
+        )
+    };
+    (0..n).map(point).collect()
+}
+
+fn moved(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
+    let map = |p: &Point3<f64>| {
+        Point3::new(
+            1.2 * p.x + 0.1 * (3.0 * p.y).sin(),
+            p.y,
+            p.z + 0.3 * p.x * p.y,
+        )
+    };
+    points.iter().map(map).collect()
+}
+
+/// Greatest distance of the values from those of one fit for each λ, relative to the targets.
+fn worst<const D: usize, const M: usize, K: Kernel>(
+    sources: &[nalgebra::Point<f64, D>],
+    targets: &[nalgebra::Point<f64, M>],
+    options: &FitOptions<f64, K>,
+    points: &[nalgebra::Point<f64, D>],
+) -> f64 {
+    let found = Spline::values_of_each(sources, targets, options, &LAMBDAS, points).unwrap();
+    assert_eq!(found.len(), LAMBDAS.len());
+    let size = targets.iter().map(|t| t.coords.amax()).fold(0.0, f64::max);
+    let mut worst = 0.0_f64;
+    for (lambda, values) in LAMBDAS.into_iter().zip(found) {
+        let options = options
+            .clone()
+            .with_smoothing(Smoothing::Lambda(lambda))
+            .unwrap();
+        let spline = Spline::fit(sources, targets, &options).unwrap();
+        for (point, value) in points.iter().zip(values) {
+            worst = worst.max((spline.apply(point) - value).amax() / size);
+        }
+    }
+    worst
+}
+
+/// Rounding times the condition number of the stiffest system, some 1e6 at the least λ.
+const ROUNDING: f64 = 1e-10;
+
+#[test]
+fn values_are_those_of_one_fit_after_the_other() {
+    let sources = dome(60, 1.0);
+    let targets = moved(&sources);
+    let points = dome(37, 0.9);
+    let plain = FitOptions::new(NegR);
+    assert!(worst(&sources, &targets, &plain, &points) < ROUNDING);
+    let weights = (0..60).map(|i| f64::from(i % 4) * 0.3).collect();
+    let weighted = plain.clone().with_weights(weights).unwrap();
+    assert!(worst(&sources, &targets, &weighted, &points) < ROUNDING);
+    // Coplanar points: the spline has no direction across.
+    let (flat, plane) = (dome(60, 0.0), dome(5, 0.0));
+    assert!(worst(&flat, &moved(&flat), &plain, &plane) < ROUNDING);
+    // Points given twice, with targets that differ.
+    let (mut twice, mut both) = (sources.clone(), targets.clone());
+    twice.extend_from_slice(&sources[..7]);
+    both.extend(targets[..7].iter().map(|t| t * 1.1));
+    assert!(worst(&twice, &both, &plain, &points) < ROUNDING);
+}
+
+#[test]
+fn so_are_those_in_the_plane_and_of_few_points() {
+    for n in [1, 2, 3, 4, 9, 30] {
+        let sources: Vec<_> = dome(n, 1.0).iter().map(|p| Point2::new(p.x, p.y)).collect();
+        let targets: Vec<_> = sources
+            .iter()
+            .map(|p| Point2::new(p.x.exp(), p.x * p.y))
+            .collect();
+        let points = [Point2::new(0.2, 0.1), Point2::new(-3.0, 1.0)];
+        let error = worst(&sources, &targets, &FitOptions::new(R2LogR), &points);
+        assert!(error < ROUNDING, "{n}: {error}");
+    }
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused() {
+    let sources = dome(20, 1.0);
+    let (targets, options) = (moved(&sources), FitOptions::new(NegR));
+    let values = |lambda: f64, targets: &[Point3<f64>], points: &[Point3<f64>]| {
+        Spline::values_of_each(&sources, targets, &options, &[lambda], points).map(drop)
+    };
+    for lambda in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = values(lambda, &targets, &sources);
+        assert!(matches!(error, Err(TpsError::Lambda { .. })), "{lambda}");
+    }
+    assert!(matches!(
+        values(1.0, &targets[1..], &sources),
+        Err(TpsError::Length { .. })
+    ));
+    let nowhere = [Point3::new(f64::NAN, 0.0, 0.0)];
+    assert!(matches!(
+        values(1.0, &targets, &nowhere),
+        Err(TpsError::NotFinite { .. })
+    ));
+    assert!(matches!(
+        values(1.0, &nowhere, &sources),
+        Err(TpsError::Length { .. })
+    ));
+}
