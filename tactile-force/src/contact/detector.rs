@@ -91,6 +91,7 @@ impl ContactDetector {
         };
         let contact = summarise(
             &workspace.region,
+            &Sums::over(&workspace.region, &mut workspace.columns),
             extent,
             peak,
             saturated,
@@ -227,6 +228,7 @@ impl ContactDetector {
 /// The contact of a region.
 fn summarise<T: Real>(
     region: &Region,
+    sums: &Sums,
     extent: Extent,
     peak: f32,
     saturated_px: usize,
@@ -240,7 +242,6 @@ fn summarise<T: Real>(
         column_end: size.1,
     };
     let place = region.place.unwrap_or(whole);
-    let sums = Sums::over(region);
     let local = sums.centroid();
     let origin = [place.column_start as f64, place.row_start as f64];
     let centroid =

@@ -14,36 +14,38 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    pub(super) fn over(region: &Region) -> Self {
-        let mut total = Self::default();
-        let columns = region.columns();
+    /// `columns` is scratch.
+    pub(super) fn over(region: &Region, columns: &mut Vec<f64>) -> Self {
+        let mut plain = [0.0; 5];
         for run in &region.aperture {
             let (y, n) = (f64::from(run.row), run.len() as f64);
             let (first, last) = (f64::from(run.start), f64::from(run.end) - 1.0);
             // Σ x and Σ x² of consecutive whole numbers.
             let cubes = |t: f64| t * (t + 1.0) * (2.0 * t + 1.0) / 6.0;
-            let plain = [
+            let terms = [
                 n,
                 0.5 * n * (first + last),
                 y * n,
                 cubes(last) - cubes(first - 1.0),
                 y * y * n,
             ];
-            let differences = &region.difference[run.span(columns)];
-            let [d0, d1, d2] = vectorized(Moments(differences));
-            let weighted = [
-                d0,
-                d1 + first * d0,
-                y * d0,
-                d2 + 2.0 * first * d1 + first * first * d0,
-                y * y * d0,
-            ];
-            for k in 0..5 {
-                total.plain[k] += plain[k];
-                total.weighted[k] += weighted[k];
+            for (sum, term) in plain.iter_mut().zip(terms) {
+                *sum += term;
             }
         }
-        total
+        columns.clear();
+        columns.resize(region.columns(), 0.0);
+        let [d, dy, dyy] = vectorized(Differences { region, columns });
+        let (mut dx, mut dxx) = (0.0, 0.0);
+        for (x, column) in columns.iter().enumerate() {
+            let x = x as f64;
+            dx += x * column;
+            dxx += x * x * column;
+        }
+        Self {
+            plain,
+            weighted: [d, dx, dy, dxx, dyy],
+        }
     }
 
     pub(super) fn sum(&self) -> f64 {
@@ -77,33 +79,42 @@ impl Sums {
     }
 }
 
-/// Σ d, Σ x d, Σ x² d for x = 0, 1, …; in lanes, so that no sum waits for the one before.
-struct Moments<'a>(&'a [f32]);
+/// Σ d of every column of the aperture, and Σ d, Σ y d, Σ y² d: moments need no product for every pixel.
+struct Differences<'a> {
+    region: &'a Region,
+    columns: &'a mut [f64],
+}
 
-impl pulp::NullaryFnOnce for Moments<'_> {
+impl pulp::NullaryFnOnce for Differences<'_> {
     type Output = [f64; 3];
 
     #[inline(always)]
     fn call(self) -> [f64; 3] {
         const LANES: usize = 8;
-        let mut lanes = [[0.0; LANES]; 3];
-        let mut x: [f64; LANES] = std::array::from_fn(|k| k as f64);
-        let (chunks, rest) = self.0.as_chunks::<LANES>();
-        for chunk in chunks {
-            for k in 0..LANES {
-                let d = f64::from(chunk[k]);
-                lanes[0][k] += d;
-                lanes[1][k] += x[k] * d;
-                lanes[2][k] += x[k] * x[k] * d;
-                x[k] += LANES as f64;
+        let width = self.region.columns();
+        let mut moments = [0.0; 3];
+        for run in &self.region.aperture {
+            let columns = &mut self.columns[run.start as usize..run.end as usize];
+            let (columns, rest) = columns.as_chunks_mut::<LANES>();
+            let (chunks, tail) = self.region.difference[run.span(width)].as_chunks::<LANES>();
+            // In lanes, so that no sum waits for the one before.
+            let mut lanes = [0.0; LANES];
+            for (columns, chunk) in columns.iter_mut().zip(chunks) {
+                for k in 0..LANES {
+                    let d = f64::from(chunk[k]);
+                    columns[k] += d;
+                    lanes[k] += d;
+                }
             }
+            for (column, d) in rest.iter_mut().zip(tail) {
+                *column += f64::from(*d);
+                lanes[0] += f64::from(*d);
+            }
+            let (y, sum) = (f64::from(run.row), lanes.iter().sum::<f64>());
+            moments[0] += sum;
+            moments[1] += y * sum;
+            moments[2] += y * y * sum;
         }
-        for (k, d) in rest.iter().enumerate() {
-            let d = f64::from(*d);
-            lanes[0][k] += d;
-            lanes[1][k] += x[k] * d;
-            lanes[2][k] += x[k] * x[k] * d;
-        }
-        lanes.map(|sums| sums.iter().sum())
+        moments
     }
 }

@@ -30,6 +30,8 @@ pub struct DetectorWorkspace {
     pub(super) pass: PassWorkspace,
     pub(crate) region: Region,
     pub(super) histogram: Vec<u64>,
+    /// Sums over the columns of a region.
+    pub(super) columns: Vec<f64>,
     pub(super) drift: FitWorkspace,
 }
 

@@ -1,36 +1,24 @@
 //! Least squares on the rings: the Gauss–Newton iteration for the profile's parameters.
 
-use nalgebra::{SMatrix, SVector};
-
 use super::edge::BlurredEdge;
+use super::equations::{BEND, Equations, Normal, Step};
 use super::misfit::Misfit;
-use super::profile::{Level, Shape, level};
-use super::rings::{RingSums, Rings};
+use super::profile::{Shape, level};
+use super::rings::Rings;
 use super::variance::PixelVariance;
 use super::{HertzFit, HertzFitOptions};
 use crate::calibration::StopReason;
 use crate::contact::Region;
 use crate::estimate::{Estimate, Real};
 
-/// Peak, background, radius, blur variance, centre's x and y, bend.
-type Normal = SMatrix<f64, 7, 7>;
-type Step = SVector<f64, 7>;
-
 /// Variance along one axis of a position spread evenly over a pixel.
 const PIXEL: f64 = 1.0 / 12.0;
-/// Place of the bend among the parameters.
-const BEND: usize = 6;
 /// Greatest bend that is fitted. Balls on soft layers reach −0.3, balls flattened on glass +0.15; beyond ±0.6 the profile is no ball's.
 const LARGEST_BEND: f64 = 0.6;
 /// Share of the misfit that a bend must take away to be believed. Contacts by finite elements lose nine tenths and more; where the light is not
 /// quite proportional, saturates, or is rough, a bend takes away a tenth and makes the radius worse (`cargo test -p tactile-force --test suite
 /// sensor`).
 const EXPLAINED: f64 = 0.5;
-/// Root mean square residual, as a share of the peak, beyond which a profile is no ball's: contacts by finite elements have 2 %, flat faces 10 % and
-/// more.
-const NO_BALL: f64 = 0.05;
-/// Squared residuals over the noise's from which on they are the profile's, not the noise's.
-const CLEARLY: f64 = 2.0;
 /// Least fall of χ² in a step, as a share, of a profile that is no ball's: there blur and radius wander along a valley without end, and what they
 /// are says nothing.
 const FALLING: f64 = 1e-2;
@@ -71,15 +59,6 @@ struct State {
     bent: bool,
     iterations: usize,
     stop: StopReason,
-}
-
-struct Equations {
-    normal: Normal,
-    gradient: Step,
-    chi2: f64,
-    pixels: f64,
-    /// Sum of the pixels' weights.
-    weights: f64,
 }
 
 impl HertzFitter {
@@ -239,13 +218,7 @@ impl HertzFitter {
     /// Normal equations over all pixels of the rings; rows of parameters that are not fitted are those of the identity.
     fn assemble(&self, rings: &Rings, state: &State, variance: PixelVariance<'_>) -> Equations {
         let shape = &state.shape;
-        let mut e = Equations {
-            normal: Normal::zeros(),
-            gradient: Step::zeros(),
-            chi2: 0.0,
-            pixels: 0.0,
-            weights: 0.0,
-        };
+        let mut e = Equations::zeros();
         for ring in rings.filled() {
             let r2 = ring.r2 / ring.n;
             let spread = (ring.r4 / ring.n - r2 * r2).max(0.0);
@@ -327,56 +300,6 @@ impl HertzFitter {
             iterations: state.iterations,
             stop: state.stop,
         })
-    }
-}
-
-impl Equations {
-    /// Adds one ring's pixels; only the lower triangle of the normal matrix is filled.
-    ///
-    /// Along a ring the model is its level, to first order in r² − mean r²; a shift of the centre changes it by
-    /// −2 (dI/dr²) times the place.
-    fn add(&mut self, ring: &RingSums, l: &Level, weight: f64, r2: f64, spread: f64) {
-        let radial = [
-            (0, l.by_peak),
-            (1, 1.0),
-            (2, l.by_radius),
-            (3, l.by_blur),
-            (BEND, l.by_bend),
-        ];
-        let along = |place: f64, by_r2: f64| l.value * place + l.by_r2 * (by_r2 - r2 * place);
-        let slope = -2.0 * weight * l.by_r2;
-        for (k, &(i, by)) in radial.iter().enumerate() {
-            let a = weight * ring.n * by;
-            for &(j, b) in &radial[..=k] {
-                self.normal[(i, j)] += a * b;
-            }
-            let (x, y) = if i == BEND {
-                ((BEND, 4), (BEND, 5))
-            } else {
-                ((4, i), (5, i))
-            };
-            self.normal[x] += slope * by * ring.u;
-            self.normal[y] += slope * by * ring.v;
-            self.gradient[i] += weight * by * (ring.d - ring.n * l.value);
-        }
-        let square = -2.0 * slope * l.by_r2;
-        self.normal[(4, 4)] += square * ring.uu;
-        self.normal[(5, 4)] += square * ring.uv;
-        self.normal[(5, 5)] += square * (ring.r2 - ring.uu);
-        self.gradient[4] += slope * (ring.du - along(ring.u, ring.r2u));
-        self.gradient[5] += slope * (ring.dv - along(ring.v, ring.r2v));
-        // Along a ring the model itself varies; that is no misfit.
-        let within = ring.n * l.by_r2 * l.by_r2 * spread;
-        self.chi2 +=
-            weight * (ring.dd - 2.0 * l.value * ring.d + ring.n * l.value * l.value - within);
-        self.pixels += ring.n;
-        self.weights += weight * ring.n;
-    }
-
-    /// Whether the residuals of a profile of that peak are neither noise nor what finite strain leaves.
-    fn is_no_ball(&self, peak: f64) -> bool {
-        let limit = NO_BALL * peak;
-        self.chi2 > CLEARLY * self.pixels && self.chi2 > limit * limit * self.weights
     }
 }
 

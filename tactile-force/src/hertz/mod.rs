@@ -10,6 +10,7 @@
 //! within 0.03 % of that of finite elements (a/R up to 1.1, layers of every depth, rigid flats).
 
 mod edge;
+mod equations;
 mod fit;
 mod misfit;
 mod options;
