@@ -61,13 +61,14 @@ pub(super) fn median_step_outside(
         let columns = image.ncols();
         let mut count = |span: Range<usize>| {
             total += span.len();
-            let span = Slice::from(span);
-            let pixels = image.row(row).slice_axis_move(Axis(0), span);
-            for (&f, &r) in pixels
-                .iter()
-                .zip(reference.row(row).slice_axis(Axis(0), span))
-            {
-                counts[usize::from(255 + u16::from(f) - u16::from(r))] += 1;
+            let [image, reference] = [image, reference].map(|image| {
+                let row = image.index_axis_move(Axis(0), row);
+                row.slice_axis_move(Axis(0), Slice::from(span.clone()))
+            });
+            match (image.to_slice(), reference.to_slice()) {
+                // Slices, which most images have, are walked without an index.
+                (Some(image), Some(reference)) => count_differences(&mut counts, image, reference),
+                _ => count_differences(&mut counts, image, reference),
             }
         };
         if (contact.row_start..contact.row_end).contains(&row) {
@@ -87,6 +88,17 @@ pub(super) fn median_step_outside(
         2 * below > total
     });
     median.map(|index| index as i32 - 255)
+}
+
+/// Counts the pixels by their image − reference, from −255 on.
+fn count_differences<'a>(
+    counts: &mut [usize; 511],
+    image: impl IntoIterator<Item = &'a u8>,
+    reference: impl IntoIterator<Item = &'a u8>,
+) {
+    for (&f, &r) in image.into_iter().zip(reference) {
+        counts[usize::from(255 + u16::from(f) - u16::from(r))] += 1;
+    }
 }
 
 #[cfg(test)]

@@ -80,7 +80,7 @@ pub(super) fn mean_difference(
 ) {
     resize(means, (region.rows() / side, region.columns() / side));
     let (frame, reference) = (region.of(frame), region.of(reference));
-    let pairs = |row: usize, columns: Range<usize>, sums: &mut [i32]| {
+    let pairs = |row: usize, columns: Range<usize>, sums: &mut [i16]| {
         let frame = span_of(frame, row, columns.clone());
         let reference = span_of(reference, row, columns);
         match (frame.to_slice(), reference.to_slice()) {
@@ -105,7 +105,7 @@ pub(super) fn block_mask(
 ) {
     resize(blocks, (region.rows() / side, region.columns() / side));
     let (rows, columns) = (contact.rows(), contact.columns());
-    let inside = |row: usize, span: Range<usize>, counts: &mut [i32]| {
+    let inside = |row: usize, span: Range<usize>, counts: &mut [i16]| {
         if row < rows {
             let span = span.start.min(columns)..span.end.min(columns);
             let mask = span_of(mask, row, span);
@@ -121,19 +121,19 @@ pub(super) fn block_mask(
 
 /// Adds frame − reference.
 fn add_differences<'a>(
-    sums: &mut [i32],
+    sums: &mut [i16],
     frame: impl IntoIterator<Item = &'a u8>,
     reference: impl IntoIterator<Item = &'a u8>,
 ) {
     for ((sum, f), r) in sums.iter_mut().zip(frame).zip(reference) {
-        *sum += i32::from(*f) - i32::from(*r);
+        *sum += i16::from(*f) - i16::from(*r);
     }
 }
 
 /// Counts the pixels inside.
-fn add_inside<'a>(counts: &mut [i32], mask: impl IntoIterator<Item = &'a bool>) {
+fn add_inside<'a>(counts: &mut [i16], mask: impl IntoIterator<Item = &'a bool>) {
     for (count, inside) in counts.iter_mut().zip(mask) {
-        *count += i32::from(*inside);
+        *count += i16::from(*inside);
     }
 }
 
@@ -150,12 +150,15 @@ fn span_of<'a, T>(
 /// Columns that are summed at a time.
 const STRIP: usize = 128;
 
+/// Rows that are summed in 16 bits, in which wide instructions hold twice as many numbers: 128 times 255 fits.
+const ROWS: usize = 128;
+
 /// Sums over square blocks: the rows of a band of blocks are added up column by column, in wide instructions, then the columns of each block.
 /// `add` adds the pixels of a row, in a span of columns, to sums.
 fn sum_blocks<T>(
     side: usize,
     mut blocks: ArrayViewMut2<'_, T>,
-    add: impl Fn(usize, Range<usize>, &mut [i32]),
+    add: impl Fn(usize, Range<usize>, &mut [i16]),
     result: impl Fn(i32) -> T,
 ) {
     // A block that is wider than the strip is laid over it several times.
@@ -167,12 +170,15 @@ fn sum_blocks<T>(
             let mut sums = [0; STRIP];
             for start in (0..blocks.len() * side).step_by(STRIP) {
                 let width = STRIP.min(blocks.len() * side - start);
-                for row in band * side..(band + 1) * side {
-                    add(
-                        row,
-                        first + start..first + start + width,
-                        &mut sums[..width],
-                    );
+                let columns = first + start..first + start + width;
+                for above in (0..side).step_by(ROWS) {
+                    let mut part = [0; STRIP];
+                    for row in above..side.min(above + ROWS) {
+                        add(band * side + row, columns.clone(), &mut part[..width]);
+                    }
+                    for (sum, part) in sums.iter_mut().zip(part) {
+                        *sum += i32::from(part);
+                    }
                 }
             }
             let columns = STRIP.min(side);
