@@ -1,15 +1,16 @@
 //! Errors of the inclusion search over a folder of solved scenes, against the Cramér–Rao bound.
 //!
 //! ```text
-//! cargo run --release -p tactile-elasticity --features fem --example inclusion_study -- FOLDER [SEEDS] [NAME]
+//! cargo run --release -p tactile-elasticity --features fem --example inclusion_study -- FOLDER [SEEDS] [NAMES]
 //! ```
 //!
 //! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m, disc_radius_m,
-//! nu, contact, approach_1_m …, force_1_n …; D_m = 0 for a plain block) and for every scene a file
-//! `NAME.csv` (load_index, r_m, pressure_pa), solved by another program. Every scene is searched with
+//! nu, contact, approach_1_m …, force_1_n …; D_m = 0 for a plain block, cells of loads that a scene has not are empty) and
+//! for every scene a file `NAME.csv` (load_index, r_m, pressure_pa), solved by another program: `evidence/inclusion_scenes.py`
+//! makes such folders with CalculiX. Every scene is searched with
 //! SEEDS (default 1) draws of the sensor's errors: white noise of pixels, smooth errors of the calibration,
-//! force, and of what is known of the block: its height and the approaches' zero. NAME keeps the scenes
-//! whose names begin so.
+//! force, and of what is known of the block: its height and the approaches' zero; Poisson's ratio is said to be
+//! 0.495 ± 0.005 whatever it is. NAMES keeps the scenes whose names begin with one of them, separated by commas.
 #![allow(clippy::print_stdout)]
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -36,7 +37,6 @@ struct SolvedScene {
     height_m: f64,
     radius_m: f64,
     face_radius_m: f64,
-    poisson_ratio: f64,
     interface: Interface,
     approaches_m: Vec<f64>,
     forces_n: Vec<f64>,
@@ -76,13 +76,16 @@ fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> {
         let name = text("scene")?.to_owned();
         let loads = header.iter().filter(|c| c.starts_with("approach_")).count();
         let numbers = |prefix: &str, unit: &str| -> Result<Vec<f64>, Box<dyn Error>> {
-            (1..=loads)
-                .map(|load| number(&format!("{prefix}_{load}_{unit}")))
+            let names = (1..=loads).map(|load| format!("{prefix}_{load}_{unit}"));
+            names
+                .filter(|name| text(name).is_ok_and(|text| !text.is_empty()))
+                .map(|name| number(&name))
                 .collect()
         };
+        let approaches_m = numbers("approach", "m")?;
         let points = table(&folder.join(format!("{name}.csv")))?.rows;
         let mut radii_m = Vec::new();
-        let mut pressures_pa = vec![Vec::new(); loads];
+        let mut pressures_pa = vec![Vec::new(); approaches_m.len()];
         for point in points {
             let (load, radius): (usize, f64) = (point[0].parse()?, point[1].parse()?);
             if radius == 0.0 {
@@ -102,12 +105,11 @@ fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> {
             height_m: number("block_height_m")?,
             radius_m: number("block_radius_m")?,
             face_radius_m: number("disc_radius_m")?,
-            poisson_ratio: number("nu")?,
             interface: match text("contact")? {
                 "bonded" => Interface::Bonded,
                 _ => Interface::Frictionless,
             },
-            approaches_m: numbers("approach", "m")?,
+            approaches_m,
             forces_n: numbers("force", "n")?,
             radii_m,
             pressures_pa,
@@ -185,8 +187,7 @@ fn measured(
     let sensor = SensorErrors::default();
     let said_height = scene.height_m * (0.02 * normal(&mut rng)).exp();
     let zero = 20e-6 * normal(&mut rng);
-    let specimen = Specimen::new(said_height, scene.radius_m)?
-        .with_poisson_ratio(scene.poisson_ratio, 0.005)?;
+    let specimen = Specimen::new(said_height, scene.radius_m)?;
     let common = smooth_field(&scene.radii_m, sensor.correlation_m, &mut rng);
     let white = white_errors(scene);
     let mut frames = Vec::new();
@@ -209,9 +210,7 @@ fn measured(
 
 /// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth, of the sensor's errors alone.
 fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn Error>> {
-    let specimen = Specimen::new(scene.height_m, scene.radius_m)?
-        .with_poisson_ratio(scene.poisson_ratio, 0.005)?
-        .with_interface(scene.interface);
+    let specimen = Specimen::new(scene.height_m, scene.radius_m)?.with_interface(scene.interface);
     let errors = SensorErrors {
         model: 0.0,
         ..SensorErrors::default()
@@ -315,12 +314,12 @@ fn quantile(values: &mut [f64], part: f64) -> f64 {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let folder = arguments.next().ok_or("usage: FOLDER [SEEDS] [NAME]")?;
+    let folder = arguments.next().ok_or("usage: FOLDER [SEEDS] [NAMES]")?;
     let seeds: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
-    let prefix = arguments.next().unwrap_or_default();
+    let names = arguments.next().unwrap_or_default();
     let mut tally = Tally::default();
     for (index, scene) in scenes(Path::new(&folder))?.iter().enumerate() {
-        if !scene.name.starts_with(&prefix) {
+        if !names.split(',').any(|name| scene.name.starts_with(name)) {
             continue;
         }
         let bounds = match scene.lump {
@@ -359,11 +358,13 @@ fn main() -> Result<(), Box<dyn Error>> {
                 {
                     let estimated = told.estimate();
                     let error = (estimated.value / truth).ln();
+                    let reach = estimated.interval.map(|end| 100.0 * (end / truth).ln());
                     print!(
-                        "; {name} {}{:+.1} ± {:.1} % (bound {:.1}, z {:+.2})",
+                        "; {name} {}{:+.1} [{:+.1} {:+.1}] % (bound {:.1}, z {:+.2})",
                         if told.value().is_some() { "" } else { "open " },
                         100.0 * error,
-                        100.0 * estimated.relative_error(),
+                        reach[0],
+                        reach[1],
                         100.0 * bound,
                         error / estimated.relative_error()
                     );

@@ -43,9 +43,14 @@ impl Scene {
         Ok(Self::from_model(model))
     }
 
-    /// The equations of this scene and of those [changed](Self::changed) from it.
-    pub(crate) fn layout(&self) -> Layout {
-        Layout::new(self.model())
+    /// The equations of this scene and of those [changed](Self::changed) from it, analysed; `None` where there is no
+    /// memory for them.
+    pub(crate) fn layout(&self) -> Option<Layout> {
+        let mut layout = Layout::new(self.model());
+        layout
+            .pattern(&self.model().elements, core::iter::empty())
+            .ok()?;
+        Some(layout)
     }
 
     /// What solutions of nearby scenes start from; `None` where the tangent is singular.

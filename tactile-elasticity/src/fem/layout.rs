@@ -15,7 +15,7 @@ pub(crate) enum Slot {
 }
 
 /// Equations of a model, and the tangent's pattern as far as contacts have needed it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Layout {
     slots: Arc<[Slot]>,
     pub(crate) equations: usize,

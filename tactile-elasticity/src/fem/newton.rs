@@ -39,7 +39,7 @@ const STICK_FIRST_STEP: f64 = 0.002;
 
 struct Solver<'a> {
     model: &'a Model,
-    layout: Layout,
+    layout: &'a mut Layout,
     report: Report,
     /// The equilibrium before the last one, for extrapolation.
     before: Option<Equilibrium>,
@@ -52,19 +52,25 @@ impl Model {
     /// A load that is not reached ends the solution: its [`Report`] says so. O(n b²) for each Newton
     /// iteration with n unknowns in a system of half-width b.
     pub(crate) fn solve(&self, loads: &[Load]) -> Solution {
-        self.solve_near(loads, &[])
+        self.solve_near(&mut Layout::new(self), loads, &[])
     }
 
     /// [`Self::solve`] that first tries, for each load, to go there from a guess: the state of a model with
-    /// the same elements at about that load.
-    pub(crate) fn solve_near(&self, loads: &[Load], guesses: &[State]) -> Solution {
+    /// the same elements at about that load. `layout` is this model's or one's with the same elements and supports:
+    /// its analysis is used again.
+    pub(crate) fn solve_near(
+        &self,
+        layout: &mut Layout,
+        loads: &[Load],
+        guesses: &[State],
+    ) -> Solution {
         let mut unloaded = Fields::zero(self);
         if self.sticks {
             unloaded.anchors = self.first_anchors(&unloaded);
         }
         let mut solver = Solver {
             model: self,
-            layout: Layout::new(self),
+            layout,
             report: Report {
                 outcome: Outcome::Solved,
                 steps: 0,
@@ -289,7 +295,7 @@ impl Solver<'_> {
             Goal::Approach(target) => target - fields.approach,
             Goal::Force(_) => 0.0,
         };
-        let mut system = model.assemble(&mut self.layout, &fields, margin(goal, &fields))?;
+        let mut system = model.assemble(self.layout, &fields, margin(goal, &fields))?;
         let mut worst = f64::INFINITY;
         for iteration in 0..MAX_ITERATIONS {
             let there = match goal {
@@ -325,7 +331,7 @@ impl Solver<'_> {
                     // Free of the rounding of the sum.
                     trial.approach = target;
                 }
-                if let Some(next) = model.assemble(&mut self.layout, &trial, margin(goal, &trial)) {
+                if let Some(next) = model.assemble(self.layout, &trial, margin(goal, &trial)) {
                     break (trial, next);
                 }
                 length *= 0.5;

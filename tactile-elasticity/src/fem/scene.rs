@@ -3,6 +3,7 @@
 use super::block::BlockMesh;
 use super::bodies::Inclusion;
 use super::guide::Guide;
+use super::layout::Layout;
 use super::load::{Load, Solution};
 use super::material::{Kinematics, Material};
 use super::mesh::Boundary;
@@ -224,13 +225,15 @@ impl Scene {
 
     /// [`Self::solve`] from the states of another scene at about these approaches, where its mesh has the
     /// same elements.
-    pub(crate) fn solve_near(&self, loads: &[Load], near: Option<(&Self, &[State])>) -> Solution {
-        match near {
-            Some((scene, states)) if scene.model.elements == self.model.elements => {
-                self.model.solve_near(loads, states)
-            }
-            _ => self.model.solve(loads),
-        }
+    pub(crate) fn solve_near(
+        &self,
+        layout: &mut Layout,
+        loads: &[Load],
+        near: Option<(&Self, &[State])>,
+    ) -> Solution {
+        let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
+        let guesses = near.map_or(&[][..], |(_, states)| states);
+        self.model.solve_near(layout, loads, guesses)
     }
 
     pub(crate) fn from_model(model: Model) -> Self {

@@ -50,14 +50,16 @@ const BONDED: ModelErrors = ModelErrors {
     bent: 0.0,
 };
 
-/// The same, without friction: all pressures 0.1 to 0.25 % low, the shape within 0.1 %, lower by 0.15 to 0.45 %
-/// towards the rim, up to 0.4 % on the axis above a shallow inclusion, forces 0.2 to 1.3 % low. What grows: between rim
+/// The same, without friction: all pressures 0.05 to 0.25 % low, the shape within 0.1 %, lower by up to 0.2 % towards the rim in soft
+/// tissue and by 0.85 % in tissue a third as stiff as the guide, 0.5 % root mean square over eight blocks of
+/// `evidence/inclusion_scenes.py`: four fifths of it go where CalculiX's elements at the rim are made a quarter as long, but
+/// data are as they are. Up to 0.4 % on the axis above a shallow inclusion, forces 0.2 to 1.3 % low. What grows: between rim
 /// elements of 0.02, 0.05 and 0.08 radii, 0.1 to 0.25 % at the outermost radius. The radial share, put in as forces on the nodes at a
 /// tenth of the block's height, bends the profile by 0.15 % across an inclusion, by more above a shallow one.
 const FRICTIONLESS: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 1.2e-3,
-    rim: 3e-3,
+    rim: 5e-3,
     rough: 1.2e-3,
     element: 0.12,
     force: 6e-3,

@@ -3,7 +3,7 @@
 use super::InclusionSearch;
 use super::covariance::{Observed, Resolution};
 use super::fit::{DRAFTED, Fit, Problem, SETTLED};
-use super::hypothesis::Hypothesis;
+use super::hypothesis::{Hypothesis, LEAST_GAIN};
 use super::parameters::{LumpParameters, Parameters};
 use super::progress::Counter;
 use crate::fem::{Interface, Kinematics};
@@ -140,7 +140,12 @@ impl InclusionSearch {
             problem.fit(plain.parameters, SETTLED, || counter.step())?
         };
         problem.priors = with_lump;
-        let lump = lump.and_then(|fit| problem.fit(fit.parameters, SETTLED, || counter.step()));
+        let ending = if is_certain {
+            SETTLED
+        } else {
+            SETTLED.below(plain.objective() - LEAST_GAIN)
+        };
+        let lump = lump.and_then(|fit| problem.fit(fit.parameters, ending, || counter.step()));
         Some(Hypothesis {
             problem,
             interface,

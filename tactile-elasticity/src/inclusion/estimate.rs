@@ -61,18 +61,21 @@ pub(crate) const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Told {
-    /// Known within 30 %.
+    /// Known within 30 % (one standard error) both ways.
     Yes(Estimated),
     /// The data leave it open: what prior and data allow together.
     No(Estimated),
 }
 
-/// Relative standard error above which a parameter cannot be told.
+/// Relative standard error above which a parameter cannot be told, on the side where its interval reaches further: a
+/// modulus that may be far higher is not told by being bounded from below.
 const OPEN: f64 = 0.3;
 
 impl Told {
     pub(crate) fn new(estimated: Estimated, is_reliable: bool) -> Self {
-        if is_reliable && estimated.relative_error() < OPEN {
+        let [low, high] = estimated.interval;
+        let reach = (estimated.value / low).max(high / estimated.value).ln();
+        if is_reliable && reach < TWO_SIDED_95 * OPEN {
             Self::Yes(estimated)
         } else {
             Self::No(estimated)

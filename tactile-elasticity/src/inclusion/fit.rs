@@ -55,12 +55,25 @@ pub(crate) struct Ending {
     step: f64,
     /// Evaluations of the model with its derivatives.
     evaluations: usize,
+    /// Objective that a fit must reach to be of use: one that does not promise to ends.
+    needed: f64,
+}
+
+impl Ending {
+    /// This ending for a fit that is of use below an objective alone.
+    pub(crate) fn below(self, objective: f64) -> Self {
+        Self {
+            needed: objective,
+            ..self
+        }
+    }
 }
 
 /// Of an answer: what is left is far below what the data tell.
 pub(crate) const SETTLED: Ending = Ending {
     step: 0.2,
     evaluations: 20,
+    needed: f64::INFINITY,
 };
 
 /// Of the first fits, which a finer mesh moves by more. From a start of the grid, four to eight
@@ -68,6 +81,7 @@ pub(crate) const SETTLED: Ending = Ending {
 pub(crate) const DRAFTED: Ending = Ending {
     step: 0.5,
     evaluations: 12,
+    needed: f64::INFINITY,
 };
 
 /// Largest step of a logarithm.
@@ -77,6 +91,10 @@ const LARGEST_STEP: f64 = 0.5;
 const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-6;
 const LARGEST_DAMPING: f64 = 10.0;
+
+/// Gain of the objective that a fit may still promise over that of its quadratic model: along a flat valley steps gain
+/// more than the model at their start says.
+const PROMISE: f64 = 4.0;
 
 /// Distance of the optimum in standard errors that the solutions' tolerance may hide.
 const UNRESOLVED: f64 = 1.0;
@@ -96,6 +114,13 @@ pub(super) struct Normal {
     pub(super) penalty: f64,
     predicted: Vec<f64>,
     solved: Solved,
+}
+
+impl Fit {
+    /// −2 ln of the posterior, up to a constant.
+    pub(crate) fn objective(&self) -> f64 {
+        self.misfit + self.penalty
+    }
 }
 
 impl Problem {
@@ -197,7 +222,8 @@ impl Problem {
         let converged = loop {
             // How far the quadratic model's optimum is; steps cut short by damping say nothing of it.
             let left = self.step(&parameters, &normal, 0.0)?.size;
-            if left < ending.step {
+            let promised = normal.misfit + normal.penalty - PROMISE * left.powi(2);
+            if left < ending.step || promised > ending.needed {
                 break true;
             }
             if damping > LARGEST_DAMPING {

@@ -3,8 +3,8 @@
 use super::motion::{Motion, sizes};
 use super::parameters::{Coordinate, Parameters};
 use crate::fem::{
-    Block, Found, Guide, Interface, Kinematics, Load, Lump, Material, Outcome, PressurePoint,
-    Relaxation, Scene, State, pressure_at,
+    Block, Found, Guide, Interface, Kinematics, Layout, Load, Lump, Material, Outcome,
+    PressurePoint, Relaxation, Scene, State, pressure_at,
 };
 use std::sync::Arc;
 
@@ -53,6 +53,8 @@ impl Solved {
 struct Meshed {
     scene: Scene,
     parameters: Parameters,
+    /// Of this mesh's equations, however it is moved.
+    layout: Layout,
 }
 
 impl Meshed {
@@ -144,10 +146,14 @@ impl Forward {
     ) -> Option<(Prediction, Solved)> {
         let meshed = match near {
             Some(near) if near.meshed.reaches(parameters) => Arc::clone(&near.meshed),
-            _ => Arc::new(Meshed {
-                scene: self.scene(parameters)?,
-                parameters: *parameters,
-            }),
+            _ => {
+                let scene = self.scene(parameters)?;
+                Arc::new(Meshed {
+                    layout: scene.layout()?,
+                    scene,
+                    parameters: *parameters,
+                })
+            }
         };
         let scene = self.changed(&meshed.scene, &meshed.parameters, parameters)?;
         let approaches: Vec<f64> = (self.approaches_m.iter())
@@ -158,7 +164,7 @@ impl Forward {
         } else {
             let loads: Vec<Load> = approaches.into_iter().map(Load::Approach).collect();
             let near = near.map(|near| (near.scene(0), near.states.as_slice()));
-            let solution = scene.solve_near(&loads, near);
+            let solution = scene.solve_near(&mut meshed.layout.clone(), &loads, near);
             if solution.report.outcome != Outcome::Solved {
                 return None;
             }
@@ -182,6 +188,7 @@ impl Forward {
         near: Option<&Solved>,
     ) -> Option<Solved> {
         let depth_m = sliding_depth(parameters);
+        let mut layout = meshed.layout.clone();
         let mut solved = Solved {
             meshed,
             scenes: Vec::with_capacity(approaches_m.len()),
@@ -190,7 +197,8 @@ impl Forward {
         for (frame, &approach) in approaches_m.iter().enumerate() {
             let before = || solved.scenes.last().zip(solved.states.last());
             let near = near.map(|near| (near.scene(frame), &near.states[frame]));
-            let (scene, state) = scene.slid(approach, depth_m, near.or_else(before))?;
+            let near = near.or_else(before);
+            let (scene, state) = scene.slid(&mut layout, approach, depth_m, near)?;
             solved.scenes.push(scene);
             solved.states.push(state);
         }
@@ -244,7 +252,7 @@ impl Forward {
                 .map(|moved| self.changed(scene, parameters, moved))
                 .collect()
         };
-        let mut layout = solved.scene(0).layout();
+        let mut layout = solved.meshed.layout.clone();
         let mut nearby = Vec::new();
         // Of each coordinate, the interface's answer frame by frame.
         let mut answers = vec![Vec::with_capacity(solved.states.len()); coordinates.len()];

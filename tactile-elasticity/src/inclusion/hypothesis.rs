@@ -12,6 +12,9 @@ use crate::fem::Interface;
 const LEAST_FALL: f64 = 20.0;
 /// Least probability for that.
 const LEAST_PROBABILITY: f64 = 0.99;
+/// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)): the parameters it adds are
+/// known better afterwards than before, which lowers the evidence further.
+pub(super) const LEAST_GAIN: f64 = 9.2;
 /// Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no more than what
 /// its mesh differs by from a plain block's (a contrast of 1.02 to 1.04 in plain blocks by CalculiX).
 const LEAST_CONTRAST: f64 = 1.2;

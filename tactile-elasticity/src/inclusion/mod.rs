@@ -20,6 +20,8 @@
 //! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won, IEEE Sensors
 //! J. 13 (2013). A. Tarantola, *Inverse Problem Theory* (2005). R. E. Kass & A. E. Raftery, J. Am. Stat.
 //! Assoc. 90 (1995) 773.
+#[cfg(test)]
+mod against_calculix;
 mod covariance;
 #[cfg(test)]
 mod departures;
