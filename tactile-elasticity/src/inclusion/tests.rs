@@ -368,11 +368,14 @@ fn a_covariance_is_one() {
 }
 
 #[test]
-fn what_is_not_known_within_thirty_percent_is_not_told() {
+fn what_is_not_known_within_a_quarter_both_ways_is_not_told() {
     let estimated = |error| super::Estimated::from_logarithm(2f64.ln(), error);
     assert!(matches!(Told::new(estimated(0.1), true), Told::Yes(_)));
     assert!(matches!(Told::new(estimated(0.1), false), Told::No(_)));
-    assert!(matches!(Told::new(estimated(0.31), true), Told::No(_)));
+    assert!(matches!(Told::new(estimated(0.26), true), Told::No(_)));
+    // As wide, but open upwards.
+    let skewed = super::Estimated::from_interval(2f64.ln(), [0.1, 0.6]);
+    assert!(matches!(Told::new(skewed, true), Told::No(_)));
     let interval = estimated(0.1).interval;
     assert!(
         (interval[0] * interval[1] - 4.0).abs() < 1e-12,
