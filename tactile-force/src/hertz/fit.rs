@@ -136,16 +136,23 @@ impl HertzFitter {
         (explained && state.shape.bend.abs() < LARGEST_BEND).then_some((state, equations, left))
     }
 
-    /// Fits and gathers the rings anew until the centre stays.
+    /// Fits and gathers the rings anew until the centre stays. `None` too where it leaves the region by more than the region's size: rings about
+    /// such a centre, of which the pixels say nothing, would be without number.
     fn refine(&self, rings: &mut Rings, data: &Data<'_>, state: &mut State) -> Option<()> {
+        let place = data.region.place?;
+        let farthest = 2.0 * (place.rows() + place.columns()) as f64;
+        let is_near = |[x, y]: [f64; 2]| x.hypot(y) <= farthest;
         for _ in 0..5 {
+            if !is_near(state.centre) {
+                return None;
+            }
             rings.gather(data.region, state.centre, data.aspect, data.radius);
             let moved = self.descend(rings, state, data.variance, data.aspect)?;
             if moved < 0.02 {
                 break;
             }
         }
-        Some(())
+        is_near(state.centre).then_some(())
     }
 
     /// Gauss–Newton steps on fixed rings until nothing moves; returns how far the centre went, in pixels.

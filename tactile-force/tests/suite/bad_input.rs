@@ -3,9 +3,9 @@
 use ndarray::{Array2, array};
 use proptest::prelude::*;
 use tactile_force::{
-    CalibrationPair, ContactOptions, ForceError, ForceMeter, ForceOptions, GaussianProfile,
-    HertzFitOptions, HertzProfile, ImageMoments, LinearCalibration, NoiseModel, ReferenceFrame,
-    ShearCalibration, ShearPair, measure_force,
+    CalibrationPair, ContactOptions, DriftCorrection, ForceError, ForceMeter, ForceOptions,
+    GaussianProfile, HertzFitOptions, HertzProfile, ImageMoments, LinearCalibration, NoiseModel,
+    Polarity, ReferenceFrame, ShearCalibration, ShearPair, measure_force,
 };
 
 fn calibration() -> LinearCalibration<f64> {
@@ -173,33 +173,59 @@ fn shear_pairs_that_say_nothing() {
     ));
 }
 
+/// Blocks, noise, edges, single pixels, full scale, whatever comes: a measurement with a finite force, or a refusal of what is saturated.
+fn end_civilly(
+    (rows, columns): (usize, usize),
+    seed: u64,
+    levels: [u8; 4],
+) -> Result<(), TestCaseError> {
+    let mut state = seed | 1;
+    let mut next = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 56) as u8
+    };
+    let mut image = |a: u8, b: u8| {
+        Array2::from_shape_fn((rows, columns), |(y, x)| {
+            if (y / 7 + x / 11) % 2 == 0 {
+                a
+            } else {
+                b.saturating_add(next() % 8)
+            }
+        })
+    };
+    let (frame, reference) = (image(levels[0], levels[1]), image(levels[2], levels[3]));
+    for polarity in [Polarity::Brighter, Polarity::Darker] {
+        for drift in [DriftCorrection::None, DriftCorrection::TiltedIllumination] {
+            let contact = ContactOptions::default()
+                .with_polarity(polarity)
+                .with_drift(drift);
+            let options = ForceOptions::default().with_contact(contact);
+            let (frame, reference) = (frame.view(), reference.view());
+            match measure_force(frame, reference, [1e-5; 2], &calibration(), &options) {
+                Ok(m) => prop_assert!(m.contact.is_none() || m.force_n.value.is_finite()),
+                Err(e) => prop_assert!(matches!(e, ForceError::SaturatedContact { .. }), "{e}"),
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Two columns say nothing of where the contact's centre is; followed without a limit, it once took rings for 223 GB.
+#[test]
+fn a_centre_that_the_pixels_do_not_determine_is_given_up() {
+    end_civilly((19, 2), 12_243_987_543_208_780_806, [192, 252, 19, 3]).unwrap();
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
     #[test]
     fn any_pair_of_images_ends_civilly(
-        (rows, columns) in (1_usize..40, 1_usize..70),
+        size in (1_usize..40, 1_usize..70),
         seed in any::<u64>(),
         levels in proptest::array::uniform4(any::<u8>()),
     ) {
-        // Blocks, noise, edges, single pixels, full scale: whatever comes.
-        let mut state = seed | 1;
-        let mut next = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 56) as u8
-        };
-        let mut image = |a: u8, b: u8| Array2::from_shape_fn((rows, columns), |(y, x)| {
-            if (y / 7 + x / 11) % 2 == 0 { a } else { b.saturating_add(next() % 8) }
-        });
-        let (frame, reference) = (image(levels[0], levels[1]), image(levels[2], levels[3]));
-        for polarity in [tactile_force::Polarity::Brighter, tactile_force::Polarity::Darker] {
-            for drift in [tactile_force::DriftCorrection::None, tactile_force::DriftCorrection::TiltedIllumination] {
-                let contact = ContactOptions::default().with_polarity(polarity).with_drift(drift);
-                let options = ForceOptions::default().with_contact(contact);
-                match measure_force(frame.view(), reference.view(), [1e-5; 2], &calibration(), &options) {
-                    Ok(m) => prop_assert!(m.contact.is_none() || m.force_n.value.is_finite()),
-                    Err(e) => prop_assert!(matches!(e, ForceError::SaturatedContact { .. }), "{e}"),
-                }
-            }
-        }
+        end_civilly(size, seed, levels)?;
     }
 }

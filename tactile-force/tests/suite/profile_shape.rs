@@ -5,8 +5,8 @@ use ndarray::Array2;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use tactile_force::{
-    Branch, CalibrationOptions, CalibrationPair, HertzFit, LinearCalibration, ProfileShape,
-    ReferenceFrame,
+    Branch, CalibrationOptions, CalibrationPair, ForceOptions, HertzFit, HertzFitOptions,
+    LinearCalibration, ProfileShape, ReferenceFrame, StopReason, measure_force,
 };
 
 use crate::simulated::{SHAPE, Sensor, measure};
@@ -157,4 +157,28 @@ fn the_curve_turns_a_balls_light_back_into_a_balls_pressure() {
     assert_eq!(pressure.shape, ProfileShape::Hertz);
     // Light ∝ p^0.8 is (1 − r²)^0.4: the misfit shows, pressure has a third of it at most.
     assert!(pressure.radial_misfit < 0.4 * light.radial_misfit);
+}
+
+/// The limit holds over all rounds of the fit, and a fit that it ends says so.
+#[test]
+fn no_fit_takes_more_steps_than_allowed() {
+    let reference = Array2::from_elem(SHAPE, 40_u8);
+    let frame = Array2::from_shape_fn(SHAPE, |(y, x)| {
+        let light = ball((x as f64 - 121.3) / 35.0, (y as f64 - 97.6) / 35.0);
+        (40.0 + 120.0 * light).round() as u8
+    });
+    let pairs = [0.0, 1e5, 2e5].map(|v| CalibrationPair::loading(v, 1e-6 * v));
+    let line = LinearCalibration::fit(&pairs, &CalibrationOptions::default()).unwrap();
+    for steps in 1..4 {
+        let hertz = HertzFitOptions::default().with_max_iterations(steps);
+        let options = ForceOptions::default().with_hertz(hertz.unwrap());
+        let (frame, reference) = (frame.view(), reference.view());
+        let measured = measure_force(frame, reference, [20e-6; 2], &line, &options).unwrap();
+        let fit = measured.profile.unwrap();
+        // The start is some pixels off: three steps do not settle it.
+        assert_eq!(
+            (fit.iterations, fit.stop),
+            (steps, StopReason::IterationLimit)
+        );
+    }
 }
