@@ -148,6 +148,9 @@ mod tests {
             [0.125, 0.25, 0.5, 1.0].into_iter(),
         );
         assert_eq!(cuts.at, [0.5, 1.0, 2.5, 4.0]);
+        // Without any weight they are numbers all the same.
+        cuts.find([0.0; 3].into_iter(), [0.5, 1.0].into_iter());
+        assert_eq!(cuts.at, [1.0, 1.0]);
     }
 
     #[test]

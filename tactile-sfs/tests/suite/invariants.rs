@@ -186,3 +186,53 @@ fn light_of_a_sphere_is_found_roughly() {
         })
     ));
 }
+
+/// Exchanging rows and columns, and slopes and pixel sizes with them, exchanges those of the heights. 37 is a length that transforms take
+/// long for: one of the two frames is solved turned.
+#[test]
+fn a_turned_frame_has_turned_heights() {
+    for (rows, columns) in [(64, 37), (37, 64), (30, 45)] {
+        let p = Array2::from_shape_fn((rows, columns), |(r, c)| {
+            (0.2 * r as f64).sin() + 0.03 * c as f64
+        });
+        let q = Array2::from_shape_fn((rows, columns), |(r, c)| {
+            (0.15 * c as f64).cos() - 0.02 * r as f64
+        });
+        let integrators: [(_, Box<dyn SlopeIntegrator<f64>>); 2] = [
+            ("poisson", Box::new(CosinePoisson)),
+            ("frankot-chellappa", Box::new(FrankotChellappa)),
+        ];
+        for (name, method) in integrators {
+            let heights = |p: ndarray::ArrayView2<'_, f64>, q, pixel_size_m| {
+                let domain = Domain {
+                    pixel_size_m,
+                    ..Domain::pixels()
+                };
+                method.integrate(p, q, &domain).unwrap().heights
+            };
+            let plain = heights(p.view(), q.view(), [1.0, 1.5]);
+            let turned = heights(q.t(), p.t(), [1.5, 1.0]);
+            let differences = plain.iter().zip(turned.t()).map(|(a, b)| (a - b).abs());
+            // Heights of some tens; both are direct solutions, with the rounding of transforms of 64 points.
+            let largest = differences.fold(0.0, f64::max);
+            assert!(largest < 1e-10, "{name}, {rows} × {columns}: {largest:e}");
+        }
+    }
+}
+
+#[test]
+fn a_depth_table_is_linear_between_its_entries_and_holds_its_ends() {
+    let table = DepthTable::new(&[(10.0, 1.0), (20.0, 2.0), (60.0, 10.0)]).unwrap();
+    for (signal, depth, within) in [
+        (5.0, 1.0, false),
+        (10.0, 1.0, true),
+        (15.0, 1.5, true),
+        (20.0, 2.0, true),
+        (30.0, 4.0, true),
+        (50.0, 8.0, true),
+        (60.0, 10.0, true),
+        (70.0, 10.0, false),
+    ] {
+        assert_eq!(table.depth(signal), (depth, within), "{signal}");
+    }
+}

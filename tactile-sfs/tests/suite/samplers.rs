@@ -145,3 +145,38 @@ fn equal_spacing_is_even_on_the_surface() {
     // A random draw has a spread of 0.52, a hexagonal lattice of 0.
     assert!(spread < 0.2, "{spread}");
 }
+
+/// Points of a ball stand for equal areas, of which ground steeper than 63° counts as if it were no steeper: the share of them within a
+/// radius is an integral, whatever the pixels' shape.
+#[test]
+fn points_of_a_contact_stand_for_equal_areas_on_oblong_pixels_too() {
+    const RADIUS: f64 = 40.0;
+    const COUNT: usize = 500;
+    let area = |to: f64| {
+        let radii = (0..4000).map(|k| to * (f64::from(k) + 0.5) / 4000.0);
+        let slope_squared = |r: f64| r * r / (RADIUS * RADIUS - r * r);
+        let rings = radii.map(|r| r * (1.0 + slope_squared(r).min(4.0)).sqrt());
+        rings.sum::<f64>() * to
+    };
+    for pixel in [[1.0, 1.0], [1.0, 2.0], [2.0, 1.0]] {
+        let shape = [100.0 / pixel[1], 100.0 / pixel[0]].map(|n| n as usize);
+        let distance = |x: f64, y: f64| (x - 49.3).hypot(y - 49.8);
+        let z = Array2::from_shape_fn(shape, |(r, c)| {
+            let r = distance(pixel[0] * c as f64, pixel[1] * r as f64);
+            (RADIUS * RADIUS - r * r).max(0.0).sqrt()
+        });
+        let mask = z.mapv(|z| z > 0.0);
+        let points = ContactSampler.sample(z.view(), Some(mask.view()), pixel, COUNT);
+        let points = points.unwrap();
+        for within in [16.0, 28.0] {
+            let inside = points.iter().filter(|p| distance(p.x, p.y) < within);
+            let found = inside.count() as f64 / COUNT as f64;
+            let expected = area(within) / area(RADIUS);
+            // A circle cuts some forty cells of the points, of which one may count too many or too few in ten.
+            assert!(
+                (found - expected).abs() < 0.015,
+                "{pixel:?}, {within}: {found} {expected}"
+            );
+        }
+    }
+}
