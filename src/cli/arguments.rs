@@ -42,7 +42,7 @@ Examples, one for each subcommand:
   tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
   tactile stream --rate 20 --period 1 --allowed-late 100
   tactile light --rays 2000
-  tactile table examples/data/press/scene.toml --moduli 4
+  tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5
 
 Exit codes:
   0    all that was asked for is there

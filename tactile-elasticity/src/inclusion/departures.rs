@@ -144,8 +144,10 @@ fn an_inclusion_off_the_axis_is_not_told_confidently() {
     );
 }
 
+/// The search goes on longest where nothing fits.
 #[test]
-fn two_inclusions_beside_the_axis_fit_poorly() {
+#[ignore = "a quarter of a minute: run by the step `studies` of the checks"]
+fn study_two_inclusions_beside_the_axis_fit_poorly() {
     let one = lump(7e-3, 3e-3, 40e3);
     let estimate = searched(&frames(&moved_aside(one, 6e-3, 2.0)));
     assert!(is_poor(&estimate) || !estimate.found, "{estimate:?}");

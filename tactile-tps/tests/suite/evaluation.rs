@@ -97,7 +97,10 @@ proptest! {
 
     #[test]
     fn single_precision_follows_double(seed in 1u64..u64::MAX) {
-        for_all!(works_in_single_precision, seed);
+        // Every kernel and every dimension once: each further pair takes seconds to compile and shares all its code with these.
+        works_in_single_precision::<2, _>(R2LogR, seed);
+        works_in_single_precision::<2, _>(R3, seed);
+        works_in_single_precision::<3, _>(NegR, seed);
     }
 }
 

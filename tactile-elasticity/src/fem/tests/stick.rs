@@ -43,31 +43,50 @@ fn a_ball_without_slip_is_as_stiff_as_a_punch_of_its_contact() {
     assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
 }
 
-#[test]
-fn growing_contacts_without_slip_follow_their_closed_forms() {
+/// Force of spheres and cones without slip on meshes of so many elements to the first line, over that of the closed forms.
+fn over_closed_forms(poisson_ratio: f64, elements: usize) -> [f64; 2] {
     let half_angle_rad = 1.3_f64;
     let tangent = half_angle_rad.tan();
+    let modulus = 1.0 / (1.0 - poisson_ratio * poisson_ratio);
+    let lines = contact_lines(0.03, elements, 1.05, 1e9, 0.14);
+    let ratio = |shape, law: &dyn ContactLaw, approach: f64| {
+        let mut model = half_space_of(poisson_ratio, &lines, 0.04 / elements as f64, shape);
+        model.forbid_slip();
+        let force = model.solve(&[Load::Approach(approach)]).states[0].force_n();
+        force / (modulus * law.of_indentation(approach, 0.0).unwrap().value.exp())
+    };
+    let sphere = NoSlipLaw::sphere(1.0, poisson_ratio).unwrap();
+    let cone = NoSlipLaw::cone(tangent, poisson_ratio).unwrap();
+    // Contact radius 2 δ tan α / π = 0.1.
+    let approach = 0.05 * core::f64::consts::PI / tangent;
+    [
+        ratio(RigidShape::Paraboloid { radius_m: 1.0 }, &sphere, 0.01),
+        ratio(RigidShape::Cone { half_angle_rad }, &cone, approach),
+    ]
+}
+
+#[test]
+fn growing_contacts_without_slip_follow_their_closed_forms() {
+    for poisson_ratio in [0.0, 0.3] {
+        let ratios = over_closed_forms(poisson_ratio, 4);
+        // Elements, loading steps and the half space's end: 0.2 % at most; without friction the force is 5.3 % less at ν = 0, 1.6 % at 0.3.
+        assert!(
+            ratios.iter().all(|ratio| (ratio - 1.0).abs() < 3e-3),
+            "{poisson_ratio}: {ratios:?}"
+        );
+    }
+}
+
+/// The same on a mesh twice as fine, and where friction does least.
+#[test]
+#[ignore = "a minute: run by the step `studies` of the checks"]
+fn study_growing_contacts_without_slip() {
     for poisson_ratio in [0.0, 0.3, 0.45] {
-        let modulus = 1.0 / (1.0 - poisson_ratio * poisson_ratio);
-        let lines = contact_lines(0.03, 8, 1.05, 1e9, 0.14);
-        let check = |shape, law: &dyn ContactLaw, approach: f64| {
-            let mut model = half_space_of(poisson_ratio, &lines, 0.005, shape);
-            model.forbid_slip();
-            let force = model.solve(&[Load::Approach(approach)]).states[0].force_n();
-            let theory = modulus * law.of_indentation(approach, 0.0).unwrap().value.exp();
-            // Elements, loading steps and the half space's end: 0.2 % at most; without friction the force is 1.6 to 5.3 % less at ν ≤ 0.3.
-            let ratio = force / theory;
-            assert!(
-                (ratio - 1.0).abs() < 3e-3,
-                "{shape:?} {poisson_ratio}: {ratio}"
-            );
-        };
-        let sphere = NoSlipLaw::sphere(1.0, poisson_ratio).unwrap();
-        check(RigidShape::Paraboloid { radius_m: 1.0 }, &sphere, 0.01);
-        let cone = NoSlipLaw::cone(tangent, poisson_ratio).unwrap();
-        // Contact radius 2 δ tan α / π = 0.1.
-        let approach = 0.05 * core::f64::consts::PI / tangent;
-        check(RigidShape::Cone { half_angle_rad }, &cone, approach);
+        let ratios = over_closed_forms(poisson_ratio, 8);
+        assert!(
+            ratios.iter().all(|ratio| (ratio - 1.0).abs() < 3e-3),
+            "{poisson_ratio}: {ratios:?}"
+        );
     }
 }
 
@@ -121,7 +140,7 @@ fn more_loads_on_the_way_change_little() {
         let state = solved(&scene, &loads).pop().unwrap();
         [state.force_n(), state.contact_radius().unwrap().radius_m]
     };
-    let [few, many] = [1, 40].map(at_the_end);
+    let [few, many] = [1, 12].map(at_the_end);
     assert!((few[0] / many[0] - 1.0).abs() < 1e-3, "{few:?} {many:?}");
     assert!((few[1] / many[1] - 1.0).abs() < 2e-3, "{few:?} {many:?}");
 }
