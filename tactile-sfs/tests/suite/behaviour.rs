@@ -252,9 +252,9 @@ fn frames_of_every_width_are_integrated_in_single_precision() {
             [Box::new(CosinePoisson), Box::new(FrankotChellappa)]
         }
         for (double, single) in both::<f64>().iter().zip(both::<f32>()) {
-            let domain = Domain::pixels();
+            let domain = Domain::default();
             let a = double.integrate(p.view(), q.view(), &domain).unwrap();
-            let domain = Domain::pixels();
+            let domain = Domain::default();
             let b = single
                 .integrate(short_p.view(), short_q.view(), &domain)
                 .unwrap();

@@ -206,7 +206,7 @@ fn a_turned_frame_has_turned_heights() {
             let heights = |p: ndarray::ArrayView2<'_, f64>, q, pixel_size_m| {
                 let domain = Domain {
                     pixel_size_m,
-                    ..Domain::pixels()
+                    ..Domain::default()
                 };
                 method.integrate(p, q, &domain).unwrap().heights
             };
