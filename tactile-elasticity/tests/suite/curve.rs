@@ -224,6 +224,42 @@ fn contact_without_slip_is_asked_for() {
     assert!(!sphere(None).candidates().contains(&sticks));
 }
 
+/// Strain under a cone goes with the cotangent of its half angle, and so does the error stated of its law; under a ball it grows with depth.
+#[test]
+fn the_error_stated_of_a_law_grows_with_the_strain() {
+    let error = |indenter: &Indenter, kind, force: &dyn Fn(f64) -> f64| {
+        let curve = curve(force, 0.0, 0.0, 0);
+        let fit = fit_curve(&curve, indenter, NU, kind, &CurveOptions::default()).unwrap();
+        fit.model_error
+    };
+    let cone = |half_angle_tangent: f64| {
+        let indenter = Indenter::Cone { half_angle_tangent };
+        let force =
+            |d: f64| std::f64::consts::FRAC_2_PI * E / (1.0 - NU * NU) * half_angle_tangent * d * d;
+        error(&indenter, EstimatorKind::Cone, &force)
+    };
+    let ratio = cone(1.5) / cone(6.0);
+    assert!((ratio - 4.0).abs() < 1e-9, "{ratio}");
+    let ball = |radius_m: f64| {
+        let indenter = Indenter::Sphere {
+            radius_m,
+            thickness_m: None,
+            bond: Bond::Bonded,
+        };
+        let force = |d: f64| 4.0 / 3.0 * E / (1.0 - NU * NU) * radius_m.sqrt() * d.powf(1.5);
+        error(&indenter, EstimatorKind::HertzSphere, &force)
+    };
+    assert!(ball(2e-3) > 1.5 * ball(4e-3));
+    // Half balls carry so much less than Hertz's law at these depths over the radius, by finite elements: about a standard error.
+    for (depth, off) in [(0.02, 0.05), (0.08, 0.12), (0.21, 0.28)] {
+        let radius_m = 2.97e-4 / depth;
+        let force = |d: f64| 4.0 / 3.0 * E / (1.0 - NU * NU) * radius_m.sqrt() * d.powf(1.5);
+        let indenter = Indenter::Ball { radius_m };
+        let stated = error(&indenter, EstimatorKind::HertzSphere, &force);
+        assert!((0.75..1.25).contains(&(off / stated)), "{depth}: {stated}");
+    }
+}
+
 #[test]
 fn bad_curves_are_named() {
     use ElasticityError as Bad;

@@ -346,3 +346,25 @@ fn what_is_no_series_is_refused() {
         Ok(TimeDependence::Steady)
     );
 }
+
+/// Four loads under one force tell no time constant, but how much the sample has softened: a compliance that grows by 15 %.
+#[test]
+fn few_loads_under_a_held_force_tell_the_change() {
+    let series: Vec<TimedModulus> = (0..4)
+        .map(|k| {
+            let modulus = 100e3 / (1.0 + 0.05 * f64::from(k));
+            TimedModulus {
+                time_s: f64::from(k),
+                force_n: 0.5,
+                youngs_modulus_pa: Estimate::new(modulus, 1e-3 * modulus),
+            }
+        })
+        .collect();
+    match time_dependence(&series, 0.0, 0.0).unwrap() {
+        TimeDependence::Undecided { change } => {
+            // The compliances lie on a line, which is fitted to them: rounding.
+            assert!((change - (1.0 / 1.15 - 1.0)).abs() < 1e-9, "{change}");
+        }
+        other => panic!("{other:?}"),
+    }
+}

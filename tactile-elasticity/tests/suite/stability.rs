@@ -219,3 +219,23 @@ fn weights_are_areas() {
     let field = StrainField::from_gradients(&gradients, Some(&[3.0, 1.0]), &Infinitesimal).unwrap();
     assert!((field.summary().mean[(1, 1)] - 0.01f64).abs() < 1e-17);
 }
+
+/// A small turn in each plane, of numbers whose strain is exact: E is 2⁻⁴³ where the terms it is summed from are 2⁻²¹ and need 81 bits.
+#[test]
+fn what_a_turn_leaves_keeps_all_its_digits_in_every_plane() {
+    let power = |k: i32| 2.0_f64.powi(k);
+    let turn = power(-10) + power(-40);
+    let along = -(power(-21) + power(-50));
+    for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+        let mut h = Matrix3::zeros();
+        (h[(i, j)], h[(j, i)]) = (-turn, turn);
+        (h[(i, i)], h[(j, j)]) = (along, along);
+        let strain = GreenLagrange.strain(&h).unwrap();
+        // along + ½ (along² + turn²), in full 2⁻⁴³ + 2⁻⁷¹ + 2⁻⁸¹ + 2⁻¹⁰¹; the last is half a rounding.
+        let expected = power(-43) + power(-71) + power(-81);
+        for k in [i, j] {
+            let error = (strain[(k, k)] / expected - 1.0).abs();
+            assert!(error <= f64::EPSILON, "({i}, {j}): {error:e}");
+        }
+    }
+}
