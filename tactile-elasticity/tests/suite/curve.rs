@@ -252,7 +252,7 @@ fn the_error_stated_of_a_law_grows_with_the_strain() {
     assert!(ball(2e-3) > 1.5 * ball(4e-3));
     // Half balls carry so much less than Hertz's law at these depths over the radius, by finite elements: about a standard error.
     for (depth, off) in [(0.02, 0.05), (0.08, 0.12), (0.21, 0.28)] {
-        let radius_m = 2.97e-4 / depth;
+        let radius_m: f64 = 2.97e-4 / depth;
         let force = |d: f64| 4.0 / 3.0 * E / (1.0 - NU * NU) * radius_m.sqrt() * d.powf(1.5);
         let indenter = Indenter::Ball { radius_m };
         let stated = error(&indenter, EstimatorKind::HertzSphere, &force);
