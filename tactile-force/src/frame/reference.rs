@@ -128,7 +128,8 @@ impl ReferenceFrame {
     ///
     /// let even = ReferenceFrame::new(Array2::from_elem((80, 120), 40_u8).view())?;
     /// assert!(even.flat_field().is_none());
-    /// assert!((even.with_flat_field()?.flat_field().expect("asked for").at(3.0, 70.0) - 1.0).abs() < 1e-9);
+    /// let coefficients = even.with_flat_field()?.flat_field().expect("asked for").coefficients;
+    /// assert!(coefficients[0] == 1.0 && coefficients[1..].iter().all(|c| c.abs() < 1e-9));
     /// // A black reference shows no vignetting.
     /// assert!(ReferenceFrame::new(Array2::zeros((80, 120)).view())?.with_flat_field().is_err());
     /// # Ok::<(), tactile_force::ForceError>(())

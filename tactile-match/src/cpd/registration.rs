@@ -19,16 +19,12 @@ const KERNEL_TOLERANCE: f64 = 1e-12;
 /// ```
 /// use nalgebra::Point2;
 /// use tactile_match::{CoherentPointDrift, DriftWorkspace};
-/// use tactile_tps::Warp;
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * k.sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y + 2.0)).collect();
 /// let mut workspace = DriftWorkspace::default();
-/// CoherentPointDrift::default().register_with(&mut workspace, &model, &target)?;
-/// assert!(workspace.iterations() > 1 && workspace.sigma2() < 1e-2); // σ² in squared radii of the target
-/// assert!(workspace.kernel_rank() <= 12); // at most one column a model point
-/// let mut warped = model.clone();
-/// workspace.warped_into(&mut warped)?;
-/// assert!((workspace.warp().apply(&model[5]) - warped[5]).norm() < 1e-6);
+/// let found = CoherentPointDrift::default().match_with(&mut workspace, &model, &target)?;
+/// assert!(found.report.iterations > 1 && found.report.sigma < 0.1); // in the units of the points
+/// assert!((found.warp.apply(&model[5]) - found.warped[5]).norm() < 1e-6);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug)]
