@@ -128,8 +128,12 @@ impl Disc {
 pub(super) fn touched(centre: f64, half: f64, length: usize, margin: usize) -> [isize; 2] {
     let margin = margin as isize;
     let limit = length as isize + margin;
-    let first = ((centre - half + 0.5).floor() as isize - margin).clamp(-margin, limit);
-    let last = ((centre + half + 0.5).ceil() as isize + margin).clamp(first, limit);
+    let first = ((centre - half + 0.5).floor() as isize)
+        .saturating_sub(margin)
+        .clamp(-margin, limit);
+    let last = ((centre + half + 0.5).ceil() as isize)
+        .saturating_add(margin)
+        .clamp(first, limit);
     [first, last]
 }
 

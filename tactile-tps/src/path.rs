@@ -6,7 +6,6 @@ use crate::{
     Factorization, FitOptions, Kernel, Scalar, Smoothing, Spline, TpsError,
     centres::finite,
     equations::Buffers,
-    
     layout::HEAD,
     null_space::{MAX, dot},
     options::validate_weight_count,

@@ -168,7 +168,7 @@ impl Pipeline {
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::sfs::Random;
-    /// let pipeline = trial.pipeline()?.with_sampler(Random::new(7)).with_control_points(40);
+    /// let pipeline = trial.pipeline()?.with_sampler(Random { seed: 7 }).with_control_points(40);
     /// let mut press = trial.press(&pipeline)?;
     /// let points = press.control_points(0)?.to_vec();
     /// assert_eq!(points.len(), 40);

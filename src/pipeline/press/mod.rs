@@ -61,7 +61,6 @@ struct KnownContact {
 /// let force = press.contact(0)?.and_then(|c| c.force_n).expect("a force");
 /// assert!((force.value / 0.7 - 1.0).abs() < 0.02);
 /// assert!((press.modulus()?.youngs_modulus_pa / 103e3 - 1.0).abs() < 0.0538, "Hertz, from both contacts");
-/// println!("most of its error comes from {:?}", press.error_budget()?.first());
 /// assert_eq!(press.report().work(Stage::Surface).runs, 0, "no surface so far");
 /// press.strain(1)?;
 /// assert_eq!(press.report().work(Stage::Surface).runs, 2);

@@ -20,7 +20,7 @@ impl Press<'_> {
     /// let error = press.set_time_s(1, 1.5).unwrap_err();
     /// assert_eq!(error, PipelineError::TimeDecreases { frame: 1, before_s: 2.0, found_s: 1.5 });
     /// press.set_time_s(1, 2.5)?;
-    /// let time = press.time_dependence()?.expect("two loads with their times");
+    /// let time = press.measure().time.expect("two loads with their times");
     /// assert_eq!((time.from_s, time.to_s, time.loads), (2.0, 2.5, 2));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
