@@ -49,7 +49,7 @@ pub struct SensorPress {
 /// ```no_run
 /// use tactile_imaging::sensor::SensorCalibration;
 /// let calibrated = SensorCalibration::read("calibration.toml")?.run()?;
-/// for layer in calibrated.layers.iter().filter(|layer| !layer.is_identified()) {
+/// for layer in calibrated.layers.iter().filter(|layer| !layer.identified) {
 ///     println!("layer {}: the presses do not tell its {}", layer.layer + 1, layer.parameter);
 /// }
 /// calibrated.sensor.write("sensor.toml")?;
