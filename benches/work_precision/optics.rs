@@ -5,7 +5,17 @@ use tactile_imaging::optics::surface::Flat;
 use tactile_imaging::optics::trace::{Slab, SlabLayer, TraceOptions, trace};
 use tactile_imaging::optics::{Geometry, Led};
 
-pub(crate) fn rays(study: &mut Study) {
+/// Rays in the plane of one section: the exact problem of a guide that is long across it.
+pub(crate) fn section(study: &mut Study) {
+    rays(study, Geometry::Section);
+}
+
+/// Rays in all directions of space, the default.
+pub(crate) fn volume(study: &mut Study) {
+    rays(study, Geometry::Volume);
+}
+
+fn rays(study: &mut Study, geometry: Geometry) {
     study.error_label = "rms error of the guided share, relative";
     const SEEDS: u64 = 4;
     let layers = [SlabLayer {
@@ -18,45 +28,38 @@ pub(crate) fn rays(study: &mut Study) {
             .expect("valid")
             .guided
     };
-    for geometry in [Geometry::Section, Geometry::Volume] {
-        let default = TraceOptions::default().with_geometry(geometry);
-        let finest = default
-            .with_seed(99)
-            .with_rays(study.choose(1 << 18, 1 << 21))
-            .and_then(|o| o.with_cutoff(1e-12))
+    let default = TraceOptions::default().with_geometry(geometry);
+    let finest = default
+        .with_seed(99)
+        .with_rays(study.choose(1 << 18, 1 << 21))
+        .and_then(|o| o.with_cutoff(1e-12))
+        .expect("valid");
+    let expected = guided(&finest);
+    let mut run = |knob, (rays, cutoff), is_default| {
+        let options = default
+            .with_rays(rays)
+            .and_then(|o| o.with_cutoff(cutoff))
             .expect("valid");
-        let expected = guided(&finest);
-        let mut run = |knob, (rays, cutoff), is_default| {
-            let options = default
-                .with_rays(rays)
-                .and_then(|o| o.with_cutoff(cutoff))
-                .expect("valid");
-            let job = || {
-                (0..SEEDS)
-                    .map(|seed| guided(&options.with_seed(seed)))
-                    .collect::<Vec<f64>>()
-            };
-            let setting = format!("{rays} rays, cutoff {cutoff:e}");
-            study.run(knob, setting, is_default, job, |found| {
-                (found
-                    .iter()
-                    .map(|g| (g / expected - 1.0).powi(2))
-                    .sum::<f64>()
-                    / SEEDS as f64)
-                    .sqrt()
-            });
-            study.entries.last_mut().expect("an entry").seconds /= SEEDS as f64;
+        let job = || {
+            (0..SEEDS)
+                .map(|seed| guided(&options.with_seed(seed)))
+                .collect::<Vec<f64>>()
         };
-        let [name, cutoffs] = match geometry {
-            Geometry::Section => ["section", "cutoff, section"],
-            _ => ["volume", "cutoff, volume"],
-        };
-        for rays in [64, 256, 1024, 4096, 16_384] {
-            // Sections and volumes are different problems; the default is a volume.
-            run(name, (rays, 1e-6), rays == 4096 && name == "volume");
-        }
-        for cutoff in [1e-2, 1e-4] {
-            run(cutoffs, (4096, cutoff), false);
-        }
+        let setting = format!("{rays} rays, cutoff {cutoff:e}");
+        study.run(knob, setting, is_default, job, |found| {
+            (found
+                .iter()
+                .map(|g| (g / expected - 1.0).powi(2))
+                .sum::<f64>()
+                / SEEDS as f64)
+                .sqrt()
+        });
+        study.entries.last_mut().expect("an entry").seconds /= SEEDS as f64;
+    };
+    for rays in [64, 256, 1024, 4096, 16_384] {
+        run("rays", (rays, 1e-6), rays == 4096);
+    }
+    for cutoff in [1e-2, 1e-4] {
+        run("cutoff", (4096, cutoff), false);
     }
 }
