@@ -9,6 +9,9 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use tactile_tps::Scalar;
 
+/// A model and a target.
+type Pair<'a, T, const D: usize> = (&'a [Point<T, D>], &'a [Point<T, D>]);
+
 impl AnnealedSoftassign {
     /// Matches every `(model, target)` on all threads of the current pool, with the bits of [`PointMatcher::match_points`]; a pair that cannot be
     /// matched does not hinder the others.
@@ -25,7 +28,7 @@ impl AnnealedSoftassign {
     /// ```
     pub fn match_all_in_parallel<T: Scalar, const D: usize>(
         &self,
-        pairs: &[(&[Point<T, D>], &[Point<T, D>])],
+        pairs: &[Pair<'_, T, D>],
     ) -> Vec<Result<Matching<T, D>, MatchError>> {
         let go = |_, _| ControlFlow::Continue(());
         let one = |workspace: &mut _, &(model, target): &_| {
