@@ -67,8 +67,8 @@ impl Quantity {
     /// The quantity that `unit` measures; a number where none has it.
     pub(crate) fn of_unit(unit: &str) -> Self {
         let has = |quantity: &Self| quantity.in_si(unit).is_some();
-        let quantities = UNITS.iter().map(|(quantity, _)| *quantity);
-        quantities.filter(has).next().unwrap_or(Self::Number)
+        let mut quantities = UNITS.iter().map(|(quantity, _)| *quantity);
+        quantities.find(has).unwrap_or(Self::Number)
     }
 
     /// The units that are known, for messages.

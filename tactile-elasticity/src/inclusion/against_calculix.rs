@@ -1,6 +1,7 @@
 //! The forward model against CalculiX, an independent finite-element program.
 //!
 //! `tests/data/inclusion_calculix.csv` is what `evidence/inclusion_scenes.py` finds, with elements of `size_mm`: a row a load.
+#![allow(clippy::print_stdout)]
 
 use super::forward::Forward;
 use super::parameters::{LumpParameters, Parameters};

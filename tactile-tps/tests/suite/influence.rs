@@ -160,7 +160,7 @@ fn what_is_no_linear_map_is_refused() {
     let chosen = chosen.expect("a factor").influence_into(
         &mut Workspace::default(),
         &[x],
-        &mut vec![0.0; 12],
+        &mut [0.0; 12],
     );
     assert_eq!(chosen, Err(TpsError::DependsOnTargets));
     let factorization =
