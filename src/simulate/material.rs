@@ -121,6 +121,14 @@ pub struct WaveguideLayer {
 }
 
 /// The layered waveguide, from the object's side to the glass.
+///
+/// ```
+/// use tactile_imaging::simulate::Waveguide;
+/// // Epidermis, dermis and subcutanea of the paper's sensor: 2, 3 and 5 mm.
+/// let guide = Waveguide::default();
+/// let thickness_m: f64 = guide.layers.iter().map(|layer| layer.thickness_m).sum();
+/// assert!((thickness_m - 10e-3).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Waveguide {

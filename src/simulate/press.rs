@@ -20,6 +20,7 @@ use super::press_options::{Load, PressOptions};
 /// let made = scene.simulate();
 /// assert_eq!(made.frames.len(), 2);
 /// assert_eq!(made.truth[0].contact.force_n, 0.7);
+/// assert_eq!(scene.options().loads[0].force_n, 0.7);
 /// # Ok::<(), tactile_imaging::simulate::SimulateError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]

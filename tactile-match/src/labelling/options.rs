@@ -26,13 +26,14 @@ use tactile_tps::Scalar;
 ///
 /// ```
 /// use nalgebra::Point2;
-/// use tactile_match::labelling::{LengthMaximum, Neighbourhood};
+/// use tactile_match::labelling::{Compatibility, LengthMaximum, Neighbourhood};
 /// use tactile_match::{MatchError, PointMatcher, RelaxationLabelling};
 /// let model: Vec<_> = (0..12).map(f64::from).map(|k| Point2::new(k % 4.0 + 0.2 * (3.0 * k).sin(), (k / 4.0).floor())).collect();
 /// let target: Vec<_> = model.iter().map(|p| Point2::new(p.x + 0.1 * p.y, p.y)).collect();
 /// let options = RelaxationLabelling::default()
 ///     .with_neighbourhood(Neighbourhood::Nearest(4))?
 ///     .with_length_maximum(LengthMaximum::Global)
+///     .with_compatibility(Compatibility::default())
 ///     .with_temperature(0.2)?
 ///     .with_slack(0.1)?
 ///     .with_smoothing(0.5)?
