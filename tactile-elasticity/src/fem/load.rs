@@ -46,15 +46,15 @@ pub enum Outcome {
 /// What the solver did.
 ///
 /// ```
-/// # use tactile_elasticity::fem::*;
-/// # let mesh = Mesh::rectangle(&[0.0, 1e-3], &[0.0, 1e-3]);
-/// # let mut model = Model::new(Kinematics::Finite);
-/// # let body = model.add(&mesh, &[Material::new(1e5, 0.45).unwrap()]).unwrap();
-/// # model.drive(body, Boundary::Base, Support::Sliding);
-/// # model.hold(body, Boundary::Contact, Support::Sliding);
-/// let report = model.solve(&[Load::Approach(1e-4)]).report;
+/// use tactile_elasticity::fem::{Load, Material, Object, Outcome, Press};
+///
+/// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+/// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
+/// let report = press.scene()?.solve(&[Load::Approach(0.3e-3)]).report;
 /// assert_eq!(report.outcome, Outcome::Solved);
-/// assert!(report.iterations < 10);
+/// assert!(report.iterations > report.steps);
+/// # Ok(())
+/// # }
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -72,12 +72,15 @@ pub struct Report {
 /// States at the loads that were reached, in order, and a report.
 ///
 /// ```
-/// use tactile_elasticity::fem::{Load, Material, Outcome, Scene};
+/// use tactile_elasticity::fem::{Load, Material, Object, Outcome, Press};
 ///
-/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
-/// let solution = scene.solve(&[Load::Approach(0.3e-3), Load::Approach(f64::NAN)]);
+/// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+/// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495)?)?;
+/// let solution = press.scene()?.solve(&[Load::Approach(0.3e-3), Load::Approach(f64::NAN)]);
 /// assert_eq!(solution.states.len(), 1);
 /// assert!(matches!(solution.report.outcome, Outcome::Stopped { load: 1, .. }));
+/// # Ok(())
+/// # }
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
