@@ -157,11 +157,10 @@ fn what_is_no_linear_map_is_refused() {
     let sources = Uniform(6).points::<2>(12);
     let x = Point::from([0.1, 0.2]);
     let chosen = Factorization::<f64, 2>::new(&sources, &options(R2LogR, Smoothing::Gcv, None));
-    let chosen = chosen.expect("a factor").influence_into(
-        &mut Workspace::default(),
-        &[x],
-        &mut [0.0; 12],
-    );
+    let chosen =
+        chosen
+            .expect("a factor")
+            .influence_into(&mut Workspace::default(), &[x], &mut [0.0; 12]);
     assert_eq!(chosen, Err(TpsError::DependsOnTargets));
     let factorization =
         Factorization::<f64, 2>::new(&sources, &FitOptions::default()).expect("a factor");
