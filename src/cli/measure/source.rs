@@ -114,7 +114,7 @@ fn within_frame(trial: &Trial) -> Result<(), Failure> {
     match contacts.max_by(|a, b| a.contact_radius_m.total_cmp(&b.contact_radius_m)) {
         Some(largest) if largest.contact_radius_m > corner_m => Err(Failure::input(format!(
             "at {} N the contact has a radius of {} mm and covers the whole frame: give smaller --forces",
-            largest.force_n,
+            four_digits(largest.force_n),
             four_digits(1e3 * largest.contact_radius_m),
         ))),
         _ => Ok(()),

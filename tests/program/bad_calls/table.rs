@@ -277,7 +277,7 @@ pub(super) const CALLS: &[(&str, &str)] = &[
     ("measure --forces 0", "forces"),
     (
         "measure --forces 0.7,1e300 --physics hertz",
-        "covers the whole frame",
+        "at 1.000e300 N",
     ),
     ("measure --forces 1e-12 --physics hertz", "give larger ones"),
     ("measure --radius-mm nan", "radius-mm"),
