@@ -64,7 +64,7 @@ pub fn run(
         ));
     }
     context.console.line(
-        "above 30 % a parameter cannot be told; a contact that slips or tissue that tears is not in the model".to_owned(),
+        "above 25 % a parameter cannot be told; a contact that slips or tissue that tears is not in the model".to_owned(),
     );
     let rows: Vec<_> = (rows.iter())
         .map(

@@ -5,8 +5,8 @@
 //! with a stiff inclusion. Loads are forces or approaches; what is not reached ends in a report.
 //!
 //! [`Scene`] has the ready models and [writes](Scene::write_vtk) states for ParaView, [`Press`] balls, half balls, cylinders, plates and cones
-//! on a guide or a rigid flat; a rigid indenter is an object of a material a thousand times stiffer than the guide. For three dimensions, or bodies
-//! of another shape, take a general package: CalculiX, FEniCSx or MOOSE.
+//! on a guide or a rigid flat. For three dimensions, bodies of another shape, or a mesh of one's own, take a general package: CalculiX,
+//! FEniCSx or MOOSE.
 //!
 //! # Ready scenes
 //! ```
