@@ -6,6 +6,7 @@ use super::{
     InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen, Told,
 };
 use crate::fem::{Guide, Interface, Kinematics, Layer, Material};
+use core::ops::ControlFlow;
 
 const RINGS: usize = 24;
 const APPROACHES_M: [f64; 2] = [1.5e-3, 3e-3];
@@ -28,10 +29,14 @@ fn lump(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> LumpParameters
 
 /// Pressures of the frames at `radii_m`, one frame after the other, then the forces.
 fn solved(lump: Option<LumpParameters>, radii_m: &[f64]) -> Vec<f64> {
+    solved_with(Interface::Bonded, lump, radii_m)
+}
+
+fn solved_with(interface: Interface, lump: Option<LumpParameters>, radii_m: &[f64]) -> Vec<f64> {
     let forward = Forward {
         guide: guide(),
         block_radius_m: 40e-3,
-        interface: Interface::Bonded,
+        interface,
         approaches_m: APPROACHES_M.to_vec(),
         radii_m: radii_m.to_vec(),
         fineness: 5,
@@ -132,6 +137,55 @@ fn as_assumed_the_told_is_right() {
     let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
     assert!(estimate.found && !is_poor(&estimate));
     assert!(told_is_right(&estimate, truth), "{estimate:?}");
+}
+
+/// A search of a plain block fits no inclusion: the grid's 27 solutions and a plain block's few.
+#[test]
+fn a_plain_block_is_plain_after_a_few_solutions() {
+    let frames = frames(&solved(None, &ring_radii()));
+    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+    let specimen = specimen.with_interface(Interface::Bonded);
+    let search = InclusionSearch::new(specimen, guide()).unwrap();
+    let mut solutions = 0;
+    let estimate = search
+        .search_with_progress(&ring_radii(), &frames, &mut |progress| {
+            solutions = progress.done;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    assert!(!estimate.found && estimate.probability < 0.01);
+    assert!(solutions < 40, "{solutions}");
+}
+
+/// The test that ends a plain block's search lets a small one of twice the tissue's modulus pass.
+#[test]
+fn a_faint_inclusion_is_found() {
+    let truth = lump(7e-3, 5e-3, 10e3);
+    let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
+    assert!(estimate.found, "{estimate:?}");
+    assert!(told_is_right(&estimate, truth), "{estimate:?}");
+}
+
+/// Two frames on soft tissue hardly tell a face that sticks from one that slides, and an inclusion is larger and softer
+/// under the wrong assumption.
+#[test]
+fn where_a_face_may_stick_or_slide_the_intervals_hold_the_truth() {
+    let truth = lump(9e-3, 4.5e-3, 50e3);
+    for interface in [Interface::Bonded, Interface::Frictionless] {
+        let frames = frames(&solved_with(interface, Some(truth), &ring_radii()));
+        let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+        let search = InclusionSearch::new(specimen, guide()).unwrap();
+        let estimate = search.search(&ring_radii(), &frames).unwrap();
+        let found = estimate.inclusion.unwrap();
+        for (told, truth) in [
+            (found.diameter_m, truth.diameter_m),
+            (found.depth_m, truth.depth_m),
+            (found.youngs_modulus_pa, truth.youngs_modulus_pa),
+        ] {
+            let [low, high] = told.estimate().interval;
+            assert!((low..=high).contains(&truth), "{interface:?}: {told:?}");
+        }
+    }
 }
 
 #[test]

@@ -23,19 +23,14 @@ pub struct Estimated {
 }
 
 impl Estimated {
-    /// From a logarithm that is Gaussian.
-    pub(crate) fn from_logarithm(logarithm: f64, error: f64) -> Self {
-        Self::from_interval(logarithm, [TWO_SIDED_95 * error; 2])
-    }
-
-    /// From a logarithm and how far its 95 % interval reaches down and up; the standard error is that of a
-    /// Gaussian with an interval as wide.
-    pub(crate) fn from_interval(logarithm: f64, [down, up]: [f64; 2]) -> Self {
+    /// From a logarithm and the ends of its 95 % interval; the standard error is that of a Gaussian with an interval as
+    /// wide.
+    pub(crate) fn within(logarithm: f64, [low, high]: [f64; 2]) -> Self {
         let value = logarithm.exp();
         Self {
             value,
-            standard_error: value * 0.5 * (down + up) / TWO_SIDED_95,
-            interval: [value * (-down).exp(), value * up.exp()],
+            standard_error: value * 0.5 * (high - low) / TWO_SIDED_95,
+            interval: [low.exp(), high.exp()],
         }
     }
 
@@ -145,8 +140,8 @@ pub enum InclusionWarning {
     OneFrame,
     /// The fit ended before it settled.
     NotConverged,
-    /// Bonded and frictionless faces explain the frames about equally well, or one of them could not be
-    /// solved; the better one is given and no parameter counts as told.
+    /// Bonded and frictionless faces explain the frames about equally well: the better one's values are given, with intervals that
+    /// hold those of both. Or one of them could not be solved, and no parameter counts as told.
     UncertainInterface,
     /// The inclusion lies nearer to the surface or to the stage than half an element: the model does
     /// not reach that far.

@@ -1,6 +1,6 @@
 //! Maximum a posteriori fit of a block's parameters to measured profiles.
 
-use super::forward::{Forward, Linearised, Solved};
+use super::forward::{Forward, Prediction, Solved};
 use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, Parameters};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -42,6 +42,8 @@ pub(crate) struct Fit {
     pub(crate) penalty: f64,
     /// Logarithm of the evidence by Laplace's approximation, up to what all models share.
     pub(crate) evidence: f64,
+    /// Its part that is the posterior's volume over the prior's.
+    pub(crate) volume: f64,
     pub(crate) predicted: Vec<f64>,
     pub(crate) solved: Solved,
     pub(crate) converged: bool,
@@ -63,7 +65,7 @@ impl Ending {
     /// This ending for a fit that is of use below an objective alone.
     pub(crate) fn below(self, objective: f64) -> Self {
         Self {
-            needed: objective,
+            needed: objective.min(self.needed),
             ..self
         }
     }
@@ -112,7 +114,9 @@ pub(super) struct Normal {
     pub(super) gradient: DVector<f64>,
     pub(super) misfit: f64,
     pub(super) penalty: f64,
-    predicted: Vec<f64>,
+    /// Whitened derivatives of the values.
+    pub(super) columns: Vec<DVector<f64>>,
+    pub(super) predicted: Vec<f64>,
     solved: Solved,
 }
 
@@ -128,7 +132,7 @@ impl Problem {
         self.priors.iter().map(|prior| prior.coordinate).collect()
     }
 
-    fn residual(&self, predicted: &[f64]) -> DVector<f64> {
+    pub(super) fn residual(&self, predicted: &[f64]) -> DVector<f64> {
         DVector::from_iterator(
             self.measured.len(),
             self.measured.iter().zip(predicted).map(|(a, b)| a - b),
@@ -143,13 +147,24 @@ impl Problem {
         squares.sum()
     }
 
+    /// −2 ln of the posterior, up to a constant.
+    fn objective(&self, parameters: &Parameters, predicted: &Prediction) -> f64 {
+        let misfit = self
+            .whitened(self.residual(&predicted.values))
+            .norm_squared();
+        misfit + self.penalty(parameters)
+    }
+
     /// A start with the block's modulus scaled so that the pressures agree on the whole, and how far it
-    /// then is from the measured values; `None` where there is no solution.
+    /// then is from the measured values; `predicted` are the start's. `None` where they do not press.
     ///
     /// Pressures are nearly proportional to the moduli of block and inclusion as long as the guide is
     /// stiffer than they are.
-    pub(crate) fn scaled_start(&self, start: &Parameters) -> Option<(f64, Parameters)> {
-        let predicted = self.forward.predict(start)?;
+    pub(crate) fn scaled_start(
+        &self,
+        start: &Parameters,
+        predicted: &Prediction,
+    ) -> Option<(f64, Parameters)> {
         let measured = self.measured.iter().zip(&predicted.values);
         let factor = measured.map(|(y, m)| y * m).sum::<f64>()
             / predicted.values.iter().map(|m| m * m).sum::<f64>();
@@ -166,18 +181,25 @@ impl Problem {
         Some((misfit + self.penalty(&parameters), parameters))
     }
 
-    fn whitened(&self, vector: DVector<f64>) -> DVector<f64> {
+    pub(super) fn whitened(&self, vector: DVector<f64>) -> DVector<f64> {
         let solved = self.factor.l_dirty().solve_lower_triangular(&vector);
         // A Cholesky factor has a positive diagonal.
         solved.unwrap_or(vector)
     }
 
     pub(super) fn normal(&self, parameters: &Parameters, near: Option<&Solved>) -> Option<Normal> {
-        let Linearised {
-            prediction,
-            columns,
-            solved,
-        } = (self.forward).linearise(parameters, &self.coordinates(), near)?;
+        let (prediction, solved) = self.forward.predict_near(parameters, near)?;
+        self.normal_at(parameters, prediction, solved)
+    }
+
+    /// The quadratic model at parameters whose scene is solved.
+    fn normal_at(
+        &self,
+        parameters: &Parameters,
+        prediction: Prediction,
+        solved: Solved,
+    ) -> Option<Normal> {
+        let columns = (self.forward).derivatives(parameters, &self.coordinates(), &solved)?;
         let residual = self.whitened(self.residual(&prediction.values));
         let columns: Vec<DVector<f64>> = columns
             .into_iter()
@@ -196,6 +218,7 @@ impl Problem {
             gradient,
             misfit: residual.norm_squared(),
             penalty: self.penalty(parameters),
+            columns,
             predicted: prediction.values,
             solved,
         })
@@ -236,8 +259,11 @@ impl Problem {
             evaluations += 1;
             let next = self.stepped(&parameters, &self.step(&parameters, &normal, damping)?.by);
             let now = normal.misfit + normal.penalty;
-            match self.normal(&next, Some(&normal.solved)) {
-                Some(found) if found.misfit + found.penalty <= now => {
+            let found = (self.forward).predict_near(&next, Some(&normal.solved));
+            // Derivatives of a step that is not taken would not be used.
+            let found = found.filter(|(there, _)| self.objective(&next, there) <= now);
+            match found.and_then(|(there, solved)| self.normal_at(&next, there, solved)) {
+                Some(found) => {
                     let gain = now - found.misfit - found.penalty;
                     let is_undamped = damping < 1e-2;
                     damping = (0.1 * damping).max(LEAST_DAMPING);
@@ -246,7 +272,7 @@ impl Problem {
                         break true;
                     }
                 }
-                _ => damping = (10.0 * damping).max(1e-2),
+                None => damping = (10.0 * damping).max(1e-2),
             }
         };
         self.finished(parameters, normal, converged)
@@ -298,19 +324,29 @@ impl Problem {
             .iter()
             .map(|prior| prior.standard_error.ln())
             .sum();
-        // Assumptions about the face differ in what the model errs by, and so in the covariance.
-        let noise: f64 = (self.factor.l_dirty().diagonal().iter())
-            .map(|d| d.ln())
-            .sum();
+        let volume = -logarithm - known;
         Some(Fit {
             parameters,
             covariance: cholesky.inverse(),
             misfit: normal.misfit,
             penalty: normal.penalty,
-            evidence: -0.5 * (normal.misfit + normal.penalty) - logarithm - known - noise,
+            evidence: -0.5 * (normal.misfit + normal.penalty) + volume - self.noise(),
+            volume,
             predicted: normal.predicted,
             solved: normal.solved,
             converged,
         })
+    }
+
+    /// Half the logarithm of the errors' covariance's determinant: assumptions about the face differ in what the
+    /// model errs by.
+    fn noise(&self) -> f64 {
+        let diagonal = self.factor.l_dirty().diagonal();
+        diagonal.iter().map(|d| d.ln()).sum()
+    }
+
+    /// Objective that goes with an evidence, for a posterior of this volume.
+    pub(crate) fn objective_at(&self, evidence: f64, volume: f64) -> f64 {
+        2.0 * (volume - self.noise() - evidence)
     }
 }

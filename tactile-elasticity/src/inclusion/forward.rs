@@ -88,15 +88,6 @@ fn is_near(from: f64, to: f64) -> bool {
 /// Largest change of the logarithm of a length by which a mesh is moved.
 const REACH: f64 = 0.3;
 
-/// A prediction and its derivative by each coordinate.
-#[derive(Debug, Clone)]
-pub(crate) struct Linearised {
-    pub(crate) prediction: Prediction,
-    pub(crate) solved: Solved,
-    /// One column a coordinate.
-    pub(crate) columns: Vec<Vec<f64>>,
-}
-
 impl Forward {
     pub(crate) fn observations(&self) -> usize {
         self.approaches_m.len() * (self.radii_m.len() + 1)
@@ -232,18 +223,17 @@ impl Forward {
         Prediction { values }
     }
 
-    /// The prediction and its derivatives by `coordinates`.
+    /// The derivatives of a solved scene's prediction, one column a coordinate.
     ///
     /// A derivative is the difference of one iteration on the slightly changed block and one on the block
     /// itself, both from the solution with its tangent: one factorisation a frame, one residual for each
     /// coordinate and frame. The iteration on the block itself takes out what the solution leaves unbalanced.
-    pub(crate) fn linearise(
+    pub(crate) fn derivatives(
         &self,
         parameters: &Parameters,
         coordinates: &[Coordinate],
-        near: Option<&Solved>,
-    ) -> Option<Linearised> {
-        let (prediction, solved) = self.predict_near(parameters, near)?;
+        solved: &Solved,
+    ) -> Option<Vec<Vec<f64>>> {
         let moved: Vec<Parameters> = (coordinates.iter())
             .map(|&coordinate| parameters.moved(coordinate, parameters.small_step(coordinate)))
             .collect();
@@ -309,10 +299,6 @@ impl Forward {
                 .collect();
             columns.push(column);
         }
-        Some(Linearised {
-            prediction,
-            columns,
-            solved,
-        })
+        Some(columns)
     }
 }

@@ -33,11 +33,14 @@ mod forward;
 mod hypothesis;
 mod motion;
 mod parameters;
+mod plain;
 mod profile;
 mod profiles;
 mod progress;
+mod score;
 mod search;
 mod specimen;
+mod starts;
 #[cfg(test)]
 mod tests;
 

@@ -85,15 +85,15 @@ const COORDINATES: [Coordinate; 7] = [
 
 /// How far derivatives are from difference quotients of solutions on the same mesh, moved.
 fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64)> {
-    let linearised = model.linearise(here, &COORDINATES, None).unwrap();
+    let (_, solved) = model.predict_near(here, None).unwrap();
+    let columns = model.derivatives(here, &COORDINATES, &solved).unwrap();
     let error = |column: &[f64], coordinate| {
         // The truncation error of a central quotient is of the step's square, the solutions' tolerance is
         // a hundred times below the difference.
         let step = 200.0 * here.small_step(coordinate).abs();
         let at = |by| {
             let moved = here.moved(coordinate, by);
-            let near = Some(&linearised.solved);
-            model.predict_near(&moved, near).unwrap().0.values
+            model.predict_near(&moved, Some(&solved)).unwrap().0.values
         };
         let (low, high) = (at(-step), at(step));
         let quotient: Vec<f64> = (low.iter().zip(&high))
@@ -101,8 +101,7 @@ fn derivative_errors(model: &Forward, here: &Parameters) -> Vec<(Coordinate, f64
             .collect();
         distance(column, &quotient)
     };
-    let columns = linearised.columns.iter().zip(COORDINATES);
-    columns
+    (columns.iter().zip(COORDINATES))
         .map(|(column, coordinate)| (coordinate, error(column, coordinate)))
         .collect()
 }
@@ -369,13 +368,13 @@ fn a_covariance_is_one() {
 
 #[test]
 fn what_is_not_known_within_a_quarter_both_ways_is_not_told() {
-    let estimated = |error| super::Estimated::from_logarithm(2f64.ln(), error);
+    let within = |down, up| super::Estimated::within(2f64.ln(), [2f64.ln() - down, 2f64.ln() + up]);
+    let estimated = |error: f64| within(1.96 * error, 1.96 * error);
     assert!(matches!(Told::new(estimated(0.1), true), Told::Yes(_)));
     assert!(matches!(Told::new(estimated(0.1), false), Told::No(_)));
     assert!(matches!(Told::new(estimated(0.26), true), Told::No(_)));
     // As wide, but open upwards.
-    let skewed = super::Estimated::from_interval(2f64.ln(), [0.1, 0.6]);
-    assert!(matches!(Told::new(skewed, true), Told::No(_)));
+    assert!(matches!(Told::new(within(0.1, 0.6), true), Told::No(_)));
     let interval = estimated(0.1).interval;
     assert!(
         (interval[0] * interval[1] - 4.0).abs() < 1e-12,
