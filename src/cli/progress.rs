@@ -15,6 +15,8 @@ pub struct Progress {
     bar: ProgressBar,
     started: Instant,
     shown: bool,
+    /// Dropped at the end, which a clock's thread hears.
+    end: Option<mpsc::Sender<()>>,
 }
 
 impl Progress {
@@ -35,6 +37,22 @@ impl Progress {
         progress
     }
 
+    /// Of a job that does not tell how far it is: after a second on the clock of its own.
+    pub fn with_clock(job: impl Into<String>) -> Self {
+        let mut progress = Self::without_end(job);
+        let bar = progress.bar.clone();
+        let (end, ended) = mpsc::channel::<()>();
+        progress.end = Some(end);
+        std::thread::spawn(move || {
+            let still_runs = Err(mpsc::RecvTimeoutError::Timeout);
+            if ended.recv_timeout(PATIENCE) == still_runs {
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+                bar.enable_steady_tick(2 * GLANCE);
+            }
+        });
+        progress
+    }
+
     fn new(bar: ProgressBar, style: Option<ProgressStyle>, job: impl Into<String>) -> Self {
         if let Some(style) = style {
             bar.set_style(style);
@@ -44,6 +62,7 @@ impl Progress {
             bar,
             started: Instant::now(),
             shown: false,
+            end: None,
         }
     }
 
@@ -69,6 +88,7 @@ impl Progress {
 
 impl Drop for Progress {
     fn drop(&mut self) {
+        self.end = None;
         self.bar.finish_and_clear();
     }
 }
@@ -104,21 +124,6 @@ pub fn waiting_or_interrupted<R: Send + 'static>(
 
 /// Runs a job that cannot tell how far it is, with the time it has taken so far on the terminal.
 pub fn waiting<R>(job: impl Into<String>, work: impl FnOnce() -> R) -> R {
-    let progress = Progress::without_end(job);
-    let bar = progress.bar.clone();
-    let (end, ended) = mpsc::channel::<()>();
-    std::thread::scope(|scope| {
-        scope.spawn(move || {
-            if ended
-                .recv_timeout(PATIENCE)
-                .is_err_and(|e| e == mpsc::RecvTimeoutError::Timeout)
-            {
-                bar.set_draw_target(ProgressDrawTarget::stderr());
-                bar.enable_steady_tick(Duration::from_millis(200));
-            }
-        });
-        let result = work();
-        drop(end);
-        result
-    })
+    let _clock = Progress::with_clock(job);
+    work()
 }

@@ -3,7 +3,7 @@ use crate::cli::context::Context;
 use crate::cli::failure::{Exit, Failure};
 use crate::cli::numbers::{count, four_digits, median_ms};
 use crate::cli::outputs::{Csv, Outputs};
-use crate::cli::progress::Progress as Bar;
+use crate::cli::progress::{Progress as Bar, waiting};
 use clap::{Args, ValueEnum};
 use nalgebra::{Point, SMatrix};
 use serde_json::json;
@@ -69,6 +69,9 @@ fn smoothing(text: &str) -> Result<Smoothing<f64>, String> {
 }
 
 const FILE: &str = "warped.csv";
+
+/// Residual of an iterative fit, relative to the largest target.
+const TOLERANCE: f64 = 1e-10;
 
 pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure> {
     let inputs = [&arguments.sources, &arguments.targets, &arguments.queries];
@@ -139,33 +142,42 @@ fn warp<const D: usize, K: Kernel>(
             .memory
             .allow(24.0 * n * n, &job, "give --lambda a number")?;
     }
-    let options = FitOptions::new(kernel).with_smoothing(arguments.lambda);
-    let options = options.map_err(Failure::input)?;
+    let options = FitOptions::new(kernel)
+        .with_smoothing(arguments.lambda)
+        .and_then(|options| options.with_tolerance(TOLERANCE))
+        .map_err(Failure::input)?;
     let (mut fit_times, mut evaluate_times) = (Vec::new(), Vec::new());
     let mut values = vec![Point::origin(); queries.len()];
     let mut jacobians = vec![SMatrix::zeros(); queries.len()];
-    let mut spline = None;
+    let (mut spline, mut warped) = (None, 0);
     for _ in 0..arguments.repeat {
+        // A direct solution does not tell how far it is.
+        let clock = Bar::with_clock(fitting(sources.len()));
         let start = Instant::now();
-        let fitted = fit(context, sources, targets, &options);
+        let fitted = fit(context, clock, sources, targets, &options);
         let fitted = fitted.map_err(|error| Failure::input(in_files(arguments, error)))?;
         fit_times.push(start.elapsed());
         let start = Instant::now();
-        (fitted.apply_and_jacobian_into(queries, &mut values, &mut jacobians))
-            .map_err(Failure::no_answer)?;
+        warped = evaluate(context, &fitted, queries, &mut values, &mut jacobians)?;
         evaluate_times.push(start.elapsed());
         spline = Some(fitted);
+        if warped < queries.len() {
+            break;
+        }
     }
     let Some(spline) = spline else {
         return Ok(Exit::Complete);
     };
     let (fit_ms, evaluate_ms) = (median_ms(&mut fit_times), median_ms(&mut evaluate_times));
-    outputs.write(FILE, &table(&values, &jacobians))?;
+    outputs.write(FILE, &table(&values[..warped], &jacobians[..warped]))?;
     let report = &spline.report;
+    // As much work as a step of the iteration, which after Ctrl-C nobody waits for.
+    let bending_energy = (!context.interrupt.requested())
+        .then(|| waiting("computing the bending energy", || spline.bending_energy()));
     let console = &mut context.console;
     console.value(&json!({
-        "points": report.points, "queries": queries.len(), "lambda": report.lambda,
-        "bending_energy": spline.bending_energy(), "condition": report.condition, "rank": report.rank,
+        "points": report.points, "queries": warped, "lambda": report.lambda,
+        "bending_energy": bending_energy, "condition": report.condition, "rank": report.rank,
         "merged": report.merged, "extents": report.extents, "residual": report.residual, "digits": report.digits,
         "iterations": report.iterations, "converged": report.converged, "fit_ms": fit_ms,
         "evaluate_ms": evaluate_ms,
@@ -175,10 +187,9 @@ fn warp<const D: usize, K: Kernel>(
         report.points, report.merged
     ));
     console.line(format!("smoothing λ      {}", four_digits(report.lambda)));
-    console.line(format!(
-        "bending energy   {}",
-        four_digits(spline.bending_energy())
-    ));
+    if let Some(energy) = bending_energy {
+        console.line(format!("bending energy   {}", four_digits(energy)));
+    }
     if let Some(residual) = report.residual {
         console.line(format!(
             "residual         {residual:.1e} of the largest target"
@@ -190,7 +201,7 @@ fn warp<const D: usize, K: Kernel>(
     ));
     console.line(format!(
         "time             fit {fit_ms:.2} ms, {} {evaluate_ms:.2} ms",
-        count(queries.len(), "evaluation")
+        count(warped, "evaluation")
     ));
     if report.rank <= D {
         console.note(format!(
@@ -203,6 +214,17 @@ fn warp<const D: usize, K: Kernel>(
     }
     if !report.converged {
         console.note("the iteration was stopped before it reached its tolerance; the residual says how far it came");
+    }
+    if warped < queries.len() {
+        console.note(format!(
+            "stopped after {warped} of {} points to warp",
+            queries.len()
+        ));
+    }
+    if context.interrupt.requested() {
+        return Ok(Exit::Interrupted);
+    }
+    if !report.converged {
         return Ok(Exit::Partial);
     }
     Ok(Exit::Complete)
@@ -211,23 +233,33 @@ fn warp<const D: usize, K: Kernel>(
 /// The spline; thousands of points are solved for by iteration, which Ctrl-C ends with what there is.
 fn fit<const D: usize, K: Kernel>(
     context: &Context,
+    clock: Bar,
     sources: &[Point<f64, D>],
     targets: &[Point<f64, D>],
     options: &FitOptions<f64, K>,
 ) -> Result<ThinPlateSpline<f64, D, K>, TpsError> {
     let interrupt = &context.interrupt;
-    interrupt.hear(true);
-    let n = sources.len();
-    let mut preparing = Bar::of(n, format!("preparing {n} points"));
-    let mut fitting = None;
+    let job = fitting(sources.len());
+    let mut clock = Some(clock);
+    let mut preparing: Option<Bar> = None;
+    let mut iterating: Option<Bar> = None;
+    let mut first = None;
     let spline = ThinPlateSpline::fit_watched(sources, targets, options, |progress| {
-        let bar = match progress.residual {
-            None => &mut preparing,
-            Some(_) => {
-                fitting.get_or_insert_with(|| Bar::without_end(format!("fitting {n} points")))
+        // From here on Ctrl-C is looked at; before, it ends the program.
+        interrupt.hear(true);
+        clock = None;
+        match progress.residual {
+            None => preparing
+                .get_or_insert_with(|| Bar::of(progress.total, format!("{job}: preparing")))
+                .done(progress.done),
+            Some(residual) => {
+                let first = *first.get_or_insert(residual);
+                preparing = None;
+                iterating
+                    .get_or_insert_with(|| Bar::of(DIGITS, format!("{job}: iterating")))
+                    .done(digits(first, residual));
             }
-        };
-        bar.done(progress.done);
+        }
         if interrupt.requested() {
             ControlFlow::Break(())
         } else {
@@ -236,6 +268,50 @@ fn fit<const D: usize, K: Kernel>(
     });
     interrupt.hear(false);
     spline
+}
+
+fn fitting(points: usize) -> String {
+    format!("fitting {}", count(points, "point"))
+}
+
+/// Steps of the bar of an iteration.
+const DIGITS: usize = 1000;
+
+/// How much of the way from the `first` residual to the tolerance is done, in digits: conjugate gradients gain about as many in every step.
+fn digits(first: f64, residual: f64) -> usize {
+    let (first, now, end) = (first.ln(), residual.ln(), TOLERANCE.ln());
+    let part = (first - now) / (first - end);
+    (DIGITS as f64 * part.clamp(0.0, 1.0)) as usize
+}
+
+/// Kernels between two looks at the clock and at Ctrl-C.
+const KERNELS: usize = 1 << 26;
+
+/// Values and Jacobians at the queries; how many there are after Ctrl-C.
+fn evaluate<const D: usize, K: Kernel>(
+    context: &Context,
+    spline: &ThinPlateSpline<f64, D, K>,
+    queries: &[Point<f64, D>],
+    values: &mut [Point<f64, D>],
+    jacobians: &mut [SMatrix<f64, D, D>],
+) -> Result<usize, Failure> {
+    let interrupt = &context.interrupt;
+    interrupt.hear(true);
+    let job = format!("warping {}", count(queries.len(), "point"));
+    let mut bar = Bar::of(queries.len(), job);
+    let run = (KERNELS / spline.report.points.max(1)).max(1);
+    let mut done = 0;
+    let parts = queries.chunks(run).zip(values.chunks_mut(run));
+    for ((queries, values), jacobians) in parts.zip(jacobians.chunks_mut(run)) {
+        (spline.apply_and_jacobian_into(queries, values, jacobians)).map_err(Failure::no_answer)?;
+        done += queries.len();
+        bar.done(done);
+        if interrupt.requested() {
+            break;
+        }
+    }
+    interrupt.hear(false);
+    Ok(done)
 }
 
 /// The error with the file it is about.
@@ -249,6 +325,9 @@ fn in_files(arguments: &Arguments, error: TpsError) -> String {
             "{targets}: expected {}, as many as {sources} has, found {found}",
             count(expected, "row")
         ),
+        TpsError::Stopped => {
+            "stopped before there was a spline: the points were still being prepared".to_owned()
+        }
         TpsError::Conflict { first, second } => format!(
             "{sources}: points {} and {} coincide but their targets in {targets} differ: smooth with --lambda, or drop one",
             first + 1,

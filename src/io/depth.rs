@@ -14,10 +14,10 @@ pub(crate) fn full_scale(
     path: &Path,
     bits: Option<u8>,
 ) -> Result<f64, ReadError> {
-    if !is_wide(image) {
+    let Samples::Sixteen(samples) = Samples::of(image) else {
         return Ok(255.0);
-    }
-    let brightest = brightest(image);
+    };
+    let brightest = brightest(samples, usize::from(image.color().channel_count()));
     let announced = pnm_maxval(bytes);
     match (bits, announced) {
         (Some(bits), _) => {
@@ -34,7 +34,7 @@ pub(crate) fn full_scale(
             Ok(largest)
         }
         (None, Some(_)) => Ok(FULL_RANGE),
-        (None, None) if brightest > TWELVE_BITS || is_stretched(image) => Ok(FULL_RANGE),
+        (None, None) if brightest > TWELVE_BITS || is_stretched(samples) => Ok(FULL_RANGE),
         (None, None) => Err(ReadError::UnclearBits {
             path: path.into(),
             brightest,
@@ -63,34 +63,43 @@ fn pnm_maxval(bytes: &[u8]) -> Option<u16> {
     word?.parse().ok().filter(|&maxval| maxval > 0)
 }
 
-pub(crate) fn is_wide(image: &DynamicImage) -> bool {
-    image.color().bytes_per_pixel() / image.color().channel_count() > 1
+/// The samples of a decoded image, pixel by pixel.
+#[derive(Clone, Copy)]
+pub(crate) enum Samples<'a> {
+    Eight(&'a [u8]),
+    Sixteen(&'a [u16]),
+}
+
+impl<'a> Samples<'a> {
+    pub(crate) fn of(image: &'a DynamicImage) -> Self {
+        match image {
+            DynamicImage::ImageLuma16(i) => Self::Sixteen(i.as_raw()),
+            DynamicImage::ImageLumaA16(i) => Self::Sixteen(i.as_raw()),
+            DynamicImage::ImageRgb16(i) => Self::Sixteen(i.as_raw()),
+            DynamicImage::ImageRgba16(i) => Self::Sixteen(i.as_raw()),
+            // None of the formats that are read has samples of another kind (floats).
+            image => Self::Eight(image.as_bytes()),
+        }
+    }
+
+    /// Bits of a sample.
+    pub(crate) fn bits(self) -> u8 {
+        match self {
+            Self::Eight(_) => 8,
+            Self::Sixteen(_) => 16,
+        }
+    }
 }
 
 /// Whether every sample is a multiple of 257, as where a program stored 8 bits in 16: those of a camera with more bits are not.
-fn is_stretched(image: &DynamicImage) -> bool {
-    let samples = match image {
-        DynamicImage::ImageLuma16(i) => i.as_raw(),
-        DynamicImage::ImageLumaA16(i) => i.as_raw(),
-        DynamicImage::ImageRgb16(i) => i.as_raw(),
-        DynamicImage::ImageRgba16(i) => i.as_raw(),
-        _ => return false,
-    };
+fn is_stretched(samples: &[u16]) -> bool {
     samples.iter().all(|sample| sample.is_multiple_of(257))
 }
 
-/// The largest sample of 16 bits, of any colour.
-fn brightest(image: &DynamicImage) -> u16 {
-    let largest = |samples: &[u16], channels: usize, colours: usize| {
-        let pixels = samples.chunks(channels);
-        pixels.flat_map(|p| p.iter().take(colours)).copied().max()
-    };
-    let found = match image {
-        DynamicImage::ImageLuma16(i) => largest(i.as_raw(), 1, 1),
-        DynamicImage::ImageLumaA16(i) => largest(i.as_raw(), 2, 1),
-        DynamicImage::ImageRgb16(i) => largest(i.as_raw(), 3, 3),
-        DynamicImage::ImageRgba16(i) => largest(i.as_raw(), 4, 3),
-        _ => None,
-    };
+/// The largest sample of a pixel's colours.
+fn brightest(samples: &[u16], channels: usize) -> u16 {
+    let colours = if channels < 3 { 1 } else { 3 };
+    let pixels = samples.chunks_exact(channels);
+    let found = pixels.flat_map(|p| &p[..colours]).copied().max();
     found.unwrap_or(u16::MAX)
 }

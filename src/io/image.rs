@@ -1,5 +1,5 @@
 //! Grey images from PNG, PGM and JPEG files.
-use super::depth::{full_scale, is_wide};
+use super::depth::{Samples, full_scale};
 use super::error::{ReadError, read_bytes, write_bytes};
 use super::grey::Grey;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
@@ -85,7 +85,7 @@ pub fn read_grey_image(
 
 fn parse(bytes: &[u8], path: &Path, grey: Grey, bits: Option<u8>) -> Result<GreyImage, ReadError> {
     let (image, largest) = decode(bytes, path, bits)?;
-    Ok(to_grey(image, largest, grey))
+    Ok(to_grey(&image, largest, grey))
 }
 
 /// The image, and the sample that stands for the level 255.
@@ -128,7 +128,7 @@ pub(crate) fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u
             let levels = Array2::from_shape_vec(shape, image.into_raw());
             Ok(levels.unwrap_or_else(|_| Array2::zeros(shape)))
         }
-        (image, largest) => Ok(to_grey(image, largest, Grey::default()).to_u8()),
+        (image, largest) => Ok(to_grey(&image, largest, Grey::default()).to_u8()),
     }
 }
 
@@ -181,41 +181,32 @@ pub fn write_grey_image(
 }
 
 /// Levels from samples of which `largest` stands for 255.
-fn to_grey(image: DynamicImage, largest: f64, grey: Grey) -> GreyImage {
-    let colour = image.color().has_color();
-    let shape = (image.height() as usize, image.width() as usize);
+fn to_grey(image: &DynamicImage, largest: f64, grey: Grey) -> GreyImage {
+    let channels = usize::from(image.color().channel_count());
     let scale = largest / 255.0;
-    let weights = grey.weights();
-    let level = |rgb: [f64; 3]| (0..3).map(|i| weights[i] * rgb[i]).sum::<f64>();
-    let wide = is_wide(&image);
-    let levels: Vec<f64> = match (wide, colour) {
-        (false, false) => image
-            .into_luma_alpha8()
-            .pixels()
-            .map(|p| f64::from(p.0[0]) / scale)
-            .collect(),
-        (false, true) => image
-            .into_rgb8()
-            .pixels()
-            .map(|p| level(p.0.map(|v| f64::from(v) / scale)))
-            .collect(),
-        (true, false) => image
-            .into_luma_alpha16()
-            .pixels()
-            .map(|p| f64::from(p.0[0]) / scale)
-            .collect(),
-        (true, true) => image
-            .into_rgb16()
-            .pixels()
-            .map(|p| level(p.0.map(|v| f64::from(v) / scale)))
-            .collect(),
+    let samples = Samples::of(image);
+    let levels = match samples {
+        Samples::Eight(samples) => levels(samples, channels, scale, grey),
+        Samples::Sixteen(samples) => levels(samples, channels, scale, grey),
     };
-    let levels = Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape));
+    let shape = (image.height() as usize, image.width() as usize);
     GreyImage {
-        levels,
-        bits: if wide { 16 } else { 8 },
-        colour,
+        levels: Array2::from_shape_vec(shape, levels).unwrap_or_else(|_| Array2::zeros(shape)),
+        bits: samples.bits(),
+        colour: image.color().has_color(),
     }
+}
+
+/// Levels of pixels of one (grey), two (grey, alpha), three (colours) or four channels (colours, alpha).
+fn levels<S: Copy + Into<f64>>(samples: &[S], channels: usize, scale: f64, grey: Grey) -> Vec<f64> {
+    let weights = grey.weights();
+    let pixels = samples.chunks_exact(channels);
+    if channels < 3 {
+        return pixels.map(|pixel| pixel[0].into() / scale).collect();
+    }
+    pixels
+        .map(|pixel| (0..3).map(|i| weights[i] * (pixel[i].into() / scale)).sum())
+        .collect()
 }
 
 #[cfg(test)]

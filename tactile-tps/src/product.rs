@@ -1,5 +1,7 @@
 //! Products with the kernel matrix, whose entries are computed as they are needed.
 
+use core::ops::Range;
+
 use crate::{
     Kernel,
     evaluate::{BLOCK, Lanes, Sum, TAIL},
@@ -22,6 +24,7 @@ pub(crate) fn energy<K: Kernel, const D: usize, const M: usize>(
     dispatch(Subtract {
         sum,
         places: centres,
+        range: 0..centres[0].len(),
         residuals: &mut residuals,
     });
     let products = weights
@@ -33,10 +36,12 @@ pub(crate) fn energy<K: Kernel, const D: usize, const M: usize>(
     f64::max(products.sum(), 0.0)
 }
 
-/// Subtracts the kernel sum at the places.
+/// Subtracts the kernel sum at the places of a range, which begins at a multiple of [`BLOCK`].
 pub(crate) struct Subtract<'a, K, const D: usize, const M: usize> {
     pub(crate) sum: Sum<'a, f64, K, D, M>,
     pub(crate) places: [&'a [f64]; D],
+    pub(crate) range: Range<usize>,
+    /// Of all places, output by output.
     pub(crate) residuals: &'a mut [f64],
 }
 
@@ -45,13 +50,13 @@ impl<K: Kernel, const D: usize, const M: usize> Job<f64> for Subtract<'_, K, D, 
 
     #[inline(always)]
     fn run<L: Lane<f64>>(mut self) {
-        let n = self.places[0].len();
-        let full = n / BLOCK * BLOCK;
-        for start in (0..full).step_by(BLOCK) {
+        let Range { start: first, end } = self.range;
+        let full = first + (end - first) / BLOCK * BLOCK;
+        for start in (first..full).step_by(BLOCK) {
             self.block::<L, BLOCK>(start, BLOCK);
         }
-        for start in (full..n).step_by(TAIL) {
-            self.block::<L, TAIL>(start, TAIL.min(n - start));
+        for start in (full..end).step_by(TAIL) {
+            self.block::<L, TAIL>(start, TAIL.min(end - start));
         }
     }
 }

@@ -2,8 +2,10 @@
 
 /// How far a fit has come, as reported to the caller.
 ///
-/// First the preconditioner is prepared: there is no residual yet, and `done` and `total` count points. Then conjugate gradients
-/// iterate: there is one, and they count steps; usually they stop long before the total.
+/// First the preconditioner is prepared: there is no residual yet, and `done` and `total` count points, each twice (when it is ordered
+/// and when it gets its weights). Then conjugate gradients iterate: there is one, and they count steps; usually they stop long before
+/// the total, when the residual falls below the [tolerance](crate::FitOptions::with_tolerance). Within a step of many points the
+/// callback is called again with the same numbers every few seconds, so that it can stop the fit.
 ///
 /// ```
 /// # use core::ops::ControlFlow;

@@ -27,6 +27,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         let sum = self.sum::<M>(weights);
         dispatch(Subtract {
             places: sum.centres,
+            range: 0..n,
             sum,
             residuals,
         });
@@ -66,6 +67,7 @@ impl<K: Kernel, const D: usize> Equations<'_, K, D> {
         dispatch(Subtract {
             sum,
             places: places.each_ref().map(|axis| &axis[..count]),
+            range: 0..count,
             residuals,
         });
         let mut size = 0.0;

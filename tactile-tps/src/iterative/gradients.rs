@@ -6,7 +6,7 @@ use super::{Iterative, Vectors};
 use crate::{
     Kernel, Progress,
     equations::{Buffers, Solution},
-    evaluate::Sum,
+    evaluate::{BLOCK, Sum},
     layout::HEAD,
     null_space::{MAX, NullSpace, dot, ratio},
     product::Subtract,
@@ -22,6 +22,8 @@ const STEPS: usize = 200;
 const STARTS: usize = 3;
 /// Steps without the residual halving after which rounding is taken to allow no more.
 const PATIENCE: usize = 25;
+/// Kernels, in units of a block of places, between two calls that ask whether to go on: some seconds' worth.
+const PAIRS: usize = (1 << 30) / BLOCK;
 
 /// One run: its system and its stopping rule.
 pub(crate) struct Run<'a, K, const D: usize> {
@@ -104,7 +106,14 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
                 break;
             }
             self.turn::<M>(vectors, &mut size);
-            self.advance::<M>(vectors, &size);
+            let mut still_wanted = || {
+                watch(&Progress {
+                    done,
+                    total: STEPS,
+                    residual: Some(left),
+                })
+            };
+            self.advance::<M>(vectors, &size, &mut still_wanted)?;
             answer.iterations += 1;
         }
         ControlFlow::Continue(())
@@ -137,8 +146,13 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         *size = new;
     }
 
-    /// The step along the direction that makes the energy least.
-    fn advance<const M: usize>(&self, vectors: &mut Vectors, size: &[f64; M]) {
+    /// The step along the direction that makes the energy least; none if `still_wanted` returns `Break` before it is known.
+    fn advance<const M: usize>(
+        &self,
+        vectors: &mut Vectors,
+        size: &[f64; M],
+        still_wanted: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let n = self.system.active.len();
         let Vectors {
             residual,
@@ -150,7 +164,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         } = vectors;
         product.clear();
         product.resize(direction.len(), 0.0);
-        self.subtract::<M>(direction, product);
+        self.subtract::<M>(direction, product, still_wanted)?;
         let curvature = inner::<M>(direction, product);
         for m in 0..M {
             // The product comes with its sign turned.
@@ -161,22 +175,36 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
             }
         }
         self.complement(residual, column);
+        ControlFlow::Continue(())
     }
 
-    /// r ← r − (K + λW⁻¹) w.
-    fn subtract<const M: usize>(&self, w: &[f64], r: &mut [f64]) {
+    /// r ← r − (K + λW⁻¹) w; unfinished if `still_wanted`, asked between runs of [`PAIRS`], returns `Break`.
+    fn subtract<const M: usize>(
+        &self,
+        w: &[f64],
+        r: &mut [f64],
+        still_wanted: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let (n, places) = (self.system.active.len(), self.iterative.axes());
         let weights = core::array::from_fn(|m| &w[m * n..(m + 1) * n]);
-        let sum = Sum::<_, _, D, M> {
-            kernel: self.kernel,
-            centres: places,
-            weights,
-        };
-        dispatch(Subtract {
-            sum,
-            places,
-            residuals: r,
-        });
+        // Whole blocks, so that the sums are the same however often it is asked.
+        let run = (PAIRS / n.max(1)).max(1) * BLOCK;
+        for start in (0..n).step_by(run) {
+            if start > 0 {
+                still_wanted()?;
+            }
+            let sum = Sum::<_, _, D, M> {
+                kernel: self.kernel,
+                centres: places,
+                weights,
+            };
+            dispatch(Subtract {
+                sum,
+                places,
+                range: start..n.min(start + run),
+                residuals: r,
+            });
+        }
         if !self.iterative.diagonal.is_empty() {
             for (r, w) in r.chunks_exact_mut(n).zip(w.chunks_exact(n)) {
                 r.iter_mut()
@@ -185,6 +213,7 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
                     .for_each(|((r, w), d)| *r -= d * w);
             }
         }
+        ControlFlow::Continue(())
     }
 
     /// Forms the residual anew: y − (K + λW⁻¹)w − P a with the a that makes it least, and its largest entry relative to the
@@ -199,7 +228,8 @@ impl<K: Kernel, const D: usize> Run<'_, K, D> {
         } = vectors;
         self.complement(solution, column);
         residual.clone_from(target);
-        self.subtract::<M>(solution, residual);
+        // To the end: the affine part of what is returned comes from it.
+        let _ = self.subtract::<M>(solution, residual, &mut || ControlFlow::Continue(()));
         let null = &self.system.null;
         let mut affine = [[0.0; MAX]; M];
         for (affine, values) in affine.iter_mut().zip(residual.chunks_exact_mut(null.n)) {

@@ -53,7 +53,16 @@ impl<const D: usize> Iterative<D> {
         watch: &mut Watch<'_>,
     ) -> ControlFlow<()> {
         system.choose(setting.centres.len(), weights, false);
-        let spacing = self.arrange(setting.centres, system);
+        // Every point is ordered first, and then given its weights.
+        let n = system.active.len();
+        let mut tell = |done| {
+            watch(&Progress {
+                done,
+                total: 2 * n,
+                residual: None,
+            })
+        };
+        let spacing = self.arrange(setting.centres, system, &mut tell)?;
         system.outline(setting);
         let weights: Vec<f64> = system
             .active
@@ -74,19 +83,16 @@ impl<const D: usize> Iterative<D> {
             weights: if lambda > 0.0 { &weights } else { &[] },
             lambda,
         };
-        let total = system.active.len();
-        let mut tell = |done| {
-            watch(&Progress {
-                done,
-                total,
-                residual: None,
-            })
-        };
-        self.preconditioner.build(&ordered, &mut tell)
+        (self.preconditioner).build(&ordered, &mut |weighted| tell(n + weighted))
     }
 
-    /// Orders the active points from coarse to fine; returns the squared distance of each to the nearest before it.
-    fn arrange(&mut self, centres: &Centres<D>, system: &mut System<D>) -> Vec<f64> {
+    /// Orders the active points from coarse to fine; gives the squared distance of each to the nearest before it.
+    fn arrange(
+        &mut self,
+        centres: &Centres<D>,
+        system: &mut System<D>,
+        watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> ControlFlow<(), Vec<f64>> {
         let gathered = |order: &[usize]| -> Vec<Vec<f64>> {
             centres
                 .axes
@@ -96,11 +102,11 @@ impl<const D: usize> Iterative<D> {
         };
         self.axes = gathered(&system.active);
         let (mut near, mut order, mut spacing) = (Vec::new(), Vec::new(), Vec::new());
-        ordering::coarse_to_fine(self.axes(), &mut near, &mut order, &mut spacing);
+        ordering::coarse_to_fine(self.axes(), &mut near, &mut order, &mut spacing, watch)?;
         order.iter_mut().for_each(|i| *i = system.active[*i]);
         self.axes = gathered(&order);
         system.active = order;
-        spacing
+        ControlFlow::Continue(spacing)
     }
 
     fn axes(&self) -> [&[f64]; D] {

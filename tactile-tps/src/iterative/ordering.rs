@@ -1,5 +1,7 @@
 //! Farthest-point order: from coarse to fine, every point the farthest from those before it.
 
+use core::ops::ControlFlow;
+
 use crate::{
     real::Lane,
     simd::{Job, dispatch},
@@ -7,13 +9,15 @@ use crate::{
 
 /// Orders the points by farthest-point sampling from the one nearest to the origin; O(n²) time.
 ///
-/// `distances` receives the squared distance of each, in the new order, to the nearest before it (infinite for the first).
+/// `distances` receives the squared distance of each, in the new order, to the nearest before it (infinite for the first). Stops if
+/// `watch`, which hears how many points are ordered, returns `Break`.
 pub(crate) fn coarse_to_fine<const D: usize>(
     axes: [&[f64]; D],
     near: &mut Vec<f64>,
     order: &mut Vec<usize>,
     distances: &mut Vec<f64>,
-) {
+    watch: &mut dyn FnMut(usize) -> ControlFlow<()>,
+) -> ControlFlow<()> {
     let n = axes[0].len();
     near.clear();
     near.resize(n, f64::INFINITY);
@@ -22,6 +26,9 @@ pub(crate) fn coarse_to_fine<const D: usize>(
     let norm = |i: usize| axes.iter().map(|axis| axis[i] * axis[i]).sum::<f64>();
     let mut next = (0..n).min_by(|&i, &j| norm(i).total_cmp(&norm(j)));
     while let Some(i) = next.filter(|_| order.len() < n) {
+        if order.len() % 64 == 0 {
+            watch(order.len())?;
+        }
         order.push(i);
         distances.push(near[i]);
         let farthest = dispatch(Approach {
@@ -36,6 +43,7 @@ pub(crate) fn coarse_to_fine<const D: usize>(
             .position(|&d| d == farthest)
             .or_else(|| near.iter().position(|&d| d >= 0.0));
     }
+    ControlFlow::Continue(())
 }
 
 /// Lowers every distance to that from one more point; returns the largest.
