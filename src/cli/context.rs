@@ -1,5 +1,4 @@
 //! What every subcommand has at hand.
-use crate::cli::arguments::Program;
 use crate::cli::console::Console;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::memory::Memory;
@@ -11,11 +10,11 @@ pub struct Context {
 }
 
 impl Context {
-    pub fn new(program: &Program) -> Self {
+    pub fn new(json: bool, memory_gb: f64) -> Self {
         Self {
-            console: Console::new(program.json),
+            console: Console::new(json),
             interrupt: Interrupt::install(),
-            memory: Memory::of_gigabytes(program.memory_gb),
+            memory: Memory::of_gigabytes(memory_gb),
         }
     }
 }

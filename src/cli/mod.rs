@@ -51,7 +51,7 @@ pub fn run() -> ExitCode {
         Ok(program) => program,
         Err(error) => return ExitCode::from(arguments::explain(&error).code()),
     };
-    let mut context = Context::new(&program);
+    let mut context = Context::new(program.json, program.memory_gb);
     let exit = match program.command.run(&mut context) {
         Ok(exit) => exit,
         Err(failure) => {

@@ -3,7 +3,8 @@
 //! A case is a line `case NAME D n_model n_target`, then rows `m` (a model point) and `t` (a target point). Rows `g` and
 //! `p`, which hold the truth for a scorer, are passed over unread. A result is a line `case NAME time_ms`, then for every
 //! model row a line `w` (its warped position) and a line `a` (the target row assigned to it, −1 for none).
-use super::error::{Expected, ReadError, read_bytes, shorten};
+use super::error::{Expected, ReadError, shorten};
+use super::files::read_bytes;
 use nalgebra::{Point, Point2, Point3};
 use std::io::Write;
 use std::path::Path;

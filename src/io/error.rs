@@ -249,8 +249,6 @@ fn list(names: &[String]) -> String {
     }
 }
 
-pub(crate) use super::files::{read_bytes, write_bytes};
-
 /// The field as it can stand in a message: at most 40 characters, no control characters.
 pub(crate) fn shorten(field: &str) -> String {
     let clean: String = field.trim().chars().filter(|c| !c.is_control()).collect();

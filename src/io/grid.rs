@@ -1,5 +1,6 @@
 //! Grids of numbers (heights, depths, pressures) as CSV matrices, one image row a line.
-use super::error::{Expected, ReadError, read_bytes};
+use super::error::{Expected, ReadError};
+use super::files::read_bytes;
 use super::table::parse_table;
 use ndarray::Array2;
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! Grey images from PNG, PGM and JPEG files.
 use super::depth::{Samples, full_scale};
-use super::error::{ReadError, read_bytes, write_bytes};
+use super::error::ReadError;
+use super::files::{read_bytes, write_bytes};
 use super::grey::Grey;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use ndarray::{Array2, ArrayView2};

@@ -2,7 +2,8 @@
 //!
 //! With a header the columns `x`, `y` and, in space, `z` are found by name, other columns (an `id`) are passed over, and
 //! units (`x_um`, `y (mm)`) are converted to metres; pixels (`x_px`) stay pixels. Without one the file has two or three columns in any unit.
-use super::error::{Expected, ReadError, read_bytes};
+use super::error::{Expected, ReadError};
+use super::files::read_bytes;
 use super::table::{Column, Table, parse_table};
 use super::units::{Heading, Quantity};
 use nalgebra::{Point, Point2, Point3};

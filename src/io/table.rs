@@ -3,7 +3,8 @@
 //! Fields are separated by commas, semicolons or tabs (the first of these that the first line has); a field may stand in
 //! double quotes. The first line is a header if none of its fields is a number. Empty lines and lines that start with
 //! `#` are passed over.
-use super::error::{Expected, ReadError, read_bytes, shorten};
+use super::error::{Expected, ReadError, shorten};
+use super::files::read_bytes;
 use super::units::{Heading, Quantity};
 use ndarray::Array2;
 use std::path::Path;

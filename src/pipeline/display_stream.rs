@@ -1,7 +1,7 @@
 //! What a person at a bench wants to read of single frames, streams, and fits.
 use super::ball::BallFit;
 use super::contact::ContactReading;
-use super::display::estimate;
+use super::digits::estimate;
 use super::report::{Skip, Stage, Work};
 use super::session::{DriftWatch, Update};
 use std::fmt::{self, Display, Formatter};

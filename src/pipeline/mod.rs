@@ -31,6 +31,7 @@ mod composition;
 mod config;
 mod contact;
 mod depth;
+mod digits;
 mod display;
 mod display_stream;
 mod error;
@@ -73,7 +74,7 @@ pub use config::StagesConfig;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
 #[cfg(any(feature = "cli", feature = "plot"))]
-pub(crate) use display::with_error;
+pub(crate) use digits::with_error;
 pub use error::PipelineError;
 pub use error_budget::{ErrorShare, ErrorSource};
 pub use face::{FaceReading, ShapeProblem};

@@ -1,5 +1,5 @@
 //! Whether the modulus changes over the time of a press.
-use super::display::with_error;
+use super::digits::with_error;
 use crate::elasticity::modulus::{
     Estimate, Interval, LoadSeries, LoadState, ModulusEstimator, SharedErrors,
 };

@@ -1,5 +1,5 @@
 //! A sensor calibrated from frames of presses.
-use super::sensor_report::page;
+use super::sensor_report::{layer_words, page};
 use crate::cli::console::Console;
 use crate::cli::context::Context;
 use crate::cli::failure::{Exit, Failure};
@@ -7,8 +7,7 @@ use crate::cli::numbers::{digits, four_digits};
 use crate::cli::outputs::Outputs;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use tactile_imaging::force::LocalCalibration;
-use tactile_imaging::force::{Branch, Estimate};
+use tactile_imaging::force::{Branch, Estimate, LocalCalibration};
 use tactile_imaging::pipeline::with_error;
 use tactile_imaging::sensor::{
     CalibratedSensor, Indenter, LayerFinding, PressFinding, SensorCalibration, SensorError,
@@ -121,25 +120,6 @@ fn print(found: &CalibratedSensor, console: &mut Console) {
         let [name, says] = layer_words(finding);
         console.line(format!("  {name:<24} {says}"));
     }
-}
-
-/// A layer's parameter, and what was learned of it.
-pub fn layer_words(finding: &LayerFinding) -> [String; 2] {
-    let (name, scale, unit) = match finding.parameter {
-        "youngs_modulus_pa" => ("Young's modulus", 1e-3, " kPa"),
-        "thickness_m" => ("thickness", 1e3, " mm"),
-        _ => ("Poisson's ratio", 1.0, ""),
-    };
-    let text = |e: Estimate<f64>| with_error(e.value, e.standard_error, scale);
-    let (stated, fitted) = (text(finding.stated), text(finding.fitted));
-    let says = if finding.identified {
-        format!("{fitted}{unit} (stated {stated})")
-    } else if finding.stated.standard_error > 0.0 {
-        format!("not identified, stays as stated: {fitted}{unit}")
-    } else {
-        format!("stated as exact: {stated}{unit}")
-    };
-    [format!("layer {} {name}", finding.layer + 1), says]
 }
 
 fn value(found: &CalibratedSensor) -> Result<Value, Failure> {

@@ -1,9 +1,8 @@
 //! The report of a calibrated sensor: curve, residuals, contact radii, and what was identified.
-use super::sensor::layer_words;
-use tactile_imaging::force::Branch;
-use tactile_imaging::force::LocalCalibration;
+use tactile_imaging::force::{Branch, Estimate, LocalCalibration};
+use tactile_imaging::pipeline::with_error;
 use tactile_imaging::plot::{Colour, Legend, Page, Panel};
-use tactile_imaging::sensor::{CalibratedSensor, PressFinding};
+use tactile_imaging::sensor::{CalibratedSensor, LayerFinding, PressFinding};
 
 pub fn page(found: &CalibratedSensor) -> Page {
     let page = Page::new(format!("Sensor calibration of {}", found.sensor.date))
@@ -102,4 +101,23 @@ fn radii(found: &CalibratedSensor) -> Panel {
 fn layers(found: &CalibratedSensor) -> Panel {
     let line = |finding| layer_words(finding).join("\t");
     Panel::new("Layers").text(found.layers.iter().map(line))
+}
+
+/// A layer's parameter, and what was learned of it.
+pub fn layer_words(finding: &LayerFinding) -> [String; 2] {
+    let (name, scale, unit) = match finding.parameter {
+        "youngs_modulus_pa" => ("Young's modulus", 1e-3, " kPa"),
+        "thickness_m" => ("thickness", 1e3, " mm"),
+        _ => ("Poisson's ratio", 1.0, ""),
+    };
+    let text = |e: Estimate<f64>| with_error(e.value, e.standard_error, scale);
+    let (stated, fitted) = (text(finding.stated), text(finding.fitted));
+    let says = if finding.identified {
+        format!("{fitted}{unit} (stated {stated})")
+    } else if finding.stated.standard_error > 0.0 {
+        format!("not identified, stays as stated: {fitted}{unit}")
+    } else {
+        format!("stated as exact: {stated}{unit}")
+    };
+    [format!("layer {} {name}", finding.layer + 1), says]
 }

@@ -1,12 +1,12 @@
 //! Contact nodes that touch, or may do so within a load step.
 
+use super::anchor::Slip;
 use super::contact::{ContactPoint, Opposite};
 use super::fields::Fields;
 use super::gap::{Gap, averaged};
 use super::material::Kinematics;
 use super::model::Model;
 use super::placement::Placement;
-use super::stick::Slip;
 
 /// Part of a node's area that has something opposite to it, below which the node is open.
 const LEAST_SHARE: f64 = 0.25;
@@ -61,8 +61,11 @@ impl Model {
                     index,
                     gap: averaged(around, total),
                     pressure: fields.multipliers[index] - node.penalty * value,
-                    slip: (fields.anchors.get(index))
-                        .and_then(|anchor| anchor.as_ref().map(|anchor| anchor.slip(fields))),
+                    slip: (fields.anchors.get(index)).and_then(|anchor| {
+                        anchor
+                            .as_ref()
+                            .map(|anchor| anchor.slip(&fields.displacement, fields.approach))
+                    }),
                 });
             }
         }

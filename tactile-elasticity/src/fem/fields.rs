@@ -1,8 +1,8 @@
 //! The unknowns of a model.
 
+use super::anchor::Anchor;
 use super::element::ALL;
 use super::model::Model;
-use super::stick::Anchor;
 
 /// The unknowns: displacements, element pressures and the approach.
 #[derive(Debug, Clone, PartialEq)]

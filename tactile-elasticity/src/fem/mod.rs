@@ -64,6 +64,7 @@
 //! T. J. R. Hughes, *The Finite Element Method* (1987). P. Wriggers, *Computational Contact Mechanics*
 //! (2006). M. Hintermüller, K. Ito & K. Kunisch, SIAM J. Optim. 13 (2003) 865. B. Yang, T. A. Laursen &
 //! X. Meng, Int. J. Numer. Meth. Eng. 62 (2005) 1183.
+mod anchor;
 mod block;
 mod bodies;
 mod candidates;

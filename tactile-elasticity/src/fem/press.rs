@@ -342,3 +342,29 @@ impl Object {
         }
     }
 }
+
+impl Scene {
+    /// The half of a ball next to its contact with a rigid flat; its equator slides freely, as it
+    /// does where the ball is pressed the same way from both sides. [`Press`] has other objects.
+    ///
+    /// # Errors
+    /// A radius that is not positive.
+    pub(crate) fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
+        Press::new(Object::Ball { radius_m }, material)?.scene()
+    }
+
+    /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
+    /// height, the glass moves by the approach. [`Press`] has other objects.
+    ///
+    /// # Errors
+    /// A radius that is not positive; a guide that is not wider than the ball.
+    pub(crate) fn ball_on_guide(
+        radius_m: f64,
+        material: Material,
+        guide: &Guide,
+    ) -> Result<Self, ElasticityError> {
+        Press::new(Object::Ball { radius_m }, material)?
+            .on_guide(guide.clone())?
+            .scene()
+    }
+}

@@ -8,7 +8,6 @@ use super::load::{Load, Solution};
 use super::material::{Kinematics, Material};
 use super::mesh::Boundary;
 use super::model::{Model, Support};
-use super::press::{Object, Press};
 use super::state::State;
 use super::stress::Stress;
 use crate::ElasticityError;
@@ -106,30 +105,6 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The half of a ball next to its contact with a rigid flat; its equator slides freely, as it
-    /// does where the ball is pressed the same way from both sides. [`Press`] has other objects.
-    ///
-    /// # Errors
-    /// A radius that is not positive.
-    pub(crate) fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
-        Press::new(Object::Ball { radius_m }, material)?.scene()
-    }
-
-    /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
-    /// height, the glass moves by the approach. [`Press`] has other objects.
-    ///
-    /// # Errors
-    /// A radius that is not positive; a guide that is not wider than the ball.
-    pub(crate) fn ball_on_guide(
-        radius_m: f64,
-        material: Material,
-        guide: &Guide,
-    ) -> Result<Self, ElasticityError> {
-        Press::new(Object::Ball { radius_m }, material)?
-            .on_guide(guide.clone())?
-            .scene()
-    }
-
     /// A block with or without an inclusion under a guide's face; the block's far side is held, the
     /// guide's glass moves by the approach. [`Block`] and [`Interface`] have examples.
     ///

@@ -9,75 +9,15 @@
 //! A node that comes into contact within a load step has done so, on the average, in its middle: it is anchored to the mean of its
 //! relative displacements before and after. Nodes that touch unloaded are anchored there.
 
+use super::anchor::Anchor;
 use super::contact::{ContactNode, Opposite};
 use super::fields::Fields;
-use super::gap::DRIVER;
 use super::material::Kinematics;
 use super::model::Model;
 use super::placement::Placement;
 
 /// Part of the nodes' spacing within which two unloaded surfaces count as touching: rounding of coordinates leaves 1e-16 of it.
 const TOUCHING: f64 = 1e-9;
-
-/// Where a contact node is held.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Anchor {
-    /// The node and those of the opposite edge, with their weights in the relative displacement.
-    weights: Vec<(usize, f64)>,
-    /// Whether what is opposite moves by the approach.
-    driven: bool,
-    /// Relative displacement at which it was anchored.
-    start: [f64; 2],
-    /// Along the surface, a unit vector.
-    direction: [f64; 2],
-}
-
-/// A distance along the surface and its derivatives by the displacement components `dofs`.
-#[derive(Debug, Clone)]
-pub(crate) struct Slip {
-    pub(crate) value: f64,
-    pub(crate) dofs: Vec<usize>,
-    pub(crate) first: Vec<f64>,
-}
-
-impl Anchor {
-    fn displacement(&self, fields: &Fields) -> [f64; 2] {
-        let mut sum = [0.0, if self.driven { -fields.approach } else { 0.0 }];
-        for &(node, weight) in &self.weights {
-            sum[0] += weight * fields.displacement[2 * node];
-            sum[1] += weight * fields.displacement[2 * node + 1];
-        }
-        sum
-    }
-
-    /// The same place on a surface that has turned.
-    fn turned(&self, direction: [f64; 2]) -> Self {
-        Self {
-            direction,
-            ..self.clone()
-        }
-    }
-
-    /// How far the node has slipped from its anchor.
-    pub(crate) fn slip(&self, fields: &Fields) -> Slip {
-        let [r, z] = self.displacement(fields);
-        let [along_r, along_z] = self.direction;
-        let mut slip = Slip {
-            value: (r - self.start[0]) * along_r + (z - self.start[1]) * along_z,
-            dofs: Vec::with_capacity(2 * self.weights.len() + 1),
-            first: Vec::with_capacity(2 * self.weights.len() + 1),
-        };
-        for &(node, weight) in &self.weights {
-            slip.dofs.extend([2 * node, 2 * node + 1]);
-            slip.first.extend([weight * along_r, weight * along_z]);
-        }
-        if self.driven {
-            slip.dofs.push(DRIVER);
-            slip.first.push(-along_z);
-        }
-        slip
-    }
-}
 
 impl Model {
     /// Anchors of the nodes that touch without load.
@@ -102,7 +42,8 @@ impl Model {
                 let found = (pressure > 0.0).then(|| self.anchor(contact, after))??;
                 let start = match known {
                     Some(known) => return Some(known.turned(found.direction)),
-                    None => [before, after].map(|fields| found.displacement(fields)),
+                    None => [before, after]
+                        .map(|fields| found.displacement(&fields.displacement, fields.approach)),
                 };
                 let start = [0, 1].map(|k| 0.5 * (start[0][k] + start[1][k]));
                 Some(Anchor { start, ..found })

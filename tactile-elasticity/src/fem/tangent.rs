@@ -1,9 +1,9 @@
 //! The symmetric linear system of a Newton step.
 
+use super::anchor::Slip;
 use super::element::OUTER;
 use super::layout::{NO_PLACE, Places, Slot, slot};
 use super::sparse::{Factors, Singular, Symmetric};
-use super::stick::Slip;
 
 /// What a step is to reach.
 #[derive(Debug, Clone, Copy, PartialEq)]

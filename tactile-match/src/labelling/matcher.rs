@@ -1,8 +1,8 @@
 //! The whole method: first probabilities, relaxation, spline, and again.
 
 use super::{
-    CompatibilityRule, MatchMatrix, NeighbourGraph, RelaxationLabelling, first_matches, sinkhorn,
-    support_by, update,
+    CompatibilityRule, MatchMatrix, NeighbourGraph, RelaxationLabelling, first_matches, relax_with,
+    support_by,
 };
 use crate::frame::Frame;
 use crate::validate::point_sets;
@@ -38,25 +38,6 @@ impl RelaxationLabelling {
     }
 }
 
-/// (19), (20) and normalisation in turn until M no longer changes.
-pub(super) fn relax_with<T: Scalar>(
-    options: &RelaxationLabelling,
-    mut m: MatchMatrix<T>,
-    support: impl Fn(&MatchMatrix<T>) -> Vec<T>,
-) -> MatchMatrix<T> {
-    for _ in 0..options.sweeps {
-        let before = m.clone();
-        let support = support(&m);
-        let gain = slack_gain(&support, m.columns(), options.slack);
-        update(&mut m, &support, gain);
-        sinkhorn(&mut m, options.sinkhorn_sweeps, T::zero());
-        if m.largest_change(&before) <= nalgebra::convert(options.tolerance) {
-            break;
-        }
-    }
-    m
-}
-
 /// The outer iterations: `relax` gives the match matrix of the warped model and the target, the spline warps the model, and again.
 fn match_with<T: Scalar, const D: usize>(
     options: &RelaxationLabelling,
@@ -85,15 +66,6 @@ fn match_with<T: Scalar, const D: usize>(
         }
     }
     Ok(run.finish(model, target))
-}
-
-/// Gain of the slack: a share of what the best partners get, so that it means the same for every neighbourhood.
-fn slack_gain<T: Scalar>(support: &[T], columns: usize, share: f64) -> T {
-    let rows = support.len() / columns;
-    let best = support
-        .chunks_exact(columns)
-        .map(|row| row.iter().fold(T::zero(), |m, &s| m.max(s)));
-    best.fold(T::zero(), |sum, s| sum + s) * nalgebra::convert(share / rows as f64)
 }
 
 /// `r` of all edge pairs: tabulated while that is possible, computed otherwise.

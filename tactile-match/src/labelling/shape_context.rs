@@ -44,6 +44,6 @@ pub(crate) fn first_matches<T: Scalar, const D: usize>(
         };
         nalgebra::convert(weight)
     });
-    super::sinkhorn(&mut m, 1, T::zero());
+    super::update::sinkhorn(&mut m, 1, T::zero());
     m
 }

@@ -1,7 +1,8 @@
 //! The same method over few candidates a point, with the links between them computed once.
 
-use super::matcher::relax_with;
-use super::{CompatibilityRule, MatchMatrix, NeighbourGraph, RelaxationLabelling, first_matches};
+use super::{
+    CompatibilityRule, MatchMatrix, NeighbourGraph, RelaxationLabelling, first_matches, relax_with,
+};
 use nalgebra::Point;
 use tactile_tps::Scalar;
 

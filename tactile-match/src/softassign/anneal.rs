@@ -2,7 +2,7 @@
 
 use super::axes::Axes;
 use super::extrapolate::Extrapolation;
-use super::landmarks::Known;
+use super::known::Known;
 use super::prior::Prior;
 use super::regression::Regression;
 use super::rigid::RigidFit;

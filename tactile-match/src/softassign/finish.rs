@@ -4,7 +4,6 @@ use super::anneal::Annealer;
 use super::confidence::{Fitted, PairOdds};
 use super::locality::Locality;
 use super::schedule::{Slack, State};
-use super::search::are_unequal;
 use super::soft_assign::SoftAssignment;
 use crate::Doubt;
 
@@ -44,6 +43,16 @@ pub(crate) struct Answer<const D: usize> {
     locality: Locality<D>,
     /// See [`Locality::contrast`]; 1 where it was not needed.
     contrast: f64,
+}
+
+/// Where the smaller set has less than this share of the larger one's points, parts are out of sight or strewn about: its edges draw what lies
+/// behind them a point aside, and an answer leaves no doubt only where it makes the targets so much likelier than chance. Less misses more of
+/// such shifts, more costs noisy scenes further starts (`--example confidence`).
+const UNEQUAL: f64 = 0.95;
+
+/// Whether parts of one set are out of sight or strewn about.
+pub(super) fn are_unequal(model: usize, target: usize) -> bool {
+    (model.min(target) as f64) < UNEQUAL * model.max(target) as f64
 }
 
 impl<const D: usize> Answer<D> {

@@ -35,6 +35,7 @@ mod finish;
 mod found;
 mod frame;
 mod gated;
+mod known;
 mod landmarks;
 mod lanes;
 mod large;
@@ -47,6 +48,7 @@ mod patterns;
 mod prior;
 mod regression;
 mod rigid;
+mod row_sums;
 mod scales;
 mod schedule;
 mod search;
@@ -68,7 +70,7 @@ use consensus::Consensus;
 use correspond::Correspondence;
 use finish::Answer;
 use frame::Frame;
-use landmarks::Known;
+use known::Known;
 use levels::Levels;
 use nalgebra::Point;
 use patterns::LocalPatterns;
@@ -146,7 +148,7 @@ impl<const D: usize> SoftassignWorkspace<D> {
     /// Whether a part of one set that is partly out of sight may lie a point aside: the answer is not much likelier than chance, and its
     /// pairs are not all sure, or a surrounding fits far worse than the others.
     fn may_lie_aside(&self) -> bool {
-        let unequal = search::are_unequal(self.model.len(), self.target.len());
+        let unequal = finish::are_unequal(self.model.len(), self.target.len());
         let plain = self.gain().is_none_or(|gain| gain >= PLAIN);
         unequal && !plain && (self.answer.sureness() < SURE || self.answer.contrast() > UNEVEN)
     }

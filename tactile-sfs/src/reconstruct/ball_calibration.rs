@@ -5,14 +5,11 @@
 
 use ndarray::Array2;
 
-use super::contact_circle::contact_circle;
+use super::contact_circle::{FEWEST, contact_circle};
 use super::depth_table::DepthTable;
 use super::signal::Signal;
 use crate::error::positive;
 use crate::{Domain, Frame, Scalar, SfsError};
-
-/// Fewest pixels of contact a calibration makes sense for.
-pub(super) const FEWEST: usize = 100;
 
 /// A depth table and how well the ball fits it; what [`DepthTable::from_ball`] returns.
 ///

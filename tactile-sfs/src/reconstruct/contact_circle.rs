@@ -2,8 +2,10 @@
 
 use ndarray::Array2;
 
-use super::ball_calibration::FEWEST;
 use crate::SfsError;
+
+/// Fewest pixels of contact a calibration makes sense for.
+pub(super) const FEWEST: usize = 100;
 
 /// Centroid (px) and radius of equal area (m) of the largest connected patch above the threshold: whatever else exceeds
 /// it, uneven light at the frame's edge say, is no contact. O(pixels).

@@ -26,7 +26,7 @@ pub(crate) fn coarse_to_fine<const D: usize>(
     let norm = |i: usize| axes.iter().map(|axis| axis[i] * axis[i]).sum::<f64>();
     let mut next = (0..n).min_by(|&i, &j| norm(i).total_cmp(&norm(j)));
     while let Some(i) = next.filter(|_| order.len() < n) {
-        if order.len() % 64 == 0 {
+        if order.len().is_multiple_of(64) {
             watch(order.len())?;
         }
         order.push(i);

@@ -17,7 +17,6 @@ use cooling::{COOLEST, LABELLED, NEAR, REHEAT, SLOW, TURNED};
 pub(super) use cooling::{Cooling, FAST};
 use nalgebra::SMatrix;
 use place::Start;
-pub(super) use progress::are_unequal;
 use progress::{COMPLETE, MANY};
 use std::ops::ControlFlow;
 

@@ -11,10 +11,6 @@ pub(super) const COMPLETE: f64 = 0.98;
 /// Share of the smaller set that a noisy answer should match.
 const EXPLAINED: f64 = 0.9;
 
-/// Where the smaller set has less than this share of the larger one's points, parts are out of sight or strewn about: its edges draw what lies
-/// behind them a point aside, and an answer leaves no doubt only where it makes the targets so much likelier than chance. Less misses more of
-/// such shifts, more costs noisy scenes further starts (`--example confidence`).
-const UNEQUAL: f64 = 0.95;
 const PLAIN_GAIN: f64 = 1.2;
 
 /// Soft partners that spread no more than this, relative to the temperature, are decided. About points well apart they spread by 0.05, where a part lies
@@ -34,11 +30,6 @@ const CLEAN_STRAGGLERS: f64 = 0.01;
 
 /// Soft partners spread so far, relative to the temperature, leave no point its own.
 const NO_PARTNERS: f64 = 0.8;
-
-/// Whether parts of one set are out of sight or strewn about.
-pub(in super::super) fn are_unequal(model: usize, target: usize) -> bool {
-    (model.min(target) as f64) < UNEQUAL * model.max(target) as f64
-}
 
 impl AnnealedSoftassign {
     /// Whether no further start can do better.
@@ -64,7 +55,7 @@ impl AnnealedSoftassign {
     /// the soft partners.
     fn is_explained<const D: usize>(&self, ws: &SoftassignWorkspace<D>) -> bool {
         let points = ws.model.len().min(ws.target.len());
-        let wanted = if are_unequal(ws.model.len(), ws.target.len()) {
+        let wanted = if finish::are_unequal(ws.model.len(), ws.target.len()) {
             PLAIN_GAIN
         } else {
             finish::TELLING

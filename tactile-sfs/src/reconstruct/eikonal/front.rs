@@ -4,10 +4,6 @@
 //! 1995; Sethian 1996). A profile fitted to a contact tells nearly that order before anything is solved. It is only a start: sweeps follow
 //! until nothing changes, so that no answer depends on it.
 
-use super::grid::{EikonalBuffers, Node};
-use super::profile::Profile;
-use crate::{BoundingBox, Scalar};
-
 /// Levels that keys are told apart by.
 const LEVELS: usize = 4096;
 
@@ -21,8 +17,10 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    /// Sorts the nodes by the level of their key, by counting; nodes of one level keep their order.
-    fn sort(&mut self) {
+    /// Takes nodes with their keys and sorts them by the level of the key, by counting; nodes of one level keep their order.
+    pub(super) fn sort(&mut self, nodes_and_keys: impl Iterator<Item = ([u32; 2], f64)>) {
+        self.keys.clear();
+        self.keys.extend(nodes_and_keys);
         let Self {
             nodes,
             keys,
@@ -52,25 +50,6 @@ impl Front {
     }
 }
 
-impl<T: Scalar> EikonalBuffers<T> {
-    /// Takes the order of the unknown nodes from a profile fitted to the mask's pixels, from its rim to its top.
-    pub(super) fn follow(&mut self, profile: &Profile, area: BoundingBox) {
-        let mut front = core::mem::take(&mut self.front);
-        front.keys.clear();
-        for (row, line) in self.node.chunks_exact(self.width).enumerate() {
-            let unknown = line.iter().enumerate();
-            let unknown = unknown.filter(|(_, node)| **node == Node::Unknown);
-            // The grid has a border of one node around the box.
-            front.keys.extend(unknown.map(|(column, _)| {
-                let pixel = [area.top + row - 1, area.left + column - 1];
-                ([row as u32, column as u32], -profile.quadratic(pixel))
-            }));
-        }
-        front.sort();
-        self.front = front;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,11 +62,8 @@ mod tests {
     #[test]
     fn nodes_are_sorted_by_their_level_and_keep_their_order_within_it() {
         let keys = [0.7, 0.0, 1.0, 0.7, 0.0];
-        let mut front = Front {
-            keys: (10..).map(|row| [row, 3]).zip(keys).collect(),
-            ..Front::default()
-        };
-        front.sort();
+        let mut front = Front::default();
+        front.sort((10..).map(|row| [row, 3]).zip(keys));
         let rows: Vec<_> = front.nodes.iter().map(|node| node[0]).collect();
         assert_eq!(rows, [11, 14, 10, 13, 12]);
     }

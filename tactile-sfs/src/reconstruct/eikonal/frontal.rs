@@ -6,7 +6,8 @@
 
 use super::boundary;
 use super::grid::{EikonalBuffers, Node};
-use crate::Scalar;
+use super::profile::Profile;
+use crate::{BoundingBox, Scalar};
 
 /// Sweeps in one of four orders; returns the largest change.
 pub(super) fn sweep<T: Scalar>(grid: &mut EikonalBuffers<T>, order: usize, tolerance: T) -> T {
@@ -29,6 +30,25 @@ pub(super) fn sweep<T: Scalar>(grid: &mut EikonalBuffers<T>, order: usize, toler
         }
     }
     change
+}
+
+impl<T: Scalar> EikonalBuffers<T> {
+    /// Takes the order of the unknown nodes from a profile fitted to the mask's pixels, from its rim to its top.
+    pub(super) fn follow(&mut self, profile: &Profile, area: BoundingBox) {
+        let rows = self.node.chunks_exact(self.width).enumerate();
+        let nodes = rows.flat_map(|(row, line)| {
+            (0..)
+                .zip(line)
+                .map(move |(column, node)| (row, column, node))
+        });
+        let unknown = nodes.filter(|(_, _, node)| **node == Node::Unknown);
+        // The grid has a border of one node around the box.
+        let keys = unknown.map(|(row, column, _): (usize, usize, _)| {
+            let pixel = [area.top + row - 1, area.left + column - 1];
+            ([row as u32, column as u32], -profile.quadratic(pixel))
+        });
+        self.front.sort(keys);
+    }
 }
 
 /// Visits the nodes in the order of the front; returns whether any may still improve.
