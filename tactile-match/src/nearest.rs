@@ -1,7 +1,7 @@
 //! Nearest neighbours: the baseline for small displacements.
 
 use crate::hard::{self, Distances};
-use crate::validate::{option_within, point_sets};
+use crate::validate::{point_sets, valid_distance};
 use crate::{MatchError, Matching, PointMatcher};
 use nalgebra::Point;
 use tactile_tps::Scalar;
@@ -30,16 +30,8 @@ impl NearestNeighbour {
     /// # Errors
     /// [`MatchError::InvalidOption`] unless the distance is positive and finite.
     pub fn within(max_distance: f64) -> Result<Self, MatchError> {
-        option_within(
-            "max_distance",
-            max_distance,
-            f64::MIN_POSITIVE,
-            f64::MAX,
-            "(0, ∞)",
-        )?;
-        Ok(Self {
-            max_distance: Some(max_distance),
-        })
+        let max_distance = Some(valid_distance(max_distance)?);
+        Ok(Self { max_distance })
     }
 }
 

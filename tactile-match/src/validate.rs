@@ -32,6 +32,18 @@ pub(crate) fn point_set<T: RealField + Copy, const D: usize>(
     }
 }
 
+/// The largest distance of a pair, which must be positive and finite.
+pub(crate) fn valid_distance(max_distance: f64) -> Result<f64, MatchError> {
+    option_within(
+        "max_distance",
+        max_distance,
+        f64::MIN_POSITIVE,
+        f64::MAX,
+        "(0, ∞)",
+    )?;
+    Ok(max_distance)
+}
+
 /// Rejects an option outside `[low, high]`, NaN included.
 pub(crate) fn option_within(
     option: &'static str,

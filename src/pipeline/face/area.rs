@@ -1,6 +1,7 @@
 //! The area within a contact's outline, from the light of the pixels that the outline cuts.
 use super::distance::{FARTHEST, to_outline};
 use super::histogram::Histogram;
+use super::moments::Moments;
 use super::{BAND, FaceReading, RING};
 use crate::force::{BoundingBox, Estimate};
 use crate::pipeline::contact::{FrameContact, resize};
@@ -38,33 +39,6 @@ struct Tile {
     pixels: f64,
     /// Σ s/P of the outline's pixels here: how much the mean's error counts.
     covered: f64,
-}
-
-/// Sums for moments: of one, x, y and x² + y².
-#[derive(Clone, Copy, Debug, Default)]
-struct Moments([f64; 4]);
-
-impl Moments {
-    fn add(&mut self, weight: f64, x: f64, y: f64) {
-        self.0[0] += weight;
-        self.0[1] += weight * x;
-        self.0[2] += weight * y;
-        self.0[3] += weight * (x * x + y * y);
-    }
-
-    /// A row's sums of the weights, and of them with the column and its square.
-    fn add_row(&mut self, [one, column, square]: [f64; 3], hx: f64, y: f64) {
-        self.0[0] += one;
-        self.0[1] += column * hx;
-        self.0[2] += one * y;
-        self.0[3] += square * hx * hx + one * y * y;
-    }
-
-    /// Σ w r² about (x, y), over Σ w.
-    fn about(&self, x: f64, y: f64) -> f64 {
-        let [w, wx, wy, wrr] = self.0;
-        (wrr - 2.0 * (x * wx + y * wy)) / w + x * x + y * y
-    }
 }
 
 /// What is kept from frame to frame to save allocations.

@@ -28,6 +28,7 @@ mod area;
 mod distance;
 mod histogram;
 mod material_law;
+mod moments;
 mod shape;
 mod texture;
 

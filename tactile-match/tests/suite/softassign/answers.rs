@@ -4,6 +4,15 @@ use crate::common;
 use nalgebra::{Point2, Point3, Rotation2};
 use tactile_match::{AnnealedSoftassign, Outliers, PointMatcher, Rotation, StopReason};
 
+/// Every model point of `partner` has its own; targets beyond them may have none.
+fn assert_pairs(assignment: &[Option<usize>], partner: &[usize], scene: &str) {
+    let mut pairs = assignment.iter().zip(partner);
+    assert!(
+        pairs.all(|(a, &j)| *a == Some(j)),
+        "{scene}: {assignment:?}"
+    );
+}
+
 fn all_right<const D: usize>(n: usize) {
     let model = cloud::<D>(n);
     let (target, partner) = shuffled(&model);
@@ -97,13 +106,7 @@ fn a_dense_nearly_regular_set_does_not_slip() {
     let found = AnnealedSoftassign::default()
         .match_points(&model, &target)
         .unwrap();
-    assert!(
-        found
-            .assignment
-            .iter()
-            .zip(&partner)
-            .all(|(a, &j)| *a == Some(j))
-    );
+    assert_pairs(&found.assignment, &partner, "");
 }
 
 #[test]
@@ -120,14 +123,7 @@ fn units_and_origin_do_not_matter() {
         let found = AnnealedSoftassign::default()
             .match_points(&change(&model), &change(&target))
             .unwrap();
-        assert!(
-            found
-                .assignment
-                .iter()
-                .zip(&partner)
-                .all(|(a, &j)| *a == Some(j)),
-            "{scale} {offset}"
-        );
+        assert_pairs(&found.assignment, &partner, &format!("{scale} {offset}"));
     }
 }
 
@@ -140,14 +136,7 @@ fn any_rotation_is_found_when_asked_for() {
         let turn = Rotation2::new(degrees.to_radians());
         let turned: Vec<Point2<f64>> = target.iter().map(|p| turn * p).collect();
         let found = matcher.match_points(&model, &turned).unwrap();
-        assert!(
-            found
-                .assignment
-                .iter()
-                .zip(&partner)
-                .all(|(a, &j)| *a == Some(j)),
-            "{degrees}"
-        );
+        assert_pairs(&found.assignment, &partner, &format!("{degrees}"));
     }
 }
 
@@ -159,13 +148,7 @@ fn outliers_stay_without_partner() {
     let found = AnnealedSoftassign::default()
         .match_points(&model, &target)
         .unwrap();
-    assert!(
-        found
-            .assignment
-            .iter()
-            .zip(&partner)
-            .all(|(a, &j)| *a == Some(j))
-    );
+    assert_pairs(&found.assignment, &partner, "");
     assert_eq!(found.unmatched_target, [61, 62, 63]);
 }
 
@@ -178,13 +161,7 @@ fn single_precision_gives_the_same_matches() {
     let found = AnnealedSoftassign::default()
         .match_points(&narrow(&model), &narrow(&target))
         .unwrap();
-    assert!(
-        found
-            .assignment
-            .iter()
-            .zip(&partner)
-            .all(|(a, &j)| *a == Some(j))
-    );
+    assert_pairs(&found.assignment, &partner, "");
 }
 
 /// Where no outliers are expected every point gets a partner; where they are, a far point is left without.
