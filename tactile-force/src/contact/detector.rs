@@ -2,8 +2,9 @@
 
 use ndarray::{ArrayView2, Axis, Slice};
 
+use super::differences::greatest;
 use super::noise;
-use super::region::{Extent, Region, greatest};
+use super::region::{Extent, Region};
 use super::runs::Run;
 use super::summary::Sums;
 use super::threshold::quantile;
@@ -135,9 +136,8 @@ impl ContactDetector {
         let sign = self.options.polarity.sign() as f32;
         let mut place = suspect.grown(TILE_COLUMNS, frame.dim());
         loop {
-            region.load(frame, reference, place, drift, sign);
+            let signal = region.load(frame, reference, place, drift, sign);
             let z = quantile(self.options.false_alarm_rate, region.difference.len());
-            let signal = greatest(&region.difference);
             let width = self
                 .options
                 .smoothing_px
@@ -165,9 +165,7 @@ impl ContactDetector {
         drift: &IlluminationDrift,
         peak: f32,
     ) -> DifferenceNoise {
-        let DetectorWorkspace {
-            region, histogram, ..
-        } = workspace;
+        let DetectorWorkspace { region, noise, .. } = workspace;
         let (x, y) = region
             .bounds(&region.mask)
             .map_or((0.0, 0.0), |b| b.middle());
@@ -180,7 +178,7 @@ impl ContactDetector {
         let [common, scale] = drift.variances(x, y);
         let gain = match reference.known_gain() {
             Some(gain) => gain / light,
-            None => noise::gain(region, histogram, background, peak),
+            None => noise::gain(region, noise, background, peak),
         };
         DifferenceNoise {
             background,

@@ -46,10 +46,9 @@ impl EveryNth {
         let up = (above + skipped * step..range.end).step_by(step);
         let skipped = (self.low + 1).saturating_sub(range.end).div_ceil(step);
         let first_down = self.low.checked_sub(skipped * step);
-        let down = first_down
-            .into_iter()
-            .flat_map(move |first| (0..).map_while(move |k| first.checked_sub(k * step)))
-            .take_while(move |&at| at >= range.start);
+        let room = first_down.and_then(|first| (first + 1).checked_sub(range.start));
+        let (first, room) = (first_down.unwrap_or(0), room.unwrap_or(0));
+        let down = (0..room.div_ceil(step)).map(move |k| first - k * step);
         up.chain(down)
     }
 }

@@ -7,6 +7,7 @@
 //! below the noise, is not cut off.
 
 mod detector;
+mod differences;
 mod every_nth;
 mod noise;
 mod options;
@@ -21,7 +22,6 @@ pub use detector::ContactDetector;
 pub use options::ContactOptions;
 pub use workspace::DetectorWorkspace;
 
-pub(crate) use every_nth::EveryNth;
 pub(crate) use region::Region;
 pub(crate) use runs::Run;
 

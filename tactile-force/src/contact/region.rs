@@ -2,10 +2,11 @@
 
 use ndarray::ArrayView2;
 
+use super::differences;
 use super::every_nth::EveryNth;
 use super::runs::{self, Components, Run, push_runs};
-use crate::drift::{DriftLine, IlluminationDrift};
-use crate::frame::{BoundingBox, FlatLine, ReferenceFrame};
+use crate::drift::IlluminationDrift;
+use crate::frame::{BoundingBox, ReferenceFrame};
 use crate::simd::vectorized;
 
 /// Differences over one box, row-major, and the contact in it as runs.
@@ -40,7 +41,7 @@ impl Region {
         self.place.map_or(1, |p| p.columns())
     }
 
-    /// Takes the differences inside a box, corrected for drift and vignetting.
+    /// Takes the differences inside a box, corrected for drift and vignetting, and returns the greatest of them, zero if none is positive.
     pub(super) fn load(
         &mut self,
         frame: ArrayView2<'_, u8>,
@@ -48,27 +49,19 @@ impl Region {
         place: BoundingBox,
         drift: &IlluminationDrift,
         sign: f32,
-    ) {
+    ) -> f32 {
         self.place = Some(place);
-        self.difference.clear();
+        // Every pixel is written below.
         self.difference.resize(place.rows() * place.columns(), 0.0);
-        let (frame, mean) = (place.of(frame), place.of(reference.mean()));
-        let flat = reference.flat_field();
-        let differences = self.difference.chunks_exact_mut(place.columns());
-        let rows = frame.rows().into_iter().zip(mean.rows()).zip(differences);
-        for (y, ((frame, mean), differences)) in rows.enumerate() {
-            let row = place.row_start + y;
-            let row = RowDifferences {
-                differences,
-                line: (!drift.is_zero()).then(|| drift.line(row, place.column_start)),
-                flat: flat.map(|flat| flat.line(row, place.column_start)),
-                sign,
-            };
-            match (frame.to_slice(), mean.to_slice()) {
-                (Some(frame), Some(mean)) => row.take(frame, mean),
-                _ => row.take(&frame.to_vec(), &mean.to_vec()),
-            }
-        }
+        let rows = differences::Rows {
+            frame,
+            levels: reference.levels(),
+            place,
+            drift: (!drift.is_zero()).then_some(drift),
+            flat: reference.flat_field(),
+            sign,
+        };
+        rows.take(&mut self.difference)
     }
 
     /// Thresholds the mean over a box of `width` pixels, keeps the largest component and fills its holes.
@@ -144,86 +137,6 @@ impl Region {
             column_end: place.column_start + r.end as usize,
         });
         boxes.reduce(BoundingBox::union)
-    }
-}
-
-/// The differences of a row.
-struct RowDifferences<'a> {
-    differences: &'a mut [f32],
-    line: Option<DriftLine>,
-    flat: Option<FlatLine>,
-    sign: f32,
-}
-
-impl RowDifferences<'_> {
-    /// From the pixels of the frame and the reference's mean, as many.
-    fn take(self, frame: &[u8], mean: &[f32]) {
-        vectorized(Differences {
-            row: self,
-            frame,
-            mean,
-        });
-    }
-}
-
-struct Differences<'a> {
-    row: RowDifferences<'a>,
-    frame: &'a [u8],
-    mean: &'a [f32],
-}
-
-impl pulp::NullaryFnOnce for Differences<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let RowDifferences {
-            differences,
-            line,
-            flat,
-            sign,
-        } = self.row;
-        let n = differences.len();
-        let (frame, mean) = (&self.frame[..n], &self.mean[..n]);
-        match line {
-            None => {
-                for x in 0..n {
-                    differences[x] = sign * (f32::from(frame[x]) - mean[x]);
-                }
-            }
-            Some(line) => {
-                for x in 0..n {
-                    differences[x] = sign * line.difference(x, f32::from(frame[x]), mean[x]);
-                }
-            }
-        }
-        if let Some(flat) = flat {
-            for (x, difference) in differences.iter_mut().enumerate() {
-                *difference /= flat.at(x);
-            }
-        }
-    }
-}
-
-/// Greatest of the values and zero.
-pub(super) fn greatest(values: &[f32]) -> f32 {
-    vectorized(Greatest(values))
-}
-
-struct Greatest<'a>(&'a [f32]);
-
-impl pulp::NullaryFnOnce for Greatest<'_> {
-    type Output = f32;
-
-    #[inline(always)]
-    fn call(self) -> f32 {
-        let larger = |a: f32, b: f32| if b > a { b } else { a };
-        let mut lanes = [0.0_f32; 16];
-        let (chunks, rest) = self.0.as_chunks::<16>();
-        for chunk in chunks {
-            lanes = std::array::from_fn(|k| larger(lanes[k], chunk[k]));
-        }
-        lanes.iter().chain(rest).copied().fold(0.0, larger)
     }
 }
 

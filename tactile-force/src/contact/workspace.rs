@@ -2,6 +2,7 @@
 
 use ndarray::ArrayView2;
 
+use super::noise::NoiseWorkspace;
 use super::region::Region;
 use crate::calibration::GreyHistogram;
 use crate::drift::FitWorkspace;
@@ -29,7 +30,7 @@ use crate::health::FrameCondition;
 pub struct DetectorWorkspace {
     pub(super) pass: PassWorkspace,
     pub(crate) region: Region,
-    pub(super) histogram: Vec<u64>,
+    pub(super) noise: NoiseWorkspace,
     /// Sums over the columns of a region.
     pub(super) columns: Vec<f64>,
     pub(super) drift: FitWorkspace,

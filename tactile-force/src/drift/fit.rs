@@ -1,5 +1,6 @@
 //! The fit of a drift to the tiles outside the contact.
 
+use super::columns::Columns;
 use super::median::median;
 use super::{DriftCorrection, DriftOutcome, IlluminationDrift};
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
@@ -15,7 +16,8 @@ const UNEVEN: f64 = 0.01;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FitWorkspace {
     pub(crate) tiles: Vec<TileSum>,
-    residuals: Vec<f64>,
+    columns: Columns,
+    pub(crate) residuals: Vec<f64>,
     /// |residual| of a pixel.
     levels: Vec<f64>,
     pub(crate) values: Vec<f64>,
@@ -26,13 +28,14 @@ pub(crate) struct FitWorkspace {
 /// again until the set settles; `sd` is the noise of one pixel's difference.
 pub(crate) fn fit(
     correction: DriftCorrection,
-    (rows, columns): (usize, usize),
+    (rows, width): (usize, usize),
     given: impl Iterator<Item = TileSum>,
     sd: f64,
     workspace: &mut FitWorkspace,
 ) -> IlluminationDrift {
     let FitWorkspace {
         tiles,
+        columns,
         residuals,
         levels,
         values,
@@ -40,7 +43,7 @@ pub(crate) fn fit(
     } = workspace;
     tiles.clear();
     tiles.extend(given);
-    let middle = [0.5 * (columns as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
+    let middle = [0.5 * (width as f64 - 1.0), 0.5 * (rows as f64 - 1.0)];
     let mut drift = IlluminationDrift {
         correction,
         middle,
@@ -49,26 +52,25 @@ pub(crate) fn fit(
     if correction.is_multiplicative() {
         drift.coefficients[0] = 1.0;
     }
-    let terms = correction.terms();
-    let change = |t: &TileSum| drift.residual(t) / weight(&drift, t);
-    values.clear();
-    values.extend(tiles.iter().map(change));
+    columns.take(tiles, &drift);
+    columns.residuals(&drift, tiles, residuals);
+    columns.changes(residuals, values);
     drift.coefficients[0] += median(values, scratch);
     let mut kept = 0;
     for _ in 0..20 {
-        residuals.clear();
-        residuals.extend(tiles.iter().map(|t| drift.residual(t)));
-        levels.clear();
-        let both = tiles.iter().zip(&*residuals);
-        levels.extend(both.map(|(tile, residual)| (residual / tile.pixels).abs()));
+        columns.residuals(&drift, tiles, residuals);
+        columns.levels(residuals, levels);
         let spread = 1.4826 * median(levels, scratch);
         let noise = sd / ((TILE_ROWS * TILE_COLUMNS) as f64).sqrt();
         let limit = 3.0 * spread.max(noise);
-        let both = tiles.iter().zip(residuals.iter().copied()).zip(&*levels);
-        let near = both.filter(|(_, level)| **level <= limit).map(|(b, _)| b);
-        let count = match terms {
-            1 => drift.step::<1>(near, sd),
-            _ => drift.step::<3>(near, sd),
+        // A plane needs the places of the tiles, too.
+        let count = match correction.terms() {
+            1 => drift.step::<1>(&columns.sums(residuals, levels, limit), sd),
+            _ => {
+                let both = tiles.iter().zip(residuals.iter().copied()).zip(&*levels);
+                let near = both.filter(|(_, level)| **level <= limit).map(|(b, _)| b);
+                drift.step::<3>(&Normal::of_places(&drift, near), sd)
+            }
         };
         drift.tiles = count;
         if count == kept {
@@ -86,7 +88,7 @@ pub(crate) fn fit(
 }
 
 /// Derivative of a tile's sum by the first coefficient.
-fn weight(drift: &IlluminationDrift, tile: &TileSum) -> f64 {
+pub(super) fn weight(drift: &IlluminationDrift, tile: &TileSum) -> f64 {
     if drift.correction.is_multiplicative() {
         tile.reference.max(1.0)
     } else {
@@ -123,14 +125,9 @@ impl IlluminationDrift {
         }
     }
 
-    /// One least-squares step of so many terms on the given tiles with their residuals; returns the number of tiles.
-    fn step<'a, const TERMS: usize>(
-        &mut self,
-        tiles: impl Iterator<Item = (&'a TileSum, f64)>,
-        sd: f64,
-    ) -> usize {
-        let scale = [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)];
-        let sums = Normal::of::<TERMS>(self, tiles, scale);
+    /// One least-squares step of so many terms by the normal equations of some tiles; returns the number of tiles.
+    fn step<const TERMS: usize>(&mut self, sums: &Normal, sd: f64) -> usize {
+        let scale = self.scale();
         let Some(inverse) = sums.matrix.try_inverse() else {
             return sums.count;
         };
@@ -145,43 +142,50 @@ impl IlluminationDrift {
         self.reference = sums.reference / f64::max(sums.pixels, 1.0);
         sums.count
     }
+
+    /// Units of the coefficients in the normal equations: half the frame.
+    fn scale(&self) -> [f64; 3] {
+        [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)]
+    }
 }
 
 /// Normal equations of the tiles' residuals, and the tiles' own sums.
-struct Normal {
-    matrix: nalgebra::Matrix3<f64>,
-    right: nalgebra::Vector3<f64>,
-    count: usize,
-    reference: f64,
-    pixels: f64,
+pub(super) struct Normal {
+    pub(super) matrix: nalgebra::Matrix3<f64>,
+    pub(super) right: nalgebra::Vector3<f64>,
+    pub(super) count: usize,
+    pub(super) reference: f64,
+    pub(super) pixels: f64,
 }
 
 impl Normal {
-    /// Places count from the frame's middle, in units of `scale`.
-    fn of<'a, const TERMS: usize>(
-        drift: &IlluminationDrift,
-        tiles: impl Iterator<Item = (&'a TileSum, f64)>,
-        scale: [f64; 3],
-    ) -> Self {
+    /// Of so many terms; the others are left alone.
+    pub(super) fn empty(terms: usize) -> Self {
         let (mut matrix, right) = (nalgebra::Matrix3::identity(), nalgebra::Vector3::zeros());
-        matrix.view_mut((0, 0), (TERMS, TERMS)).fill(0.0);
-        let mut sums = Self {
+        matrix.view_mut((0, 0), (terms, terms)).fill(0.0);
+        Self {
             matrix,
             right,
             count: 0,
             reference: 0.0,
             pixels: 0.0,
-        };
+        }
+    }
+
+    /// Of a plane, from tiles and their residuals. Places count from the frame's middle.
+    fn of_places<'a>(
+        drift: &IlluminationDrift,
+        tiles: impl Iterator<Item = (&'a TileSum, f64)>,
+    ) -> Self {
+        let scale = drift.scale();
+        let mut sums = Self::empty(3);
         for (tile, residual) in tiles {
             let w = weight(drift, tile);
             let place = |k: usize, x: f64| (x - drift.middle[k]) / scale[k + 1];
-            let at = match TERMS {
-                1 => [1.0, 0.0, 0.0],
-                _ => [1.0, place(0, tile.x), place(1, tile.y)],
-            };
-            for i in 0..TERMS {
+            let at = [1.0, place(0, tile.x), place(1, tile.y)];
+            for i in 0..3 {
                 sums.right[i] += w * at[i] * residual / tile.pixels;
-                for j in 0..TERMS {
+                for j in 0..3 {
                     sums.matrix[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
                 }
             }

@@ -21,16 +21,15 @@ pub(crate) fn median(values: &[f64], scratch: &mut Vec<f64>) -> f64 {
     let high = scratch[(centre + reach).min(scratch.len() - 1)];
     if low <= high {
         // A value that is not a number, whatever its sign, is neither below nor above: it is among those looked at.
-        scratch.clear();
         scratch.resize(values.len(), 0.0);
-        let (mut below, mut between) = (0, 0);
+        let (mut below, mut between, mut whole) = (0, 0, true);
         for value in values {
             // Written always and kept sometimes: no branch to guess.
             scratch[between] = *value;
             below += usize::from(*value < low);
-            between += usize::from(*value >= low && *value <= high);
+            between += usize::from((*value >= low) & (*value <= high));
+            whole &= !value.is_nan();
         }
-        let whole = !values.iter().any(|value| value.is_nan());
         if whole && (below..below + between).contains(&middle) {
             let inside = &mut scratch[..between];
             return *inside

@@ -1,5 +1,6 @@
 //! IlluminationDrift of illumination and stray light since the reference was taken, estimated from the pixels outside the contact.
 
+mod columns;
 mod correction;
 mod fit;
 mod median;
@@ -110,13 +111,18 @@ impl IlluminationDrift {
 
     /// Background that the correction subtracts from a frame at a place where the reference is `reference`.
     fn level(&self, x: f64, y: f64, reference: f64) -> f64 {
-        let [value, per_column, per_row] = self.coefficients;
-        let at = value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1]);
+        let at = self.at(x, y);
         if self.correction.is_multiplicative() {
             reference * (at - 1.0)
         } else {
             at
         }
+    }
+
+    #[inline]
+    fn at(&self, x: f64, y: f64) -> f64 {
+        let [value, per_column, per_row] = self.coefficients;
+        value + per_column * (x - self.middle[0]) + per_row * (y - self.middle[1])
     }
 
     /// The greatest background that the correction removes anywhere in a frame of a given size, in grey levels, for a reference
@@ -134,7 +140,14 @@ impl IlluminationDrift {
     }
 
     /// A tile's summed difference after the correction.
+    #[inline]
     pub(crate) fn residual(&self, tile: &TileSum) -> f64 {
-        tile.difference - tile.pixels * self.level(tile.x, tile.y, tile.reference / tile.pixels)
+        let at = self.at(tile.x, tile.y);
+        let background = if self.correction.is_multiplicative() {
+            tile.reference * (at - 1.0)
+        } else {
+            tile.pixels * at
+        };
+        tile.difference - background
     }
 }

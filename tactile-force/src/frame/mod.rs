@@ -6,6 +6,7 @@ mod pass;
 mod reference;
 mod statistics;
 mod strip;
+mod tighten;
 mod tiles;
 
 pub use flat_field::FlatField;
@@ -15,5 +16,5 @@ pub use statistics::{BoundingBox, FrameStatistics};
 
 pub(crate) use flat_field::FlatLine;
 pub(crate) use noise::trimmed_variance;
-pub(crate) use reference::PassWorkspace;
+pub(crate) use reference::{Levels, PassWorkspace};
 pub(crate) use tiles::{TILE_COLUMNS, TILE_ROWS, TileSum, Tiles};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use ndarray::{ArrayView2, Axis, Zip};
+use ndarray::{ArrayView2, Zip};
 
 use super::statistics::{BoundingBox, FrameStatistics};
 use super::strip::{Rows, STRIP_TILES, Strip, compare};
@@ -179,34 +179,4 @@ impl FrameStatistics {
             self.greatest = self.greatest.max(d);
         });
     }
-}
-
-/// Shrinks a box of whole tiles to the pixels with |frame − reference| > threshold, side by side.
-pub(super) fn tighten(
-    mut tight: BoundingBox,
-    frame: ArrayView2<'_, u8>,
-    reference: ArrayView2<'_, u8>,
-    threshold: u8,
-) -> BoundingBox {
-    let over = |(f, r): (&u8, &u8)| f.abs_diff(*r) > threshold;
-    let line = |within: BoundingBox, axis: usize, at: usize| {
-        let (f, r) = (within.of(frame), within.of(reference));
-        f.index_axis(Axis(axis), at)
-            .iter()
-            .zip(r.index_axis(Axis(axis), at))
-            .any(over)
-    };
-    while tight.rows() > 1 && !line(tight, 0, 0) {
-        tight.row_start += 1;
-    }
-    while tight.rows() > 1 && !line(tight, 0, tight.rows() - 1) {
-        tight.row_end -= 1;
-    }
-    while tight.columns() > 1 && !line(tight, 1, 0) {
-        tight.column_start += 1;
-    }
-    while tight.columns() > 1 && !line(tight, 1, tight.columns() - 1) {
-        tight.column_end -= 1;
-    }
-    tight
 }

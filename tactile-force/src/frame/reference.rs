@@ -4,8 +4,9 @@ use ndarray::{Array2, ArrayView2};
 
 use super::flat_field::FlatField;
 use super::noise::NoiseModel;
-use super::pass::{pixels_of, scan, tighten};
+use super::pass::{pixels_of, scan};
 use super::statistics::FrameStatistics;
+use super::tighten::tighten;
 use super::tiles::{TILE_ROWS, TileSum, Tiles};
 use crate::error::ForceError;
 
@@ -30,8 +31,8 @@ const LONGEST_SIDE: usize = 16_384;
 #[derive(Clone, Debug)]
 pub struct ReferenceFrame {
     image: Array2<u8>,
-    /// The mean of several frames, finer than whole grey levels.
-    mean: Array2<f32>,
+    /// The mean of several frames, finer than whole grey levels; one frame is its own.
+    mean: Option<Array2<f32>>,
     frames: usize,
     noise: NoiseModel,
     /// Whether the gain was given, and not only the noise at the reference's own level measured.
@@ -40,6 +41,8 @@ pub struct ReferenceFrame {
     /// Σ of the image.
     sum: i64,
     tiles: Tiles,
+    /// Places, pixels and sums of all tiles, for frames that differ nowhere.
+    blank: Vec<TileSum>,
     /// Brightest pixel of every band of eight rows.
     brightest: Vec<u8>,
 }
@@ -69,16 +72,15 @@ impl ReferenceFrame {
     /// No frame, an empty one, a side longer than 16384 pixels, or frames that differ in size.
     pub fn from_frames(frames: &[ArrayView2<'_, u8>]) -> Result<Self, ForceError> {
         let size = common_size(frames)?;
-        let mean = mean_of(frames, size);
+        let mean = (frames.len() > 1).then(|| mean_of(frames, size));
         // To the nearest, halves upwards: exact, and the standard library's rounding is a function call a pixel.
-        let image = match frames {
-            [frame] => frame.as_standard_layout().into_owned(),
-            _ => mean.mapv(|m| (f64::from(m) + 0.5) as u8),
+        let image = match &mean {
+            None => frames[0].as_standard_layout().into_owned(),
+            Some(mean) => mean.mapv(|m| (f64::from(m) + 0.5) as u8),
         };
-        let noise = if frames.len() == 1 {
-            NoiseModel::of_frame(frames[0])
-        } else {
-            NoiseModel::of_repeats(frames, mean.view())
+        let noise = match &mean {
+            None => NoiseModel::of_frame(frames[0]),
+            Some(mean) => NoiseModel::of_repeats(frames, mean.view()),
         };
         let mut tiles = Tiles::default();
         let pixels = image.as_slice().unwrap_or_default();
@@ -91,9 +93,10 @@ impl ReferenceFrame {
                 .unwrap_or(0)
         };
         let brightest = (0..size.0.div_ceil(TILE_ROWS)).map(band).collect();
-        if frames.len() > 1 {
+        if let Some(mean) = &mean {
             sum_means(mean.view(), &mut tiles);
         }
+        let blank = (0..tiles.sums.len()).map(|k| tiles.blank(k, size));
         Ok(Self {
             image,
             mean,
@@ -102,6 +105,7 @@ impl ReferenceFrame {
             gain_known: false,
             flat: None,
             sum,
+            blank: blank.collect(),
             tiles,
             brightest,
         })
@@ -217,14 +221,17 @@ impl ReferenceFrame {
         s.sum -= self.sum;
         s.bounding_box = s
             .bounding_box
-            .map(|b| tighten(b, frame, self.image(), threshold));
+            .map(|b| tighten(b, [pixels, reference.0], frame.ncols(), threshold));
         s.correct_extremes(frame, self.image());
         s
     }
 
     /// The image before rounding.
-    pub(crate) fn mean(&self) -> ArrayView2<'_, f32> {
-        self.mean.view()
+    pub(crate) fn levels(&self) -> Levels<'_> {
+        match &self.mean {
+            None => Levels::Whole(self.image.view()),
+            Some(mean) => Levels::Fine(mean.view()),
+        }
     }
 
     /// Mean grey level of the image.
@@ -253,19 +260,21 @@ impl ReferenceFrame {
         passed: &'a Tiles,
     ) -> Option<impl Iterator<Item = TileSum> + Clone + 'a> {
         let same = (passed.rows, passed.columns) == (self.tiles.rows, self.tiles.columns);
-        same.then(|| (0..passed.sums.len()).map(move |k| self.tile_sum(passed, k)))
+        let both = self.blank.iter().zip(&passed.sums);
+        same.then(|| {
+            both.map(|(blank, sum)| TileSum {
+                difference: f64::from(*sum),
+                ..*blank
+            })
+        })
     }
 
     /// One tile of the last pass.
     #[inline]
     pub(crate) fn tile_sum(&self, passed: &Tiles, tile: usize) -> TileSum {
-        let at = passed.pixels(tile, self.image.dim());
         TileSum {
-            x: 0.5 * (at.column_start + at.column_end - 1) as f64,
-            y: 0.5 * (at.row_start + at.row_end - 1) as f64,
-            pixels: (at.rows() * at.columns()) as f64,
-            reference: f64::from(self.tiles.sums[tile]),
             difference: f64::from(passed.sums[tile]),
+            ..self.blank[tile]
         }
     }
 
@@ -277,6 +286,13 @@ impl ReferenceFrame {
             Err(ForceError::SizeMismatch { expected, found })
         }
     }
+}
+
+/// The grey levels of a reference: those of one frame, or the mean of several.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Levels<'a> {
+    Whole(ArrayView2<'a, u8>),
+    Fine(ArrayView2<'a, f32>),
 }
 
 /// The size that all frames have.
@@ -294,11 +310,6 @@ fn common_size(frames: &[ArrayView2<'_, u8>]) -> Result<(usize, usize), ForceErr
 
 /// The mean of the frames, pixel by pixel.
 fn mean_of(frames: &[ArrayView2<'_, u8>], size: (usize, usize)) -> Array2<f32> {
-    if let [frame] = frames {
-        let mut mean = Array2::zeros(size);
-        mean.zip_mut_with(frame, |mean, grey| *mean = f32::from(*grey));
-        return mean;
-    }
     let n = frames.len() as f64;
     Array2::from_shape_fn(size, |at| {
         let total: u32 = frames.iter().map(|f| u32::from(f[at])).sum();

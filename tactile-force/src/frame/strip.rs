@@ -54,35 +54,31 @@ impl pulp::NullaryFnOnce for Comparison<'_, '_> {
     #[inline(always)]
     fn call(self) -> Strip {
         let tiles = self.sums.len();
-        // Row after row, as the memory has them; what is kept of the columns stays in the nearest cache.
-        let mut columns = [[0_u16; TILE_COLUMNS]; STRIP_TILES];
-        let mut above = [[0_u8; TILE_COLUMNS]; STRIP_TILES];
-        let mut below = [[0_u8; TILE_COLUMNS]; STRIP_TILES];
-        for k in 0..TILE_ROWS {
-            let frame: &[Row] = &self.frame[k].as_chunks().0[..tiles];
-            let reference: &[Row] = &self.reference[k].as_chunks().0[..tiles];
-            for t in 0..tiles {
-                let (f, r) = (&frame[t], &reference[t]);
-                let (mut over, mut under, mut column) = (above[t], below[t], columns[t]);
+        let frame: [&[Row]; TILE_ROWS] = self.frame.map(|row| &row.as_chunks().0[..tiles]);
+        let reference: [&[Row]; TILE_ROWS] = self.reference.map(|row| &row.as_chunks().0[..tiles]);
+        let mut strip = Strip::default();
+        for t in 0..tiles {
+            // Tile after tile, so that nothing but its sums leaves the registers: 0.09 ms for the paper's frame where row after row, as memory has
+            // the pixels, takes 0.16. Only a frame that no cache holds comes in slower through eight streams, in 0.23 ms instead of 0.19.
+            let (mut above, mut below) = ([0_u8; TILE_COLUMNS], [0_u8; TILE_COLUMNS]);
+            let mut columns = [0_u16; TILE_COLUMNS];
+            for k in 0..TILE_ROWS {
+                let (f, r) = (&frame[k][t], &reference[k][t]);
                 // A loop for every width of numbers: mixed, the bytes fill half a register.
                 for j in 0..TILE_COLUMNS {
-                    over[j] = over[j].max(f[j].saturating_sub(r[j]));
-                    under[j] = under[j].max(r[j].saturating_sub(f[j]));
+                    above[j] = above[j].max(f[j].saturating_sub(r[j]));
+                    below[j] = below[j].max(r[j].saturating_sub(f[j]));
                 }
                 for j in 0..TILE_COLUMNS {
                     // Eight times 255 fits; checked, the sum would be taken pixel by pixel.
-                    column[j] = column[j].wrapping_add(u16::from(f[j]));
+                    columns[j] = columns[j].wrapping_add(u16::from(f[j]));
                 }
-                (above[t], below[t], columns[t]) = (over, under, column);
             }
-        }
-        let mut strip = Strip::default();
-        for t in 0..tiles {
             let (mut sum, mut highest, mut deepest) = (0, 0, 0);
             for j in 0..TILE_COLUMNS {
-                sum = i32::wrapping_add(sum, i32::from(columns[t][j]));
-                highest = above[t][j].max(highest);
-                deepest = below[t][j].max(deepest);
+                sum = i32::wrapping_add(sum, i32::from(columns[j]));
+                highest = above[j].max(highest);
+                deepest = below[j].max(deepest);
             }
             self.sums[t] = sum;
             if highest.max(deepest) > self.threshold {

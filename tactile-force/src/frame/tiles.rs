@@ -29,6 +29,18 @@ impl Tiles {
         sums.iter().map(|s| sign * s).max().unwrap_or(0)
     }
 
+    /// A tile of a reference, and of a frame that does not differ from it.
+    pub(super) fn blank(&self, tile: usize, size: (usize, usize)) -> TileSum {
+        let at = self.pixels(tile, size);
+        TileSum {
+            x: 0.5 * (at.column_start + at.column_end - 1) as f64,
+            y: 0.5 * (at.row_start + at.row_end - 1) as f64,
+            pixels: (at.rows() * at.columns()) as f64,
+            reference: f64::from(self.sums[tile]),
+            difference: 0.0,
+        }
+    }
+
     /// The pixels of a tile.
     pub(crate) fn pixels(&self, tile: usize, (rows, columns): (usize, usize)) -> BoundingBox {
         let (row, column) = (tile / self.columns, tile % self.columns);

@@ -9,6 +9,7 @@
 //! wide or 0.5 % too narrow. Where its misfit stands out of the noise, p(r) = p₀ √(1 − r²/a²) (1 − c r²/a²) is fitted instead, whose radius is
 //! within 0.03 % of that of finite elements (a/R up to 1.1, layers of every depth, rigid flats).
 
+mod blocks;
 mod edge;
 mod equations;
 mod fit;
