@@ -2,7 +2,8 @@
 //!
 //! With k = 1 this is of first order: p and n_x belong to the middle of the edge in x, q and n_y to that of the edge in y.
 //! With the direction φ of the gradient, p²/n_x² + q²/n_y² = cos²φ_x + sin²φ_y, φ_x and φ_y in those two places. A second
-//! solve with k = 1 + cos²φ_x − cos²φ_y, φ from the first, removes that error (deferred correction).
+//! solve with k = 1 + cos²φ_x − cos²φ_y, φ from the first, removes that error (deferred correction). A profile fitted to the light tells φ before
+//! anything is solved.
 
 use super::boundary;
 use super::grid::{EikonalBuffers, Node};
@@ -33,21 +34,26 @@ pub(super) fn sweep<T: Scalar>(grid: &mut EikonalBuffers<T>, order: usize, toler
 }
 
 impl<T: Scalar> EikonalBuffers<T> {
-    /// Takes the order of the unknown nodes from a profile fitted to the mask's pixels, from its rim to its top.
+    /// Takes the order of the unknown nodes from a profile fitted to the mask's pixels, from its rim to its top, and the directions of the
+    /// gradient: nothing but the rim is known, and lines of equal light are lines of equal height.
     pub(super) fn follow(&mut self, profile: &Profile, area: BoundingBox) {
-        let rows = self.node.chunks_exact(self.width).enumerate();
-        let nodes = rows.flat_map(|(row, line)| {
-            (0..)
-                .zip(line)
-                .map(move |(column, node)| (row, column, node))
+        let aspect = self.aspect.as_f64();
+        let directions = self.along_x.chunks_exact_mut(self.width);
+        let lines = self.node.chunks_exact(self.width).zip(directions);
+        let nodes = lines.enumerate().flat_map(|(row, (nodes, directions))| {
+            let both = nodes.iter().zip(directions).enumerate();
+            let unknown = both.filter(|(_, (node, _))| **node == Node::Unknown);
+            unknown.map(move |(column, (_, along_x))| {
+                // The grid has a border of one node around the box.
+                let pixel = [area.top + row - 1, area.left + column - 1];
+                let (quadratic, [p, q]) = profile.quadratic_and_gradient(pixel);
+                let (pp, qq) = (p * p, q * q / (aspect * aspect));
+                *along_x = T::of(pp / (pp + qq));
+                ([row as u32, column as u32], -quadratic)
+            })
         });
-        let unknown = nodes.filter(|(_, _, node)| **node == Node::Unknown);
-        // The grid has a border of one node around the box.
-        let keys = unknown.map(|(row, column, _): (usize, usize, _)| {
-            let pixel = [area.top + row - 1, area.left + column - 1];
-            ([row as u32, column as u32], -profile.quadratic(pixel))
-        });
-        self.front.sort(keys);
+        self.front.sort(nodes);
+        self.directed = true;
     }
 }
 

@@ -41,9 +41,10 @@ pub(crate) struct EikonalBuffers<T> {
     pub(super) offset: Vec<T>,
     /// 1/(slope · step)² of the edge to the next node in x and in y.
     pub(super) edges: Vec<[T; 2]>,
-    /// cos²φ of the gradient of an earlier solution, and whether sweeps use it.
+    /// cos²φ of the gradient, whether sweeps use it, and whether a fitted profile has told it before any solution.
     pub(super) along_x: Vec<T>,
     pub(super) corrected: bool,
+    pub(super) directed: bool,
     /// Nodes whose intensity is not finite.
     pub(super) holes: Vec<usize>,
     /// Unknown nodes in the order in which the front is expected to reach them; none where nothing is expected.
@@ -65,6 +66,7 @@ impl<T: Scalar> EikonalBuffers<T> {
         fill(&mut self.edges, length, [T::one(); 2]);
         fill(&mut self.along_x, length, T::nan());
         self.corrected = false;
+        self.directed = false;
         self.front.nodes.clear();
         self.holes.clear();
     }

@@ -205,6 +205,15 @@ impl Profile {
         (determinant > 0.0).then_some(c[0] - drop)
     }
 
+    /// The quadratic with its derivatives by x and y.
+    pub(super) fn quadratic_and_gradient(&self, at: [usize; 2]) -> (f64, [f64; 2]) {
+        let [x, y] = self.place(at);
+        let c = &self.coefficients;
+        let along_x = c[1] + y * c[4] + 2.0 * x * c[3];
+        let along_y = c[2] + x * c[4] + 2.0 * y * c[5];
+        (self.quadratic(at), [along_x, along_y])
+    }
+
     /// A pixel's x and y.
     fn place(&self, [row, column]: [usize; 2]) -> [f64; 2] {
         [

@@ -37,9 +37,12 @@ impl<T: Scalar> Eikonal<T> {
     /// Solves one branch into the buffers' values; under frontal light twice, the second time with the directions of the
     /// first.
     fn solve(&self, workspace: &mut Workspace<T>, convex: bool) -> Outcome<T> {
-        workspace.eikonal.corrected = false;
+        let grid = &mut workspace.eikonal;
+        // A fitted profile tells the directions of a convex surface; any other is solved once to measure them.
+        grid.corrected = convex && grid.directed;
+        let corrected = grid.corrected;
         let first = self.sweep(workspace, convex, 0);
-        if !self.lighting.is_frontal() || first.stop != StopReason::Converged {
+        if corrected || !self.lighting.is_frontal() || first.stop != StopReason::Converged {
             return first;
         }
         frontal::measure_directions(&mut workspace.eikonal);
@@ -59,7 +62,7 @@ impl<T: Scalar> Eikonal<T> {
             change: T::infinity(),
         };
         let grid = &workspace.eikonal;
-        let marched = convex && !grid.corrected && !grid.front.nodes.is_empty();
+        let marched = convex && !grid.front.nodes.is_empty();
         for _ in 0..if marched {
             self.max_sweeps.min(MARCHES)
         } else {
