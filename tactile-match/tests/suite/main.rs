@@ -9,6 +9,7 @@ mod dense_sets;
 mod drift;
 mod hostile;
 mod large_sets;
+mod nearest;
 mod recorded;
 mod rigid;
 #[cfg(feature = "serde")]
