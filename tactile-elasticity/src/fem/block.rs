@@ -28,6 +28,9 @@ pub(crate) struct BlockMeshes {
 /// less as the face sinks in: of 0.02, they turn over at a tenth of the block's height, and the pressure within three
 /// quarters of the face jumps by 1 %. Until then it is that of the finer ones within 0.05 %.
 const SLIDING_RIM: f64 = 0.045;
+/// Elements along an eighth of the inclusion's circumference up to which they hold it: finer meshes have flatter elements at the
+/// rim, and with seven those of 0.045 turn over at some tenths of the height.
+const SLIDING_FINENESS: f64 = 5.0;
 
 impl BlockMesh {
     /// Box around the inclusion that takes a grid of its own: radius, lower and upper height.
@@ -53,7 +56,11 @@ impl BlockMesh {
         let inner = cell.map_or(0.5 * self.disc_radius, |(_, [radius, _, _])| radius);
         // Above a wide inclusion the pressure wants elements no longer than elsewhere.
         let n = self.fineness.max((inner / face).ceil() as usize);
-        let shortest = if self.bonded { 0.0 } else { SLIDING_RIM };
+        let shortest = if self.bonded {
+            0.0
+        } else {
+            SLIDING_RIM * (self.fineness as f64 / SLIDING_FINENESS).max(1.0)
+        };
         let first = (0.25 * face).max(shortest * self.disc_radius);
         let mut rim = graded_up_to(self.disc_radius, inner, first, 1.35, face);
         rim.reverse();

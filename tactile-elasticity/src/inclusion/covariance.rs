@@ -42,7 +42,7 @@ const BONDED: ModelErrors = ModelErrors {
     scale: 2e-3,
     shape: 7e-4,
     rim: 2e-3,
-    rough: 6e-4,
+    rough: 1e-3,
     element: 0.08,
     force: 6e-3,
     sinking: 1e-3,

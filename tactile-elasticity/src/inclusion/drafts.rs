@@ -22,14 +22,11 @@ const HOPELESS_EVIDENCE: f64 = 25.0;
 const HOPELESS_MISFIT: f64 = 0.1;
 
 /// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the pressure is within 0.05 %
-/// of a mesh of ten; five leave waves of 0.1 % above a wide shallow inclusion, which move its size and depth by one bound. A
-/// face that slides takes three to four solutions for one, and its rim errs by more than five elements do; so does the
-/// noise on an inclusion that hardly shows.
-pub(super) fn answer_fineness(interface: Interface, is_certain: bool) -> usize {
-    match interface {
-        Interface::Bonded if is_certain => 7,
-        _ => 5,
-    }
+/// of a mesh of ten; five leave waves of 0.1 % above a wide shallow inclusion, which move its size and depth by one bound, and where
+/// the face slides χ² by up to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs by
+/// more than five elements do.
+pub(super) fn answer_fineness(is_certain: bool) -> usize {
+    if is_certain { 7 } else { 5 }
 }
 
 /// The best first fits under one assumption about the face.
@@ -126,7 +123,7 @@ impl InclusionSearch {
         let with_lump = core::mem::take(&mut problem.priors);
         let gain = (lump.as_ref()).map_or(f64::NEG_INFINITY, |lump| lump.evidence - plain.evidence);
         let is_certain = gain > CERTAIN_EVIDENCE;
-        let fineness = answer_fineness(interface, is_certain);
+        let fineness = answer_fineness(is_certain);
         problem.forward = self.forward(observed, approaches_m, interface, fineness);
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
         problem.factor = covariance.cholesky()?;
@@ -154,6 +151,7 @@ impl InclusionSearch {
             plain,
             score,
             lump,
+            marginal: None,
         })
     }
 }

@@ -102,10 +102,10 @@ const PROMISE: f64 = 4.0;
 const UNRESOLVED: f64 = 1.0;
 
 /// A change of the coordinates.
-struct Step {
-    by: DVector<f64>,
+pub(super) struct Step {
+    pub(super) by: DVector<f64>,
     /// In standard errors, before it is cut to [`LARGEST_STEP`].
-    size: f64,
+    pub(super) size: f64,
 }
 
 /// The quadratic model of the objective at some parameters.
@@ -117,7 +117,16 @@ pub(super) struct Normal {
     /// Whitened derivatives of the values.
     pub(super) columns: Vec<DVector<f64>>,
     pub(super) predicted: Vec<f64>,
-    solved: Solved,
+    pub(super) solved: Solved,
+}
+
+/// Fixes a coordinate's step in the equations of all.
+fn fix(matrix: &mut DMatrix<f64>, gradient: &mut DVector<f64>, k: usize, step: f64) {
+    gradient.axpy(-step, &matrix.column(k), 1.0);
+    matrix.row_mut(k).fill(0.0);
+    matrix.column_mut(k).fill(0.0);
+    matrix[(k, k)] = 1.0;
+    gradient[k] = step;
 }
 
 impl Fit {
@@ -139,7 +148,7 @@ impl Problem {
         )
     }
 
-    fn penalty(&self, parameters: &Parameters) -> f64 {
+    pub(super) fn penalty(&self, parameters: &Parameters) -> f64 {
         let squares = self.priors.iter().map(|prior| {
             let distance = parameters.get(prior.coordinate) - prior.mean;
             (distance / prior.standard_error).powi(2)
@@ -244,7 +253,7 @@ impl Problem {
         let mut evaluations = 1;
         let converged = loop {
             // How far the quadratic model's optimum is; steps cut short by damping say nothing of it.
-            let left = self.step(&parameters, &normal, 0.0)?.size;
+            let left = self.step(&parameters, &normal, 0.0, None)?.size;
             let promised = normal.misfit + normal.penalty - PROMISE * left.powi(2);
             if left < ending.step || promised > ending.needed {
                 break true;
@@ -257,7 +266,10 @@ impl Problem {
                 break false;
             }
             evaluations += 1;
-            let next = self.stepped(&parameters, &self.step(&parameters, &normal, damping)?.by);
+            let next = self.stepped(
+                &parameters,
+                &self.step(&parameters, &normal, damping, None)?.by,
+            );
             let now = normal.misfit + normal.penalty;
             let found = (self.forward).predict_near(&next, Some(&normal.solved));
             // Derivatives of a step that is not taken would not be used.
@@ -278,24 +290,30 @@ impl Problem {
         self.finished(parameters, normal, converged)
     }
 
-    /// The damped step towards the quadratic model's optimum.
-    fn step(&self, parameters: &Parameters, normal: &Normal, damping: f64) -> Option<Step> {
+    /// The damped step towards the quadratic model's optimum, that of a coordinate that is held left out.
+    pub(super) fn step(
+        &self,
+        parameters: &Parameters,
+        normal: &Normal,
+        damping: f64,
+        held: Option<usize>,
+    ) -> Option<Step> {
         let mut matrix = normal.matrix.clone();
+        let mut gradient = normal.gradient.clone();
         for k in 0..matrix.nrows() {
             matrix[(k, k)] *= 1.0 + damping;
         }
-        let mut by = matrix.clone().cholesky()?.solve(&normal.gradient);
+        if let Some(held) = held {
+            fix(&mut matrix, &mut gradient, held, 0.0);
+        }
+        let mut by = matrix.clone().cholesky()?.solve(&gradient);
         let poisson = |prior: &Prior| prior.coordinate == Coordinate::PoissonRatio;
         if let Some(k) = self.priors.iter().position(poisson) {
             // A step cut short at the limit of ν alone would not lower the objective: the others' steps
             // are those that go with ν at its limit.
             let room = LARGEST_POISSON_RATIO - parameters.poisson_ratio;
             if by[k] > room {
-                let mut gradient = &normal.gradient - room * matrix.column(k);
-                matrix.row_mut(k).fill(0.0);
-                matrix.column_mut(k).fill(0.0);
-                matrix[(k, k)] = 1.0;
-                gradient[k] = room;
+                fix(&mut matrix, &mut gradient, k, room);
                 by = matrix.cholesky()?.solve(&gradient);
             }
         }

@@ -5,6 +5,7 @@ use super::estimate::{
     Estimated, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95, Told,
 };
 use super::fit::{Fit, Problem};
+use super::marginal::Marginal;
 use super::parameters::Coordinate;
 use super::score::Score;
 use crate::fem::Interface;
@@ -28,14 +29,17 @@ pub(super) fn is_poor(misfit: f64, observed: &Observed) -> bool {
     misfit > freedom + POOR * (2.0 * freedom).sqrt()
 }
 
-/// ln E₀, zero, ln H and ν, the first of the coordinates.
-pub(super) const BLOCK_COORDINATES: usize = 4;
-/// The coordinates after them.
-const LUMP: [Coordinate; 3] = [
+/// The coordinates as they are fitted: those of the block first.
+const COORDINATES: [Coordinate; 7] = [
+    Coordinate::BlockModulus,
+    Coordinate::Zero,
+    Coordinate::Height,
+    Coordinate::PoissonRatio,
     Coordinate::Diameter,
     Coordinate::Depth,
     Coordinate::LumpModulus,
 ];
+pub(super) const BLOCK_COORDINATES: usize = 4;
 
 /// The best fits under one assumption about the face.
 pub(super) struct Hypothesis {
@@ -45,21 +49,30 @@ pub(super) struct Hypothesis {
     /// What inclusions promise, where none was fitted.
     pub(super) score: Option<Score>,
     pub(super) lump: Option<Fit>,
+    /// Posteriors of the fit with an inclusion, once its ridge is followed.
+    pub(super) marginal: Option<Marginal>,
 }
 
 impl Hypothesis {
-    pub(super) fn evidence(&self) -> f64 {
-        let lump = self
+    /// Follows the ridge of the fit with an inclusion, where there is more for one than against.
+    pub(super) fn follow(&mut self, go_on: impl FnMut() -> bool) {
+        if let Some(fit) = self
             .lump
             .as_ref()
-            .map_or(f64::NEG_INFINITY, |fit| fit.evidence);
-        self.plain.evidence.max(lump)
+            .filter(|fit| fit.evidence > self.plain.evidence)
+        {
+            self.marginal = self.problem.marginal(fit, go_on);
+        }
+    }
+
+    pub(super) fn evidence(&self) -> f64 {
+        self.plain.evidence.max(self.evidence_with())
     }
 
     /// Log evidence with an inclusion: that of the grid where none was fitted.
     fn evidence_with(&self) -> f64 {
         match (&self.lump, &self.score) {
-            (Some(fit), _) => fit.evidence,
+            (Some(fit), _) => fit.evidence + self.marginal.as_ref().map_or(0.0, |m| m.gain),
             (None, Some(score)) => self.plain.evidence + score.log_odds,
             (None, None) => f64::NEG_INFINITY,
         }
@@ -84,24 +97,32 @@ impl Hypothesis {
         })
     }
 
-    /// Interval of a coordinate's logarithm by the standard error, widened by a factor.
-    fn interval(fit: &Fit, index: usize, coordinate: Coordinate, widened: f64) -> [f64; 2] {
-        let reach = TWO_SIDED_95 * widened * fit.covariance[(index, index)].sqrt();
-        let at = fit.parameters.get(coordinate);
-        [at - reach, at + reach]
+    /// Best value and 95 % interval of a coordinate, errors widened by a factor.
+    fn posterior(&self, fit: &Fit, coordinate: usize, widened: f64) -> (f64, [f64; 2]) {
+        let at = fit.parameters.get(COORDINATES[coordinate]);
+        let is_lump = fit.covariance.nrows() > BLOCK_COORDINATES;
+        let [low, high] = match self.marginal.as_ref().filter(|_| is_lump) {
+            Some(marginal) => marginal.interval(coordinate),
+            None => {
+                let reach = TWO_SIDED_95 * fit.covariance[(coordinate, coordinate)].sqrt();
+                [at - reach, at + reach]
+            }
+        };
+        // The optimum of a skewed posterior may lie at an end of its interval.
+        let (down, up) = ((at - low).max(0.0), (high - at).max(0.0));
+        (at, [at - widened * down, at + widened * up])
     }
 
-    /// Ends of the 95 % intervals of ln D, ln d and ln E₁, errors widened by a factor.
-    fn intervals(&self, fit: &Fit, widened: f64) -> [[f64; 2]; 3] {
-        let profile = self.problem.profile(fit);
-        core::array::from_fn(|k| {
-            let index = BLOCK_COORDINATES + k;
-            let Some(profile) = &profile else {
-                return Self::interval(fit, index, LUMP[k], widened);
-            };
-            let [down, up] = profile.reach(index, TWO_SIDED_95 * widened);
-            let at = fit.parameters.get(LUMP[k]);
-            [at - down, at + up]
+    /// Correlations of ln D, ln d and ln E₁.
+    fn correlation(&self, fit: &Fit) -> [[f64; 3]; 3] {
+        let marginal = self.marginal.as_ref().map(Marginal::covariance);
+        let c = marginal.as_ref().unwrap_or(&fit.covariance);
+        let at = |k: usize| BLOCK_COORDINATES + k;
+        core::array::from_fn(|i| {
+            core::array::from_fn(|k| {
+                let variances = c[(at(i), at(i))] * c[(at(k), at(k))];
+                c[(at(i), at(k))] / variances.sqrt()
+            })
         })
     }
 
@@ -136,33 +157,25 @@ impl Hypothesis {
             warnings.push(InclusionWarning::AtBoundary);
         }
         let is_reliable = chosen.converged && !is_poor && !is_unsolved && !is_at_boundary;
+        let estimated = |coordinate: usize| {
+            let (at, interval) = self.posterior(chosen, coordinate, widened);
+            let other = rival.map(|rival| {
+                let lump = rival.lump.as_ref().filter(|_| found.is_some());
+                rival
+                    .posterior(lump.unwrap_or(&rival.plain), coordinate, widened)
+                    .1
+            });
+            Estimated::within(at, other.map_or(interval, |other| hull(interval, other)))
+        };
         let inclusion = found.map(|fit| {
-            let mut intervals = self.intervals(fit, widened);
-            if let Some((rival, fit)) = rival.and_then(|rival| Some((rival, rival.lump.as_ref()?)))
-            {
-                let others = rival.intervals(fit, widened);
-                intervals = core::array::from_fn(|k| hull(intervals[k], others[k]));
-            }
-            let told = |k: usize| {
-                let at = fit.parameters.get(LUMP[k]);
-                Told::new(Estimated::within(at, intervals[k]), is_reliable)
-            };
+            let told = |k: usize| Told::new(estimated(BLOCK_COORDINATES + k), is_reliable);
             Inclusion {
                 diameter_m: told(0),
                 depth_m: told(1),
                 youngs_modulus_pa: told(2),
-                correlation: correlation(fit),
+                correlation: self.correlation(fit),
             }
         });
-        let modulus = |fit| Self::interval(fit, 0, Coordinate::BlockModulus, widened);
-        let block = match rival {
-            Some(rival) if found.is_some() => hull(
-                modulus(chosen),
-                modulus(rival.lump.as_ref().unwrap_or(&rival.plain)),
-            ),
-            Some(rival) => hull(modulus(chosen), modulus(&rival.plain)),
-            None => modulus(chosen),
-        };
         let rings = observed.radii_m.len();
         let split = |values: &[f64]| -> Vec<Vec<f64>> {
             let pressures = values[..observed.frames * rings].chunks(rings);
@@ -171,10 +184,7 @@ impl Hypothesis {
         InclusionEstimate {
             probability: probability(log_odds),
             found: found.is_some(),
-            block_modulus_pa: Estimated::within(
-                chosen.parameters.get(Coordinate::BlockModulus),
-                block,
-            ),
+            block_modulus_pa: estimated(0),
             inclusion,
             interface: self.interface,
             misfit,
@@ -193,16 +203,4 @@ fn probability(log_odds: f64) -> f64 {
 /// The least interval that holds two.
 fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
-}
-
-/// Correlations of ln D, ln d and ln E₁.
-fn correlation(fit: &Fit) -> [[f64; 3]; 3] {
-    let c = &fit.covariance;
-    let at = |k: usize| BLOCK_COORDINATES + k;
-    core::array::from_fn(|i| {
-        core::array::from_fn(|k| {
-            let variances = c[(at(i), at(i))] * c[(at(k), at(k))];
-            c[(at(i), at(k))] / variances.sqrt()
-        })
-    })
 }

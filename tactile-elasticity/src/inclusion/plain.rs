@@ -96,7 +96,7 @@ impl InclusionSearch {
         let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
         let problem = Problem {
             forward: Forward {
-                fineness: super::drafts::answer_fineness(interface, false),
+                fineness: super::drafts::answer_fineness(false),
                 ..problem.forward.clone()
             },
             measured: problem.measured.clone(),

@@ -25,9 +25,9 @@ const MIN_RINGS: usize = 8;
 /// finite elements err by on a sliding face, which the covariance knows by its size alone. Two frames on soft tissue by CalculiX
 /// preferred the wrong one by up to 5 (`inclusion_study` on the scenes of `evidence/inclusion_scenes.py`); the price is intervals
 /// that hold under both where the right one leads by less.
-const CLEAR_EVIDENCE: f64 = 8.0;
+const CLEAR_EVIDENCE: f64 = 12.0;
 /// Difference of log evidence beyond which another assumption about the face is not fitted to the end.
-const RIVAL_EVIDENCE: f64 = 12.0;
+const RIVAL_EVIDENCE: f64 = 16.0;
 
 /// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
 ///
@@ -165,6 +165,13 @@ impl InclusionSearch {
             let found = self.hypothesis(&observed, &approaches_m, draft, needed, &mut counter);
             is_unsolved |= found.is_none();
             hypotheses.extend(found);
+        }
+        let best = (hypotheses.iter()).map(Hypothesis::evidence);
+        let needed = best.fold(f64::NEG_INFINITY, f64::max) - RIVAL_EVIDENCE;
+        for hypothesis in &mut hypotheses {
+            if hypothesis.evidence() > needed {
+                hypothesis.follow(|| counter.step());
+            }
         }
         if counter.cancelled {
             return Err(ElasticityError::Cancelled);

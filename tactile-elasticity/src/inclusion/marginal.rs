@@ -1,0 +1,403 @@
+//! Marginal posteriors of an inclusion's parameters, which are not Gaussian.
+//!
+//! A stiff inclusion hardly changes the pressure when it gets stiffer still, and a small stiff one is hardly told from a
+//! large one that is little stiffer than the tissue: along such a ridge the posterior's density falls neither fast nor
+//! evenly, and the curvature at its top says little of its length. With u = ln E₁, θ all other coordinates, F the fit's objective
+//! (−2 ln of the posterior), θ(u) its minimum at given u and M(u) its curvature there in θ,
+//!
+//! $$ p(u) \propto |M(u)|^{-1/2} \exp(-F(u, \theta(u)) / 2) $$
+//!
+//! and at a given u the others are Gaussian about θ(u) with covariance M(u)⁻¹ (Laplace's approximation, nested: H. Rue, S. Martino & N.
+//! Chopin, J. R. Stat. Soc. B 71 (2009) 319). θ(u) is followed to both sides of the optimum by its tangent and one
+//! step of Gauss and Newton each, until p has become small.
+
+use super::fit::{Fit, Normal, Problem, Step};
+use super::forward::Solved;
+use super::parameters::{Coordinate, Parameters};
+use nalgebra::{DMatrix, DVector};
+
+/// Step along ln E₁ in its local standard error, and the largest: mesh and tangent follow the ridge that far.
+const STEP: f64 = 1.2;
+const LARGEST_STEP: f64 = 0.9;
+/// Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes on.
+const FALL: f64 = 2.9;
+/// Further fall in one step beyond which it was too long, and is halved.
+const CLIFF: f64 = 4.0;
+/// Distance from the ridge in standard errors above which one step to it does not do.
+const LONG: f64 = 1.0;
+/// Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
+const RISE: f64 = 0.3;
+/// Nodes of a side; reached where E₁ is open and the prior alone ends it.
+const MAX_NODES: usize = 8;
+/// Points of the quadrature over u.
+const POINTS: usize = 200;
+/// Fall of ln p beyond the last node up to which its slope is followed.
+const TAIL: f64 = 4.0;
+
+/// The ridge at one E₁.
+#[derive(Debug, Clone)]
+struct Node {
+    /// Logarithm of p(u), up to a constant.
+    density: f64,
+    /// Values of all coordinates.
+    at: DVector<f64>,
+    /// Their covariance at this E₁, whose own row is zero.
+    covariance: DMatrix<f64>,
+}
+
+/// A point from which the ridge is followed.
+struct Place {
+    parameters: Parameters,
+    /// Change of all coordinates by one of ln E₁, along the ridge.
+    tangent: DVector<f64>,
+    /// Standard error of ln E₁.
+    error: f64,
+    /// How far the parameters were from the ridge, in standard errors.
+    away: f64,
+    solved: Solved,
+}
+
+/// Marginal posteriors of all coordinates: a mixture of Gaussians.
+#[derive(Debug, Clone)]
+pub(super) struct Marginal {
+    weights: Vec<f64>,
+    points: Vec<Node>,
+    /// Logarithm of the evidence over that by the curvature at the optimum.
+    pub(super) gain: f64,
+}
+
+impl Problem {
+    /// The marginals at an optimum with an inclusion; `None` where neither side can be followed.
+    pub(super) fn marginal(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Marginal> {
+        let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
+        let normal = self.normal(&fit.parameters, Some(&fit.solved))?;
+        let (node, start) = self.node(&fit.parameters, normal, index)?;
+        let top = node.density;
+        let mut nodes = vec![node];
+        for sign in [-1.0, 1.0] {
+            let mut place = Place {
+                solved: fit.solved.clone(),
+                tangent: start.tangent.clone(),
+                ..start
+            };
+            let mut part = 1.0;
+            for _ in 0..MAX_NODES {
+                let step = part * (STEP * place.error).min(LARGEST_STEP);
+                let at = self.stepped(&place.parameters, &(sign * step * &place.tangent));
+                let near = &place.solved;
+                let Some((node, next)) = self.settled_node(&at, near, index, &mut go_on) else {
+                    break;
+                };
+                let density = node.density;
+                if density < top - FALL - CLIFF {
+                    // The ridge bends or ends on the way: an inclusion as soft as the tissue is none.
+                    part *= 0.5;
+                    continue;
+                }
+                if sign < 0.0 {
+                    nodes.insert(0, node);
+                } else {
+                    nodes.push(node);
+                }
+                place = next;
+                if density < top - FALL {
+                    break;
+                }
+            }
+        }
+        let volume = 0.5 * core::f64::consts::TAU.ln() + start.error.ln();
+        Marginal::new(&nodes, index, top + volume)
+    }
+
+    /// The ridge at the E₁ of some parameters nearby, solved anew where the first step to it was long.
+    fn settled_node(
+        &self,
+        at: &Parameters,
+        near: &Solved,
+        index: usize,
+        go_on: &mut impl FnMut() -> bool,
+    ) -> Option<(Node, Place)> {
+        let mut solve =
+            |at: &Parameters, near: &Solved| go_on().then(|| self.normal(at, Some(near))).flatten();
+        let (node, place) = self.node(at, solve(at, near)?, index)?;
+        if place.away < LONG {
+            return Some((node, place));
+        }
+        let normal = solve(&place.parameters, &place.solved)?;
+        self.node(&place.parameters, normal, index)
+    }
+
+    /// The ridge at the E₁ of some parameters nearby.
+    fn node(&self, at: &Parameters, normal: Normal, index: usize) -> Option<(Node, Place)> {
+        let Step { by, size } = self.step(at, &normal, 0.0, Some(index))?;
+        let fall = 2.0 * by.dot(&normal.gradient) - by.dot(&(&normal.matrix * &by));
+        let objective = normal.misfit + normal.penalty - fall;
+        let mut matrix = normal.matrix.clone();
+        let mut along = -normal.matrix.column(index);
+        matrix.row_mut(index).fill(0.0);
+        matrix.column_mut(index).fill(0.0);
+        matrix[(index, index)] = 1.0;
+        along[index] = 1.0;
+        let factor = matrix.cholesky()?;
+        let logarithm: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        let tangent = factor.solve(&along);
+        let mut covariance = factor.inverse();
+        covariance[(index, index)] = 0.0;
+        let curvature = tangent.dot(&(&normal.matrix * &tangent));
+        let parameters = self.stepped(at, &by);
+        let values = self
+            .priors
+            .iter()
+            .map(|prior| parameters.get(prior.coordinate));
+        let node = Node {
+            density: -0.5 * objective - logarithm,
+            at: DVector::from_iterator(self.priors.len(), values),
+            covariance,
+        };
+        let place = Place {
+            parameters,
+            tangent,
+            error: curvature.sqrt().recip(),
+            away: size,
+            solved: normal.solved,
+        };
+        Some((node, place))
+    }
+}
+
+/// A function of the nodes at `x` in the interval after node `k`: the mean of the parabolas through the nodes around it.
+fn between(xs: &[f64], ys: &[f64], k: usize, x: f64) -> f64 {
+    let parabola = |first: usize| -> f64 {
+        let [a, b, c] = [xs[first], xs[first + 1], xs[first + 2]];
+        ys[first] * (x - b) * (x - c) / ((a - b) * (a - c))
+            + ys[first + 1] * (x - a) * (x - c) / ((b - a) * (b - c))
+            + ys[first + 2] * (x - a) * (x - b) / ((c - a) * (c - b))
+    };
+    match (k > 0, k + 2 < xs.len()) {
+        (true, true) => 0.5 * (parabola(k - 1) + parabola(k)),
+        (true, false) => parabola(k - 1),
+        (false, _) => parabola(k),
+    }
+}
+
+/// The ridge between its nodes and beyond the outermost.
+struct Ridge<'a> {
+    nodes: &'a [Node],
+    /// ln E₁ of the nodes, ascending.
+    xs: Vec<f64>,
+}
+
+impl Ridge<'_> {
+    /// Fall of ln p by ln E₁ beyond the first node, or the last: the parabola's through three there, not below the last
+    /// interval's and not negative.
+    fn slope(&self, is_first: bool) -> f64 {
+        let last = self.xs.len() - 1;
+        let [a, b, c] = if is_first {
+            [0, 1, 2]
+        } else {
+            [last, last - 1, last - 2]
+        };
+        let step = |from: usize, to: usize| (self.xs[to] - self.xs[from]).abs();
+        let mean = |outer: usize, inner: usize| {
+            (self.nodes[inner].density - self.nodes[outer].density) / step(outer, inner)
+        };
+        let (near, far) = (mean(a, b), mean(b, c));
+        (near + ((near - far) * step(a, b) / step(a, c)).max(0.0)).max(0.0)
+    }
+
+    /// How far that slope is followed.
+    fn tail(&self, is_first: bool) -> f64 {
+        let last = self.xs.len() - 1;
+        let [outer, inner] = if is_first { [0, 1] } else { [last, last - 1] };
+        let step = (self.xs[outer] - self.xs[inner]).abs();
+        // A side that ended before p fell is followed as far as its last step.
+        (TAIL / self.slope(is_first).max(1e-9)).clamp(step, 4.0 * step)
+    }
+
+    /// The ridge at ln E₁.
+    fn at(&self, x: f64) -> Node {
+        let last = self.xs.len() - 1;
+        let k = self.xs.partition_point(|node| *node < x).clamp(1, last) - 1;
+        let (a, b) = (&self.nodes[k], &self.nodes[k + 1]);
+        let part = (x - self.xs[k]) / (self.xs[k + 1] - self.xs[k]);
+        if !(0.0..=1.0).contains(&part) {
+            let (end, other, beyond) = if part < 0.0 {
+                (a, b, -part)
+            } else {
+                (b, a, part - 1.0)
+            };
+            let away = beyond * (self.xs[k + 1] - self.xs[k]);
+            return Node {
+                density: end.density - away * self.slope(part < 0.0),
+                at: &end.at + beyond * (&end.at - &other.at),
+                covariance: end.covariance.clone(),
+            };
+        }
+        let value = |of: &dyn Fn(&Node) -> f64| {
+            let ys: Vec<f64> = self.nodes.iter().map(of).collect();
+            between(&self.xs, &ys, k, x)
+        };
+        let (low, high) = (a.density.min(b.density), a.density.max(b.density));
+        Node {
+            density: value(&|node| node.density).clamp(low, high + RISE),
+            at: DVector::from_fn(a.at.len(), |c, _| value(&|node| node.at[c])),
+            covariance: &a.covariance * (1.0 - part) + &b.covariance * part,
+        }
+    }
+}
+
+impl Marginal {
+    /// Of the ridge's nodes along coordinate `index`; `laplace` is the logarithm of the integral by the curvature.
+    fn new(nodes: &[Node], index: usize, laplace: f64) -> Option<Self> {
+        let xs: Vec<f64> = nodes.iter().map(|node| node.at[index]).collect();
+        if xs.len() < 3 || xs.windows(2).any(|pair| pair[1] <= pair[0]) {
+            return None;
+        }
+        let last = xs.len() - 1;
+        let ridge = Ridge { nodes, xs };
+        let from = ridge.xs[0] - ridge.tail(true);
+        let to = ridge.xs[last] + ridge.tail(false);
+        let step = (to - from) / POINTS as f64;
+        let mut points: Vec<Node> = (0..POINTS)
+            .map(|point| ridge.at(from + (point as f64 + 0.5) * step))
+            .collect();
+        for point in &mut points {
+            // The point's own width.
+            point.covariance[(index, index)] = step * step / 12.0;
+        }
+        let largest = (points.iter())
+            .map(|point| point.density)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let weight = |point: &Node| (point.density - largest).exp();
+        let sum: f64 = points.iter().map(weight).sum();
+        Some(Self {
+            weights: points.iter().map(|point| weight(point) / sum).collect(),
+            points,
+            gain: largest + (sum * step).ln() - laplace,
+        })
+    }
+
+    /// The interval that a coordinate lies in with a probability of 95 %, as likely below as above it.
+    pub(super) fn interval(&self, coordinate: usize) -> [f64; 2] {
+        [0.025, 0.975].map(|probability| self.quantile(coordinate, probability))
+    }
+
+    /// The value that a coordinate is below with this probability.
+    fn quantile(&self, coordinate: usize, probability: f64) -> f64 {
+        let each = || {
+            (self.points.iter()).map(|point| {
+                let error = point.covariance[(coordinate, coordinate)].sqrt();
+                (point.at[coordinate], error)
+            })
+        };
+        let mut low = f64::INFINITY;
+        let mut high = f64::NEG_INFINITY;
+        for (at, error) in each() {
+            low = low.min(at - 6.0 * error);
+            high = high.max(at + 6.0 * error);
+        }
+        // Bisection to a millionth of the range.
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            let below: f64 = (each().zip(&self.weights))
+                .map(|((at, error), weight)| weight * normal_below((middle - at) / error))
+                .sum();
+            if below < probability {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+
+    /// Covariance of the coordinates.
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
+        let count = self.points[0].at.len();
+        let mut mean = DVector::zeros(count);
+        for (weight, point) in self.weights.iter().zip(&self.points) {
+            mean.axpy(*weight, &point.at, 1.0);
+        }
+        let mut covariance = DMatrix::zeros(count, count);
+        for (weight, point) in self.weights.iter().zip(&self.points) {
+            let off = &point.at - &mean;
+            covariance += *weight * (&point.covariance + &off * off.transpose());
+        }
+        covariance
+    }
+}
+
+/// Probability that a standard normal deviate is below `x`.
+fn normal_below(x: f64) -> f64 {
+    // M. Abramowitz & I. A. Stegun, 26.2.17: within 1e-7.
+    const TERMS: [f64; 5] = [
+        0.319_381_530,
+        -0.356_563_782,
+        1.781_477_937,
+        -1.821_255_978,
+        1.330_274_429,
+    ];
+    let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
+    let sum = TERMS.iter().rev().fold(0.0, |sum, term| (sum + term) * t);
+    let above = sum * (-0.5 * x * x).exp() / core::f64::consts::TAU.sqrt();
+    if x > 0.0 { 1.0 - above } else { above }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DMatrix, DVector, Marginal, Node};
+
+    /// Nodes at these deviations of ln E₁, on which another coordinate depends linearly.
+    fn nodes(at: &[f64], density: impl Fn(f64) -> f64) -> Vec<Node> {
+        let node = |x: &f64| Node {
+            density: density(*x),
+            at: DVector::from_vec(vec![-0.5 * x, *x]),
+            covariance: DMatrix::from_diagonal(&DVector::from_vec(vec![0.04, 0.0])),
+        };
+        at.iter().map(node).collect()
+    }
+
+    #[test]
+    fn a_gaussian_has_its_own_interval_and_evidence() {
+        let (error, top) = (0.3, -7.0);
+        let at: Vec<f64> = (-2..=2).map(|k| 0.36 * f64::from(k)).collect();
+        let nodes = nodes(&at, |x| top - 0.5 * (x / error).powi(2));
+        let laplace = top + 0.5 * core::f64::consts::TAU.ln() + f64::ln(error);
+        let marginal = Marginal::new(&nodes, 1, laplace).unwrap();
+        // Beyond the outermost node, at 2.4 standard errors, the slope goes on: 1 % of the probability lies there.
+        let own = 1.96 * error;
+        let other = 1.96 * f64::hypot(0.5 * error, 0.2);
+        for (coordinate, reach) in [(1, own), (0, other)] {
+            let [low, high] = marginal.interval(coordinate);
+            assert!(
+                (high / reach - 1.0).abs() < 0.03,
+                "{coordinate}: {high} {reach}"
+            );
+            assert!(
+                (low / reach + 1.0).abs() < 0.03,
+                "{coordinate}: {low} {reach}"
+            );
+        }
+        assert!(marginal.gain.abs() < 0.03, "{}", marginal.gain);
+        let correlation = marginal.covariance()[(0, 1)] / (0.3 * f64::hypot(0.15, 0.2));
+        assert!((correlation + 0.6).abs() < 0.05, "{correlation}");
+    }
+
+    #[test]
+    fn a_ridge_that_is_open_upwards_reaches_further_there() {
+        // Falls as a Gaussian below and a ninth as fast above.
+        let fall = |x: f64| if x < 0.0 { 12.5 * x * x } else { 1.4 * x * x };
+        let nodes = nodes(&[-0.5, -0.25, 0.0, 0.6, 1.2, 1.8], |x| -fall(x));
+        let [low, high] = Marginal::new(&nodes, 1, 0.0).unwrap().interval(1);
+        // The exact ends, of two halves of Gaussians with standard errors of 0.2 and 0.6.
+        assert!(
+            (low + 0.33).abs() < 0.05 && (high - 1.27).abs() < 0.08,
+            "{low} {high}"
+        );
+    }
+
+    #[test]
+    fn two_nodes_are_no_ridge() {
+        assert!(Marginal::new(&nodes(&[0.0, 1.0], |_| 0.0), 1, 0.0).is_none());
+    }
+}
