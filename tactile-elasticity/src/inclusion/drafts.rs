@@ -4,7 +4,7 @@ use super::InclusionSearch;
 use super::covariance::{Observed, Resolution};
 use super::fit::{DRAFTED, Fit, Problem, SETTLED};
 use super::hypothesis::{BLOCK_COORDINATES, Hypothesis, LEAST_GAIN};
-use super::plain::Plain;
+use super::plain::{Plain, answer_fineness};
 use super::progress::Counter;
 use super::score::Score;
 use crate::fem::Interface;
@@ -19,15 +19,7 @@ const CERTAIN_EVIDENCE: f64 = 50.0;
 /// Difference of the first fits' log evidence beyond which an assumption about the face is given up: this
 /// and a part of the better one's misfit, most of which is the mesh's.
 const HOPELESS_EVIDENCE: f64 = 25.0;
-const HOPELESS_MISFIT: f64 = 0.1;
-
-/// Elements along an eighth of the inclusion's circumference for the answer. Of bonded blocks the pressure is within 0.05 %
-/// of a mesh of ten; five leave waves of 0.1 % above a wide shallow inclusion, which move its size and depth by one bound, and where
-/// the face slides χ² by up to ten, enough to take it for one that sticks. On an inclusion that hardly shows the noise errs by
-/// more than five elements do.
-pub(super) fn answer_fineness(is_certain: bool) -> usize {
-    if is_certain { 7 } else { 5 }
-}
+const HOPELESS_MISFIT: f64 = 0.05;
 
 /// The best first fits under one assumption about the face.
 ///

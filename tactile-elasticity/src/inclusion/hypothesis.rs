@@ -61,7 +61,8 @@ impl Hypothesis {
             .as_ref()
             .filter(|fit| fit.evidence > self.plain.evidence)
         {
-            self.marginal = self.problem.marginal(fit, go_on);
+            let ridge = self.problem.ridge(fit, go_on);
+            self.marginal = ridge.as_ref().and_then(Marginal::new);
         }
     }
 

@@ -8,54 +8,21 @@
 //! $$ p(u) \propto |M(u)|^{-1/2} \exp(-F(u, \theta(u)) / 2) $$
 //!
 //! and at a given u the others are Gaussian about θ(u) with covariance M(u)⁻¹ (Laplace's approximation, nested: H. Rue, S. Martino & N.
-//! Chopin, J. R. Stat. Soc. B 71 (2009) 319). θ(u) is followed to both sides of the optimum by its tangent and one
-//! step of Gauss and Newton each, until p has become small.
+//! Chopin, J. R. Stat. Soc. B 71 (2009) 319), which gives evidence, covariance and quantiles. The likelihood ratio's interval
+//! is where F, least over all other coordinates, has risen by that of a Gaussian (O. E. Barndorff-Nielsen & D. R. Cox, *Inference and
+//! Asymptotics*, 1994).
 
-use super::fit::{Fit, Normal, Problem, Step};
-use super::forward::Solved;
-use super::parameters::{Coordinate, Parameters};
+use super::ridge::{Node, Ridge};
 use nalgebra::{DMatrix, DVector};
 
-/// Step along ln E₁ in its local standard error, and the largest: mesh and tangent follow the ridge that far.
-const STEP: f64 = 1.2;
-const LARGEST_STEP: f64 = 0.9;
-/// Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes on.
-const FALL: f64 = 2.9;
-/// Further fall in one step beyond which it was too long, and is halved.
-const CLIFF: f64 = 4.0;
-/// Distance from the ridge in standard errors above which one step to it does not do.
-const LONG: f64 = 1.0;
 /// Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
 const RISE: f64 = 0.3;
-/// Nodes of a side; reached where E₁ is open and the prior alone ends it.
-const MAX_NODES: usize = 8;
+/// Rise of F at an end of an interval of 95 %: that of χ² with one degree of freedom.
+const LIKELIHOOD_RATIO: f64 = 3.84;
 /// Points of the quadrature over u.
 const POINTS: usize = 200;
 /// Fall of ln p beyond the last node up to which its slope is followed.
 const TAIL: f64 = 4.0;
-
-/// The ridge at one E₁.
-#[derive(Debug, Clone)]
-struct Node {
-    /// Logarithm of p(u), up to a constant.
-    density: f64,
-    /// Values of all coordinates.
-    at: DVector<f64>,
-    /// Their covariance at this E₁, whose own row is zero.
-    covariance: DMatrix<f64>,
-}
-
-/// A point from which the ridge is followed.
-struct Place {
-    parameters: Parameters,
-    /// Change of all coordinates by one of ln E₁, along the ridge.
-    tangent: DVector<f64>,
-    /// Standard error of ln E₁.
-    error: f64,
-    /// How far the parameters were from the ridge, in standard errors.
-    away: f64,
-    solved: Solved,
-}
 
 /// Marginal posteriors of all coordinates: a mixture of Gaussians.
 #[derive(Debug, Clone)]
@@ -64,105 +31,6 @@ pub(super) struct Marginal {
     points: Vec<Node>,
     /// Logarithm of the evidence over that by the curvature at the optimum.
     pub(super) gain: f64,
-}
-
-impl Problem {
-    /// The marginals at an optimum with an inclusion; `None` where neither side can be followed.
-    pub(super) fn marginal(&self, fit: &Fit, mut go_on: impl FnMut() -> bool) -> Option<Marginal> {
-        let index = (self.coordinates().iter()).position(|c| *c == Coordinate::LumpModulus)?;
-        let normal = self.normal(&fit.parameters, Some(&fit.solved))?;
-        let (node, start) = self.node(&fit.parameters, normal, index)?;
-        let top = node.density;
-        let mut nodes = vec![node];
-        for sign in [-1.0, 1.0] {
-            let mut place = Place {
-                solved: fit.solved.clone(),
-                tangent: start.tangent.clone(),
-                ..start
-            };
-            let mut part = 1.0;
-            for _ in 0..MAX_NODES {
-                let step = part * (STEP * place.error).min(LARGEST_STEP);
-                let at = self.stepped(&place.parameters, &(sign * step * &place.tangent));
-                let near = &place.solved;
-                let Some((node, next)) = self.settled_node(&at, near, index, &mut go_on) else {
-                    break;
-                };
-                let density = node.density;
-                if density < top - FALL - CLIFF {
-                    // The ridge bends or ends on the way: an inclusion as soft as the tissue is none.
-                    part *= 0.5;
-                    continue;
-                }
-                if sign < 0.0 {
-                    nodes.insert(0, node);
-                } else {
-                    nodes.push(node);
-                }
-                place = next;
-                if density < top - FALL {
-                    break;
-                }
-            }
-        }
-        let volume = 0.5 * core::f64::consts::TAU.ln() + start.error.ln();
-        Marginal::new(&nodes, index, top + volume)
-    }
-
-    /// The ridge at the E₁ of some parameters nearby, solved anew where the first step to it was long.
-    fn settled_node(
-        &self,
-        at: &Parameters,
-        near: &Solved,
-        index: usize,
-        go_on: &mut impl FnMut() -> bool,
-    ) -> Option<(Node, Place)> {
-        let mut solve =
-            |at: &Parameters, near: &Solved| go_on().then(|| self.normal(at, Some(near))).flatten();
-        let (node, place) = self.node(at, solve(at, near)?, index)?;
-        if place.away < LONG {
-            return Some((node, place));
-        }
-        let normal = solve(&place.parameters, &place.solved)?;
-        self.node(&place.parameters, normal, index)
-    }
-
-    /// The ridge at the E₁ of some parameters nearby.
-    fn node(&self, at: &Parameters, normal: Normal, index: usize) -> Option<(Node, Place)> {
-        let Step { by, size } = self.step(at, &normal, 0.0, Some(index))?;
-        let fall = 2.0 * by.dot(&normal.gradient) - by.dot(&(&normal.matrix * &by));
-        let objective = normal.misfit + normal.penalty - fall;
-        let mut matrix = normal.matrix.clone();
-        let mut along = -normal.matrix.column(index);
-        matrix.row_mut(index).fill(0.0);
-        matrix.column_mut(index).fill(0.0);
-        matrix[(index, index)] = 1.0;
-        along[index] = 1.0;
-        let factor = matrix.cholesky()?;
-        let logarithm: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-        let tangent = factor.solve(&along);
-        let mut covariance = factor.inverse();
-        covariance[(index, index)] = 0.0;
-        let curvature = tangent.dot(&(&normal.matrix * &tangent));
-        let parameters = self.stepped(at, &by);
-        let values = self
-            .priors
-            .iter()
-            .map(|prior| parameters.get(prior.coordinate));
-        let node = Node {
-            density: -0.5 * objective - logarithm,
-            at: DVector::from_iterator(self.priors.len(), values),
-            covariance,
-        };
-        let place = Place {
-            parameters,
-            tangent,
-            error: curvature.sqrt().recip(),
-            away: size,
-            solved: normal.solved,
-        };
-        Some((node, place))
-    }
 }
 
 /// A function of the nodes at `x` in the interval after node `k`: the mean of the parabolas through the nodes around it.
@@ -181,13 +49,13 @@ fn between(xs: &[f64], ys: &[f64], k: usize, x: f64) -> f64 {
 }
 
 /// The ridge between its nodes and beyond the outermost.
-struct Ridge<'a> {
+struct Curve<'a> {
     nodes: &'a [Node],
     /// ln E₁ of the nodes, ascending.
     xs: Vec<f64>,
 }
 
-impl Ridge<'_> {
+impl Curve<'_> {
     /// Fall of ln p by ln E₁ beyond the first node, or the last: the parabola's through three there, not below the last
     /// interval's and not negative.
     fn slope(&self, is_first: bool) -> f64 {
@@ -228,6 +96,7 @@ impl Ridge<'_> {
             };
             let away = beyond * (self.xs[k + 1] - self.xs[k]);
             return Node {
+                objective: end.objective + 2.0 * away * self.slope(part < 0.0),
                 density: end.density - away * self.slope(part < 0.0),
                 at: &end.at + beyond * (&end.at - &other.at),
                 covariance: end.covariance.clone(),
@@ -238,7 +107,10 @@ impl Ridge<'_> {
             between(&self.xs, &ys, k, x)
         };
         let (low, high) = (a.density.min(b.density), a.density.max(b.density));
+        let objective = value(&|node| node.objective);
+        let (least, most) = (a.objective.min(b.objective), a.objective.max(b.objective));
         Node {
+            objective: objective.clamp(least - 2.0 * RISE, most),
             density: value(&|node| node.density).clamp(low, high + RISE),
             at: DVector::from_fn(a.at.len(), |c, _| value(&|node| node.at[c])),
             covariance: &a.covariance * (1.0 - part) + &b.covariance * part,
@@ -247,19 +119,20 @@ impl Ridge<'_> {
 }
 
 impl Marginal {
-    /// Of the ridge's nodes along coordinate `index`; `laplace` is the logarithm of the integral by the curvature.
-    fn new(nodes: &[Node], index: usize, laplace: f64) -> Option<Self> {
+    /// Of a ridge; `None` where neither side could be followed.
+    pub(super) fn new(ridge: &Ridge) -> Option<Self> {
+        let (nodes, index) = (&ridge.nodes, ridge.index);
         let xs: Vec<f64> = nodes.iter().map(|node| node.at[index]).collect();
         if xs.len() < 3 || xs.windows(2).any(|pair| pair[1] <= pair[0]) {
             return None;
         }
         let last = xs.len() - 1;
-        let ridge = Ridge { nodes, xs };
-        let from = ridge.xs[0] - ridge.tail(true);
-        let to = ridge.xs[last] + ridge.tail(false);
+        let curve = Curve { nodes, xs };
+        let from = curve.xs[0] - curve.tail(true);
+        let to = curve.xs[last] + curve.tail(false);
         let step = (to - from) / POINTS as f64;
         let mut points: Vec<Node> = (0..POINTS)
-            .map(|point| ridge.at(from + (point as f64 + 0.5) * step))
+            .map(|point| curve.at(from + (point as f64 + 0.5) * step))
             .collect();
         for point in &mut points {
             // The point's own width.
@@ -273,13 +146,34 @@ impl Marginal {
         Some(Self {
             weights: points.iter().map(|point| weight(point) / sum).collect(),
             points,
-            gain: largest + (sum * step).ln() - laplace,
+            gain: largest + (sum * step).ln() - ridge.laplace,
         })
     }
 
-    /// The interval that a coordinate lies in with a probability of 95 %, as likely below as above it.
+    /// The 95 % interval of a coordinate: the least that holds both the likelihood ratio's and the one with equal tails of
+    /// probability. Along a ridge each left out truths that the other holds, for the mesh's waves move F by a few units.
     pub(super) fn interval(&self, coordinate: usize) -> [f64; 2] {
-        [0.025, 0.975].map(|probability| self.quantile(coordinate, probability))
+        let region = self.region(coordinate, LIKELIHOOD_RATIO);
+        let tails = [0.025, 0.975].map(|probability| self.quantile(coordinate, probability));
+        [region[0].min(tails[0]), region[1].max(tails[1])]
+    }
+
+    /// Values of a coordinate at which the objective, least over all others, exceeds its least by no more than `rise`: 3.84 for
+    /// an interval of 95 %, whatever the coordinate's scale.
+    fn region(&self, coordinate: usize, rise: f64) -> [f64; 2] {
+        let least = (self.points.iter())
+            .map(|point| point.objective)
+            .fold(f64::INFINITY, f64::min);
+        let mut interval = [f64::INFINITY, f64::NEG_INFINITY];
+        for point in &self.points {
+            let left = rise - (point.objective - least);
+            if left >= 0.0 {
+                let reach = (left * point.covariance[(coordinate, coordinate)]).sqrt();
+                let at = point.at[coordinate];
+                interval = [interval[0].min(at - reach), interval[1].max(at + reach)];
+            }
+        }
+        interval
     }
 
     /// The value that a coordinate is below with this probability.
@@ -345,26 +239,30 @@ fn normal_below(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{DMatrix, DVector, Marginal, Node};
+    use super::{DMatrix, DVector, Marginal, Node, Ridge};
 
     /// Nodes at these deviations of ln E₁, on which another coordinate depends linearly.
-    fn nodes(at: &[f64], density: impl Fn(f64) -> f64) -> Vec<Node> {
+    fn ridge(at: &[f64], density: impl Fn(f64) -> f64, laplace: f64) -> Ridge {
         let node = |x: &f64| Node {
+            objective: -2.0 * density(*x),
             density: density(*x),
             at: DVector::from_vec(vec![-0.5 * x, *x]),
             covariance: DMatrix::from_diagonal(&DVector::from_vec(vec![0.04, 0.0])),
         };
-        at.iter().map(node).collect()
+        Ridge {
+            nodes: at.iter().map(node).collect(),
+            index: 1,
+            laplace,
+        }
     }
 
     #[test]
     fn a_gaussian_has_its_own_interval_and_evidence() {
         let (error, top) = (0.3, -7.0);
         let at: Vec<f64> = (-2..=2).map(|k| 0.36 * f64::from(k)).collect();
-        let nodes = nodes(&at, |x| top - 0.5 * (x / error).powi(2));
         let laplace = top + 0.5 * core::f64::consts::TAU.ln() + f64::ln(error);
-        let marginal = Marginal::new(&nodes, 1, laplace).unwrap();
-        // Beyond the outermost node, at 2.4 standard errors, the slope goes on: 1 % of the probability lies there.
+        let ridge = ridge(&at, |x| top - 0.5 * (x / error).powi(2), laplace);
+        let marginal = Marginal::new(&ridge).unwrap();
         let own = 1.96 * error;
         let other = 1.96 * f64::hypot(0.5 * error, 0.2);
         for (coordinate, reach) in [(1, own), (0, other)] {
@@ -387,17 +285,17 @@ mod tests {
     fn a_ridge_that_is_open_upwards_reaches_further_there() {
         // Falls as a Gaussian below and a ninth as fast above.
         let fall = |x: f64| if x < 0.0 { 12.5 * x * x } else { 1.4 * x * x };
-        let nodes = nodes(&[-0.5, -0.25, 0.0, 0.6, 1.2, 1.8], |x| -fall(x));
-        let [low, high] = Marginal::new(&nodes, 1, 0.0).unwrap().interval(1);
-        // The exact ends, of two halves of Gaussians with standard errors of 0.2 and 0.6.
+        let ridge = ridge(&[-0.5, -0.25, 0.0, 0.6, 1.2, 1.8], |x| -fall(x), 0.0);
+        let [low, high] = Marginal::new(&ridge).unwrap().region(1, 3.84);
+        // Where it has fallen by half of 3.84.
         assert!(
-            (low + 0.33).abs() < 0.05 && (high - 1.27).abs() < 0.08,
+            (low + 0.392).abs() < 0.03 && (high - 1.171).abs() < 0.06,
             "{low} {high}"
         );
     }
 
     #[test]
     fn two_nodes_are_no_ridge() {
-        assert!(Marginal::new(&nodes(&[0.0, 1.0], |_| 0.0), 1, 0.0).is_none());
+        assert!(Marginal::new(&ridge(&[0.0, 1.0], |_| 0.0, 0.0)).is_none());
     }
 }

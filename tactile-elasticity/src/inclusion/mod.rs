@@ -13,13 +13,15 @@
 //!
 //! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there gives
 //! errors and correlations, its determinant the evidence (Laplace), whose ratio with and without
-//! inclusion is the odds that there is one. The intervals of D, d and E₁ are those of the profile along ln E₁, which
-//! is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no more.
+//! inclusion is the odds that there is one. The intervals of D, d and E₁ follow the posterior along ln E₁ and hold both its 95 % and
+//! the likelihood ratio's, for it is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no
+//! more, and a small stiff one is hardly told from a large one that is little stiffer than the tissue. Where bonded and frictionless
+//! faces explain the frames about equally well the intervals hold those of both.
 //!
 //! # References
 //! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won, IEEE Sensors
 //! J. 13 (2013). A. Tarantola, *Inverse Problem Theory* (2005). R. E. Kass & A. E. Raftery, J. Am. Stat.
-//! Assoc. 90 (1995) 773.
+//! Assoc. 90 (1995) 773. H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B 71 (2009) 319.
 #[cfg(test)]
 mod against_calculix;
 mod covariance;
@@ -37,6 +39,7 @@ mod parameters;
 mod plain;
 mod profiles;
 mod progress;
+mod ridge;
 mod score;
 mod search;
 mod specimen;

@@ -21,10 +21,10 @@ use core::ops::ControlFlow;
 const REACH: f64 = 0.75;
 /// Fewer rings do not show an inclusion's shape.
 const MIN_RINGS: usize = 8;
-/// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1 and as much again for what the
-/// finite elements err by on a sliding face, which the covariance knows by its size alone. Two frames on soft tissue by CalculiX
-/// preferred the wrong one by up to 5 (`inclusion_study` on the scenes of `evidence/inclusion_scenes.py`); the price is intervals
-/// that hold under both where the right one leads by less.
+/// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1 and three times as much again for
+/// what the finite elements err by on a sliding face, which the covariance knows by its size alone. Two frames on soft tissue by
+/// CalculiX preferred the wrong one by up to 9 (`inclusion_study` on the scenes of `evidence/inclusion_scenes.py`); the price is
+/// intervals that hold under both where the right one leads by less.
 const CLEAR_EVIDENCE: f64 = 12.0;
 /// Difference of log evidence beyond which another assumption about the face is not fitted to the end.
 const RIVAL_EVIDENCE: f64 = 16.0;
@@ -32,8 +32,9 @@ const RIVAL_EVIDENCE: f64 = 16.0;
 /// Finds a spherical inclusion in a block from the pressure on a guide's face at some approaches.
 ///
 /// Maximum a posteriori over ln D, ln d, ln E₁, ln E₀, the block's height, ν and the approaches' zero by
-/// Levenberg–Marquardt on finite-strain finite elements from several starts; errors by Laplace's
-/// approximation and the profile along ln E₁; an inclusion's probability from the evidence with and without one.
+/// Levenberg–Marquardt on finite-strain finite elements from several starts, once a score test says that an inclusion would explain
+/// more than the plain block; intervals by following the posterior along ln E₁; an inclusion's probability from the evidence with
+/// and without one.
 ///
 /// ```no_run
 /// use tactile_elasticity::fem::{Guide, Layer, Material};
