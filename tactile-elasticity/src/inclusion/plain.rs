@@ -76,7 +76,9 @@ impl InclusionSearch {
             kinematics: Kinematics::Linear,
             ..forward
         };
-        let grid = starts(&linear, &fit.parameters, counter)?;
+        // A plain block that fits an inclusion's pressures is bent out of what is known of it; starts are not.
+        let known = self.plain_block(fit.parameters.block_modulus_pa);
+        let grid = starts(&linear, &known, counter)?;
         let settled = if fit.misfit < DOUBTFUL * observed.values.len() as f64 {
             self.settled(&problem, &fit, observed, &grid, counter)
         } else {
