@@ -36,7 +36,7 @@ struct ModelErrors {
 const SHAPE_LENGTH: f64 = 0.4;
 
 /// Against CalculiX, over bonded blocks with and without inclusion: all pressures 0.05 to 0.2 % low,
-/// the shape within 0.1 %, lower by 0.05 to 0.3 % towards the rim, waves of 0.05 % there, forces 0.1 to 1 % low.
+/// the shape within 0.1 %, lower by 0.05 to 0.3 % towards the rim, waves of 0.05 to 0.1 % there, forces 0.1 to 1 % low.
 /// What grows as the face sinks in: between meshes of 5 and 10 elements an eighth, 0.1 % at the outermost radius and 0.3 % of the force.
 const BONDED: ModelErrors = ModelErrors {
     scale: 2e-3,
