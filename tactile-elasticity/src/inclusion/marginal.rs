@@ -14,6 +14,7 @@
 
 use super::ridge::{Node, Ridge};
 use nalgebra::{DMatrix, DVector};
+use statrs::function::erf::erfc;
 
 /// Largest rise of ln p between nodes: parabolas through uneven ones overshoot.
 const RISE: f64 = 0.3;
@@ -223,18 +224,7 @@ impl Marginal {
 
 /// Probability that a standard normal deviate is below `x`.
 fn normal_below(x: f64) -> f64 {
-    // M. Abramowitz & I. A. Stegun, 26.2.17: within 1e-7.
-    const TERMS: [f64; 5] = [
-        0.319_381_530,
-        -0.356_563_782,
-        1.781_477_937,
-        -1.821_255_978,
-        1.330_274_429,
-    ];
-    let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
-    let sum = TERMS.iter().rev().fold(0.0, |sum, term| (sum + term) * t);
-    let above = sum * (-0.5 * x * x).exp() / core::f64::consts::TAU.sqrt();
-    if x > 0.0 { 1.0 - above } else { above }
+    0.5 * erfc(-x * core::f64::consts::FRAC_1_SQRT_2)
 }
 
 #[cfg(test)]
