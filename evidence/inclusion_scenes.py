@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Makes scenes of a tissue block with a spherical inclusion under the sensor's guide, solved by CalculiX (`ccx`, Debian's calculix-ccx).
 
-    evidence/inclusion_scenes.py FOLDER [--size MM] [--part K/N] [NAMES ...]
+    evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [NAMES ...]
 
 writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-elasticity/examples/inclusion_study.rs` reads them: 108 blocks with an
-inclusion, 32 plain ones, drawn from a fixed seed. NAMES keeps some, `--part` shares them among processes; what is there already is
+inclusion, 32 plain ones, drawn from a fixed seed or from N. NAMES keeps some, `--part` shares them among processes; what is there already is
 left. Python's standard library alone; a scene takes 5 to 30 s.
 
 Axisymmetric quadratic elements with reduced integration (CAX8R) at finite strain, compressible neo-Hooke
@@ -38,9 +38,9 @@ HEADER = ("scene,D_m,depth_m,E1_pa,E0_pa,block_height_m,block_radius_m,disc_radi
           "approach_1_m,approach_2_m,approach_3_m,force_1_n,force_2_n,force_3_n")
 
 
-def draw():
+def draw(seed):
     """The scenes: dictionaries of lengths in mm and moduli in kPa."""
-    rng = random.Random(20240613)
+    rng = random.Random(seed)
     scenes = []
 
     def logarithmic(low, high):
@@ -381,11 +381,12 @@ def main():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("names", nargs="*")
     parser.add_argument("--size", type=float, default=0.9, help="length of elements in mm")
+    parser.add_argument("--seed", type=int, default=20240613, help="of the draw: another one gives scenes that no constant was chosen on")
     parser.add_argument("--part", default="0/1", help="K/N: every N-th scene from the K-th")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     part, parts = map(int, options.part.split("/"))
-    scenes = draw()
+    scenes = draw(options.seed)
     wanted = [scene for scene in scenes if not options.names or scene["name"] in options.names]
     for scene in wanted[part::parts]:
         if not (options.folder / f"{scene['name']}.row").exists():

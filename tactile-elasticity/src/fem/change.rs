@@ -29,16 +29,7 @@ impl Scene {
             model.materials[region] = material;
         }
         if let Some(moved) = moved {
-            for node in &mut model.nodes {
-                *node = moved(*node);
-            }
-            for (index, element) in model.elements.iter().enumerate() {
-                let corners = element.map(|node| model.nodes[node]);
-                if corners != element.map(|node| self.model().nodes[node]) {
-                    model.geometry[index] = Geometry::new(&corners)
-                        .ok_or(ElasticityError::DegenerateElement { element: index })?;
-                }
-            }
+            model.move_nodes(|_, node| moved(node))?;
         }
         Ok(Self::from_model(model))
     }
@@ -129,25 +120,20 @@ impl Neighbourhood<'_> {
         let mut changes = Vec::with_capacity(model.elements.len());
         for (index, nodes) in model.elements.iter().enumerate() {
             let materials = [model, nearby].map(|m| &m.materials[m.regions[index]]);
-            let is_moved = nodes
-                .iter()
-                .any(|&node| model.nodes[node] != nearby.nodes[node]);
+            let geometry = &nearby.geometry[index];
+            let is_moved = !Arc::ptr_eq(&model.geometry[index], geometry);
             if materials[0] == materials[1] && !is_moved {
                 changes.push(None);
                 continue;
             }
-            let u = self.fields.element(nodes);
-            let evaluated = |model: &Model, material: &Material| {
-                model.geometry[index].nearby(
-                    model.kinematics,
-                    material,
-                    &u,
-                    &self.fields.pressures[index],
-                    &self.eliminations[index],
-                )
+            let here = &self.eliminations[index];
+            let before = here.outer_residual_before();
+            let (after, elimination) = if is_moved {
+                let u = self.fields.element(nodes);
+                geometry.nearby(model.kinematics, materials[1], &u, here)?
+            } else {
+                geometry.of_material(materials, here)
             };
-            let (before, _) = evaluated(model, materials[0])?;
-            let (after, elimination) = evaluated(nearby, materials[1])?;
             for (k, (after, before)) in after.iter().zip(&before).enumerate() {
                 if let Slot::Equation(row) = self.slots[2 * nodes[k / 2] + k % 2] {
                     right[row] -= after - before;
@@ -193,5 +179,31 @@ impl Neighbourhood<'_> {
             force_n: nearby.interface_forces(interface, &fields).sum(),
             displacement: fields.displacement,
         })
+    }
+}
+
+impl Model {
+    /// Moves nodes, each by its index and position. Elements whose nodes stay keep their geometry.
+    ///
+    /// # Errors
+    /// An element would be turned inside out.
+    pub(super) fn move_nodes(
+        &mut self,
+        moved: impl Fn(usize, [f64; 2]) -> [f64; 2],
+    ) -> Result<(), ElasticityError> {
+        let mut is_moved = Vec::with_capacity(self.nodes.len());
+        for (index, node) in self.nodes.iter_mut().enumerate() {
+            let to = moved(index, *node);
+            is_moved.push(to != *node);
+            *node = to;
+        }
+        for (index, element) in self.elements.iter().enumerate() {
+            if element.iter().any(|&node| is_moved[node]) {
+                let geometry = Geometry::new(&element.map(|node| self.nodes[node]))
+                    .ok_or(ElasticityError::DegenerateElement { element: index })?;
+                self.geometry[index] = Arc::new(geometry);
+            }
+        }
+        Ok(())
     }
 }

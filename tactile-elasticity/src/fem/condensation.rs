@@ -1,7 +1,7 @@
 //! Elimination of an element's pressures and of its centre node, so that the global system holds the
 //! displacements of the eight outer nodes alone and is symmetric.
 
-use super::element::{ALL, Forces, Geometry, OUTER};
+use super::element::{ALL, Forces, Geometry, OUTER, with_pressures};
 use super::material::{Kinematics, Material};
 
 /// An element's contribution to the global system, and what recovers its eliminated unknowns.
@@ -20,6 +20,8 @@ pub(crate) struct Elimination {
     centre_inverse: [[f64; 2]; 2],
     centre_row: [[f64; OUTER]; 2],
     centre_residual: [f64; 2],
+    /// The deviatoric stress's forces before the step.
+    deviatoric: [f64; ALL],
     volume_by_displacement: [[f64; ALL]; 3],
     /// ∫ψⱼ (J − 1) before the step.
     volume: [f64; 3],
@@ -38,35 +40,67 @@ impl Geometry {
         centre_load: [f64; 2],
     ) -> Option<Condensed> {
         let shear = material.shear_modulus();
-        let mut forces = self.forces(kinematics, shear, u, pressures)?;
-        for (force, load) in forces.internal[OUTER..].iter_mut().zip(centre_load) {
-            *force -= load;
-        }
-        let mut stiffness = self.stiffness(kinematics, shear, u, pressures);
-        Some(self.eliminate(material.bulk_modulus(), &forces, &mut stiffness, pressures))
+        let (forces, stiffness) = self.forces_and_stiffness(kinematics, shear, u, pressures)?;
+        Some(self.eliminate(material.bulk_modulus(), &forces, stiffness, centre_load))
     }
 
-    /// Outer residual and elimination after a slight change of material or shape, by the forces there and
+    /// Outer residual and elimination after a slight change of shape and material, by the forces there and
     /// the stiffness `before`: right to first order in the change. `None` where turned inside out.
     pub(crate) fn nearby(
         &self,
         kinematics: Kinematics,
         material: &Material,
         u: &[f64; ALL],
-        pressures: &[f64; 3],
         before: &Elimination,
     ) -> Option<([f64; OUTER], Elimination)> {
-        let forces = self.forces(kinematics, material.shear_modulus(), u, pressures)?;
-        let compliance_inverse = self.compliance_inverse(material.bulk_modulus());
-        let residual = forces.residual(&compliance_inverse, pressures);
+        let forces = self.forces(kinematics, material.shear_modulus(), u)?;
         let elimination = Elimination {
-            centre_residual: [residual[16], residual[17]],
+            deviatoric: forces.deviatoric,
             volume_by_displacement: forces.volume_by_displacement,
             volume: forces.volume,
-            compliance_inverse,
+            compliance_inverse: self.compliance_inverse(material.bulk_modulus()),
             ..*before
         };
-        Some((elimination.outer_residual(&residual), elimination))
+        Some(elimination.balanced([0.0; 2]))
+    }
+
+    /// As [`Self::nearby`] of the same shape: forces are proportional to the moduli.
+    pub(crate) fn of_material(
+        &self,
+        [from, to]: [&Material; 2],
+        before: &Elimination,
+    ) -> ([f64; OUTER], Elimination) {
+        let times = to.shear_modulus() / from.shear_modulus();
+        let elimination = Elimination {
+            deviatoric: before.deviatoric.map(|force| times * force),
+            compliance_inverse: self.compliance_inverse(to.bulk_modulus()),
+            ..*before
+        };
+        elimination.balanced([0.0; 2])
+    }
+
+    /// Residual of all nodes with the pressures eliminated by the tangent `before`, and κM⁻¹∫ψ(J − 1); `None` where turned
+    /// inside out.
+    ///
+    /// The pressures stay unknowns of their own: with $\partial J/\partial u$ of here in their elimination, a tangent of
+    /// elsewhere would be wrong by κ/μ times the difference.
+    pub(crate) fn balance(
+        &self,
+        kinematics: Kinematics,
+        material: &Material,
+        u: &[f64; ALL],
+        pressures: &[f64; 3],
+        before: &Elimination,
+    ) -> Option<([f64; ALL], [f64; 3])> {
+        let forces = self.forces(kinematics, material.shear_modulus(), u)?;
+        let compliance_inverse = self.compliance_inverse(material.bulk_modulus());
+        let projected = product(&compliance_inverse, &forces.volume);
+        let steps: [f64; 3] = core::array::from_fn(|k| projected[k] - pressures[k]);
+        let internal = forces.internal(pressures);
+        Some((
+            with_pressures(&internal, &before.volume_by_displacement, &steps),
+            projected,
+        ))
     }
 
     /// κ M⁻¹.
@@ -78,15 +112,14 @@ impl Geometry {
         &self,
         bulk: f64,
         forces: &Forces,
-        stiffness: &mut [[f64; ALL]; ALL],
-        pressures: &[f64; 3],
+        mut stiffness: [[f64; ALL]; ALL],
+        centre_load: [f64; 2],
     ) -> Condensed {
         let compliance_inverse = self.compliance_inverse(bulk);
         let rows = &forces.volume_by_displacement;
         let scaled_rows: [[f64; ALL]; 3] = core::array::from_fn(|i| {
             core::array::from_fn(|k| (0..3).map(|j| compliance_inverse[i][j] * rows[j][k]).sum())
         });
-        let residual = forces.residual(&compliance_inverse, pressures);
         for i in 0..ALL {
             for k in 0..=i {
                 for (row, scaled) in rows.iter().zip(&scaled_rows) {
@@ -105,7 +138,8 @@ impl Geometry {
         let elimination = Elimination {
             centre_inverse,
             centre_row,
-            centre_residual: [residual[16], residual[17]],
+            centre_residual: [0.0; 2],
+            deviatoric: forces.deviatoric,
             volume_by_displacement: *rows,
             volume: forces.volume,
             compliance_inverse,
@@ -118,34 +152,37 @@ impl Geometry {
                     stiffness[i][k] - gain[0] * centre_row[0][k] - gain[1] * centre_row[1][k];
             }
         }
+        let (residual, elimination) = elimination.balanced(centre_load);
         Condensed {
             stiffness: outer,
-            residual: elimination.outer_residual(&residual),
+            residual,
             elimination,
         }
     }
 }
 
-impl Forces {
-    /// Residual of the nodes with the pressures eliminated.
-    ///
-    /// Pressure equations: ∫ψ(J − 1) − M p/κ; κM⁻¹ times that is κM⁻¹∫ψ(J − 1) − p.
-    fn residual(&self, compliance_inverse: &[[f64; 3]; 3], pressures: &[f64; 3]) -> [f64; ALL] {
-        let mut residual = self.internal;
-        for (k, row) in self.volume_by_displacement.iter().enumerate() {
-            let projected: f64 = (compliance_inverse[k].iter().zip(&self.volume))
-                .map(|(a, b)| a * b)
-                .sum();
-            let step = projected - pressures[k];
-            for (residual, by) in residual.iter_mut().zip(row) {
-                *residual += by * step;
-            }
-        }
-        residual
-    }
-}
-
 impl Elimination {
+    /// Residual of the nodes with the pressures eliminated, before loads.
+    fn residual(&self) -> [f64; ALL] {
+        let pressures = product(&self.compliance_inverse, &self.volume);
+        with_pressures(&self.deviatoric, &self.volume_by_displacement, &pressures)
+    }
+
+    /// Outer residual with the centre eliminated, and this with the centre's.
+    fn balanced(mut self, centre_load: [f64; 2]) -> ([f64; OUTER], Self) {
+        let mut residual = self.residual();
+        for (k, load) in centre_load.into_iter().enumerate() {
+            residual[OUTER + k] -= load;
+            self.centre_residual[k] = residual[OUTER + k];
+        }
+        (self.outer_residual(&residual), self)
+    }
+
+    /// Outer residual before the step that this is for.
+    pub(crate) fn outer_residual_before(&self) -> [f64; OUTER] {
+        self.outer_residual(&self.residual())
+    }
+
     /// What the centre's residuals give the outer component `i`.
     fn gain(&self, i: usize) -> [f64; 2] {
         let column = [self.centre_row[0][i], self.centre_row[1][i]];
@@ -157,34 +194,45 @@ impl Elimination {
     }
 
     /// Residual of the outer nodes with the centre eliminated.
-    fn outer_residual(&self, residual: &[f64; ALL]) -> [f64; OUTER] {
+    pub(crate) fn outer_residual(&self, residual: &[f64; ALL]) -> [f64; OUTER] {
         core::array::from_fn(|i| {
             let gain = self.gain(i);
             residual[i] - gain[0] * residual[OUTER] - gain[1] * residual[OUTER + 1]
         })
     }
 
-    /// Increments of the centre's displacement and the new pressures, from the outer increments.
-    pub(crate) fn recover(&self, outer: &[f64; OUTER]) -> ([f64; 2], [f64; 3]) {
+    /// Increments of the centre's displacement, from its residual and the outer increments.
+    pub(crate) fn centre(&self, residual: [f64; 2], outer: &[f64; OUTER]) -> [f64; 2] {
         let right: [f64; 2] = core::array::from_fn(|i| {
             let coupled: f64 = (self.centre_row[i].iter().zip(outer))
                 .map(|(a, b)| a * b)
                 .sum();
-            -(self.centre_residual[i] + coupled)
+            -(residual[i] + coupled)
         });
-        let centre: [f64; 2] = core::array::from_fn(|i| {
+        core::array::from_fn(|i| {
             self.centre_inverse[i][0] * right[0] + self.centre_inverse[i][1] * right[1]
-        });
-        let volume: [f64; 3] = core::array::from_fn(|j| {
-            let row = &self.volume_by_displacement[j];
-            let by_outer: f64 = row.iter().zip(outer).map(|(a, b)| a * b).sum();
-            self.volume[j] + by_outer + row[16] * centre[0] + row[17] * centre[1]
-        });
-        let pressures = core::array::from_fn(|i| {
-            (0..3)
-                .map(|j| self.compliance_inverse[i][j] * volume[j])
-                .sum()
-        });
-        (centre, pressures)
+        })
     }
+
+    /// Increments of the centre's displacement and the new pressures, from the outer increments.
+    pub(crate) fn recover(&self, outer: &[f64; OUTER]) -> ([f64; 2], [f64; 3]) {
+        let centre = self.centre(self.centre_residual, outer);
+        let before = product(&self.compliance_inverse, &self.volume);
+        let change = self.pressure_change(outer, centre);
+        (centre, core::array::from_fn(|k| before[k] + change[k]))
+    }
+
+    /// Change of κM⁻¹∫ψ(J − 1) by increments.
+    pub(crate) fn pressure_change(&self, outer: &[f64; OUTER], centre: [f64; 2]) -> [f64; 3] {
+        let volume = self.volume_by_displacement.map(|row| {
+            let by_outer: f64 = row.iter().zip(outer).map(|(a, b)| a * b).sum();
+            by_outer + row[OUTER] * centre[0] + row[OUTER + 1] * centre[1]
+        });
+        product(&self.compliance_inverse, &volume)
+    }
+}
+
+/// κM⁻¹ times ∫ψ(J − 1): the pressures of an element in balance, for ∫ψ(J − 1) − M p/κ = 0.
+fn product(compliance_inverse: &[[f64; 3]; 3], volume: &[f64; 3]) -> [f64; 3] {
+    compliance_inverse.map(|row| row.iter().zip(volume).map(|(a, b)| a * b).sum())
 }

@@ -3,7 +3,7 @@
 //! The perturbed Lagrangian $\int W_{dev} + p (J - 1) - p^2 / 2\kappa$ with p linear in (r, z) within
 //! each element.
 
-use super::material::{Gradient, Kinematics, respond, tangent};
+use super::material::{Deformation, Gradient, Kinematics, Response};
 
 /// Displacement components of the outer nodes (r, z of each).
 pub(crate) const OUTER: usize = 16;
@@ -46,20 +46,24 @@ pub(crate) fn shape(xi: f64, eta: f64) -> [[f64; 3]; 9] {
 }
 
 /// Shape values at a Gauss point in the reference configuration.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct GaussPoint {
-    /// ∂N/∂r, ∂N/∂z and N/r of each node.
-    pub(crate) gradients: [[f64; 3]; 9],
+    /// ∂N/∂r of each node.
+    by_r: [f64; 9],
+    /// ∂N/∂z.
+    by_z: [f64; 9],
+    /// N/r.
+    over_r: [f64; 9],
     /// Reference volume 2π r dr dz.
-    pub(crate) weight: f64,
+    pub(super) weight: f64,
     /// Pressure shape functions 1, (r − r₀)/h, (z − z₀)/h.
-    pub(crate) pressure: [f64; 3],
+    pressure: [f64; 3],
 }
 
 /// The reference configuration of an element.
 #[derive(Debug, Clone)]
 pub(crate) struct Geometry {
-    pub(crate) points: [GaussPoint; 9],
+    pub(super) points: [GaussPoint; 9],
     /// Inverse of the pressures' mass matrix.
     pub(crate) inverse_mass: [[f64; 3]; 3],
 }
@@ -101,10 +105,10 @@ pub(crate) fn pressure_functions(nodes: &[[f64; 2]; 9], position: [f64; 2]) -> [
 impl Geometry {
     /// `None` where the element is turned inside out or degenerate at a Gauss point.
     pub(crate) fn new(nodes: &[[f64; 2]; 9]) -> Option<Self> {
-        let mut points = Vec::with_capacity(9);
+        let mut points: [GaussPoint; 9] = Default::default();
         let mut mass = nalgebra::Matrix3::<f64>::zeros();
-        for (eta, eta_weight) in GAUSS3 {
-            for (xi, xi_weight) in GAUSS3 {
+        for (row, (eta, eta_weight)) in GAUSS3.into_iter().enumerate() {
+            for (column, (xi, xi_weight)) in GAUSS3.into_iter().enumerate() {
                 let (position, gradients, determinant) = map(nodes, xi, eta);
                 if !(determinant > 0.0 && position[0] > 0.0) {
                     return None;
@@ -114,16 +118,18 @@ impl Geometry {
                 let pressure = pressure_functions(nodes, position);
                 let functions = nalgebra::Vector3::from(pressure);
                 mass += weight * functions * functions.transpose();
-                points.push(GaussPoint {
-                    gradients,
+                points[3 * row + column] = GaussPoint {
+                    by_r: gradients.map(|[by_r, ..]| by_r),
+                    by_z: gradients.map(|[_, by_z, _]| by_z),
+                    over_r: gradients.map(|[.., over_r]| over_r),
                     weight,
                     pressure,
-                });
+                };
             }
         }
         let inverse = mass.try_inverse()?;
         Some(Self {
-            points: points.try_into().ok()?,
+            points,
             inverse_mass: core::array::from_fn(|i| core::array::from_fn(|j| inverse[(i, j)])),
         })
     }
@@ -131,114 +137,200 @@ impl Geometry {
 
 impl GaussPoint {
     /// Displacement gradient from nodal displacements (r, z of each node).
-    pub(crate) fn gradient(&self, u: &[f64; ALL]) -> Gradient {
+    #[inline]
+    fn gradient(&self, u: &[f64; ALL]) -> Gradient {
         let mut h = [0.0; 5];
-        for (a, [by_r, by_z, over_r]) in self.gradients.iter().enumerate() {
+        for a in 0..9 {
             let (ur, uz) = (u[2 * a], u[2 * a + 1]);
-            h[0] += by_r * ur;
-            h[1] += by_z * ur;
-            h[2] += by_r * uz;
-            h[3] += by_z * uz;
-            h[4] += over_r * ur;
+            h[0] += self.by_r[a] * ur;
+            h[1] += self.by_z[a] * ur;
+            h[2] += self.by_r[a] * uz;
+            h[3] += self.by_z[a] * uz;
+            h[4] += self.over_r[a] * ur;
         }
         h
+    }
+
+    /// Nodal forces of a stress, along r and along z.
+    #[inline]
+    fn forces(&self, stress: &Gradient) -> [[f64; 9]; 2] {
+        let s = stress.map(|component| self.weight * component);
+        [
+            core::array::from_fn(|a| {
+                s[0] * self.by_r[a] + s[1] * self.by_z[a] + s[4] * self.over_r[a]
+            }),
+            core::array::from_fn(|a| s[2] * self.by_r[a] + s[3] * self.by_z[a]),
+        ]
     }
 }
 
 /// What an element contributes before elimination.
 pub(crate) struct Forces {
-    /// Derivative of the energy by the nodal displacements.
-    pub(crate) internal: [f64; ALL],
+    /// Derivative of the deviatoric energy by the nodal displacements.
+    pub(crate) deviatoric: [f64; ALL],
     /// ∫ψⱼ ∂J/∂u.
     pub(crate) volume_by_displacement: [[f64; ALL]; 3],
     /// ∫ψⱼ (J − 1).
     pub(crate) volume: [f64; 3],
-    /// Stored energy with the pressure at its own equilibrium.
-    pub(crate) energy: f64,
+}
+
+impl Forces {
+    /// Derivative of the energy by the nodal displacements at given pressures.
+    pub(crate) fn internal(&self, pressures: &[f64; 3]) -> [f64; ALL] {
+        with_pressures(&self.deviatoric, &self.volume_by_displacement, pressures)
+    }
+}
+
+/// Nodal forces and those of pressures added.
+pub(crate) fn with_pressures(
+    forces: &[f64; ALL],
+    volume_by_displacement: &[[f64; ALL]; 3],
+    pressures: &[f64; 3],
+) -> [f64; ALL] {
+    let mut forces = *forces;
+    for (row, pressure) in volume_by_displacement.iter().zip(pressures) {
+        for (force, by) in forces.iter_mut().zip(row) {
+            *force += pressure * by;
+        }
+    }
+    forces
+}
+
+/// Sums over Gauss points, of all nodes along r and along z.
+#[derive(Default)]
+struct Sums {
+    deviatoric: [[f64; 9]; 2],
+    volume_by_displacement: [[[f64; 9]; 2]; 3],
+    volume: [f64; 3],
+}
+
+#[inline]
+fn add(sums: &mut [[f64; 9]; 2], times: f64, forces: &[[f64; 9]; 2]) {
+    for (sums, forces) in sums.iter_mut().zip(forces) {
+        for (sum, force) in sums.iter_mut().zip(forces) {
+            *sum += times * force;
+        }
+    }
+}
+
+impl Sums {
+    #[inline]
+    fn add(&mut self, point: &GaussPoint, response: &Response) {
+        let stress = point.forces(&response.stress);
+        let volume = point.forces(&response.cofactor);
+        add(&mut self.deviatoric, 1.0, &stress);
+        for (row, psi) in (self.volume_by_displacement.iter_mut()).zip(&point.pressure) {
+            add(row, *psi, &volume);
+        }
+        for (volume, psi) in self.volume.iter_mut().zip(&point.pressure) {
+            *volume += point.weight * psi * response.volume;
+        }
+    }
+
+    fn forces(&self) -> Forces {
+        let interleaved = |[r, z]: &[[f64; 9]; 2]| {
+            core::array::from_fn(|k| if k % 2 == 0 { r } else { z }[k / 2])
+        };
+        Forces {
+            deviatoric: interleaved(&self.deviatoric),
+            volume_by_displacement: core::array::from_fn(|k| {
+                interleaved(&self.volume_by_displacement[k])
+            }),
+            volume: self.volume,
+        }
+    }
+}
+
+/// Second derivatives of the energy by the nodes' displacements.
+struct Stiffness {
+    /// By u_r of both nodes, by u_z of both, by u_r of the first and u_z of the second.
+    radial: [[f64; 9]; 9],
+    axial: [[f64; 9]; 9],
+    mixed: [[f64; 9]; 9],
+}
+
+impl Stiffness {
+    #[inline]
+    fn add(&mut self, point: &GaussPoint, tangent: &[Gradient; 5]) {
+        let (by_r, by_z, over_r) = (&point.by_r, &point.by_z, &point.over_r);
+        for i in 0..9 {
+            let (r, z, o) = (by_r[i], by_z[i], over_r[i]);
+            // Stress increments from unit displacements of node i along r and along z.
+            let [along_r, along_z] = [
+                core::array::from_fn(|k| {
+                    let [a, b, _, _, c] = tangent[k];
+                    point.weight * (a * r + b * z + c * o)
+                }),
+                core::array::from_fn(|k| {
+                    let [_, _, a, b, _] = tangent[k];
+                    point.weight * (a * r + b * z)
+                }),
+            ] as [Gradient; 2];
+            let (radial, mixed) = (&mut self.radial[i], &mut self.mixed[i]);
+            for j in 0..9 {
+                radial[j] += along_r[0] * by_r[j] + along_r[1] * by_z[j] + along_r[4] * over_r[j];
+                mixed[j] += along_r[2] * by_r[j] + along_r[3] * by_z[j];
+            }
+            let axial = &mut self.axial[i];
+            for j in 0..9 {
+                axial[j] += along_z[2] * by_r[j] + along_z[3] * by_z[j];
+            }
+        }
+    }
+
+    /// Of all components, lower half.
+    fn interleaved(&self) -> [[f64; ALL]; ALL] {
+        let mut all = [[0.0; ALL]; ALL];
+        for i in 0..9 {
+            for j in 0..=i {
+                all[2 * i][2 * j] = self.radial[i][j];
+                all[2 * i][2 * j + 1] = self.mixed[i][j];
+                all[2 * i + 1][2 * j] = self.mixed[j][i];
+                all[2 * i + 1][2 * j + 1] = self.axial[i][j];
+            }
+        }
+        all
+    }
 }
 
 impl Geometry {
-    /// Forces at given displacements and pressures; `None` where the element is turned inside out.
+    /// Forces at given displacements; `None` where the element is turned inside out.
     pub(crate) fn forces(
         &self,
         kinematics: Kinematics,
         shear: f64,
         u: &[f64; ALL],
-        pressures: &[f64; 3],
     ) -> Option<Forces> {
-        let mut forces = Forces {
-            internal: [0.0; ALL],
-            volume_by_displacement: [[0.0; ALL]; 3],
-            volume: [0.0; 3],
-            energy: 0.0,
-        };
+        let mut forces = Sums::default();
         for point in &self.points {
-            let h = point.gradient(u);
-            let response = respond(kinematics, shear, &h)?;
-            forces.energy += point.weight * response.energy;
-            let (s, c) = (response.stress, response.cofactor);
-            for (a, [by_r, by_z, over_r]) in point.gradients.iter().enumerate() {
-                forces.internal[2 * a] +=
-                    point.weight * (s[0] * by_r + s[1] * by_z + s[4] * over_r);
-                forces.internal[2 * a + 1] += point.weight * (s[2] * by_r + s[3] * by_z);
-                let by_ur = point.weight * (c[0] * by_r + c[1] * by_z + c[4] * over_r);
-                let by_uz = point.weight * (c[2] * by_r + c[3] * by_z);
-                for (row, psi) in forces
-                    .volume_by_displacement
-                    .iter_mut()
-                    .zip(&point.pressure)
-                {
-                    row[2 * a] += psi * by_ur;
-                    row[2 * a + 1] += psi * by_uz;
-                }
-            }
-            for (volume, psi) in forces.volume.iter_mut().zip(&point.pressure) {
-                *volume += point.weight * psi * response.volume;
-            }
+            let deformation = Deformation::new(kinematics, shear, &point.gradient(u))?;
+            forces.add(point, &deformation.response());
         }
-        for (row, pressure) in forces.volume_by_displacement.iter().zip(pressures) {
-            for (force, by) in forces.internal.iter_mut().zip(row) {
-                *force += pressure * by;
-            }
-        }
-        Some(forces)
+        Some(forces.forces())
     }
 
-    /// Second derivative of the energy by the nodal displacements at fixed pressures, lower half.
-    pub(crate) fn stiffness(
+    /// Forces, and the second derivative of the energy by the nodal displacements at fixed pressures, lower half.
+    pub(crate) fn forces_and_stiffness(
         &self,
         kinematics: Kinematics,
         shear: f64,
         u: &[f64; ALL],
         pressures: &[f64; 3],
-    ) -> [[f64; ALL]; ALL] {
-        let mut stiffness = [[0.0; ALL]; ALL];
+    ) -> Option<(Forces, [[f64; ALL]; ALL])> {
+        let mut forces = Sums::default();
+        let mut stiffness = Stiffness {
+            radial: [[0.0; 9]; 9],
+            axial: [[0.0; 9]; 9],
+            mixed: [[0.0; 9]; 9],
+        };
         for point in &self.points {
-            let h = point.gradient(u);
+            let deformation = Deformation::new(kinematics, shear, &point.gradient(u))?;
+            forces.add(point, &deformation.response());
             let pressure: f64 = (point.pressure.iter().zip(pressures))
                 .map(|(a, b)| a * b)
                 .sum();
-            let a = tangent(kinematics, shear, pressure, &h);
-            for (j, [by_r, by_z, over_r]) in point.gradients.iter().enumerate() {
-                // Stress increments from unit displacements of node j along r and z.
-                let (r, z, o) = (
-                    point.weight * by_r,
-                    point.weight * by_z,
-                    point.weight * over_r,
-                );
-                let along_r: Gradient =
-                    core::array::from_fn(|k| a[k][0] * r + a[k][1] * z + a[k][4] * o);
-                let along_z: Gradient = core::array::from_fn(|k| a[k][2] * r + a[k][3] * z);
-                for (i, [by_r, by_z, over_r]) in point.gradients.iter().enumerate().skip(j) {
-                    let radial = |s: &Gradient| s[0] * by_r + s[1] * by_z + s[4] * over_r;
-                    let axial = |s: &Gradient| s[2] * by_r + s[3] * by_z;
-                    stiffness[2 * i][2 * j] += radial(&along_r);
-                    stiffness[2 * i][2 * j + 1] += radial(&along_z);
-                    stiffness[2 * i + 1][2 * j] += axial(&along_r);
-                    stiffness[2 * i + 1][2 * j + 1] += axial(&along_z);
-                }
-            }
+            stiffness.add(point, &deformation.tangent(pressure));
         }
-        stiffness
+        Some((forces.forces(), stiffness.interleaved()))
     }
 }

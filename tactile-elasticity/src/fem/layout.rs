@@ -1,5 +1,6 @@
 //! Numbers of the equations, and the pattern of the tangent.
 
+use super::chord::Chord;
 use super::element::OUTER;
 use super::gap::DRIVER;
 use super::model::{Model, Motion};
@@ -24,6 +25,8 @@ pub(crate) struct Layout {
     pattern: Option<Arc<Pattern>>,
     /// Of each element, in the pattern.
     places: Arc<[Places]>,
+    /// The tangent taken last, with which a scene nearby converges; elsewhere a new one is taken.
+    pub(crate) chord: Option<Arc<Chord>>,
 }
 
 /// Where the entries of an element's stiffness, the lower half row by row, stand among the tangent's values;
@@ -67,6 +70,7 @@ impl Layout {
             groups: Vec::new(),
             pattern: None,
             places: Arc::new([]),
+            chord: None,
         };
         let elements = model.elements.iter();
         layout.groups = elements

@@ -69,6 +69,7 @@ mod block;
 mod bodies;
 mod candidates;
 mod change;
+mod chord;
 mod condensation;
 mod contact;
 mod curve;

@@ -10,6 +10,7 @@ use super::rigid::RigidShape;
 use crate::ElasticityError;
 use crate::error::Quantity;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A body of a [`Model`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,7 +51,8 @@ pub(crate) struct Model {
     pub(crate) elements: Vec<[usize; 9]>,
     /// Material of each element, an index of `materials`.
     pub(crate) regions: Vec<usize>,
-    pub(crate) geometry: Vec<Geometry>,
+    /// Shared by the scenes on one mesh whose nodes are moved elsewhere only.
+    pub(crate) geometry: Vec<Arc<Geometry>>,
     pub(crate) materials: Vec<Material>,
     pub(crate) parts: Vec<Part>,
     /// Of each displacement component, 2 node + (0 for r, 1 for z).
@@ -109,7 +111,8 @@ impl Model {
         let mut geometry = Vec::with_capacity(mesh.elements.len());
         for (index, element) in mesh.elements.iter().enumerate() {
             let element = Geometry::new(&element.map(|node| mesh.nodes[node]));
-            geometry.push(element.ok_or(ElasticityError::DegenerateElement { element: index })?);
+            let element = element.ok_or(ElasticityError::DegenerateElement { element: index })?;
+            geometry.push(Arc::new(element));
         }
         let (first, region) = (self.nodes.len(), self.materials.len());
         self.nodes.extend(&mesh.nodes);

@@ -1,5 +1,6 @@
 //! Newton's method with load steps chosen by what converges.
 
+use super::chord;
 use super::contact::Opposite;
 use super::fields::{Equilibrium, Fields};
 use super::layout::Layout;
@@ -11,7 +12,7 @@ use super::tangent::Goal;
 
 /// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
 /// below what the forces are wanted to, and well above rounding.
-const TOLERANCE: f64 = 1e-8;
+pub(super) const TOLERANCE: f64 = 1e-8;
 /// Iterations of a load step before it is halved. Steps that converge take three to ten.
 const MAX_ITERATIONS: usize = 25;
 /// Halvings of a load step before the solver stops.
@@ -281,7 +282,17 @@ impl Solver<'_> {
         })
     }
 
+    /// Equilibrium at the goal; without contacts by simplified Newton iterations where they converge.
     fn newton(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
+        if let (Goal::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
+            let iterations = &mut self.report.iterations;
+            let found = chord::equilibrium(self.model, self.layout, &start, to, iterations);
+            return found.or_else(|| self.full(start, goal));
+        }
+        self.full(start, goal)
+    }
+
+    fn full(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
         let model = self.model;
         let wanted = goal;
         let mut fields = start;

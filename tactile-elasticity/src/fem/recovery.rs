@@ -54,14 +54,13 @@ impl Model {
             let shear = self.materials[self.regions[index]].shear_modulus();
             let u = fields.element(nodes);
             // A state in equilibrium has no inverted element.
-            let Some(element) =
-                self.geometry[index].forces(self.kinematics, shear, &u, &fields.pressures[index])
-            else {
+            let Some(element) = self.geometry[index].forces(self.kinematics, shear, &u) else {
                 continue;
             };
+            let internal = element.internal(&fields.pressures[index]);
             for (local, node) in nodes.iter().enumerate() {
                 if let Some(place) = interface.nodes.iter().position(|n| n == node) {
-                    forces[place] += interface.sign * element.internal[2 * local + 1];
+                    forces[place] += interface.sign * internal[2 * local + 1];
                 }
             }
         }

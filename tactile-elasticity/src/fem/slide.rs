@@ -10,7 +10,6 @@
 //! whose pressure is normal to the bent face, CalculiX's forces and pressures are lower by 0.3 % at a thirtieth of the
 //! block's height and by about 2 % at a tenth, which the search does not allow for.
 
-use super::element::Geometry;
 use super::layout::Layout;
 use super::load::Load;
 use super::model::Model;
@@ -152,17 +151,12 @@ impl Scene {
                 (None, None) => 0.0,
             }
         };
-        for (node, is_upper) in model.nodes.iter_mut().zip(&is_upper) {
-            let part = 1.0 - node[1] / depth_m;
-            if *is_upper && part > 0.0 {
-                node[0] += part * at(node[0]);
-            }
-        }
-        for (geometry, element) in model.geometry.iter_mut().zip(&model.elements) {
-            if element.iter().any(|&node| is_upper[node]) {
-                *geometry = Geometry::new(&element.map(|node| model.nodes[node]))?;
-            }
-        }
+        let moved = |node: usize, [r, z]: [f64; 2]| {
+            let part = 1.0 - z / depth_m;
+            let is_moved = is_upper[node] && part > 0.0;
+            [if is_moved { r + part * at(r) } else { r }, z]
+        };
+        model.move_nodes(moved).ok()?;
         Some(scene)
     }
 }

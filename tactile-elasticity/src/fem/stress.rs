@@ -1,7 +1,7 @@
 //! Stresses at any point of a state.
 
 use super::element::{ALL, map, pressure_functions, shape};
-use super::material::{Gradient, Kinematics, respond};
+use super::material::{Deformation, Gradient, Kinematics};
 use super::model::Model;
 use super::state::State;
 
@@ -68,7 +68,8 @@ impl Model {
             h[4] += over_r * u[2 * a];
         }
         let material = &self.materials[self.regions[index]];
-        let response = respond(self.kinematics, material.shear_modulus(), &h)?;
+        let deformation = Deformation::new(self.kinematics, material.shear_modulus(), &h)?;
+        let response = deformation.response();
         let functions = pressure_functions(&nodes, position);
         let pressures = functions.iter().zip(&fields.pressures[index]);
         let pressure: f64 = pressures.map(|(function, value)| function * value).sum();

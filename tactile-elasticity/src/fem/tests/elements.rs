@@ -2,7 +2,7 @@
 
 use crate::fem::element::{GAUSS3, map, shape};
 use crate::fem::load::{Load, Outcome};
-use crate::fem::material::{Gradient, Kinematics, Material, respond};
+use crate::fem::material::{Deformation, Gradient, Kinematics, Material};
 use crate::fem::mesh::Mesh;
 use crate::fem::model::{Model, Motion};
 
@@ -107,7 +107,8 @@ fn stress(kinematics: Kinematics, material: &Material, [r, z]: [f64; 2]) -> Grad
         smooth([r, z])[0] / r
     };
     let h = [by_r[0], by_z[0], by_r[1], by_z[1], hoop];
-    let response = respond(kinematics, material.shear_modulus(), &h).unwrap();
+    let deformation = Deformation::new(kinematics, material.shear_modulus(), &h).unwrap();
+    let response = deformation.response();
     let pressure = material.bulk_modulus() * response.volume;
     core::array::from_fn(|k| response.stress[k] + pressure * response.cofactor[k])
 }
