@@ -6,7 +6,7 @@ use crate::{
     Factorization, FitOptions, Kernel, Scalar, Smoothing, Spline, TpsError,
     centres::finite,
     equations::Buffers,
-    layout::HEAD,
+    layout::{HEAD, PANEL},
     null_space::{MAX, dot},
     options::validate_weight_count,
     real::Lane,
@@ -21,7 +21,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
     /// [`fit`](Self::fit) with that [`Smoothing::Lambda`] and then [`apply`](Self::apply), to rounding.
     ///
     /// With the side conditions eliminated a spline solves $(A + \lambda) z = b$ with A symmetric, and its value at a point is linear in z.
-    /// Householder's $A = H T H^T$ with T tridiagonal serves every λ (Eldén, BIT 17, 1977): O(n³ + p n²) once for p points, O(p n) a λ.
+    /// Householder's $A = H T H^T$ with T tridiagonal serves every λ (Eldén, BIT 17, 1977): O(n³) once, O(n² + p n) a λ for p points.
     ///
     /// ```
     /// use nalgebra::Point2;
@@ -67,131 +67,189 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
         splines
             .centres
             .gather(targets, weights, &origin, &mut buffers);
-        let places: Vec<_> = points
-            .iter()
-            .map(|p| splines.centres.frame.inside(p))
-            .collect();
-        let path = Path::<D, M>::new(&splines, &system, &buffers.targets, &places);
-        let value = |shares: [f64; M]| {
-            Point::from(core::array::from_fn(|m| T::narrow(origin[m] + shares[m])))
-        };
-        let each = lambdas.iter().map(|&lambda| {
-            let inner = splines.inner_lambda(Smoothing::Lambda(lambda));
-            path.values(inner).into_iter().map(value).collect()
-        });
-        Ok(each.collect())
+        let inner = |&lambda: &T| splines.inner_lambda(Smoothing::Lambda(lambda));
+        let mut path = Path::default();
+        path.solve::<M, D>(&system, &buffers.targets, lambdas.iter().map(inner));
+        path.places.resize((D + 1) * system.active.len(), 0.0);
+        system.places(&splines.centres, &mut path.places);
+        let mut values = vec![Vec::with_capacity(points.len()); lambdas.len()];
+        for point in points {
+            let place = splines.centres.frame.inside(point);
+            path.evaluate(&splines.kernel, &system, &place);
+            for (l, values) in values.iter_mut().enumerate() {
+                let value = |m: usize| T::narrow(origin[m] + path.sums[l * M + m]);
+                values.push(Point::from(core::array::from_fn(value)));
+            }
+        }
+        Ok(values)
     }
 }
 
-/// The splines' values at points: that of the affine fit, and what a spline's z adds.
-struct Path<const D: usize, const M: usize> {
-    /// T, and its vectors: what z adds at every point, then the right-hand sides.
+/// The splines of several λ side by side: column l M + m is output m of the l-th λ. Rows have a multiple of eight columns.
+#[derive(Default)]
+struct Path {
     form: Tridiagonal,
-    affine: Vec<[f64; M]>,
+    width: usize,
+    shifts: Vec<f64>,
+    pivots: Vec<f64>,
+    /// Right-hand sides, output by output, and what the affine functions take of them.
+    sides: Vec<f64>,
+    heads: Vec<[f64; MAX]>,
+    solutions: Vec<f64>,
+    /// Centre by centre, in the order of the system.
+    weights: Vec<f64>,
+    affine: Vec<[f64; MAX]>,
+    /// Coordinates of the centres, axis by axis, and their scales.
+    places: Vec<f64>,
+    kernels: Vec<f64>,
+    sums: Vec<f64>,
 }
 
-impl<const D: usize, const M: usize> Path<D, M> {
-    fn new<T: Scalar, K: Kernel>(
-        splines: &Factorization<T, D, K>,
+impl Path {
+    /// Weights and affine parts for every λ.
+    fn solve<const M: usize, const D: usize>(
+        &mut self,
         system: &System<D>,
         targets: &[f64],
-        places: &[[f64; D]],
-    ) -> Self {
-        let (null, count, centres) = (&system.null, places.len(), &splines.centres);
-        let (q, stride, order) = (null.q, null.stride, system.active.len() - null.q);
-        let mut form = Tridiagonal::new(order, count + M);
-        let [row, width] = form.strides();
-        let matrix = &system.cholesky.l;
-        for i in 0..order {
-            for j in i..order {
-                let entry = matrix[(HEAD + i) * stride + HEAD + j];
-                form.matrix[i * row + j] = entry;
-                form.matrix[j * row + i] = entry;
+        lambdas: impl Iterator<Item = f64>,
+    ) {
+        self.shifts.clear();
+        self.shifts
+            .extend(lambdas.flat_map(|lambda| core::iter::repeat_n(lambda, M)));
+        let count = self.shifts.len();
+        // At least one panel: rows of no columns are none.
+        self.width = count.next_multiple_of(PANEL).max(PANEL);
+        self.shifts.resize(self.width, 1.0);
+        self.load(system);
+        self.form.reduce();
+        self.project::<M, D>(system, targets);
+        let (width, outputs) = (self.width, M.next_multiple_of(PANEL));
+        // The same right-hand sides for every λ: turned once.
+        self.form.turn(&mut self.sides, outputs);
+        self.solutions.clear();
+        self.solutions
+            .resize(self.sides.len() / outputs * width, 0.0);
+        let rows = self.solutions.chunks_exact_mut(width);
+        for (row, side) in rows.zip(self.sides.chunks_exact(outputs)) {
+            for (c, value) in row[..count].iter_mut().enumerate() {
+                *value = side[c % M];
             }
         }
-        let mut column = vec![0.0; stride];
-        let mut heads = [[0.0; MAX]; M];
+        self.form
+            .solve(&self.shifts, &mut self.solutions, &mut self.pivots);
+        self.form.turn_back(&mut self.solutions, width);
+        self.lift::<M, D>(system, count);
+    }
+
+    /// The projected matrix.
+    fn load<const D: usize>(&mut self, system: &System<D>) {
+        let (null, order) = (&system.null, system.active.len() - system.null.q);
+        self.form.reset(order);
+        let row = self.form.stride();
+        for i in 0..order {
+            let start = (HEAD + i) * null.stride + HEAD;
+            self.form.matrix[i * row + i..i * row + order]
+                .copy_from_slice(&system.cholesky.l[start + i..start + order]);
+        }
+    }
+
+    /// The right-hand sides, rotated into the complement of the affine functions, and what that leaves in `heads`.
+    fn project<const M: usize, const D: usize>(&mut self, system: &System<D>, targets: &[f64]) {
+        let (null, order) = (&system.null, system.active.len() - system.null.q);
+        let centres = targets.len() / M;
+        let outputs = M.next_multiple_of(PANEL);
+        self.sides.clear();
+        self.sides.resize(order * outputs, 0.0);
+        self.heads.clear();
+        let mut column = vec![0.0; null.stride];
         for m in 0..M {
             column.fill(0.0);
-            let own = &targets[m * centres.len()..(m + 1) * centres.len()];
+            let own = &targets[m * centres..(m + 1) * centres];
             system.scaled(own, &mut column[null.rows()]);
             null.apply_transpose(&mut column);
-            heads[m][..q].copy_from_slice(&column[HEAD - q..HEAD]);
-            for i in 0..order {
-                form.vectors[i * width + count + m] = column[HEAD + i];
+            let mut head = [0.0; MAX];
+            head[..null.q].copy_from_slice(&column[HEAD - null.q..HEAD]);
+            self.heads.push(head);
+            for (row, value) in self.sides.chunks_exact_mut(outputs).zip(&column[HEAD..]) {
+                row[m] = *value;
             }
         }
-        let mut axes = vec![0.0; (D + 1) * system.active.len()];
-        system.places(centres, &mut axes);
-        let mut affine = Vec::with_capacity(count);
-        for (p, place) in places.iter().enumerate() {
-            let mut terms = [0.0; MAX];
-            for (c, term) in terms.iter_mut().enumerate().take(q) {
-                *term = system.span.value(c, place);
-            }
-            let terms = null.solve_transpose(&terms);
-            affine.push(core::array::from_fn(|m| dot(&terms[..q], &heads[m][..q])));
-            column.fill(0.0);
-            dispatch(Kernels {
-                kernel: &splines.kernel,
-                place,
-                axes: &axes,
-                values: &mut column[null.rows()],
-            });
-            null.apply_transpose(&mut column);
-            for (k, term) in terms.iter().enumerate().take(q) {
-                let tail = column[HEAD..HEAD + order].iter_mut();
-                tail.zip(system.coupling(k))
-                    .for_each(|(value, coupling)| *value -= term * coupling);
-            }
-            for i in 0..order {
-                form.vectors[i * width + p] = column[HEAD + i];
-            }
-        }
-        form.reduce();
-        Self { form, affine }
     }
 
-    /// The values at all points, from the targets' origin.
-    fn values(&self, lambda: f64) -> Vec<[f64; M]> {
-        let (count, width) = (self.affine.len(), self.form.strides()[1]);
-        let sides = self.form.vectors.chunks_exact(width);
-        let mut z: Vec<[f64; M]> = sides
-            .map(|row| core::array::from_fn(|m| row[count + m]))
-            .collect();
-        self.form.solve(lambda, &mut z);
-        let mut sums = vec![0.0; M * width];
-        dispatch(Combine {
-            vectors: &self.form.vectors,
-            z: &z,
-            sums: &mut sums,
-            width,
+    /// From solutions to weights and affine parts.
+    fn lift<const M: usize, const D: usize>(&mut self, system: &System<D>, count: usize) {
+        let (null, width) = (&system.null, self.width);
+        let n = system.active.len();
+        self.weights.clear();
+        self.weights.resize(n * width, 0.0);
+        self.affine.clear();
+        let mut column = vec![0.0; null.stride];
+        for c in 0..count {
+            column.fill(0.0);
+            for (value, row) in column[HEAD..]
+                .iter_mut()
+                .zip(self.solutions.chunks_exact(width))
+            {
+                *value = row[c];
+            }
+            let mut head = self.heads[c % M];
+            for (k, head) in head.iter_mut().enumerate().take(null.q) {
+                *head -= dot(system.coupling(k), &column[HEAD..HEAD + n - null.q]);
+            }
+            self.affine.push(null.solve_upper(&head[..null.q]));
+            null.apply(&mut column);
+            for (row, weight) in self
+                .weights
+                .chunks_exact_mut(width)
+                .zip(&column[null.rows()])
+            {
+                row[c] = *weight;
+            }
+        }
+    }
+
+    /// The values of all splines at a place, into `sums`.
+    fn evaluate<K: Kernel, const D: usize>(
+        &mut self,
+        kernel: &K,
+        system: &System<D>,
+        place: &[f64; D],
+    ) {
+        self.kernels.resize(system.active.len(), 0.0);
+        self.sums.resize(self.width, 0.0);
+        dispatch(Evaluate {
+            kernel,
+            place,
+            places: &self.places,
+            kernels: &mut self.kernels,
+            weights: &self.weights,
+            sums: &mut self.sums,
         });
-        let value = |(p, affine): (usize, &[f64; M])| {
-            core::array::from_fn(|m| affine[m] + sums[m * width + p])
-        };
-        self.affine.iter().enumerate().map(value).collect()
+        for (sum, affine) in self.sums.iter_mut().zip(&self.affine) {
+            *sum += system.span.polynomial(affine, |k| place[k]);
+        }
     }
 }
 
-/// The kernel's value at a place for every centre, times the centre's scale.
-struct Kernels<'a, K, const D: usize> {
+/// Kernels between a place and the centres, times their scales, and their products with the weights of all splines.
+struct Evaluate<'a, K, const D: usize> {
     kernel: &'a K,
     place: &'a [f64; D],
-    /// D coordinates and the scale, one after the other.
-    axes: &'a [f64],
-    values: &'a mut [f64],
+    places: &'a [f64],
+    kernels: &'a mut [f64],
+    weights: &'a [f64],
+    sums: &'a mut [f64],
 }
 
-impl<K: Kernel, const D: usize> Job<f64> for Kernels<'_, K, D> {
+impl<K: Kernel, const D: usize> Job<f64> for Evaluate<'_, K, D> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lane<f64>>(self) {
-        let n = self.values.len();
-        let axes: [&[f64]; D] = core::array::from_fn(|k| &self.axes[k * n..(k + 1) * n]);
-        let scales = &self.axes[D * n..(D + 1) * n];
-        for (i, value) in self.values.iter_mut().enumerate() {
+        let n = self.kernels.len();
+        let axes: [&[f64]; D] = core::array::from_fn(|k| &self.places[k * n..(k + 1) * n]);
+        let scales = &self.places[D * n..(D + 1) * n];
+        for (i, value) in self.kernels.iter_mut().enumerate() {
             let mut s = L::from_f64(0.0);
             for k in 0..D {
                 let d = L::new(self.place[k]) - L::new(axes[k][i]);
@@ -199,28 +257,37 @@ impl<K: Kernel, const D: usize> Job<f64> for Kernels<'_, K, D> {
             }
             *value = (self.kernel.jet(s).value * L::new(scales[i])).get();
         }
-    }
-}
-
-/// Σ z_i × the i-th components of the vectors, for each of M columns of z.
-struct Combine<'a, const M: usize> {
-    vectors: &'a [f64],
-    z: &'a [[f64; M]],
-    sums: &'a mut [f64],
-    width: usize,
-}
-
-impl<const M: usize> Job<f64> for Combine<'_, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lane<f64>>(self) {
-        for (row, z) in self.vectors.chunks_exact(self.width).zip(self.z) {
-            for (sums, &z) in self.sums.chunks_exact_mut(self.width).zip(z) {
-                for (sum, x) in sums.iter_mut().zip(row) {
-                    *sum = L::new(z).mul_add(L::new(*x), L::new(*sum)).get();
-                }
-            }
+        let width = self.sums.len();
+        let mut at = 0;
+        while at + TOGETHER <= width {
+            combine::<L, TOGETHER>(self.kernels, self.weights, width, at, self.sums);
+            at += TOGETHER;
+        }
+        while at < width {
+            combine::<L, PANEL>(self.kernels, self.weights, width, at, self.sums);
+            at += PANEL;
         }
     }
+}
+
+/// Columns that are summed at once, in registers.
+const TOGETHER: usize = 3 * PANEL;
+
+/// The sums of so many columns of the weights from the `at`-th on.
+#[inline(always)]
+fn combine<L: Lane<f64>, const W: usize>(
+    kernels: &[f64],
+    weights: &[f64],
+    width: usize,
+    at: usize,
+    sums: &mut [f64],
+) {
+    let mut own = [0.0; W];
+    for (row, kernel) in weights.chunks_exact(width).zip(kernels) {
+        let (row, kernel) = (&row[at..at + W], L::new(*kernel));
+        for l in 0..W {
+            own[l] = kernel.mul_add(L::new(row[l]), L::new(own[l])).get();
+        }
+    }
+    sums[at..at + W].copy_from_slice(&own);
 }

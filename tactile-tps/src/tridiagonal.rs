@@ -1,4 +1,4 @@
-//! Householder's tridiagonal form of a dense symmetric matrix, applied to vectors on the way.
+//! Householder's tridiagonal form of a dense symmetric matrix.
 
 use crate::{
     layout::PANEL,
@@ -6,65 +6,85 @@ use crate::{
     simd::{Job, dispatch},
 };
 
-/// A symmetric matrix with both triangles, row by row, and vectors that go with it, component by component: the j-th vector's i-th
-/// component is at i × `width` + j.
+/// Columns that are reflected at once: so many sums stay in registers, and no addition waits for the one before.
+const TOGETHER: usize = 3 * PANEL;
+
+/// A = H T Hᵀ with H orthogonal and T tridiagonal.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tridiagonal {
     order: usize,
     stride: usize,
+    /// The matrix row by row, of which only the triangle from the diagonal on is read; after [`reduce`](Self::reduce) row k holds reflector k.
     pub(crate) matrix: Vec<f64>,
-    pub(crate) vectors: Vec<f64>,
-    width: usize,
+    /// What a reflector v is scaled with: 1 − τ v vᵀ.
+    scales: Vec<f64>,
     diagonal: Vec<f64>,
     beside: Vec<f64>,
+    /// The last reflector and what it takes off the matrix, the present one and its product with the matrix.
+    work: [Vec<f64>; 4],
 }
 
 impl Tridiagonal {
-    /// Room for a matrix and so many vectors, all zero.
-    pub(crate) fn new(order: usize, vectors: usize) -> Self {
-        let [stride, width] = [order, vectors].map(|n| n.next_multiple_of(PANEL));
-        Self {
-            order,
-            stride,
-            width,
-            matrix: vec![0.0; order * stride],
-            vectors: vec![0.0; order * width],
-            diagonal: Vec::with_capacity(order),
-            beside: Vec::with_capacity(order),
+    /// Room for a matrix of this order, all zero.
+    pub(crate) fn reset(&mut self, order: usize) {
+        self.order = order;
+        self.stride = order.next_multiple_of(PANEL);
+        self.matrix.clear();
+        self.matrix.resize(order * self.stride, 0.0);
+        for list in [&mut self.scales, &mut self.diagonal, &mut self.beside] {
+            list.clear();
+        }
+        for vector in &mut self.work {
+            vector.clear();
+            vector.resize(self.stride, 0.0);
         }
     }
 
-    /// Numbers from one row of the matrix to the next, and from one component of the vectors to the next.
-    pub(crate) fn strides(&self) -> [usize; 2] {
-        [self.stride, self.width]
+    /// Numbers from one row of the matrix to the next.
+    pub(crate) fn stride(&self) -> usize {
+        self.stride
     }
 
-    /// Turns matrix A and vectors x into T = Hᵀ A H and Hᵀ x, with H orthogonal and T tridiagonal. 4/3 n³ operations, and 2 n² a vector.
+    /// Finds T and H. 4/3 n³ operations; the matrix goes through the caches once a reflector.
     pub(crate) fn reduce(&mut self) {
         dispatch(Reduce(self));
     }
 
-    /// Solves (T + λ) X = B, one of M columns after the other; overwrites `b`. Positive definite T + λ needs no pivots.
-    pub(crate) fn solve<const M: usize>(&self, lambda: f64, b: &mut [[f64; M]]) {
-        let mut pivot = vec![0.0; self.order];
-        for i in 0..self.order {
-            pivot[i] = self.diagonal[i] + lambda;
-            if i > 0 {
-                let factor = self.beside[i - 1] / pivot[i - 1];
-                pivot[i] -= factor * self.beside[i - 1];
-                for m in 0..M {
-                    b[i][m] -= factor * b[i - 1][m];
-                }
-            }
-        }
-        for i in (0..self.order).rev() {
-            for m in 0..M {
-                if i + 1 < self.order {
-                    b[i][m] -= self.beside[i] * b[i + 1][m];
-                }
-                b[i][m] /= pivot[i];
-            }
-        }
+    /// B ← Hᵀ B, B having so many columns, a multiple of eight, row by row. 2 n² operations a column.
+    pub(crate) fn turn(&self, b: &mut [f64], width: usize) {
+        let back = false;
+        let form = self;
+        dispatch(Turn {
+            form,
+            b,
+            width,
+            back,
+        });
+    }
+
+    /// B ← H B.
+    pub(crate) fn turn_back(&self, b: &mut [f64], width: usize) {
+        let back = true;
+        let form = self;
+        dispatch(Turn {
+            form,
+            b,
+            width,
+            back,
+        });
+    }
+
+    /// Solves (T + λ) x = b for every column of B, each with its own λ, of which `shifts` has a multiple of eight; overwrites B. Positive
+    /// definite T + λ needs no pivots.
+    pub(crate) fn solve(&self, shifts: &[f64], b: &mut [f64], pivots: &mut Vec<f64>) {
+        pivots.clear();
+        pivots.resize(self.order * shifts.len(), 0.0);
+        dispatch(Solve {
+            form: self,
+            shifts,
+            b,
+            pivots,
+        });
     }
 }
 
@@ -79,90 +99,248 @@ impl Job<f64> for Reduce<'_> {
             order,
             stride,
             matrix,
-            vectors,
-            width,
+            scales,
             diagonal,
             beside,
+            work: [last, taken, v, w],
         } = self.0;
-        let (order, stride, width) = (*order, *stride, *width);
-        let (mut v, mut w) = (vec![0.0; stride], vec![0.0; stride]);
-        let mut sums = vec![0.0; width];
+        let (order, stride) = (*order, *stride);
         for k in 0..order {
-            diagonal.push(matrix[k * stride + k]);
+            let row = &mut matrix[k * stride..(k + 1) * stride];
+            let (by_v, by_w) = (L::new(-taken[k]), L::new(-last[k]));
+            for ((a, v), w) in row[k..].iter_mut().zip(&last[k..]).zip(&taken[k..]) {
+                let sum = by_v.mul_add(L::new(*v), L::new(*a));
+                *a = by_w.mul_add(L::new(*w), sum).get();
+            }
+            diagonal.push(row[k]);
             if k + 1 == order {
                 break;
             }
             // Whole vectors from the one that holds k + 1; what lies before is zero in v.
             let from = (k + 1) / PANEL * PANEL;
-            v[from..].copy_from_slice(&matrix[k * stride + from..(k + 1) * stride]);
+            v[from..].copy_from_slice(&row[from..]);
             v[from..=k].fill(0.0);
             let (tau, side) = reflector::<L>(&mut v[from..], k + 1 - from);
+            row[from..].copy_from_slice(&v[from..]);
             beside.push(side);
-            if tau == 0.0 {
-                continue;
-            }
-            // w = τ A v − ½ τ² (vᵀ A v) v.
+            scales.push(tau);
+            // w = τ A v − ½ τ² (vᵀ A v) v; A without what the last reflector takes off, which is made up for on the way.
             w[from..].fill(0.0);
-            let rows = &matrix[(k + 1) * stride..order * stride];
-            combine::<L>(&mut w[from..], rows, stride, from, &v[k + 1..order]);
+            let mut pass = Pass {
+                stride,
+                last,
+                taken,
+                v,
+                product: w,
+            };
+            let mut j = k + 1;
+            if j % 2 == 1 {
+                pass.rows::<L, 1>(&mut matrix[j * stride..(j + 1) * stride], j);
+                j += 1;
+            }
+            while j + 1 < order {
+                pass.rows::<L, 2>(&mut matrix[j * stride..(j + 2) * stride], j);
+                j += 2;
+            }
+            if j < order {
+                pass.rows::<L, 1>(&mut matrix[j * stride..(j + 1) * stride], j);
+            }
             w[from..].iter_mut().for_each(|w| *w *= tau);
             let half = L::new(-0.5 * tau * dot::<L>(&w[from..], &v[from..]));
             for (w, v) in w[from..].iter_mut().zip(&v[from..]) {
                 *w = half.mul_add(L::new(*v), L::new(*w)).get();
             }
-            for j in k + 1..order {
-                let row = &mut matrix[j * stride + from..(j + 1) * stride];
-                let (by_v, by_w) = (L::new(-w[j]), L::new(-v[j]));
-                for ((a, v), w) in row.iter_mut().zip(&v[from..]).zip(&w[from..]) {
-                    let sum = by_v.mul_add(L::new(*v), L::new(*a));
-                    *a = by_w.mul_add(L::new(*w), sum).get();
+            core::mem::swap(last, v);
+            core::mem::swap(taken, w);
+        }
+    }
+}
+
+/// A row's part of a panel.
+type Block = [f64; PANEL];
+
+/// What a pass over the triangle reads and adds to.
+struct Pass<'a> {
+    stride: usize,
+    last: &'a [f64],
+    taken: &'a [f64],
+    v: &'a [f64],
+    product: &'a mut [f64],
+}
+
+impl Pass<'_> {
+    /// Takes off so many rows, of which `j` is the first and which lie in one panel, what the last reflector does, and adds to the product
+    /// with v what they and the columns that mirror them have.
+    #[inline(always)]
+    fn rows<L: Lane<f64>, const R: usize>(&mut self, rows: &mut [f64], j: usize) {
+        let start = j / PANEL * PANEL;
+        let blocks = (self.stride - start) / PANEL;
+        let mut sums = [[0.0; PANEL]; R];
+        let mut cut = [0; R];
+        for (r, cut) in cut.iter_mut().enumerate() {
+            *cut = j + r - start;
+        }
+        self.block::<L, R>(rows, j, start, cut, &mut sums);
+        for block in 1..blocks {
+            self.block::<L, R>(rows, j, start + block * PANEL, [0; R], &mut sums);
+        }
+        for r in 0..R {
+            // The diagonal is its own mirror.
+            let own = rows[r * self.stride + j + r] * self.v[j + r];
+            self.product[j + r] += sums[r].iter().sum::<f64>() - own;
+        }
+    }
+
+    /// One panel of these rows from column `at` on; the first `cut` places of a row belong to the other triangle.
+    #[inline(always)]
+    fn block<L: Lane<f64>, const R: usize>(
+        &mut self,
+        rows: &mut [f64],
+        j: usize,
+        at: usize,
+        cut: [usize; R],
+        sums: &mut [Block; R],
+    ) {
+        let take = |list: &[f64]| -> Block {
+            let mut block = [0.0; PANEL];
+            block.copy_from_slice(&list[at..at + PANEL]);
+            block
+        };
+        let (last, taken, v) = (take(self.last), take(self.taken), take(self.v));
+        let mut product = take(self.product);
+        for r in 0..R {
+            let (by_v, by_w) = (L::new(-self.taken[j + r]), L::new(-self.last[j + r]));
+            let own = L::new(self.v[j + r]);
+            let row = &mut rows[r * self.stride + at..r * self.stride + at + PANEL];
+            let mut a = [0.0; PANEL];
+            a.copy_from_slice(row);
+            for l in 0..PANEL {
+                let sum = by_v.mul_add(L::new(last[l]), L::new(a[l]));
+                a[l] = by_w.mul_add(L::new(taken[l]), sum).get();
+            }
+            a[..cut[r]].fill(0.0);
+            for l in 0..PANEL {
+                sums[r][l] = L::new(a[l]).mul_add(L::new(v[l]), L::new(sums[r][l])).get();
+            }
+            for l in 0..PANEL {
+                product[l] = own.mul_add(L::new(a[l]), L::new(product[l])).get();
+            }
+            row.copy_from_slice(&a);
+        }
+        self.product[at..at + PANEL].copy_from_slice(&product);
+    }
+}
+
+struct Turn<'a> {
+    form: &'a Tridiagonal,
+    b: &'a mut [f64],
+    width: usize,
+    /// From the last reflector to the first.
+    back: bool,
+}
+
+impl Job<f64> for Turn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(mut self) {
+        let mut at = 0;
+        while at + TOGETHER <= self.width {
+            self.columns::<L, TOGETHER>(at);
+            at += TOGETHER;
+        }
+        while at < self.width {
+            self.columns::<L, PANEL>(at);
+            at += PANEL;
+        }
+    }
+}
+
+impl Turn<'_> {
+    /// So many columns from the `at`-th on.
+    #[inline(always)]
+    fn columns<L: Lane<f64>, const W: usize>(&mut self, at: usize) {
+        let (form, width) = (self.form, self.width);
+        let (order, reflectors) = (form.order, form.scales.len());
+        for step in 0..reflectors {
+            let k = if self.back {
+                reflectors - 1 - step
+            } else {
+                step
+            };
+            let v = &form.matrix[k * form.stride + k + 1..k * form.stride + order];
+            let rows = &mut self.b[(k + 1) * width..order * width];
+            let mut sums = [0.0; W];
+            for (row, v) in rows.chunks_exact(width).zip(v) {
+                let (row, v) = (&row[at..at + W], L::new(*v));
+                for l in 0..W {
+                    sums[l] = v.mul_add(L::new(row[l]), L::new(sums[l])).get();
                 }
             }
-            sums.fill(0.0);
-            let rows = &vectors[(k + 1) * width..order * width];
-            combine::<L>(&mut sums, rows, width, 0, &v[k + 1..order]);
-            for i in k + 1..order {
-                let factor = L::new(-tau * v[i]);
-                let row = &mut vectors[i * width..(i + 1) * width];
-                for (x, sum) in row.iter_mut().zip(&sums) {
-                    *x = factor.mul_add(L::new(*sum), L::new(*x)).get();
+            for (row, v) in rows.chunks_exact_mut(width).zip(v) {
+                let (row, factor) = (&mut row[at..at + W], L::new(-form.scales[k] * v));
+                for l in 0..W {
+                    row[l] = factor.mul_add(L::new(sums[l]), L::new(row[l])).get();
                 }
             }
         }
     }
 }
 
-/// y + Σ factor × row, of the rows from place `from` on; four at a time, so that y is fetched and stored a quarter as often.
-#[inline(always)]
-fn combine<L: Lane<f64>>(y: &mut [f64], rows: &[f64], stride: usize, from: usize, factors: &[f64]) {
-    const ROWS: usize = 4;
-    let row = |i: usize| &rows[i * stride + from..(i + 1) * stride];
-    let (fours, rest) = factors.as_chunks::<ROWS>();
-    for (four, factors) in fours.iter().enumerate() {
-        let factors = factors.map(L::new);
-        let [a, b, c, d] = core::array::from_fn(|l| &row(ROWS * four + l)[..y.len()]);
-        for (i, y) in y.iter_mut().enumerate() {
-            let mut sum = L::new(*y);
-            for (factor, x) in factors.into_iter().zip([a[i], b[i], c[i], d[i]]) {
-                sum = factor.mul_add(L::new(x), sum);
+struct Solve<'a> {
+    form: &'a Tridiagonal,
+    shifts: &'a [f64],
+    b: &'a mut [f64],
+    pivots: &'a mut [f64],
+}
+
+impl Job<f64> for Solve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lane<f64>>(self) {
+        let Self {
+            form,
+            shifts,
+            b,
+            pivots,
+        } = self;
+        let (order, width) = (form.order, shifts.len());
+        for at in (0..width).step_by(PANEL) {
+            let (mut pivot, mut above) = ([1.0; PANEL], [0.0; PANEL]);
+            for i in 0..order {
+                let beside = if i > 0 { form.beside[i - 1] } else { 0.0 };
+                let place = i * width + at..i * width + at + PANEL;
+                let (b, pivots) = (&mut b[place.clone()], &mut pivots[place]);
+                for l in 0..PANEL {
+                    let factor = beside / pivot[l];
+                    pivot[l] = form.diagonal[i] + shifts[at + l] - factor * beside;
+                    above[l] = b[l] - factor * above[l];
+                    (pivots[l], b[l]) = (pivot[l], above[l]);
+                }
             }
-            *y = sum.get();
-        }
-    }
-    for (i, &factor) in rest.iter().enumerate() {
-        let factor = L::new(factor);
-        for (y, x) in y.iter_mut().zip(row(ROWS * fours.len() + i)) {
-            *y = factor.mul_add(L::new(*x), L::new(*y)).get();
+            let mut below = [0.0; PANEL];
+            for i in (0..order).rev() {
+                let beside = form.beside.get(i).copied().unwrap_or(0.0);
+                let place = i * width + at..i * width + at + PANEL;
+                let (b, pivots) = (&mut b[place.clone()], &pivots[place]);
+                for l in 0..PANEL {
+                    below[l] = (b[l] - beside * below[l]) / pivots[l];
+                    b[l] = below[l];
+                }
+            }
         }
     }
 }
 
-/// Turns x into v with v[head] = 1 and (1 − τ v vᵀ) x = β e_head; returns τ and β.
+/// Turns x into the v of the reflector 1 − τ v vᵀ that takes it to a multiple of the axis `head`, before which all is zero; returns τ and that
+/// multiple. Where x is one already τ is zero, and so is v.
 #[inline(always)]
 fn reflector<L: Lane<f64>>(x: &mut [f64], head: usize) -> (f64, f64) {
     let (top, norm) = (x[head], dot::<L>(x, x).sqrt());
     let beta = if top > 0.0 { -norm } else { norm };
     if norm == top.abs() {
+        x.fill(0.0);
         return (0.0, top);
     }
     x.iter_mut().for_each(|x| *x /= top - beta);
@@ -170,6 +348,7 @@ fn reflector<L: Lane<f64>>(x: &mut [f64], head: usize) -> (f64, f64) {
     ((beta - top) / beta, beta)
 }
 
+/// Inner product of whole vectors, their lanes summed apart.
 #[inline(always)]
 fn dot<L: Lane<f64>>(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; PANEL];
@@ -191,10 +370,12 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
+    /// x that reads (A + λ) x = b, of two λ at once, against LU.
     #[test]
     fn solutions_are_those_of_the_dense_matrix() {
-        for n in [1, 2, 3, 8, 9, 21] {
-            // Diagonally dominant, and an x that reads (A + λ) x in two vectors.
+        let mut form = Tridiagonal::default();
+        for n in [1, 2, 3, 8, 9, 21, 40] {
+            // Diagonally dominant.
             let entry = |i: usize, j: usize| {
                 let (i, j) = (i.min(j), i.max(j));
                 if i == j {
@@ -205,26 +386,48 @@ mod tests {
             };
             let a = DMatrix::from_fn(n, n, entry);
             let b = DVector::from_fn(n, |i, _| 1.0 + (i % 4) as f64);
-            let probe = DVector::from_fn(n, |i, _| ((5 * i) % 7) as f64 - 3.0);
-            let mut form = Tridiagonal::new(n, 2);
-            let [stride, width] = form.strides();
+            form.reset(n);
+            let stride = form.stride();
             for i in 0..n {
-                (0..n).for_each(|j| form.matrix[i * stride + j] = a[(i, j)]);
-                form.vectors[i * width] = b[i];
-                form.vectors[i * width + 1] = probe[i];
+                (0..n).for_each(|j| {
+                    // What lies below the diagonal is not read.
+                    form.matrix[i * stride + j] = if j < i { f64::NAN } else { a[(i, j)] };
+                });
             }
             form.reduce();
-            for lambda in [0.0, 3.0] {
-                let mut x: Vec<_> = (0..n).map(|i| [form.vectors[i * width]]).collect();
-                form.solve(lambda, &mut x);
-                let found: f64 = (0..n).map(|i| x[i][0] * form.vectors[i * width + 1]).sum();
-                let shifted = &a + lambda * DMatrix::identity(n, n);
-                let expected = probe.dot(&shifted.lu().solve(&b).expect("definite"));
-                assert!(
-                    (found - expected).abs() < 1e-12 * n as f64,
-                    "{n}: {found} {expected}"
-                );
+            // More columns than are turned together, and a λ for each.
+            let width = TOGETHER + PANEL;
+            let shifts: Vec<f64> = (0..width).map(|c| (c % 4) as f64).collect();
+            let mut x: Vec<f64> = (0..n * width).map(|at| b[at / width]).collect();
+            form.turn(&mut x, width);
+            form.solve(&shifts, &mut x, &mut Vec::new());
+            form.turn_back(&mut x, width);
+            for (c, shift) in shifts.iter().enumerate() {
+                let shifted = &a + *shift * DMatrix::identity(n, n);
+                let expected = shifted.lu().solve(&b).expect("definite");
+                for i in 0..n {
+                    let error = (x[i * width + c] - expected[i]).abs();
+                    assert!(error < 1e-13 * n as f64, "{n}, {c}: {error}");
+                }
             }
         }
+    }
+
+    /// A matrix that is tridiagonal already has nothing to reflect.
+    #[test]
+    fn a_tridiagonal_matrix_stays_as_it_is() {
+        let mut form = Tridiagonal::default();
+        form.reset(5);
+        let stride = form.stride();
+        for i in 0..5 {
+            form.matrix[i * stride + i] = 2.0 + i as f64;
+            if i < 4 {
+                form.matrix[i * stride + i + 1] = -1.0;
+            }
+        }
+        form.reduce();
+        assert_eq!(form.diagonal, [2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(form.beside, [-1.0; 4]);
+        assert_eq!(form.scales, [0.0; 4]);
     }
 }
