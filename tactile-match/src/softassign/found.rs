@@ -79,7 +79,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         let workspace = self.workspace;
         let (answer, frame) = (&workspace.answer, &workspace.frame);
         let mut warped: Vec<Point<T, D>> = self.warped().collect();
-        let warp = spline.through(model, &mut warped);
+        let warp = spline.through(&mut warped);
         let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
         for i in 0..model.len() {
             row.clear();

@@ -3,56 +3,161 @@
 use super::blocks::Blocks;
 use super::frame::Frame;
 use super::large::LARGE;
+use crate::frame::{centre_and_radius, widened};
 use crate::hard::{self, Interpolation};
-use nalgebra::Point;
-use tactile_tps::{Scalar, Smoothing, Warp};
+use nalgebra::{Point, SMatrix};
+use std::sync::{Arc, OnceLock};
+use tactile_tps::{Scalar, Smoothing, TpsError, Warp};
 
 /// Points that the spline of a large set goes through: a system of so many is solved in a tenth of a second, and between them a field as
 /// smooth as the prior's differs from it by less than its residuals.
 const SAMPLE: usize = 1500;
 
-/// The factorised system of a model's interpolating spline: through all points, or through a well-spread sample of a large set.
+/// Least distance of two points, in radii of the model, from which on a spline surely goes through all positions: the condition of its
+/// system grows with the square of the distance's inverse at most (Narcowich & Ward, J. Approx. Theory 69, 1992), to 10⁷ for some hundred points.
+const APART: f64 = 0.01;
+
+/// Radii in which nothing over- or underflows, whatever the type of the points.
+const ORDINARY: std::ops::Range<f64> = 1e-12..1e12;
+
+/// A model's interpolating spline: through all points, or through a well-spread sample of a large set. Its system is factorised when a warp first
+/// needs it, and once for all targets.
 #[derive(Clone, Debug)]
 pub(super) struct ModelSpline<T: Scalar, const D: usize> {
-    /// The rows of the sample; empty for all.
+    sources: Arc<Sources<T, D>>,
+}
+
+#[derive(Debug)]
+struct Sources<T: Scalar, const D: usize> {
+    points: Vec<Point<T, D>>,
+    /// Their rows in the model; empty for all.
     rows: Vec<usize>,
-    interpolation: Interpolation<T, D>,
+    /// Whether a spline goes through any positions.
+    apart: bool,
+    system: OnceLock<Interpolation<T, D>>,
+}
+
+impl<T: Scalar, const D: usize> Sources<T, D> {
+    fn system(&self) -> &Interpolation<T, D> {
+        self.system
+            .get_or_init(|| Interpolation::new(&self.points, None, Smoothing::None))
+    }
 }
 
 impl<T: Scalar, const D: usize> ModelSpline<T, D> {
     pub(super) fn new(model: &[Point<T, D>]) -> Self {
-        if model.len() < LARGE {
-            return Self {
-                rows: Vec::new(),
-                interpolation: Interpolation::new(model, None, Smoothing::None),
-            };
+        let mut rows = Vec::new();
+        if model.len() >= LARGE {
+            let frame = Frame::new(model, model);
+            let inside: Vec<[f64; D]> = model.iter().map(|p| frame.model(p)).collect();
+            let mut blocks = Blocks::default();
+            blocks.build(&inside);
+            let step = model.len() / SAMPLE;
+            rows.extend(blocks.order.iter().step_by(step));
         }
-        let frame = Frame::new(model, model);
-        let inside: Vec<[f64; D]> = model.iter().map(|p| frame.model(p)).collect();
-        let mut blocks = Blocks::default();
-        blocks.build(&inside);
-        let step = model.len() / SAMPLE;
-        let rows: Vec<usize> = blocks.order.iter().step_by(step).copied().collect();
-        let sources: Vec<_> = rows.iter().map(|&i| model[i]).collect();
+        let points = if rows.is_empty() {
+            model.to_vec()
+        } else {
+            rows.iter().map(|&i| model[i]).collect()
+        };
         Self {
-            rows,
-            interpolation: Interpolation::new(&sources, None, Smoothing::None),
+            sources: Arc::new(Sources {
+                apart: are_apart(&points),
+                points,
+                rows,
+                system: OnceLock::new(),
+            }),
         }
     }
 
-    /// The spline that takes the model, or its sample, to `warped`; see [`warp_through`].
-    pub(super) fn through(
-        &self,
-        model: &[Point<T, D>],
-        warped: &mut [Point<T, D>],
-    ) -> Box<dyn Warp<T, D> + Send + Sync> {
-        if self.rows.is_empty() {
-            return warp_through(&self.interpolation, model, warped);
+    /// The spline that takes the model, or its sample, to `warped`. Where none goes through these positions a smoothed one, and `warped`, unless
+    /// that is of a sample, becomes what it gives.
+    pub(super) fn through(&self, warped: &mut [Point<T, D>]) -> Box<dyn Warp<T, D> + Send + Sync> {
+        let Sources { rows, apart, .. } = &*self.sources;
+        let mut images = if rows.is_empty() {
+            warped.to_vec()
+        } else {
+            rows.iter().map(|&i| warped[i]).collect()
+        };
+        if *apart && ORDINARY.contains(&centre_and_radius(&images).1) {
+            return Box::new(Lazy {
+                sources: Arc::clone(&self.sources),
+                images,
+                spline: OnceLock::new(),
+            });
         }
-        let sources: Vec<_> = self.rows.iter().map(|&i| model[i]).collect();
-        let mut images: Vec<_> = self.rows.iter().map(|&i| warped[i]).collect();
-        warp_through(&self.interpolation, &sources, &mut images)
+        let warp = warp_through(&self.sources, &mut images);
+        if rows.is_empty() {
+            warped.copy_from_slice(&images);
+        }
+        warp
     }
+}
+
+/// A spline that is fitted when it is first asked for: who wants the pairs alone does not wait for it.
+#[derive(Debug)]
+struct Lazy<T: Scalar, const D: usize> {
+    sources: Arc<Sources<T, D>>,
+    images: Vec<Point<T, D>>,
+    spline: OnceLock<Fitted<T, D>>,
+}
+
+struct Fitted<T: Scalar, const D: usize>(Box<dyn Warp<T, D> + Send + Sync>);
+
+impl<T: Scalar, const D: usize> std::fmt::Debug for Fitted<T, D> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Fitted").finish_non_exhaustive()
+    }
+}
+
+impl<T: Scalar, const D: usize> Lazy<T, D> {
+    fn spline(&self) -> &dyn Warp<T, D> {
+        let fit = || Fitted(warp_through(&self.sources, &mut self.images.clone()));
+        &*self.spline.get_or_init(fit).0
+    }
+}
+
+impl<T: Scalar, const D: usize> Warp<T, D> for Lazy<T, D> {
+    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+        self.spline().apply(point)
+    }
+
+    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
+        self.spline().jacobian(point)
+    }
+
+    fn apply_into(
+        &self,
+        points: &[Point<T, D>],
+        images: &mut [Point<T, D>],
+    ) -> Result<(), TpsError> {
+        self.spline().apply_into(points, images)
+    }
+
+    fn jacobian_into(
+        &self,
+        points: &[Point<T, D>],
+        jacobians: &mut [SMatrix<T, D, D>],
+    ) -> Result<(), TpsError> {
+        self.spline().jacobian_into(points, jacobians)
+    }
+}
+
+/// Whether all points are so far from each other, and their set of such a size, that a spline goes through any positions.
+fn are_apart<T: Scalar, const D: usize>(points: &[Point<T, D>]) -> bool {
+    let (centre, radius) = centre_and_radius(points);
+    if !ORDINARY.contains(&radius) {
+        return false;
+    }
+    let inside = |p: &Point<T, D>| (widened(p) - centre) / radius;
+    let mut sorted: Vec<_> = points.iter().map(inside).collect();
+    // Only neighbours along the first axis can be near.
+    sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    sorted.iter().enumerate().all(|(i, p)| {
+        let near = sorted[i + 1..].iter();
+        near.take_while(|q| q[0] - p[0] < APART)
+            .all(|q| (q - p).norm() >= APART)
+    })
 }
 
 /// Smoothing of the spline where none goes through all positions.
@@ -61,11 +166,11 @@ const SMOOTHING: f64 = 1e-6;
 /// The interpolating spline through the estimated positions. Where there is none (model points that coincide and go different
 /// ways) a smoothed one, and `warped` becomes what that gives.
 fn warp_through<T: Scalar, const D: usize>(
-    interpolation: &Interpolation<T, D>,
-    model: &[Point<T, D>],
+    sources: &Sources<T, D>,
     warped: &mut [Point<T, D>],
 ) -> Box<dyn Warp<T, D> + Send + Sync> {
-    let exact = interpolation.through(model, warped);
+    let model = &sources.points;
+    let exact = sources.system().through(model, warped);
     if agrees(&*exact, model, warped) {
         return exact;
     }
@@ -97,4 +202,49 @@ fn agrees<T: Scalar, const D: usize>(
             .iter()
             .zip(warped)
             .all(|(image, w)| (image - w).amax() <= tolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    fn lattice(step: f64) -> Vec<Point2<f64>> {
+        let place = |i: usize| (i % 5) as f64 + 0.1 * ((i * i) as f64).sin();
+        (0..25)
+            .map(|i| Point2::new(place(i), (i / 5) as f64) * step)
+            .collect()
+    }
+
+    #[test]
+    fn nothing_is_factorised_before_the_warp_is_asked_and_then_once() {
+        let model = lattice(1e-3);
+        let spline = ModelSpline::new(&model);
+        let mut warped: Vec<_> = model.iter().map(|p| p * 1.2).collect();
+        let [one, other] = [0, 1].map(|_| spline.through(&mut warped));
+        assert!(spline.sources.system.get().is_none());
+        assert!((one.apply(&model[3]) - warped[3]).norm() < 1e-15);
+        let system: *const _ = spline.sources.system();
+        assert!((other.jacobian(&model[7])[(0, 0)] - 1.2).abs() < 1e-9);
+        assert!(std::ptr::eq(system, spline.sources.system()));
+    }
+
+    #[test]
+    fn points_that_nearly_coincide_or_sizes_out_of_all_range_are_fitted_at_once() {
+        assert!(are_apart(&lattice(1.0)));
+        let mut model = lattice(1.0);
+        model.push(model[11] + nalgebra::Vector2::new(0.0, 0.01));
+        assert!(!are_apart(&model));
+        for step in [1e-200, 1e200] {
+            assert!(!are_apart(&lattice(step)));
+        }
+        // The twins go different ways: the positions become those of a smoothed spline.
+        let mut warped = model.clone();
+        model[25] = model[11];
+        warped[25].x += 0.5;
+        let wanted = warped.clone();
+        let warp = ModelSpline::new(&model).through(&mut warped);
+        assert!((warped[25] - wanted[25]).norm() > 0.1);
+        assert!((warp.apply(&model[25]) - warped[25]).norm() < 1e-9);
+    }
 }
