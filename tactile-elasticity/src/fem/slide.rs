@@ -18,6 +18,9 @@ use super::state::State;
 
 /// Rounds of meshing and solving; each leaves about a tenth of the distance before.
 const MAX_ROUNDS: usize = 10;
+/// Part of the distance that a round may leave: beyond a tenth of the block's height the rim's nodes of a coarse mesh pass each
+/// other to and fro, which moves the pressure by a thousandth and takes most of a search's time.
+const STALLED: f64 = 0.8;
 /// Distance of nodes over the face's radius at which they meet: pressures change by as large a part.
 const MET: f64 = 2e-6;
 /// Part of the face's radius beyond which nodes count as the rim's, and their distance there: at a tenth of the block's height
@@ -62,6 +65,7 @@ impl Scene {
             |model: &Model, guess: &[State]| model.solve_near(layout, &load, guess).states.pop();
         let mut state = solve(&scene.model, guess)?;
         let mut relaxation = Relaxation::default();
+        let mut before = f64::INFINITY;
         for _ in 0..MAX_ROUNDS {
             let pairs = scene.model.pairs();
             let radius =
@@ -71,13 +75,15 @@ impl Scene {
                 .iter()
                 .map(|pair| radius(pair.lower))
                 .fold(0.0, f64::max);
-            let has_met = |pair: &Pair| {
+            let left = |pair: &Pair| {
                 let is_rim = radius(pair.lower) > RIM * face;
-                apart(pair).abs() <= if is_rim { RIM_MET } else { MET } * face
+                apart(pair).abs() / (if is_rim { RIM_MET } else { MET } * face)
             };
-            if pairs.iter().all(has_met) {
+            let left = pairs.iter().map(left).fold(0.0, f64::max);
+            if left <= 1.0 || left > STALLED * before {
                 break;
             }
+            before = left;
             let parts = relaxation.next(pairs.iter().map(apart));
             let mut shifts = Vec::with_capacity(pairs.len());
             for (pair, part) in pairs.iter().zip(parts) {

@@ -70,6 +70,15 @@ impl Hypothesis {
         self.plain.evidence.max(self.evidence_with())
     }
 
+    /// χ² over its degrees of freedom, where that is more than one: what differences of log evidence are too large by.
+    pub(super) fn inflation(&self, observed: &Observed) -> f64 {
+        let best = match &self.lump {
+            Some(lump) if lump.evidence > self.plain.evidence => lump,
+            _ => &self.plain,
+        };
+        (best.misfit / observed.values.len() as f64).max(1.0)
+    }
+
     /// Log evidence with an inclusion: that of the grid where none was fitted.
     fn evidence_with(&self) -> f64 {
         match (&self.lump, &self.score) {

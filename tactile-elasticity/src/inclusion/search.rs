@@ -24,7 +24,8 @@ const MIN_RINGS: usize = 8;
 /// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1 and three times as much again for
 /// what the finite elements err by on a sliding face, which the covariance knows by its size alone. Two frames on soft tissue by
 /// CalculiX preferred the wrong one by up to 9 (`inclusion_study` on the scenes of `evidence/inclusion_scenes.py`); the price is
-/// intervals that hold under both where the right one leads by less.
+/// intervals that hold under both where the right one leads by less. Where the better one leaves more than the errors explain, differences
+/// count as much less (K. P. Burnham & D. R. Anderson, *Model Selection and Multimodel Inference* (2002), §2.5).
 const CLEAR_EVIDENCE: f64 = 12.0;
 /// Difference of log evidence beyond which another assumption about the face is not fitted to the end.
 const RIVAL_EVIDENCE: f64 = 16.0;
@@ -180,8 +181,8 @@ impl InclusionSearch {
         hypotheses.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
         let mut hypotheses = hypotheses.into_iter();
         let best = hypotheses.next().ok_or(ElasticityError::NoSolution)?;
-        let rival =
-            (hypotheses.next()).filter(|other| best.evidence() - other.evidence() < CLEAR_EVIDENCE);
+        let clear = CLEAR_EVIDENCE * best.inflation(&observed);
+        let rival = (hypotheses.next()).filter(|other| best.evidence() - other.evidence() < clear);
         Ok(best.estimate(&observed, rival.as_ref(), is_unsolved))
     }
 
