@@ -108,11 +108,11 @@ impl Told {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Inclusion {
-    /// Diameter D, in metres.
+    /// Diameter D, in metres: the posterior's median.
     pub diameter_m: Told,
-    /// Depth of its top d, in metres.
+    /// Depth of its top d, in metres: the posterior's median.
     pub depth_m: Told,
-    /// Young's modulus E₁, in pascals.
+    /// Young's modulus E₁, in pascals: of the best fit, for how stiff it may be at most is often known from the prior alone.
     pub youngs_modulus_pa: Told,
     /// Correlations of ln D, ln d and ln E₁.
     pub correlation: [[f64; 3]; 3],
@@ -161,8 +161,7 @@ pub enum InclusionWarning {
 pub struct InclusionEstimate {
     /// Probability that there is an inclusion, one and none being equally likely beforehand.
     pub probability: f64,
-    /// Whether one was found: the probability is above 0.99 and χ² falls by more than 20 (for three
-    /// parameters and some ten independent places to look, one false alarm in about a thousand), and its
+    /// Whether one was found: the probability is above 0.99, χ² falls by more than 36, and its
     /// modulus is a fifth or more from the tissue's.
     pub found: bool,
     /// Young's modulus of the tissue, in pascals.

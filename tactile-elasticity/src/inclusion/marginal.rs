@@ -151,6 +151,11 @@ impl Marginal {
         })
     }
 
+    /// The value that a coordinate is as probably above as below: the optimum of a skewed posterior lies at an end of its interval.
+    pub(super) fn median(&self, coordinate: usize) -> f64 {
+        self.quantile(coordinate, 0.5)
+    }
+
     /// The 95 % interval of a coordinate: the least that holds both the likelihood ratio's and the one with equal tails of
     /// probability. Along a ridge each left out truths that the other holds, for the mesh's waves move F by a few units.
     pub(super) fn interval(&self, coordinate: usize) -> [f64; 2] {
@@ -276,12 +281,16 @@ mod tests {
         // Falls as a Gaussian below and a ninth as fast above.
         let fall = |x: f64| if x < 0.0 { 12.5 * x * x } else { 1.4 * x * x };
         let ridge = ridge(&[-0.5, -0.25, 0.0, 0.6, 1.2, 1.8], |x| -fall(x), 0.0);
-        let [low, high] = Marginal::new(&ridge).unwrap().region(1, 3.84);
+        let marginal = Marginal::new(&ridge).unwrap();
+        let [low, high] = marginal.region(1, 3.84);
         // Where it has fallen by half of 3.84.
         assert!(
             (low + 0.392).abs() < 0.03 && (high - 1.171).abs() < 0.06,
             "{low} {high}"
         );
+        let [lowest, highest] = marginal.interval(1);
+        assert!(lowest <= low && highest >= high, "{lowest} {highest}");
+        assert!(marginal.median(1) > 0.0 && marginal.median(1) < 0.5 * high);
     }
 
     #[test]

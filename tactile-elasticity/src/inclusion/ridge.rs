@@ -10,12 +10,13 @@ const STEP: f64 = 1.2;
 const LARGEST_STEP: f64 = 1.0;
 /// Fall of ln p at which a side ends: that of 2.4 standard errors. Beyond, its slope goes on.
 const FALL: f64 = 2.9;
-/// Further fall in one step beyond which it was too long, and is halved.
-const CLIFF: f64 = 4.0;
-/// Distance from the ridge in standard errors above which one step to it does not do.
+/// Fall of ln p in one step beyond which it was too long, and is halved: a Gaussian falls by 2.2 in the second.
+const CLIFF: f64 = 3.0;
+/// Distance from the ridge in standard errors above which one step to it does not do, and steps there.
 const LONG: f64 = 1.0;
-/// Nodes of a side; reached where E₁ is open and the prior alone ends it.
-const MAX_NODES: usize = 6;
+const MAX_STEPS: usize = 4;
+/// Steps along a side, halved ones too; reached where E₁ is open and the prior alone ends it.
+const MAX_NODES: usize = 8;
 
 /// The ridge at one E₁.
 #[derive(Debug, Clone)]
@@ -68,6 +69,7 @@ impl Problem {
                 ..start
             };
             let mut part = 1.0;
+            let mut before = top;
             for _ in 0..MAX_NODES {
                 let step = part * (STEP * place.error).min(LARGEST_STEP);
                 let at = self.stepped(&place.parameters, &(sign * step * &place.tangent));
@@ -76,11 +78,13 @@ impl Problem {
                     break;
                 };
                 let density = node.density;
-                if density < top - FALL - CLIFF {
+                if density < before - CLIFF {
                     // The ridge bends or ends on the way: an inclusion as soft as the tissue is none.
                     part *= 0.5;
                     continue;
                 }
+                before = density;
+                part = (2.0 * part).min(1.0);
                 if sign < 0.0 {
                     nodes.insert(0, node);
                 } else {
@@ -110,12 +114,16 @@ impl Problem {
     ) -> Option<(Node, Place)> {
         let mut solve =
             |at: &Parameters, near: &Solved| go_on().then(|| self.normal(at, Some(near))).flatten();
-        let (node, place) = self.node(at, solve(at, near)?, index)?;
-        if place.away < LONG {
-            return Some((node, place));
+        let mut found = self.node(at, solve(at, near)?, index)?;
+        for _ in 1..MAX_STEPS {
+            let place = &found.1;
+            if place.away < LONG {
+                break;
+            }
+            let normal = solve(&place.parameters, &place.solved)?;
+            found = self.node(&place.parameters, normal, index)?;
         }
-        let normal = solve(&place.parameters, &place.solved)?;
-        self.node(&place.parameters, normal, index)
+        Some(found)
     }
 
     /// The ridge at the E₁ of some parameters nearby.

@@ -14,9 +14,9 @@ use super::fit::{Fit, Problem};
 use super::starts::Start;
 use nalgebra::{DMatrix, DVector};
 
-/// Fall of the objective that a grid's inclusion must promise for inclusions to be fitted. One that is found lowers χ² by 20; its
+/// Fall of the objective that a grid's inclusion must promise for inclusions to be fitted. One that is found lowers χ² by 36; its
 /// neighbour in the grid promises half of that or more.
-const LEAST_PROMISE: f64 = 10.0;
+const LEAST_PROMISE: f64 = 18.0;
 
 /// What a grid of inclusions would change of a plain fit.
 #[derive(Debug, Clone, Copy)]
