@@ -3,7 +3,7 @@
 
     evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [NAMES ...]
 
-writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-elasticity/examples/inclusion_study.rs` reads them: 108 blocks with an
+writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-elasticity/examples/inclusion_study` reads them: 108 blocks with an
 inclusion, 32 plain ones, drawn from a fixed seed or from N. NAMES keeps some, `--part` shares them among processes; what is there already is
 left. Python's standard library alone; a scene takes 5 to 30 s.
 

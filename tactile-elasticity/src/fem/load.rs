@@ -65,7 +65,7 @@ pub struct Report {
     pub steps: usize,
     /// Load steps given up and taken again in halves.
     pub rejected_steps: usize,
-    /// Newton iterations, of rejected steps too.
+    /// Newton iterations, those with an earlier tangent and of rejected steps too.
     pub iterations: usize,
 }
 

@@ -41,8 +41,8 @@
 //! # Method
 //! Nine-node quadrilaterals with three discontinuous pressures each (Q9/P1, inf–sup stable: no locking
 //! up to ν = 0.4999), the pressures and the centre node eliminated element by element; Newton's method
-//! with the consistent tangent, a sparse LDLᵀ factorisation analysed once a pattern, load steps halved and doubled by what
-//! converges. Contact without friction: pressures piecewise linear on the nodes of one surface, gaps to
+//! with the consistent tangent, which scenes without contact search keep as long as it converges fast, a sparse LDLᵀ
+//! factorisation analysed once a pattern, load steps halved and doubled by what converges. Contact without friction: pressures piecewise linear on the nodes of one surface, gaps to
 //! the closest points of the other's edges, integrated from one end of these edges to the next
 //! (segment-to-segment), augmented Lagrangian, the contact zone of each iteration by a primal–dual active
 //! set. Contact without slip: nodes are held along the surface, by a penalty, where they first touched, in load steps of a tenth.

@@ -13,113 +13,25 @@
 //! 0.495 ± 0.005 whatever it is. NAMES keeps the scenes whose names begin with one of them, separated by commas.
 #![allow(clippy::print_stdout)]
 
+mod scenes;
+mod tally;
+
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
+use scenes::{SolvedScene, scenes};
 use std::error::Error;
 use std::path::Path;
-use tactile_elasticity::fem::{Guide, Interface, Layer, Material};
+use tactile_elasticity::fem::{Guide, Layer, Material};
 use tactile_elasticity::inclusion::{
-    AssumedInclusion, ExpectedErrors, Inclusion, InclusionEstimate, InclusionSearch,
-    PressureProfile, SensorErrors, Specimen, Told,
+    AssumedInclusion, ExpectedErrors, InclusionSearch, PressureProfile, SensorErrors, Specimen,
 };
+use tally::{Tally, parameters};
 
 /// A camera's pixel in metres, and its noise over the largest pressure.
 const PIXEL_M: f64 = 86e-6;
 const PIXEL_NOISE: f64 = 7.5e-3;
-/// Bound on a relative error up to which a parameter can be told.
-const TELLABLE: f64 = 0.3;
 /// Scenes after which the figures so far are printed.
 const SUMMARY_EVERY: usize = 10;
-
-struct SolvedScene {
-    name: String,
-    /// D, d, E₁; `None` for a plain block.
-    lump: Option<[f64; 3]>,
-    block_modulus_pa: f64,
-    height_m: f64,
-    radius_m: f64,
-    face_radius_m: f64,
-    interface: Interface,
-    approaches_m: Vec<f64>,
-    forces_n: Vec<f64>,
-    radii_m: Vec<f64>,
-    pressures_pa: Vec<Vec<f64>>,
-}
-
-/// A CSV file.
-struct Table {
-    header: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
-
-fn table(path: &Path) -> Result<Table, Box<dyn Error>> {
-    let text = std::fs::read_to_string(path)?;
-    let mut lines = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
-    let header = lines.next().ok_or("an empty file")?;
-    Ok(Table {
-        header,
-        rows: lines.collect(),
-    })
-}
-
-fn scenes(folder: &Path) -> Result<Vec<SolvedScene>, Box<dyn Error>> {
-    let Table { header, rows } = table(&folder.join("scenes.csv"))?;
-    let mut scenes = Vec::new();
-    for row in rows {
-        let text = |name: &str| -> Result<&str, String> {
-            let column = header.iter().position(|column| column == name);
-            let found = column.and_then(|column| row.get(column));
-            found.map(String::as_str).ok_or(format!("no column {name}"))
-        };
-        let number =
-            |name: &str| -> Result<f64, Box<dyn Error>> { Ok(text(name)?.parse::<f64>()?) };
-        let name = text("scene")?.to_owned();
-        let loads = header.iter().filter(|c| c.starts_with("approach_")).count();
-        let numbers = |prefix: &str, unit: &str| -> Result<Vec<f64>, Box<dyn Error>> {
-            let names = (1..=loads).map(|load| format!("{prefix}_{load}_{unit}"));
-            names
-                .filter(|name| text(name).is_ok_and(|text| !text.is_empty()))
-                .map(|name| number(&name))
-                .collect()
-        };
-        let approaches_m = numbers("approach", "m")?;
-        let points = table(&folder.join(format!("{name}.csv")))?.rows;
-        let mut radii_m = Vec::new();
-        let mut pressures_pa = vec![Vec::new(); approaches_m.len()];
-        for point in points {
-            let (load, radius): (usize, f64) = (point[0].parse()?, point[1].parse()?);
-            if radius == 0.0 {
-                // A ring has an area.
-                continue;
-            }
-            if load == 1 {
-                radii_m.push(radius);
-            }
-            pressures_pa[load - 1].push(point[2].parse()?);
-        }
-        let diameter = number("D_m")?;
-        let lump = [diameter, number("depth_m")?, number("E1_pa")?];
-        scenes.push(SolvedScene {
-            lump: (diameter > 0.0).then_some(lump),
-            block_modulus_pa: number("E0_pa")?,
-            height_m: number("block_height_m")?,
-            radius_m: number("block_radius_m")?,
-            face_radius_m: number("disc_radius_m")?,
-            interface: match text("contact")? {
-                "bonded" => Interface::Bonded,
-                _ => Interface::Frictionless,
-            },
-            approaches_m,
-            forces_n: numbers("force", "n")?,
-            radii_m,
-            pressures_pa,
-            name,
-        });
-    }
-    Ok(scenes)
-}
 
 /// The sensor's guide in all scenes.
 fn guide(radius_m: f64) -> Result<Guide, Box<dyn Error>> {
@@ -229,91 +141,6 @@ fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn
     Ok(search.expected_errors(&assumed, &scene.approaches_m, &scene.radii_m, &white)?)
 }
 
-fn parameters(inclusion: &Inclusion) -> [Told; 3] {
-    [
-        inclusion.diameter_m,
-        inclusion.depth_m,
-        inclusion.youngs_modulus_pa,
-    ]
-}
-
-#[derive(Default)]
-struct Tally {
-    /// |error| over the bound of each parameter, where that is below 30 %.
-    ratios: [Vec<f64>; 3],
-    /// Relative errors on wide shallow lumps.
-    shallow: [Vec<f64>; 3],
-    within: [usize; 3],
-    told: [usize; 3],
-    /// Parameters whose bound is above 30 %, and those of them not told.
-    open: usize,
-    left_open: usize,
-    findable: usize,
-    findable_found: usize,
-    plain: usize,
-    false_alarms: usize,
-}
-
-impl Tally {
-    fn add(&mut self, lump: [f64; 3], bounds: [f64; 3], estimate: &InclusionEstimate) {
-        if bounds[0] < 0.2 {
-            self.findable += 1;
-            self.findable_found += usize::from(estimate.found);
-        }
-        let Some(inclusion) = &estimate.inclusion else {
-            self.open += bounds.iter().filter(|bound| **bound > TELLABLE).count();
-            self.left_open += bounds.iter().filter(|bound| **bound > TELLABLE).count();
-            return;
-        };
-        for (k, told) in parameters(inclusion).iter().enumerate() {
-            let estimated = told.estimate();
-            let error = (estimated.value / lump[k]).ln().abs();
-            if bounds[k] > TELLABLE {
-                self.open += 1;
-                self.left_open += usize::from(told.value().is_none());
-            } else {
-                self.ratios[k].push(error / bounds[k]);
-            }
-            if lump[0] >= 14e-3 && lump[1] <= 4e-3 {
-                self.shallow[k].push(error);
-            }
-            let [low, high] = estimated.interval;
-            self.told[k] += 1;
-            self.within[k] += usize::from((low..=high).contains(&lump[k]));
-        }
-    }
-
-    fn print(&mut self) {
-        for (k, name) in ["D", "d", "E1"].into_iter().enumerate() {
-            println!(
-                "{name:>3}: |error| / bound: median {:.2}, 95th centile {:.2} ({}); 95 % intervals hold {:.1} % ({}); wide and shallow: median error {:.1} % ({})",
-                quantile(&mut self.ratios[k], 0.5),
-                quantile(&mut self.ratios[k], 0.95),
-                self.ratios[k].len(),
-                100.0 * self.within[k] as f64 / self.told[k].max(1) as f64,
-                self.told[k],
-                100.0 * quantile(&mut self.shallow[k], 0.5),
-                self.shallow[k].len(),
-            );
-        }
-        println!(
-            "found {} of {} with a bound on D below 20 %; not told {} of {} with a bound above 30 %; false alarms {} of {}",
-            self.findable_found,
-            self.findable,
-            self.left_open,
-            self.open,
-            self.false_alarms,
-            self.plain
-        );
-    }
-}
-
-fn quantile(values: &mut [f64], part: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let at = (part * (values.len().max(1) - 1) as f64).round() as usize;
-    values.get(at).copied().unwrap_or(f64::NAN)
-}
-
 /// The processor's time where Linux tells it, else the clock's.
 fn seconds() -> f64 {
     let told = std::fs::read_to_string("/proc/self/schedstat").ok();
@@ -335,7 +162,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         let bounds = match scene.lump {
             Some(lump) => {
+                let begun = seconds();
                 let bounds = bounds(scene, lump)?;
+                tally.model_seconds.push(seconds() - begun);
                 [bounds.diameter, bounds.depth, bounds.youngs_modulus]
             }
             None => [f64::INFINITY; 3],
@@ -346,6 +175,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let begun = seconds();
             let estimate = search.search(&scene.radii_m, &frames)?;
             let seconds = seconds() - begun;
+            tally.search_seconds.push(seconds);
             print!(
                 "{} {seed} {:?}: {seconds:.1} s, p {:.3}, {:?}, misfit {:.2}",
                 scene.name,
@@ -356,10 +186,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             );
             match scene.lump {
                 Some(lump) => tally.add(lump, bounds, &estimate),
-                None => {
-                    tally.plain += 1;
-                    tally.false_alarms += usize::from(estimate.found);
-                }
+                None => tally.add_plain(&estimate),
             }
             if let (Some(lump), Some(inclusion)) = (scene.lump, &estimate.inclusion) {
                 for ((name, told), (truth, bound)) in ["D", "d", "E1"]
