@@ -5,36 +5,37 @@ use std::ops::Range;
 use ndarray::{ArrayView2, Zip};
 
 use super::statistics::{BoundingBox, FrameStatistics};
-use super::strip::{Rows, STRIP_TILES, Strip, compare};
+use super::strip::{Beside, OfTiles, Rows, STRIP_TILES, Strip, compare};
 use super::tiles::{TILE_COLUMNS, TILE_ROWS, Tiles};
 
 /// What a frame without a reference, or a band below the image, is compared with.
 const ZEROS: [u8; STRIP_TILES * TILE_COLUMNS] = [0; STRIP_TILES * TILE_COLUMNS];
+/// The extremes of its tiles.
+const BLACK: [[u8; 2]; STRIP_TILES] = [[0; 2]; STRIP_TILES];
 
 /// The sum of the frame itself, extremes and the box of |frame − reference| > threshold. Both images are in standard layout
-/// and have the same, nonzero size; without a reference it counts as black. With the reference come the brightest
-/// pixels of its bands of eight rows: only where they leave room for 255 are saturated pixels counted one by one.
+/// and have the same, nonzero size; without a reference it counts as black. With the reference come the darkest and the brightest pixels of its
+/// tiles.
 pub(super) fn scan(
     frame: &[u8],
-    reference: Option<(&[u8], &[u8])>,
+    reference: Option<(&[u8], &Tiles)>,
     size: (usize, usize),
     threshold: u8,
     tiles: &mut Tiles,
 ) -> FrameStatistics {
     tiles.reset(size);
     let mut s = FrameStatistics::empty(size);
-    let brightest = reference.map(|(_, b)| b);
-    let reference = reference.map(|(r, _)| r);
     let pass = Pass {
         frame,
-        reference,
+        reference: reference.map(|(image, tiles)| (image, &tiles.extremes[..])),
         size,
         threshold,
     };
     for band in 0..tiles.rows {
-        let sums = &mut tiles.sums[band * tiles.columns..(band + 1) * tiles.columns];
-        let above = pass.band(band, sums, &mut s);
-        if above >= u8::MAX - brightest.map_or(0, |b| b[band]) {
+        let here = band * tiles.columns..(band + 1) * tiles.columns;
+        let extremes = &mut tiles.extremes[here.clone()];
+        pass.band(band, &mut tiles.sums[here], extremes, &mut s);
+        if extremes.iter().any(|[_, brightest]| *brightest == u8::MAX) {
             s.saturated += pixels_of(band, frame, size.1)
                 .iter()
                 .map(|&p| usize::from(p == u8::MAX))
@@ -48,59 +49,92 @@ pub(super) fn scan(
 /// The inputs of a pass.
 struct Pass<'a> {
     frame: &'a [u8],
-    reference: Option<&'a [u8]>,
+    /// The reference, and the extremes of its tiles.
+    reference: Option<(&'a [u8], &'a [[u8; 2]])>,
     size: (usize, usize),
     threshold: u8,
 }
 
 impl Pass<'_> {
-    /// Adds a band of eight rows; returns its greatest frame − reference.
+    /// Adds a band of eight rows.
     #[inline]
-    fn band(&self, band: usize, sums: &mut [i32], s: &mut FrameStatistics) -> u8 {
+    fn band(
+        &self,
+        band: usize,
+        sums: &mut [i32],
+        extremes: &mut [[u8; 2]],
+        s: &mut FrameStatistics,
+    ) {
         let whole = self.size.1 / TILE_COLUMNS;
-        let mut above = 0;
-        for first in (0..whole).step_by(STRIP_TILES) {
-            let last = (first + STRIP_TILES).min(whole);
-            let strip = self.strip(band, first..last, &mut sums[first..last]);
-            above = above.max(strip.above);
+        let mut first = 0;
+        while first < sums.len() {
+            // Whole tiles, and at last the columns beyond them.
+            let last = match first < whole {
+                true => (first + STRIP_TILES).min(whole),
+                false => sums.len(),
+            };
+            let tiles = OfTiles {
+                sums: &mut sums[first..last],
+                extremes: &mut extremes[first..last],
+            };
+            let seen = [s.greatest, -s.least].map(|extreme| extreme as u8);
+            let strip = if first < whole {
+                self.strip(band, first, seen, tiles)
+            } else {
+                self.margin(band, first, seen, tiles)
+            };
             s.add(&strip, band, first);
+            first = last;
         }
-        if whole < sums.len() {
-            let strip = self.margin(band, whole, &mut sums[whole..]);
-            above = above.max(strip.above);
-            s.add(&strip, band, whole);
-        }
-        above
     }
 
     /// A strip of whole tiles.
     #[inline]
-    fn strip(&self, band: usize, tiles: Range<usize>, sums: &mut [i32]) -> Strip {
-        let columns = tiles.start * TILE_COLUMNS..tiles.end * TILE_COLUMNS;
+    fn strip(&self, band: usize, first: usize, seen: [u8; 2], tiles: OfTiles<'_>) -> Strip {
+        let last = first + tiles.sums.len();
+        let columns = first * TILE_COLUMNS..last * TILE_COLUMNS;
         let f = rows(self.frame, self.size, band, columns.clone());
         let r = match self.reference {
-            Some(r) => rows(r, self.size, band, columns),
+            Some((r, _)) => rows(r, self.size, band, columns),
             None => [&ZEROS[..columns.len()]; TILE_ROWS],
         };
-        compare(&f, &r, self.threshold, sums)
+        let reference = Beside {
+            rows: &r,
+            extremes: self.extremes(band, first..last),
+        };
+        compare(&f, reference, self.threshold, seen, tiles)
     }
 
     /// The columns beyond the last whole tile, filled up to one.
     #[inline]
-    fn margin(&self, band: usize, whole: usize, sums: &mut [i32]) -> Strip {
+    fn margin(&self, band: usize, whole: usize, seen: [u8; 2], tiles: OfTiles<'_>) -> Strip {
         let columns = whole * TILE_COLUMNS..self.size.1;
         let f = padded(rows(self.frame, self.size, band, columns.clone()));
         let r = padded(
             self.reference
-                .map_or([&[]; TILE_ROWS], |r| rows(r, self.size, band, columns)),
+                .map_or([&[]; TILE_ROWS], |(r, _)| rows(r, self.size, band, columns)),
         );
         let (f, r) = (f.each_ref().map(|p| &p[..]), r.each_ref().map(|p| &p[..]));
-        compare(&f, &r, self.threshold, sums)
+        let reference = Beside {
+            rows: &r,
+            extremes: self.extremes(band, whole..whole + 1),
+        };
+        compare(&f, reference, self.threshold, seen, tiles)
+    }
+
+    /// The extremes of some of the reference's tiles of a band.
+    #[inline]
+    fn extremes(&self, band: usize, tiles: Range<usize>) -> &[[u8; 2]] {
+        let columns = self.size.1.div_ceil(TILE_COLUMNS);
+        match self.reference {
+            Some((_, extremes)) => &extremes[band * columns..][tiles],
+            None => &BLACK[..tiles.len()],
+        }
     }
 }
 
 /// The pixels of a band of eight rows.
-pub(super) fn pixels_of(band: usize, image: &[u8], columns: usize) -> &[u8] {
+fn pixels_of(band: usize, image: &[u8], columns: usize) -> &[u8] {
     let length = TILE_ROWS * columns;
     &image[band * length..((band + 1) * length).min(image.len())]
 }

@@ -4,10 +4,10 @@ use ndarray::{Array2, ArrayView2};
 
 use super::flat_field::FlatField;
 use super::noise::NoiseModel;
-use super::pass::{pixels_of, scan};
+use super::pass::scan;
 use super::statistics::FrameStatistics;
 use super::tighten::tighten;
-use super::tiles::{TILE_ROWS, TileSum, Tiles};
+use super::tiles::{TileSum, Tiles};
 use crate::error::ForceError;
 
 /// Longest side for which every integer sum of the pass fits its type: 16384⁴/3 · 255 < 2⁶³.
@@ -43,8 +43,6 @@ pub struct ReferenceFrame {
     tiles: Tiles,
     /// Places, pixels and sums of all tiles, for frames that differ nowhere.
     blank: Vec<TileSum>,
-    /// Brightest pixel of every band of eight rows.
-    brightest: Vec<u8>,
 }
 
 /// Buffers of the pass.
@@ -85,14 +83,6 @@ impl ReferenceFrame {
         let mut tiles = Tiles::default();
         let pixels = image.as_slice().unwrap_or_default();
         let sum = scan(pixels, None, size, u8::MAX, &mut tiles).sum;
-        let band = |k: usize| {
-            pixels_of(k, pixels, size.1)
-                .iter()
-                .copied()
-                .max()
-                .unwrap_or(0)
-        };
-        let brightest = (0..size.0.div_ceil(TILE_ROWS)).map(band).collect();
         if let Some(mean) = &mean {
             sum_means(mean.view(), &mut tiles);
         }
@@ -107,7 +97,6 @@ impl ReferenceFrame {
             sum,
             blank: blank.collect(),
             tiles,
-            brightest,
         })
     }
 
@@ -208,10 +197,7 @@ impl ReferenceFrame {
             copy.extend(frame.iter());
             copy
         });
-        let reference = (
-            self.image.as_slice().unwrap_or_default(),
-            &self.brightest[..],
-        );
+        let reference = (self.image.as_slice().unwrap_or_default(), &self.tiles);
         let mut s = scan(pixels, Some(reference), frame.dim(), threshold, tiles);
         tiles
             .sums

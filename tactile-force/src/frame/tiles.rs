@@ -7,12 +7,14 @@ pub(crate) const TILE_ROWS: usize = 8;
 /// Columns of a tile.
 pub(crate) const TILE_COLUMNS: usize = 32;
 
-/// The sums of all tiles of a frame.
+/// The sums of all tiles of a frame, and their darkest and brightest pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tiles {
     pub(crate) rows: usize,
     pub(crate) columns: usize,
     pub(crate) sums: Vec<i32>,
+    /// Of a tile that reaches beyond the image, with the black that fills it up.
+    pub(super) extremes: Vec<[u8; 2]>,
 }
 
 impl Tiles {
@@ -21,6 +23,8 @@ impl Tiles {
         self.columns = columns.div_ceil(TILE_COLUMNS);
         self.sums.clear();
         self.sums.resize(self.rows * self.columns, 0);
+        // Written by every pass.
+        self.extremes.resize(self.rows * self.columns, [0; 2]);
     }
 
     /// Greatest sum of a band, each times `sign`.
