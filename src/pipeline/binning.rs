@@ -80,6 +80,17 @@ pub(super) fn mean_difference(
 ) {
     resize(means, (region.rows() / side, region.columns() / side));
     let (frame, reference) = (region.of(frame), region.of(reference));
+    if side == 1 {
+        // A block of one pixel is its own sum.
+        let rows = means.rows_mut().into_iter();
+        for ((mut means, frame), reference) in rows.zip(frame.rows()).zip(reference.rows()) {
+            let pixels = means.iter_mut().zip(frame).zip(reference);
+            pixels.for_each(|((mean, f), r)| {
+                *mean = f64::from(i16::from(*f) - i16::from(*r)) * scale
+            });
+        }
+        return;
+    }
     let pairs = |row: usize, columns: Range<usize>, sums: &mut [i16]| {
         let frame = span_of(frame, row, columns.clone());
         let reference = span_of(reference, row, columns);
@@ -104,6 +115,10 @@ pub(super) fn block_mask(
     blocks: &mut Array2<bool>,
 ) {
     resize(blocks, (region.rows() / side, region.columns() / side));
+    if side == 1 && blocks.dim() == mask.dim() {
+        blocks.assign(&mask);
+        return;
+    }
     let (rows, columns) = (contact.rows(), contact.columns());
     let inside = |row: usize, span: Range<usize>, counts: &mut [i16]| {
         if row < rows {
@@ -239,6 +254,28 @@ mod tests {
         for (at, mean) in means.indexed_iter() {
             assert!((mean - middle(at)).abs() < 1e-12, "{at:?}: {mean}");
         }
+    }
+
+    #[test]
+    fn blocks_of_one_pixel_are_the_pixels() {
+        let frame = Array2::from_shape_fn((5, 7), |(r, c)| (7 * r + 3 * c) as u8);
+        let reference = Array2::from_elem((5, 7), 9_u8);
+        let region = BoundingBox {
+            row_start: 1,
+            row_end: 4,
+            column_start: 2,
+            column_end: 7,
+        };
+        let mut means = Array2::zeros((0, 0));
+        mean_difference(frame.view(), reference.view(), region, 1, -0.5, &mut means);
+        let expected = |(r, c): (usize, usize)| {
+            -0.5 * (f64::from(frame[[r + 1, c + 2]]) - f64::from(reference[[r + 1, c + 2]]))
+        };
+        assert_eq!(means, Array2::from_shape_fn((3, 5), expected));
+        let mask = Array2::from_shape_fn((3, 5), |(r, c)| r != c);
+        let mut blocks = Array2::default((0, 0));
+        block_mask(mask.view(), region, region, 1, &mut blocks);
+        assert_eq!(blocks, mask);
     }
 
     #[test]

@@ -177,7 +177,7 @@ impl StageRunner {
         surface: &ContactSurface,
     ) -> Result<ControlPoints, PipelineError> {
         let start = Instant::now();
-        let points = surface::sample(&self.pipeline, surface)
+        let points = surface::sample(&self.pipeline, &mut self.surface, surface)
             .map_err(|source| PipelineError::Surface { frame, source })?;
         self.report.ran(Stage::ControlPoints, start.elapsed());
         Ok(points)

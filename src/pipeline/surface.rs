@@ -6,7 +6,7 @@ use super::settings::{Settings, SurfaceInput};
 use crate::force::{BoundingBox, LensGeometry, LocalCalibration, Polarity};
 use crate::sfs::{Domain, Frame, SfsError, Surface, Workspace};
 use nalgebra::Point3;
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Axis, Slice};
 use std::sync::{Mutex, PoisonError};
 
 /// A reconstructed surface and its place in the frame.
@@ -81,6 +81,10 @@ impl Default for SurfaceWorkspace {
 }
 
 impl SurfaceWorkspace {
+    fn sfs(&mut self) -> &mut Workspace<f64> {
+        self.sfs.get_mut().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// The signal and the mask on the grid; returns the grid's box. With a curve the signal is the pressure over its peak.
     fn load(
         &mut self,
@@ -97,7 +101,13 @@ impl SurfaceWorkspace {
             self.signal
                 .mapv_inplace(|grey| curve.value_pa(grey) / peak_pa);
         }
-        binning::block_mask(contact.mask.view(), region, whole, side, &mut self.mask);
+        binning::block_mask(
+            mask_over(contact, region),
+            region,
+            whole,
+            side,
+            &mut self.mask,
+        );
         if side == 1 && settings.surface_input == SurfaceInput::Shading {
             binning::trim_rim(&mut self.mask, &self.signal);
         }
@@ -122,6 +132,44 @@ fn ceiling(input: SurfaceInput) -> f64 {
         SurfaceInput::Shading => 1.0,
         SurfaceInput::Signal => 255.0,
     }
+}
+
+/// Blocks around a contact that its surface depends on, beside those that smoothing brings in: a ring of up to three on which the profile is
+/// continued, and one of known height.
+const AROUND: usize = 4;
+
+/// The part of a contact's region that its surface depends on, with the same blocks: detection looks far around a contact. Two passes of the
+/// smoothing reach as far as its width.
+fn trimmed(
+    region: BoundingBox,
+    contact: BoundingBox,
+    side: usize,
+    smoothing: usize,
+) -> BoundingBox {
+    let margin = (AROUND + smoothing) * side;
+    let start = |region: usize, contact: usize| {
+        let blocks = (contact - region).saturating_sub(margin) / side;
+        region + blocks * side
+    };
+    BoundingBox {
+        row_start: start(region.row_start, contact.row_start),
+        row_end: region.row_end.min(contact.row_end + margin),
+        column_start: start(region.column_start, contact.column_start),
+        column_end: region.column_end.min(contact.column_end + margin),
+    }
+}
+
+/// A contact's mask over a part of its region.
+fn mask_over(contact: &FrameContact, part: BoundingBox) -> ArrayView2<'_, bool> {
+    let whole = contact.region.unwrap_or(part);
+    let mut mask = contact.mask.view();
+    for (axis, start, length) in [
+        (0, part.row_start - whole.row_start, part.rows()),
+        (1, part.column_start - whole.column_start, part.columns()),
+    ] {
+        mask.slice_axis_inplace(Axis(axis), Slice::from(start..start + length));
+    }
+    mask
 }
 
 /// Reconstructs the surface of a contact on a grid as fine as a contact of `pixels` pixels asks for.
@@ -151,6 +199,10 @@ pub(super) fn reconstruct(
         scale
     };
     let side = settings.binning.side(pixels, settings.control_points);
+    let region = match contact.bounds().filter(|_| settings.skips.outside_contact) {
+        Some(bounds) => trimmed(region, bounds, side, settings.smoothing_px / side),
+        None => region,
+    };
     let region = workspace.load(settings, images, contact, (region, scale, side), peak);
     let pixel_size_m = pipeline
         .contact()
@@ -159,10 +211,8 @@ pub(super) fn reconstruct(
     let domain = Domain::new(pixel_size_m)?.with_mask(workspace.mask.view());
     let mut surface = Surface::default();
     let frame = Frame::Real(workspace.signal.view());
-    let sfs = workspace
-        .sfs
-        .get_mut()
-        .unwrap_or_else(PoisonError::into_inner);
+    let sfs = workspace.sfs.get_mut();
+    let sfs = sfs.unwrap_or_else(PoisonError::into_inner);
     pipeline
         .surface()
         .reconstruct_with(sfs, frame, &domain, &mut surface)?;
@@ -187,15 +237,18 @@ pub(super) struct ControlPoints {
 /// Samples the control points of a surface.
 pub(super) fn sample(
     pipeline: &Pipeline,
+    workspace: &mut SurfaceWorkspace,
     surface: &ContactSurface,
 ) -> Result<ControlPoints, SfsError> {
     let (heights, mask) = (&surface.surface.heights, &surface.surface.mask);
     let usable = mask.iter().filter(|m| **m).count();
     let count = pipeline.settings().control_points.min(usable);
     let size = surface.pixel_size_m;
-    let mut points = pipeline
+    let mut points = Vec::with_capacity(count);
+    let (heights, mask) = (heights.view(), Some(mask.view()));
+    pipeline
         .sampler()
-        .sample(heights.view(), Some(mask.view()), size, count)?;
+        .sample_with(workspace.sfs(), heights, mask, size, count, &mut points)?;
     let [x, y] = surface.origin_m;
     for p in &mut points {
         p.x += x;
@@ -288,6 +341,34 @@ fn add(sums: &mut [f64], line: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_trimmed_away_leaves_the_blocks_where_they_were() {
+        let region = BoundingBox {
+            row_start: 10,
+            row_end: 200,
+            column_start: 0,
+            column_end: 90,
+        };
+        let contact = BoundingBox {
+            row_start: 95,
+            row_end: 120,
+            column_start: 5,
+            column_end: 70,
+        };
+        for (side, smoothing) in [(1, 5), (3, 1), (4, 0)] {
+            let part = trimmed(region, contact, side, smoothing);
+            let margin = (AROUND + smoothing) * side;
+            assert_eq!((part.row_start - region.row_start) % side, 0);
+            assert!(part.row_start + margin <= 95 && part.row_start + margin + side > 95);
+            assert_eq!(part.row_end, 120 + margin);
+            // No further than the region goes.
+            assert_eq!(
+                (part.column_start, part.column_end),
+                (0, 90.min(70 + margin))
+            );
+        }
+    }
 
     #[test]
     fn smoothing_keeps_constants_and_lines_and_quietens_noise() {

@@ -255,10 +255,17 @@ impl<T: Scalar> Surface<T> {
 
     /// Counts solved and flagged pixels.
     pub(crate) fn finish(&mut self, domain: &Domain<'_, T>) {
-        let (mut solved, mut flagged) = (0, 0);
-        for at in self.bounding_box.pixels() {
-            solved += usize::from(self.mask[at]);
-            flagged += usize::from(!self.flags[at].is_empty() && domain.contains(at.0, at.1));
+        let area = self.bounding_box;
+        let (mask, flags) = (area.view(self.mask.view()), area.view(self.flags.view()));
+        let solved = mask.rows().into_iter().map(|row| match row.to_slice() {
+            // Slices are added up in wide instructions.
+            Some(row) => row.iter().map(|&solved| usize::from(solved)).sum(),
+            None => row.iter().filter(|solved| **solved).count(),
+        });
+        let solved: usize = solved.sum();
+        let mut flagged = 0;
+        for ((row, column), _) in flags.indexed_iter().filter(|(_, flags)| !flags.is_empty()) {
+            flagged += usize::from(domain.contains(area.top + row, area.left + column));
         }
         self.report.solved = solved;
         self.report.flagged = flagged;

@@ -178,6 +178,14 @@ impl FrameContact {
         let region = self.region?;
         let mut bounds: Option<BoundingBox> = None;
         for (row, pixels) in self.mask.rows().into_iter().enumerate() {
+            // Whole lines outside are passed over in wide instructions.
+            let any = |all: bool, inside: &bool| all | inside;
+            if pixels
+                .as_slice()
+                .is_some_and(|pixels| !pixels.iter().fold(false, any))
+            {
+                continue;
+            }
             let Some(first) = pixels.iter().position(|inside| *inside) else {
                 continue;
             };

@@ -128,12 +128,16 @@ impl<T: Scalar> Field<T> {
         // A row more, which is never filled: what lies above and below the field.
         squares.resize((rows + 1) * columns, f64::NAN);
         let (mut plane, mut solved) = (0.0_f64, 0);
-        for (row, column) in area.pixels() {
-            let height = surface[[row, column]].as_f64() / width;
-            if height.is_finite() && domain.contains(row, column) {
-                squares[(row - area.top + 1) * columns + column - area.left + 1] = height;
-                plane = plane.min(height);
-                solved += 1;
+        let heights = area.view(surface);
+        let lines = squares.chunks_exact_mut(columns).skip(1);
+        for ((row, heights), line) in heights.rows().into_iter().enumerate().zip(lines) {
+            for ((column, height), place) in heights.iter().enumerate().zip(&mut line[1..]) {
+                let height = height.as_f64() / width;
+                if height.is_finite() && domain.contains(area.top + row, area.left + column) {
+                    *place = height;
+                    plane = plane.min(height);
+                    solved += 1;
+                }
             }
         }
         for height in &mut squares {
@@ -171,9 +175,17 @@ impl<T: Scalar> Field<T> {
             }
         };
         for row in 0..self.rows {
+            // Whether one of a column's three places about this row has a square; of the columns before, at and after the present one.
+            let is_reached = |column: usize| {
+                (row.saturating_sub(1)..(row + 2).min(self.rows))
+                    .any(|row| !inner[row * self.columns + column].is_nan())
+            };
+            let mut reached = [false, false, is_reached(0)];
             for column in 0..self.columns {
+                let after = column + 1 < self.columns && is_reached(column + 1);
+                reached = [reached[1], reached[2], after];
                 let place = row * self.columns + column;
-                if !inner[place].is_nan() {
+                if !inner[place].is_nan() || reached == [false; 3] {
                     continue;
                 }
                 let (r, c) = (row as isize, column as isize);
@@ -240,7 +252,11 @@ impl<T: Scalar> Field<T> {
                 let (gx, gy) = (difference(here, along), difference(here, down));
                 // The contour crosses the pixel where |square| is below half of what it changes over the pixel.
                 let change = (gx.abs() + gy.abs()).max(f64::MIN_POSITIVE);
-                let cover = (0.5 + here / change).clamp(0.0, 1.0);
+                let cover = if here >= 0.5 * change {
+                    1.0
+                } else {
+                    (0.5 + here / change).max(0.0)
+                };
                 let slope_squared = if here > 0.0 {
                     (gx * gx + (gy / self.aspect).powi(2)) / (4.0 * here)
                 } else {

@@ -48,11 +48,14 @@ fn largest_difference(blocks: &ContactSurface, pixels: &ContactSurface) -> f64 {
     let top = pixels.surface.heights.iter().copied().fold(0.0, f64::max);
     let mut largest = 0.0_f64;
     for ((row, column), height) in blocks.surface.heights.indexed_iter() {
+        if !blocks.surface.mask[[row, column]] {
+            continue;
+        }
         let first_row = blocks.region.row_start + side * row - pixels.region.row_start;
         let first_column = blocks.region.column_start + side * column - pixels.region.column_start;
         let inside = (0..side * side).map(|k| [first_row + k / side, first_column + k % side]);
         let seen = |at: &[usize; 2]| pixels.surface.mask.get(*at) == Some(&true);
-        if !blocks.surface.mask[[row, column]] || !inside.clone().all(|at| seen(&at)) {
+        if !inside.clone().all(|at| seen(&at)) {
             continue;
         }
         let mean = inside.map(|at| pixels.surface.heights[at]).sum::<f64>() / (side * side) as f64;

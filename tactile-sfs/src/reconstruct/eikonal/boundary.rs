@@ -18,6 +18,11 @@ const WINDOW: usize = 4;
 /// |∇ sin θ| is taken.
 pub(super) fn measure<T: Scalar>(grid: &mut EikonalBuffers<T>) {
     for i in grid.width..grid.node.len() - grid.width {
+        let near = [i - 1, i + 1, i - grid.width, i + grid.width];
+        // Most nodes have none outside beside them.
+        if !near.iter().any(|&j| grid.node[j] == Node::Outside) {
+            continue;
+        }
         if grid.node[i] == Node::Unknown && lowest(grid, i, T::one()).is_finite() {
             // Until the edges are measured their place holds |∇ sin θ| and step.
             grid.edges[i] = gradient_and_step(grid, i);

@@ -10,16 +10,17 @@ const LEVELS: usize = 4096;
 /// Unknown nodes in rising order of a key, and the buffers of the sort.
 #[derive(Debug, Default)]
 pub(crate) struct Front {
-    /// Row and column in the grid.
-    pub(super) nodes: Vec<[u32; 2]>,
-    keys: Vec<([u32; 2], f64)>,
+    /// Places in the grid.
+    pub(super) nodes: Vec<u32>,
+    keys: Vec<(u32, f64)>,
     starts: Vec<u32>,
 }
 
 impl Front {
     /// Takes nodes with their keys and sorts them by the level of the key, by counting; nodes of one level keep their order.
-    pub(super) fn sort(&mut self, nodes_and_keys: impl Iterator<Item = ([u32; 2], f64)>) {
+    pub(super) fn sort(&mut self, room: usize, nodes_and_keys: impl Iterator<Item = (u32, f64)>) {
         self.keys.clear();
+        self.keys.reserve(room);
         self.keys.extend(nodes_and_keys);
         let Self {
             nodes,
@@ -41,7 +42,7 @@ impl Front {
             starts[level + 1] += starts[level];
         }
         nodes.clear();
-        nodes.resize(keys.len(), [0; 2]);
+        nodes.resize(keys.len(), 0);
         for &(node, key) in keys.iter() {
             let place = &mut starts[level(key)];
             nodes[*place as usize] = node;
@@ -64,9 +65,8 @@ mod tests {
     fn nodes_are_sorted_by_their_level_and_keep_their_order_within_it() {
         let keys = [0.7, 0.0, 1.0, 0.7, 0.0];
         let mut front = Front::default();
-        front.sort((10..).map(|row| [row, 3]).zip(keys));
-        let rows: Vec<_> = front.nodes.iter().map(|node| node[0]).collect();
-        assert_eq!(rows, [11, 14, 10, 13, 12]);
+        front.sort(5, (10..).zip(keys));
+        assert_eq!(front.nodes, [11, 14, 10, 13, 12]);
     }
 
     const RADIUS: f64 = 26.4;

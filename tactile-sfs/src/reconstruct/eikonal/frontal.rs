@@ -5,6 +5,8 @@
 //! solve with k = 1 + cos²φ_x − cos²φ_y, φ from the first, removes that error (deferred correction). A profile fitted to the light tells φ before
 //! anything is solved.
 
+use std::ops::Range;
+
 use super::boundary;
 use super::grid::{EikonalBuffers, Node};
 use super::profile::Profile;
@@ -20,14 +22,14 @@ pub(super) fn sweep<T: Scalar>(grid: &mut EikonalBuffers<T>, order: usize, toler
         if !core::mem::take(&mut grid.busy[r]) {
             continue;
         }
-        let mut lines = Lines::around(grid, r);
-        let columns = 1..width - 1;
-        if order == 0 || order == 3 {
-            columns.for_each(|c| change = change.max(lines.visit(c, tolerance)));
-        } else {
-            columns
-                .rev()
-                .for_each(|c| change = change.max(lines.visit(c, tolerance)));
+        let (mut nodes, busy) = Nodes::of(grid);
+        let busy = &mut busy[r - 1..=r + 1];
+        let row = r * width + 1..(r + 1) * width - 1;
+        let forwards = order == 0 || order == 3;
+        let mut rest = row;
+        while let Some(i) = nodes.next_active(&mut rest, forwards) {
+            let wake = |line: usize| busy[line] = true;
+            change = change.max(nodes.visit(i, tolerance, wake));
         }
     }
     change
@@ -37,10 +39,12 @@ impl<T: Scalar> EikonalBuffers<T> {
     /// Takes the order of the unknown nodes from a profile fitted to the mask's pixels, from its rim to its top, and the directions of the
     /// gradient: nothing but the rim is known, and lines of equal light are lines of equal height.
     pub(super) fn follow(&mut self, profile: &Profile, area: BoundingBox) {
-        let aspect = self.aspect.as_f64();
-        let directions = self.along_x.chunks_exact_mut(self.width);
-        let lines = self.node.chunks_exact(self.width).zip(directions);
+        let (aspect, room) = (self.aspect.as_f64(), self.node.len());
+        let width = self.width;
+        let directions = self.along_x.chunks_exact_mut(width);
+        let lines = self.node.chunks_exact(width).zip(directions);
         let nodes = lines.enumerate().flat_map(|(row, (nodes, directions))| {
+            let first = row * width;
             let both = nodes.iter().zip(directions).enumerate();
             let unknown = both.filter(|(_, (node, _))| **node == Node::Unknown);
             unknown.map(move |(column, (_, along_x))| {
@@ -49,10 +53,10 @@ impl<T: Scalar> EikonalBuffers<T> {
                 let (quadratic, [p, q]) = profile.quadratic_and_gradient(pixel);
                 let (pp, qq) = (p * p, q * q / (aspect * aspect));
                 *along_x = T::of(pp / (pp + qq));
-                ([row as u32, column as u32], -quadratic)
+                ((first + column) as u32, -quadratic)
             })
         });
-        self.front.sort(nodes);
+        self.front.sort(room, nodes);
         self.directed = true;
     }
 }
@@ -60,10 +64,10 @@ impl<T: Scalar> EikonalBuffers<T> {
 /// Visits the nodes in the order of the front; returns whether any may still improve.
 pub(super) fn march<T: Scalar>(grid: &mut EikonalBuffers<T>, tolerance: T) -> bool {
     let front = core::mem::take(&mut grid.front);
-    for &[row, column] in &front.nodes {
-        if grid.active[row as usize * grid.width + column as usize] {
-            Lines::around(grid, row as usize).visit(column as usize, tolerance);
-        }
+    // All rows count as busy until a sweep has been through them.
+    let (mut nodes, _) = Nodes::of(grid);
+    for &node in &front.nodes {
+        nodes.visit(node as usize, tolerance, |_| {});
     }
     grid.front = front;
     grid.active.contains(&true)
@@ -98,90 +102,111 @@ struct Edge<T> {
     along_x: T,
 }
 
-/// A row of the grid between its neighbours, all of one length: no index of a node has to be checked.
-struct Lines<'a, T> {
+/// The nodes of the grid, side by side.
+struct Nodes<'a, T> {
+    width: usize,
     corrected: bool,
-    value: [&'a mut [T]; 3],
-    active: [&'a mut [bool]; 3],
-    /// Whether a row has active nodes.
-    busy: &'a mut [bool],
-    node: [&'a [Node]; 3],
-    along_x: [&'a [T]; 3],
-    /// Of the row above and the row itself.
-    edges: [&'a [[T; 2]]; 2],
+    value: &'a mut [T],
+    active: &'a mut [bool],
+    node: &'a [Node],
+    along_x: &'a [T],
+    edges: &'a [[T; 2]],
 }
 
-impl<'a, T: Scalar> Lines<'a, T> {
-    #[inline(always)]
-    fn around(grid: &'a mut EikonalBuffers<T>, row: usize) -> Self {
-        let (start, width) = ((row - 1) * grid.width, grid.width);
-        let three = start..start + 3 * width;
-        Self {
+impl<'a, T: Scalar> Nodes<'a, T> {
+    /// The nodes, and which rows have active ones.
+    fn of(grid: &'a mut EikonalBuffers<T>) -> (Self, &'a mut [bool]) {
+        let nodes = Self {
+            width: grid.width,
             corrected: grid.corrected,
-            value: thirds_mut(&mut grid.value[three.clone()], width),
-            active: thirds_mut(&mut grid.active[three.clone()], width),
-            busy: &mut grid.busy[row - 1..=row + 1],
-            node: thirds(&grid.node[three.clone()], width),
-            along_x: thirds(&grid.along_x[three.clone()], width),
-            edges: {
-                let [above, here, _] = thirds(&grid.edges[three], width);
-                [above, here]
-            },
-        }
+            value: &mut grid.value,
+            active: &mut grid.active,
+            node: &grid.node,
+            along_x: &grid.along_x,
+            edges: &grid.edges,
+        };
+        (nodes, &mut grid.busy)
     }
 
-    /// Updates a node if it may improve, and wakes the neighbours its new value can lower.
+    /// Takes the next active node from a row's `rest`, from the front or from the back. Most nodes sleep, and are passed over by wide instructions.
     #[inline(always)]
-    fn visit(&mut self, c: usize, tolerance: T) -> T {
-        if !self.active[1][c] {
+    fn next_active(&self, rest: &mut Range<usize>, forwards: bool) -> Option<usize> {
+        const BLOCK: usize = 16;
+        let any = |block: &[bool]| block.iter().fold(false, |any, &active| any | active);
+        while rest.start < rest.end {
+            let length = (rest.end - rest.start).min(BLOCK);
+            let (from, block);
+            if forwards {
+                (from, block) = (rest.start, &self.active[rest.start..rest.start + length]);
+                rest.start += length;
+            } else {
+                (from, block) = (rest.end - length, &self.active[rest.end - length..rest.end]);
+                rest.end -= length;
+            }
+            if !any(block) {
+                continue;
+            }
+            let found = if forwards {
+                block.iter().position(|&active| active)
+            } else {
+                block.iter().rposition(|&active| active)
+            };
+            if let Some(i) = found.map(|at| from + at) {
+                // What is left of the block stays in the rest.
+                if forwards {
+                    rest.start = i + 1;
+                } else {
+                    rest.end = i;
+                }
+                return Some(i);
+            }
+        }
+        None
+    }
+
+    /// Updates a node if it may improve, and wakes the neighbours its new value can lower; `wake` is told in which of the three lines around the
+    /// node they are.
+    #[inline(always)]
+    fn visit(&mut self, i: usize, tolerance: T, mut wake: impl FnMut(usize)) -> T {
+        if !self.active[i] {
             return T::zero();
         }
-        self.active[1][c] = false;
-        let edge = |line: usize, c: usize, metric: T| Edge {
-            value: self.value[line][c],
+        self.active[i] = false;
+        let width = self.width;
+        let edge = |at: usize, metric: T| Edge {
+            value: self.value[at],
             metric,
-            along_x: self.along_x[line][c],
+            along_x: self.along_x[at],
         };
-        let [above, here] = self.edges;
-        let x = upwind(edge(1, c - 1, here[c - 1][0]), edge(1, c + 1, here[c][0]));
-        let y = upwind(edge(0, c, above[c][1]), edge(2, c, here[c][1]));
+        let [right, down] = self.edges[i];
+        let x = upwind(edge(i - 1, self.edges[i - 1][0]), edge(i + 1, right));
+        let y = upwind(
+            edge(i - width, self.edges[i - width][1]),
+            edge(i + width, down),
+        );
         let k = if self.corrected {
             correction(x, y)
         } else {
             T::one()
         };
-        let (old, new) = (self.value[1][c], update(x, y, k));
+        let (old, new) = (self.value[i], update(x, y, k));
         if new >= old {
             return T::zero();
         }
-        self.value[1][c] = new;
+        self.value[i] = new;
         let change = old - new;
         if change > tolerance {
-            for (line, c) in [(1, c - 1), (1, c + 1), (0, c), (2, c)] {
+            let near = [(1, i - 1), (1, i + 1), (0, i - width), (2, i + width)];
+            for (line, j) in near {
                 // Known and outside nodes never wake: they are not unknown.
-                let wakes = self.value[line][c] > new && self.node[line][c] == Node::Unknown;
-                self.active[line][c] |= wakes;
-                self.busy[line] |= wakes;
+                if self.value[j] > new && !self.active[j] && self.node[j] == Node::Unknown {
+                    self.active[j] = true;
+                    wake(line);
+                }
             }
         }
         change
     }
-}
-
-#[inline(always)]
-fn thirds<A>(all: &[A], width: usize) -> [&[A]; 3] {
-    [
-        &all[..width],
-        &all[width..][..width],
-        &all[2 * width..][..width],
-    ]
-}
-
-#[inline(always)]
-fn thirds_mut<A>(all: &mut [A], width: usize) -> [&mut [A]; 3] {
-    let (above, rest) = all.split_at_mut(width);
-    let (here, below) = rest.split_at_mut(width);
-    [&mut above[..width], &mut here[..width], &mut below[..width]]
 }
 
 /// k of the second solve, from means of the node and its neighbours: half of the difference of the neighbours is left. Where

@@ -75,20 +75,28 @@ impl<T: Scalar> EikonalBuffers<T> {
     pub(super) fn measure_edges(&mut self) {
         // A floor keeps flat parts (slope 0) from dividing by zero: 10⁻⁶ pixels per pixel.
         let floor = T::of(1e-6);
-        let metric = |i: usize, j: usize, step: T| {
-            let slope = (self.sine[i] + self.sine[j]) / (self.cosine[i] + self.cosine[j]);
+        let metric = |sine: [T; 2], cosine: [T; 2], step: T| {
+            let slope = (sine[0] + sine[1]) / (cosine[0] + cosine[1]);
             (slope.max(floor) * step).powi(-2)
         };
-        for i in self.width..self.node.len() - self.width {
-            if self.node[i] != Node::Outside {
-                self.edges[i] = [
-                    metric(i, i + 1, T::one()),
-                    metric(i, i + self.width, self.aspect),
-                ];
-            }
-            if self.node[i - 1] == Node::Outside {
-                self.edges[i - 1] = [T::one(); 2];
-            }
+        let (width, aspect) = (self.width, self.aspect);
+        let rest = self.node.len() - 2 * width;
+        // Every node and those after and below it, as slices of one length: no step asks where it is.
+        let (sine, cosine) = (&self.sine[width..], &self.cosine[width..]);
+        let (sine_right, cosine_right) = (&sine[1..=rest], &cosine[1..=rest]);
+        let (sine_below, cosine_below) = (&sine[width..][..rest], &cosine[width..][..rest]);
+        let (sine, cosine) = (&sine[..rest], &cosine[..rest]);
+        let nodes = &self.node[width..][..rest];
+        let edges = &mut self.edges[width..][..rest];
+        for i in 0..rest {
+            let (s, c) = (sine[i], cosine[i]);
+            let right = metric([s, sine_right[i]], [c, cosine_right[i]], T::one());
+            let below = metric([s, sine_below[i]], [c, cosine_below[i]], aspect);
+            edges[i] = if nodes[i] == Node::Outside {
+                [T::one(); 2]
+            } else {
+                [right, below]
+            };
         }
     }
 

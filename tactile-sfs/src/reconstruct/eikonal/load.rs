@@ -3,6 +3,7 @@
 use super::boundary;
 use super::grid::{EikonalBuffers, Node};
 use crate::{BoundingBox, Domain, Frame, Lighting, PixelFlags, Scalar, SfsError, Surface};
+use ndarray::Axis;
 
 /// What a solve starts from.
 pub(super) struct Input<'a, 'f, 'd, T> {
@@ -53,25 +54,92 @@ impl<T: Scalar> EikonalBuffers<T> {
     /// The nodes of the mask, and the heights given around it.
     fn load_nodes(&mut self, input: &Input<'_, '_, '_, T>, surface: &mut Surface<T>) -> KnownCount {
         let area = surface.bounding_box;
-        let width = input.domain.pixel_size_m[0];
         let mut count = KnownCount::default();
         for r in 0..area.rows + 2 {
-            for c in 0..self.width {
-                let Some(at @ (row, column)) = pixel(area, [r, c], input.frame.dim()) else {
-                    continue;
-                };
-                let i = r * self.width + c;
-                let in_box = r > 0 && c > 0 && r <= area.rows && c <= area.columns;
-                if in_box && input.domain.contains(row, column) {
-                    surface.flags[at] = self.load_node(input, i, at);
-                    count.inside += usize::from(self.node[i] == Node::Known);
-                } else if let Some(height) = input.domain.known(row, column).or(input.boundary) {
-                    self.given[i] = height / width;
-                    count.border += 1;
-                }
+            let inside = r > 0 && r <= area.rows;
+            if inside && self.load_row(input, r, surface, &mut count).is_some() {
+                self.load_place(input, [r, 0], surface, &mut count);
+                self.load_place(input, [r, area.columns + 1], surface, &mut count);
+            } else {
+                (0..self.width).for_each(|c| self.load_place(input, [r, c], surface, &mut count));
             }
         }
         count
+    }
+
+    /// One place of the grid.
+    fn load_place(
+        &mut self,
+        input: &Input<'_, '_, '_, T>,
+        [r, c]: [usize; 2],
+        surface: &mut Surface<T>,
+        count: &mut KnownCount,
+    ) {
+        let area = surface.bounding_box;
+        let Some(at @ (row, column)) = pixel(area, [r, c], input.frame.dim()) else {
+            return;
+        };
+        let i = r * self.width + c;
+        let in_box = r > 0 && c > 0 && r <= area.rows && c <= area.columns;
+        if in_box && input.domain.contains(row, column) {
+            surface.flags[at] = self.load_node(input, i, at);
+            count.inside += usize::from(self.node[i] == Node::Known);
+        } else if let Some(height) = input.domain.known(row, column).or(input.boundary) {
+            self.given[i] = height / input.domain.pixel_size_m[0];
+            count.border += 1;
+        }
+    }
+
+    /// A row of the box as slices, a third of what its places take one by one; `None`, with nothing done, where heights are known inside or the
+    /// images do not lie in memory row by row.
+    fn load_row(
+        &mut self,
+        input: &Input<'_, '_, '_, T>,
+        r: usize,
+        surface: &mut Surface<T>,
+        count: &mut KnownCount,
+    ) -> Option<()> {
+        let (Frame::Real(image), Some(mask), None) =
+            (input.frame, input.domain.mask, input.domain.known_heights)
+        else {
+            return None;
+        };
+        let area = surface.bounding_box;
+        let row = area.top + r - 1;
+        let columns = area.left..area.left + area.columns;
+        let image = &image.index_axis(Axis(0), row).to_slice()?[columns.clone()];
+        let mask = &mask.index_axis(Axis(0), row).to_slice()?[columns.clone()];
+        let flags = surface.flags.index_axis_mut(Axis(0), row);
+        let flags = &mut flags.into_slice()?[columns];
+        let first = r * self.width + 1;
+        let line = first..first + area.columns;
+        let given = input
+            .boundary
+            .map(|height| height / input.domain.pixel_size_m[0]);
+        let nodes = self.node[line.clone()].iter_mut();
+        let nodes = nodes.zip(&mut self.cosine[line.clone()]);
+        let nodes = nodes.zip(&mut self.given[line]).zip(flags);
+        let pixels = image.iter().zip(mask);
+        for (i, (place, (light, inside))) in nodes.zip(pixels).enumerate() {
+            let (((node, cosine), height), flags) = place;
+            if !inside {
+                if let Some(given) = given {
+                    *height = given;
+                    count.border += 1;
+                }
+                continue;
+            }
+            *node = Node::Unknown;
+            let reflectance = input.lighting.reflectance(*light);
+            *flags = PixelFlags::of_reflectance(reflectance, input.least);
+            if *flags == PixelFlags::NON_FINITE {
+                self.holes.push(first + i);
+                *cosine = T::nan();
+            } else {
+                *cosine = reflectance.max(input.least).min(T::one());
+            }
+        }
+        Some(())
     }
 
     /// A node of the mask; returns its flags.

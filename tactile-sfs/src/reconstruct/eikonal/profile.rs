@@ -61,6 +61,7 @@ impl<T: Scalar> ProfileBuffers<T> {
         self.discs.load(mask, area);
         self.mask.fill(false);
         self.samples.clear();
+        self.samples.reserve(area.area());
         for row in area.top..area.top + area.rows {
             let inner = self.discs.inside(row - area.top);
             for (column, _) in (area.left..).zip(inner).filter(|(_, inner)| **inner) {
@@ -206,15 +207,17 @@ impl Profile {
     }
 
     /// The quadratic with its derivatives by x and y.
+    #[inline]
     pub(super) fn quadratic_and_gradient(&self, at: [usize; 2]) -> (f64, [f64; 2]) {
         let [x, y] = self.place(at);
         let c = &self.coefficients;
         let along_x = c[1] + y * c[4] + 2.0 * x * c[3];
         let along_y = c[2] + x * c[4] + 2.0 * y * c[5];
-        (self.quadratic(at), [along_x, along_y])
+        (self.quadratic_at([x, y]), [along_x, along_y])
     }
 
     /// A pixel's x and y.
+    #[inline]
     fn place(&self, [row, column]: [usize; 2]) -> [f64; 2] {
         [
             (column as f64 - self.middle[1]) / self.unit,
@@ -222,8 +225,13 @@ impl Profile {
         ]
     }
 
+    #[inline]
     pub(super) fn quadratic(&self, at: [usize; 2]) -> f64 {
-        let [x, y] = self.place(at);
+        self.quadratic_at(self.place(at))
+    }
+
+    #[inline]
+    fn quadratic_at(&self, [x, y]: [f64; 2]) -> f64 {
         let c = &self.coefficients;
         c[0] + y * (c[2] + y * c[5]) + x * (c[1] + y * c[4] + x * c[3])
     }
