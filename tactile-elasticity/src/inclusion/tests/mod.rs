@@ -1,13 +1,13 @@
-//! The forward model and its derivatives, the fit, and what a search refuses.
+//! The forward model and its derivatives, and what a search refuses.
 
-use super::covariance::{Observed, Resolution};
-use super::fit::{Prior, Problem, SETTLED};
 use super::forward::Forward;
 use super::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
-use super::{AssumedInclusion, InclusionSearch, PressureProfile, SensorErrors, Specimen, Told};
+use super::{AssumedInclusion, InclusionSearch, PressureProfile, Specimen, Told};
 use crate::ElasticityError;
 use crate::fem::{Guide, Interface, Kinematics, Layer, Material};
 use core::ops::ControlFlow;
+
+mod fits;
 
 fn guide(scale: f64) -> Guide {
     let layer = |thickness_m, modulus: f64| Layer {
@@ -184,88 +184,6 @@ fn small_strain_is_the_limit_of_small_approaches() {
     assert!(distance(&linear, &finite) < 1e-3);
 }
 
-/// Values without noise from a finer mesh than the fit's, with the errors of a first fit.
-fn problem() -> (Problem, Parameters) {
-    let truth = block(1.0);
-    let values = forward(5, 1.0).predict(&truth).unwrap().values;
-    let observed = Observed {
-        radii_m: forward(5, 1.0).radii_m,
-        white: values.iter().map(|p| 1e-3 * p).collect(),
-        values,
-        frames: 2,
-    };
-    let covariance = observed.covariance(
-        &SensorErrors::default(),
-        Interface::Bonded,
-        Resolution::FirstFits,
-    );
-    let prior = |coordinate, mean, error| Prior::new(coordinate, (mean, error));
-    let problem = Problem {
-        forward: forward(3, 1.0),
-        measured: observed.values,
-        factor: covariance.cholesky().unwrap(),
-        priors: vec![
-            prior(Coordinate::BlockModulus, 5e3f64.ln(), 1.0),
-            prior(Coordinate::Zero, 0.0, 20e-6),
-            prior(Coordinate::Height, 30e-3f64.ln(), 0.02),
-            prior(Coordinate::PoissonRatio, 0.49, 0.005),
-            prior(Coordinate::Diameter, 10e-3f64.ln(), 0.6),
-            prior(Coordinate::Depth, 5e-3f64.ln(), 0.8),
-            prior(Coordinate::LumpModulus, 20e3f64.ln(), 1.2),
-        ],
-    };
-    (problem, truth)
-}
-
-#[test]
-fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
-    let (problem, truth) = problem();
-    let mut start = truth;
-    start.block_modulus_pa *= 1.2;
-    start.lump = Some(LumpParameters {
-        diameter_m: 9e-3,
-        depth_m: 6e-3,
-        youngs_modulus_pa: 15e3,
-    });
-    let fit = problem.fit(start, SETTLED, || true).unwrap();
-    assert!(fit.converged);
-    for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
-        let error = fit.covariance[(k, k)].sqrt();
-        let z = (fit.parameters.get(coordinate) - truth.get(coordinate)) / error;
-        // Without noise the coarse mesh and the priors pull, whose means are not the truth.
-        assert!(z.abs() < 0.7, "{coordinate:?}: {z}");
-    }
-    // The covariance has the coarse mesh's error in it.
-    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
-}
-
-#[test]
-fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
-    let (problem, truth) = problem();
-    // From the limit itself and far from the truth in all else: ν's prior and the data pull it back,
-    // but first steps go beyond the limit.
-    let mut start = truth;
-    start.poisson_ratio = LARGEST_POISSON_RATIO;
-    start.block_modulus_pa *= 0.8;
-    start.lump = Some(LumpParameters {
-        diameter_m: 14e-3,
-        depth_m: 3e-3,
-        youngs_modulus_pa: 60e3,
-    });
-    let fit = problem.fit(start, SETTLED, || true).unwrap();
-    assert!(fit.converged);
-    // As of the fit from afar.
-    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
-}
-
-#[test]
-fn a_step_that_may_not_go_on_ends_the_fit() {
-    let (problem, mut start) = problem();
-    start.block_modulus_pa *= 1.5;
-    let fit = problem.fit(start, SETTLED, || false).unwrap();
-    assert!(!fit.converged);
-}
-
 fn search() -> InclusionSearch {
     let specimen = Specimen::new(30e-3, 40e-3).unwrap();
     InclusionSearch::new(specimen.with_interface(Interface::Bonded), guide(1.0)).unwrap()
@@ -356,14 +274,6 @@ fn more_frames_tell_more_of_an_inclusion() {
     assert!(two.diameter < one.diameter && two.youngs_modulus < one.youngs_modulus);
     let none = search().expected_errors(&assumed, &[], &radii, &[0.5; 16]);
     assert!(matches!(none, Err(ElasticityError::TooFewLoads { .. })));
-}
-
-#[test]
-fn a_covariance_is_one() {
-    let (problem, _) = problem();
-    // Cholesky's factor exists and the values' own errors are not below the stated ones.
-    let white = 1e-3 * problem.measured[0];
-    assert!(problem.factor.l_dirty()[(0, 0)] > white);
 }
 
 #[test]
