@@ -5,6 +5,8 @@
 //! Cholesky factor `K ≈ L Lᵀ` reaches the wanted accuracy with 20 to 40 columns whatever the number of points, so that a
 //! weighted fit costs `O(I r²)`.
 
+use crate::simd::vectorised;
+
 /// Scales of the prior, in radii of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PriorScales {
@@ -67,6 +69,7 @@ impl Prior {
             .extend(points.iter().map(|p| covariance(p, p)));
         self.columns.clear();
         self.stride = n.next_multiple_of(LANES);
+        self.columns.reserve(MAX_RANK.min(n) * self.stride);
         self.pivots.clear();
         self.left.clear();
         let floor = TOLERANCE * self.diagonal.iter().fold(0.0_f64, |m, &d| m.max(d));
@@ -92,14 +95,23 @@ impl Prior {
             .extend(points.iter().map(|p| covariance(p, &points[pivot])));
         self.columns.resize(start + self.stride, 0.0);
         let (earlier, new) = self.columns.split_at_mut(start);
-        for column in earlier.chunks_exact(self.stride) {
-            let f = column[pivot];
-            new.iter_mut().zip(column).for_each(|(v, c)| *v -= f * c);
-        }
-        for (value, left) in new.iter_mut().zip(&mut self.diagonal) {
-            *value /= root;
-            *left = (*left - *value * *value).max(0.0);
-        }
+        let diagonal = &mut self.diagonal;
+        let stride = self.stride;
+        vectorised(
+            #[inline(always)]
+            || {
+                for column in earlier.chunks_exact(stride) {
+                    let f = column[pivot];
+                    for (v, c) in new.iter_mut().zip(column) {
+                        *v -= f * c;
+                    }
+                }
+                for (value, left) in new.iter_mut().zip(diagonal.iter_mut()) {
+                    *value /= root;
+                    *left = (*left - *value * *value).max(0.0);
+                }
+            },
+        );
         self.diagonal[pivot] = 0.0;
         self.pivots.push(pivot);
     }
