@@ -13,8 +13,8 @@
 //!
 //! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there gives
 //! errors and correlations, its determinant the evidence (Laplace), whose ratio with and without
-//! inclusion is the odds that there is one. The intervals of D, d and E₁ follow the posterior along ln E₁ and hold both its 95 % and
-//! the likelihood ratio's, for it is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no
+//! inclusion is the odds that there is one. The intervals of D, d and E₁ follow the posterior along ln E₁,
+//! for it is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no
 //! more, and a small stiff one is hardly told from a large one that is little stiffer than the tissue. Where bonded and frictionless
 //! faces explain the frames about equally well the intervals hold those of both.
 //!

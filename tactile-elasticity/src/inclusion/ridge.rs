@@ -21,8 +21,6 @@ const MAX_NODES: usize = 8;
 /// The ridge at one E₁.
 #[derive(Debug, Clone)]
 pub(super) struct Node {
-    /// F, the least objective at this E₁.
-    pub(super) objective: f64,
     /// Logarithm of p(u), up to a constant.
     pub(super) density: f64,
     /// Values of all coordinates.
@@ -149,7 +147,6 @@ impl Problem {
             .iter()
             .map(|prior| parameters.get(prior.coordinate));
         let node = Node {
-            objective,
             density: -0.5 * objective - logarithm,
             at: DVector::from_iterator(self.priors.len(), values),
             covariance,
