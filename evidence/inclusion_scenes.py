@@ -4,8 +4,7 @@
     evidence/inclusion_scenes.py FOLDER [--size MM] [--seed N] [--part K/N] [NAMES ...]
 
 writes FOLDER/scenes.csv and FOLDER/NAME.csv as `tactile-elasticity/examples/inclusion_study` reads them: 108 blocks with an
-inclusion, 32 plain ones, drawn from a fixed seed or from N. NAMES keeps some, `--part` shares them among processes; what is there already is
-left. Python's standard library alone; a scene takes 5 to 30 s.
+inclusion, 32 plain ones, drawn from a fixed seed or N. NAMES keeps some, `--part` shares them out; what is there is left. A scene takes 5 to 30 s.
 
 Axisymmetric quadratic elements with reduced integration (CAX8R) at finite strain, compressible neo-Hooke
 U = C10 (I1 - 3) + (J - 1)^2 / D1 with C10 = mu/2, D1 = 2/kappa. The face's nodes are doubled and tied by equations, in both
@@ -385,8 +384,7 @@ def main():
     parser.add_argument("--part", default="0/1", help="K/N: every N-th scene from the K-th")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    part, parts = map(int, options.part.split("/"))
-    scenes = draw(options.seed)
+    part, parts, scenes = *map(int, options.part.split("/")), draw(options.seed)
     wanted = [scene for scene in scenes if not options.names or scene["name"] in options.names]
     for scene in wanted[part::parts]:
         if not (options.folder / f"{scene['name']}.row").exists():
