@@ -3,11 +3,12 @@
 use super::condensation::Elimination;
 use super::element::Geometry;
 use super::fields::Fields;
-use super::layout::{Layout, Slot};
+use super::layout::Layout;
 use super::material::Material;
 use super::model::Model;
 use super::pressure::PressurePoint;
 use super::scene::Scene;
+use super::slot::Slot;
 use super::sparse::Factors;
 use super::state::State;
 use super::tangent::Tangent;

@@ -8,21 +8,17 @@
 use super::condensation::Elimination;
 use super::element::OUTER;
 use super::fields::{Equilibrium, Fields};
-use super::layout::{Layout, Slot};
-use super::material::Kinematics;
 use super::model::Model;
-use super::newton::TOLERANCE;
+use super::slot::Slot;
 use super::sparse::Factors;
-use super::system::System;
+use super::tangent::Tangent;
 use std::sync::Arc;
 
-/// Tangents on the way to an equilibrium: those that are reached take one to three.
-const MAX_TANGENTS: usize = 7;
+/// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
+/// below what the forces are wanted to, and well above rounding.
+pub(super) const TOLERANCE: f64 = 1e-8;
 /// Iterations that may be left at the rate of the last one: more take longer than a new tangent and the two that then do.
 const MOST_LEFT: f64 = 6.0;
-/// Change of the approach, relative, up to which the last tangent is tried.
-const NEAR: f64 = 0.02;
-
 /// A factorised tangent of a model without contacts.
 #[derive(Debug)]
 pub(crate) struct Chord {
@@ -34,7 +30,7 @@ pub(crate) struct Chord {
 }
 
 /// How iterations with one tangent end.
-enum Ending {
+pub(super) enum Ending {
     Balanced(Equilibrium),
     /// They converge no longer, or not fast: the iterate from which a new tangent is to be taken.
     Slow(Fields),
@@ -54,42 +50,13 @@ struct Unbalanced {
     imbalance: f64,
 }
 
-/// Equilibrium at an approach, of a model without contacts; `None` where iterations do not converge. A new tangent is taken
-/// only where those with the last one of `layout` converge slowly.
-pub(crate) fn equilibrium(
-    model: &Model,
-    layout: &mut Layout,
-    start: &Fields,
-    approach: f64,
-    iterations: &mut usize,
-) -> Option<Equilibrium> {
-    let mut fields = start.clone();
-    let is_near = (approach - fields.approach).abs() <= NEAR * approach.abs();
-    let mut chord = layout.chord.take();
-    if model.kinematics == Kinematics::Finite && !is_near {
-        chord = None;
-    }
-    for _ in 0..MAX_TANGENTS {
-        let is_new = chord.is_none();
-        let tried = match chord.take() {
-            Some(chord) => chord,
-            None => Arc::new(Chord::new(model.assemble(layout, &fields, 0.0)?)?),
-        };
-        match tried.iterate(model, fields, approach, is_new, iterations) {
-            Ending::Balanced(found) => {
-                layout.chord = Some(tried);
-                return Some(found);
-            }
-            Ending::Slow(last) => fields = last,
-        }
-    }
-    None
-}
-
 impl Chord {
     /// `None` where the tangent is singular.
-    fn new(system: System<'_>) -> Option<Self> {
-        let (tangent, slots, eliminations) = system.into_parts();
+    pub(super) fn new(
+        tangent: Tangent,
+        slots: Arc<[Slot]>,
+        eliminations: Vec<Elimination>,
+    ) -> Option<Self> {
         let factors = tangent.matrix.factorise().ok()?;
         let mut by_approach = tangent.driver_column;
         factors.solve(&mut by_approach).ok()?;
@@ -102,7 +69,7 @@ impl Chord {
     }
 
     /// Iterates from `start` at an approach as long as that converges fast.
-    fn iterate(
+    pub(super) fn iterate(
         &self,
         model: &Model,
         start: Fields,

@@ -2,18 +2,10 @@
 
 use super::chord::Chord;
 use super::element::OUTER;
-use super::gap::DRIVER;
 use super::model::{Model, Motion};
+use super::slot::{NO_PLACE, Places, Slot, slot};
 use super::sparse::{Pattern, Singular};
 use std::sync::Arc;
-
-/// Where a displacement component's share of the system goes.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Slot {
-    Nowhere,
-    Driver(f64),
-    Equation(usize),
-}
 
 /// Equations of a model, and the tangent's pattern as far as contacts have needed it.
 #[derive(Debug, Clone)]
@@ -28,13 +20,6 @@ pub(crate) struct Layout {
     /// The tangent taken last, with which a scene nearby converges; elsewhere a new one is taken.
     pub(crate) chord: Option<Arc<Chord>>,
 }
-
-/// Where the entries of an element's stiffness, the lower half row by row, stand among the tangent's values;
-/// [`NO_PLACE`] where one of the two components has no equation.
-pub(crate) type Places = [u32; OUTER * (OUTER + 1) / 2];
-
-/// Of entries that are not in the tangent.
-pub(crate) const NO_PLACE: u32 = u32::MAX;
 
 impl Layout {
     pub(crate) fn new(model: &Model) -> Self {
@@ -146,14 +131,5 @@ impl Layout {
             }
         }
         places
-    }
-}
-
-/// The slot of a displacement component of a [`Gap`](super::gap::Gap).
-pub(crate) fn slot(slots: &[Slot], dof: usize) -> Slot {
-    if dof == DRIVER {
-        Slot::Driver(1.0)
-    } else {
-        slots[dof]
     }
 }

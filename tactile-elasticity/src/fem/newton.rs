@@ -1,18 +1,16 @@
 //! Newton's method with load steps chosen by what converges.
 
-use super::chord;
+use super::chord::TOLERANCE;
 use super::contact::Opposite;
 use super::fields::{Equilibrium, Fields};
 use super::layout::Layout;
 use super::load::{Load, Outcome, Report, Solution};
 use super::material::Kinematics;
 use super::model::Model;
+use super::simplified;
 use super::state::State;
 use super::tangent::Goal;
 
-/// Unbalanced force over element forces at which an equilibrium counts as reached: four digits
-/// below what the forces are wanted to, and well above rounding.
-pub(super) const TOLERANCE: f64 = 1e-8;
 /// Iterations of a load step before it is halved. Steps that converge take three to ten.
 const MAX_ITERATIONS: usize = 25;
 /// Halvings of a load step before the solver stops.
@@ -286,7 +284,7 @@ impl Solver<'_> {
     fn newton(&mut self, start: Fields, goal: Goal) -> Option<Equilibrium> {
         if let (Goal::Approach(to), true) = (goal, self.model.contact_nodes.is_empty()) {
             let iterations = &mut self.report.iterations;
-            let found = chord::equilibrium(self.model, self.layout, &start, to, iterations);
+            let found = simplified::equilibrium(self.model, self.layout, &start, to, iterations);
             return found.or_else(|| self.full(start, goal));
         }
         self.full(start, goal)

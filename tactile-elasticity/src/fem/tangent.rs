@@ -2,7 +2,7 @@
 
 use super::anchor::Slip;
 use super::element::OUTER;
-use super::layout::{NO_PLACE, Places, Slot, slot};
+use super::slot::{NO_PLACE, Places, Slot, slot};
 use super::sparse::{Factors, Singular, Symmetric};
 
 /// What a step is to reach.

@@ -1,7 +1,7 @@
 //! The tiles of a frame as columns of numbers, which loops go over with wide instructions.
 
 use super::IlluminationDrift;
-use super::fit::{Normal, weight};
+use super::normal::{Normal, weight};
 use crate::frame::TileSum;
 use crate::simd::vectorized;
 

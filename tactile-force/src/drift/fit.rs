@@ -2,6 +2,7 @@
 
 use super::columns::Columns;
 use super::median::median;
+use super::normal::Normal;
 use super::{DriftCorrection, DriftOutcome, IlluminationDrift};
 use crate::frame::{TILE_COLUMNS, TILE_ROWS, TileSum};
 
@@ -87,15 +88,6 @@ pub(crate) fn fit(
     }
 }
 
-/// Derivative of a tile's sum by the first coefficient.
-pub(super) fn weight(drift: &IlluminationDrift, tile: &TileSum) -> f64 {
-    if drift.correction.is_multiplicative() {
-        tile.reference.max(1.0)
-    } else {
-        tile.pixels
-    }
-}
-
 impl IlluminationDrift {
     /// The automatic correction if it is sure enough, else none and the reason.
     fn accepted(self, tiles: &[TileSum], sd: f64) -> Self {
@@ -144,55 +136,7 @@ impl IlluminationDrift {
     }
 
     /// Units of the coefficients in the normal equations: half the frame.
-    fn scale(&self) -> [f64; 3] {
+    pub(super) fn scale(&self) -> [f64; 3] {
         [1.0, self.middle[0].max(1.0), self.middle[1].max(1.0)]
-    }
-}
-
-/// Normal equations of the tiles' residuals, and the tiles' own sums.
-pub(super) struct Normal {
-    pub(super) matrix: nalgebra::Matrix3<f64>,
-    pub(super) right: nalgebra::Vector3<f64>,
-    pub(super) count: usize,
-    pub(super) reference: f64,
-    pub(super) pixels: f64,
-}
-
-impl Normal {
-    /// Of so many terms; the others are left alone.
-    pub(super) fn empty(terms: usize) -> Self {
-        let (mut matrix, right) = (nalgebra::Matrix3::identity(), nalgebra::Vector3::zeros());
-        matrix.view_mut((0, 0), (terms, terms)).fill(0.0);
-        Self {
-            matrix,
-            right,
-            count: 0,
-            reference: 0.0,
-            pixels: 0.0,
-        }
-    }
-
-    /// Of a plane, from tiles and their residuals. Places count from the frame's middle.
-    fn of_places<'a>(
-        drift: &IlluminationDrift,
-        tiles: impl Iterator<Item = (&'a TileSum, f64)>,
-    ) -> Self {
-        let scale = drift.scale();
-        let mut sums = Self::empty(3);
-        for (tile, residual) in tiles {
-            let w = weight(drift, tile);
-            let place = |k: usize, x: f64| (x - drift.middle[k]) / scale[k + 1];
-            let at = [1.0, place(0, tile.x), place(1, tile.y)];
-            for i in 0..3 {
-                sums.right[i] += w * at[i] * residual / tile.pixels;
-                for j in 0..3 {
-                    sums.matrix[(i, j)] += w * at[i] * w * at[j] / tile.pixels;
-                }
-            }
-            sums.count += 1;
-            sums.reference += tile.reference;
-            sums.pixels += tile.pixels;
-        }
-        sums
     }
 }

@@ -4,6 +4,7 @@ mod columns;
 mod correction;
 mod fit;
 mod median;
+mod normal;
 
 pub use correction::{DriftCorrection, DriftOutcome};
 

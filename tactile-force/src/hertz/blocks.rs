@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::rings::Ring;
+use super::ring::Ring;
 
 /// Where blocks lie: a corner of four of them is beside the centre, so that they are the same whichever way the image is mirrored, turned or moved.
 #[derive(Clone, Copy, Debug)]

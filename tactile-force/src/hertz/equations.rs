@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::profile::Level;
-use super::rings::RingSums;
+use super::ring::RingSums;
 
 /// Peak, background, radius, blur variance, centre's x and y, bend.
 pub(super) type Normal = SMatrix<f64, 7, 7>;

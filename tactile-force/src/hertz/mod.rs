@@ -17,6 +17,7 @@ mod misfit;
 mod options;
 mod outcome;
 mod profile;
+mod ring;
 mod rings;
 mod variance;
 
