@@ -174,26 +174,28 @@ fn a_faint_inclusion_is_found() {
 #[test]
 fn where_a_face_may_stick_or_slide_the_intervals_hold_the_truth() {
     let truth = lump(9e-3, 4.5e-3, 50e3);
-    for interface in [Interface::Bonded, Interface::Frictionless] {
-        let frames = &frames(&solved_with(interface, Some(truth), &ring_radii()))[..1];
-        let specimen = Specimen::new(30e-3, 40e-3).unwrap();
-        let estimate = searched_in(&specimen, frames);
-        assert!((estimate.warnings).contains(&InclusionWarning::UncertainInterface));
-        let assumed = [Interface::Bonded, Interface::Frictionless]
-            .map(|assumed| searched_in(&specimen.with_interface(assumed), frames));
-        let intervals = |estimate: &InclusionEstimate| {
-            let found = estimate.inclusion.unwrap();
-            [found.diameter_m, found.depth_m, found.youngs_modulus_pa]
-                .map(|told| told.estimate().interval)
-        };
-        let truth = [truth.diameter_m, truth.depth_m, truth.youngs_modulus_pa];
-        for (k, ([low, high], truth)) in intervals(&estimate).into_iter().zip(truth).enumerate() {
-            assert!((low..=high).contains(&truth), "{interface:?}: {low} {high}");
-            // Of the same fits, but for where they start: within 2 %.
-            for assumed in &assumed {
-                let [lower, upper] = intervals(assumed)[k];
-                assert!(low < 1.02 * lower && high > upper / 1.02, "{interface:?}");
-            }
+    let frames = &frames(&solved_with(
+        Interface::Frictionless,
+        Some(truth),
+        &ring_radii(),
+    ))[..1];
+    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+    let estimate = searched_in(&specimen, frames);
+    assert!((estimate.warnings).contains(&InclusionWarning::UncertainInterface));
+    let assumed = [Interface::Bonded, Interface::Frictionless]
+        .map(|assumed| searched_in(&specimen.with_interface(assumed), frames));
+    let intervals = |estimate: &InclusionEstimate| {
+        let found = estimate.inclusion.unwrap();
+        [found.diameter_m, found.depth_m, found.youngs_modulus_pa]
+            .map(|told| told.estimate().interval)
+    };
+    let truth = [truth.diameter_m, truth.depth_m, truth.youngs_modulus_pa];
+    for (k, ([low, high], truth)) in intervals(&estimate).into_iter().zip(truth).enumerate() {
+        assert!((low..=high).contains(&truth), "{low} {high}");
+        // Of the same fits, but for where they start: within 2 %.
+        for assumed in &assumed {
+            let [lower, upper] = intervals(assumed)[k];
+            assert!(low < 1.02 * lower && high > upper / 1.02);
         }
     }
 }
