@@ -19,6 +19,7 @@ use std::sync::Arc;
 pub(super) const TOLERANCE: f64 = 1e-8;
 /// Iterations that may be left at the rate of the last one: more take longer than a new tangent and the two that then do.
 const MOST_LEFT: f64 = 6.0;
+
 /// A factorised tangent of a model without contacts.
 #[derive(Debug)]
 pub(crate) struct Chord {
@@ -133,8 +134,7 @@ impl Chord {
                 found.right[*equation] += force;
             }
         }
-        let mut scale = 0.0;
-        let mut centre_squares = 0.0;
+        let (mut element_squares, mut centre_squares) = (0.0, 0.0);
         for (index, (nodes, elimination)) in
             model.elements.iter().zip(&self.eliminations).enumerate()
         {
@@ -158,7 +158,7 @@ impl Chord {
                     Slot::Equation(row) => found.right[row] -= force,
                     Slot::Driver(factor) => found.force += factor * force,
                 }
-                scale += force * force;
+                element_squares += force * force;
             }
             found.centres.push([residual[OUTER], residual[OUTER + 1]]);
             found.pressures.push(pressures);
@@ -166,7 +166,7 @@ impl Chord {
         let squares: f64 = found.right.iter().map(|force| force * force).sum();
         if squares + centre_squares > 0.0 {
             found.imbalance =
-                (squares + centre_squares).sqrt() / scale.sqrt().max(f64::MIN_POSITIVE);
+                ((squares + centre_squares) / element_squares.max(f64::MIN_POSITIVE)).sqrt();
         }
         Some(found)
     }

@@ -14,7 +14,7 @@ use super::tangent::Goal;
 /// Iterations of a load step before it is halved. Steps that converge take three to ten.
 const MAX_ITERATIONS: usize = 25;
 /// Halvings of a load step before the solver stops.
-const MAX_HALVINGS: usize = 4;
+const MAX_HALVINGS: usize = 10;
 /// Part of a Newton step below which it is given up, where elements are turned inside out before.
 const SHORTEST_STEP: f64 = 0.02;
 /// Updates of the contact multipliers a load.

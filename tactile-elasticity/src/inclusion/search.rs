@@ -23,7 +23,7 @@ const REACH: f64 = 0.75;
 const MIN_RINGS: usize = 8;
 /// Difference of log evidence above which one assumption about the face is clearly better: 20 to 1 and three times as much again for
 /// what the finite elements err by on a sliding face, which the covariance knows by its size alone. Two frames on soft tissue by
-/// CalculiX preferred the wrong one by up to 9 (`inclusion_study` on the scenes of `evidence/inclusion_scenes.py`); the price is
+/// CalculiX preferred the wrong one by up to 13, beside a poor fit (`inclusion_study` on the scenes of `evidence/inclusion_scenes.py`); the price is
 /// intervals that hold under both where the right one leads by less. Where the better one leaves more than the errors explain, differences
 /// count as much less (K. P. Burnham & D. R. Anderson, *Model Selection and Multimodel Inference* (2002), §2.5).
 const CLEAR_EVIDENCE: f64 = 12.0;
