@@ -224,13 +224,28 @@ pub enum ReadError {
         expected: Expected,
     },
     /// The file is no image that can be decoded.
-    #[error("cannot decode the image {}: {source}", path.display())]
+    #[error("cannot decode the image {}: {}", path.display(), plain(source))]
     Image {
         /// The file.
         path: PathBuf,
         /// What the decoder said.
         source: ::image::ImageError,
     },
+}
+
+/// What a decoder said, on one line. That of portable anymaps prints the fields of a header as `Some(3)` and `None`.
+fn plain(source: &::image::ImageError) -> String {
+    let mut text = source.to_string();
+    while let Some(start) = text.find("Some(") {
+        let inner = start + "Some(".len();
+        let Some(length) = text[inner..].find(')') else {
+            break;
+        };
+        text.replace_range(inner + length..=inner + length, "");
+        text.replace_range(start..inner, "");
+    }
+    let text = text.replace("None", "missing");
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// A heading's unit for a message.
