@@ -7,7 +7,7 @@ use super::strain_error::mean_strain_error;
 use super::surface::ControlPoints;
 use crate::elasticity::field::{StrainField, StrainSummary};
 use crate::elasticity::modulus::{Estimate, LoadSeries, LoadState, UniaxialLoads};
-use crate::matching::Matching;
+use crate::tps::{Memory, Pairs};
 use nalgebra::{Matrix3, Point3};
 
 /// Fewest matches from which a strain is worked out: twice the four affine terms of a spline in space.
@@ -40,6 +40,16 @@ pub struct PairStrain {
 }
 
 impl PairStrain {
+    /// No strain yet, to be filled.
+    pub(super) fn empty() -> Self {
+        let field = StrainField::default();
+        Self {
+            measure: "",
+            summary: field.summary(),
+            field,
+        }
+    }
+
     /// The apparent strain of a ball's load for equation (31). The surface that its pressure is read as swells where the load rises, in all directions,
     /// so that (31) takes the size of the mean e_zz, with the sign of `force_step_n`, the step of the load from the first frame to the second.
     /// (Specimens with a flat face have signed strains, from [`of_faces`].)
@@ -89,60 +99,87 @@ pub(super) fn of_faces(
     })
 }
 
-/// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.
-///
-/// The matcher's own warp follows every point; its gradient across a surface, where no two points lie behind each other,
-/// would be noise. The warp fitted here is smooth.
-pub(super) fn strain(
-    pipeline: &Pipeline,
-    frames: [usize; 2],
-    model: &ControlPoints,
-    target: &[Point3<f64>],
-    matching: &Matching<f64, 3>,
-) -> Result<PairStrain, PipelineError> {
-    let [from, to] = frames;
-    let ControlPoints {
-        points: model,
-        grid_m,
-    } = model;
-    let pairs = matching
-        .assignment
-        .iter()
-        .enumerate()
-        .filter_map(|(i, a)| a.map(|j| (i, j)));
-    let pairs: Vec<_> = pairs
-        .filter(|&(i, _)| matching.confidence[i] > 0.0)
-        .collect();
-    if pairs.len() < LEAST_MATCHES {
-        return Err(PipelineError::TooFewMatches {
-            from,
-            to,
-            expected: LEAST_MATCHES,
-            found: pairs.len(),
-        });
+/// The pairs of a match between the control points of two frames.
+#[derive(Clone, Copy)]
+pub(super) struct MatchedPoints<'a> {
+    pub(super) model: &'a ControlPoints,
+    pub(super) target: &'a [Point3<f64>],
+    /// For every point of the model.
+    pub(super) assignment: &'a [Option<usize>],
+    pub(super) confidence: &'a [f64],
+}
+
+/// What strains reuse from pair to pair.
+#[derive(Default)]
+pub(super) struct StrainWorkspace {
+    warp: Memory,
+    sources: Vec<Point3<f64>>,
+    targets: Vec<Point3<f64>>,
+    weights: Vec<f64>,
+    gradients: Vec<Matrix3<f64>>,
+}
+
+impl StrainWorkspace {
+    /// Takes the pairs of a match.
+    fn take(&mut self, matched: &MatchedPoints<'_>) {
+        self.sources.clear();
+        self.targets.clear();
+        self.weights.clear();
+        let points = matched.model.points.iter().zip(matched.assignment);
+        for ((source, partner), &weight) in points.zip(matched.confidence) {
+            let partner = partner.and_then(|partner| matched.target.get(partner));
+            if let Some(target) = partner.filter(|_| weight > 0.0) {
+                self.sources.push(*source);
+                self.targets.push(*target);
+                self.weights.push(weight);
+            }
+        }
     }
-    let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
-    let targets: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
-    let weights: Vec<_> = pairs.iter().map(|&(i, _)| matching.confidence[i]).collect();
-    let warp = pipeline
-        .warp()
-        .fit(&sources, &targets, Some(&weights))
-        .map_err(|source| PipelineError::Warp { from, to, source })?;
-    let mut gradients = vec![Matrix3::zeros(); model.len()];
-    warp.jacobian_into(model, &mut gradients)
-        .map_err(|source| PipelineError::Warp { from, to, source })?;
-    gradients.iter_mut().for_each(|g| *g -= Matrix3::identity());
-    let measure = pipeline.strain();
-    let field = StrainField::from_gradients(&gradients, None, measure)
-        .map_err(|source| PipelineError::Strain { from, to, source })?;
-    let mut summary = field.summary();
-    let noise = mean_strain_error(&sources, &targets, *grid_m);
-    summary
-        .standard_error
-        .zip_apply(&noise, |error, noise| *error = error.hypot(noise));
-    Ok(PairStrain {
-        measure: measure.name(),
-        summary,
-        field,
-    })
+
+    /// Strain, at the first frame's control points, of the warp through the matches, weighted by their confidence.
+    ///
+    /// The matcher's own warp follows every point; its gradient across a surface, where no two points lie behind each other,
+    /// would be noise. The warp fitted here is smooth.
+    pub(super) fn strain(
+        &mut self,
+        pipeline: &Pipeline,
+        [from, to]: [usize; 2],
+        matched: &MatchedPoints<'_>,
+        strain: &mut PairStrain,
+    ) -> Result<(), PipelineError> {
+        self.take(matched);
+        if self.sources.len() < LEAST_MATCHES {
+            return Err(PipelineError::TooFewMatches {
+                from,
+                to,
+                expected: LEAST_MATCHES,
+                found: self.sources.len(),
+            });
+        }
+        let model = &matched.model.points;
+        self.gradients.clear();
+        self.gradients.resize(model.len(), Matrix3::zeros());
+        let pairs = Pairs {
+            sources: &self.sources,
+            targets: &self.targets,
+            weights: Some(&self.weights),
+        };
+        pipeline
+            .warp()
+            .jacobians_through(&mut self.warp, pairs, model, &mut self.gradients)
+            .map_err(|source| PipelineError::Warp { from, to, source })?;
+        let gradients = self.gradients.iter_mut();
+        gradients.for_each(|g| *g -= Matrix3::identity());
+        let measure = pipeline.strain();
+        strain
+            .field
+            .set_gradients(&self.gradients, None, measure)
+            .map_err(|source| PipelineError::Strain { from, to, source })?;
+        strain.measure = measure.name();
+        strain.summary = strain.field.summary();
+        let noise = mean_strain_error(&self.sources, &self.targets, matched.model.grid_m);
+        let errors = &mut strain.summary.standard_error;
+        errors.zip_apply(&noise, |error, noise| *error = error.hypot(noise));
+        Ok(())
+    }
 }

@@ -4,12 +4,12 @@ use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
 use super::face::{self, FaceWorkspace, TextureStretch};
 use super::load_reading::{self, LoadReading};
-use super::pair::{self, PairStrain};
+use super::pair::{self, MatchedPoints, PairStrain, StrainWorkspace};
 use super::report::{Report, SkipReason, Stage};
 use super::surface::{self, ContactSurface, ControlPoints, SurfaceWorkspace};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator, UniaxialLoads};
 use crate::force::{Estimate, ForceWorkspace, FrameCondition, Polarity, ReferenceFrame};
-use crate::matching::{MatchError, Matching, WarmStart};
+use crate::matching::{MatchError, MatchedPairs, Matching, WarmStart};
 use nalgebra::{Point2, Point3};
 use ndarray::ArrayView2;
 use std::sync::Arc;
@@ -41,6 +41,7 @@ pub(super) struct StageRunner {
     force: ForceWorkspace,
     face: FaceWorkspace,
     surface: SurfaceWorkspace,
+    strain: StrainWorkspace,
     skip_records: SkipRecords,
     report: Report,
 }
@@ -60,6 +61,7 @@ impl StageRunner {
             force: ForceWorkspace::default(),
             face: FaceWorkspace::default(),
             surface: SurfaceWorkspace::default(),
+            strain: StrainWorkspace::default(),
             skip_records,
             report: Report::default(),
         }
@@ -147,7 +149,7 @@ impl StageRunner {
         self.force.detector.condition(&self.reference)
     }
 
-    /// Reconstructs the surface of a contact. All surfaces that are compared have one grid, so that what the grid does to them leaves no
+    /// Reconstructs the surface of a contact into `surface`. All surfaces that are compared have one grid, so that what the grid does to them leaves no
     /// strain: the grid for a contact of `grid_pixels` pixels.
     pub(super) fn surface(
         &mut self,
@@ -155,32 +157,36 @@ impl StageRunner {
         image: ArrayView2<'_, u8>,
         contact: &FrameContact,
         grid_pixels: usize,
-    ) -> Result<ContactSurface, PipelineError> {
+        surface: &mut ContactSurface,
+    ) -> Result<(), PipelineError> {
         let start = Instant::now();
         let images = [image, self.reference.image()];
         let (pipeline, workspace) = (&self.pipeline, &mut self.surface);
-        let surface = if pipeline.settings().skips.outside_contact {
-            surface::reconstruct(pipeline, workspace, images, contact, grid_pixels)
+        let widened;
+        let contact = if pipeline.settings().skips.outside_contact {
+            contact
         } else {
-            let contact = contact.widened(image.dim());
-            surface::reconstruct(pipeline, workspace, images, &contact, grid_pixels)
+            widened = contact.widened(image.dim());
+            &widened
         };
-        let surface = surface.map_err(|source| PipelineError::Surface { frame, source })?;
+        surface::reconstruct(pipeline, workspace, images, contact, grid_pixels, surface)
+            .map_err(|source| PipelineError::Surface { frame, source })?;
         self.report.ran(Stage::Surface, start.elapsed());
-        Ok(surface)
+        Ok(())
     }
 
-    /// Samples the control points of a surface.
+    /// Samples the control points of a surface into `points`.
     pub(super) fn control_points(
         &mut self,
         frame: usize,
         surface: &ContactSurface,
-    ) -> Result<ControlPoints, PipelineError> {
+        points: &mut ControlPoints,
+    ) -> Result<(), PipelineError> {
         let start = Instant::now();
-        let points = surface::sample(&self.pipeline, &mut self.surface, surface)
+        surface::sample(&self.pipeline, &mut self.surface, surface, points)
             .map_err(|source| PipelineError::Surface { frame, source })?;
         self.report.ran(Stage::ControlPoints, start.elapsed());
-        Ok(points)
+        Ok(())
     }
 
     /// Matches the control points of two frames.
@@ -195,22 +201,35 @@ impl StageRunner {
         })
     }
 
-    /// As [`matching`](Self::matching), from where the last match ended, unless that skip is turned off.
-    pub(super) fn next_matching(
+    /// The pairs of a match that begins where the last one ended, unless that skip is turned off.
+    pub(super) fn next_pairs(
         &mut self,
         frames: [usize; 2],
         history: &mut MatchHistory,
         model: &[Point3<f64>],
         target: &[Point3<f64>],
-    ) -> Result<Matching<f64, 3>, PipelineError> {
+        pairs: &mut MatchedPairs<f64>,
+    ) -> Result<(), PipelineError> {
         if !self.pipeline.settings().skips.last_answer {
-            return self.matching(frames, model, target);
+            let Matching {
+                assignment,
+                confidence,
+                report,
+                ..
+            } = self.matching(frames, model, target)?;
+            *pairs = MatchedPairs {
+                assignment,
+                confidence,
+                report,
+            };
+            return Ok(());
         }
         let warm = &mut history.warm;
-        let matching = self.matched(frames, |pipeline| {
-            pipeline.matcher().match_next(warm, model, target)
+        self.matched(frames, |pipeline| {
+            let matcher = pipeline.matcher();
+            matcher.match_next_pairs(warm, model, target, pairs)
         })?;
-        let iterations = matching.report.iterations;
+        let iterations = pairs.report.iterations;
         match history.first_iterations {
             None => history.first_iterations = Some(iterations),
             Some(first) => {
@@ -218,14 +237,14 @@ impl StageRunner {
                 self.skip(Stage::Match, frames[1], SkipReason::NearLastAnswer, saved);
             }
         }
-        Ok(matching)
+        Ok(())
     }
 
-    fn matched(
+    fn matched<M>(
         &mut self,
         [from, to]: [usize; 2],
-        run: impl FnOnce(&Pipeline) -> Result<Matching<f64, 3>, MatchError>,
-    ) -> Result<Matching<f64, 3>, PipelineError> {
+        run: impl FnOnce(&Pipeline) -> Result<M, MatchError>,
+    ) -> Result<M, PipelineError> {
         let start = Instant::now();
         let matching =
             run(&self.pipeline).map_err(|source| PipelineError::Match { from, to, source })?;
@@ -233,18 +252,18 @@ impl StageRunner {
         Ok(matching)
     }
 
-    /// Works out the strain between two frames from the match of their control points.
+    /// Works out the strain between two frames, from the match of their control points, into `strain`.
     pub(super) fn strain(
         &mut self,
         frames: [usize; 2],
-        model: &ControlPoints,
-        target: &[Point3<f64>],
-        matching: &Matching<f64, 3>,
-    ) -> Result<PairStrain, PipelineError> {
+        matched: &MatchedPoints<'_>,
+        strain: &mut PairStrain,
+    ) -> Result<(), PipelineError> {
         let start = Instant::now();
-        let strain = pair::strain(&self.pipeline, frames, model, target, matching)?;
+        self.strain
+            .strain(&self.pipeline, frames, matched, strain)?;
         self.report.ran(Stage::Strain, start.elapsed());
-        Ok(strain)
+        Ok(())
     }
 
     /// Works out the strain between two loads of a specimen with a flat face.

@@ -17,25 +17,22 @@ pub(super) fn mean_strain_error(
     targets: &[Point3<f64>],
     grid_m: f64,
 ) -> Matrix3<f64> {
-    let [(from, s), (to, t)] = [sources, targets].map(centred);
-    let spread: Matrix3<f64> = s.iter().map(|d| d * d.transpose()).sum();
+    let [from, to] = [sources, targets].map(Disc::of);
+    let offsets = || pairs_of(sources, targets, [&from, &to]);
+    let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
     // What the points do not span they know nothing of: a little of their size keeps the inverse finite.
     let inverse = (spread + Matrix3::identity() * (1e-12 * spread.trace())).try_inverse();
     let Some(inverse) = inverse else {
         return Matrix3::zeros();
     };
-    let slope = t
-        .iter()
-        .zip(&s)
-        .map(|(t, d)| t * d.transpose())
+    let slope = offsets()
+        .map(|(d, t)| t * d.transpose())
         .sum::<Matrix3<f64>>()
         * inverse;
-    let gradient = clustered(&s, &t, &slope, &inverse);
+    let gradient = clustered(offsets(), &slope, &inverse);
     let along = |k: usize| slope.column(k).norm();
-    let edge = EDGE_PX * grid_m * (from.recip() - to.recip()).abs();
-    let residual: Vector3<f64> = s
-        .iter()
-        .zip(&t)
+    let edge = EDGE_PX * grid_m * (from.radius.recip() - to.radius.recip()).abs();
+    let residual: Vector3<f64> = offsets()
         .map(|(d, t)| t - slope * d)
         .map(|r| r.component_mul(&r))
         .sum();
@@ -53,34 +50,49 @@ pub(super) fn mean_strain_error(
     })
 }
 
-/// Offsets from the centroid, and the radius in the image plane of the disc that has their spread.
-fn centred(points: &[Point3<f64>]) -> (f64, Vec<Vector3<f64>>) {
-    let n = points.len() as f64;
-    let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
-    let offsets: Vec<_> = points.iter().map(|p| p.coords - mean).collect();
-    let square = offsets.iter().map(|d| d.xy().norm_squared()).sum::<f64>() / n;
-    ((2.0 * square).sqrt().max(f64::MIN_POSITIVE), offsets)
+/// The disc in the image plane that has the points' centroid and spread.
+struct Disc {
+    centroid: Vector3<f64>,
+    radius: f64,
+}
+
+impl Disc {
+    fn of(points: &[Point3<f64>]) -> Self {
+        let n = points.len() as f64;
+        let centroid = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
+        let offsets = points.iter().map(|p| p.coords - centroid);
+        let square = offsets.map(|d| d.xy().norm_squared()).sum::<f64>() / n;
+        let radius = (2.0 * square).sqrt().max(f64::MIN_POSITIVE);
+        Self { centroid, radius }
+    }
+}
+
+/// The pairs' offsets from their centroids.
+fn pairs_of<'a>(
+    sources: &'a [Point3<f64>],
+    targets: &'a [Point3<f64>],
+    [from, to]: [&'a Disc; 2],
+) -> impl ExactSizeIterator<Item = (Vector3<f64>, Vector3<f64>)> + 'a {
+    let pairs = sources.iter().zip(targets);
+    pairs.map(|(s, t)| (s.coords - from.centroid, t.coords - to.centroid))
 }
 
 /// Standard errors of the affine gradient's entries, runs of neighbours being independent.
 fn clustered(
-    s: &[Vector3<f64>],
-    t: &[Vector3<f64>],
+    mut offsets: impl ExactSizeIterator<Item = (Vector3<f64>, Vector3<f64>)>,
     slope: &Matrix3<f64>,
     inverse: &Matrix3<f64>,
 ) -> Matrix3<f64> {
+    let runs = offsets.len().div_ceil(RUN);
     let mut variance = Matrix3::zeros();
-    for (s, t) in s.chunks(RUN).zip(t.chunks(RUN)) {
-        let sum: Matrix3<f64> = s
-            .iter()
-            .zip(t)
-            .map(|(d, t)| (t - slope * d) * d.transpose())
-            .sum();
+    for _ in 0..runs {
+        let run = offsets.by_ref().take(RUN);
+        let sum: Matrix3<f64> = run.map(|(d, t)| (t - slope * d) * d.transpose()).sum();
         let share = sum * inverse;
         variance += share.component_mul(&share);
     }
     // The fit itself takes four of the runs' degrees of freedom.
-    let runs = s.len().div_ceil(RUN) as f64;
+    let runs = runs as f64;
     variance.map(|v| (v * runs / (runs - 4.0).max(1.0)).sqrt())
 }
 
@@ -127,9 +139,10 @@ mod tests {
                 .enumerate()
                 .map(|(i, p)| Point3::new(p.x, p.y, 1.2 * p.z + off(i)))
                 .collect();
-            let [(_, s), (_, t)] = [&sources, &targets].map(|points| centred(points));
-            let spread: Matrix3<f64> = s.iter().map(|d| d * d.transpose()).sum();
-            let outer: Matrix3<f64> = t.iter().zip(&s).map(|(t, d)| t * d.transpose()).sum();
+            let [from, to] = [&sources, &targets].map(|points| Disc::of(points));
+            let offsets = || pairs_of(&sources, &targets, [&from, &to]);
+            let spread: Matrix3<f64> = offsets().map(|(d, _)| d * d.transpose()).sum();
+            let outer: Matrix3<f64> = offsets().map(|(d, t)| t * d.transpose()).sum();
             let slope = (outer * spread.try_inverse().unwrap())[(2, 2)];
             told += mean_strain_error(&sources, &targets, 0.0)[(2, 2)].powi(2);
             true_square += (0.5 * (slope * slope - 1.44)).powi(2);

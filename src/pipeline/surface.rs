@@ -43,6 +43,24 @@ pub struct ContactSurface {
     pub origin_m: [f64; 2],
 }
 
+impl ContactSurface {
+    /// No surface yet, to be filled.
+    pub(super) fn empty() -> Self {
+        Self {
+            surface: Surface::default(),
+            region: BoundingBox {
+                row_start: 0,
+                row_end: 0,
+                column_start: 0,
+                column_end: 0,
+            },
+            binning: 1,
+            pixel_size_m: [1.0; 2],
+            origin_m: [0.0; 2],
+        }
+    }
+}
+
 /// Position (x, y) in metres of the grid's first pixel.
 fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f64; 2] {
     let side = binning as f64;
@@ -179,7 +197,8 @@ pub(super) fn reconstruct(
     images: [ArrayView2<'_, u8>; 2],
     contact: &FrameContact,
     pixels: usize,
-) -> Result<ContactSurface, SfsError> {
+    surface: &mut ContactSurface,
+) -> Result<(), SfsError> {
     let (Some(region), Some(reading)) = (contact.region, contact.reading) else {
         return Err(SfsError::EmptyMask);
     };
@@ -209,24 +228,19 @@ pub(super) fn reconstruct(
         .pixel_size_m()
         .map(|size| size * side as f64);
     let domain = Domain::new(pixel_size_m)?.with_mask(workspace.mask.view());
-    let mut surface = Surface::default();
     let frame = Frame::Real(workspace.signal.view());
     let sfs = workspace.sfs.get_mut();
     let sfs = sfs.unwrap_or_else(PoisonError::into_inner);
     pipeline
         .surface()
-        .reconstruct_with(sfs, frame, &domain, &mut surface)?;
-    Ok(ContactSurface {
-        surface,
-        origin_m: origin_m(&region, side, pixel_size_m),
-        region,
-        binning: side,
-        pixel_size_m,
-    })
+        .reconstruct_with(sfs, frame, &domain, &mut surface.surface)?;
+    surface.origin_m = origin_m(&region, side, pixel_size_m);
+    (surface.region, surface.binning, surface.pixel_size_m) = (region, side, pixel_size_m);
+    Ok(())
 }
 
 /// Control points on a surface.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct ControlPoints {
     /// In metres from the frame's first pixel.
     pub(super) points: Vec<Point3<f64>>,
@@ -239,28 +253,27 @@ pub(super) fn sample(
     pipeline: &Pipeline,
     workspace: &mut SurfaceWorkspace,
     surface: &ContactSurface,
-) -> Result<ControlPoints, SfsError> {
+    sampled: &mut ControlPoints,
+) -> Result<(), SfsError> {
     let (heights, mask) = (&surface.surface.heights, &surface.surface.mask);
     let usable = mask.iter().filter(|m| **m).count();
     let count = pipeline.settings().control_points.min(usable);
     let size = surface.pixel_size_m;
-    let mut points = Vec::with_capacity(count);
+    let points = &mut sampled.points;
     let (heights, mask) = (heights.view(), Some(mask.view()));
     pipeline
         .sampler()
-        .sample_with(workspace.sfs(), heights, mask, size, count, &mut points)?;
+        .sample_with(workspace.sfs(), heights, mask, size, count, points)?;
     let [x, y] = surface.origin_m;
-    for p in &mut points {
+    for p in points {
         p.x += x;
         p.y += y;
         if let Some(lens) = pipeline.contact().lens() {
             *p = undistorted(lens, *p);
         }
     }
-    Ok(ControlPoints {
-        points,
-        grid_m: size[0].max(size[1]),
-    })
+    sampled.grid_m = size[0].max(size[1]);
+    Ok(())
 }
 
 /// A point of a surface that was made as if all pixels were of the size at the centre of distortion. Its height grows as the pixels

@@ -4,7 +4,7 @@
 //! example and dependent crate compiles the matchers anew: half of the time a test build takes.
 
 use crate::{
-    AnnealedSoftassign, CoherentPointDrift, MatchError, Matching, PointMatcher,
+    AnnealedSoftassign, CoherentPointDrift, MatchError, MatchedPairs, Matching, PointMatcher,
     RelaxationLabelling, WarmStart,
 };
 use nalgebra::Point;
@@ -18,16 +18,24 @@ type Next<M, const D: usize> = fn(
     &[Point<f64, D>],
 ) -> Result<Matching<f64, D>, MatchError>;
 
-/// A matcher's two ways to match.
-type Both<M, const D: usize> = (Once<M, D>, Next<M, D>);
+type NextPairs<M, const D: usize> = fn(
+    &M,
+    &mut WarmStart,
+    &[Point<f64, D>],
+    &[Point<f64, D>],
+    &mut MatchedPairs<f64>,
+) -> Result<(), MatchError>;
 
-const fn both<M: PointMatcher<f64, D>, const D: usize>() -> Both<M, D> {
-    (M::match_points, M::match_next)
+/// A matcher's ways to match.
+type Ways<M, const D: usize> = (Once<M, D>, Next<M, D>, NextPairs<M, D>);
+
+const fn ways<M: PointMatcher<f64, D>, const D: usize>() -> Ways<M, D> {
+    (M::match_points, M::match_next, M::match_next_pairs)
 }
 
 #[used]
-static SOFTASSIGN: (Both<AnnealedSoftassign, 2>, Both<AnnealedSoftassign, 3>) = (both(), both());
+static SOFTASSIGN: (Ways<AnnealedSoftassign, 2>, Ways<AnnealedSoftassign, 3>) = (ways(), ways());
 #[used]
-static DRIFT: (Both<CoherentPointDrift, 2>, Both<CoherentPointDrift, 3>) = (both(), both());
+static DRIFT: (Ways<CoherentPointDrift, 2>, Ways<CoherentPointDrift, 3>) = (ways(), ways());
 #[used]
-static LABELLING: (Both<RelaxationLabelling, 2>, Both<RelaxationLabelling, 3>) = (both(), both());
+static LABELLING: (Ways<RelaxationLabelling, 2>, Ways<RelaxationLabelling, 3>) = (ways(), ways());

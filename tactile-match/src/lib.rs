@@ -52,7 +52,9 @@ pub use assignment_matcher::LinearAssignment;
 pub use cpd::{CoherentPointDrift, DriftWorkspace, Motion, Normalization};
 pub use error::MatchError;
 pub use labelling::RelaxationLabelling;
-pub use matching::{Doubt, MatchReport, Matching, PointMatcher, StopReason, unmatched_rows};
+pub use matching::{
+    Doubt, MatchReport, MatchedPairs, Matching, PointMatcher, StopReason, unmatched_rows,
+};
 pub use nearest::NearestNeighbour;
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;

@@ -63,6 +63,58 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
         let _ = warm;
         self.match_points(model, target)
     }
+
+    /// As [`match_next`](Self::match_next), for who asks for the pairs alone: a matcher may leave out what else a [`Matching`] holds, and
+    /// then allocates nothing once `warm` and `pairs` have grown. By default it is the match's.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{AnnealedSoftassign, MatchedPairs, PointMatcher, WarmStart};
+    /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
+    /// let (matcher, mut warm, mut pairs) = (AnnealedSoftassign::default(), WarmStart::default(), MatchedPairs::default());
+    /// for step in [0.1, 0.2] {
+    ///     let target = model.map(|p| Point2::new(p.x + step, p.y));
+    ///     matcher.match_next_pairs(&mut warm, &model, &target, &mut pairs)?;
+    ///     assert!((0..6).all(|i| pairs.assignment[i] == Some(i) && pairs.confidence[i] > 0.9));
+    /// }
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`match_points`](Self::match_points); `pairs` is then as it was.
+    fn match_next_pairs(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+        pairs: &mut MatchedPairs<T>,
+    ) -> Result<(), MatchError> {
+        let found = self.match_next(warm, model, target)?;
+        (pairs.assignment, pairs.confidence, pairs.report) =
+            (found.assignment, found.confidence, found.report);
+        Ok(())
+    }
+}
+
+/// The pairs of a match without its warp, soft matches and covariances: see [`PointMatcher::match_next_pairs`].
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_match::{LinearAssignment, MatchedPairs, PointMatcher, WarmStart};
+/// let (model, target) = ([Point2::new(0.0, 0.0)], [Point2::new(0.1, 0.0)]);
+/// let (mut warm, mut pairs) = (WarmStart::default(), MatchedPairs::default());
+/// LinearAssignment::default().match_next_pairs(&mut warm, &model, &target, &mut pairs)?;
+/// assert_eq!(pairs.assignment, [Some(0)]);
+/// # Ok::<(), tactile_match::MatchError>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MatchedPairs<T> {
+    /// Target row of every model point.
+    pub assignment: Vec<Option<usize>>,
+    /// As [`Matching::confidence`].
+    pub confidence: Vec<T>,
+    /// How it went.
+    pub report: MatchReport<T>,
 }
 
 /// Passes the calls on to what a pointer points to, so that a boxed or shared matcher is a matcher.
@@ -86,6 +138,16 @@ macro_rules! matcher_behind {
                 target: &[Point<T, D>],
             ) -> Result<Matching<T, D>, MatchError> {
                 (**self).match_next(warm, model, target)
+            }
+
+            fn match_next_pairs(
+                &self,
+                warm: &mut WarmStart,
+                model: &[Point<T, D>],
+                target: &[Point<T, D>],
+                pairs: &mut MatchedPairs<T>,
+            ) -> Result<(), MatchError> {
+                (**self).match_next_pairs(warm, model, target, pairs)
             }
         }
     };

@@ -1,6 +1,6 @@
 //! What a matcher keeps from one target of a series for the next.
 
-use std::any::Any;
+use tactile_tps::Memory;
 
 /// Memory of one matcher along a series of targets of one model, for [`PointMatcher::match_next`](crate::PointMatcher::match_next).
 ///
@@ -30,9 +30,7 @@ use std::any::Any;
 /// # }
 /// ```
 #[derive(Default)]
-pub struct WarmStart {
-    state: Option<Box<dyn Any + Send + Sync>>,
-}
+pub struct WarmStart(Memory);
 
 impl WarmStart {
     /// The state of type `S` that the last match left here; a default one where there is none, or one of another type.
@@ -64,19 +62,14 @@ impl WarmStart {
     /// # Ok::<(), MatchError>(())
     /// ```
     pub fn state<S: Default + Send + Sync + 'static>(&mut self) -> &mut S {
-        let kept = self.state.take().and_then(|state| state.downcast().ok());
-        let state: Box<S> = kept.unwrap_or_default();
-        match self.state.insert(state).downcast_mut() {
-            Some(state) => state,
-            None => unreachable!("the state was put there as this type"),
-        }
+        self.0.state()
     }
 }
 
 impl std::fmt::Debug for WarmStart {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("WarmStart")
-            .field("cold", &self.state.is_none())
+            .field("cold", &self.0.is_empty())
             .finish()
     }
 }

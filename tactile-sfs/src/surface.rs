@@ -226,9 +226,10 @@ impl<T: Scalar> Surface<T> {
         bounding_box: BoundingBox,
     ) {
         if self.heights.dim() != (rows, columns) {
-            self.heights = Array2::from_elem((rows, columns), T::nan());
-            self.mask = Array2::from_elem((rows, columns), false);
-            self.flags = Array2::from_elem((rows, columns), PixelFlags::NONE);
+            let shape = (rows, columns);
+            fill_shape(&mut self.heights, shape, T::nan());
+            fill_shape(&mut self.mask, shape, false);
+            fill_shape(&mut self.flags, shape, PixelFlags::NONE);
         } else if !bounding_box.holds(self.bounding_box) {
             self.clear(self.bounding_box);
         }
@@ -270,4 +271,16 @@ impl<T: Scalar> Surface<T> {
         self.report.solved = solved;
         self.report.flagged = flagged;
     }
+}
+
+/// Gives an array a shape and fills it, in its memory where that is large enough.
+pub(crate) fn fill_shape<V: Copy>(array: &mut Array2<V>, shape: (usize, usize), value: V) {
+    let empty = Array2::from_shape_simple_fn((0, 0), || value);
+    let (mut memory, _) = core::mem::replace(array, empty).into_raw_vec_and_offset();
+    memory.clear();
+    memory.resize(shape.0 * shape.1, value);
+    *array = match Array2::from_shape_vec(shape, memory) {
+        Ok(array) => array,
+        Err(_) => unreachable!("as many values as the shape has places"),
+    };
 }

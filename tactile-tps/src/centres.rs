@@ -67,42 +67,58 @@ pub(crate) struct Centres<const D: usize> {
     /// Rounding of the coordinates, relative to the frame.
     pub(crate) grain: f64,
     inputs: usize,
+    /// The input points in the order of their coordinates.
+    order: Vec<usize>,
+}
+
+impl<const D: usize> Default for Centres<D> {
+    fn default() -> Self {
+        Self {
+            frame: Frame {
+                centre: [0.0; D],
+                scale: 1.0,
+            },
+            axes: [const { Vec::new() }; D],
+            low: [const { Vec::new() }; D],
+            first: Vec::new(),
+            centre_of: Vec::new(),
+            grain: 0.0,
+            inputs: 0,
+            order: Vec::new(),
+        }
+    }
 }
 
 impl<const D: usize> Centres<D> {
-    pub(crate) fn new<T: Scalar>(points: &[Point<T, D>], rescale: bool) -> Result<Self, TpsError> {
+    /// Takes over points, reusing memory where it suffices.
+    pub(crate) fn take<T: Scalar>(
+        &mut self,
+        points: &[Point<T, D>],
+        rescale: bool,
+    ) -> Result<(), TpsError> {
         if points.is_empty() {
             return Err(TpsError::Empty("source points"));
         }
         finite(points, "source points")?;
-        let frame = Frame::around(points, rescale);
-        let (first, centre_of) = merge(points);
-        let exact = |i: usize, k: usize| two_sum(points[i][k].widen(), -frame.centre[k]);
-        let axes = core::array::from_fn(|k| {
-            first
-                .iter()
-                .map(|&i| exact(i, k).high / frame.scale)
-                .collect()
-        });
-        let low = core::array::from_fn(|k| {
-            first
-                .iter()
-                .map(|&i| exact(i, k).low / frame.scale)
-                .collect()
-        });
+        self.frame = Frame::around(points, rescale);
+        self.merge(points);
+        let (centre, scale) = (self.frame.centre, self.frame.scale);
+        for (k, (axis, low)) in self.axes.iter_mut().zip(&mut self.low).enumerate() {
+            axis.clear();
+            low.clear();
+            for &i in &self.first {
+                let exact = two_sum(points[i][k].widen(), -centre[k]);
+                axis.push(exact.high / scale);
+                low.push(exact.low / scale);
+            }
+        }
         let largest = points
             .iter()
             .flat_map(|p| p.iter())
             .fold(0.0, |m, x| f64::max(m, x.widen().abs()));
-        Ok(Self {
-            frame,
-            axes,
-            low,
-            first,
-            centre_of,
-            grain: largest / frame.scale * T::UNIT_ROUNDOFF,
-            inputs: points.len(),
-        })
+        self.grain = largest / scale * T::UNIT_ROUNDOFF;
+        self.inputs = points.len();
+        Ok(())
     }
 
     /// Replaces `local` by these centres alone, in the same frame.
@@ -128,6 +144,40 @@ impl<const D: usize> Centres<D> {
             high: self.axes[k][centre],
             low: self.low[k][centre],
         })
+    }
+
+    /// Finds the first point of every group of equal ones, and the group of each point.
+    fn merge<T: Scalar>(&mut self, points: &[Point<T, D>]) {
+        let Self {
+            first,
+            centre_of,
+            order,
+            ..
+        } = self;
+        for list in [&mut *first, &mut *order] {
+            list.clear();
+            list.extend(0..points.len());
+        }
+        centre_of.clear();
+        let compare = |&i: &usize, &j: &usize| {
+            let differ = (0..D).map(|k| points[i][k].widen().partial_cmp(&points[j][k].widen()));
+            differ.flatten().find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
+        };
+        order.sort_unstable_by(compare);
+        if order.windows(2).all(|w| points[w[0]] != points[w[1]]) {
+            return;
+        }
+        // The first point of every point's group, then the group's number.
+        centre_of.extend(0..points.len());
+        for pair in order.windows(2) {
+            if points[pair[0]] == points[pair[1]] {
+                centre_of[pair[1]] = centre_of[pair[0]];
+            }
+        }
+        first.retain(|&i| centre_of[i] == i);
+        for leader in centre_of {
+            *leader = first.partition_point(|&i| i < *leader);
+        }
     }
 
     /// Number of points given.
@@ -158,32 +208,4 @@ pub(crate) fn finite<T: Scalar, const D: usize>(
         Some(index) => Err(TpsError::NotFinite { input, index }),
         None => Ok(()),
     }
-}
-
-/// First point of every group of equal ones, and the group of each point (empty if all differ).
-fn merge<T: Scalar, const D: usize>(points: &[Point<T, D>]) -> (Vec<usize>, Vec<usize>) {
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    let compare = |&i: &usize, &j: &usize| {
-        let differ = (0..D).map(|k| points[i][k].widen().partial_cmp(&points[j][k].widen()));
-        differ.flatten().find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
-    };
-    order.sort_unstable_by(compare);
-    if order.windows(2).all(|w| points[w[0]] != points[w[1]]) {
-        return ((0..points.len()).collect(), Vec::new());
-    }
-    let mut leader: Vec<usize> = (0..points.len()).collect();
-    for pair in order.windows(2) {
-        if points[pair[0]] == points[pair[1]] {
-            leader[pair[1]] = leader[pair[0]];
-        }
-    }
-    let first: Vec<usize> = (0..points.len()).filter(|&i| leader[i] == i).collect();
-    let mut centre_of = vec![0; points.len()];
-    for (centre, &i) in first.iter().enumerate() {
-        centre_of[i] = centre;
-    }
-    for i in 0..points.len() {
-        centre_of[i] = centre_of[leader[i]];
-    }
-    (first, centre_of)
 }

@@ -11,6 +11,7 @@ use crate::{
     equations::Buffers,
     iterative::Iterative,
     options::validate_weight_count,
+    progress::Watch,
     system::{Setting, System},
 };
 
@@ -104,55 +105,112 @@ impl<T: Scalar, const D: usize, K: Kernel> Factorization<T, D, K> {
         options: &FitOptions<T, K>,
         mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TpsError> {
-        if let Some(weights) = &options.weights {
-            validate_weight_count(weights, sources.len())?;
-        }
-        let mut this = Self::unfactored(sources, options)?;
+        let this = Self::without_points(options.kernel.clone());
+        this.refactored(sources, options, &mut watch)
+    }
+
+    /// As [`new`](Self::new), in the memory of this factorisation: for points of the same number nothing is allocated. O(n³/3).
+    ///
+    /// ```
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{Factorization, FitOptions, Spline, TpsError, Workspace};
+    /// # fn main() -> Result<(), TpsError> {
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let options = FitOptions::default();
+    /// let mut factorization = Factorization::new(&sources, &options)?;
+    /// let (mut workspace, mut spline) = (Workspace::default(), Spline::default());
+    /// for step in 1..=3 {
+    ///     let moved = sources.map(|p| p * f64::from(step));
+    ///     factorization = factorization.refactor(&moved, &options)?;
+    ///     factorization.refit_with(&mut workspace, &sources, None, None, &mut spline)?;
+    ///     assert!((spline.apply(&moved[4]) - sources[4]).norm() < 1e-14);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn refactor(
+        self,
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+    ) -> Result<Self, TpsError> {
+        self.refactored(sources, options, &mut |_| ControlFlow::Continue(()))
+    }
+
+    fn refactored(
+        self,
+        sources: &[Point<T, D>],
+        options: &FitOptions<T, K>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, TpsError> {
+        let mut this = self.with_points(sources, options)?;
         let lambda = this.inner_lambda(this.smoothing);
-        let mut system = System::default();
+        let kept = core::mem::take(&mut this.system);
+        let preconditioner = this.iterative.take();
+        // Only a factor is made in the memory of the last one: what a spectrum or a preconditioner leaves unwritten must be empty.
         if this.smoothing == Smoothing::Gcv {
             this.decompose();
         } else if options.iterates(this.centres.len()) {
-            let mut iterative = Iterative::default();
+            let (mut iterative, mut system) =
+                (preconditioner.unwrap_or_default(), System::default());
             let built = iterative.build(
                 &this.setting(),
                 &this.centre_weights,
                 lambda,
                 &mut system,
-                &mut watch,
+                watch,
             );
             if built.is_break() {
                 return Err(TpsError::Stopped);
             }
-            this.iterative = Some(iterative);
+            (this.iterative, this.system) = (Some(iterative), system);
         } else {
+            let mut system = kept;
             system.factor(&this.setting(), &this.centre_weights, lambda)?;
+            this.system = system;
         }
-        this.system = system;
         Ok(this)
     }
 
-    /// The distinct centres and the options, without a factor.
-    pub(crate) fn unfactored(
+    /// No points yet: memory for [`with_points`](Self::with_points).
+    pub(crate) fn without_points(kernel: K) -> Self {
+        Self {
+            kernel,
+            centres: Centres::default(),
+            system: System::default(),
+            spectral: OnceLock::new(),
+            weights: None,
+            centre_weights: Vec::new(),
+            smoothing: Smoothing::None,
+            rank_tolerance: 0.0,
+            iterative: None,
+            tolerance: 0.0,
+        }
+    }
+
+    /// The distinct centres and the options, without a factor for them.
+    pub(crate) fn with_points(
+        mut self,
         sources: &[Point<T, D>],
         options: &FitOptions<T, K>,
     ) -> Result<Self, TpsError> {
-        let kernel = options.kernel.clone();
-        let centres = Centres::new(sources, kernel.degree().is_some())?;
-        let mut centre_weights = Vec::new();
-        centres.weigh(options.weights.as_deref(), &mut centre_weights);
-        Ok(Self {
-            kernel,
-            centres,
-            system: System::default(),
-            spectral: OnceLock::new(),
-            weights: options.weights.clone(),
-            centre_weights,
-            smoothing: options.smoothing,
-            rank_tolerance: options.rank_tolerance.widen(),
-            iterative: None,
-            tolerance: options.tolerance.widen(),
-        })
+        if let Some(weights) = &options.weights {
+            validate_weight_count(weights, sources.len())?;
+            self.weights.get_or_insert_default().clone_from(weights);
+        } else {
+            self.weights = None;
+        }
+        self.kernel.clone_from(&options.kernel);
+        self.centres.take(sources, self.kernel.degree().is_some())?;
+        self.centres
+            .weigh(self.weights.as_deref(), &mut self.centre_weights);
+        self.spectral = OnceLock::new();
+        self.smoothing = options.smoothing;
+        self.rank_tolerance = options.rank_tolerance.widen();
+        self.tolerance = options.tolerance.widen();
+        Ok(self)
     }
 
     /// Number of source points.

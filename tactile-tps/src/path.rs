@@ -1,14 +1,12 @@
-//! The values that splines of several λ take: what cross-validation over left-out points asks for.
+//! The splines of several λ through the same pairs.
 
 use nalgebra::Point;
 
 use crate::{
-    Factorization, FitOptions, Kernel, Scalar, Smoothing, Spline, TpsError,
-    centres::finite,
+    Factorization, FitOptions, Kernel, R2LogR, Scalar, Smoothing, TpsError,
     equations::Buffers,
     layout::{HEAD, PANEL},
     null_space::{MAX, dot},
-    options::validate_weight_count,
     real::Lane,
     simd::{Job, dispatch},
     smoothing::validate_smoothing,
@@ -16,77 +14,136 @@ use crate::{
     tridiagonal::Tridiagonal,
 };
 
-impl<T: Scalar, const D: usize, const M: usize, K: Kernel> Spline<T, D, M, K> {
-    /// The values at `points` of the splines through the same pairs with each of the `lambdas`, in their order: those of
-    /// [`fit`](Self::fit) with that [`Smoothing::Lambda`] and then [`apply`](Self::apply), to rounding.
+/// The splines through the same pairs for several λ: what cross-validation over left-out points asks for.
+///
+/// With the side conditions eliminated a spline solves $(A + \lambda) z = b$ with A symmetric, and its value at a point is linear in z.
+/// Householder's $A = H T H^T$ with T tridiagonal serves every λ (Eldén, BIT 17, 1977): O(n³) once, O(n²) a λ.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_tps::{FitOptions, LambdaPath, R2LogR, Smoothing, ThinPlateSpline};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// let sources: Vec<_> = (0..20).map(|i| Point2::new((i % 5) as f64, (i * i % 7) as f64 + 0.1 * i as f64)).collect();
+/// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y)).collect();
+/// let options = FitOptions::new(R2LogR);
+/// let place = Point2::new(1.5, 2.5);
+/// let mut path = LambdaPath::fit(&sources, &targets, &options, &[0.1, 10.0])?;
+/// let stiff = ThinPlateSpline::fit(&sources, &targets, &options.with_smoothing(Smoothing::Lambda(10.0))?)?;
+/// assert!((path.values(&place)[1] - stiff.apply(&place)).norm() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct LambdaPath<T: Scalar, const D: usize, const M: usize, K = R2LogR> {
+    /// Centres and options, without a factor.
+    points: Factorization<T, D, K>,
+    system: System<D>,
+    buffers: Buffers,
+    path: Path,
+    origin: [f64; M],
+    values: Vec<Point<T, M>>,
+}
+
+impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K> {
+    /// The splines of [`Spline::fit`](crate::Spline::fit) with [`Smoothing::Lambda`] of each of the `lambdas`, to rounding.
     ///
-    /// With the side conditions eliminated a spline solves $(A + \lambda) z = b$ with A symmetric, and its value at a point is linear in z.
-    /// Householder's $A = H T H^T$ with T tridiagonal serves every λ (Eldén, BIT 17, 1977): O(n³) once, O(n² + p n) a λ for p points.
+    /// # Errors
+    /// Those of [`Spline::fit`](crate::Spline::fit), and [`TpsError::Lambda`] for a λ that is not positive and finite.
+    pub fn fit(
+        sources: &[Point<T, D>],
+        targets: &[Point<T, M>],
+        options: &FitOptions<T, K>,
+        lambdas: &[T],
+    ) -> Result<Self, TpsError> {
+        let empty = Self {
+            points: Factorization::without_points(options.kernel.clone()),
+            system: System::default(),
+            buffers: Buffers::default(),
+            path: Path::default(),
+            origin: [0.0; M],
+            values: Vec::new(),
+        };
+        empty.refit(sources, targets, options, lambdas)
+    }
+
+    /// As [`fit`](Self::fit), in the memory of these splines: for as many points nothing is allocated.
     ///
     /// ```
-    /// use nalgebra::Point2;
-    /// use tactile_tps::{FitOptions, R2LogR, Smoothing, ThinPlateSpline};
+    /// # use nalgebra::Point2;
+    /// # use tactile_tps::{FitOptions, LambdaPath};
     /// # fn main() -> Result<(), tactile_tps::TpsError> {
-    /// let sources: Vec<_> = (0..20).map(|i| Point2::new((i % 5) as f64, (i * i % 7) as f64 + 0.1 * i as f64)).collect();
-    /// let targets: Vec<_> = sources.iter().map(|p| Point2::new(p.x.sin(), p.y)).collect();
-    /// let options = FitOptions::new(R2LogR);
-    /// let place = Point2::new(1.5, 2.5);
-    /// let found = ThinPlateSpline::values_of_each(&sources, &targets, &options, &[0.1, 10.0], &[place])?;
-    /// let stiff = ThinPlateSpline::fit(&sources, &targets, &options.with_smoothing(Smoothing::Lambda(10.0))?)?;
-    /// assert!((found[1][0] - stiff.apply(&place)).norm() < 1e-12);
+    /// # let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.4, 0.6]].map(Point2::from);
+    /// let options = FitOptions::default();
+    /// let mut path = LambdaPath::fit(&sources, &sources, &options, &[1e-9, 1.0])?;
+    /// let lifted = sources.map(|p| Point2::new(p.x, p.y + p.x * p.y));
+    /// path = path.refit(&sources, &lifted, &options, &[1e-9, 1.0])?;
+    /// // Nearly interpolated, and smoothed.
+    /// let misses = path.values(&sources[4]).iter().map(|v| (v - lifted[4]).norm()).collect::<Vec<_>>();
+    /// assert!(misses[0] < 1e-8 && misses[1] > 0.01);
     /// # Ok(())
     /// # }
     /// ```
     ///
     /// # Errors
-    /// Those of [`fit`](Self::fit), and [`TpsError::Lambda`] for a λ that is not positive and finite, [`TpsError::NotFinite`] for a point.
-    pub fn values_of_each(
+    /// As [`fit`](Self::fit).
+    pub fn refit(
+        mut self,
         sources: &[Point<T, D>],
         targets: &[Point<T, M>],
         options: &FitOptions<T, K>,
         lambdas: &[T],
-        points: &[Point<T, D>],
-    ) -> Result<Vec<Vec<Point<T, M>>>, TpsError> {
+    ) -> Result<Self, TpsError> {
         for &lambda in lambdas {
             validate_smoothing(&Smoothing::Lambda(lambda))?;
             if lambda.widen() == 0.0 {
                 return Err(TpsError::Lambda { value: 0.0 });
             }
         }
-        if let Some(weights) = &options.weights {
-            validate_weight_count(weights, sources.len())?;
-        }
-        finite(points, "queries")?;
-        let splines = Factorization::unfactored(sources, options)?;
-        splines.check(targets, None, false)?;
-        let mut system = System::default();
-        system.assemble(&splines.setting(), &splines.centre_weights, true);
-        let origin: [f64; M] = core::array::from_fn(|k| targets[0][k].widen());
-        let mut buffers = Buffers::default();
-        let weights = splines.weights.as_deref();
-        splines
-            .centres
-            .gather(targets, weights, &origin, &mut buffers);
-        let inner = |&lambda: &T| splines.inner_lambda(Smoothing::Lambda(lambda));
-        let mut path = Path::default();
-        path.solve::<M, D>(&system, &buffers.targets, lambdas.iter().map(inner));
+        self.points = self.points.with_points(sources, options)?;
+        self.points.check(targets, None, false)?;
+        let Self {
+            points,
+            system,
+            buffers,
+            path,
+            origin,
+            values,
+        } = &mut self;
+        system.assemble(&points.setting(), &points.centre_weights, true);
+        *origin = core::array::from_fn(|k| targets[0][k].widen());
+        let weights = points.weights.as_deref();
+        points.centres.gather(targets, weights, origin, buffers);
+        let inner = |&lambda: &T| points.inner_lambda(Smoothing::Lambda(lambda));
+        path.solve::<M, D>(system, &buffers.targets, lambdas.iter().map(inner));
+        path.places.clear();
         path.places.resize((D + 1) * system.active.len(), 0.0);
-        system.places(&splines.centres, &mut path.places);
-        let mut values = vec![Vec::with_capacity(points.len()); lambdas.len()];
-        for point in points {
-            let place = splines.centres.frame.inside(point);
-            path.evaluate(&splines.kernel, &system, &place);
-            for (l, values) in values.iter_mut().enumerate() {
-                let value = |m: usize| T::narrow(origin[m] + path.sums[l * M + m]);
-                values.push(Point::from(core::array::from_fn(value)));
-            }
+        system.places(&points.centres, &mut path.places);
+        values.clear();
+        values.resize(lambdas.len(), Point::origin());
+        Ok(self)
+    }
+
+    /// The values at `point`, one for each λ, in the order of the λ; O(n) each.
+    pub fn values(&mut self, point: &Point<T, D>) -> &[Point<T, M>] {
+        let Self {
+            points,
+            system,
+            path,
+            origin,
+            values,
+            ..
+        } = self;
+        let place = points.centres.frame.inside(point);
+        path.evaluate(&points.kernel, system, &place);
+        for (value, sums) in values.iter_mut().zip(path.sums.chunks_exact(M)) {
+            *value = Point::from(core::array::from_fn(|m| T::narrow(origin[m] + sums[m])));
         }
-        Ok(values)
+        values
     }
 }
 
 /// The splines of several λ side by side: column l M + m is output m of the l-th λ. Rows have a multiple of eight columns.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 struct Path {
     form: Tridiagonal,
     width: usize,
@@ -103,6 +160,7 @@ struct Path {
     places: Vec<f64>,
     kernels: Vec<f64>,
     sums: Vec<f64>,
+    column: Vec<f64>,
 }
 
 impl Path {
@@ -161,12 +219,13 @@ impl Path {
         self.sides.clear();
         self.sides.resize(order * outputs, 0.0);
         self.heads.clear();
-        let mut column = vec![0.0; null.stride];
+        let column = &mut self.column;
         for m in 0..M {
-            column.fill(0.0);
+            column.clear();
+            column.resize(null.stride, 0.0);
             let own = &targets[m * centres..(m + 1) * centres];
             system.scaled(own, &mut column[null.rows()]);
-            null.apply_transpose(&mut column);
+            null.apply_transpose(column);
             let mut head = [0.0; MAX];
             head[..null.q].copy_from_slice(&column[HEAD - null.q..HEAD]);
             self.heads.push(head);
@@ -183,9 +242,10 @@ impl Path {
         self.weights.clear();
         self.weights.resize(n * width, 0.0);
         self.affine.clear();
-        let mut column = vec![0.0; null.stride];
+        let column = &mut self.column;
         for c in 0..count {
-            column.fill(0.0);
+            column.clear();
+            column.resize(null.stride, 0.0);
             for (value, row) in column[HEAD..]
                 .iter_mut()
                 .zip(self.solutions.chunks_exact(width))
@@ -197,7 +257,7 @@ impl Path {
                 *head -= dot(system.coupling(k), &column[HEAD..HEAD + n - null.q]);
             }
             self.affine.push(null.solve_upper(&head[..null.q]));
-            null.apply(&mut column);
+            null.apply(column);
             for (row, weight) in self
                 .weights
                 .chunks_exact_mut(width)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point, SMatrix};
 
-use crate::{FitOptions, Kernel, Scalar, Spline, ThinPlateSpline, TpsError};
+use crate::{FitOptions, Kernel, Memory, Scalar, Spline, ThinPlateSpline, TpsError};
 
 /// A map of `D`-dimensional space onto itself. Object safe: a `Box<dyn Warp<f64, 3>>` is a warp.
 ///
@@ -107,6 +107,15 @@ macro_rules! forward {
             ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError> {
                 (**self).fit(sources, targets, weights)
             }
+            fn jacobians_through(
+                &self,
+                memory: &mut Memory,
+                pairs: Pairs<'_, T, D>,
+                points: &[Point<T, D>],
+                jacobians: &mut [SMatrix<T, D, D>],
+            ) -> Result<(), TpsError> {
+                (**self).jacobians_through(memory, pairs, points, jacobians)
+            }
         }
     };
 }
@@ -147,6 +156,55 @@ pub trait WarpModel<T: Scalar, const D: usize> {
         targets: &[Point<T, D>],
         weights: Option<&[T]>,
     ) -> Result<Box<dyn Warp<T, D> + Send + Sync>, TpsError>;
+
+    /// The Jacobians at `points` of the warp that [`fit`](Self::fit) finds, for one set of pairs of a series: a model may work in what it
+    /// keeps in `memory` ([`Memory`]), and then allocates nothing from the second set on. By default the warp is fitted as if alone.
+    ///
+    /// ```
+    /// use nalgebra::{Matrix2, Point2};
+    /// use tactile_tps::{AffineModel, Memory, Pairs, WarpModel};
+    /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(Point2::from);
+    /// let (mut memory, mut jacobians) = (Memory::default(), [Matrix2::zeros()]);
+    /// for stretch in [1.1, 1.2] {
+    ///     let targets = sources.map(|p| Point2::new(stretch * p.x, p.y));
+    ///     let pairs = Pairs { sources: &sources, targets: &targets, weights: None };
+    ///     AffineModel::General.jacobians_through(&mut memory, pairs, &sources[..1], &mut jacobians)?;
+    ///     assert!((jacobians[0][(0, 0)] - stretch).abs() < 1e-14);
+    /// }
+    /// # Ok::<(), tactile_tps::TpsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit), and [`TpsError::Length`] where `points` and `jacobians` differ in number.
+    fn jacobians_through(
+        &self,
+        memory: &mut Memory,
+        pairs: Pairs<'_, T, D>,
+        points: &[Point<T, D>],
+        jacobians: &mut [SMatrix<T, D, D>],
+    ) -> Result<(), TpsError> {
+        let _ = memory;
+        self.fit(pairs.sources, pairs.targets, pairs.weights)?
+            .jacobian_into(points, jacobians)
+    }
+}
+
+/// Pairs of points, as many sources as targets and, where given, weights.
+///
+/// ```
+/// use nalgebra::Point2;
+/// use tactile_tps::Pairs;
+/// let (sources, targets) = ([Point2::new(0.0, 0.0)], [Point2::new(1.0, 0.0)]);
+/// assert_eq!(Pairs { sources: &sources, targets: &targets, weights: Some(&[0.5]) }.weights, Some(&[0.5][..]));
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Pairs<'a, T: Scalar, const D: usize> {
+    /// From where.
+    pub sources: &'a [Point<T, D>],
+    /// To where.
+    pub targets: &'a [Point<T, D>],
+    /// How much each pair counts; without weights all count alike.
+    pub weights: Option<&'a [T]>,
 }
 
 impl<T: Scalar, const D: usize, K: Kernel> Warp<T, D> for Spline<T, D, D, K> {

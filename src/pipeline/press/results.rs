@@ -5,7 +5,7 @@ use crate::pipeline::background;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::face::TextureStretch;
-use crate::pipeline::pair::PairStrain;
+use crate::pipeline::pair::{MatchedPoints, PairStrain};
 use crate::pipeline::surface::{ContactSurface, ControlPoints};
 use nalgebra::Point3;
 use ndarray::{Array2, ArrayView2, CowArray, Ix2};
@@ -102,8 +102,10 @@ impl<'a> Press<'a> {
         if self.frames[at].surface.is_none() {
             let pixels = self.contact_pixels(0)?;
             let (image, contact) = self.masked(frame)?;
-            let surface = self.runner.surface(frame, image.view(), &contact, pixels)?;
-            self.frames[at].surface = Some(Box::new(surface));
+            let mut surface = Box::new(ContactSurface::empty());
+            self.runner
+                .surface(frame, image.view(), &contact, pixels, &mut surface)?;
+            self.frames[at].surface = Some(surface);
         }
         self.frames[at]
             .surface
@@ -157,7 +159,8 @@ impl<'a> Press<'a> {
                 .surface
                 .as_deref()
                 .ok_or(PipelineError::NoContact { frame })?;
-            let points = self.runner.control_points(frame, surface)?;
+            let mut points = ControlPoints::default();
+            self.runner.control_points(frame, surface, &mut points)?;
             self.frames[at].points = Some(points);
         }
         Ok(&known_points(&self.frames, at)?.points)
@@ -235,10 +238,15 @@ impl<'a> Press<'a> {
                 .matching
                 .as_deref()
                 .ok_or(PipelineError::NoContact { frame })?;
-            let strain = self
-                .runner
-                .strain([0, frame], model, &target.points, matching)?;
-            self.frames[at].strain = Some(Box::new(strain));
+            let matched = MatchedPoints {
+                model,
+                target: &target.points,
+                assignment: &matching.assignment,
+                confidence: &matching.confidence,
+            };
+            let mut strain = Box::new(PairStrain::empty());
+            self.runner.strain([0, frame], &matched, &mut strain)?;
+            self.frames[at].strain = Some(strain);
         }
         self.frames[at]
             .strain

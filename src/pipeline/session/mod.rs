@@ -4,7 +4,7 @@
 //! refines the modulus. Shear is followed where its stiffnesses are known, drift of the light watched in frames without
 //! contact. Strain is followed for who asks ([`Session::strain`]), from the load where that began: its surface, points and
 //! spline are kept, and each match begins where the last one ended. Memory is constant: similar loads are merged.
-//! [`Session::push`] allocates nothing once its buffers have their size.
+//! [`Session::push`] and, with the default stages, [`Session::strain`] allocate nothing once their buffers have their size.
 mod drift;
 mod health;
 mod loads;

@@ -1,14 +1,14 @@
 //! Strain along a stream, counted from one load.
 use super::loads::SeenLoads;
-use crate::matching::MatchReport;
+use crate::matching::{MatchReport, MatchedPairs};
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::load_reading::LoadReading;
 use crate::pipeline::object::Object;
-use crate::pipeline::pair::PairStrain;
+use crate::pipeline::pair::{MatchedPoints, PairStrain};
 use crate::pipeline::report::{SkipReason, Stage};
 use crate::pipeline::runner::{MatchHistory, StageRunner};
-use crate::pipeline::surface::ControlPoints;
+use crate::pipeline::surface::{ContactSurface, ControlPoints};
 use ndarray::ArrayView2;
 
 /// Strain of one frame of a stream.
@@ -43,6 +43,18 @@ pub struct SessionStrain {
     pub strain: PairStrain,
 }
 
+impl SessionStrain {
+    fn empty() -> Self {
+        Self {
+            from: 0,
+            to: 0,
+            matched: 0,
+            report: MatchReport::default(),
+            strain: PairStrain::empty(),
+        }
+    }
+}
+
 /// The frame whose strain is asked for.
 pub(super) struct Frame<'a> {
     pub(super) number: u64,
@@ -61,11 +73,43 @@ struct Anchor {
     points: Option<ControlPoints>,
 }
 
+/// Memory of the stages before the strain.
+struct Buffers {
+    surface: ContactSurface,
+    points: ControlPoints,
+    pairs: MatchedPairs<f64>,
+}
+
+impl Default for Buffers {
+    fn default() -> Self {
+        Self {
+            surface: ContactSurface::empty(),
+            points: ControlPoints::default(),
+            pairs: MatchedPairs::default(),
+        }
+    }
+}
+
+impl Buffers {
+    /// The control points of a frame's surface, into `points`.
+    fn sample(
+        &mut self,
+        runner: &mut StageRunner,
+        frame: &Frame<'_>,
+        grid_pixels: usize,
+    ) -> Result<(), PipelineError> {
+        let (number, surface) = (frame.number as usize, &mut self.surface);
+        runner.surface(number, frame.image, frame.contact, grid_pixels, surface)?;
+        runner.control_points(number, surface, &mut self.points)
+    }
+}
+
 /// What is kept from frame to frame.
 #[derive(Default)]
 pub(super) struct FollowedStrain {
     anchor: Option<Anchor>,
     history: MatchHistory,
+    buffers: Buffers,
     last: Option<SessionStrain>,
     loads: Option<SeenLoads>,
 }
@@ -79,14 +123,15 @@ impl FollowedStrain {
     ) -> Result<Option<&SessionStrain>, PipelineError> {
         let Some(anchor) = &self.anchor else {
             let pixels = frame.contact.pixels();
+            let curved = runner.pipeline().settings().object.flat_face().is_none();
+            if curved {
+                self.buffers.sample(runner, frame, pixels)?;
+            }
             self.anchor = Some(Anchor {
                 frame: frame.number,
                 reading: frame.reading,
                 pixels,
-                points: match runner.pipeline().settings().object.flat_face() {
-                    Some(_) => None,
-                    None => Some(control_points(runner, frame, pixels)?),
-                },
+                points: curved.then(|| std::mem::take(&mut self.buffers.points)),
             });
             return Ok(None);
         };
@@ -95,8 +140,10 @@ impl FollowedStrain {
         }
         let known = |last: &SessionStrain| last.to == frame.number;
         if !self.last.as_ref().is_some_and(known) {
-            self.last = None;
-            let found = strain_since(anchor, &mut self.history, runner, frame)?;
+            // A strain that fails leaves none behind.
+            let mut found = self.last.take().unwrap_or_else(SessionStrain::empty);
+            let (buffers, history) = (&mut self.buffers, &mut self.history);
+            strain_since(anchor, buffers, history, runner, frame, &mut found)?;
             let step = force_n(&frame.reading) - force_n(&anchor.reading);
             self.loads
                 .get_or_insert_with(SeenLoads::new)
@@ -121,52 +168,38 @@ impl FollowedStrain {
     }
 }
 
-/// Control points of a frame's surface.
-fn control_points(
-    runner: &mut StageRunner,
-    frame: &Frame<'_>,
-    grid_pixels: usize,
-) -> Result<ControlPoints, PipelineError> {
-    let number = frame.number as usize;
-    let surface = runner.surface(number, frame.image, frame.contact, grid_pixels)?;
-    runner.control_points(number, &surface)
-}
-
 fn strain_since(
     anchor: &Anchor,
+    buffers: &mut Buffers,
     history: &mut MatchHistory,
     runner: &mut StageRunner,
     frame: &Frame<'_>,
-) -> Result<SessionStrain, PipelineError> {
+    found: &mut SessionStrain,
+) -> Result<(), PipelineError> {
     let frames = [anchor.frame as usize, frame.number as usize];
-    let Some(points) = &anchor.points else {
+    (found.from, found.to) = (anchor.frame, frame.number);
+    let Some(model) = &anchor.points else {
         let readings = [&anchor.reading, &frame.reading];
         let object = runner.pipeline().settings().object;
         let poisson_ratio = object.flat_face().unwrap_or(Object::DEFAULT_POISSON_RATIO);
-        return Ok(SessionStrain {
-            from: anchor.frame,
-            to: frame.number,
-            matched: 0,
-            report: MatchReport::default(),
-            strain: runner.strain_of_faces(frames, readings, poisson_ratio)?,
-        });
+        found.strain = runner.strain_of_faces(frames, readings, poisson_ratio)?;
+        return Ok(());
     };
-    let target = control_points(runner, frame, anchor.pixels)?.points;
-    runner.skip(
-        Stage::Surface,
-        frames[1],
-        SkipReason::KeptFromBefore,
-        anchor.pixels,
-    );
-    let found = runner.next_matching(frames, history, &points.points, &target)?;
-    let strain = runner.strain(frames, points, &target, &found)?;
-    Ok(SessionStrain {
-        from: anchor.frame,
-        to: frame.number,
-        matched: found.assignment.iter().flatten().count(),
-        report: found.report,
-        strain,
-    })
+    buffers.sample(runner, frame, anchor.pixels)?;
+    let kept = SkipReason::KeptFromBefore;
+    runner.skip(Stage::Surface, frames[1], kept, anchor.pixels);
+    let (pairs, target) = (&mut buffers.pairs, &buffers.points.points);
+    runner.next_pairs(frames, history, &model.points, target, pairs)?;
+    let matched = MatchedPoints {
+        model,
+        target,
+        assignment: &pairs.assignment,
+        confidence: &pairs.confidence,
+    };
+    runner.strain(frames, &matched, &mut found.strain)?;
+    found.matched = pairs.assignment.iter().flatten().count();
+    found.report.clone_from(&pairs.report);
+    Ok(())
 }
 
 /// The force of a reading in newtons, zero where it has none.

@@ -38,7 +38,7 @@ pub struct StrainSummary<T> {
 }
 
 /// Strain at points, with the weight (area, volume) of each.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct StrainField<T> {
     /// The strain at every point; zero where the deformation folds.
@@ -71,23 +71,73 @@ impl<T: RealField + Copy> StrainField<T> {
         weights: Option<&[T]>,
         measure: &dyn StrainMeasure<T>,
     ) -> Result<Self, ElasticityError> {
-        let weights = checked_weights(gradients.len(), weights)?;
         let mut field = Self {
-            strains: Vec::with_capacity(gradients.len()),
-            weights,
+            strains: Vec::new(),
+            weights: Vec::new(),
             folded: Vec::new(),
         };
+        field.set_gradients(gradients, weights, measure)?;
+        Ok(field)
+    }
+
+    /// As [`from_gradients`](Self::from_gradients), in the memory of this field: for as many points nothing is allocated.
+    ///
+    /// ```
+    /// use nalgebra::Matrix3;
+    /// use tactile_elasticity::field::StrainField;
+    /// use tactile_elasticity::strain::Infinitesimal;
+    /// let mut field = StrainField::from_gradients(&[Matrix3::identity(); 2], None, &Infinitesimal)?;
+    /// field.set_gradients(&[Matrix3::from_diagonal_element(0.01)], Some(&[2.0]), &Infinitesimal)?;
+    /// assert_eq!((field.strains.len(), field.summary().mean[(2, 2)]), (1, 0.01));
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`from_gradients`](Self::from_gradients); the field is then empty.
+    pub fn set_gradients(
+        &mut self,
+        gradients: &[Matrix3<T>],
+        weights: Option<&[T]>,
+        measure: &dyn StrainMeasure<T>,
+    ) -> Result<(), ElasticityError> {
+        self.clear();
+        let taken = self.take(gradients, weights, measure);
+        if taken.is_err() {
+            self.clear();
+        }
+        taken
+    }
+
+    fn clear(&mut self) {
+        self.strains.clear();
+        self.weights.clear();
+        self.folded.clear();
+    }
+
+    fn take(
+        &mut self,
+        gradients: &[Matrix3<T>],
+        weights: Option<&[T]>,
+        measure: &dyn StrainMeasure<T>,
+    ) -> Result<(), ElasticityError> {
+        match weights {
+            None => self.weights.resize(gradients.len(), T::one()),
+            Some(weights) => {
+                check_weights(gradients.len(), weights)?;
+                self.weights.extend_from_slice(weights);
+            }
+        }
         for (i, h) in gradients.iter().enumerate() {
             let deformation = Deformation::from_displacement_gradient(*h);
             if deformation.is_finite() && deformation.jacobian() <= T::zero() {
-                field.folded.push(i);
-                field.strains.push(Matrix3::zeros());
-                field.weights[i] = T::zero();
+                self.folded.push(i);
+                self.strains.push(Matrix3::zeros());
+                self.weights[i] = T::zero();
             } else {
-                field.strains.push(measure.of(&deformation)?);
+                self.strains.push(measure.of(&deformation)?);
             }
         }
-        Ok(field)
+        Ok(())
     }
 
     /// Mean, spread and standard error, robust if asked for.
@@ -172,13 +222,7 @@ impl<T: RealField + Copy> StrainField<T> {
     }
 }
 
-fn checked_weights<T: RealField + Copy>(
-    n: usize,
-    weights: Option<&[T]>,
-) -> Result<Vec<T>, ElasticityError> {
-    let Some(weights) = weights else {
-        return Ok(vec![T::one(); n]);
-    };
+fn check_weights<T: RealField + Copy>(n: usize, weights: &[T]) -> Result<(), ElasticityError> {
     if weights.len() != n {
         return Err(ElasticityError::LengthMismatch {
             quantity: Quantity::Weight,
@@ -189,5 +233,5 @@ fn checked_weights<T: RealField + Copy>(
     for &w in weights {
         crate::error::not_negative(crate::scalar::widen(w), Quantity::Weight)?;
     }
-    Ok(weights.to_vec())
+    Ok(())
 }

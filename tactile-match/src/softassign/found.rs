@@ -70,6 +70,19 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
         self.interpolated(model, &ModelSpline::new(model))
     }
 
+    /// The report in the type of the points.
+    pub(super) fn narrow_report<T: Scalar>(&self) -> MatchReport<T> {
+        let report = &self.report;
+        MatchReport {
+            stop: report.stop,
+            iterations: report.iterations,
+            starts: report.starts,
+            residual: nalgebra::convert(report.residual),
+            sigma: nalgebra::convert(report.sigma),
+            doubt: report.doubt,
+        }
+    }
+
     /// As [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
     pub(super) fn interpolated<T: Scalar>(
         &self,
@@ -113,7 +126,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
                 .iter()
                 .map(|&e| nalgebra::convert(e))
                 .collect(),
-            report: narrow(&self.report),
+            report: self.narrow_report(),
         }
     }
 }
@@ -130,16 +143,5 @@ fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason
         }
         () if workspace.best.settled => StopReason::Converged,
         () => StopReason::IterationLimit,
-    }
-}
-
-fn narrow<T: Scalar>(report: &MatchReport<f64>) -> MatchReport<T> {
-    MatchReport {
-        stop: report.stop,
-        iterations: report.iterations,
-        starts: report.starts,
-        residual: nalgebra::convert(report.residual),
-        sigma: nalgebra::convert(report.sigma),
-        doubt: report.doubt,
     }
 }

@@ -64,7 +64,7 @@ pub use found::SoftassignMatch;
 pub use landmarks::Landmark;
 pub use options::{AnnealedSoftassign, Outliers, Rotation, Search, Transformation};
 
-use crate::{Doubt, MatchError, Matching, PointMatcher, WarmStart, validate};
+use crate::{Doubt, MatchError, MatchedPairs, Matching, PointMatcher, WarmStart, validate};
 use anneal::Annealer;
 use consensus::Consensus;
 use correspond::Correspondence;
@@ -76,6 +76,7 @@ use nalgebra::Point;
 use patterns::LocalPatterns;
 use scales::ScaleAverage;
 use schedule::State;
+use series::Series;
 use std::ops::ControlFlow;
 use tactile_tps::Scalar;
 use tuples::Tuples;
@@ -237,6 +238,21 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for AnnealedSoftassign {
         model: &[Point<T, D>],
         target: &[Point<T, D>],
     ) -> Result<Matching<T, D>, MatchError> {
-        self.follow(warm.state(), model, target)
+        let series: &mut Series<T, D> = warm.state();
+        self.follow(series, model, target)?;
+        Ok(series.matching())
+    }
+
+    fn match_next_pairs(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+        pairs: &mut MatchedPairs<T>,
+    ) -> Result<(), MatchError> {
+        let series: &mut Series<T, D> = warm.state();
+        self.follow(series, model, target)?;
+        series.pairs(pairs);
+        Ok(())
     }
 }

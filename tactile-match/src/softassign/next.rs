@@ -2,8 +2,8 @@
 
 use super::frame::mean;
 use super::series::Series;
-use super::{AnnealedSoftassign, SoftassignMatch, finish};
-use crate::{MatchError, Matching, validate};
+use super::{AnnealedSoftassign, finish};
+use crate::{MatchError, validate};
 use nalgebra::Point;
 use std::ops::ControlFlow;
 use tactile_tps::Scalar;
@@ -17,51 +17,51 @@ const MARGIN: f64 = 2.0;
 
 impl AnnealedSoftassign {
     /// A short run from where the last match put the model, as warm as the target is far from there; the usual search where
-    /// there is no last match, or the run loses partners.
+    /// there is no last match, or the run loses partners. The answer is left in the series.
     pub(super) fn follow<T: Scalar, const D: usize>(
         &self,
         series: &mut Series<T, D>,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+    ) -> Result<(), MatchError> {
         // Before the series takes notice of the model.
         validate::point_sets(model, target)?;
-        let go = |_, _| ControlFlow::Continue(());
-        let found = match self.go_on(series, model, target)? {
-            Some(found) => found,
-            None => {
-                let (spline, workspace) = series.parts(model);
-                self.match_points_with(workspace, model, target, go)?
-                    .interpolated(model, spline)
-            }
-        };
-        series.keep(model, &found);
-        Ok(found)
+        series.switch_to(model);
+        if !self.go_on(series, model, target)? {
+            let go = |_, _| ControlFlow::Continue(());
+            self.match_points_with(&mut series.workspace, model, target, go)?;
+        }
+        series.keep();
+        Ok(())
     }
 
+    /// Whether a run from the last answer is one: it keeps the partners, and fits as well.
     fn go_on<T: Scalar, const D: usize>(
         &self,
         series: &mut Series<T, D>,
         model: &[Point<T, D>],
         target: &[Point<T, D>],
-    ) -> Result<Option<Matching<T, D>>, MatchError> {
-        let (matched, sigma) = (series.matched as f64, series.sigma);
-        let Some(last) = series.last_for(model) else {
-            return Ok(None);
-        };
-        let last = last.to_vec();
-        let (spline, workspace) = series.parts(model);
+    ) -> Result<bool, MatchError> {
+        let Series {
+            last,
+            start,
+            matched,
+            sigma,
+            workspace,
+            ..
+        } = series;
+        if last.is_empty() {
+            return Ok(false);
+        }
         workspace.take(model, target)?;
         let frame = workspace.frame;
-        let start: Vec<[f64; D]> = last.iter().map(|p| frame.target(p)).collect();
-        let warmth = MARGIN * apart(&start, &workspace.target);
-        self.solve_from(workspace, &start, warmth);
-        let found = SoftassignMatch::of(workspace);
-        let noise =
-            (WORSE * nalgebra::convert_unchecked::<T, f64>(sigma) / frame.scale).max(finish::CLEAN);
-        let kept = found.assignment.iter().flatten().count() as f64 >= LOST * matched
-            && workspace.best.sigma <= noise;
-        Ok(kept.then(|| found.interpolated(model, spline)))
+        start.clear();
+        start.extend(last.iter().map(|p| frame.target(p)));
+        let warmth = MARGIN * apart(start, &workspace.target);
+        self.solve_from(workspace, start, warmth);
+        let noise = (WORSE * *sigma / frame.scale).max(finish::CLEAN);
+        let found = workspace.answer.assignment.iter().flatten().count();
+        Ok(found as f64 >= LOST * *matched as f64 && workspace.best.sigma <= noise)
     }
 }
 

@@ -1,8 +1,8 @@
 //! What the matcher keeps of one model along a series of targets.
 
-use super::SoftassignWorkspace;
 use super::spline::ModelSpline;
-use crate::Matching;
+use super::{SoftassignMatch, SoftassignWorkspace};
+use crate::{MatchedPairs, Matching};
 use nalgebra::Point;
 use tactile_tps::Scalar;
 
@@ -11,12 +11,16 @@ use tactile_tps::Scalar;
 #[derive(Clone, Debug)]
 pub(super) struct Series<T: Scalar, const D: usize> {
     model: Vec<Point<T, D>>,
-    last: Vec<Point<T, D>>,
+    /// Empty where nothing was matched yet.
+    pub(super) last: Vec<Point<T, D>>,
+    /// `last` in the frame of the match that begins there.
+    pub(super) start: Vec<[f64; D]>,
     /// How many points had a partner.
     pub(super) matched: usize,
-    /// The noise that was found.
-    pub(super) sigma: T,
-    workspace: SoftassignWorkspace<D>,
+    /// The noise that was found, in the units of the points.
+    pub(super) sigma: f64,
+    /// Holds the answer of the last match.
+    pub(super) workspace: SoftassignWorkspace<D>,
     spline: Option<ModelSpline<T, D>>,
 }
 
@@ -25,8 +29,9 @@ impl<T: Scalar, const D: usize> Default for Series<T, D> {
         Self {
             model: Vec::new(),
             last: Vec::new(),
+            start: Vec::new(),
             matched: 0,
-            sigma: T::zero(),
+            sigma: 0.0,
             workspace: SoftassignWorkspace::default(),
             spline: None,
         }
@@ -34,21 +39,8 @@ impl<T: Scalar, const D: usize> Default for Series<T, D> {
 }
 
 impl<T: Scalar, const D: usize> Series<T, D> {
-    /// Where the last match put the points of `model`; `None` for a model it has not seen.
-    pub(super) fn last_for(&self, model: &[Point<T, D>]) -> Option<&[Point<T, D>]> {
-        (!self.last.is_empty() && self.model == model).then_some(&self.last)
-    }
-
-    /// Keeps a match for the next.
-    pub(super) fn keep(&mut self, model: &[Point<T, D>], found: &Matching<T, D>) {
-        self.switch_to(model);
-        self.last.clone_from(&found.warped);
-        self.matched = found.assignment.iter().flatten().count();
-        self.sigma = found.report.sigma;
-    }
-
     /// Forgets the past of another model.
-    fn switch_to(&mut self, model: &[Point<T, D>]) {
+    pub(super) fn switch_to(&mut self, model: &[Point<T, D>]) {
         if self.model != model {
             self.model.clear();
             self.model.extend_from_slice(model);
@@ -57,16 +49,37 @@ impl<T: Scalar, const D: usize> Series<T, D> {
         }
     }
 
-    /// The factorised system of the model's spline, and the workspace.
-    pub(super) fn parts(
-        &mut self,
-        model: &[Point<T, D>],
-    ) -> (&ModelSpline<T, D>, &mut SoftassignWorkspace<D>) {
-        self.switch_to(model);
+    /// Keeps the answer in the workspace for the next match.
+    pub(super) fn keep(&mut self) {
+        let found = SoftassignMatch::of(&self.workspace);
+        self.last.clear();
+        self.last.extend(found.warped::<T>());
+        self.matched = found.assignment.iter().flatten().count();
+        self.sigma = found.report.sigma;
+    }
+
+    /// The last answer, its warp through the factorised system of the model's spline.
+    pub(super) fn matching(&mut self) -> Matching<T, D> {
         let Self {
-            spline, workspace, ..
+            spline,
+            workspace,
+            model,
+            ..
         } = self;
         let spline = spline.get_or_insert_with(|| ModelSpline::new(model));
-        (spline, workspace)
+        SoftassignMatch::of(workspace).interpolated(model, spline)
+    }
+
+    /// The pairs of the last answer.
+    pub(super) fn pairs(&self, pairs: &mut MatchedPairs<T>) {
+        let found = SoftassignMatch::of(&self.workspace);
+        pairs.assignment.clear();
+        pairs.assignment.extend_from_slice(found.assignment);
+        pairs.confidence.clear();
+        let confidence = found.confidence.iter();
+        pairs
+            .confidence
+            .extend(confidence.map(|&c| nalgebra::convert::<f64, T>(c)));
+        pairs.report = found.narrow_report();
     }
 }

@@ -1,7 +1,9 @@
 //! A batch through one workspace allocates nothing after its first match.
 use nalgebra::Point2;
 use std::ops::ControlFlow;
-use tactile_match::{AnnealedSoftassign, SoftassignWorkspace};
+use tactile_match::{
+    AnnealedSoftassign, MatchedPairs, PointMatcher, SoftassignWorkspace, WarmStart,
+};
 
 #[test]
 fn a_batch_of_small_matches_allocates_nothing_after_the_first() {
@@ -67,4 +69,44 @@ fn a_dense_set_allocates_nothing_the_second_time() {
         allocation_counter::measure(|| assert!(run() > 1)).count_total,
         0
     );
+}
+
+#[test]
+fn pairs_along_a_series_allocate_nothing() {
+    let place = |i: u32, stretch: f64| {
+        let (r, turn) = (0.1 * f64::from(i).sqrt(), 2.4 * f64::from(i));
+        Point2::new(stretch * r * turn.cos(), r * turn.sin())
+    };
+    let model: Vec<_> = (0..80).map(|i| place(i, 1.0)).collect();
+    // Steps that the last answer is followed over, and a leap that asks for the whole search.
+    let targets = [1.02, 1.04, 1.06, 1.6, 1.04]
+        .map(|stretch| (0..80).map(|i| place(i, stretch)).collect::<Vec<_>>());
+    let matcher = AnnealedSoftassign::default();
+    let (mut warm, mut pairs) = (WarmStart::default(), MatchedPairs::default());
+    let (mut other, mut whole) = (WarmStart::default(), Vec::new());
+    for _ in 0..2 {
+        for target in &targets {
+            matcher
+                .match_next_pairs(&mut warm, &model, target, &mut pairs)
+                .expect("finite points");
+            let matching = matcher
+                .match_next(&mut other, &model, target)
+                .expect("finite points");
+            assert_eq!(
+                (&pairs.assignment, &pairs.report),
+                (&matching.assignment, &matching.report)
+            );
+            assert_eq!(pairs.confidence, matching.confidence);
+            whole.push(matching.report.iterations);
+        }
+    }
+    assert!(whole[1] < whole[0], "followed, not searched: {whole:?}");
+    let counted = allocation_counter::measure(|| {
+        for target in &targets {
+            matcher
+                .match_next_pairs(&mut warm, &model, target, &mut pairs)
+                .expect("finite points");
+        }
+    });
+    assert_eq!(counted.count_total, 0);
 }

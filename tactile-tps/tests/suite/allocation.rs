@@ -2,7 +2,7 @@
 
 use crate::common::{Uniform, bend};
 use nalgebra::{Matrix3, Point, SVector};
-use tactile_tps::{Factorization, FitOptions, NegR, Smoothing, Spline, Workspace};
+use tactile_tps::{Factorization, FitOptions, LambdaPath, NegR, Smoothing, Spline, Workspace};
 
 #[test]
 fn refits_and_evaluation_allocate_nothing() {
@@ -61,5 +61,40 @@ fn refits_and_evaluation_allocate_nothing() {
     };
     round(0.5);
     let counted = allocation_counter::measure(|| round(0.25));
+    assert_eq!(counted.count_total, 0);
+}
+
+#[test]
+fn factors_of_other_points_allocate_nothing() {
+    let mut random = Uniform(2);
+    let sets: Vec<_> = [105, 97, 105, 101].map(|n| random.points::<3>(n)).to_vec();
+    let options = FitOptions::new(NegR)
+        .with_smoothing(Smoothing::Lambda(0.1))
+        .expect("a λ");
+    let mut options = options.with_weights(vec![1.0; 105]).expect("weights");
+    let lambdas = [0.01, 1.0, 100.0];
+    let mut kept = Factorization::new(&sets[0], &options).ok();
+    let mut path = LambdaPath::fit(&sets[0], &sets[0], &options, &lambdas).ok();
+    let (mut workspace, mut spline) = (Workspace::default(), Spline::<_, 3, 3, _>::default());
+    let mut sum = 0.0;
+    let mut round = |sources: &[nalgebra::Point3<f64>]| {
+        let weights: [f64; 105] = core::array::from_fn(|i| 0.1 + f64::from(i as u32 % 5));
+        options
+            .set_weights(&weights[..sources.len()])
+            .expect("weights");
+        let factorization = kept.take().expect("kept").refactor(sources, &options);
+        let factorization = kept.insert(factorization.expect("a factor"));
+        factorization
+            .refit_with(&mut workspace, sources, None, None, &mut spline)
+            .expect("a fit");
+        let splines = path
+            .take()
+            .expect("kept")
+            .refit(sources, sources, &options, &lambdas);
+        let splines = path.insert(splines.expect("fits"));
+        sum += splines.values(&sources[3])[1].x + spline.apply(&sources[3]).x;
+    };
+    round(&sets[0]);
+    let counted = allocation_counter::measure(|| sets.iter().for_each(|set| round(set)));
     assert_eq!(counted.count_total, 0);
 }

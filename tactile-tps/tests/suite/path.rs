@@ -1,7 +1,9 @@
 //! Values for many λ against one fit after the other.
 
 use nalgebra::{Point2, Point3};
-use tactile_tps::{FitOptions, Kernel, NegR, R2LogR, Smoothing, Spline, TpsError};
+use tactile_tps::{
+    Factorization, FitOptions, Kernel, LambdaPath, NegR, R2LogR, Smoothing, Spline, TpsError,
+};
 
 const LAMBDAS: [f64; 4] = [1e-4, 0.02, 1.0, 300.0];
 
@@ -37,18 +39,17 @@ fn worst<const D: usize, const M: usize, K: Kernel>(
     options: &FitOptions<f64, K>,
     points: &[nalgebra::Point<f64, D>],
 ) -> f64 {
-    let found = Spline::values_of_each(sources, targets, options, &LAMBDAS, points).unwrap();
-    assert_eq!(found.len(), LAMBDAS.len());
+    let mut path = LambdaPath::fit(sources, targets, options, &LAMBDAS).unwrap();
     let size = targets.iter().map(|t| t.coords.amax()).fold(0.0, f64::max);
     let mut worst = 0.0_f64;
-    for (lambda, values) in LAMBDAS.into_iter().zip(found) {
+    for (l, lambda) in LAMBDAS.into_iter().enumerate() {
         let options = options
             .clone()
             .with_smoothing(Smoothing::Lambda(lambda))
             .unwrap();
         let spline = Spline::fit(sources, targets, &options).unwrap();
-        for (point, value) in points.iter().zip(values) {
-            worst = worst.max((spline.apply(point) - value).amax() / size);
+        for point in points {
+            worst = worst.max((spline.apply(point) - path.values(point)[l]).amax() / size);
         }
     }
     worst
@@ -95,24 +96,70 @@ fn so_are_those_in_the_plane_and_of_few_points() {
 fn what_cannot_be_fitted_is_refused() {
     let sources = dome(20, 1.0);
     let (targets, options) = (moved(&sources), FitOptions::new(NegR));
-    let values = |lambda: f64, targets: &[Point3<f64>], points: &[Point3<f64>]| {
-        Spline::values_of_each(&sources, targets, &options, &[lambda], points).map(drop)
+    let fit = |lambda: f64, targets: &[Point3<f64>]| {
+        LambdaPath::fit(&sources, targets, &options, &[lambda])
     };
     for lambda in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = values(lambda, &targets, &sources);
+        let error = fit(lambda, &targets);
         assert!(matches!(error, Err(TpsError::Lambda { .. })), "{lambda}");
     }
-    assert!(matches!(
-        values(1.0, &targets[1..], &sources),
-        Err(TpsError::Length { .. })
-    ));
-    let nowhere = [Point3::new(f64::NAN, 0.0, 0.0)];
-    assert!(matches!(
-        values(1.0, &targets, &nowhere),
-        Err(TpsError::NotFinite { .. })
-    ));
-    assert!(matches!(
-        values(1.0, &nowhere, &sources),
-        Err(TpsError::Length { .. })
-    ));
+    for few in [&targets[1..], &[Point3::new(f64::NAN, 0.0, 0.0)]] {
+        assert!(matches!(fit(1.0, few), Err(TpsError::Length { .. })));
+    }
+    let mut none = targets.clone();
+    none[3].y = f64::NAN;
+    assert!(matches!(fit(1.0, &none), Err(TpsError::NotFinite { .. })));
+    let nowhere = Point3::new(f64::NAN, 0.0, 0.0);
+    let values = fit(1.0, &targets).unwrap().values(&nowhere)[0];
+    assert!(values.coords.iter().all(|x| x.is_nan()), "as a spline's");
+}
+
+/// In the memory of other splines, of more or fewer points, with or without weights, the values are those of a new fit.
+#[test]
+fn what_was_fitted_before_leaves_no_trace() {
+    let query = Point3::new(0.2, 0.1, 0.7);
+    let weights = |n: usize| (0..n).map(|i| f64::from(i as u32 % 3)).collect::<Vec<_>>();
+    let plain = FitOptions::new(NegR);
+    let path = |n: usize, lambdas: &[f64], options: &FitOptions<f64, NegR>| {
+        let sources = dome(n, 1.0);
+        LambdaPath::fit(&sources, &moved(&sources), options, lambdas).unwrap()
+    };
+    let mut kept = path(70, &LAMBDAS, &plain);
+    for (n, weighted, twice) in [
+        (40, true, false),
+        (90, false, true),
+        (12, true, true),
+        (91, false, false),
+    ] {
+        let mut sources = dome(n, 1.0);
+        if twice {
+            sources[5] = sources[2];
+        }
+        let targets = moved(&sources);
+        let mut options = plain.clone();
+        if weighted {
+            options.set_weights(&weights(n)).unwrap();
+        }
+        let lambdas = &LAMBDAS[..1 + n % 3];
+        kept = kept.refit(&sources, &targets, &options, lambdas).unwrap();
+        let mut new = LambdaPath::fit(&sources, &targets, &options, lambdas).unwrap();
+        assert_eq!(kept.values(&query), new.values(&query), "{n}");
+        let smooth = options.with_smoothing(Smoothing::Lambda(0.02)).unwrap();
+        let factored = Factorization::new(
+            &dome(33, 1.0),
+            &plain.clone().with_smoothing(Smoothing::Gcv).unwrap(),
+        );
+        let again = factored.unwrap().refactor(&sources, &smooth).unwrap();
+        let spline: Spline<_, 3, 3, _> = again.fit(&targets).unwrap();
+        let fresh: Spline<_, 3, 3, _> = Spline::fit(&sources, &targets, &smooth).unwrap();
+        assert_eq!(spline.apply(&query), fresh.apply(&query), "{n}");
+        let gcv = plain.clone().with_smoothing(Smoothing::Gcv).unwrap();
+        let validated: Spline<_, 3, 3, _> = again
+            .refactor(&sources, &gcv)
+            .unwrap()
+            .fit(&targets)
+            .unwrap();
+        let fresh: Spline<_, 3, 3, _> = Spline::fit(&sources, &targets, &gcv).unwrap();
+        assert_eq!(validated.apply(&query), fresh.apply(&query), "{n}");
+    }
 }

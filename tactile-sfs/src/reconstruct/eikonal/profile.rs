@@ -17,7 +17,7 @@ use discs::Discs;
 use nalgebra::{Matrix6, Vector6};
 use ndarray::{Array2, ArrayView2};
 
-use crate::{BoundingBox, Frame, Lighting, Scalar};
+use crate::{BoundingBox, Frame, Lighting, Scalar, surface::fill_shape};
 
 /// Pixels nearer than this to the mask's border are replaced: three standard deviations of a lens's blur of 0.8 pixels.
 /// With 1.5 and 3.2 the strain of simulated presses is off by a fifth to a half more (frames of 174 to 696 pixels).
@@ -54,8 +54,8 @@ impl<T: Scalar> ProfileBuffers<T> {
         lighting: &Lighting<T>,
     ) -> Option<Profile> {
         if self.mask.dim() != mask.dim() {
-            self.image = Array2::from_elem(mask.dim(), T::zero());
-            self.mask = Array2::from_elem(mask.dim(), false);
+            fill_shape(&mut self.image, mask.dim(), T::zero());
+            fill_shape(&mut self.mask, mask.dim(), false);
         }
         let area = grown(area, mask.dim());
         self.discs.load(mask, area);
