@@ -198,15 +198,21 @@ fn to_grey(image: &DynamicImage, largest: f64, grey: Grey) -> GreyImage {
     }
 }
 
+/// The level of the largest sample. Where the caller says how many bits there are, the decoder's rounding can pass it.
+const WHITE: f64 = 255.0;
+
 /// Levels of pixels of one (grey), two (grey, alpha), three (colours) or four channels (colours, alpha).
 fn levels<S: Copy + Into<f64>>(samples: &[S], channels: usize, scale: f64, grey: Grey) -> Vec<f64> {
     let weights = grey.weights();
     let pixels = samples.chunks_exact(channels);
     if channels < 3 {
-        return pixels.map(|pixel| pixel[0].into() / scale).collect();
+        return pixels
+            .map(|pixel| (pixel[0].into() / scale).min(WHITE))
+            .collect();
     }
     pixels
-        .map(|pixel| (0..3).map(|i| weights[i] * (pixel[i].into() / scale)).sum())
+        .map(|pixel| (0..3).map(|i| weights[i] * (pixel[i].into() / scale)))
+        .map(|colours| colours.sum::<f64>().min(WHITE))
         .collect()
 }
 
