@@ -29,7 +29,7 @@ use tactile_tps::Memory;
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct WarmStart(Memory);
 
 impl WarmStart {
@@ -63,27 +63,5 @@ impl WarmStart {
     /// ```
     pub fn state<S: Default + Send + Sync + 'static>(&mut self) -> &mut S {
         self.0.state()
-    }
-}
-
-impl std::fmt::Debug for WarmStart {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("WarmStart")
-            .field("cold", &self.0.is_empty())
-            .finish()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::WarmStart;
-
-    #[test]
-    fn a_state_is_kept_until_another_type_is_asked_for() {
-        let mut warm = WarmStart::default();
-        *warm.state::<usize>() = 7;
-        assert_eq!(*warm.state::<usize>(), 7);
-        assert!(warm.state::<String>().is_empty());
-        assert_eq!(*warm.state::<usize>(), 0);
     }
 }

@@ -30,17 +30,12 @@ impl Memory {
             None => unreachable!("the state was put there as this type"),
         }
     }
-
-    /// Whether nothing was left here.
-    pub fn is_empty(&self) -> bool {
-        self.state.is_none()
-    }
 }
 
 impl core::fmt::Debug for Memory {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Memory")
-            .field("is_empty", &self.is_empty())
+            .field("is_empty", &self.state.is_none())
             .finish()
     }
 }

@@ -50,6 +50,7 @@ fn strains_are_within_their_errors_at_every_size_or_flagged() {
     let mut failures = Vec::new();
     for size in SIZES {
         let mut worst: BTreeMap<&str, f64> = BTreeMap::new();
+        let mut errors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         let mut flagged = 0;
         for seed in 0..seeds() {
             let trial = trial(size, seed);
@@ -65,6 +66,10 @@ fn strains_are_within_their_errors_at_every_size_or_flagged() {
             flagged += usize::from(caution);
             for (k, name) in ["e_xx", "e_yy", "e_zz"].into_iter().enumerate() {
                 let z = (strain.mean[k][k] - truth[(k, k)]) / strain.standard_error[k][k];
+                errors
+                    .entry(name)
+                    .or_default()
+                    .push(strain.mean[k][k] / truth[(k, k)] - 1.0);
                 let entry = worst.entry(name).or_default();
                 if z.abs() > entry.abs() {
                     *entry = z;
@@ -83,6 +88,16 @@ fn strains_are_within_their_errors_at_every_size_or_flagged() {
             "{size:?}: {flagged} of {} flagged, greatest z {worst:.2?}",
             seeds()
         );
+        for (name, errors) in &errors {
+            let n = errors.len() as f64;
+            let mean = errors.iter().sum::<f64>() / n;
+            let square = errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n;
+            println!(
+                "  {name} {:+.1} % ± {:.1} %",
+                100.0 * mean,
+                100.0 * square.sqrt()
+            );
+        }
     }
     assert!(failures.is_empty(), "{failures:#?}");
 }
