@@ -79,7 +79,7 @@ impl<T: Scalar, const D: usize, const M: usize, K: Kernel> LambdaPath<T, D, M, K
     /// path = path.refit(&sources, &lifted, &options, &[1e-9, 1.0])?;
     /// // Nearly interpolated, and smoothed.
     /// let misses = path.values(&sources[4]).iter().map(|v| (v - lifted[4]).norm()).collect::<Vec<_>>();
-    /// assert!(misses[0] < 1e-8 && misses[1] > 0.01);
+    /// assert!(misses[0] < 1e-6 && misses[1] > 1e-3, "{misses:?}");
     /// # Ok(())
     /// # }
     /// ```

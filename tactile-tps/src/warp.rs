@@ -165,7 +165,7 @@ pub trait WarpModel<T: Scalar, const D: usize> {
     /// use tactile_tps::{AffineModel, Memory, Pairs, WarpModel};
     /// let sources = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(Point2::from);
     /// let (mut memory, mut jacobians) = (Memory::default(), [Matrix2::zeros()]);
-    /// for stretch in [1.1, 1.2] {
+    /// for stretch in [1.1_f64, 1.2] {
     ///     let targets = sources.map(|p| Point2::new(stretch * p.x, p.y));
     ///     let pairs = Pairs { sources: &sources, targets: &targets, weights: None };
     ///     AffineModel::General.jacobians_through(&mut memory, pairs, &sources[..1], &mut jacobians)?;
