@@ -1,5 +1,6 @@
 //! The one pass over a frame, the reference it is compared with, and the noise of both.
 
+mod extent;
 mod flat_field;
 mod noise;
 mod pass;

@@ -1,202 +1,66 @@
 //! The pass over a frame, which reads every pixel once.
 
-use std::ops::Range;
-
 use ndarray::{ArrayView2, Zip};
 
-use super::statistics::{BoundingBox, FrameStatistics};
-use super::strip::{Beside, OfTiles, Rows, STRIP_TILES, Strip, compare};
+use super::statistics::FrameStatistics;
+use super::strip::{OfTiles, summarise};
 use super::tiles::{TILE_COLUMNS, TILE_ROWS, Tiles};
 
-/// What a frame without a reference, or a band below the image, is compared with.
-const ZEROS: [u8; STRIP_TILES * TILE_COLUMNS] = [0; STRIP_TILES * TILE_COLUMNS];
-/// The extremes of its tiles.
-const BLACK: [[u8; 2]; STRIP_TILES] = [[0; 2]; STRIP_TILES];
-
-/// The sum of the frame itself, extremes and the box of |frame − reference| > threshold. Both images are in standard layout
-/// and have the same, nonzero size; without a reference it counts as black. With the reference come the darkest and the brightest pixels of its
-/// tiles.
+/// The tiles of an image in standard layout and of nonzero size, and the number of its pixels at 255. `band` is scratch.
 pub(super) fn scan(
-    frame: &[u8],
-    reference: Option<(&[u8], &Tiles)>,
-    size: (usize, usize),
-    threshold: u8,
-    tiles: &mut Tiles,
-) -> FrameStatistics {
-    tiles.reset(size);
-    let mut s = FrameStatistics::empty(size);
-    let pass = Pass {
-        frame,
-        reference: reference.map(|(image, tiles)| (image, &tiles.extremes[..])),
-        size,
-        threshold,
-    };
-    for band in 0..tiles.rows {
-        let here = band * tiles.columns..(band + 1) * tiles.columns;
-        let extremes = &mut tiles.extremes[here.clone()];
-        pass.band(band, &mut tiles.sums[here], extremes, &mut s);
-        if extremes.iter().any(|[_, brightest]| *brightest == u8::MAX) {
-            s.saturated += pixels_of(band, frame, size.1)
-                .iter()
-                .map(|&p| usize::from(p == u8::MAX))
-                .sum::<usize>();
-        }
-    }
-    s.sum = tiles.sums.iter().map(|&sum| i64::from(sum)).sum();
-    s
-}
-
-/// The inputs of a pass.
-struct Pass<'a> {
-    frame: &'a [u8],
-    /// The reference, and the extremes of its tiles.
-    reference: Option<(&'a [u8], &'a [[u8; 2]])>,
-    size: (usize, usize),
-    threshold: u8,
-}
-
-impl Pass<'_> {
-    /// Adds a band of eight rows.
-    #[inline]
-    fn band(
-        &self,
-        band: usize,
-        sums: &mut [i32],
-        extremes: &mut [[u8; 2]],
-        s: &mut FrameStatistics,
-    ) {
-        let whole = self.size.1 / TILE_COLUMNS;
-        let mut first = 0;
-        while first < sums.len() {
-            // Whole tiles, and at last the columns beyond them.
-            let last = match first < whole {
-                true => (first + STRIP_TILES).min(whole),
-                false => sums.len(),
-            };
-            let tiles = OfTiles {
-                sums: &mut sums[first..last],
-                extremes: &mut extremes[first..last],
-            };
-            let seen = [s.greatest, -s.least].map(|extreme| extreme as u8);
-            let strip = if first < whole {
-                self.strip(band, first, seen, tiles)
-            } else {
-                self.margin(band, first, seen, tiles)
-            };
-            s.add(&strip, band, first);
-            first = last;
-        }
-    }
-
-    /// A strip of whole tiles.
-    #[inline]
-    fn strip(&self, band: usize, first: usize, seen: [u8; 2], tiles: OfTiles<'_>) -> Strip {
-        let last = first + tiles.sums.len();
-        let columns = first * TILE_COLUMNS..last * TILE_COLUMNS;
-        let f = rows(self.frame, self.size, band, columns.clone());
-        let r = match self.reference {
-            Some((r, _)) => rows(r, self.size, band, columns),
-            None => [&ZEROS[..columns.len()]; TILE_ROWS],
-        };
-        let reference = Beside {
-            rows: &r,
-            extremes: self.extremes(band, first..last),
-        };
-        compare(&f, reference, self.threshold, seen, tiles)
-    }
-
-    /// The columns beyond the last whole tile, filled up to one.
-    #[inline]
-    fn margin(&self, band: usize, whole: usize, seen: [u8; 2], tiles: OfTiles<'_>) -> Strip {
-        let columns = whole * TILE_COLUMNS..self.size.1;
-        let f = padded(rows(self.frame, self.size, band, columns.clone()));
-        let r = padded(
-            self.reference
-                .map_or([&[]; TILE_ROWS], |(r, _)| rows(r, self.size, band, columns)),
-        );
-        let (f, r) = (f.each_ref().map(|p| &p[..]), r.each_ref().map(|p| &p[..]));
-        let reference = Beside {
-            rows: &r,
-            extremes: self.extremes(band, whole..whole + 1),
-        };
-        compare(&f, reference, self.threshold, seen, tiles)
-    }
-
-    /// The extremes of some of the reference's tiles of a band.
-    #[inline]
-    fn extremes(&self, band: usize, tiles: Range<usize>) -> &[[u8; 2]] {
-        let columns = self.size.1.div_ceil(TILE_COLUMNS);
-        match self.reference {
-            Some((_, extremes)) => &extremes[band * columns..][tiles],
-            None => &BLACK[..tiles.len()],
-        }
-    }
-}
-
-/// The pixels of a band of eight rows.
-fn pixels_of(band: usize, image: &[u8], columns: usize) -> &[u8] {
-    let length = TILE_ROWS * columns;
-    &image[band * length..((band + 1) * length).min(image.len())]
-}
-
-/// Part of the eight rows of a band; rows below the image are black.
-fn rows(
     image: &[u8],
-    (height, width): (usize, usize),
-    band: usize,
-    columns: Range<usize>,
-) -> Rows<'_> {
-    std::array::from_fn(|k| {
-        let y = band * TILE_ROWS + k;
-        if y < height {
-            &image[y * width + columns.start..y * width + columns.end]
-        } else {
-            &ZEROS[..columns.len()]
-        }
-    })
-}
-
-/// The image's last columns, filled up with black to a whole tile.
-fn padded(rows: Rows<'_>) -> [[u8; TILE_COLUMNS]; TILE_ROWS] {
-    rows.map(|row| {
-        let mut tile = [0; TILE_COLUMNS];
-        tile[..row.len()].copy_from_slice(row);
-        tile
-    })
-}
-
-impl FrameStatistics {
-    fn empty((rows, columns): (usize, usize)) -> Self {
-        Self {
-            rows,
-            columns,
-            sum: 0,
-            least: 0,
-            greatest: 0,
-            saturated: 0,
-            bounding_box: None,
+    size: (usize, usize),
+    tiles: &mut Tiles,
+    band: &mut Vec<u8>,
+) -> usize {
+    tiles.reset(size);
+    let mut saturated = 0;
+    for (number, rows) in image.chunks(TILE_ROWS * size.1).enumerate() {
+        let here = number * tiles.columns..(number + 1) * tiles.columns;
+        let brightest = &mut tiles.brightest[here.clone()];
+        let of_band = OfTiles {
+            sums: &mut tiles.sums[here.clone()],
+            darkest: &mut tiles.darkest[here],
+            brightest,
+        };
+        // As memory has them, pixels that come from far arrive in half the time that they take where tiles fetch them from eight rows in turn.
+        band.clear();
+        band.extend_from_slice(rows);
+        summarise_band(band, size.1, of_band);
+        if brightest.contains(&u8::MAX) {
+            let full = rows.iter().map(|&p| usize::from(p == u8::MAX));
+            saturated += full.sum::<usize>();
         }
     }
+    saturated
+}
 
-    /// Adds a strip whose first pixel is that of tile (band, first); the box grows by whole tiles.
-    fn add(&mut self, strip: &Strip, band: usize, first: usize) {
-        let s = strip;
-        self.greatest = self.greatest.max(i16::from(s.above));
-        self.least = self.least.min(-i16::from(s.below));
-        if s.hits[1] > s.hits[0] {
-            let here = BoundingBox {
-                row_start: band * TILE_ROWS,
-                row_end: ((band + 1) * TILE_ROWS).min(self.rows),
-                column_start: (first + s.hits[0]) * TILE_COLUMNS,
-                column_end: ((first + s.hits[1]) * TILE_COLUMNS).min(self.columns),
-            };
-            self.bounding_box = Some(self.bounding_box.map_or(here, |b| b.union(here)));
+/// The tiles of up to eight rows.
+fn summarise_band(rows: &[u8], width: usize, mut tiles: OfTiles<'_>) {
+    let is_whole = rows.len() == TILE_ROWS * width;
+    let whole = if is_whole { width / TILE_COLUMNS } else { 0 };
+    if is_whole {
+        let row = |k: usize| rows[k * width..(k + 1) * width].as_chunks().0;
+        summarise(std::array::from_fn(row), tiles.first(whole));
+    }
+    // At the image's edges some have fewer rows or columns.
+    for tile in whole..tiles.sums.len() {
+        let columns = tile * TILE_COLUMNS..width.min((tile + 1) * TILE_COLUMNS);
+        let (mut sum, mut darkest, mut brightest) = (0, u8::MAX, 0);
+        for row in rows.chunks(width) {
+            for &pixel in &row[columns.clone()] {
+                sum += i32::from(pixel);
+                darkest = darkest.min(pixel);
+                brightest = brightest.max(pixel);
+            }
         }
+        tiles.sums[tile] = sum;
+        (tiles.darkest[tile], tiles.brightest[tile]) = (darkest, brightest);
     }
 }
 
 impl FrameStatistics {
-    /// The strips give extremes on their own side of zero only; where every difference is on one side, computes them anew.
+    /// The tiles give extremes on their own side of zero only; where every difference is on one side, computes them anew.
     pub(super) fn correct_extremes(
         &mut self,
         frame: ArrayView2<'_, u8>,

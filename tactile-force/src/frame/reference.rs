@@ -2,6 +2,7 @@
 
 use ndarray::{Array2, ArrayView2};
 
+use super::extent::{Pair, Tiled};
 use super::flat_field::FlatField;
 use super::noise::NoiseModel;
 use super::pass::scan;
@@ -52,6 +53,8 @@ pub(crate) struct PassWorkspace {
     pub(crate) tiles: Tiles,
     /// A copy of frames that are not in standard layout.
     copy: Vec<u8>,
+    /// Eight rows at work.
+    band: Vec<u8>,
 }
 
 impl ReferenceFrame {
@@ -82,7 +85,8 @@ impl ReferenceFrame {
         };
         let mut tiles = Tiles::default();
         let pixels = image.as_slice().unwrap_or_default();
-        let sum = scan(pixels, None, size, u8::MAX, &mut tiles).sum;
+        scan(pixels, size, &mut tiles, &mut Vec::new());
+        let sum = tiles.total();
         if let Some(mean) = &mean {
             sum_means(mean.view(), &mut tiles);
         }
@@ -191,23 +195,44 @@ impl ReferenceFrame {
         frame: ArrayView2<'_, u8>,
         threshold: u8,
     ) -> FrameStatistics {
-        let PassWorkspace { tiles, copy } = workspace;
+        let PassWorkspace { tiles, copy, band } = workspace;
         let pixels = frame.to_slice().unwrap_or_else(|| {
             copy.clear();
             copy.extend(frame.iter());
             copy
         });
-        let reference = (self.image.as_slice().unwrap_or_default(), &self.tiles);
-        let mut s = scan(pixels, Some(reference), frame.dim(), threshold, tiles);
+        let saturated = scan(pixels, frame.dim(), tiles, band);
+        let sum = tiles.total() - self.sum;
+        let image = self.image.as_slice().unwrap_or_default();
+        let pair = Pair {
+            frame: Tiled {
+                image: pixels,
+                tiles,
+            },
+            reference: Tiled {
+                image,
+                tiles: &self.tiles,
+            },
+            size: frame.dim(),
+        };
+        let [above, below] = pair.greatest();
+        let bounding_box = pair
+            .tiles_above(threshold)
+            .map(|b| tighten(b, [pixels, image], frame.ncols(), threshold));
         tiles
             .sums
             .iter_mut()
             .zip(&self.tiles.sums)
             .for_each(|(f, r)| *f -= r);
-        s.sum -= self.sum;
-        s.bounding_box = s
-            .bounding_box
-            .map(|b| tighten(b, [pixels, reference.0], frame.ncols(), threshold));
+        let mut s = FrameStatistics {
+            rows: frame.nrows(),
+            columns: frame.ncols(),
+            sum,
+            least: -i16::from(below),
+            greatest: i16::from(above),
+            saturated,
+            bounding_box,
+        };
         s.correct_extremes(frame, self.image());
         s
     }

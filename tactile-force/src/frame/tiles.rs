@@ -13,8 +13,8 @@ pub(crate) struct Tiles {
     pub(crate) rows: usize,
     pub(crate) columns: usize,
     pub(crate) sums: Vec<i32>,
-    /// Of a tile that reaches beyond the image, with the black that fills it up.
-    pub(super) extremes: Vec<[u8; 2]>,
+    pub(super) darkest: Vec<u8>,
+    pub(super) brightest: Vec<u8>,
 }
 
 impl Tiles {
@@ -24,7 +24,14 @@ impl Tiles {
         self.sums.clear();
         self.sums.resize(self.rows * self.columns, 0);
         // Written by every pass.
-        self.extremes.resize(self.rows * self.columns, [0; 2]);
+        for extremes in [&mut self.darkest, &mut self.brightest] {
+            extremes.resize(self.rows * self.columns, 0);
+        }
+    }
+
+    /// Sum of all tiles.
+    pub(super) fn total(&self) -> i64 {
+        self.sums.iter().map(|&sum| i64::from(sum)).sum()
     }
 
     /// Greatest sum of a band, each times `sign`.
