@@ -2,7 +2,8 @@
 
 use nalgebra::{Point2, Point3};
 use tactile_tps::{
-    Factorization, FitOptions, Kernel, LambdaPath, NegR, R2LogR, Smoothing, Spline, TpsError,
+    Factorization, FitOptions, Kernel, LambdaPath, NegR, R2LogR, Smoothing, Solver, Spline,
+    TpsError, Workspace,
 };
 
 const LAMBDAS: [f64; 4] = [1e-4, 0.02, 1.0, 300.0];
@@ -161,5 +162,40 @@ fn what_was_fitted_before_leaves_no_trace() {
             .unwrap();
         let fresh: Spline<_, 3, 3, _> = Spline::fit(&sources, &targets, &gcv).unwrap();
         assert_eq!(validated.apply(&query), fresh.apply(&query), "{n}");
+    }
+}
+
+/// A factor of the last points is not taken for one of these: what has none, by its smoothing or its number of points, is solved anew.
+#[test]
+fn a_factor_of_other_points_is_not_used() {
+    let (old, sources) = (dome(40, 0.7), dome(40, 1.0));
+    let targets = moved(&sources);
+    let weights: Vec<_> = (0..40).map(|i| 1.0 + f64::from(i % 3)).collect();
+    let query = Point3::new(0.2, 0.1, 0.7);
+    let plain = FitOptions::new(NegR);
+    for options in [
+        plain.clone().with_smoothing(Smoothing::Gcv).unwrap(),
+        plain.clone().with_solver(Solver::Iterative),
+    ] {
+        let refitted = |factorization: Factorization<f64, 3, NegR>| {
+            let mut spline = Spline::<f64, 3, 3, NegR>::default();
+            let (weights, none) = (Some(&weights[..]), Some(Smoothing::None));
+            factorization
+                .refit_with(
+                    &mut Workspace::default(),
+                    &targets,
+                    weights,
+                    none,
+                    &mut spline,
+                )
+                .unwrap();
+            spline.apply(&query)
+        };
+        let kept = Factorization::new(&old, &plain).unwrap();
+        let kept = refitted(kept.refactor(&sources, &options).unwrap());
+        assert_eq!(
+            kept,
+            refitted(Factorization::new(&sources, &options).unwrap())
+        );
     }
 }
