@@ -47,7 +47,7 @@ impl DetectorWorkspace {
     }
 
     /// Brightness and noise of the last frame outside the contact, against the reference that it was compared with; `None` if no
-    /// frame of the reference's size was. O(tiles), so that a session can ask for it every so many frames.
+    /// frame of the reference's size was. From some 1,500 tiles of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
     ///
     /// ```
     /// # use ndarray::Array2;
@@ -65,8 +65,9 @@ impl DetectorWorkspace {
     pub fn condition(&mut self, reference: &ReferenceFrame) -> Option<FrameCondition> {
         let size = reference.image().dim();
         let tiles = reference.tile_sums(&self.pass.tiles)?;
+        let step = FrameCondition::tile_step(self.pass.tiles.sums.len(), self.pass.tiles.columns);
         let sd = reference.difference_variance().sqrt();
-        FrameCondition::of(size, tiles, sd, &mut self.drift)
+        FrameCondition::of(size, tiles.step_by(step), sd, &mut self.drift)
     }
 
     /// The grey histogram of the last frame's contact over its aperture, each pixel covering `pixel_area_m2`: a row of the fit of a
