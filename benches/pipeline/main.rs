@@ -290,7 +290,7 @@ fn scenes(_: &mut Criterion) {
     table.print();
     let worst = table.modulus_error.last().copied().unwrap_or(f64::NAN);
     assert!(worst < 3.0, "modulus error {worst} %");
-    // A frame without contact takes 0.24 ms, in which an image comes from memory: a tenth of a frame's everything, 0.27 ms, is less than the twentieth that
+    // A frame without contact takes 0.2 ms, in which an image comes from memory: a tenth of a frame's everything, 0.27 ms, is less than the twentieth that
     // was allowed when everything took 5.6 ms. Telling an equal frame takes a fifth of that.
     if !quick {
         let shares = [&table.empty_share, &table.equal_share].map(|list| list[list.len() / 2]);
