@@ -273,3 +273,31 @@ fn an_estimator_of_a_users_own_is_a_stage_boxed_too() {
         assert!(press.estimates().unwrap().contains(&modulus));
     }
 }
+
+/// What a frame leaves in the memory that the next one works in changes no digit of its strain.
+#[test]
+fn frames_in_between_leave_no_trace() {
+    let trial = trial(&[0.7, 1.2, 0.4, 1.0], 5);
+    // A match that begins where the last one ended differs by rounding.
+    let skips = Skips {
+        last_answer: false,
+        ..Skips::default()
+    };
+    let pipeline = trial.pipeline().unwrap();
+    let pipeline = pipeline.with_settings(|settings| settings.skips = skips);
+    let last = |frames: &[usize]| {
+        let mut session = session(&trial, pipeline.as_ref().unwrap());
+        let mut found = None;
+        for &frame in frames {
+            session.push(trial.simulation.frames[frame].view()).unwrap();
+            found = session.strain().unwrap().cloned();
+        }
+        found.expect("a strain").strain
+    };
+    let (alone, after_others) = (last(&[0, 3]), last(&[0, 1, 2, 1, 3]));
+    assert_eq!(alone.field, after_others.field);
+    assert_eq!(
+        alone.summary.standard_error,
+        after_others.summary.standard_error
+    );
+}
