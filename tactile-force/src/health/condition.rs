@@ -136,4 +136,53 @@ mod tests {
         // No columns, no tiles.
         assert_eq!(FrameCondition::tile_step(0, 0), 1);
     }
+
+    /// A quarter of the tiles says what all say, to the errors that are stated.
+    #[test]
+    fn a_part_of_the_tiles_knows_the_frame() {
+        let (rows, columns, sd) = (131, 44, 2.0);
+        let mut state = 1_u64;
+        let mut normal = || {
+            let mut uniform = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+        };
+        // 1.2 times the reference's noise, and light that falls off from column to column.
+        let tiles: Vec<_> = (0..rows * columns)
+            .map(|i| {
+                let reference = 256.0 * (40.0 - 0.5 * (i % columns) as f64);
+                TileSum {
+                    x: 32.0 * (i % columns) as f64,
+                    y: 8.0 * (i / columns) as f64,
+                    pixels: 256.0,
+                    reference,
+                    difference: 0.01 * reference + 1.2 * sd * 16.0 * normal(),
+                }
+            })
+            .collect();
+        let step = FrameCondition::tile_step(tiles.len(), columns);
+        assert!(step > 3);
+        let size = (8 * rows, 32 * columns);
+        let of = |step: usize| {
+            let tiles = tiles.iter().copied().step_by(step);
+            FrameCondition::of(size, tiles, sd, &mut FitWorkspace::default()).expect("background")
+        };
+        let (all, part) = (of(1), of(step));
+        let error = (part.brightness.value - all.brightness.value).abs();
+        // Four standard errors; 2 % is what charts look for.
+        assert!(
+            error < 4.0 * part.brightness.standard_error && error < 2e-4,
+            "{error}"
+        );
+        // The median of |z| of n tiles has a relative standard error of 1.17/√n, 3.4 % of these; four of them.
+        let looked_at = tiles.len().div_ceil(step) as f64;
+        let error = (part.noise_ratio / 1.2 - 1.0).abs();
+        assert!(error < 4.0 * 1.17 / looked_at.sqrt(), "{part:?}");
+        // Every column is looked at as often as others: the fall of the light leaves no trace.
+        assert!((part.background_grey - all.background_grey).abs() < 0.1);
+    }
 }
