@@ -52,6 +52,7 @@ mod runner;
 mod same_image;
 mod session;
 mod settings;
+mod smoothing;
 mod source;
 mod strain_error;
 mod strain_spline;

@@ -47,7 +47,7 @@ impl DetectorWorkspace {
     }
 
     /// Brightness and noise of the last frame outside the contact, against the reference that it was compared with; `None` if no
-    /// frame of the reference's size was. From some 1,500 tiles of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
+    /// frame of the reference's size was. From at most 1,500 tiles of 8 × 32 pixels, evenly over the frame, or all of a smaller one: O(tiles).
     ///
     /// ```
     /// # use ndarray::Array2;

@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(FrameCondition::tile_step(0, 0), 1);
     }
 
-    /// A quarter of the tiles says what all say, to the errors that are stated.
+    /// A fifth of the tiles says what all say, to the errors that are stated.
     #[test]
     fn a_part_of_the_tiles_knows_the_frame() {
         let (rows, columns, sd) = (131, 44, 2.0);
