@@ -1,0 +1,137 @@
+//! A rectangle of pixels.
+
+use ndarray::{ArrayView2, Axis, Slice};
+
+/// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
+///
+/// ```
+/// use tactile_core::BoundingBox;
+///
+/// let contact = BoundingBox { row_start: 2, row_end: 5, column_start: 0, column_end: 4 };
+/// // A margin of one pixel, clipped to a frame of 5 × 20.
+/// let wider = contact.grown(1, (5, 20));
+/// assert_eq!((wider.rows(), wider.columns()), (4, 5));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BoundingBox {
+    /// First row.
+    pub row_start: usize,
+    /// One past the last row.
+    pub row_end: usize,
+    /// First column.
+    pub column_start: usize,
+    /// One past the last column.
+    pub column_end: usize,
+}
+
+impl BoundingBox {
+    /// The box of a whole image of the given shape, (rows, columns).
+    ///
+    /// ```
+    /// use tactile_core::BoundingBox;
+    /// assert_eq!(BoundingBox::whole((5, 20)).columns(), 20);
+    /// ```
+    #[must_use]
+    pub const fn whole((rows, columns): (usize, usize)) -> Self {
+        Self {
+            row_start: 0,
+            row_end: rows,
+            column_start: 0,
+            column_end: columns,
+        }
+    }
+
+    /// The smallest box that holds the true pixels of a mask. `None` if there are none.
+    ///
+    /// ```
+    /// use tactile_core::BoundingBox;
+    /// let mask = ndarray::array![[false, false, true], [false, true, false]];
+    /// let bounds = BoundingBox::of_mask(mask.view()).expect("two pixels");
+    /// assert_eq!((bounds.rows(), bounds.column_start, bounds.columns()), (2, 1, 2));
+    /// ```
+    #[must_use]
+    pub fn of_mask(mask: ArrayView2<'_, bool>) -> Option<Self> {
+        let mut bounds: Option<Self> = None;
+        for (row, line) in mask.outer_iter().enumerate() {
+            let Some(first) = line.iter().position(|&inside| inside) else {
+                continue;
+            };
+            let last = line.iter().rposition(|&inside| inside).unwrap_or(first);
+            let run = Self {
+                row_start: row,
+                row_end: row + 1,
+                column_start: first,
+                column_end: last + 1,
+            };
+            bounds = Some(bounds.map_or(run, |bounds| bounds.union(run)));
+        }
+        bounds
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub const fn rows(&self) -> usize {
+        self.row_end - self.row_start
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub const fn columns(&self) -> usize {
+        self.column_end - self.column_start
+    }
+
+    /// Centre (x, y) in pixels.
+    ///
+    /// ```
+    /// use tactile_core::BoundingBox;
+    /// assert_eq!(BoundingBox::whole((5, 20)).centre(), (9.5, 2.0));
+    /// ```
+    #[must_use]
+    pub fn centre(&self) -> (f64, f64) {
+        let half = |from: usize, to: usize| 0.5 * ((from + to) as f64 - 1.0);
+        (
+            half(self.column_start, self.column_end),
+            half(self.row_start, self.row_end),
+        )
+    }
+
+    /// The part of an image inside the box.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_core::BoundingBox;
+    ///
+    /// let right = BoundingBox { row_start: 4, row_end: 6, column_start: 6, column_end: 9 };
+    /// let image = Array2::from_shape_fn((6, 20), |(row, column)| 100 * row + column);
+    /// assert_eq!(right.of(image.view())[[0, 0]], 406);
+    /// ```
+    #[must_use]
+    pub fn of<'a, P>(&self, mut image: ArrayView2<'a, P>) -> ArrayView2<'a, P> {
+        image.slice_axis_inplace(Axis(0), Slice::from(self.row_start..self.row_end));
+        image.slice_axis_inplace(Axis(1), Slice::from(self.column_start..self.column_end));
+        image
+    }
+
+    /// The smallest box that holds both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            row_start: self.row_start.min(other.row_start),
+            row_end: self.row_end.max(other.row_end),
+            column_start: self.column_start.min(other.column_start),
+            column_end: self.column_end.max(other.column_end),
+        }
+    }
+
+    /// The box with a margin on every side, clipped to an image of the given size.
+    #[must_use]
+    pub fn grown(self, margin: usize, (rows, columns): (usize, usize)) -> Self {
+        Self {
+            row_start: self.row_start.saturating_sub(margin),
+            row_end: (self.row_end + margin).min(rows),
+            column_start: self.column_start.saturating_sub(margin),
+            column_end: (self.column_end + margin).min(columns),
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! A number with its standard error, and the interval that follows from both.
+
+use crate::statistics::quantile_95;
+use std::fmt::{self, Display};
+use std::ops::Mul;
+
+/// A value, its standard error and the degrees of freedom of that error.
+///
+/// All three are in double precision, whatever the precision of the data they come from.
+///
+/// ```
+/// use tactile_core::Estimate;
+/// let force_n = Estimate::new(1.2, 0.003);
+/// assert_eq!(format!("{force_n} N"), "1.2 ± 0.003 N");
+/// // In another unit: millinewtons.
+/// assert_eq!((force_n * 1e3).standard_error, 3.0);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Standard deviation of the value over repetitions. Zero where it is unknown or negligible.
+    pub standard_error: f64,
+    /// Degrees of freedom of a standard error that was itself estimated: pairs less parameters of a
+    /// calibration, parts of a jackknife less one. `None` where the error is known.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none")
+    )]
+    pub degrees_of_freedom: Option<f64>,
+}
+
+impl Estimate {
+    /// A value with its standard error.
+    #[must_use]
+    pub const fn new(value: f64, standard_error: f64) -> Self {
+        Self {
+            value,
+            standard_error,
+            degrees_of_freedom: None,
+        }
+    }
+
+    /// A value whose error is negligible.
+    ///
+    /// ```
+    /// use tactile_core::Estimate;
+    /// assert_eq!(Estimate::exact(3e-3), Estimate::new(3e-3, 0.0));
+    /// ```
+    #[must_use]
+    pub const fn exact(value: f64) -> Self {
+        Self::new(value, 0.0)
+    }
+
+    /// With the degrees of freedom of a standard error that was estimated from few repetitions.
+    /// Fewer degrees make a wider interval.
+    ///
+    /// ```
+    /// use tactile_core::Estimate;
+    /// let known = Estimate::new(0.12, 0.001);
+    /// let estimated = known.with_degrees_of_freedom(5.0);
+    /// assert!(estimated.interval_95().lower < known.interval_95().lower);
+    /// ```
+    #[must_use]
+    pub const fn with_degrees_of_freedom(mut self, degrees: f64) -> Self {
+        self.degrees_of_freedom = Some(degrees);
+        self
+    }
+
+    /// The standard error as a share of the value's magnitude.
+    ///
+    /// ```
+    /// use tactile_core::Estimate;
+    /// assert_eq!(Estimate::new(-4.0, 1.0).relative_error(), 0.25);
+    /// ```
+    #[must_use]
+    pub fn relative_error(self) -> f64 {
+        self.standard_error / self.value.abs()
+    }
+
+    /// The symmetric 95 % interval, value ± t·standard error, with t of Student's distribution where
+    /// the degrees of freedom are known and of the normal distribution otherwise.
+    ///
+    /// ```
+    /// use tactile_core::Estimate;
+    /// let interval = Estimate::new(10.0, 1.0).interval_95();
+    /// assert!(interval.contains(11.9) && !interval.contains(12.0));
+    /// ```
+    #[must_use]
+    pub fn interval_95(self) -> Interval {
+        let half = quantile_95(self.degrees_of_freedom) * self.standard_error;
+        Interval::new(self.value - half, Some(self.value + half))
+    }
+}
+
+impl Mul<f64> for Estimate {
+    type Output = Self;
+
+    /// The value and its error in another unit.
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            value: self.value * factor,
+            standard_error: self.standard_error * factor.abs(),
+            ..self
+        }
+    }
+}
+
+impl Display for Estimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Display::fmt(&self.value, f)?;
+        f.write_str(" ± ")?;
+        Display::fmt(&self.standard_error, f)
+    }
+}
+
+/// A range that holds the truth with a stated probability.
+///
+/// ```
+/// use tactile_core::Interval;
+/// let at_least = Interval::new(20e3, None);
+/// assert!(at_least.contains(1e9) && !at_least.contains(19e3));
+/// // The ends are put in order.
+/// assert_eq!(Interval::new(3.0, Some(1.0)), Interval::new(1.0, Some(3.0)));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Interval {
+    /// Lower limit.
+    pub lower: f64,
+    /// Upper limit. `None` where the data set no upper limit.
+    pub upper: Option<f64>,
+}
+
+impl Interval {
+    /// The interval between two ends, the smaller one below.
+    #[must_use]
+    pub fn new(lower: f64, upper: Option<f64>) -> Self {
+        match upper {
+            Some(upper) if upper < lower => Self {
+                lower: upper,
+                upper: Some(lower),
+            },
+            _ => Self { lower, upper },
+        }
+    }
+
+    /// Whether `x` lies within, ends included.
+    #[must_use]
+    pub fn contains(&self, x: f64) -> bool {
+        x >= self.lower && self.upper.is_none_or(|upper| x <= upper)
+    }
+}

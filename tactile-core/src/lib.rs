@@ -1,0 +1,15 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod bounding_box;
+mod error;
+mod estimate;
+mod option;
+mod report;
+pub mod statistics;
+
+pub use bounding_box::BoundingBox;
+pub use error::CustomError;
+pub use estimate::{Estimate, Interval};
+pub use option::{InvalidOption, Requirement};
+pub use report::{Polarity, Progress, StopReason};
