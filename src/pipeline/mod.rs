@@ -55,7 +55,6 @@ mod settings;
 mod smoothing;
 mod source;
 mod strain_error;
-mod strain_spline;
 mod surface;
 mod time;
 #[cfg(feature = "simulate")]

@@ -5,7 +5,7 @@
 //! and the sums taken as independent (cluster-robust errors: Liang & Zeger, Biometrika 73, 1986). And the contact's edge,
 //! to which the points are tied, is known to a part of a pixel: the smaller contact is off by more, relatively. Third, errors of
 //! the first surface's points make any fit to them too flat (regression dilution: Fuller, Measurement Error Models, 1987, §1.1).
-use super::strain_spline::RUN;
+use crate::tps::StrainSpline;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// How far, in pixels of the surfaces, the edge of a mask lies from the contact's.
@@ -83,10 +83,10 @@ fn clustered(
     slope: &Matrix3<f64>,
     inverse: &Matrix3<f64>,
 ) -> Matrix3<f64> {
-    let runs = offsets.len().div_ceil(RUN);
+    let runs = offsets.len().div_ceil(StrainSpline::RUN_LENGTH);
     let mut variance = Matrix3::zeros();
     for _ in 0..runs {
-        let run = offsets.by_ref().take(RUN);
+        let run = offsets.by_ref().take(StrainSpline::RUN_LENGTH);
         let sum: Matrix3<f64> = run.map(|(d, t)| (t - slope * d) * d.transpose()).sum();
         let share = sum * inverse;
         variance += share.component_mul(&share);
@@ -133,7 +133,7 @@ mod tests {
         let sources = dome();
         let (mut told, mut true_square, trials) = (0.0, 0.0, 200);
         for trial in 0..trials {
-            let off = |i: usize| 0.02 * wave(i / RUN + 1000 * trial);
+            let off = |i: usize| 0.02 * wave(i / StrainSpline::RUN_LENGTH + 1000 * trial);
             let targets: Vec<_> = sources
                 .iter()
                 .enumerate()

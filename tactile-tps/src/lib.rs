@@ -9,6 +9,8 @@
 //! | choose kernel, smoothing, weights | [`FitOptions`], [`Smoothing`], [`Kernel`] |
 //! | propagate the targets' uncertainty to values and Jacobians | [`Factorization::influence_into`], [`Factorization::jacobian_influence_into`] |
 //! | see condition, residual and iterations | [`FitReport`] |
+//! | strain from matches whose neighbours share errors | [`StrainSpline`] |
+//! | warp by matches some of which are wrong | [`RobustSpline`], [`RobustFit`] |
 //! | accept any warp | the object-safe trait [`Warp`]: splines, [`Affine`] |
 //! | fit any kind of warp | the trait [`WarpModel`]: [`FitOptions`], [`AffineModel`] |
 //!
@@ -88,6 +90,6 @@ pub use path::LambdaPath;
 pub use progress::Progress;
 pub use real::{Real, Scalar};
 pub use report::FitReport;
-pub use smoothing::Smoothing;
+pub use smoothing::{RobustFit, RobustSpline, Smoothing, StrainSpline};
 pub use spline::{Spline, ThinPlateSpline};
 pub use warp::{Pairs, Warp, WarpModel};

@@ -16,9 +16,6 @@ mod modulus_on_simulated_scenes;
 mod pipeline;
 mod press_9dtact;
 mod recorded_answers;
-#[path = "../../src/cli/strain/robust_spline.rs"]
-#[allow(unreachable_pub, dead_code)]
-mod robust_spline;
 mod scene_files;
 mod sensor_calibration;
 mod serialtrack_strain;

@@ -1,11 +1,11 @@
 //! Two point sets in, strain with its error out: match, spline, strain.
 
-use super::robust_spline::{self, RobustSpline};
 use nalgebra::{Matrix3, Point};
 use std::error::Error;
 use tactile_imaging::elasticity::field::{StrainField, StrainSummary};
 use tactile_imaging::elasticity::strain::StrainMeasure;
 use tactile_imaging::matching::PointMatcher;
+use tactile_imaging::tps::{RobustFit, ThinPlateSpline};
 
 /// Pairs that a spline and its error need.
 const FEWEST_PAIRS: usize = 16;
@@ -75,7 +75,7 @@ pub fn strain_of<const D: usize>(
     let robust = fit(before, after, &rows)?;
     let sources: Vec<_> = rows.iter().map(|&(i, _)| before[i]).collect();
     let strained = |spline| {
-        let gradients = RobustSpline::gradients(spline, &sources);
+        let gradients = gradients(spline, &sources);
         StrainField::from_gradients(&gradients, None, measure)
     };
     let field = strained(&robust.spline)?;
@@ -105,17 +105,32 @@ fn fit<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
     pairs: &[(usize, usize)],
-) -> Result<RobustSpline<D>, Box<dyn Error>> {
+) -> Result<RobustFit<D>, Box<dyn Error>> {
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| before[i]).collect();
     let targets: Vec<_> = pairs.iter().map(|&(_, j)| after[j]).collect();
-    Ok(robust_spline::fit(&sources, &targets)?)
+    Ok(RobustFit::new(&sources, &targets, None)?)
+}
+
+/// H = ∇f − I at every point, in three dimensions.
+fn gradients<const D: usize>(
+    spline: &ThinPlateSpline<f64, D>,
+    points: &[Point<f64, D>],
+) -> Vec<Matrix3<f64>> {
+    points
+        .iter()
+        .map(|p| {
+            let mut h = spline.jacobian(p).fixed_resize::<3, 3>(0.0);
+            (0..D).for_each(|i| h[(i, i)] -= 1.0);
+            h
+        })
+        .collect()
 }
 
 /// Mutual nearest neighbours of prediction and target, within a third of the targets' usual spacing.
 fn partners<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
-    rough: &RobustSpline<D>,
+    rough: &RobustFit<D>,
 ) -> Vec<(usize, usize)> {
     let predicted: Vec<_> = before.iter().map(|p| rough.spline.apply(p)).collect();
     let nearest = |p: &Point<f64, D>, set: &[Point<f64, D>], not: usize| {

@@ -1,7 +1,6 @@
 //! `tactile strain`: from two sets of points, before and after a deformation.
 mod measure;
 mod report;
-mod robust_spline;
 
 use crate::cli::context::Context;
 use crate::cli::failure::{Exit, Failure};

@@ -9,13 +9,12 @@ use super::error::PipelineError;
 use super::estimators::EstimatorStage;
 use super::object::Object;
 use super::settings::{Settings, SurfaceInput};
-use super::strain_spline::StrainSpline;
 use crate::elasticity::modulus::ModulusEstimator;
 use crate::elasticity::strain::{GreenLagrange, StrainMeasure};
 use crate::force::{CalibrationPair, ReferenceFrame};
 use crate::matching::PointMatcher;
 use crate::sfs::{ContactSampler, ControlPointSampler, EquallySpaced, SurfaceReconstruction};
-use crate::tps::WarpModel;
+use crate::tps::{StrainSpline, WarpModel};
 use ndarray::ArrayView2;
 use std::sync::Arc;
 

@@ -10,13 +10,12 @@ use crate::pipeline::choice::{
     IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice, StrainChoice, WarpChoice,
 };
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::strain_spline::StrainSpline;
 use crate::sfs::{
     BoundaryCondition, BrooksHorn, ContactSampler, ControlPointSampler, CosinePoisson,
     CurvatureAdaptive, Eikonal, EquallySpaced, FrankotChellappa, Lighting, MaskedLeastSquares,
     Random, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
 };
-use crate::tps::{AffineModel, FitOptions, R3, Smoothing, WarpModel};
+use crate::tps::{AffineModel, FitOptions, R3, Smoothing, StrainSpline, WarpModel};
 use std::sync::Arc;
 
 /// How much denser [`SamplerChoice::Curvature`] samples where the surface bends: between even spacing (1) and points at the rim alone.

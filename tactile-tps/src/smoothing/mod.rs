@@ -1,6 +1,11 @@
 //! How closely a spline follows its targets.
 
+mod blocked;
+mod robust;
+
 use crate::{Scalar, TpsError};
+pub use blocked::StrainSpline;
+pub use robust::{RobustFit, RobustSpline};
 
 /// How closely the spline follows its targets.
 ///

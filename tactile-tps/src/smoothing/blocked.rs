@@ -1,38 +1,59 @@
-//! The spline whose gradient is the strain: as stiff as the matches allow.
-//!
-//! Errors of matches on a reconstructed surface are those of its neighbourhood: they are correlated, and the rule of least
-//! (generalised) cross-validation takes what neighbours share for deformation. Along the surface that is a small
-//! error; across it, where no two points lie behind each other, the gradient of such a spline is noise. So whole runs of
-//! neighbours are predicted from the others ("blocked" cross-validation: Roberts et al., Ecography 40, 2017), and of all
-//! splines that predict as well as the best, to one standard error of that, the stiffest is taken (Breiman, Friedman,
-//! Olshen & Stone 1984, §3.4.3).
-use crate::tps::{
+//! Smoothing chosen by blocked cross-validation, for errors that neighbours share.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::{
     Factorization, FitOptions, LambdaPath, Memory, NegR, Pairs, Smoothing, ThinPlateSpline,
     TpsError, Warp, WarpModel, Workspace,
 };
-use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Neighbours that share their errors, and are left out together.
-pub(super) const RUN: usize = 10;
-
-/// Fewest pairs that are split; below, generalised cross-validation chooses.
-const LEAST_PAIRS: usize = 4 * RUN;
-
-/// λ for n points is n/200 times a power of eight, times the points' mean radius: from nearly an interpolant to nearly affine.
-const POWERS: std::ops::RangeInclusive<i32> = -5..=2;
-
-/// Number of points to which the powers belong.
-const USUAL_POINTS: f64 = 200.0;
+/// λ for n points is n/200 times a power of eight, times the points' root mean square radius.
+/// The powers go from nearly an interpolant to nearly affine.
+const POWERS: core::ops::RangeInclusive<i32> = -5..=2;
 
 type Spline = ThinPlateSpline<f64, 3, NegR>;
 
-/// A thin-plate spline (kernel −r) that smooths as much as blocked cross-validation allows.
+/// The model of the spline whose gradient is the strain: kernel −r, as stiff as the matches allow.
 ///
-/// Points must come with neighbours following each other, as samplers of control points give them. Runs of ten points
-/// are dealt to two halves, each of which predicts the other for eight values of λ. O(n³), a twentieth of what
-/// [`Smoothing::Gcv`] takes at 200 points; with fewer than 40 that is used.
+/// Errors of matches on a reconstructed surface are shared by neighbours.
+/// Plain (generalised) cross-validation takes such errors for deformation.
+/// Across the surface, where no two points lie behind each other, the gradient of its spline is noise.
+///
+/// Here whole runs of neighbours are predicted from the others
+/// ("blocked" cross-validation: Roberts et al., Ecography 40, 2017).
+/// Of all λ whose prediction error is within one standard error of the least, the largest is taken
+/// (Breiman, Friedman, Olshen & Stone 1984, §3.4.3).
+///
+/// Points must come with neighbours following each other, as samplers of control points give them.
+/// Runs of [`RUN_LENGTH`](Self::RUN_LENGTH) points are dealt to two halves.
+/// Each half predicts the other for eight values of λ. O(n³) time.
+/// With fewer than four runs [`Smoothing::Gcv`] chooses λ.
+///
+/// ```
+/// use nalgebra::{Matrix3, Point3};
+/// use tactile_tps::{StrainSpline, Warp, WarpModel};
+/// # fn main() -> Result<(), tactile_tps::TpsError> {
+/// // A dome, sampled along a spiral, stretched by 20 % along its axis.
+/// let dome = |i: usize| {
+///     let (z, angle) = (1.0 - i as f64 / 60.0, 0.6 * i as f64);
+///     let r = (1.0 - z * z).sqrt();
+///     Point3::new(r * angle.cos(), r * angle.sin(), z)
+/// };
+/// let sources: Vec<_> = (0..60).map(dome).collect();
+/// let targets: Vec<_> = sources.iter().map(|p| Point3::new(p.x, p.y, 1.2 * p.z)).collect();
+/// let warp = StrainSpline.fit(&sources, &targets, None)?;
+/// let stretch = Matrix3::from_diagonal(&[1.0, 1.0, 1.2].into());
+/// assert!((warp.jacobian(&sources[30]) - stretch).norm() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct StrainSpline;
+pub struct StrainSpline;
+
+impl StrainSpline {
+    /// Neighbours that share their errors and are left out together.
+    pub const RUN_LENGTH: usize = 10;
+}
 
 impl WarpModel<f64, 3> for StrainSpline {
     fn fit(
@@ -102,7 +123,7 @@ impl Default for Fitter {
 
 impl Fitter {
     fn fit(&mut self, pairs: Pairs<'_, f64, 3>) -> Result<(), TpsError> {
-        let smoothing = match self.stiffest_as_good(pairs) {
+        let smoothing = match self.one_standard_error_lambda(pairs) {
             Some(lambda) => Smoothing::Lambda(lambda),
             None => Smoothing::Gcv,
         };
@@ -110,7 +131,7 @@ impl Fitter {
             Some(weights) => self.options.set_weights(weights)?,
             None => self.options = FitOptions::new(NegR),
         }
-        let options = std::mem::replace(&mut self.options, FitOptions::new(NegR));
+        let options = core::mem::replace(&mut self.options, FitOptions::new(NegR));
         self.options = options.with_smoothing(smoothing)?;
         let factorization = match self.factorization.take() {
             Some(kept) => kept.refactor(pairs.sources, &self.options),
@@ -127,14 +148,14 @@ impl Fitter {
 
     /// The greatest λ that predicts left-out runs as well as the best, to one standard error; `None` where too few pairs, or
     /// too badly placed ones, are there to be split.
-    fn stiffest_as_good(&mut self, pairs: Pairs<'_, f64, 3>) -> Option<f64> {
+    fn one_standard_error_lambda(&mut self, pairs: Pairs<'_, f64, 3>) -> Option<f64> {
         let n = pairs.sources.len();
         let as_many = pairs.targets.len() == n && pairs.weights.is_none_or(|w| w.len() == n);
-        if n < LEAST_PAIRS || !as_many {
+        if n < 4 * StrainSpline::RUN_LENGTH || !as_many {
             return None;
         }
         self.split(pairs);
-        let unit = mean_radius(pairs.sources) * n as f64 / USUAL_POINTS;
+        let unit = mean_radius(pairs.sources) * n as f64 / 200.0;
         let lambda = |power: i32| unit * 8_f64.powi(power);
         self.lambdas.clear();
         // The sum of squares of a half has half its terms.
@@ -160,7 +181,7 @@ impl Fitter {
             half.weights.clear();
         }
         for (i, (source, target)) in pairs.sources.iter().zip(pairs.targets).enumerate() {
-            let half = &mut self.halves[i / RUN % 2];
+            let half = &mut self.halves[i / StrainSpline::RUN_LENGTH % 2];
             half.sources.push(*source);
             half.targets.push(*target);
             half.weights.push(pairs.weights.map_or(1.0, |w| w[i]));
