@@ -212,38 +212,11 @@ fn ball(
 ) -> Option<Result<BallFit, String>> {
     let surface = surface?;
     let fit = if arguments.ball {
-        any_ball(surface)
+        surface.fit_any_ball()
     } else {
         surface.fit_ball(arguments.ball_radius_mm? / MM)
     };
     Some(fit.ok_or_else(|| "no ball fits the depth".to_owned()))
-}
-
-/// The ball of the radius that fits best: the best of 60 radii from the contact's own to a hundred times that, then golden
-/// section between its neighbours.
-fn any_ball(surface: &ContactSurface) -> Option<BallFit> {
-    const STEP: f64 = 1.08;
-    let (rows, columns) = surface.surface.heights.dim();
-    let [x, y] = surface.pixel_size_m;
-    let half_width = 0.5 * f64::max(columns as f64 * x, rows as f64 * y);
-    let error = |radius: f64| {
-        let fit = surface.fit_ball(radius);
-        fit.map_or(f64::INFINITY, |fit| fit.mean_absolute_error_m)
-    };
-    let radii = (0..60).map(|k| half_width * STEP.powi(k));
-    let best = radii.min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
-    let (mut low, mut high) = (best / STEP, best * STEP);
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    // 30 steps narrow the bracket of 16 % to a millionth of it.
-    for _ in 0..30 {
-        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-        if error(a) < error(b) {
-            high = b;
-        } else {
-            low = a;
-        }
-    }
-    surface.fit_ball(0.5 * (low + high))
 }
 
 fn print(found: Option<&Found>, context: &mut Context) {

@@ -1,5 +1,4 @@
 //! What a person at a bench wants to read of single frames, streams, and fits.
-use super::ball::BallFit;
 use super::contact::ContactReading;
 use super::digits::estimate;
 use super::report::{Skip, Stage, Work};
@@ -63,26 +62,6 @@ impl Display for DriftWatch {
             "light {last_grey:+.2} grey levels from the reference, {greatest_grey:+.2} at most, in "
         )?;
         write!(f, "{frames} frame{s} without contact")
-    }
-}
-
-impl Display for BallFit {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let [x, y] = self.centre_m.map(|v| v * 1e3);
-        write!(
-            f,
-            "ball of radius {:.3} mm at ({x:.3}, {y:.3}) mm",
-            self.radius_m * 1e3
-        )?;
-        let (a, error) = (
-            self.contact_radius_m * 1e3,
-            self.mean_absolute_error_m * 1e6,
-        );
-        write!(
-            f,
-            "   contact radius {a:.3} mm   mean absolute error {error:.1} µm over {} pixels",
-            self.pixels
-        )
     }
 }
 

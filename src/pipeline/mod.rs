@@ -23,9 +23,7 @@
 //! face's area. An object of unknown shape is read so if its contacts are those of a flat face, and refused with what to tell the program if not
 //! ([`PipelineError::NotUniaxial`]).
 mod background;
-mod ball;
 mod batch;
-mod binning;
 mod choice;
 mod composition;
 mod config;
@@ -52,7 +50,6 @@ mod runner;
 mod same_image;
 mod session;
 mod settings;
-mod smoothing;
 mod source;
 mod strain_error;
 mod surface;
@@ -60,11 +57,10 @@ mod time;
 #[cfg(feature = "simulate")]
 mod trial;
 
+pub use crate::sfs::{BallFit, Binning};
 #[cfg(feature = "cli")]
 pub(crate) use background::clear_step;
-pub use ball::BallFit;
 pub use batch::contacts;
-pub use binning::Binning;
 pub use choice::{
     EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
     StrainChoice, UnknownStage, WarpChoice,

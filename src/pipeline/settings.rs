@@ -1,9 +1,9 @@
 //! What a pipeline knows beside its stages.
-use super::binning::Binning;
 use super::error::PipelineError;
 use super::guide_error::LAYER_PARAMETERS;
 use super::object::Object;
 use crate::elasticity::contact::Waveguide;
+use crate::sfs::Binning;
 use nalgebra::DMatrix;
 
 /// Control points on each surface where nothing else is asked for: the paper's number.

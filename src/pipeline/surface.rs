@@ -1,13 +1,11 @@
 //! From a frame's contact to its surface and the control points on it.
-use super::binning;
 use super::composition::Pipeline;
 use super::contact::FrameContact;
 use super::settings::{Settings, SurfaceInput};
-use super::smoothing::smooth;
 use crate::force::{BoundingBox, LensGeometry, LocalCalibration, Polarity};
-use crate::sfs::{Domain, Frame, SfsError, Surface, Workspace};
+use crate::sfs::{BallFit, BinnedContact, Domain, Frame, SfsError, Surface, Workspace};
 use nalgebra::Point3;
-use ndarray::{Array2, ArrayView2, Axis, Slice};
+use ndarray::{ArrayView2, Axis, Slice};
 use std::sync::{Mutex, PoisonError};
 
 /// A reconstructed surface and its place in the frame.
@@ -60,6 +58,44 @@ impl ContactSurface {
             origin_m: [0.0; 2],
         }
     }
+
+    /// Fits a ball of radius `radius_m`, its centre in metres from the frame's first pixel.
+    ///
+    /// `None` where the surface has fewer than 16 pixels, is wider than the ball, or no cap fits.
+    pub fn fit_ball(&self, radius_m: f64) -> Option<BallFit> {
+        self.fit(|heights, domain| BallFit::of_radius(heights, domain, radius_m))
+    }
+
+    /// Fits a ball of the radius with the least mean absolute error. `None` as for [`fit_ball`](Self::fit_ball).
+    pub fn fit_any_ball(&self) -> Option<BallFit> {
+        self.fit(BallFit::of_any_radius)
+    }
+
+    fn fit(
+        &self,
+        by: impl FnOnce(ArrayView2<'_, f64>, &Domain<'_, f64>) -> Option<BallFit>,
+    ) -> Option<BallFit> {
+        let domain = Domain::new(self.pixel_size_m).ok()?;
+        let domain = domain.with_mask(self.surface.mask.view());
+        let mut fit = by(self.surface.heights.view(), &domain)?;
+        for (centre, origin) in fit.centre_m.iter_mut().zip(self.origin_m) {
+            *centre += origin;
+        }
+        Some(fit)
+    }
+}
+
+/// The box that whole blocks make of a contact's box: grown to the right and downwards, cut at the frame's end.
+fn whole_blocks(region: BoundingBox, side: usize, (rows, columns): (usize, usize)) -> BoundingBox {
+    let end = |start: usize, end: usize, limit: usize| {
+        let blocks = (end - start).div_ceil(side).min((limit - start) / side);
+        start + blocks * side
+    };
+    BoundingBox {
+        row_end: end(region.row_start, region.row_end, rows),
+        column_end: end(region.column_start, region.column_end, columns),
+        ..region
+    }
 }
 
 /// Position (x, y) in metres of the grid's first pixel.
@@ -81,20 +117,14 @@ fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f6
 pub(super) struct SurfaceWorkspace {
     /// Behind a mutex, never locked, so that what holds it is `Sync` though progress callbacks are not.
     sfs: Mutex<Workspace<f64>>,
-    signal: Array2<f64>,
-    smoothed: Array2<f64>,
-    mask: Array2<bool>,
-    scratch: Vec<f64>,
+    grid: BinnedContact,
 }
 
 impl Default for SurfaceWorkspace {
     fn default() -> Self {
         Self {
             sfs: Mutex::new(Workspace::default()),
-            signal: Array2::default((0, 0)),
-            smoothed: Array2::default((0, 0)),
-            mask: Array2::default((0, 0)),
-            scratch: Vec::new(),
+            grid: BinnedContact::default(),
         }
     }
 }
@@ -114,33 +144,22 @@ impl SurfaceWorkspace {
         pressure: Option<(&dyn LocalCalibration, f64)>,
     ) -> BoundingBox {
         let [frame, reference] = images;
-        let whole = binning::whole_blocks(region, side, frame.dim());
-        binning::mean_difference(frame, reference, whole, side, scale, &mut self.signal);
+        let whole = whole_blocks(region, side, frame.dim());
+        let images = [whole.of(frame), whole.of(reference)];
+        self.grid.load(images, side, scale);
         if let Some((curve, peak_pa)) = pressure {
-            self.signal
-                .mapv_inplace(|grey| curve.value_pa(grey) / peak_pa);
+            let pressure = |grey| curve.value_pa(grey) / peak_pa;
+            self.grid.signal.mapv_inplace(pressure);
         }
-        binning::block_mask(
-            mask_over(contact, region),
-            region,
-            whole,
-            side,
-            &mut self.mask,
-        );
+        self.grid.load_mask(mask_over(contact, region), side);
         if side == 1 && settings.surface_input == SurfaceInput::Shading {
-            binning::trim_rim(&mut self.mask, &self.signal);
+            self.grid.trim_rim();
         }
         let ceiling = ceiling(settings.surface_input);
         // The width is that in the frame: a block has smoothed already.
         let width = (settings.smoothing_px / side) | 1;
-        if width > 1 {
-            self.smoothed.clone_from(&self.signal);
-            smooth(&mut self.smoothed, &mut self.scratch, width);
-            self.signal.zip_mut_with(&self.smoothed, |sharp, level| {
-                *sharp += levelness(*level / ceiling) * (*level - *sharp)
-            });
-        }
-        self.signal.mapv_inplace(|v| v.clamp(0.0, ceiling));
+        self.grid.smooth(width, |level| levelness(level / ceiling));
+        self.grid.signal.mapv_inplace(|v| v.clamp(0.0, ceiling));
         whole
     }
 }
@@ -228,8 +247,8 @@ pub(super) fn reconstruct(
         .contact()
         .pixel_size_m()
         .map(|size| size * side as f64);
-    let domain = Domain::new(pixel_size_m)?.with_mask(workspace.mask.view());
-    let frame = Frame::Real(workspace.signal.view());
+    let domain = Domain::new(pixel_size_m)?.with_mask(workspace.grid.mask.view());
+    let frame = Frame::Real(workspace.grid.signal.view());
     let sfs = workspace.sfs.get_mut();
     let sfs = sfs.unwrap_or_else(PoisonError::into_inner);
     pipeline
@@ -296,6 +315,19 @@ fn levelness(shading: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whole_blocks_end_with_the_frame() {
+        let contact = BoundingBox {
+            row_start: 1,
+            row_end: 8,
+            column_start: 2,
+            column_end: 9,
+        };
+        let region = whole_blocks(contact, 3, (9, 11));
+        // Two blocks down to the frame's end, three across.
+        assert_eq!((region.row_end, region.column_end), (7, 11));
+    }
 
     #[test]
     fn what_is_trimmed_away_leaves_the_blocks_where_they_were() {

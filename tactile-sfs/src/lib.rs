@@ -22,6 +22,8 @@
 //! Errors are [`SfsError`]; not converging is a [`Report`].
 #![forbid(unsafe_code)]
 
+mod ball;
+mod binning;
 mod domain;
 mod error;
 mod estimate;
@@ -36,6 +38,8 @@ mod scalar;
 mod surface;
 mod workspace;
 
+pub use ball::BallFit;
+pub use binning::{BinnedContact, Binning};
 pub(crate) use domain::BoundingBox;
 pub use domain::Domain;
 pub use error::SfsError;

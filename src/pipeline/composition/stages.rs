@@ -3,13 +3,12 @@ use super::{Pipeline, named};
 use crate::elasticity::modulus::ModulusEstimator;
 use crate::elasticity::strain::StrainMeasure;
 use crate::matching::PointMatcher;
-use crate::pipeline::binning::Binning;
 use crate::pipeline::config::StagesConfig;
 use crate::pipeline::contact::ContactStage;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::estimators::EstimatorStage;
 use crate::pipeline::settings::SurfaceInput;
-use crate::sfs::{ControlPointSampler, SlopeIntegrator, SurfaceReconstruction};
+use crate::sfs::{Binning, ControlPointSampler, SlopeIntegrator, SurfaceReconstruction};
 use crate::tps::WarpModel;
 use std::sync::Arc;
 

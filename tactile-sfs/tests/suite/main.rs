@@ -4,6 +4,7 @@ mod behaviour;
 mod boundaries;
 mod common;
 mod contacts;
+mod depth_maps;
 mod hard_input;
 mod invariants;
 mod large;

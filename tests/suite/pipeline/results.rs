@@ -3,6 +3,7 @@ use super::trial;
 use tactile_imaging::pipeline::{
     BallFit, ImageFolder, PipelineError, Press, Report, Session, Update,
 };
+use tactile_imaging::sfs::Domain;
 
 #[test]
 fn everything_can_cross_threads() {
@@ -62,14 +63,12 @@ fn every_result_can_be_read_by_people_and_programs() {
             .iter()
             .all(|skip| told(skip).ends_with("saved)"))
     );
-    let ball = BallFit {
-        radius_m: 3e-3,
-        centre_m: [1e-3, 2e-3],
-        contact_radius_m: 1.5e-3,
-        mean_absolute_error_m: 28e-6,
-        pixels: 900,
-        iterations: 4,
+    let cap = |(r, c): (usize, usize)| {
+        let square = (r as f64 - 20.0).powi(2) + (c as f64 - 10.0).powi(2);
+        (900.0 - square).max(0.0).sqrt() / 1e4 - 2.5e-3
     };
+    let heights = ndarray::Array2::from_shape_fn((40, 30), cap);
+    let ball = BallFit::of_radius(heights.view(), &Domain::new([1e-4; 2]).unwrap(), 3e-3).unwrap();
     assert!(
         told(&ball).starts_with("ball of radius 3.000 mm at (1.000, 2.000) mm"),
         "{ball}"

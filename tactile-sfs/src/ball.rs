@@ -1,0 +1,175 @@
+//! A ball fitted to a depth map.
+
+use core::fmt;
+
+use nalgebra::{Matrix3, Vector3};
+use ndarray::ArrayView2;
+
+use crate::Domain;
+
+/// A spherical cap z = √(R² − ρ²) − √(R² − a²), ρ the distance from the centre, fitted to heights.
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{BallFit, Domain};
+/// // A ball of 4 mm radius, in contact up to 2.4 mm from its axis, is 4 − √(4² − 2.4²) = 0.8 mm deep.
+/// let depth_m = |(r, c): (usize, usize)| {
+///     let square = 1e-8 * ((r as f64 - 32.0).powi(2) + (c as f64 - 32.0).powi(2));
+///     (16e-6 - square).sqrt() - 3.2e-3
+/// };
+/// let heights = Array2::from_shape_fn((64, 64), depth_m).mapv(|z| if z > 0.0 { z } else { f64::NAN });
+/// let domain = Domain::new([1e-4; 2])?;
+/// let fit = BallFit::of_radius(heights.view(), &domain, 4e-3).expect("a cap");
+/// assert!((fit.contact_radius_m - 2.4e-3).abs() < 1e-9 && fit.mean_absolute_error_m < 1e-9);
+/// let any = BallFit::of_any_radius(heights.view(), &domain).expect("a cap");
+/// assert!((any.radius_m - 4e-3).abs() < 1e-7);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct BallFit {
+    /// The ball's radius R in metres.
+    pub radius_m: f64,
+    /// Centre (x, y) in metres from the first pixel of the heights.
+    pub centre_m: [f64; 2],
+    /// Radius a of the circle where the cap meets depth zero, in metres.
+    pub contact_radius_m: f64,
+    /// Mean absolute difference between heights and cap over the pixels inside that circle, in metres.
+    pub mean_absolute_error_m: f64,
+    /// Number of those pixels.
+    pub pixels: usize,
+    /// Gauss–Newton steps.
+    pub iterations: usize,
+}
+
+impl BallFit {
+    /// Fits a ball of radius `radius_m` by least squares over the centre and the height of its equator.
+    ///
+    /// Gauss–Newton, O(pixels) a step. `None` where fewer than 16 pixels have a height, where the heights are wider than
+    /// the ball, where no cap fits, or where the mask of the domain has another shape.
+    pub fn of_radius(
+        heights: ArrayView2<'_, f64>,
+        domain: &Domain<'_, f64>,
+        radius_m: f64,
+    ) -> Option<Self> {
+        fit(&pixels(heights, domain)?, radius_m)
+    }
+
+    /// Fits a ball of the radius with the least mean absolute error.
+    ///
+    /// Takes the best of 60 radii, from the half width of the heights to a hundred times that, then a golden-section search
+    /// between its neighbours. 120 fits of a known radius. `None` as for [`of_radius`](Self::of_radius).
+    pub fn of_any_radius(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Self> {
+        let pixels = pixels(heights, domain)?;
+        let ([x, y], (rows, columns)) = (domain.pixel_size_m, heights.dim());
+        let half_width = 0.5 * f64::max(columns as f64 * x, rows as f64 * y);
+        let error = |radius: f64| {
+            fit(&pixels, radius).map_or(f64::INFINITY, |fit| fit.mean_absolute_error_m)
+        };
+        let step = 1.08_f64;
+        let radii = (0..60).map(|k| half_width * step.powi(k));
+        let best = radii.min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
+        let (mut low, mut high) = (best / step, best * step);
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        // 30 steps narrow the bracket of 16 % to a millionth of it.
+        for _ in 0..30 {
+            let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+            if error(a) < error(b) {
+                high = b;
+            } else {
+                low = a;
+            }
+        }
+        fit(&pixels, 0.5 * (low + high))
+    }
+
+    /// Depth of the cap in metres at (x, y) in metres. Zero outside the circle.
+    pub fn depth_m(&self, [x, y]: [f64; 2]) -> f64 {
+        let square = (x - self.centre_m[0]).powi(2) + (y - self.centre_m[1]).powi(2);
+        if square >= self.contact_radius_m.powi(2) {
+            return 0.0;
+        }
+        let r2 = self.radius_m.powi(2);
+        (r2 - square).sqrt() - (r2 - self.contact_radius_m.powi(2)).sqrt()
+    }
+}
+
+impl fmt::Display for BallFit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y] = self.centre_m.map(|v| v * 1e3);
+        write!(
+            f,
+            "ball of radius {:.3} mm at ({x:.3}, {y:.3}) mm   contact radius {:.3} mm   \
+             mean absolute error {:.1} µm over {} pixels",
+            self.radius_m * 1e3,
+            self.contact_radius_m * 1e3,
+            self.mean_absolute_error_m * 1e6,
+            self.pixels
+        )
+    }
+}
+
+/// The pixels with a height as (x, y, z) in metres. `None` for a domain of another shape, or too few pixels to trust.
+fn pixels(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Vec<[f64; 3]>> {
+    domain.validate(heights.nrows(), heights.ncols()).ok()?;
+    let [hx, hy] = domain.pixel_size_m;
+    let inside = heights
+        .indexed_iter()
+        .filter(|((row, column), z)| z.is_finite() && domain.contains(*row, *column));
+    let pixels: Vec<_> = inside
+        .map(|((row, column), z)| [column as f64 * hx, row as f64 * hy, *z])
+        .collect();
+    (pixels.len() >= 16).then_some(pixels)
+}
+
+fn fit(pixels: &[[f64; 3]], radius_m: f64) -> Option<BallFit> {
+    if !(radius_m > 0.0 && radius_m.is_finite()) {
+        return None;
+    }
+    let mean = |k: usize| pixels.iter().map(|p| p[k]).sum::<f64>() / pixels.len() as f64;
+    let mut at = Vector3::new(mean(0), mean(1), 0.0);
+    let mut iterations = 0;
+    while iterations < 50 {
+        iterations += 1;
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for [x, y, z] in pixels {
+            let (u, v) = (x - at.x, y - at.y);
+            let square = radius_m * radius_m - u * u - v * v;
+            // At the ball's equator the slope has no end: such pixels carry no height.
+            if square > 1e-6 * radius_m * radius_m {
+                let up = square.sqrt();
+                let slope = Vector3::new(u / up, v / up, 1.0);
+                normal += slope * slope.transpose();
+                right += slope * (z - up - at.z);
+            }
+        }
+        let step = normal.cholesky()?.solve(&right);
+        at += step;
+        if step.amax() < 1e-9 * radius_m {
+            break;
+        }
+    }
+    let contact_radius_m = (radius_m * radius_m - at.z * at.z).sqrt();
+    if !(at.z < 0.0 && contact_radius_m > 0.0) {
+        return None;
+    }
+    let mut fit = BallFit {
+        radius_m,
+        centre_m: [at.x, at.y],
+        contact_radius_m,
+        mean_absolute_error_m: 0.0,
+        pixels: 0,
+        iterations,
+    };
+    let mut sum = 0.0;
+    for [x, y, z] in pixels {
+        let depth = fit.depth_m([*x, *y]);
+        if depth > 0.0 {
+            sum += (z - depth).abs();
+            fit.pixels += 1;
+        }
+    }
+    fit.mean_absolute_error_m = sum / fit.pixels.max(1) as f64;
+    Some(fit)
+}
