@@ -14,12 +14,12 @@ struct Certain {
     least_confidence: f64,
 }
 
-impl PointMatcher<f64, 3> for Certain {
+impl PointMatcher<3> for Certain {
     fn match_points(
         &self,
         model: &[Point3<f64>],
         target: &[Point3<f64>],
-    ) -> Result<Matching<f64, 3>, MatchError> {
+    ) -> Result<Matching<3>, MatchError> {
         let mut found = self.inner.match_points(model, target)?;
         for (partner, confidence) in found.assignment.iter_mut().zip(&found.confidence) {
             *partner = partner.filter(|_| *confidence >= self.least_confidence);

@@ -115,7 +115,7 @@ struct Job<'a> {
 }
 
 impl Method {
-    fn matcher<const D: usize>(self, expectations: Expectations) -> Box<dyn PointMatcher<f64, D>> {
+    fn matcher<const D: usize>(self, expectations: Expectations) -> Box<dyn PointMatcher<D>> {
         match self {
             Self::Softassign => Box::new(expectations.matcher()),
             Self::Labelling => Box::new(RelaxationLabelling::default()),
@@ -262,12 +262,12 @@ impl Job<'_> {
 
 /// The answer, and the median time of the calls in milliseconds.
 fn repeated<const D: usize>(
-    matcher: &dyn PointMatcher<f64, D>,
+    matcher: &dyn PointMatcher<D>,
     repeat: u32,
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
-) -> Result<(Matching<f64, D>, f64), MatchError> {
-    let timed = || -> Result<(Matching<f64, D>, Duration), MatchError> {
+) -> Result<(Matching<D>, f64), MatchError> {
+    let timed = || -> Result<(Matching<D>, Duration), MatchError> {
         let start = Instant::now();
         let matching = matcher.match_points(model, target)?;
         Ok((matching, start.elapsed()))
@@ -287,7 +287,7 @@ fn stop_reason(stop: StopReason) -> &'static str {
         StopReason::Converged => "converged",
         StopReason::Exact => "exact",
         StopReason::IterationLimit => "stopped at the limit",
-        StopReason::Callback => "stopped by the caller",
+        StopReason::Cancelled => "stopped by the caller",
         StopReason::Degenerate => "degenerate points",
         _ => "stopped",
     }

@@ -195,7 +195,7 @@ impl StageRunner {
         frames: [usize; 2],
         model: &[Point3<f64>],
         target: &[Point3<f64>],
-    ) -> Result<Matching<f64, 3>, PipelineError> {
+    ) -> Result<Matching<3>, PipelineError> {
         self.matched(frames, |pipeline| {
             pipeline.matcher().match_points(model, target)
         })
@@ -208,7 +208,7 @@ impl StageRunner {
         history: &mut MatchHistory,
         model: &[Point3<f64>],
         target: &[Point3<f64>],
-        pairs: &mut MatchedPairs<f64>,
+        pairs: &mut MatchedPairs,
     ) -> Result<(), PipelineError> {
         if !self.pipeline.settings().skips.last_answer {
             let Matching {
@@ -217,11 +217,7 @@ impl StageRunner {
                 report,
                 ..
             } = self.matching(frames, model, target)?;
-            *pairs = MatchedPairs {
-                assignment,
-                confidence,
-                report,
-            };
+            (pairs.assignment, pairs.confidence, pairs.report) = (assignment, confidence, report);
             return Ok(());
         }
         let warm = &mut history.warm;

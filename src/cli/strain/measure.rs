@@ -39,7 +39,7 @@ pub struct Strain<const D: usize> {
 pub fn strain_between<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
-    matcher: &dyn PointMatcher<f64, D>,
+    matcher: &dyn PointMatcher<D>,
     measure: &dyn StrainMeasure<f64>,
 ) -> Result<Strain<D>, Box<dyn Error>> {
     let matching = matcher.match_points(before, after)?;

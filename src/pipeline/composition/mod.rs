@@ -60,7 +60,7 @@ pub struct Pipeline {
     surface: Arc<dyn SurfaceReconstruction<f64> + Send + Sync>,
     /// None: the default for what the surface is read from.
     sampler: Option<Arc<dyn ControlPointSampler<f64> + Send + Sync>>,
-    matcher: Arc<dyn PointMatcher<f64, 3> + Send + Sync>,
+    matcher: Arc<dyn PointMatcher<3> + Send + Sync>,
     warp: Arc<dyn WarpModel<f64, 3> + Send + Sync>,
     strain: Arc<dyn StrainMeasure<f64> + Send + Sync>,
     estimator: EstimatorStage,
@@ -142,7 +142,7 @@ impl Pipeline {
         }
     }
 
-    pub(super) fn matcher(&self) -> &dyn PointMatcher<f64, 3> {
+    pub(super) fn matcher(&self) -> &dyn PointMatcher<3> {
         self.matcher.as_ref()
     }
 

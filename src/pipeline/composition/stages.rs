@@ -194,16 +194,13 @@ impl Pipeline {
     /// let mut press = trial.press(&pipeline)?;
     /// let matching = press.matching(1)?;
     /// assert!(matching.assignment.iter().all(Option::is_some), "without a limit to the distance every point has a partner");
-    /// let chosen: Box<dyn PointMatcher<f64, 3> + Send + Sync> = Box::new(LinearAssignment::default());
+    /// let chosen: Box<dyn PointMatcher<3> + Send + Sync> = Box::new(LinearAssignment::default());
     /// let pipeline = pipeline.with_matcher(chosen);
     /// assert_eq!(trial.press(&pipeline)?.matching(1)?.assignment, matching.assignment);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_matcher(
-        mut self,
-        matcher: impl PointMatcher<f64, 3> + Send + Sync + 'static,
-    ) -> Self {
+    pub fn with_matcher(mut self, matcher: impl PointMatcher<3> + Send + Sync + 'static) -> Self {
         self.matcher = Arc::new(matcher);
         self
     }

@@ -31,7 +31,7 @@ struct Loaded<'a> {
     contact: Option<Box<KnownContact>>,
     surface: Option<Box<ContactSurface>>,
     points: Option<ControlPoints>,
-    matching: Option<Box<Matching<f64, 3>>>,
+    matching: Option<Box<Matching<3>>>,
     strain: Option<Box<PairStrain>>,
 }
 

@@ -183,7 +183,7 @@ impl<'a> Press<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Match`] and those of [`control_points`](Self::control_points).
-    pub fn matching(&mut self, frame: usize) -> Result<&Matching<f64, 3>, PipelineError> {
+    pub fn matching(&mut self, frame: usize) -> Result<&Matching<3>, PipelineError> {
         self.control_points(0)?;
         self.control_points(frame)?;
         let at = self.twin(frame)?;

@@ -38,7 +38,7 @@ pub struct SessionStrain {
     /// Control points with a partner on the strained surface; 0 of a flat face, whose strain is that of its area.
     pub matched: usize,
     /// How the match went.
-    pub report: MatchReport<f64>,
+    pub report: MatchReport,
     /// The strain at the control points of the load it is counted from.
     pub strain: PairStrain,
 }
@@ -77,7 +77,7 @@ struct Anchor {
 struct Buffers {
     surface: ContactSurface,
     points: ControlPoints,
-    pairs: MatchedPairs<f64>,
+    pairs: MatchedPairs,
 }
 
 impl Default for Buffers {
