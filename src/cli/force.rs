@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
 }
 
 /// What casts doubt on a measurement; `step_grey` is how far the frame is from the reference where they differ most, if that is no noise.
-fn warnings(m: &ForceMeasurement<f64>, step_grey: Option<f64>) -> Vec<String> {
+fn warnings(m: &ForceMeasurement, step_grey: Option<f64>) -> Vec<String> {
     let edge = m.contact.is_some_and(|contact| contact.touches_edge);
     let outside = m.reading.is_some_and(|reading| reading.out_of_range);
     let warnings = [
@@ -128,9 +128,9 @@ fn warnings(m: &ForceMeasurement<f64>, step_grey: Option<f64>) -> Vec<String> {
     raised.chain(opposite).collect()
 }
 
-fn lines(m: &ForceMeasurement<f64>, warnings: &[String]) -> Vec<String> {
+fn lines(m: &ForceMeasurement, warnings: &[String]) -> Vec<String> {
     let warnings = warnings.iter().map(|w| format!("  warning      {w}"));
-    let estimate = |e: Estimate<f64>, scale| with_error(e.value, e.standard_error, scale);
+    let estimate = |e: Estimate, scale| with_error(e.value, e.standard_error, scale);
     let Some([x, y]) = m.centroid_m else {
         return std::iter::once("  no contact".to_owned())
             .chain(warnings)
@@ -153,8 +153,8 @@ fn lines(m: &ForceMeasurement<f64>, warnings: &[String]) -> Vec<String> {
     lines
 }
 
-fn value(m: &ForceMeasurement<f64>, warnings: &[String]) -> Value {
-    let estimate = |e: Estimate<f64>| [e.value, e.standard_error];
+fn value(m: &ForceMeasurement, warnings: &[String]) -> Value {
+    let estimate = |e: Estimate| [e.value, e.standard_error];
     json!({
         "contact": m.contact.is_some(),
         "force_n": estimate(m.force_n),
@@ -181,9 +181,8 @@ const HEADER: [&str; 11] = [
 ];
 
 /// A frame's row; NaN where there is no contact.
-fn row(k: usize, m: &ForceMeasurement<f64>) -> Vec<f64> {
-    let or_nan =
-        |e: Option<Estimate<f64>>| e.map_or([f64::NAN; 2], |e| [e.value, e.standard_error]);
+fn row(k: usize, m: &ForceMeasurement) -> Vec<f64> {
+    let or_nan = |e: Option<Estimate>| e.map_or([f64::NAN; 2], |e| [e.value, e.standard_error]);
     let centroid = |i: usize| m.centroid_m.map(|c| c[i]);
     let numbers = [
         Some(m.force_n),

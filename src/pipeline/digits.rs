@@ -17,7 +17,7 @@ pub(crate) fn with_error(value: f64, error: f64, scale: f64) -> String {
 }
 
 /// An estimate with its standard error, scaled to a unit.
-pub(super) fn estimate(e: Estimate<f64>, scale: f64) -> String {
+pub(super) fn estimate(e: Estimate, scale: f64) -> String {
     with_error(e.value, e.standard_error, scale)
 }
 

@@ -92,7 +92,7 @@ impl StageRunner {
         &mut self,
         frame: usize,
         image: ArrayView2<'_, u8>,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         contact: &mut FrameContact,
     ) -> Result<(), PipelineError> {
         let start = Instant::now();

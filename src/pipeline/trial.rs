@@ -31,7 +31,7 @@ pub struct Trial {
     /// Its frames and their truth.
     pub simulation: PressSimulation,
     /// What the calibration of this sensor with a gauge gave.
-    pub pairs: Vec<CalibrationPair<f64>>,
+    pub pairs: Vec<CalibrationPair>,
 }
 
 impl Trial {

@@ -25,7 +25,7 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoadedCalibration {
     /// Integrated pixel value and force.
-    Pairs(Vec<CalibrationPair<f64>>),
+    Pairs(Vec<CalibrationPair>),
     /// Darkness in grey levels and depth in metres.
     DepthTable(Vec<(f64, f64)>),
     /// None: the forces are a gauge's.
@@ -154,7 +154,7 @@ pub(super) fn read_image(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, Re
 }
 
 /// Pairs of integrated pixel value and force from a CSV file.
-pub(crate) fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair<f64>>, ReadError> {
+pub(crate) fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair>, ReadError> {
     let value = (&["integrated_pixel_value"][..], "grey_levels");
     let [values, forces] = read_columns(path, [value, (&["force"], "N")])?;
     let pairs = values.into_iter().zip(forces);

@@ -100,7 +100,7 @@ pub struct Sensor {
     pub noise: NoiseModel,
     /// Springs of shear, where they are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shear: Option<ShearCalibration<f64>>,
+    pub shear: Option<ShearCalibration>,
     /// The guide's layers from the object's side; empty: rigid.
     #[serde(default)]
     pub layers: Vec<SceneLayer>,

@@ -75,7 +75,7 @@ impl Default for CalibrationOptions {
 pub struct CalibrationSeries {
     /// Sum over the pixels of frame minus reference in 8-bit grey levels, and the gauge's reading with its noise, in the order they were taken: up
     /// and down again.
-    pub pairs: Vec<CalibrationPair<f64>>,
+    pub pairs: Vec<CalibrationPair>,
     /// The force itself of every pair, in newton.
     pub true_forces_n: Vec<f64>,
     /// Force over integrated pixel value in newton, without noise: exact for a linear response.

@@ -17,7 +17,6 @@
 //! | `pressure` | the local curve f of (5), fitted from frames |
 //! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
-//! | `image` | moments of float images, blobs averaged over pixels |
 //! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |
 //!
 //! # Equations
@@ -36,11 +35,9 @@ mod calibration;
 mod contact;
 mod drift;
 mod error;
-mod estimate;
 mod frame;
 mod health;
 mod hertz;
-mod image;
 mod lens;
 mod measure;
 mod pressure;
@@ -49,26 +46,21 @@ mod simd;
 
 pub use calibration::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, GreyHistogram,
-    Hysteresis, LinearCalibration, LocalCalibration, MonotoneCalibration, PolynomialCalibration,
-    Robustness, StopReason, StressCalibration,
+    Hysteresis, LinearCalibration, LocalCalibration, Robustness, StressCalibration,
 };
-pub use contact::{
-    Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
-};
+pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
 pub use drift::{DriftCorrection, DriftOutcome, IlluminationDrift};
 pub use error::ForceError;
-pub use estimate::{Estimate, Real};
-pub use frame::{
-    BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame,
-};
+pub use frame::{DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame};
 pub use health::{
     ChartState, FrameCondition, HealthMonitor, HealthOptions, HealthReport, StuckPixels,
 };
 pub use hertz::{HertzFit, HertzFitOptions, ProfileShape};
-pub use image::{GaussianProfile, HertzProfile, ImageMoments, PixelGrid, ProfileMoments};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use pressure::{
     CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
 };
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
+pub use tactile_core::{BoundingBox, CustomError, Estimate, InvalidOption, Polarity, StopReason};
+pub use {nalgebra, ndarray};

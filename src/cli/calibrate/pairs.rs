@@ -34,7 +34,7 @@ pub fn run(
     Ok(Exit::Complete)
 }
 
-pub fn read_pairs(path: &Path, there_and_back: bool) -> Result<Vec<CalibrationPair<f64>>, Failure> {
+pub fn read_pairs(path: &Path, there_and_back: bool) -> Result<Vec<CalibrationPair>, Failure> {
     let value = (
         &["integrated_pixel_value", "pixel_value"][..],
         "grey_levels",
@@ -57,13 +57,13 @@ pub fn read_pairs(path: &Path, there_and_back: bool) -> Result<Vec<CalibrationPa
     Ok(values.iter().zip(&forces).enumerate().map(pair).collect())
 }
 
-pub fn fit(path: &Path, pairs: &[CalibrationPair<f64>]) -> Result<LinearCalibration<f64>, Failure> {
+pub fn fit(path: &Path, pairs: &[CalibrationPair]) -> Result<LinearCalibration, Failure> {
     LinearCalibration::fit(pairs, &CalibrationOptions::default())
         .map_err(|error| Failure::input(format!("{}: {error}", path.display())))
 }
 
-pub fn print(line: &LinearCalibration<f64>, console: &mut Console) {
-    let report: &CalibrationReport<f64> = line.report();
+pub fn print(line: &LinearCalibration, console: &mut Console) {
+    let report: &CalibrationReport = line.report();
     console.line(format!("calibration, {} pairs:", report.pairs));
     for (name, unit, estimate) in [
         ("offset", "N", report.parameters.first()),
@@ -108,7 +108,7 @@ pub fn print(line: &LinearCalibration<f64>, console: &mut Console) {
     ));
 }
 
-pub fn value(line: &LinearCalibration<f64>) -> Value {
+pub fn value(line: &LinearCalibration) -> Value {
     let report = line.report();
     let parameters: Vec<[f64; 2]> = (report.parameters.iter())
         .map(|e| [e.value, e.standard_error])
@@ -127,7 +127,7 @@ pub fn value(line: &LinearCalibration<f64>) -> Value {
 }
 
 /// Pairs and line above, residuals below.
-pub fn page(pairs: &[CalibrationPair<f64>], line: &LinearCalibration<f64>) -> Page {
+pub fn page(pairs: &[CalibrationPair], line: &LinearCalibration) -> Page {
     let residuals = &line.report().residuals_n;
     let [low, high] = line.range();
     let x = "integrated pixel value (million grey levels)";

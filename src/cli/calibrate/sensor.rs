@@ -123,7 +123,7 @@ fn print(found: &CalibratedSensor, console: &mut Console) {
 }
 
 fn value(found: &CalibratedSensor) -> Result<Value, Failure> {
-    let pair = |e: Estimate<f64>| [e.value, e.standard_error];
+    let pair = |e: Estimate| [e.value, e.standard_error];
     let press = |p: &PressFinding| {
         let (shape, radius_m) = match p.indenter {
             Indenter::Ball { radius_m, .. } => ("ball", radius_m),

@@ -110,7 +110,7 @@ pub fn layer_words(finding: &LayerFinding) -> [String; 2] {
         "thickness_m" => ("thickness", 1e3, " mm"),
         _ => ("Poisson's ratio", 1.0, ""),
     };
-    let text = |e: Estimate<f64>| with_error(e.value, e.standard_error, scale);
+    let text = |e: Estimate| with_error(e.value, e.standard_error, scale);
     let (stated, fitted) = (text(finding.stated), text(finding.fitted));
     let says = if finding.identified {
         format!("{fitted}{unit} (stated {stated})")

@@ -102,7 +102,7 @@ impl Pipeline {
     /// # Errors
     /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`]; those of [`new`](Self::new).
     pub fn from_pairs(
-        pairs: &[CalibrationPair<f64>],
+        pairs: &[CalibrationPair],
         pixel_size_m: [f64; 2],
         object: Object,
     ) -> Result<Self, PipelineError> {

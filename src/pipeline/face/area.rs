@@ -263,10 +263,7 @@ impl FaceWorkspace {
         let [of_area, of_light] = [area, light].map(|m| m.about(centre[0], centre[1]));
         let pixel = hx * hy;
         Some(FaceReading {
-            area_m2: Estimate {
-                value: count * pixel,
-                standard_error: error * pixel,
-            },
+            area_m2: Estimate::new(count * pixel, error * pixel),
             edge_ratio: near[0] * far[1] / (near[1] * far[0]),
             outline_moment: 2.0 * std::f64::consts::PI * of_area / (count * pixel),
             light_moment: of_light / of_area,

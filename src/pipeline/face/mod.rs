@@ -68,7 +68,7 @@ const RING: u8 = 4;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FaceReading {
     /// Area within the outline in square metres.
-    pub area_m2: Estimate<f64>,
+    pub area_m2: Estimate,
     /// Light 3 to 5 pixels inside the outline over that 7 to 9 pixels inside: 1 for an even pressure, some 0.7 for a ball's.
     pub edge_ratio: f64,
     /// 2π (m_xx + m_yy)/A² of the outline, m the second moments about its centre: 1 for a disc, π/3 for a square.

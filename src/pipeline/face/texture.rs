@@ -27,7 +27,7 @@ const REACH_PX: f64 = 4.0;
 pub(in crate::pipeline) struct TextureStretch {
     pub points: usize,
     pub pairs: usize,
-    pub stretch: Estimate<f64>,
+    pub stretch: Estimate,
     /// Root mean square distance that the similarity leaves, and mean length of the displacement, in metres.
     pub residual_m: f64,
     pub displacement_m: f64,
@@ -130,10 +130,7 @@ pub(in crate::pipeline) fn stretch(
     Ok(Some(TextureStretch {
         points: model.len(),
         pairs: pairs.len(),
-        stretch: Estimate {
-            value: cosine.hypot(sine),
-            standard_error: (variance / spread).sqrt(),
-        },
+        stretch: Estimate::new(cosine.hypot(sine), (variance / spread).sqrt()),
         residual_m: (squares / n).sqrt(),
         displacement_m: displacement,
     }))

@@ -223,7 +223,7 @@ impl Press<'_> {
         let areas = [0, last].map(|frame| Some(self.reading(frame).ok()?.face?.area_m2));
         if let [Some(first), Some(second)] = areas {
             let outline = (second.value / first.value).sqrt();
-            let relative = |area: Estimate<f64>| area.standard_error / area.value;
+            let relative = |area: Estimate| area.standard_error / area.value;
             let error = 0.5 * outline * relative(first).hypot(relative(second));
             let apart = (outline - texture.stretch.value).abs();
             let allowed = SLIP_ERRORS * error.hypot(texture.stretch.standard_error);

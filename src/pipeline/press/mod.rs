@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// A frame and what is known of it so far.
 struct Loaded<'a> {
     image: FrameImage<'a>,
-    gauge: Option<Estimate<f64>>,
+    gauge: Option<Estimate>,
     /// Seconds since the object touched, where they are known.
     time_s: Option<f64>,
     // Boxed, so that thousands of frames, whose strain nobody asks for, take no room for it.
@@ -151,7 +151,7 @@ impl<'a> Press<'a> {
     /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?;
     /// let (reference, frame) = (hertz(0.0).mapv(|v| 255 - v), hertz(120.0).mapv(|v| 255 - v));
     /// let mut press = pipeline.press(reference.view())?;
-    /// let gauge = Estimate { value: 0.9, standard_error: 2e-3 };
+    /// let gauge = Estimate::new(0.9, 2e-3);
     /// assert_eq!(press.add_gauged_frame(frame.view(), Some(gauge)), 0);
     /// assert!(press.modulus().is_ok());
     /// press.add_frame(frame.view());
@@ -161,7 +161,7 @@ impl<'a> Press<'a> {
     pub fn add_gauged_frame(
         &mut self,
         image: ArrayView2<'a, u8>,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
     ) -> usize {
         let frame = FrameImage::Lent(image);
         let twin = self.twin_of(&frame, fingerprint(image), gauge);
@@ -193,7 +193,7 @@ impl<'a> Press<'a> {
     pub fn add_frame_on_demand(
         &mut self,
         image: ArrayView2<'_, u8>,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         read: impl Fn() -> Result<Array2<u8>, String> + Send + Sync + 'static,
     ) -> usize {
         let frame = FrameImage::on_demand(image, Arc::new(read));
@@ -206,7 +206,7 @@ impl<'a> Press<'a> {
         &mut self,
         image: &FrameImage<'a>,
         fingerprint: u64,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
     ) -> usize {
         let index = self.frames.len();
         let equal = |&&at: &&usize| {
@@ -221,7 +221,7 @@ impl<'a> Press<'a> {
         })
     }
 
-    fn push(&mut self, image: FrameImage<'a>, gauge: Option<Estimate<f64>>, twin: usize) -> usize {
+    fn push(&mut self, image: FrameImage<'a>, gauge: Option<Estimate>, twin: usize) -> usize {
         let index = self.frames.len();
         if twin != index && self.pipeline().settings().skips.equal_frames {
             let pixels = self.runner.reference().image().len();
@@ -267,7 +267,7 @@ impl<'a> Press<'a> {
     }
 
     /// The gauge's reading of a frame's force, if there was one.
-    pub(crate) fn gauge(&self, frame: usize) -> Option<Estimate<f64>> {
+    pub(crate) fn gauge(&self, frame: usize) -> Option<Estimate> {
         self.frames.get(frame)?.gauge
     }
 

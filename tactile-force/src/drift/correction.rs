@@ -10,7 +10,7 @@
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 20_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 23_u8);
 /// let options = ContactOptions::default().with_drift(DriftCorrection::Offset);
-/// let found: Detection<f64> =
+/// let found: Detection =
 ///     ContactDetector::new(options).detect_with(&mut Default::default(), brighter.view(), &reference)?;
 /// assert!(found.contact.is_none());
 /// assert!((found.drift.coefficients[0] - 3.0).abs() < 1e-9);
@@ -47,7 +47,7 @@ pub enum DriftCorrection {
 /// let outcome = |at_rest: u8, now: u8| -> Result<DriftOutcome, ForceError> {
 ///     let reference = ReferenceFrame::new(Array2::from_elem((160, 160), at_rest).view())?;
 ///     let frame = Array2::from_elem((160, 160), now);
-///     let found: Detection<f64> =
+///     let found: Detection =
 ///         ContactDetector::new(options).detect_with(&mut Default::default(), frame.view(), &reference)?;
 ///     Ok(found.drift.outcome)
 /// };

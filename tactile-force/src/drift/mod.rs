@@ -24,7 +24,7 @@ use crate::frame::TileSum;
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 100_u8).view())?;
 /// let brighter = Array2::from_elem((160, 160), 110_u8);
 /// let options = ContactOptions::default().with_drift(DriftCorrection::Illumination);
-/// let found: Detection<f64> =
+/// let found: Detection =
 ///     ContactDetector::new(options).detect_with(&mut Default::default(), brighter.view(), &reference)?;
 /// assert!((found.drift.coefficients[0] - 1.1).abs() < 1e-9);
 /// assert_eq!(found.drift.tiles, 20 * 5);

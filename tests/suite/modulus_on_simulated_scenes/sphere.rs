@@ -99,7 +99,7 @@ impl Presses {
 
     fn report(
         &self,
-        measured: &ForceMeasurement<f64>,
+        measured: &ForceMeasurement,
         load: &LoadState<f64>,
         found: &ModulusEstimate<f64>,
     ) {

@@ -61,10 +61,7 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
     let stiffness = options.shear_stiffness_n_per_m;
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let calibration = ShearCalibration {
-        stiffness_n_per_m: stiffness.map(|value| Estimate {
-            value,
-            standard_error: 0.0,
-        }),
+        stiffness_n_per_m: stiffness.map(|value| Estimate::new(value, 0.0)),
         residual_sd_n: [0.0; 2],
     };
     let pipeline = trial.pipeline().unwrap();

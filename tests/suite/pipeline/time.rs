@@ -42,10 +42,7 @@ fn measured(trial: &Trial, frames: &[Array2<u8>], gauge_n: Option<f64>) -> Measu
     let pipeline = trial.pipeline().unwrap().with_control_points(60);
     let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
     for (frame, time_s) in frames.iter().zip(TIMES_S) {
-        let gauge = gauge_n.map(|value| Estimate {
-            value,
-            standard_error: 1e-3 * value,
-        });
+        let gauge = gauge_n.map(|value| Estimate::new(value, 1e-3 * value));
         let added = press.add_gauged_frame(frame.view(), gauge);
         press.set_time_s(added, time_s).unwrap();
     }

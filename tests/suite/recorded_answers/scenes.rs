@@ -90,11 +90,8 @@ fn block() -> Vec<Answer> {
     answers.all
 }
 
-fn exactly(value: f64) -> Estimate<f64> {
-    Estimate {
-        value,
-        standard_error: 0.0,
-    }
+fn exactly(value: f64) -> Estimate {
+    Estimate::new(value, 0.0)
 }
 
 /// A sensor that darkens with depth, forces from a gauge.

@@ -94,7 +94,7 @@ fn object() -> Object {
 }
 
 /// Sums of the frames of the largest ball, as a line is fitted to.
-fn pairs(calibration: &SensorCalibration) -> Vec<CalibrationPair<f64>> {
+fn pairs(calibration: &SensorCalibration) -> Vec<CalibrationPair> {
     let mut pairs = vec![CalibrationPair::loading(0.0, 0.0)];
     let reference = calibration.references[0].mapv(f64::from);
     for given in calibration.presses.iter().skip(30) {

@@ -64,7 +64,7 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
             / (units.length * units.length),
         poisson_ratio: l.material.poisson_ratio,
     });
-    let scaled = |p: &CalibrationPair<f64>| CalibrationPair {
+    let scaled = |p: &CalibrationPair| CalibrationPair {
         integrated_pixel_value: p.integrated_pixel_value * units.grey,
         force_n: p.force_n * units.force,
         ..*p

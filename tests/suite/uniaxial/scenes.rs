@@ -90,7 +90,7 @@ impl Face {
 }
 
 /// A calibration without errors, `per_grey` newtons a grey level.
-pub(super) fn exact_pairs(per_grey: f64) -> Vec<CalibrationPair<f64>> {
+pub(super) fn exact_pairs(per_grey: f64) -> Vec<CalibrationPair> {
     let values = [0.0, 5e6, 10e6, 15e6, 20e6, 25e6];
     values
         .map(|v| CalibrationPair::loading(v, per_grey * v))

@@ -73,13 +73,7 @@ fn trial(seed: u64) -> Outcome {
     let mut press = pipeline.press(reference.view()).unwrap();
     for (frame, force) in frames.iter().zip(&scene.options().forces_n) {
         let value = scale * force + noise_n * normal();
-        press.add_gauged_frame(
-            frame.view(),
-            Some(Estimate {
-                value,
-                standard_error: noise_n,
-            }),
-        );
+        press.add_gauged_frame(frame.view(), Some(Estimate::new(value, noise_n)));
     }
     let found = press.modulus().unwrap();
     let signs_right = (1..loads).all(|load| {
