@@ -11,9 +11,7 @@ use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions, DetectorWorkspace,
     ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame,
 };
-use tactile_imaging::simulate::{
-    CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene,
-};
+use tactile_simulate::{CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene};
 
 struct Scene {
     scene: PressScene,

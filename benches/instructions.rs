@@ -8,9 +8,9 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng, rngs::SmallRng};
 use tactile_imaging::force::ReferenceFrame;
 use tactile_imaging::matching::{AnnealedSoftassign, PointMatcher};
-use tactile_imaging::pipeline::Trial;
-use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
 use tactile_imaging::tps::{FitOptions, NegR, ThinPlateSpline};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
 
 /// The job; its name is what callgrind looks for.
 #[inline(never)]

@@ -5,8 +5,9 @@ use std::error::Error;
 use tactile_imaging::matching::{
     AnnealedSoftassign, CoherentPointDrift, MatchError, Matching, PointMatcher, unmatched_rows,
 };
-use tactile_imaging::pipeline::{Pipeline, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, PressOptions};
+use tactile_imaging::pipeline::Pipeline;
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, PressOptions};
 
 /// The default matcher, of whose pairs only those count that are surely right.
 struct Certain {

@@ -39,7 +39,7 @@ fn greatest_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> f6
 }
 
 /// The step of a frame without contact that is not the reference's: other light, or the two swapped.
-pub(crate) fn clear_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
+pub fn clear_step(image: ArrayView2<'_, u8>, reference: ArrayView2<'_, u8>) -> Option<f64> {
     let grey = greatest_step(image, reference);
     (grey.abs() > CLEAR_STEP_GREY).then_some(grey)
 }

@@ -3,7 +3,7 @@
 use crate::force::Estimate;
 
 /// A value with its standard error, scaled to a unit: two significant digits of the error decide the decimals.
-pub(crate) fn with_error(value: f64, error: f64, scale: f64) -> String {
+pub fn with_error(value: f64, error: f64, scale: f64) -> String {
     let (value, error) = (value * scale, error * scale);
     if !(error > 0.0 && error.is_finite()) {
         return format!("{value:.4}");

@@ -53,7 +53,7 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
 /// What one frame says.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::FrameResult;
@@ -99,7 +99,7 @@ pub struct FrameResult {
 /// How the control points of the first and the last frame were matched.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::MatchResult;
@@ -132,7 +132,7 @@ pub struct MatchResult {
 /// The strain between the first and the last frame.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::StrainResult;
@@ -163,7 +163,7 @@ pub struct StrainResult {
 /// All results of a press: what a stage computed, or why it could not, whatever became of the others.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::Measurement;

@@ -54,12 +54,9 @@ mod source;
 mod strain_error;
 mod surface;
 mod time;
-#[cfg(feature = "simulate")]
-mod trial;
 
 pub use crate::sfs::{BallFit, Binning};
-#[cfg(feature = "cli")]
-pub(crate) use background::clear_step;
+pub use background::clear_step;
 pub use batch::contacts;
 pub use choice::{
     EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
@@ -69,8 +66,7 @@ pub use composition::Pipeline;
 pub use config::StagesConfig;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
-#[cfg(any(feature = "cli", feature = "plot"))]
-pub(crate) use digits::with_error;
+pub use digits::with_error;
 pub use error::PipelineError;
 pub use error_budget::{ErrorShare, ErrorSource};
 pub use face::{FaceReading, ShapeProblem};
@@ -87,5 +83,3 @@ pub use source::FrameSource;
 pub use source::ImageFolder;
 pub use surface::ContactSurface;
 pub use time::TimeResult;
-#[cfg(feature = "simulate")]
-pub use trial::Trial;

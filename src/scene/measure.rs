@@ -16,7 +16,7 @@ impl Scene {
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene, write_folder};
+    /// # use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene, write_folder};
     /// use tactile_imaging::scene::Scene;
     /// # let camera = Camera::default().coarser(16);
     /// # let made = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;

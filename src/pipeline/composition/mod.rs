@@ -115,7 +115,7 @@ impl Pipeline {
     }
 
     /// The contact stage.
-    pub(crate) fn contact(&self) -> &dyn ContactStage {
+    pub fn contact(&self) -> &dyn ContactStage {
         self.contact.as_ref()
     }
 

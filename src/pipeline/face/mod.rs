@@ -50,7 +50,7 @@ const RING: u8 = 4;
 ///
 /// ```
 /// use tactile_imaging::pipeline::{FaceReading, Object, Pipeline};
-/// use tactile_imaging::simulate::{Camera, UniaxialOptions, UniaxialScene};
+/// use tactile_simulate::{Camera, UniaxialOptions, UniaxialScene};
 /// # use tactile_imaging::force::CalibrationPair;
 /// let camera = Camera { shape: [300, 300], pixel_size_m: [48e-6; 2], ..Camera::default() };
 /// let scene = UniaxialScene::new(UniaxialOptions { camera, ..UniaxialOptions::default() })?;

@@ -31,7 +31,7 @@ impl Press<'_> {
     /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error stands in its place.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);

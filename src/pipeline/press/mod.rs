@@ -16,7 +16,6 @@ use crate::force::{Estimate, ReferenceFrame};
 use crate::matching::Matching;
 use frame_image::{FrameImage, fingerprint};
 use ndarray::{Array2, ArrayView2};
-#[cfg(feature = "plot")]
 use ndarray::{CowArray, Ix2};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -51,7 +50,7 @@ struct KnownContact {
 /// Made by [`Pipeline::press`].
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Stage;
@@ -118,9 +117,8 @@ impl Pipeline {
 
 impl<'a> Press<'a> {
     /// The same frames on the same reference, of which nothing is computed yet: to time it again.
-    #[cfg(feature = "cli")]
     #[must_use]
-    pub(crate) fn renewed(&self) -> Self {
+    pub fn renewed(&self) -> Self {
         let reference = Arc::clone(self.runner.reference());
         let mut press = self.pipeline().press_on(reference);
         for (index, frame) in self.frames.iter().enumerate() {
@@ -243,13 +241,12 @@ impl<'a> Press<'a> {
     }
 
     /// The pipeline.
-    pub(crate) fn pipeline(&self) -> &Pipeline {
+    pub fn pipeline(&self) -> &Pipeline {
         self.runner.pipeline()
     }
 
     /// The image of a frame.
-    #[cfg(feature = "plot")]
-    pub(crate) fn image(&self, frame: usize) -> Result<CowArray<'a, u8, Ix2>, PipelineError> {
+    pub fn image(&self, frame: usize) -> Result<CowArray<'a, u8, Ix2>, PipelineError> {
         let frames = self.frames.len();
         let loaded = self.frames.get(frame);
         let loaded = loaded.ok_or(PipelineError::NoSuchFrame { frame, frames })?;
@@ -267,7 +264,7 @@ impl<'a> Press<'a> {
     }
 
     /// The gauge's reading of a frame's force, if there was one.
-    pub(crate) fn gauge(&self, frame: usize) -> Option<Estimate> {
+    pub fn gauge(&self, frame: usize) -> Option<Estimate> {
         self.frames.get(frame)?.gauge
     }
 

@@ -81,7 +81,7 @@ impl<'a> Press<'a> {
     /// The surface of a frame's contact.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?;
@@ -136,7 +136,7 @@ impl<'a> Press<'a> {
     /// Control points on a frame's surface, in metres from the frame's first pixel.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
@@ -169,7 +169,7 @@ impl<'a> Press<'a> {
     /// The matches of the first frame's control points to those of a later frame.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);

@@ -33,8 +33,9 @@ pub use update::Update;
 ///
 /// ```
 /// use std::sync::Arc;
-/// use tactile_imaging::pipeline::{Session, Trial};
-/// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+/// use tactile_imaging::pipeline::Session;
+/// use tactile_simulate::Trial;
+/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
 /// let camera = Camera::default().coarser(8);
 /// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;

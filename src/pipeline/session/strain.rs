@@ -15,8 +15,9 @@ use ndarray::ArrayView2;
 ///
 /// ```
 /// # use std::sync::Arc;
-/// # use tactile_imaging::pipeline::{Session, Trial};
-/// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
+/// # use tactile_imaging::pipeline::Session;
+/// # use tactile_simulate::Trial;
+/// # use tactile_simulate::{Camera, CalibrationOptions, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;

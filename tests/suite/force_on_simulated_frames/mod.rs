@@ -13,9 +13,7 @@ use tactile_imaging::force::{
     ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair,
     ShearTracker, StressCalibration, measure_force,
 };
-use tactile_imaging::simulate::{
-    Camera, Gain, Illumination, Load, PressOptions, PressScene, PressTruth,
-};
+use tactile_simulate::{Camera, Gain, Illumination, Load, PressOptions, PressScene, PressTruth};
 
 /// A quarter of the default resolution, so that a thousand frames take seconds.
 fn camera() -> Camera {

@@ -2,7 +2,7 @@
 
 use super::{calibration, dark};
 use tactile_imaging::force::{Estimate, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame};
-use tactile_imaging::simulate::PressScene;
+use tactile_simulate::PressScene;
 
 /// Errors of one quantity over many seeds.
 pub(super) struct Errors {

@@ -3,8 +3,9 @@
 use super::trial;
 use ndarray::Array2;
 use tactile_imaging::force::{Estimate, ShearCalibration};
-use tactile_imaging::pipeline::{FrameSource, Session, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, LoadCycle, PressOptions};
+use tactile_imaging::pipeline::{FrameSource, Session};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, Gain, Load, LoadCycle, PressOptions};
 
 #[test]
 fn a_session_refines_the_modulus_and_agrees_with_a_press() {

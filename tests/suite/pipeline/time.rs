@@ -4,10 +4,9 @@ use super::trial;
 use ndarray::Array2;
 use tactile_imaging::elasticity::relaxation::{StandardLinearSolid, TimeDependence};
 use tactile_imaging::force::Estimate;
-use tactile_imaging::pipeline::{Flag, Measurement, PipelineError, Trial};
-use tactile_imaging::simulate::{
-    ContactLaw, Elastic, Gain, Load, PressOptions, PressScene, Sphere,
-};
+use tactile_imaging::pipeline::{Flag, Measurement, PipelineError};
+use tactile_simulate::Trial;
+use tactile_simulate::{ContactLaw, Elastic, Gain, Load, PressOptions, PressScene, Sphere};
 
 const TIMES_S: [f64; 8] = [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 

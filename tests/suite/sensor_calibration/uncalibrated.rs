@@ -8,7 +8,7 @@ use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::{CalibrationPair, ForceOptions};
 use tactile_imaging::pipeline::{Flag, LightContact, Object, Pipeline};
 use tactile_imaging::sensor::{Sensor, SensorCalibration, SensorError};
-use tactile_imaging::simulate::Camera;
+use tactile_simulate::Camera;
 
 /// What is left out of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
-use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
+use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
 
 /// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
 pub(crate) fn camera() -> Camera {

@@ -2,10 +2,10 @@
 use ndarray::Array2;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::Measurement;
-use tactile_imaging::simulate::{
+use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::{
     Camera, Elastic, FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene,
 };
-use tactile_imaging::{Object, Pipeline};
 
 /// A face of one brightness.
 pub(super) fn plain() -> SurfacePattern {

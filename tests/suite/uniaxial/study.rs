@@ -5,8 +5,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_imaging::force::{Estimate, ForceOptions};
 use tactile_imaging::pipeline::LightContact;
-use tactile_imaging::simulate::{Camera, FaceOutline};
 use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::{Camera, FaceOutline};
 
 /// Relative error that all readings of a gauge share: what a pipeline assumes unless told otherwise (`Settings::force_scale_error`).
 const GAUGE_SCALE: f64 = 1e-3;
