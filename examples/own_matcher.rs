@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 use std::error::Error;
 use tactile_imaging::matching::{MatchError, Matching, PointMatcher};
-use tactile_imaging::pipeline::Trial;
-use tactile_imaging::simulate::{CalibrationOptions, PressOptions};
+
+use tactile_simulate::{CalibrationOptions, PressOptions, Trial};
 
 /// Mutual nearest neighbours of both sets as they lie.
 struct MutualNearest;

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use tactile_imaging::elasticity::contact::ContactTable;
-use tactile_imaging::fem::{self, TableOptions, Load, Material, Object, Press};
+use tactile_imaging::fem::{self, Load, Material, Object, Press, TableOptions};
 use tactile_simulate::ContactState;
 
 /// A ball's radius and the layers (thickness, modulus) that it is pressed on; none is a rigid flat.
