@@ -1,8 +1,7 @@
 //! Support and Sinkhorn at every scale, far from the origin and with entries over 120 decades; the fast matcher under units and offsets.
 #![allow(clippy::print_stdout)]
 
-#[path = "../../../../evidence/worst.rs"]
-mod worst;
+use test_support as worst;
 
 use super::super::compatibility::{Compatibility, CompatibilityRule};
 use super::super::match_matrix::MatchMatrix;

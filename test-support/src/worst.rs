@@ -1,13 +1,13 @@
-//! Worst error over rounding times condition, one row a check; included by the stability suites of all crates.
+//! Worst error over rounding times condition, one row a check.
 
 /// The rows of one crate.
-pub(crate) struct Worst {
+pub struct Worst {
     heading: &'static str,
     rows: Vec<(String, f64, f64)>,
 }
 
 impl Worst {
-    pub(crate) fn new(heading: &'static str) -> Self {
+    pub fn new(heading: &'static str) -> Self {
         Self {
             heading,
             rows: Vec::new(),
@@ -15,7 +15,7 @@ impl Worst {
     }
 
     /// Enters an error in units of ε·cond; `bound` is what the check allows.
-    pub(crate) fn enter(&mut self, check: &str, units: f64, bound: f64) {
+    pub fn enter(&mut self, check: &str, units: f64, bound: f64) {
         match self.rows.iter_mut().find(|row| row.0 == check) {
             Some(row) if units <= row.1 => {}
             Some(row) => (row.1, row.2) = (units, bound),
@@ -24,7 +24,7 @@ impl Worst {
     }
 
     /// Prints the table and fails where a row is above its bound or NaN.
-    pub(crate) fn finish(self) {
+    pub fn finish(self) {
         println!(
             "{}: worst error / (epsilon * condition)\n  {:<48} {:>10} {:>10}",
             self.heading, "check", "worst", "allowed"
@@ -43,12 +43,12 @@ impl Worst {
 
 /// The cases of a file of `tests/reference`, written by `evidence/reference_cases.py`.
 #[allow(dead_code)]
-pub(crate) fn cases(text: &str) -> Vec<serde_json::Value> {
+pub fn cases(text: &str) -> Vec<serde_json::Value> {
     serde_json::from_str(text).expect("the file is JSON")
 }
 
 #[allow(dead_code)]
-pub(crate) fn numbers(value: &serde_json::Value) -> Vec<f64> {
+pub fn numbers(value: &serde_json::Value) -> Vec<f64> {
     value
         .as_array()
         .expect("an array")
@@ -58,7 +58,7 @@ pub(crate) fn numbers(value: &serde_json::Value) -> Vec<f64> {
 }
 
 #[allow(dead_code)]
-pub(crate) fn rows(value: &serde_json::Value) -> Vec<Vec<f64>> {
+pub fn rows(value: &serde_json::Value) -> Vec<Vec<f64>> {
     value
         .as_array()
         .expect("rows")

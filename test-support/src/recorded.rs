@@ -1,4 +1,4 @@
-//! Answers of the tests' scenes, compared with those of an earlier state: one file for all crates, included by path.
+//! Answers of the tests' scenes, compared with those of an earlier state: one format for all crates.
 //!
 //! A record is a text file of lines `name: number number …`. A change that is meant to leave every answer as it is shows that here. One
 //! that is meant to move answers writes the records anew with `RECORD_ANSWERS=1 cargo test -p CRATE --test suite recorded`: the
@@ -7,17 +7,13 @@ use std::fmt::Write as _;
 
 /// What a crate's scenes answer, in the order in which it was found.
 #[derive(Default)]
-pub(crate) struct Answers {
+pub struct Answers {
     /// What the numbers are, then the numbers.
     lines: Vec<(String, Vec<f64>)>,
 }
 
 impl Answers {
-    pub(crate) fn add(
-        &mut self,
-        name: impl std::fmt::Display,
-        numbers: impl IntoIterator<Item = f64>,
-    ) {
+    pub fn add(&mut self, name: impl std::fmt::Display, numbers: impl IntoIterator<Item = f64>) {
         self.lines
             .push((name.to_string(), numbers.into_iter().collect()));
     }
@@ -36,7 +32,7 @@ impl Answers {
     }
 
     /// What differs from the text of a record by more than `tolerance(name, number, largest number of the line)` allows.
-    pub(crate) fn differences(
+    pub fn differences(
         &self,
         record: &str,
         tolerance: impl Fn(&str, f64, f64) -> f64,
@@ -72,7 +68,7 @@ impl Answers {
     }
 
     /// Compares with the record at `path`, or writes it where the environment asks for that.
-    pub(crate) fn check(&self, path: &str, tolerance: impl Fn(&str, f64, f64) -> f64) {
+    pub fn check(&self, path: &str, tolerance: impl Fn(&str, f64, f64) -> f64) {
         if std::env::var_os("RECORD_ANSWERS").is_some() {
             std::fs::write(path, self.text()).expect("the record can be written");
             return;
