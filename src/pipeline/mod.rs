@@ -22,7 +22,6 @@
 //! result carries a flag. Specimens with a flat face are what (31) is exact for: stress over strain, regressed over all loads, the strain from the growth of the
 //! face's area. An object of unknown shape is read so if its contacts are those of a flat face, and refused with what to tell the program if not
 //! ([`PipelineError::NotUniaxial`]).
-mod background;
 mod batch;
 mod choice;
 mod composition;
@@ -55,8 +54,8 @@ mod strain_error;
 mod surface;
 mod time;
 
+pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
-pub use background::clear_step;
 pub use batch::contacts;
 pub use choice::{
     EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
@@ -69,7 +68,6 @@ pub use depth::DarkContact;
 pub use digits::with_error;
 pub use error::PipelineError;
 pub use error_budget::{ErrorShare, ErrorSource};
-pub use face::{FaceReading, ShapeProblem};
 pub use flag::Flag;
 pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 pub use object::Object;

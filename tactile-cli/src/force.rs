@@ -11,8 +11,9 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use tactile_imaging::force::{
     Estimate, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame,
+    background_shift,
 };
-use tactile_imaging::pipeline::{PipelineError, clear_step, with_error};
+use tactile_imaging::pipeline::{PipelineError, with_error};
 
 /// Measure force, contact radius, centroid and stress in frames of a sensor that grows brighter where it is pressed
 ///
@@ -82,7 +83,7 @@ pub fn run(arguments: &Arguments, context: &mut Context) -> Result<Exit, Failure
         context.console.line(format!("{name}:"));
         match found {
             Ok(measurement) => {
-                let step = clear_step(frame.view(), image.view());
+                let step = background_shift(frame.view(), image.view());
                 let warnings = warnings(&measurement, step);
                 let lines = lines(&measurement, &warnings);
                 lines.iter().for_each(|line| context.console.line(line));

@@ -9,6 +9,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `frame` | the pass over a frame, the reference, the noise of both, vignetting |
+//! | `face` | area and shape of flat faces, stretch of their texture |
 //! | `drift` | drift of illumination and stray light since the reference was taken |
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
@@ -35,6 +36,7 @@ mod calibration;
 mod contact;
 mod drift;
 mod error;
+mod face;
 mod frame;
 mod health;
 mod hertz;
@@ -49,8 +51,11 @@ pub use calibration::{
     Hysteresis, LinearCalibration, LocalCalibration, Robustness, StressCalibration,
 };
 pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
-pub use drift::{DriftCorrection, DriftOutcome, IlluminationDrift};
+pub use drift::{
+    DriftCorrection, DriftOutcome, IlluminationDrift, background_shift, median_shift_outside,
+};
 pub use error::ForceError;
+pub use face::{FaceReading, FaceWorkspace, ShapeProblem, TextureStretch, texture_spots};
 pub use frame::{DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame};
 pub use health::{
     ChartState, FrameCondition, HealthMonitor, HealthOptions, HealthReport, StuckPixels,

@@ -1,6 +1,7 @@
 //! What a frame says of its contact, and where in the frame the contact is.
-use crate::force::{BoundingBox, Estimate, ForceMeasurement, ProfileShape, StopReason};
-use crate::pipeline::face::FaceReading;
+use crate::force::{
+    BoundingBox, Estimate, FaceReading, ForceMeasurement, ProfileShape, StopReason,
+};
 use ndarray::Array2;
 
 /// What a frame says of its contact.

@@ -1,8 +1,7 @@
 //! Everything that the frames of a press say, in one go.
 use super::Press;
-use crate::force::Estimate;
+use crate::force::{Estimate, median_shift_outside};
 use crate::matching::StopReason;
-use crate::pipeline::background;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::face;
 use crate::pipeline::flag::Flag;
@@ -86,7 +85,7 @@ impl Press<'_> {
                 return known.light_step_grey;
             }
             let image = frame.image.get(index).ok()?;
-            background::median_step_outside(image.view(), reference, known.contact.bounds()?)
+            median_shift_outside(image.view(), reference, known.contact.bounds()?)
         });
         let greatest = steps.max_by_key(|step| step.abs())?;
         (greatest != 0).then_some(Flag::LightDrifted {
@@ -126,7 +125,7 @@ impl Press<'_> {
             }),
         );
         if let Some(face) = &reading.face
-            && face::sticks(face)
+            && face.sticks()
         {
             let edge_ratio = face.edge_ratio;
             flags.push(Flag::FaceSticks { frame, edge_ratio });

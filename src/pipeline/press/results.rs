@@ -1,10 +1,9 @@
 //! What a press says of its frames, one stage after the other: contact, surface, control points, match, strain.
 use super::{KnownContact, Loaded, Press};
+use crate::force::{TextureStretch, background_shift, median_shift_outside};
 use crate::matching::Matching;
-use crate::pipeline::background;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::face::TextureStretch;
 use crate::pipeline::pair::{MatchedPoints, PairStrain};
 use crate::pipeline::surface::{ContactSurface, ControlPoints};
 use nalgebra::Point3;
@@ -25,9 +24,8 @@ impl<'a> Press<'a> {
             if self.frames[at].image.is_on_demand() {
                 let reference = self.runner.reference().image();
                 let around = contact.bounds();
-                light_step_grey = around.and_then(|contact| {
-                    background::median_step_outside(image.view(), reference, contact)
-                });
+                light_step_grey = around
+                    .and_then(|contact| median_shift_outside(image.view(), reference, contact));
                 contact.mask = Array2::default((0, 0));
             }
             self.frames[at].contact = Some(Box::new(KnownContact {
@@ -72,7 +70,7 @@ impl<'a> Press<'a> {
         }
         let image = self.frames[self.twin(frame)?].image.get(frame)?;
         let reference = self.runner.reference().image();
-        Err(match background::clear_step(image.view(), reference) {
+        Err(match background_shift(image.view(), reference) {
             Some(grey) => PipelineError::OppositeSignal { frame, grey },
             None => PipelineError::NoContact { frame },
         })
