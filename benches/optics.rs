@@ -8,7 +8,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use tactile_imaging::optics::surface::{Dimple, Flat, TopSurface};
 use tactile_imaging::optics::trace::{Slab, SlabLayer, TraceOptions, trace};
 use tactile_imaging::optics::{Geometry, Led, acceptance_angle, fresnel, normal_incidence};
-use tactile_simulate::{Camera, PressOptions, PressScene};
+use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
 
 fn closed_forms(c: &mut Criterion) {
     let mut group = c.benchmark_group("optics/closed form");
@@ -31,7 +31,7 @@ fn closed_forms(c: &mut Criterion) {
     group.finish();
 }
 
-fn waveguide() -> [SlabLayer<f64>; 4] {
+fn waveguide() -> [SlabLayer; 4] {
     // From the object's side to the glass, §3.3.
     [(1.38, 2e-3), (1.39, 3e-3), (1.40, 5e-3), (1.4737, 2e-3)]
         .map(|(index, thickness_m)| SlabLayer { index, thickness_m })
@@ -42,7 +42,7 @@ fn rays(c: &mut Criterion) {
     let slab = Slab::new(&layers, 1.0, 30e-3).unwrap();
     let led = Led::new(1.0, 70_f64.to_radians()).unwrap();
     let dimple = Dimple::new([15e-3, 0.0], 5e-3, 1.5e-3).unwrap();
-    let surfaces: [(&str, &dyn TopSurface<f64>); 2] = [("flat", &Flat), ("dimple", &dimple)];
+    let surfaces: [(&str, &dyn TopSurface); 2] = [("flat", &Flat), ("dimple", &dimple)];
     let mut group = c.benchmark_group("optics/rays");
     for geometry in [Geometry::Section, Geometry::Volume] {
         for (name, surface) in surfaces {

@@ -9,10 +9,10 @@ use criterion::{
 };
 use ndarray::Array2;
 use tactile_imaging::sfs::{
-    Alignment, BoundaryCondition, Branch, BrooksHorn, ControlPointSampler, CosinePoisson,
-    CurvatureAdaptive, DepthTable, Domain, Eikonal, EquallySpaced, Frame, FrankotChellappa,
-    Lighting, MaskedLeastSquares, Pentland, Random, Scalar, SlopeIntegrator, Surface,
-    SurfaceReconstruction, TsaiShah, Workspace, height_error, slopes,
+    Alignment, BoundaryCondition, BrooksHorn, ControlPointSampler, CosinePoisson,
+    CurvatureAdaptive, DepthTable, Domain, Eikonal, EikonalBranch, EquallySpaced, Frame,
+    FrankotChellappa, Lighting, MaskedLeastSquares, PixelScalar, Random, SlopeIntegrator, Surface,
+    SurfaceReconstruction, SurfaceWorkspace, TsaiShah, height_error, slopes,
 };
 
 type Method = Box<dyn SurfaceReconstruction<f64>>;
@@ -139,7 +139,7 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
     let rim = eikonal
         .with_boundary(BoundaryCondition::Height(0.0))
         .unwrap()
-        .with_branch(Branch::Convex);
+        .with_branch(EikonalBranch::Convex);
     let mut methods: Vec<(&str, Method, &Domain<'_, f64>, Alignment)> = vec![
         (
             "eikonal-known",
@@ -162,17 +162,10 @@ fn survey_light(group: &mut BenchmarkGroup<'_, WallTime>, case: &Case, light: [f
     ];
     if lighting.direction() == [0.0, 0.0, 1.0] {
         methods.push(("eikonal-rim", Box::new(rim), &masked, Alignment::None));
-    } else {
-        methods.push((
-            "pentland",
-            Box::new(Pentland::new(lighting)),
-            &masked,
-            Alignment::Offset,
-        ));
     }
     for (name, method, domain, alignment) in methods {
         let id = format!("{name}/{}/{:?}", case.name, light.map(|v| v as i32)).replace(' ', "");
-        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
+        let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
         let frame = Frame::Real(image.view());
         method
             .reconstruct_with(&mut workspace, frame, domain, &mut surface)
@@ -240,8 +233,8 @@ fn contact_share(criterion: &mut Criterion) {
         let domain = Domain::default()
             .with_mask(mask.view())
             .with_known_heights(known.view());
-        let method = Eikonal::new(lighting).with_branch(Branch::Concave);
-        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
+        let method = Eikonal::new(lighting).with_branch(EikonalBranch::Concave);
+        let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
         group.bench_function(
             BenchmarkId::new("eikonal", format!("{percent}%/{columns}x{rows}")),
             |bencher| {
@@ -270,7 +263,7 @@ fn points(criterion: &mut Criterion) {
     for (name, sampler) in samplers {
         assert_eq!(
             sampler
-                .sample(z.view(), None, [1.0, 1.0], 200)
+                .sample(z.view(), &Domain::default(), 200)
                 .unwrap()
                 .len(),
             200
@@ -278,7 +271,7 @@ fn points(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::new(name, "200/300x300"), |bencher| {
             bencher.iter(|| {
                 sampler
-                    .sample(black_box(z.view()), None, [1.0, 1.0], 200)
+                    .sample(black_box(z.view()), &Domain::default(), 200)
                     .unwrap()
             });
         });
@@ -292,7 +285,7 @@ fn depth_table(criterion: &mut Criterion) {
     let table = DepthTable::new(&entries).unwrap();
     let image = Array2::from_shape_fn((1042, 1392), |(r, c)| ((r * 7 + c * 3) % 61) as u8);
     let domain = Domain::new([5e-5, 5e-5]).unwrap();
-    let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
+    let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
     group.throughput(Throughput::Elements(1042 * 1392));
     group.bench_function(BenchmarkId::new("depth-table", "1392x1042"), |bencher| {
         bencher.iter(|| {
@@ -338,7 +331,12 @@ fn bumps(rows: usize, columns: usize) -> [Array2<f64>; 3] {
     [z, p, q]
 }
 
-fn integrate_as<T: Scalar>(criterion: &mut Criterion, scalar: &str, rows: usize, columns: usize) {
+fn integrate_as<T: PixelScalar>(
+    criterion: &mut Criterion,
+    scalar: &str,
+    rows: usize,
+    columns: usize,
+) {
     let [z, p, q] = bumps(rows, columns);
     let (p, q) = (p.mapv(T::of), q.mapv(T::of));
     let mut group = criterion.benchmark_group("integrate");
@@ -355,7 +353,7 @@ fn integrate_as<T: Scalar>(criterion: &mut Criterion, scalar: &str, rows: usize,
         ),
     ];
     for (name, method, bound) in methods {
-        let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
+        let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
         let domain = Domain::default();
         method
             .integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)

@@ -10,9 +10,8 @@ use tactile_imaging::force::{
     Branch, CalibrationFrame, ContactOptions, DriftCorrection, ForceOptions, GreyHistogram,
     LensGeometry, PressureCurve,
 };
-use tactile_imaging::pipeline::{LightContact, Object, Session};
-use tactile_simulate::Trial;
-use tactile_simulate::{
+use tactile_imaging::pipeline::{LightContact, Object, Session, Trial};
+use tactile_imaging::simulate::{
     CalibrationOptions, Camera, Gain, Load, PressOptions, PressScene, PressSimulation,
 };
 

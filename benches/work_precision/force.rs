@@ -5,7 +5,7 @@ use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ForceMeter, ForceOptions, ForceWorkspace, HertzFitOptions,
     LinearCalibration, ReferenceFrame,
 };
-use tactile_simulate::{
+use tactile_imaging::simulate::{
     CalibrationOptions as SimulatedRun, Camera, Load, PressOptions, PressScene,
 };
 

@@ -23,7 +23,7 @@ fn rays(study: &mut Study, geometry: Geometry) {
         thickness_m: 10e-3,
     }];
     let slab = Slab::new(&layers, 1.0, 30e-3).expect("valid");
-    let guided = |options: &TraceOptions<f64>| {
+    let guided = |options: &TraceOptions| {
         trace(&slab, &Led::default(), &Flat, options, &mut [])
             .expect("valid")
             .guided

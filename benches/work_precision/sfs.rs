@@ -4,7 +4,7 @@ use crate::study::Study;
 use ndarray::Array2;
 use tactile_imaging::sfs::{
     Alignment, BoundaryCondition, BrooksHorn, CosinePoisson, Domain, Eikonal, FrankotChellappa,
-    Lighting, MaskedLeastSquares, Scalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
+    Lighting, MaskedLeastSquares, PixelScalar, SlopeIntegrator, SurfaceReconstruction, TsaiShah,
     height_error,
 };
 
@@ -126,23 +126,12 @@ pub(crate) fn slopes(study: &mut Study) {
             n,
             &FrankotChellappa,
         );
-        for tolerance in [1e-2, 1e-4, 1e-8] {
-            let method = MaskedLeastSquares::default()
-                .with_tolerance(tolerance)
-                .expect("valid");
-            integral::<f64>(
-                study,
-                "least squares",
-                &format!("{size}, {tolerance}"),
-                false,
-                n,
-                &method,
-            );
-        }
+        let method = MaskedLeastSquares::default();
+        integral::<f64>(study, "least squares", &size, false, n, &method);
     }
 }
 
-fn integral<T: Scalar>(
+fn integral<T: PixelScalar>(
     study: &mut Study,
     knob: &'static str,
     setting: &str,

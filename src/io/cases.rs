@@ -91,7 +91,10 @@ pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, ReadError> {
 ///
 /// # Errors
 /// As [`read_cases`].
-pub fn parse_cases(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<MatchCase>, ReadError> {
+pub(crate) fn parse_cases(
+    bytes: &[u8],
+    name: impl AsRef<Path>,
+) -> Result<Vec<MatchCase>, ReadError> {
     let path = name.as_ref();
     let text = String::from_utf8_lossy(bytes);
     let mut cases = Vec::new();
@@ -133,7 +136,7 @@ pub fn parse_cases(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<MatchCase
 ///
 /// # Panics
 /// Where `warped` and `assignment` differ in length.
-pub fn write_case_result<const D: usize>(
+pub(crate) fn write_case_result<const D: usize>(
     out: &mut impl Write,
     name: &str,
     time_ms: f64,

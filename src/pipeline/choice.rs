@@ -72,7 +72,7 @@ macro_rules! choice {
 }
 
 choice! {
-    /// Image to surface, under frontal light. Pentland's method needs oblique light: give it with its light to
+    /// Image to surface, under frontal light. Methods under another light go to
     /// [`Pipeline::with_surface`](super::Pipeline::with_surface).
     ///
     /// ```

@@ -3,10 +3,9 @@ use super::composition::Pipeline;
 use super::contact::FrameContact;
 use super::settings::{Settings, SurfaceInput};
 use crate::force::{BoundingBox, LensGeometry, LocalCalibration, Polarity};
-use crate::sfs::{BallFit, BinnedContact, Domain, Frame, SfsError, Surface, Workspace};
+use crate::sfs::{self, BallFit, BinnedContact, Domain, Frame, SfsError, Surface};
 use nalgebra::Point3;
 use ndarray::{ArrayView2, Axis, Slice};
-use std::sync::{Mutex, PoisonError};
 
 /// A reconstructed surface and its place in the frame.
 ///
@@ -113,27 +112,13 @@ fn origin_m(region: &BoundingBox, binning: usize, pixel_size_m: [f64; 2]) -> [f6
 }
 
 /// What the surface stage reuses from frame to frame.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct SurfaceWorkspace {
-    /// Behind a mutex, never locked, so that what holds it is `Sync` though progress callbacks are not.
-    sfs: Mutex<Workspace<f64>>,
+    sfs: sfs::SurfaceWorkspace<f64>,
     grid: BinnedContact,
 }
 
-impl Default for SurfaceWorkspace {
-    fn default() -> Self {
-        Self {
-            sfs: Mutex::new(Workspace::default()),
-            grid: BinnedContact::default(),
-        }
-    }
-}
-
 impl SurfaceWorkspace {
-    fn sfs(&mut self) -> &mut Workspace<f64> {
-        self.sfs.get_mut().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// The signal and the mask on the grid; returns the grid's box. With a curve the signal is the pressure over its peak.
     fn load(
         &mut self,
@@ -249,11 +234,12 @@ pub(super) fn reconstruct(
         .map(|size| size * side as f64);
     let domain = Domain::new(pixel_size_m)?.with_mask(workspace.grid.mask.view());
     let frame = Frame::Real(workspace.grid.signal.view());
-    let sfs = workspace.sfs.get_mut();
-    let sfs = sfs.unwrap_or_else(PoisonError::into_inner);
-    pipeline
-        .surface()
-        .reconstruct_with(sfs, frame, &domain, &mut surface.surface)?;
+    pipeline.surface().reconstruct_with(
+        &mut workspace.sfs,
+        frame,
+        &domain,
+        &mut surface.surface,
+    )?;
     surface.origin_m = origin_m(&region, side, pixel_size_m);
     (surface.region, surface.binning, surface.pixel_size_m) = (region, side, pixel_size_m);
     Ok(())
@@ -280,10 +266,10 @@ pub(super) fn sample(
     let count = pipeline.settings().control_points.min(usable);
     let size = surface.pixel_size_m;
     let points = &mut sampled.points;
-    let (heights, mask) = (heights.view(), Some(mask.view()));
+    let domain = Domain::new(size)?.with_mask(mask.view());
     pipeline
         .sampler()
-        .sample_with(workspace.sfs(), heights, mask, size, count, points)?;
+        .sample_with(&mut workspace.sfs, heights.view(), &domain, count, points)?;
     let [x, y] = surface.origin_m;
     for p in points {
         p.x += x;

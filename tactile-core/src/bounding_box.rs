@@ -1,6 +1,6 @@
 //! A rectangle of pixels.
 
-use ndarray::{ArrayView2, Axis, Slice};
+use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
 
 /// A rectangle of pixels, half open: rows `row_start..row_end`, columns `column_start..column_end`.
 ///
@@ -54,6 +54,12 @@ impl BoundingBox {
     pub fn of_mask(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let mut bounds: Option<Self> = None;
         for (row, line) in mask.outer_iter().enumerate() {
+            // Most rows of a large frame are empty. A fold without an early end is computed in wide instructions.
+            if let Some(line) = line.to_slice()
+                && !line.iter().fold(false, |any, &inside| any | inside)
+            {
+                continue;
+            }
             let Some(first) = line.iter().position(|&inside| inside) else {
                 continue;
             };
@@ -79,6 +85,25 @@ impl BoundingBox {
     #[must_use]
     pub const fn columns(&self) -> usize {
         self.column_end - self.column_start
+    }
+
+    /// Number of pixels.
+    #[must_use]
+    pub const fn area(&self) -> usize {
+        self.rows() * self.columns()
+    }
+
+    /// Row and column of its pixels, in reading order.
+    ///
+    /// ```
+    /// use tactile_core::BoundingBox;
+    /// let bounds = BoundingBox { row_start: 2, row_end: 4, column_start: 7, column_end: 9 };
+    /// assert!(bounds.pixels().eq([(2, 7), (2, 8), (3, 7), (3, 8)]));
+    /// ```
+    pub fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
+        let columns = self.column_start..self.column_end;
+        (self.row_start..self.row_end)
+            .flat_map(move |row| columns.clone().map(move |column| (row, column)))
     }
 
     /// Centre (x, y) in pixels.
@@ -108,6 +133,14 @@ impl BoundingBox {
     /// ```
     #[must_use]
     pub fn of<'a, P>(&self, mut image: ArrayView2<'a, P>) -> ArrayView2<'a, P> {
+        image.slice_axis_inplace(Axis(0), Slice::from(self.row_start..self.row_end));
+        image.slice_axis_inplace(Axis(1), Slice::from(self.column_start..self.column_end));
+        image
+    }
+
+    /// The part of a mutable image inside the box.
+    #[must_use]
+    pub fn of_mut<'a, P>(&self, mut image: ArrayViewMut2<'a, P>) -> ArrayViewMut2<'a, P> {
         image.slice_axis_inplace(Axis(0), Slice::from(self.row_start..self.row_end));
         image.slice_axis_inplace(Axis(1), Slice::from(self.column_start..self.column_end));
         image

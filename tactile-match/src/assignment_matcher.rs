@@ -4,6 +4,7 @@ use crate::hard::{self, Distances};
 use crate::validate::{point_sets, valid_distance};
 use crate::{MatchError, Matching, PointMatcher, linear_assignment};
 use nalgebra::Point;
+use tactile_tps::Scalar;
 
 /// Pairs the sets so that the sum of squared distances is least, by [`linear_assignment`].
 ///
@@ -46,12 +47,12 @@ impl LinearAssignment {
     }
 }
 
-impl<const D: usize> PointMatcher<D> for LinearAssignment {
+impl<T: Scalar, const D: usize> PointMatcher<T, D> for LinearAssignment {
     fn match_points(
         &self,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-    ) -> Result<Matching<D>, MatchError> {
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
         point_sets(model, target)?;
         let distances = Distances::new(model, target);
         let limit = distances.limit(self.max_distance);

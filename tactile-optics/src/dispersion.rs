@@ -1,8 +1,9 @@
 //! Refractive index as a function of wavelength, for PDMS and glass.
 
-use crate::error::OpticsError;
-use crate::real::{real, within};
-use num_traits::{Float, FloatConst};
+#[cfg(not(feature = "std"))]
+use num_traits::Float;
+
+use crate::error::{OpticsError, within};
 
 /// A dispersion formula and the range of wavelengths it was fitted on; λ is in micrometres inside the formulas.
 ///
@@ -96,28 +97,27 @@ impl Dispersion {
     /// assert!(Dispersion::PDMS_10_1.index(850e-9_f64).is_err());
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
-    pub fn index<T: Float + FloatConst>(&self, wavelength_m: T) -> Result<T, OpticsError> {
+    pub fn index(&self, wavelength_m: f64) -> Result<f64, OpticsError> {
         let [shortest, longest] = self.range_m();
-        // The ends themselves may be rounded in a short scalar.
+        // The ends themselves may be rounded.
         within(
             "wavelength in metres",
             wavelength_m,
             shortest * (1.0 - 1e-7),
             longest * (1.0 + 1e-7),
         )?;
-        let square = (wavelength_m * real(1e6)).powi(2);
+        let square = (wavelength_m * 1e6).powi(2);
         Ok(match self {
             Self::Cauchy {
                 coefficients: [a, b, c],
                 ..
-            } => real::<T>(*a) + (real::<T>(*b) + real::<T>(*c) / square) / square,
+            } => *a + (*b + *c / square) / square,
             Self::Sellmeier {
                 constant, terms, ..
             } => {
-                let mut n_squared = T::one() + real(*constant);
+                let mut n_squared = 1.0 + *constant;
                 for &[strength, resonance] in terms {
-                    n_squared =
-                        n_squared + real::<T>(strength) * square / (square - real(resonance));
+                    n_squared = n_squared + strength * square / (square - resonance);
                 }
                 n_squared.sqrt()
             }
@@ -133,12 +133,12 @@ impl Dispersion {
     /// use tactile_optics::Dispersion;
     ///
     /// // Schott's catalogue has 64.17.
-    /// assert!((Dispersion::N_BK7.abbe_number::<f64>()? - 64.17).abs() < 0.01);
+    /// assert!((Dispersion::N_BK7.abbe_number()? - 64.17).abs() < 0.01);
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
-    pub fn abbe_number<T: Float + FloatConst>(&self) -> Result<T, OpticsError> {
-        let [d, f, c] = [587.56e-9, 486.13e-9, 656.27e-9].map(|w| self.index(real::<T>(w)));
-        Ok((d? - T::one()) / (f? - c?))
+    pub fn abbe_number(&self) -> Result<f64, OpticsError> {
+        let [d, f, c] = [587.56e-9, 486.13e-9, 656.27e-9].map(|w| self.index(w));
+        Ok((d? - 1.0) / (f? - c?))
     }
 
     /// Shortest and longest wavelength of the fit in metres.

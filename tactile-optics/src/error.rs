@@ -1,6 +1,6 @@
 //! The errors of this crate.
 
-/// The reason why an input was rejected. Values are reported as `f64` whatever the scalar in use.
+/// The reason why an input was rejected.
 ///
 /// ```
 /// use tactile_optics::{OpticsError, critical_angle};
@@ -29,4 +29,28 @@ pub enum OpticsError {
         /// Name of the list.
         quantity: &'static str,
     },
+}
+
+/// `found` if it lies in `minimum..=maximum`.
+pub(crate) fn within(
+    quantity: &'static str,
+    found: f64,
+    minimum: f64,
+    maximum: f64,
+) -> Result<f64, OpticsError> {
+    if (minimum..=maximum).contains(&found) {
+        Ok(found)
+    } else {
+        Err(OpticsError::OutOfRange {
+            quantity,
+            minimum,
+            maximum,
+            found,
+        })
+    }
+}
+
+/// A refractive index: positive and finite.
+pub(crate) fn index(n: f64) -> Result<f64, OpticsError> {
+    within("refractive index", n, f64::MIN_POSITIVE, f64::MAX)
 }

@@ -1,9 +1,12 @@
 //! The LED at the slab's edge: its radiation pattern, and the share of its light that a layer traps.
 
+use core::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
+
+#[cfg(not(feature = "std"))]
+use num_traits::Float;
+
 use crate::angle::Angle;
-use crate::error::OpticsError;
-use crate::real::{real, within};
-use num_traits::{Float, FloatConst};
+use crate::error::{OpticsError, within};
 
 /// The directions that light may take: one plane, or all of space.
 ///
@@ -40,37 +43,37 @@ pub enum Geometry {
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Led<T> {
-    exponent: T,
-    half_angle: T,
+pub struct Led {
+    exponent: f64,
+    half_angle: f64,
 }
 
-impl<T: Float + FloatConst> Default for Led<T> {
+impl Default for Led {
     /// A Lambertian LED: m = 1 up to a right angle.
     fn default() -> Self {
         Self {
-            exponent: T::one(),
-            half_angle: T::FRAC_PI_2(),
+            exponent: 1.0,
+            half_angle: FRAC_PI_2,
         }
     }
 }
 
-impl<T: Float + FloatConst> Led<T> {
+impl Led {
     /// Intensity ∝ cosᵐ θ for θ below `half_angle`; m = 1 is Lambertian (the default), m = 0 even.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for an exponent outside 0 to 1000 or a half angle outside (0, π/2].
-    pub fn new(exponent: T, half_angle: T) -> Result<Self, OpticsError> {
+    pub fn new(exponent: f64, half_angle: f64) -> Result<Self, OpticsError> {
         within("exponent of the radiation pattern", exponent, 0.0, 1000.0)?;
         within(
             "half angle of the LED",
             half_angle,
             1e-6,
-            core::f64::consts::FRAC_PI_2 * (1.0 + 1e-7),
+            FRAC_PI_2 * (1.0 + 1e-7),
         )?;
         Ok(Self {
             exponent,
-            half_angle: half_angle.min(T::FRAC_PI_2()),
+            half_angle: half_angle.min(FRAC_PI_2),
         })
     }
 
@@ -78,9 +81,9 @@ impl<T: Float + FloatConst> Led<T> {
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for an angle outside 0.04 to 1.57 (beyond which m leaves 0 to 1000).
-    pub fn from_half_intensity_angle(angle: T) -> Result<Self, OpticsError> {
+    pub fn from_half_intensity_angle(angle: f64) -> Result<Self, OpticsError> {
         within("half-intensity angle", angle, 0.04, 1.57)?;
-        Self::new(real::<T>(0.5).ln() / angle.cos().ln(), T::FRAC_PI_2())
+        Self::new(0.5_f64.ln() / angle.cos().ln(), FRAC_PI_2)
     }
 
     /// The share of the LED's light that a layer of this acceptance angle traps, before losses at the entry.
@@ -90,69 +93,64 @@ impl<T: Float + FloatConst> Led<T> {
     /// quadrature, some 10⁻¹² in `f64`.
     ///
     /// ```
-    /// use tactile_optics::{acceptance_angle, led::{Geometry, Led}};
+    /// use tactile_optics::{Geometry, Led, acceptance_angle};
     /// let share = Led::default().trapped_share(acceptance_angle(1.38_f64, 1.0)?, Geometry::Section);
     /// assert!((share - (1.38_f64 * 1.38 - 1.0).sqrt()).abs() < 1e-12);
     /// # Ok::<(), tactile_optics::OpticsError>(())
     /// ```
-    pub fn trapped_share(&self, acceptance: Angle<T>, geometry: Geometry) -> T {
+    pub fn trapped_share(&self, acceptance: Angle, geometry: Geometry) -> f64 {
         let limit = acceptance.radians.min(self.half_angle);
         if geometry == Geometry::Section {
-            let intensity = |t: T| t.cos().max(T::zero()).powf(self.exponent);
-            return integral(T::zero(), limit, intensity)
-                / integral(T::zero(), self.half_angle, intensity);
+            let intensity = |t: f64| t.cos().max(0.0).powf(self.exponent);
+            return integral(0.0, limit, intensity) / integral(0.0, self.half_angle, intensity);
         }
-        let flux = |t: T| t.cos().max(T::zero()).powf(self.exponent) * t.sin();
+        let flux = |t: f64| t.cos().max(0.0).powf(self.exponent) * t.sin();
         let slope = acceptance.radians.sin();
         // Beyond θᵢ the trapped part falls with an infinite slope; substituting θ = θᵢ + t² removes it.
-        let outer = |t: T| {
+        let outer = |t: f64| {
             let theta = limit + t * t;
-            let part = (slope / theta.sin()).min(T::one()).asin() * T::FRAC_2_PI();
+            let part = (slope / theta.sin()).min(1.0).asin() * FRAC_2_PI;
             flux(theta) * part * (t + t)
         };
-        let trapped = integral(T::zero(), limit, flux)
-            + integral(
-                T::zero(),
-                (self.half_angle - limit).max(T::zero()).sqrt(),
-                outer,
-            );
-        trapped / integral(T::zero(), self.half_angle, flux)
+        let trapped = integral(0.0, limit, flux)
+            + integral(0.0, (self.half_angle - limit).max(0.0).sqrt(), outer);
+        trapped / integral(0.0, self.half_angle, flux)
     }
 
     /// The direction that two numbers in [0, 1) stand for: components along the axis, across it in the slab's plane, and
     /// along the slab's normal; and the weight of the direction, 1 on average.
-    pub(crate) fn direction(&self, u: T, v: T, geometry: Geometry) -> ([T; 3], T) {
-        let one = T::one();
+    pub(crate) fn direction(&self, u: f64, v: f64, geometry: Geometry) -> ([f64; 3], f64) {
+        let one = 1.0;
         if geometry == Geometry::Section {
             let theta = (u + u - one) * self.half_angle;
             return (
-                [theta.cos(), T::zero(), theta.sin()],
-                theta.cos().max(T::zero()).powf(self.exponent),
+                [theta.cos(), 0.0, theta.sin()],
+                theta.cos().max(0.0).powf(self.exponent),
             );
         }
         let power = self.exponent + one;
-        let edge = self.half_angle.cos().max(T::zero()).powf(power);
+        let edge = self.half_angle.cos().max(0.0).powf(power);
         let cosine = (one - u * (one - edge)).powf(power.recip());
-        let sine = ((one - cosine) * (one + cosine)).max(T::zero()).sqrt();
-        let (across, up) = ((v + v) * T::PI()).sin_cos();
+        let sine = ((one - cosine) * (one + cosine)).max(0.0).sqrt();
+        let (across, up) = ((v + v) * PI).sin_cos();
         ([cosine, sine * across, sine * up], one)
     }
 }
 
 /// ∫ f from `a` to `b` by the five-point Gauss–Legendre rule on 32 panels.
-fn integral<T: Float + FloatConst>(a: T, b: T, f: impl Fn(T) -> T) -> T {
+fn integral(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     const NODES: [(f64, f64); 3] = [
         (0.0, 0.568_888_888_888_888_9),
         (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
         (0.906_179_845_938_664, 0.236_926_885_056_189_1),
     ];
     const PANELS: usize = 32;
-    let half = (b - a) / real(2.0 * PANELS as f64);
-    let mut sum = T::zero();
+    let half = (b - a) / (2.0 * PANELS as f64);
+    let mut sum = 0.0;
     for panel in 0..PANELS {
-        let middle = a + half * real((2 * panel + 1) as f64);
+        let middle = a + half * ((2 * panel + 1) as f64);
         for (k, (node, weight)) in NODES.iter().enumerate() {
-            let (offset, weight) = (half * real(*node), real::<T>(*weight));
+            let (offset, weight) = (half * *node, *weight);
             sum = sum + weight * f(middle + offset);
             if k > 0 {
                 sum = sum + weight * f(middle - offset);

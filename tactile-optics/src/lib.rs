@@ -1,24 +1,23 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # Modules
+//! # Contents
 //!
-//! | module | contents |
+//! | functions and types | contents |
 //! |---|---|
-//! | [`angle`] | critical and acceptance angles, (1)–(4) |
-//! | [`snell`] | propagation angles through a stack |
-//! | [`mod@fresnel`] | reflectance and transmittance, s, p and unpolarised |
-//! | [`stack`] | a stack of layers in its ambient: normal incidence, the LED's cone |
-//! | [`dispersion`] | refractive index as a function of wavelength; PDMS and borosilicate glass |
-//! | [`led`] | radiation pattern and the share of it that is trapped |
+//! | [`critical_angle`], [`acceptance_angle`], [`propagation`] | the angles of a layer, (1)–(4), and through a stack |
+//! | [`fresnel`] | reflectance and transmittance, s, p and unpolarised |
+//! | [`normal_incidence`], [`led_cone`] | a stack of layers in its ambient |
+//! | [`Dispersion`] | refractive index as a function of wavelength, of PDMS and borosilicate glass |
+//! | [`Led`] | radiation pattern and the share of it that is trapped |
 //! | [`surface`] | the slab's deformed top and the object that touches it |
-//! | [`trace`] | ray tracing through the slab: the light budget of a press |
-//! | [`sensor`] | Table 1: grid elements, temporal and force resolution |
+//! | [`trace`](mod@trace) | ray tracing through the slab: the light budget of a press |
+//! | [`SensorSpecification`] | Table 1: grid elements, temporal and force resolution |
 //!
 //! # Conventions
 //! Angles in radians unless the name says degrees; angles of incidence are measured from the normal of the interface,
 //! the LED's from its axis. Lengths in metres. Layers count from the object's side towards the glass, and their indices
-//! grow that way as in §3.3: 1.38, 1.39, 1.40, glass 1.41. Every function is generic over `f32` and `f64`,
-//! allocates nothing, and needs no standard library.
+//! grow that way as in §3.3: 1.38, 1.39, 1.40, glass 1.41. Nothing allocates or needs the
+//! standard library.
 //!
 //! # Equations
 //! Equation numbers are the paper's. $n_i$ is a layer's index, $n_0$ the ambient's, $\theta$ an angle of incidence.
@@ -37,23 +36,20 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod angle;
-pub mod dispersion;
+mod angle;
+mod dispersion;
 mod error;
-pub mod fresnel;
-pub mod led;
-mod real;
-pub mod sensor;
-pub mod snell;
-pub mod stack;
+mod fresnel;
+mod led;
+mod sensor;
+mod stack;
 pub mod surface;
 pub mod trace;
 
-pub use angle::{Angle, acceptance_angle, critical_angle};
+pub use angle::{Angle, acceptance_angle, critical_angle, propagation};
 pub use dispersion::Dispersion;
 pub use error::OpticsError;
 pub use fresnel::{Fresnel, fresnel};
 pub use led::{Geometry, Led};
 pub use sensor::{SensorParameters, SensorSpecification};
-pub use snell::propagation;
 pub use stack::{LedCone, NormalIncidence, led_cone, normal_incidence};

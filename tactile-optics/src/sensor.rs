@@ -1,8 +1,9 @@
 //! The sensor's figures of merit (§3.4 and Table 1) from its parameters.
 
-use crate::error::OpticsError;
-use crate::real::within;
-use num_traits::{Float, FloatConst};
+#[cfg(not(feature = "std"))]
+use num_traits::Float;
+
+use crate::error::{OpticsError, within};
 
 /// The parameters from which a [`SensorSpecification`] follows.
 ///
@@ -24,21 +25,21 @@ use num_traits::{Float, FloatConst};
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensorParameters<T> {
+pub struct SensorParameters {
     /// Side of the sensing area in metres.
-    pub side_m: T,
+    pub side_m: f64,
     /// Size of a pixel in metres.
-    pub pixel_m: T,
+    pub pixel_m: f64,
     /// Frames per second.
-    pub frame_rate_hz: T,
+    pub frame_rate_hz: f64,
     /// Largest force in newtons.
-    pub largest_force_n: T,
+    pub largest_force_n: f64,
     /// Force over integrated pixel value, in newtons per grey level.
-    pub newton_per_grey: T,
+    pub newton_per_grey: f64,
     /// Standard deviation of a pixel's noise in grey levels.
-    pub pixel_noise_grey: T,
+    pub pixel_noise_grey: f64,
     /// Number of pixels that are summed for a force.
-    pub summed_pixels: T,
+    pub summed_pixels: f64,
 }
 
 /// Resolution of a sensor in space, time and force.
@@ -66,19 +67,19 @@ pub struct SensorParameters<T> {
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensorSpecification<T> {
+pub struct SensorSpecification {
     /// Pixels along a side: 6452 (6451.6) for the paper's 30 mm of 4.65 µm, where §3.4 prints 6415.
-    pub grid_elements: T,
+    pub grid_elements: f64,
     /// Seconds between frames: 12.5 ms at the paper's 80 frames per second.
-    pub temporal_resolution_s: T,
+    pub temporal_resolution_s: f64,
     /// The smallest force distinguished from none, in newtons: k σ_pixel √pixels × √2 × newtons per grey level, k the number
     /// of standard deviations asked for. The √2 is the reference frame's noise, which is as large as the frame's.
-    pub force_resolution_n: T,
+    pub force_resolution_n: f64,
     /// Number of forces distinguished between none and the largest.
-    pub force_levels: T,
+    pub force_levels: f64,
 }
 
-impl SensorSpecification<f64> {
+impl SensorSpecification {
     /// The sensor's force sensitivity in newtons, 2.5 mN, as the paper's text gives it. Table 1 swaps it with
     /// [`FINGERTIP_FORCE_SENSITIVITY_N`](Self::FINGERTIP_FORCE_SENSITIVITY_N).
     pub const PAPER_FORCE_SENSITIVITY_N: f64 = 2.5e-3;
@@ -87,12 +88,12 @@ impl SensorSpecification<f64> {
     pub const FINGERTIP_FORCE_SENSITIVITY_N: f64 = 2.0e-2;
 }
 
-impl<T: Float + FloatConst> SensorSpecification<T> {
+impl SensorSpecification {
     /// The specification of a sensor whose smallest force stands out by `sigmas` standard deviations of the noise.
     ///
     /// # Errors
     /// [`OpticsError::OutOfRange`] for a parameter that is not positive and finite; the noise may be zero.
-    pub fn new(parameters: &SensorParameters<T>, sigmas: T) -> Result<Self, OpticsError> {
+    pub fn new(parameters: &SensorParameters, sigmas: f64) -> Result<Self, OpticsError> {
         let p = parameters;
         for (name, value) in [
             ("side of the sensing area", p.side_m),
@@ -106,7 +107,7 @@ impl<T: Float + FloatConst> SensorSpecification<T> {
             within(name, value, f64::MIN_POSITIVE, f64::MAX)?;
         }
         within("noise of a pixel", p.pixel_noise_grey, 0.0, f64::MAX)?;
-        let two = T::one() + T::one();
+        let two = 1.0 + 1.0;
         let force_resolution_n =
             sigmas * p.pixel_noise_grey * (two * p.summed_pixels).sqrt() * p.newton_per_grey;
         Ok(Self {

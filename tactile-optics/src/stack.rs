@@ -4,10 +4,10 @@
 //! Critical, acceptance and propagation angles are per layer: call [`critical_angle`](crate::critical_angle),
 //! [`acceptance_angle`] or [`propagation`](crate::propagation) on the index wanted.
 
+use core::f64::consts::PI;
+
 use crate::angle::{Angle, acceptance_angle};
-use crate::error::OpticsError;
-use crate::real::{index, real, within};
-use num_traits::{Float, FloatConst};
+use crate::error::{OpticsError, index, within};
 
 /// Transmittance and reflectance of a lossless stack at normal incidence, from [`normal_incidence`].
 ///
@@ -23,13 +23,13 @@ use num_traits::{Float, FloatConst};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub struct NormalIncidence<T> {
+pub struct NormalIncidence {
     /// Transmittance if what is reflected once is lost, Π(1 − Rⱼ).
-    pub single_pass: T,
+    pub single_pass: f64,
     /// Transmittance with all reflections added by intensity, 1/(1 + Σ Rⱼ/(1 − Rⱼ)).
-    pub transmittance: T,
+    pub transmittance: f64,
     /// Reflectance with all reflections added by intensity, 1 − transmittance.
-    pub reflectance: T,
+    pub reflectance: f64,
 }
 
 /// The comparison of an LED's cone of light with the acceptance angles of a stack, from [`led_cone`].
@@ -45,14 +45,14 @@ pub struct NormalIncidence<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub struct LedCone<T> {
+pub struct LedCone {
     /// Full angle of the LED's cone in radians.
-    pub full_angle: T,
+    pub full_angle: f64,
     /// The smallest acceptance angle of the layers.
-    pub weakest: Angle<T>,
+    pub weakest: Angle,
     /// The largest full angle trapped, twice the weakest layer's acceptance angle, less the cone's. Negative: that much
     /// too wide. A cone of less than π inside a stack that traps every ray has at least π less its own angle.
-    pub margin: T,
+    pub margin: f64,
     /// Whether every ray of the cone is trapped.
     pub trapped: bool,
 }
@@ -73,13 +73,10 @@ pub struct LedCone<T> {
 /// assert!(coated.reflectance < 0.55 * bare.reflectance);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
-pub fn normal_incidence<T: Float + FloatConst>(
-    indices: &[T],
-    ambient: T,
-) -> Result<NormalIncidence<T>, OpticsError> {
+pub fn normal_incidence(indices: &[f64], ambient: f64) -> Result<NormalIncidence, OpticsError> {
     checked(indices, ambient)?;
-    let four = real::<T>(4.0);
-    let (mut single_pass, mut reflected) = (T::one(), T::zero());
+    let four = 4.0;
+    let (mut single_pass, mut reflected) = (1.0, 0.0);
     let mut before = ambient;
     for after in indices.iter().copied().chain(core::iter::once(ambient)) {
         let (sum, step) = (before + after, before - after);
@@ -89,8 +86,8 @@ pub fn normal_incidence<T: Float + FloatConst>(
     }
     Ok(NormalIncidence {
         single_pass,
-        transmittance: (T::one() + reflected).recip(),
-        reflectance: reflected / (T::one() + reflected),
+        transmittance: (1.0 + reflected).recip(),
+        reflectance: reflected / (1.0 + reflected),
     })
 }
 
@@ -109,18 +106,9 @@ pub fn normal_incidence<T: Float + FloatConst>(
 /// assert!(!led_cone(&layers, 1.0, 150.0_f64.to_radians())?.trapped);
 /// # Ok::<(), tactile_optics::OpticsError>(())
 /// ```
-pub fn led_cone<T: Float + FloatConst>(
-    indices: &[T],
-    ambient: T,
-    full_angle: T,
-) -> Result<LedCone<T>, OpticsError> {
+pub fn led_cone(indices: &[f64], ambient: f64, full_angle: f64) -> Result<LedCone, OpticsError> {
     checked(indices, ambient)?;
-    within(
-        "full angle of the cone",
-        full_angle,
-        0.0,
-        core::f64::consts::PI * (1.0 + 1e-7),
-    )?;
+    within("full angle of the cone", full_angle, 0.0, PI * (1.0 + 1e-7))?;
     let mut weakest = Angle::right();
     for &n in indices {
         let angle = acceptance_angle(n, ambient)?;
@@ -133,12 +121,11 @@ pub fn led_cone<T: Float + FloatConst>(
         full_angle,
         weakest,
         margin,
-        trapped: weakest.radians > T::zero()
-            && (weakest.complement == T::zero() || margin > T::zero()),
+        trapped: weakest.radians > 0.0 && (weakest.complement == 0.0 || margin > 0.0),
     })
 }
 
-fn checked<T: Float>(indices: &[T], ambient: T) -> Result<(), OpticsError> {
+fn checked(indices: &[f64], ambient: f64) -> Result<(), OpticsError> {
     if indices.is_empty() {
         return Err(OpticsError::Empty {
             quantity: "stack of layers",

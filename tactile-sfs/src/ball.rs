@@ -112,7 +112,7 @@ impl fmt::Display for BallFit {
 
 /// The pixels with a height as (x, y, z) in metres. `None` for a domain of another shape, or too few pixels to trust.
 fn pixels(heights: ArrayView2<'_, f64>, domain: &Domain<'_, f64>) -> Option<Vec<[f64; 3]>> {
-    domain.validate(heights.nrows(), heights.ncols()).ok()?;
+    domain.bounding_box(heights.dim()).ok()?;
     let [hx, hy] = domain.pixel_size_m;
     let inside = heights
         .indexed_iter()

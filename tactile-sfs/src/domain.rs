@@ -1,9 +1,9 @@
 //! Where to solve: mask, pixel size and the heights that are known.
 
-use ndarray::{ArrayView2, ArrayViewMut2, Axis, Slice};
+use ndarray::ArrayView2;
+use tactile_core::Requirement;
 
-use crate::error::positive;
-use crate::{Scalar, SfsError};
+use crate::{BoundingBox, PixelScalar, SfsError};
 
 /// The pixels to solve for, their size, and what is known of the heights.
 ///
@@ -30,7 +30,7 @@ pub struct Domain<'a, T> {
     pub known_heights: Option<ArrayView2<'a, T>>,
 }
 
-impl<T: Scalar> Default for Domain<'_, T> {
+impl<T: PixelScalar> Default for Domain<'_, T> {
     /// The whole image with heights in pixels.
     fn default() -> Self {
         Self {
@@ -41,11 +41,11 @@ impl<T: Scalar> Default for Domain<'_, T> {
     }
 }
 
-impl<'a, T: Scalar> Domain<'a, T> {
+impl<'a, T: PixelScalar> Domain<'a, T> {
     /// The whole image, pixels of the given width and height, nothing known.
     ///
     /// # Errors
-    /// [`SfsError::NotPositive`] unless both sizes are positive and finite.
+    /// [`SfsError::InvalidOption`] unless both sizes are positive and finite.
     pub fn new(pixel_size_m: [T; 2]) -> Result<Self, SfsError> {
         let domain = Self {
             mask: None,
@@ -85,40 +85,58 @@ impl<'a, T: Scalar> Domain<'a, T> {
     }
 
     fn check_pixel_size(&self) -> Result<(), SfsError> {
-        positive("pixel width", self.pixel_size_m[0].as_f64())?;
-        positive("pixel height", self.pixel_size_m[1].as_f64())
+        let [width, height] = self.pixel_size_m.map(T::as_f64);
+        Requirement::Positive.check("pixel width", width)?;
+        Requirement::Positive.check("pixel height", height)?;
+        Ok(())
     }
 
-    /// Checks everything against an image of `rows` × `columns` and returns the box that holds the mask.
-    pub(crate) fn validate(&self, rows: usize, columns: usize) -> Result<BoundingBox, SfsError> {
+    /// Checks the domain against an image of `shape` (rows, columns) and returns the box that holds the mask.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::{Domain, SfsError};
+    /// let mask = array![[false, true, true], [false, true, false]];
+    /// let domain = Domain::<f64>::default().with_mask(mask.view());
+    /// assert_eq!(domain.bounding_box((2, 3))?.columns(), 2);
+    /// assert!(domain.bounding_box((4, 4)).is_err()); // another shape
+    /// # Ok::<(), SfsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SfsError::EmptyImage`], [`SfsError::EmptyMask`], [`SfsError::ShapeMismatch`] of the mask or the known heights,
+    /// [`SfsError::InvalidOption`] for a pixel size that is not positive and finite.
+    pub fn bounding_box(&self, shape: (usize, usize)) -> Result<BoundingBox, SfsError> {
         self.check_pixel_size()?;
+        let (rows, columns) = shape;
         if rows == 0 || columns == 0 {
             return Err(SfsError::EmptyImage { rows, columns });
         }
         if let Some(known) = self.known_heights {
-            same_shape("known heights", [rows, columns], known.dim())?;
+            same_shape("known heights", shape, known.dim())?;
         }
         let Some(mask) = self.mask else {
-            return Ok(BoundingBox {
-                top: 0,
-                left: 0,
-                rows,
-                columns,
-            });
+            return Ok(BoundingBox::whole(shape));
         };
-        same_shape("mask", [rows, columns], mask.dim())?;
-        BoundingBox::of(mask).ok_or(SfsError::EmptyMask)
+        same_shape("mask", shape, mask.dim())?;
+        BoundingBox::of_mask(mask).ok_or(SfsError::EmptyMask)
     }
 
-    /// Whether the pixel is to be solved for.
+    /// Whether the height of a pixel is wanted.
+    ///
+    /// # Panics
+    /// If the pixel lies outside the mask's array.
     #[inline]
-    pub(crate) fn contains(&self, row: usize, column: usize) -> bool {
+    pub fn contains(&self, row: usize, column: usize) -> bool {
         self.mask.is_none_or(|mask| mask[[row, column]])
     }
 
     /// The known height of a pixel, if there is one.
+    ///
+    /// # Panics
+    /// If the pixel lies outside the array of known heights.
     #[inline]
-    pub(crate) fn known(&self, row: usize, column: usize) -> Option<T> {
+    pub fn known(&self, row: usize, column: usize) -> Option<T> {
         self.known_heights
             .map(|known| known[[row, column]])
             .filter(|height| height.is_finite())
@@ -128,101 +146,15 @@ impl<'a, T: Scalar> Domain<'a, T> {
 /// Refuses an input of another shape.
 pub(crate) fn same_shape(
     input: &'static str,
-    expected: [usize; 2],
-    (rows, columns): (usize, usize),
+    expected: (usize, usize),
+    found: (usize, usize),
 ) -> Result<(), SfsError> {
-    let found = [rows, columns];
     if found == expected {
-        Ok(())
-    } else {
-        Err(SfsError::ShapeMismatch {
-            input,
-            expected,
-            found,
-        })
+        return Ok(());
     }
-}
-
-/// The smallest rectangle that holds a mask.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub(crate) struct BoundingBox {
-    /// First row.
-    pub(crate) top: usize,
-    /// First column.
-    pub(crate) left: usize,
-    /// Number of rows.
-    pub(crate) rows: usize,
-    /// Number of columns.
-    pub(crate) columns: usize,
-}
-
-impl BoundingBox {
-    /// The box of the true pixels, `None` if there are none.
-    pub(crate) fn of(mask: ArrayView2<'_, bool>) -> Option<Self> {
-        let (mut top, mut bottom, mut left, mut right) = (usize::MAX, 0, usize::MAX, 0);
-        for (row, line) in mask.outer_iter().enumerate() {
-            let Some((first, last)) = ends(line) else {
-                continue;
-            };
-            top = top.min(row);
-            bottom = row;
-            left = left.min(first);
-            right = right.max(last);
-        }
-        (top != usize::MAX).then(|| Self {
-            top,
-            left,
-            rows: bottom - top + 1,
-            columns: right - left + 1,
-        })
-    }
-
-    /// Number of pixels.
-    pub(crate) fn area(&self) -> usize {
-        self.rows * self.columns
-    }
-
-    /// Row and column of its pixels, in reading order.
-    pub(crate) fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
-        let columns = self.left..self.left + self.columns;
-        (self.top..self.top + self.rows)
-            .flat_map(move |row| columns.clone().map(move |column| (row, column)))
-    }
-
-    /// Whether every pixel of `other` lies in this box.
-    pub(crate) fn holds(&self, other: Self) -> bool {
-        self.top <= other.top
-            && self.left <= other.left
-            && other.top + other.rows <= self.top + self.rows
-            && other.left + other.columns <= self.left + self.columns
-    }
-
-    /// The part of an array inside the box.
-    pub(crate) fn view<'a, A>(&self, mut array: ArrayView2<'a, A>) -> ArrayView2<'a, A> {
-        array.slice_axis_inplace(Axis(0), Slice::from(self.top..self.top + self.rows));
-        array.slice_axis_inplace(Axis(1), Slice::from(self.left..self.left + self.columns));
-        array
-    }
-
-    /// The part of a mutable array inside the box.
-    pub(crate) fn view_mut<'a, A>(&self, mut array: ArrayViewMut2<'a, A>) -> ArrayViewMut2<'a, A> {
-        array.slice_axis_inplace(Axis(0), Slice::from(self.top..self.top + self.rows));
-        array.slice_axis_inplace(Axis(1), Slice::from(self.left..self.left + self.columns));
-        array
-    }
-}
-
-/// First and last true element of a line; whole blocks of false are skipped at once.
-fn ends(line: ndarray::ArrayView1<'_, bool>) -> Option<(usize, usize)> {
-    let Some(slice) = line.as_slice() else {
-        let first = line.iter().position(|&inside| inside)?;
-        let last = line.iter().rposition(|&inside| inside)?;
-        return Some((first, last));
-    };
-    const BLOCK: usize = 64;
-    let any = |block: &[bool]| block.iter().fold(false, |any, &inside| any | inside);
-    let start = slice.chunks(BLOCK).position(any)? * BLOCK;
-    let first = start + slice[start..].iter().position(|&inside| inside)?;
-    let last = slice.iter().rposition(|&inside| inside)?;
-    Some((first, last))
+    Err(SfsError::ShapeMismatch {
+        input,
+        expected: expected.into(),
+        found: found.into(),
+    })
 }

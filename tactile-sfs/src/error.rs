@@ -1,19 +1,16 @@
 //! Errors, each with what was expected and what was found.
 
+use tactile_core::{CustomError, InvalidOption};
 use thiserror::Error;
 
 /// Why a surface, a slope field or a set of control points could not be computed.
 ///
 /// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{DepthTable, Domain, Lighting, Pentland, SfsError, SurfaceReconstruction};
+/// use tactile_sfs::{DepthTable, Domain, SfsError};
 /// let error = DepthTable::new(&[(0.0, 0.0), (5.0, 1e-3), (3.0, 2e-3)]).unwrap_err();
 /// assert_eq!(error, SfsError::TableNotIncreasing { index: 2 });
-/// let image = Array2::from_elem((8, 8), 0.5);
-/// let result = Pentland::new(Lighting::default()).reconstruct(image.view().into(), &Domain::default());
-/// assert!(matches!(result, Err(SfsError::FrontalLight { .. })));
 /// let error = Domain::new([-1.0, 1.0]).unwrap_err();
-/// assert_eq!(error.to_string(), "pixel width is -1, which is not a positive finite number");
+/// assert_eq!(error.to_string(), "`pixel width` is -1, expected a finite number above zero");
 /// ```
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
@@ -39,30 +36,12 @@ pub enum SfsError {
         /// Rows and columns found.
         found: [usize; 2],
     },
-    /// An option that must be positive is zero, negative, NaN or infinite.
-    #[error("{option} is {found}, which is not a positive finite number")]
-    NotPositive {
-        /// Name of the option.
-        option: &'static str,
-        /// The value found.
-        found: f64,
-    },
-    /// An option that must be at least zero is negative, NaN or infinite.
-    #[error("{option} is {found}, which is not a finite number of at least zero")]
-    Negative {
-        /// Name of the option.
-        option: &'static str,
-        /// The value found.
-        found: f64,
-    },
-    /// An option is NaN or infinite.
-    #[error("{option} is {found}, which is not finite")]
-    NotFinite {
-        /// Name of the option.
-        option: &'static str,
-        /// The value found.
-        found: f64,
-    },
+    /// An option outside its range.
+    #[error(transparent)]
+    InvalidOption(#[from] InvalidOption),
+    /// A stage of a user's own failed.
+    #[error(transparent)]
+    Custom(CustomError),
     /// The contact of a calibration press is as large as the ball, or its radius is not finite.
     #[error(
         "the contact radius is {found_m} m, which is not below the ball's radius of {ball_radius_m} m"
@@ -84,14 +63,6 @@ pub enum SfsError {
         y: f64,
         /// z of the direction found.
         z: f64,
-    },
-    /// The method is defined for frontal or for oblique light alone.
-    #[error(
-        "{method} needs an oblique light (x or y not zero): under frontal light it is undefined"
-    )]
-    FrontalLight {
-        /// Name of the method.
-        method: &'static str,
     },
     /// The eikonal equation needs at least one height to start from.
     #[error("no height is known: give known heights or a height at the boundary")]
@@ -148,29 +119,14 @@ pub enum SfsError {
     },
 }
 
-/// `Ok` if `value` is finite and positive.
-pub(crate) fn positive(option: &'static str, found: f64) -> Result<(), SfsError> {
-    if found > 0.0 && found.is_finite() {
-        Ok(())
-    } else {
-        Err(SfsError::NotPositive { option, found })
-    }
-}
-
-/// `Ok` if `value` is finite and not negative.
-pub(crate) fn non_negative(option: &'static str, found: f64) -> Result<(), SfsError> {
-    if found >= 0.0 && found.is_finite() {
-        Ok(())
-    } else {
-        Err(SfsError::Negative { option, found })
-    }
-}
-
-/// `Ok` if `value` is finite.
-pub(crate) fn finite(option: &'static str, found: f64) -> Result<(), SfsError> {
-    if found.is_finite() {
-        Ok(())
-    } else {
-        Err(SfsError::NotFinite { option, found })
+impl SfsError {
+    /// The failure of a stage of a user's own, from an error or a message.
+    ///
+    /// ```
+    /// use tactile_sfs::SfsError;
+    /// assert_eq!(SfsError::custom("no weights loaded").to_string(), "no weights loaded");
+    /// ```
+    pub fn custom(error: impl Into<Box<dyn core::error::Error + Send + Sync>>) -> Self {
+        Self::Custom(CustomError::new(error))
     }
 }

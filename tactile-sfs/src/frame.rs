@@ -2,7 +2,7 @@
 
 use ndarray::ArrayView2;
 
-use crate::Scalar;
+use crate::PixelScalar;
 
 /// An image as the reconstructions take it: real intensities or 8-bit grey levels (0 … 255, not rescaled).
 ///
@@ -23,21 +23,29 @@ pub enum Frame<'a, T> {
     Bytes(ArrayView2<'a, u8>),
 }
 
-impl<'a, T: Scalar> From<ArrayView2<'a, T>> for Frame<'a, T> {
+impl<'a, T: PixelScalar> From<ArrayView2<'a, T>> for Frame<'a, T> {
     fn from(view: ArrayView2<'a, T>) -> Self {
         Frame::Real(view)
     }
 }
 
-impl<'a, T: Scalar> From<ArrayView2<'a, u8>> for Frame<'a, T> {
+impl<'a, T: PixelScalar> From<ArrayView2<'a, u8>> for Frame<'a, T> {
     fn from(view: ArrayView2<'a, u8>) -> Self {
         Frame::Bytes(view)
     }
 }
 
-impl<T: Scalar> Frame<'_, T> {
+impl<T: PixelScalar> Frame<'_, T> {
     /// Rows and columns.
-    pub(crate) fn dim(&self) -> (usize, usize) {
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::Frame;
+    /// let bytes = array![[0_u8, 128, 255]];
+    /// let frame = Frame::<f64>::from(bytes.view());
+    /// assert_eq!((frame.dim(), frame.at(0, 1)), ((1, 3), 128.0));
+    /// ```
+    pub fn dim(&self) -> (usize, usize) {
         match self {
             Frame::Real(view) => view.dim(),
             Frame::Bytes(view) => view.dim(),
@@ -45,11 +53,14 @@ impl<T: Scalar> Frame<'_, T> {
     }
 
     /// Intensity of one pixel of the image.
+    ///
+    /// # Panics
+    /// If the pixel lies outside the image.
     #[inline]
-    pub(crate) fn at(&self, row: usize, column: usize) -> T {
+    pub fn at(&self, row: usize, column: usize) -> T {
         match self {
             Frame::Real(view) => view[[row, column]],
-            Frame::Bytes(view) => T::from_u8(view[[row, column]]).unwrap_or_else(T::nan),
+            Frame::Bytes(view) => T::of(f64::from(view[[row, column]])),
         }
     }
 }

@@ -19,18 +19,16 @@
 //! - Frankot–Chellappa: $\hat Z = -i (u \hat P + v \hat Q)/(u^2 + v^2)$, periodic. O(N log N).
 //! - Tsai–Shah: a damped Newton step $z - K f(z)$ on $f = R - n \cdot s$, pixel by pixel. O(N) an iteration.
 //!
-//! Errors are [`SfsError`]; not converging is a [`Report`].
+//! Errors are [`SfsError`]; not converging is a [`SurfaceReport`].
 #![forbid(unsafe_code)]
 
 mod ball;
 mod binning;
 mod domain;
 mod error;
-mod estimate;
 mod frame;
 mod integrate;
 mod lighting;
-mod line_fft;
 mod quality;
 mod reconstruct;
 mod sample;
@@ -40,10 +38,8 @@ mod workspace;
 
 pub use ball::BallFit;
 pub use binning::{BinnedContact, Binning};
-pub(crate) use domain::BoundingBox;
 pub use domain::Domain;
 pub use error::SfsError;
-pub use estimate::estimate_lighting;
 pub use frame::Frame;
 pub use integrate::{CosinePoisson, FrankotChellappa, MaskedLeastSquares, SlopeIntegrator};
 pub use lighting::Lighting;
@@ -51,10 +47,12 @@ pub use quality::{
     Alignment, ErrorSummary, HeightError, height_error, render, reprojection, slopes,
 };
 pub use reconstruct::{
-    BallCalibration, BoundaryCondition, Branch, BrooksHorn, DepthTable, Eikonal, Pentland, Signal,
+    BallCalibration, BoundaryCondition, BrooksHorn, DepthTable, Eikonal, EikonalBranch, Signal,
     SurfaceReconstruction, TsaiShah,
 };
 pub use sample::{ContactSampler, ControlPointSampler, CurvatureAdaptive, EquallySpaced, Random};
-pub use scalar::Scalar;
-pub use surface::{Component, PixelFlags, Report, StopReason, Surface};
-pub use workspace::{Progress, Workspace};
+pub use scalar::PixelScalar;
+pub use surface::{Component, PixelFlags, Surface, SurfaceReport};
+pub use tactile_core::{BoundingBox, CustomError, InvalidOption, Progress, StopReason};
+pub use workspace::SurfaceWorkspace;
+pub use {nalgebra, ndarray};

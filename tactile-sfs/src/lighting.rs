@@ -1,7 +1,7 @@
 //! Light, albedo and ambient: the model from slopes to grey levels.
 
-use crate::error::{non_negative, positive};
-use crate::{Scalar, SfsError};
+use crate::{PixelScalar, SfsError};
+use tactile_core::Requirement;
 
 /// Distant light on a Lambertian surface: I = ambient + I₀ · max(0, n·s), with I₀ the light's intensity times the albedo.
 ///
@@ -29,7 +29,7 @@ pub struct Lighting<T> {
     normal_intensity: T,
 }
 
-impl<T: Scalar> Default for Lighting<T> {
+impl<T: PixelScalar> Default for Lighting<T> {
     fn default() -> Self {
         let (zero, one) = (T::zero(), T::one());
         Self {
@@ -40,15 +40,15 @@ impl<T: Scalar> Default for Lighting<T> {
     }
 }
 
-impl<T: Scalar> Lighting<T> {
+impl<T: PixelScalar> Lighting<T> {
     /// Light from `direction` (any length), ambient 0 and intensity 1 at normal incidence.
     ///
     /// # Errors
-    /// [`SfsError::NotPositive`] for a direction that is zero or not finite, [`SfsError::LightFromBelow`] for z ≤ 0.
+    /// [`SfsError::InvalidOption`] for a direction that is zero or not finite, [`SfsError::LightFromBelow`] for z ≤ 0.
     pub fn new(direction: [T; 3]) -> Result<Self, SfsError> {
         let [x, y, z] = direction.map(T::as_f64);
         let length = (x * x + y * y + z * z).sqrt();
-        positive("length of the light direction", length)?;
+        Requirement::Positive.check("length of the light direction", length)?;
         if z <= 0.0 {
             return Err(SfsError::LightFromBelow { x, y, z });
         }
@@ -62,9 +62,9 @@ impl<T: Scalar> Lighting<T> {
     /// The intensity that every pixel has without the light.
     ///
     /// # Errors
-    /// [`SfsError::Negative`] unless finite and not negative.
+    /// [`SfsError::InvalidOption`] unless finite and not negative.
     pub fn with_ambient(self, ambient: T) -> Result<Self, SfsError> {
-        non_negative("ambient", ambient.as_f64())?;
+        Requirement::NonNegative.check("ambient", ambient.as_f64())?;
         Ok(Self { ambient, ..self })
     }
 
@@ -72,9 +72,9 @@ impl<T: Scalar> Lighting<T> {
     /// faces the light, a high quantile of the image (0.995 leaves out single bright pixels) less the ambient.
     ///
     /// # Errors
-    /// [`SfsError::NotPositive`] unless positive and finite.
+    /// [`SfsError::InvalidOption`] unless positive and finite.
     pub fn with_normal_intensity(self, normal_intensity: T) -> Result<Self, SfsError> {
-        positive("intensity at normal incidence", normal_intensity.as_f64())?;
+        Requirement::Positive.check("intensity at normal incidence", normal_intensity.as_f64())?;
         Ok(Self {
             normal_intensity,
             ..self

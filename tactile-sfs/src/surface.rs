@@ -3,38 +3,10 @@
 use core::ops::{BitOr, BitOrAssign};
 
 use ndarray::{Array2, ArrayView2};
+use tactile_core::StopReason;
 
 use crate::domain::same_shape;
-use crate::{BoundingBox, Domain, Scalar, SfsError};
-
-/// Why a computation ended.
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator, StopReason};
-/// let mask = Array2::from_shape_fn((20, 20), |(r, c)| (r as f64 - 9.5).hypot(c as f64 - 9.5) < 8.0);
-/// let p = Array2::from_shape_fn((20, 20), |(r, c)| ((r * c) as f64).sin());
-/// let (q, method) = (Array2::zeros((20, 20)), MaskedLeastSquares::<f64>::default());
-/// let stop = |domain| method.integrate(p.view(), q.view(), &domain).map(|surface| surface.report.stop);
-/// assert_eq!(stop(Domain::default().with_mask(mask.view()))?, StopReason::Converged);
-/// assert_eq!(stop(Domain::default())?, StopReason::Direct); // the whole rectangle needs no iterations
-/// # Ok::<(), tactile_sfs::SfsError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum StopReason {
-    /// The method has no iterations: the answer is exact up to rounding.
-    #[default]
-    Direct,
-    /// The change or the residual fell below the tolerance.
-    Converged,
-    /// The limit of iterations came first; the residual says how far it got.
-    IterationLimit,
-    /// Further iterations no longer improved the residual.
-    Stagnated,
-    /// The progress callback asked to stop.
-    Cancelled,
-}
+use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
 /// What happened at one pixel: a set of the constants below.
 ///
@@ -66,7 +38,7 @@ impl PixelFlags {
     pub const OUT_OF_RANGE: Self = Self(16);
 
     /// Flags of a reflectance that the model does not explain: above 1, below `least`, not finite.
-    pub(crate) fn of_reflectance<T: Scalar>(reflectance: T, least: T) -> Self {
+    pub(crate) fn of_reflectance<T: PixelScalar>(reflectance: T, least: T) -> Self {
         if !reflectance.is_finite() {
             Self::NON_FINITE
         } else if reflectance > T::one() {
@@ -136,8 +108,9 @@ pub struct Component<T> {
 /// assert_eq!((report.solved, report.flagged), (2, 2)); // one pixel out of range, one without a height
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Report<T> {
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SurfaceReport<T> {
     /// Why the method stopped.
     pub stop: StopReason,
     /// Iterations (sweeps, conjugate-gradient steps, …) done; 0 for direct methods.
@@ -152,6 +125,20 @@ pub struct Report<T> {
     pub components: Vec<Component<T>>,
 }
 
+impl<T: Default> Default for SurfaceReport<T> {
+    /// Of a direct method that has solved nothing yet.
+    fn default() -> Self {
+        Self {
+            stop: StopReason::Direct,
+            iterations: 0,
+            residual: T::default(),
+            solved: 0,
+            flagged: 0,
+            components: Vec::new(),
+        }
+    }
+}
+
 /// Heights over the frame, in the unit of the pixel size.
 ///
 /// `heights` is NaN outside `mask`. When a surface is used again as output, only the rectangle written last is
@@ -159,17 +146,18 @@ pub struct Report<T> {
 ///
 /// ```
 /// use ndarray::{Array2, array};
-/// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator, Surface, Workspace};
+/// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator, Surface, SurfaceWorkspace};
 /// let mask = array![[true, true, true, false], [true, true, true, false]];
 /// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::zeros((2, 4)));
-/// let (mut workspace, mut surface) = (Workspace::default(), Surface::<f64>::default()); // used again for every frame
+/// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::<f64>::default()); // used again for every frame
 /// let domain = Domain::default().with_mask(mask.view());
 /// CosinePoisson.integrate_with(&mut workspace, p.view(), q.view(), &domain, &mut surface)?;
 /// assert!(surface.heights[[0, 3]].is_nan() && !surface.mask[[0, 3]]);
 /// assert_eq!(surface.report.solved, 6);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Surface<T> {
     /// Heights z(row, column), NaN where there is none.
     pub heights: Array2<T>,
@@ -178,21 +166,81 @@ pub struct Surface<T> {
     /// What happened at each pixel.
     pub flags: Array2<PixelFlags>,
     /// How the heights were found.
-    pub report: Report<T>,
+    pub report: SurfaceReport<T>,
     /// The rectangle that holds every pixel with a height or a flag.
     pub(crate) bounding_box: BoundingBox,
 }
 
-impl<T: Scalar> Surface<T> {
-    /// Where every reconstruction enters: checks the domain against an image of this size, empties the surface for it and
+impl<T: Default> Default for Surface<T> {
+    /// No pixel yet, to be filled.
+    fn default() -> Self {
+        Self {
+            heights: Array2::default((0, 0)),
+            mask: Array2::default((0, 0)),
+            flags: Array2::default((0, 0)),
+            report: SurfaceReport::default(),
+            bounding_box: BoundingBox::whole((0, 0)),
+        }
+    }
+}
+
+impl<T: PixelScalar> Surface<T> {
+    /// A surface from heights, as a reconstruction of a user's own returns it. Pixels that are not finite have no height.
+    ///
+    /// Flags and report may be set afterwards: `surface.flags[[row, column]] |= PixelFlags::DARK`.
+    ///
+    /// ```
+    /// use ndarray::array;
+    /// use tactile_sfs::Surface;
+    /// let surface = Surface::from_heights(array![[1e-3, f64::NAN, 2e-3]]);
+    /// assert_eq!(surface.mask, array![[true, false, true]]);
+    /// assert_eq!(surface.report.solved, 2);
+    /// ```
+    pub fn from_heights(heights: Array2<T>) -> Self {
+        let mask = heights.mapv(T::is_finite);
+        Self {
+            flags: Array2::default(heights.dim()),
+            bounding_box: BoundingBox::whole(heights.dim()),
+            report: SurfaceReport {
+                solved: mask.iter().filter(|solved| **solved).count(),
+                ..SurfaceReport::default()
+            },
+            heights,
+            mask,
+        }
+    }
+
+    /// What a method writes with a workspace and a surface of its own.
+    pub(crate) fn made_by(
+        method: impl FnOnce(&mut SurfaceWorkspace<T>, &mut Self) -> Result<(), SfsError>,
+    ) -> Result<Self, SfsError> {
+        let mut surface = Self::default();
+        method(&mut SurfaceWorkspace::default(), &mut surface)?;
+        Ok(surface)
+    }
+
+    /// Where every reconstruction enters: checks the domain against an image of this shape, empties the surface for it and
     /// returns the mask's box. On an error the surface is left as it was.
     pub(crate) fn enter(
         &mut self,
-        (rows, columns): (usize, usize),
+        shape: (usize, usize),
         domain: &Domain<'_, T>,
     ) -> Result<BoundingBox, SfsError> {
-        let area = domain.validate(rows, columns)?;
-        self.prepare(rows, columns, area);
+        let area = domain.bounding_box(shape)?;
+        if self.heights.dim() == shape {
+            self.clear();
+        } else {
+            fill_shape(&mut self.heights, shape, T::nan());
+            fill_shape(&mut self.mask, shape, false);
+            fill_shape(&mut self.flags, shape, PixelFlags::NONE);
+        }
+        self.bounding_box = area;
+        let mut components = core::mem::take(&mut self.report.components);
+        components.clear();
+        self.report = SurfaceReport {
+            components,
+            ..SurfaceReport::default()
+        };
         Ok(area)
     }
 
@@ -203,48 +251,17 @@ impl<T: Scalar> Surface<T> {
         q: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
     ) -> Result<BoundingBox, SfsError> {
-        let (rows, columns) = p.dim();
-        domain.validate(rows, columns)?;
-        same_shape("slopes along y", [rows, columns], q.dim())?;
-        self.enter((rows, columns), domain)
+        domain.bounding_box(p.dim())?;
+        same_shape("slopes along y", p.dim(), q.dim())?;
+        self.enter(p.dim(), domain)
     }
 
-    /// Makes the surface `rows` × `columns` and empty, at the cost of the rectangles concerned.
-    fn prepare(&mut self, rows: usize, columns: usize, bounding_box: BoundingBox) {
-        if self.heights.dim() == (rows, columns) {
-            self.clear(self.bounding_box);
-            self.bounding_box = bounding_box;
-        }
-        self.prepare_to_overwrite(rows, columns, bounding_box);
-    }
-
-    /// The same for callers that write every pixel of the box themselves: what it holds need not be cleared.
-    pub(crate) fn prepare_to_overwrite(
-        &mut self,
-        rows: usize,
-        columns: usize,
-        bounding_box: BoundingBox,
-    ) {
-        if self.heights.dim() != (rows, columns) {
-            let shape = (rows, columns);
-            fill_shape(&mut self.heights, shape, T::nan());
-            fill_shape(&mut self.mask, shape, false);
-            fill_shape(&mut self.flags, shape, PixelFlags::NONE);
-        } else if !bounding_box.holds(self.bounding_box) {
-            self.clear(self.bounding_box);
-        }
-        self.bounding_box = bounding_box;
-        self.report.components.clear();
-        self.report = Report {
-            components: core::mem::take(&mut self.report.components),
-            ..Report::default()
-        };
-    }
-
-    fn clear(&mut self, area: BoundingBox) {
-        area.view_mut(self.heights.view_mut()).fill(T::nan());
-        area.view_mut(self.mask.view_mut()).fill(false);
-        area.view_mut(self.flags.view_mut()).fill(PixelFlags::NONE);
+    /// Empties the rectangle written last.
+    fn clear(&mut self) {
+        let area = self.bounding_box;
+        area.of_mut(self.heights.view_mut()).fill(T::nan());
+        area.of_mut(self.mask.view_mut()).fill(false);
+        area.of_mut(self.flags.view_mut()).fill(PixelFlags::NONE);
     }
 
     /// Writes one height and marks the pixel as solved (unless the height is not finite).
@@ -257,19 +274,28 @@ impl<T: Scalar> Surface<T> {
     /// Counts solved and flagged pixels.
     pub(crate) fn finish(&mut self, domain: &Domain<'_, T>) {
         let area = self.bounding_box;
-        let (mask, flags) = (area.view(self.mask.view()), area.view(self.flags.view()));
-        let solved = mask.rows().into_iter().map(|row| match row.to_slice() {
-            // Slices are added up in wide instructions.
-            Some(row) => row.iter().map(|&solved| usize::from(solved)).sum(),
-            None => row.iter().filter(|solved| **solved).count(),
-        });
-        let solved: usize = solved.sum();
-        let mut flagged = 0;
-        for ((row, column), _) in flags.indexed_iter().filter(|(_, flags)| !flags.is_empty()) {
-            flagged += usize::from(domain.contains(area.top + row, area.left + column));
+        let (mut solved, mut flagged) = (0, 0);
+        let flags = area.of(self.flags.view());
+        for (r, line) in area.of(self.mask.view()).rows().into_iter().enumerate() {
+            solved += line
+                .iter()
+                .map(|&solved| usize::from(solved))
+                .sum::<usize>();
+            // Most rows have no flag. A fold without an early end is computed in wide instructions.
+            let flags = flags.row(r);
+            if flags
+                .iter()
+                .fold(false, |any, flags| any | !flags.is_empty())
+            {
+                let inside = |c: usize| domain.contains(area.row_start + r, area.column_start + c);
+                let set = flags
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, flags)| !flags.is_empty());
+                flagged += set.filter(|(c, _)| inside(*c)).count();
+            }
         }
-        self.report.solved = solved;
-        self.report.flagged = flagged;
+        (self.report.solved, self.report.flagged) = (solved, flagged);
     }
 }
 

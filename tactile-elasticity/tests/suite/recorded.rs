@@ -2,7 +2,8 @@
 //!
 //! `RECORD_ANSWERS=1 cargo test -p tactile-elasticity --test suite recorded` writes the file anew; the reason belongs in the commit.
 
-use test_support as record;
+#[path = "../../../tests/support/recorded.rs"]
+mod record;
 
 use nalgebra::{DMatrix, Matrix3};
 use tactile_elasticity::contact::*;

@@ -1,7 +1,8 @@
 //! Tiny strain under large rotation, nearly singular deformations, contacts of every size, against 80-digit numbers.
 #![allow(clippy::print_stdout)]
 
-use test_support as worst;
+#[path = "../../../evidence/worst.rs"]
+mod worst;
 
 use nalgebra::Matrix3;
 use serde_json::Value;

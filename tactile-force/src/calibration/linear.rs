@@ -3,12 +3,13 @@
 use nalgebra::DMatrix;
 
 use super::StressCalibration;
+use super::curve::extremes;
 use super::least_squares::{self, Fit};
 use super::options::CalibrationOptions;
 use super::pair::{CalibrationPair, check_pairs};
 use super::report::{self, CalibrationReport, Parameters, Shape};
 use crate::error::ForceError;
-use tactile_core::Estimate;
+use crate::estimate::{Estimate, Real};
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the origin.
 ///
@@ -25,29 +26,32 @@ use tactile_core::Estimate;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct LinearCalibration {
+pub struct LinearCalibration<T> {
     /// Pixel value about which the line is held: there level and slope are (nearly) uncorrelated.
-    centre: f64,
-    level_n: Estimate,
-    slope_n: Estimate,
-    covariance: f64,
-    range: [f64; 2],
-    report: CalibrationReport,
+    centre: T,
+    level_n: Estimate<T>,
+    slope_n: Estimate<T>,
+    covariance: T,
+    range: [T; 2],
+    report: CalibrationReport<T>,
 }
 
-impl LinearCalibration {
+impl<T: Real> LinearCalibration<T> {
     /// Fits the line to pairs of integrated pixel value and force.
     ///
     /// # Errors
     /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value only.
     pub fn fit(
-        pairs: &[CalibrationPair],
+        pairs: &[CalibrationPair<T>],
         options: &CalibrationOptions,
     ) -> Result<Self, ForceError> {
         let columns = if options.through_origin { 1 } else { 2 };
         check_pairs(pairs, columns)?;
-        let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value).collect();
-        let forces: Vec<f64> = pairs.iter().map(|p| p.force_n).collect();
+        let values: Vec<f64> = pairs
+            .iter()
+            .map(|p| p.integrated_pixel_value.as_f64())
+            .collect();
+        let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
         let (centre, scale) = axis(&values, options.through_origin)?;
         let entry = |i: usize, j: usize| {
             if j + 1 == columns {
@@ -69,11 +73,11 @@ impl LinearCalibration {
             degrees_of_freedom: pairs.len() - columns,
         };
         Ok(Self {
-            centre: centre,
-            level_n: Estimate::from_variance(line.level.0, line.level.1),
-            slope_n: Estimate::from_variance(line.slope.0, line.slope.1),
-            covariance: line.covariance,
-            range: report::extremes(&values),
+            centre: T::nearest(centre),
+            level_n: Estimate::nearest(line.level.0, line.level.1),
+            slope_n: Estimate::nearest(line.slope.0, line.slope.1),
+            covariance: T::nearest(line.covariance),
+            range: extremes(&values).map(T::nearest),
             report: report::build(pairs, &fit, parameters, shape),
         })
     }
@@ -148,38 +152,38 @@ fn nonlinearity(forces: &[f64], residuals: &[f64]) -> f64 {
     residuals.iter().fold(0.0_f64, |m, r| m.max(r.abs())) / report::full_scale(forces)
 }
 
-impl StressCalibration for LinearCalibration {
-    fn force_n(&self, integrated_pixel_value: f64) -> f64 {
+impl<T: Real> StressCalibration<T> for LinearCalibration<T> {
+    fn force_n(&self, integrated_pixel_value: T) -> T {
         self.level_n.value + self.slope_n.value * (integrated_pixel_value - self.centre)
     }
 
-    fn sensitivity_n(&self, _integrated_pixel_value: f64) -> f64 {
+    fn sensitivity_n(&self, _integrated_pixel_value: T) -> T {
         self.slope_n.value
     }
 
-    fn standard_error_n(&self, integrated_pixel_value: f64) -> f64 {
+    fn standard_error_n(&self, integrated_pixel_value: T) -> T {
         self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value)
-            .max(0.0)
+            .max(T::zero())
             .sqrt()
     }
 
-    fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
+    fn error_covariance_n2(&self, a: T, b: T) -> T {
         let (level, slope) = (self.level_n.standard_error, self.slope_n.standard_error);
         let (a, b) = (a - self.centre, b - self.centre);
         let branch = self.report.branch_error_n();
         level * level + slope * a * (slope * b) + self.covariance * (a + b) + branch * branch
     }
 
-    fn integrated_pixel_value(&self, force_n: f64) -> Option<f64> {
+    fn integrated_pixel_value(&self, force_n: T) -> Option<T> {
         let v = self.centre + (force_n - self.level_n.value) / self.slope_n.value;
         v.is_finite().then_some(v)
     }
 
-    fn range(&self) -> [f64; 2] {
+    fn range(&self) -> [T; 2] {
         self.range
     }
 
-    fn report(&self) -> &CalibrationReport {
+    fn report(&self) -> &CalibrationReport<T> {
         &self.report
     }
 }

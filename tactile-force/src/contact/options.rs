@@ -1,9 +1,8 @@
 //! The options of contact detection.
 
+use super::Polarity;
 use crate::drift::DriftCorrection;
-use crate::error::ForceError;
-use tactile_core::Polarity;
-use tactile_core::Requirement;
+use crate::error::{ForceError, Requirement};
 
 /// The options of contact detection.
 ///

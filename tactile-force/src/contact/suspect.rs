@@ -3,8 +3,7 @@
 use super::ContactDetector;
 use super::threshold::quantile;
 use crate::drift::IlluminationDrift;
-use crate::frame::{FrameStatistics, PassWorkspace, ReferenceFrame, Tiles};
-use tactile_core::BoundingBox;
+use crate::frame::{BoundingBox, FrameStatistics, PassWorkspace, ReferenceFrame, Tiles};
 
 impl ContactDetector {
     /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.

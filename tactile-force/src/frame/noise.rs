@@ -3,8 +3,7 @@
 use ndarray::ArrayView2;
 use pulp::Arch;
 
-use crate::error::ForceError;
-use tactile_core::Requirement;
+use crate::error::{ForceError, Requirement};
 
 /// Variance of one pixel of one frame: read variance + gain × grey level, in squared grey levels.
 ///

@@ -14,14 +14,13 @@ use ndarray::ArrayView2;
 
 use crate::calibration::StressCalibration;
 use crate::contact::{Contact, ContactDetector, Detection, Region};
-use crate::error::ForceError;
+use crate::error::{ForceError, Requirement};
+use crate::estimate::{Estimate, Real};
 use crate::frame::ReferenceFrame;
 use crate::hertz::{HertzFit, HertzFitter, Start};
 use crate::lens::LensGeometry;
 use local::Stress;
 use outcome::{contact_radius, mean_stress};
-use tactile_core::Estimate;
-use tactile_core::Requirement;
 
 /// Measures forces with one sensor: options checked and tables built once.
 ///
@@ -42,22 +41,22 @@ use tactile_core::Requirement;
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct ForceMeter {
+pub struct ForceMeter<T> {
     detector: ContactDetector,
     fitter: HertzFitter,
     skip_profile: bool,
-    pixel_size_m: [f64; 2],
+    pixel_size_m: [T; 2],
     lens: Option<LensGeometry>,
 }
 
-impl ForceMeter {
+impl<T: Real> ForceMeter<T> {
     /// A meter for pixels of the given size [x, y].
     ///
     /// # Errors
     /// A pixel size that is not positive and finite.
-    pub fn new(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, ForceError> {
+    pub fn new(pixel_size_m: [T; 2], options: &ForceOptions) -> Result<Self, ForceError> {
         for size in pixel_size_m {
-            Requirement::Positive.check("pixel_size_m", size)?;
+            Requirement::Positive.check("pixel_size_m", size.as_f64())?;
         }
         Ok(Self {
             detector: ContactDetector::new(options.contact),
@@ -75,7 +74,7 @@ impl ForceMeter {
     /// use tactile_force::{ForceMeter, LensGeometry};
     ///
     /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
-    /// let meter = ForceMeter::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
+    /// let meter = ForceMeter::<f64>::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
     /// # let _ = meter;
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
@@ -89,7 +88,7 @@ impl ForceMeter {
     /// ```
     /// use tactile_force::ForceMeter;
     ///
-    /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?.without_profile();
+    /// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?.without_profile();
     /// # let _ = meter;
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
@@ -108,8 +107,8 @@ impl ForceMeter {
         workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        calibration: &(impl StressCalibration + ?Sized),
-    ) -> Result<ForceMeasurement, ForceError> {
+        calibration: &(impl StressCalibration<T> + ?Sized),
+    ) -> Result<ForceMeasurement<T>, ForceError> {
         let ForceWorkspace {
             detector,
             rings,
@@ -123,7 +122,7 @@ impl ForceMeter {
         let pixel = self.pixel_at(&contact);
         let region = &mut detector.region;
         let stress = match calibration.local() {
-            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area),
+            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area.as_f64()),
             None => Stress {
                 reading: calibration.read(contact.integrated_pixel_value),
                 per_grey_pa: calibration
@@ -132,37 +131,37 @@ impl ForceMeter {
         };
         let mut profile = None;
         if !self.skip_profile {
-            let integral = contact.integrated_pixel_value.value;
+            let integral = contact.integrated_pixel_value.value.as_f64();
             let levels = local.per_grey_pa().unwrap_or(1.0);
             let start = self.start(region, &contact, pixel, integral * levels);
             let variance = local.variance(&noise);
-            let sizes = pixel.step;
+            let sizes = pixel.step.map(T::as_f64);
             profile = start
                 .and_then(|start| self.fitter.fit_with(rings, region, start, variance, sizes))
-                .map(|fit: HertzFit| match local.per_grey_pa() {
-                    Some(per_grey) => fit.with_levels_scaled(per_grey.recip()),
+                .map(|fit: HertzFit<T>| match local.per_grey_pa() {
+                    Some(per_grey) => fit.with_levels_scaled(T::nearest(per_grey).recip()),
                     None => fit,
                 });
         }
         // A part of an outline, or one that noise has frayed, says nothing of its shape.
         let whole = !contact.touches_edge && contact.other_contacts == 0;
-        let clear = contact.peak > CLEAR * noise.background.sqrt();
+        let clear = contact.peak.as_f64() > CLEAR * noise.background.sqrt();
         let elongation = (whole && clear)
             .then(|| outline::elongation(&workspace.detector.region.mask, self.jacobian(&contact)))
             .flatten();
         Ok(ForceMeasurement {
-            elongation: elongation,
+            elongation: elongation.map(T::nearest),
             ..self.combine(found, contact, profile, stress, pixel)
         })
     }
 
     /// Metres [x, y] for a step of one pixel along x and along y at a contact, in rows.
-    fn jacobian(&self, contact: &Contact) -> [[f64; 2]; 2] {
+    fn jacobian(&self, contact: &Contact<T>) -> [[f64; 2]; 2] {
         let Some(lens) = &self.lens else {
-            let [hx, hy] = self.pixel_size_m;
+            let [hx, hy] = self.pixel_size_m.map(T::as_f64);
             return [[hx, 0.0], [0.0, hy]];
         };
-        let [x, y] = contact.centroid_px.map(|c| c.value);
+        let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
         let step = |from: [f64; 2], to: [f64; 2]| {
             let (from, to) = (lens.to_metres(from), lens.to_metres(to));
             [to[0] - from[0], to[1] - from[1]]
@@ -173,7 +172,7 @@ impl ForceMeter {
     }
 
     /// The size of a pixel at a contact.
-    fn pixel_at(&self, contact: &Contact) -> PixelSize {
+    fn pixel_at(&self, contact: &Contact<T>) -> PixelSize<T> {
         let Some(lens) = &self.lens else {
             let [hx, hy] = self.pixel_size_m;
             return PixelSize {
@@ -181,11 +180,11 @@ impl ForceMeter {
                 area: hx * hy,
             };
         };
-        let place = contact.centroid_px.map(|c| c.value);
-        let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px);
+        let place = contact.centroid_px.map(|c| c.value.as_f64());
+        let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px.as_f64());
         PixelSize {
-            step: lens.pixel_step_m(place),
-            area: area,
+            step: lens.pixel_step_m(place).map(T::nearest),
+            area: T::nearest(area),
         }
     }
 
@@ -193,28 +192,28 @@ impl ForceMeter {
     fn start(
         &self,
         region: &Region,
-        contact: &Contact,
-        pixel: PixelSize,
+        contact: &Contact<T>,
+        pixel: PixelSize<T>,
         integral: f64,
     ) -> Option<Start> {
         let place = region.place?;
-        let [x, y] = contact.centroid_px.map(|c| c.value);
-        let [hx, hy] = pixel.step;
+        let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
+        let [hx, hy] = pixel.step.map(T::as_f64);
         Some(Start {
             centre: [x - place.column_start as f64, y - place.row_start as f64],
-            radius: contact.equivalent_radius_px * (hy / hx).sqrt(),
+            radius: contact.equivalent_radius_px.as_f64() * (hy / hx).sqrt(),
             integral,
         })
     }
 
     fn combine(
         &self,
-        found: Detection,
-        contact: Contact,
-        profile: Option<HertzFit>,
-        stress: Stress,
-        pixel: PixelSize,
-    ) -> ForceMeasurement {
+        found: Detection<T>,
+        contact: Contact<T>,
+        profile: Option<HertzFit<T>>,
+        stress: Stress<T>,
+        pixel: PixelSize<T>,
+    ) -> ForceMeasurement<T> {
         let Stress {
             reading,
             per_grey_pa,
@@ -223,25 +222,28 @@ impl ForceMeter {
         let mut centroid_m = [x * pixel.step[0], y * pixel.step[1]];
         let mut profile = profile;
         if let Some(lens) = &self.lens {
-            let aspect = pixel.step[1] / pixel.step[0];
+            let aspect = (pixel.step[1] / pixel.step[0]).as_f64();
             let seen = profile.map_or(contact.equivalent_radius_px, |p| p.radius_px.value);
-            let centre = [x.value, y.value];
-            let (place, radius_m) = lens.contact_m(centre, seen, aspect);
-            centroid_m[0].value = place[0];
-            centroid_m[1].value = place[1];
+            let centre = [x.value.as_f64(), y.value.as_f64()];
+            let (place, radius_m) = lens.contact_m(centre, seen.as_f64(), aspect);
+            centroid_m[0].value = T::nearest(place[0]);
+            centroid_m[1].value = T::nearest(place[1]);
             if let Some(profile) = &mut profile {
-                let undistorted = radius_m / profile.radius_m.value;
+                let undistorted = T::nearest(radius_m) / profile.radius_m.value;
                 profile.radius_m = profile.radius_m * undistorted;
             }
         }
         let radius = contact_radius(&contact, profile, pixel.area.sqrt());
-        let brightest = Estimate::new(contact.peak, 1.0);
+        let brightest = Estimate {
+            value: contact.peak,
+            standard_error: T::one(),
+        };
         let peak = profile.map_or(brightest, |p| p.peak);
         ForceMeasurement {
             force_n: reading.force_n,
             reading: Some(reading),
             centroid_m: Some(centroid_m),
-            contact_area_m2: Some((contact.area_px as f64) * pixel.area),
+            contact_area_m2: Some(T::nearest(contact.area_px as f64) * pixel.area),
             contact_radius_m: Some(radius),
             mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
             peak_stress_pa: Some(peak * per_grey_pa),
@@ -260,9 +262,9 @@ const CLEAR: f64 = 20.0;
 
 /// Steps [x, y] of a pixel in metres, and its area.
 #[derive(Clone, Copy, Debug)]
-struct PixelSize {
-    step: [f64; 2],
-    area: f64,
+struct PixelSize<T> {
+    step: [T; 2],
+    area: T,
 }
 
 /// Measures the force of one frame against one reference frame. For many frames keep a [`ForceMeter`], a
@@ -288,13 +290,13 @@ struct PixelSize {
 /// assert!((measured.force_n.value - 2.51).abs() < 0.01);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
-pub fn measure_force(
+pub fn measure_force<T: Real>(
     frame: ArrayView2<'_, u8>,
     reference: ArrayView2<'_, u8>,
-    pixel_size_m: [f64; 2],
-    calibration: &(impl StressCalibration + ?Sized),
+    pixel_size_m: [T; 2],
+    calibration: &(impl StressCalibration<T> + ?Sized),
     options: &ForceOptions,
-) -> Result<ForceMeasurement, ForceError> {
+) -> Result<ForceMeasurement<T>, ForceError> {
     let meter = ForceMeter::new(pixel_size_m, options)?;
     let reference = ReferenceFrame::new(reference)?;
     meter.measure_with(

@@ -3,9 +3,8 @@
 use super::basis::{Basis, KNOTS, Knots};
 use super::nonnegative::Normal;
 #[cfg(feature = "serde")]
-use crate::error::ForceError;
-use tactile_core::Estimate;
-use tactile_core::Requirement;
+use crate::error::{ForceError, Requirement};
+use crate::estimate::Estimate;
 
 /// Slopes at the knots in Pa per grey level, and their covariance.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,9 +39,9 @@ impl Coefficients {
         Ok(self)
     }
 
-    pub(super) fn pressure_pa(&self, grey: f64) -> Estimate {
+    pub(super) fn pressure_pa(&self, grey: f64) -> Estimate<f64> {
         let row = self.basis.integrals(grey);
-        Estimate::from_variance(row.dot(&self.slopes()), self.variance(&row))
+        Estimate::nearest(row.dot(&self.slopes()), self.variance(&row))
     }
 
     /// Slopes at the knots.

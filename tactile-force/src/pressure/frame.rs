@@ -1,8 +1,7 @@
 //! One frame of a calibration.
 
 use crate::calibration::{Branch, GreyHistogram};
-use crate::error::ForceError;
-use tactile_core::Requirement;
+use crate::error::{ForceError, Requirement};
 
 /// The grey histogram of a contact under a known force.
 ///

@@ -1,7 +1,6 @@
 //! The options of a curve's fit.
 
-use crate::error::ForceError;
-use tactile_core::Requirement;
+use crate::error::{ForceError, Requirement};
 
 /// The weights of the frames and the smoothness of the curve.
 ///

@@ -12,6 +12,7 @@ mod augment;
 
 use crate::MatchError;
 use augment::{NONE, Search};
+use nalgebra::RealField;
 
 /// Columns for the rows of a cost matrix (`rows × columns`, row-major) at the least total cost.
 ///
@@ -30,8 +31,8 @@ use augment::{NONE, Search};
 /// assert_eq!(linear_assignment(&costs, 2, 3)?, [Some(1), Some(0)]); // 1 + 2; the greedy 0 + 3 costs as much
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-pub fn linear_assignment(
-    costs: &[f64],
+pub fn linear_assignment<T: RealField + Copy>(
+    costs: &[T],
     rows: usize,
     columns: usize,
 ) -> Result<Vec<Option<usize>>, MatchError> {
@@ -50,18 +51,18 @@ pub fn linear_assignment(
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct AssignmentWorkspace {
+pub struct AssignmentWorkspace<T> {
     assignment: Vec<Option<usize>>,
     /// `u` of the last solution.
-    pub row_prices: Vec<f64>,
+    pub row_prices: Vec<T>,
     /// `v` of the last solution.
-    pub column_prices: Vec<f64>,
+    pub column_prices: Vec<T>,
     /// The matrix turned so that it is not taller than wide.
-    turned: Vec<f64>,
-    search: Search,
+    turned: Vec<T>,
+    search: Search<T>,
 }
 
-impl Default for AssignmentWorkspace {
+impl<T: RealField + Copy> Default for AssignmentWorkspace<T> {
     /// Without memory yet.
     fn default() -> Self {
         Self {
@@ -74,14 +75,14 @@ impl Default for AssignmentWorkspace {
     }
 }
 
-impl AssignmentWorkspace {
+impl<T: RealField + Copy> AssignmentWorkspace<T> {
     /// As [`linear_assignment`].
     ///
     /// # Errors
     /// As [`linear_assignment`].
     pub fn solve(
         &mut self,
-        costs: &[f64],
+        costs: &[T],
         rows: usize,
         columns: usize,
     ) -> Result<&[Option<usize>], MatchError> {
@@ -115,7 +116,7 @@ impl AssignmentWorkspace {
     }
 }
 
-fn check(costs: &[f64], rows: usize, columns: usize) -> Result<(), MatchError> {
+fn check<T: RealField + Copy>(costs: &[T], rows: usize, columns: usize) -> Result<(), MatchError> {
     let expected = rows.saturating_mul(columns);
     if costs.len() != expected {
         return Err(MatchError::Shape {
@@ -124,7 +125,10 @@ fn check(costs: &[f64], rows: usize, columns: usize) -> Result<(), MatchError> {
             found: costs.len(),
         });
     }
-    match costs.iter().position(|&c| !(c.is_finite() || c > 0.0)) {
+    match costs
+        .iter()
+        .position(|&c| !(c.is_finite() || c > T::zero()))
+    {
         Some(at) => Err(MatchError::Cost {
             row: at / columns,
             column: at % columns,

@@ -5,6 +5,7 @@ use super::expectation::gaussians;
 use super::registration::DriftWorkspace;
 use crate::{AssignmentWorkspace, MatchReport, Matching, SoftMatches, unmatched_rows};
 use nalgebra::{SMatrix, SVector};
+use tactile_tps::Scalar;
 
 /// Soft matches below this weight are left out.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -53,12 +54,12 @@ fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<u
 }
 
 /// Assembles the result; lengths are those of the model and the target.
-pub(super) fn matching<const D: usize>(
+pub(super) fn matching<T: Scalar, const D: usize>(
     options: &CoherentPointDrift,
     workspace: &DriftWorkspace<D>,
     model_len: usize,
     target_len: usize,
-) -> Matching<D> {
+) -> Matching<T, D> {
     let posterior = posterior(options, workspace);
     let assignment = pairs(&posterior, model_len, target_len);
     let scale = workspace.target_frame.scale;
@@ -71,10 +72,13 @@ pub(super) fn matching<const D: usize>(
             .collect();
         let mass = row.iter().map(|p| p.1).sum::<f64>();
         let share = |p: f64| p / mass.max(1.0); // many targets may have one model point; a row of M has sum one
-        soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
+        soft.push_row(
+            row.iter()
+                .map(|&(n, p)| (n, nalgebra::convert::<f64, T>(share(p)))),
+        );
         let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * model_len + m]));
-        confidence.push(sure.clamp(0.0, 1.0));
-        covariance.push(spread(workspace, &row, mass) * (scale * scale));
+        confidence.push(nalgebra::convert(sure.clamp(0.0, 1.0)));
+        covariance.push((spread(workspace, &row, mass) * (scale * scale)).map(nalgebra::convert));
     }
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target_len);
     Matching {
@@ -85,7 +89,11 @@ pub(super) fn matching<const D: usize>(
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
-        energy: workspace.energy.iter().map(|&e| e).collect(),
+        energy: workspace
+            .energy
+            .iter()
+            .map(|&e| nalgebra::convert(e))
+            .collect(),
         report: report(workspace, &assignment),
         assignment,
     }
@@ -109,10 +117,10 @@ fn spread<const D: usize>(
     })
 }
 
-fn report<const D: usize>(
+fn report<T: Scalar, const D: usize>(
     workspace: &DriftWorkspace<D>,
     assignment: &[Option<usize>],
-) -> MatchReport {
+) -> MatchReport<T> {
     let squares = assignment
         .iter()
         .enumerate()
@@ -128,8 +136,8 @@ fn report<const D: usize>(
         stop: workspace.stop,
         iterations: workspace.iterations(),
         starts: 1,
-        residual: (scale * (sum / count.max(1.0)).sqrt()),
-        sigma: (scale * workspace.sigma2.sqrt()),
+        residual: nalgebra::convert(scale * (sum / count.max(1.0)).sqrt()),
+        sigma: nalgebra::convert(scale * workspace.sigma2.sqrt()),
         doubt: None,
     }
 }

@@ -4,6 +4,7 @@ use super::spline::ModelSpline;
 use super::{SoftassignWorkspace, finish};
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{Point, SMatrix};
+use tactile_tps::Scalar;
 
 /// The answer in a workspace.
 ///
@@ -17,7 +18,7 @@ use nalgebra::{Point, SMatrix};
 /// let found = AnnealedSoftassign::default()
 ///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
 /// assert_eq!((found.assignment[2], found.confidence[2] > 0.9), (Some(2), true));
-/// assert!(found.warped().zip(&target).all(|(w, t)| (w - t).norm() < 1e-9));
+/// assert!(found.warped::<f64>().zip(&target).all(|(w, t)| (w - t).norm() < 1e-9));
 /// assert!(found.report.residual < 1e-9); // units of the points
 /// let matching = found.to_matching(&model);
 /// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6); // areas grow by a tenth
@@ -31,7 +32,7 @@ pub struct SoftassignMatch<'w, const D: usize> {
     /// Probability that each assignment is right.
     pub confidence: &'w [f64],
     /// How it went.
-    pub report: MatchReport,
+    pub report: MatchReport<f64>,
 }
 
 impl<'w, const D: usize> SoftassignMatch<'w, D> {
@@ -54,7 +55,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
     }
 
     /// The warped model points.
-    pub fn warped(&self) -> impl ExactSizeIterator<Item = Point<f64, D>> + use<'w, D> {
+    pub fn warped<T: Scalar>(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + use<'w, T, D> {
         let workspace = self.workspace;
         workspace
             .answer
@@ -65,54 +66,66 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
 
     /// The answer with its warp, soft matches and covariances; `model` are the points that were matched.
     #[must_use]
-    pub fn to_matching(&self, model: &[Point<f64, D>]) -> Matching<D> {
+    pub fn to_matching<T: Scalar>(&self, model: &[Point<T, D>]) -> Matching<T, D> {
         self.interpolated(model, &ModelSpline::new(model))
     }
 
     /// The report in the type of the points.
-    pub(super) fn narrow_report(&self) -> MatchReport {
+    pub(super) fn narrow_report<T: Scalar>(&self) -> MatchReport<T> {
         let report = &self.report;
         MatchReport {
             stop: report.stop,
             iterations: report.iterations,
             starts: report.starts,
-            residual: report.residual,
-            sigma: report.sigma,
+            residual: nalgebra::convert(report.residual),
+            sigma: nalgebra::convert(report.sigma),
             doubt: report.doubt,
         }
     }
 
     /// As [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
-    pub(super) fn interpolated(
+    pub(super) fn interpolated<T: Scalar>(
         &self,
-        model: &[Point<f64, D>],
-        spline: &ModelSpline<D>,
-    ) -> Matching<D> {
+        model: &[Point<T, D>],
+        spline: &ModelSpline<T, D>,
+    ) -> Matching<T, D> {
         let workspace = self.workspace;
         let (answer, frame) = (&workspace.answer, &workspace.frame);
-        let mut warped: Vec<Point<f64, D>> = self.warped().collect();
+        let mut warped: Vec<Point<T, D>> = self.warped().collect();
         let warp = spline.through(&mut warped);
         let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
         for i in 0..model.len() {
             row.clear();
-            row.extend(finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, p)));
+            row.extend(
+                finish::soft_row(&workspace.annealer.soft, i)
+                    .map(|(j, p)| (j, nalgebra::convert(p))),
+            );
             row.sort_unstable_by_key(|entry| entry.0);
             soft.push_row(row.iter().copied());
         }
         let square = frame.scale * frame.scale;
-        let covariance = |v: &f64| SMatrix::from_diagonal_element(v * square);
+        let covariance = |v: &f64| SMatrix::from_diagonal_element(nalgebra::convert(v * square));
         let (unmatched_model, unmatched_target) =
             unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
             warp,
             warped,
             assignment: answer.assignment.clone(),
-            confidence: answer.confidence.iter().map(|&c| c).collect(),
+            confidence: answer
+                .confidence
+                .iter()
+                .map(|&c| nalgebra::convert(c))
+                .collect(),
             soft,
             unmatched_model,
             unmatched_target,
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
-            energy: workspace.best.trace.iter().map(|&e| e).collect(),
+            energy: workspace
+                .best
+                .trace
+                .iter()
+                .map(|&e| nalgebra::convert(e))
+                .collect(),
             report: self.narrow_report(),
         }
     }
@@ -120,7 +133,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
 
 fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason {
     match () {
-        () if workspace.stopped => StopReason::Cancelled,
+        () if workspace.stopped => StopReason::Callback,
         // The floor is reached to rounding.
         () if workspace.best.sigma <= 1.000_001 * finish::FLOOR
             && !workspace.annealer.soft.errors.differ()

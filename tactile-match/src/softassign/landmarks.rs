@@ -7,6 +7,7 @@ use crate::validate::option_within;
 use crate::{MatchError, Matching};
 use nalgebra::Point;
 use std::ops::ControlFlow;
+use tactile_tps::Scalar;
 
 /// Where a model point is known to go, as a normal distribution: the fit counts it beside the soft matches, with the weight σ²/s² of its
 /// standard deviation s at the temperature σ.
@@ -26,23 +27,23 @@ use std::ops::ControlFlow;
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Landmark<const D: usize> {
+pub struct Landmark<T: Scalar, const D: usize> {
     /// Row of the model point.
     pub row: usize,
     /// Where it goes.
-    pub position: Point<f64, D>,
+    pub position: Point<T, D>,
     /// Standard deviation along an axis, in the units of the points; 0 for a hard landmark, which is kept to a thousandth of the model's
     /// radius, and where its position is a target exactly.
-    pub deviation: f64,
+    pub deviation: T,
 }
 
-impl<const D: usize> Landmark<D> {
+impl<T: Scalar, const D: usize> Landmark<T, D> {
     fn check(&self, points: usize) -> Result<(), MatchError> {
         let row = self.row;
         if row >= points {
             return Err(MatchError::LandmarkRow { row, points });
         }
-        let deviation = self.deviation;
+        let deviation = nalgebra::convert_unchecked::<T, f64>(self.deviation);
         option_within("deviation", deviation, 0.0, f64::MAX, "[0, ∞)")?;
         if !self.position.iter().all(|c| c.is_finite()) {
             return Err(MatchError::LandmarkPosition { row });
@@ -70,22 +71,26 @@ impl AnnealedSoftassign {
     /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::LandmarkRow`] for a landmark of a point that the model does not
     /// have, [`MatchError::LandmarkPosition`] for a position that is not finite, and [`MatchError::InvalidOption`] for a deviation that is
     /// negative or not finite.
-    pub fn match_with_landmarks<const D: usize>(
+    pub fn match_with_landmarks<T: Scalar, const D: usize>(
         &self,
-        model: &[Point<f64, D>],
-        target: &[Point<f64, D>],
-        landmarks: &[Landmark<D>],
-    ) -> Result<Matching<D>, MatchError> {
+        model: &[Point<T, D>],
+        target: &[Point<T, D>],
+        landmarks: &[Landmark<T, D>],
+    ) -> Result<Matching<T, D>, MatchError> {
         for landmark in landmarks {
             landmark.check(model.len())?;
         }
         let mut workspace = SoftassignWorkspace::default();
         workspace.take(model, target)?;
         let frame = workspace.frame;
-        workspace.known.extend(landmarks.iter().map(|known| Known {
-            row: known.row,
-            position: frame.target(&known.position),
-            variance: (known.deviation / frame.scale).max(finish::FLOOR).powi(2),
+        workspace.known.extend(landmarks.iter().map(|known| {
+            Known {
+                row: known.row,
+                position: frame.target(&known.position),
+                variance: (nalgebra::convert_unchecked::<T, f64>(known.deviation) / frame.scale)
+                    .max(finish::FLOOR)
+                    .powi(2),
+            }
         }));
         self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
         Ok(SoftassignMatch::of(&workspace).to_matching(model))

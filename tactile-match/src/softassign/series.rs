@@ -4,14 +4,15 @@ use super::spline::ModelSpline;
 use super::{SoftassignMatch, SoftassignWorkspace};
 use crate::{MatchedPairs, Matching};
 use nalgebra::Point;
+use tactile_tps::Scalar;
 
 /// Where the last match put the model, the factorisation of the spline between its points, the matcher's memory. Given another model it
 /// forgets the old one.
 #[derive(Clone, Debug)]
-pub(super) struct Series<const D: usize> {
-    model: Vec<Point<f64, D>>,
+pub(super) struct Series<T: Scalar, const D: usize> {
+    model: Vec<Point<T, D>>,
     /// Empty where nothing was matched yet.
-    pub(super) last: Vec<Point<f64, D>>,
+    pub(super) last: Vec<Point<T, D>>,
     /// `last` in the frame of the match that begins there.
     pub(super) start: Vec<[f64; D]>,
     /// How many points had a partner.
@@ -20,10 +21,10 @@ pub(super) struct Series<const D: usize> {
     pub(super) sigma: f64,
     /// Holds the answer of the last match.
     pub(super) workspace: SoftassignWorkspace<D>,
-    spline: Option<ModelSpline<D>>,
+    spline: Option<ModelSpline<T, D>>,
 }
 
-impl<const D: usize> Default for Series<D> {
+impl<T: Scalar, const D: usize> Default for Series<T, D> {
     fn default() -> Self {
         Self {
             model: Vec::new(),
@@ -37,9 +38,9 @@ impl<const D: usize> Default for Series<D> {
     }
 }
 
-impl<const D: usize> Series<D> {
+impl<T: Scalar, const D: usize> Series<T, D> {
     /// Forgets the past of another model.
-    pub(super) fn switch_to(&mut self, model: &[Point<f64, D>]) {
+    pub(super) fn switch_to(&mut self, model: &[Point<T, D>]) {
         if self.model != model {
             self.model.clear();
             self.model.extend_from_slice(model);
@@ -52,13 +53,13 @@ impl<const D: usize> Series<D> {
     pub(super) fn keep(&mut self) {
         let found = SoftassignMatch::of(&self.workspace);
         self.last.clear();
-        self.last.extend(found.warped());
+        self.last.extend(found.warped::<T>());
         self.matched = found.assignment.iter().flatten().count();
         self.sigma = found.report.sigma;
     }
 
     /// The last answer, its warp through the factorised system of the model's spline.
-    pub(super) fn matching(&mut self) -> Matching<D> {
+    pub(super) fn matching(&mut self) -> Matching<T, D> {
         let Self {
             spline,
             workspace,
@@ -70,13 +71,15 @@ impl<const D: usize> Series<D> {
     }
 
     /// The pairs of the last answer.
-    pub(super) fn pairs(&self, pairs: &mut MatchedPairs) {
+    pub(super) fn pairs(&self, pairs: &mut MatchedPairs<T>) {
         let found = SoftassignMatch::of(&self.workspace);
         pairs.assignment.clear();
         pairs.assignment.extend_from_slice(found.assignment);
         pairs.confidence.clear();
         let confidence = found.confidence.iter();
-        pairs.confidence.extend(confidence.map(|&c| c));
+        pairs
+            .confidence
+            .extend(confidence.map(|&c| nalgebra::convert::<f64, T>(c)));
         pairs.report = found.narrow_report();
     }
 }

@@ -65,7 +65,7 @@ impl Score {
         self.worst = self.worst.max(error / tolerance);
     }
 
-    fn angle(&mut self, found: &Angle<f64>, expected: &Value, name: &str, what: &str) {
+    fn angle(&mut self, found: &Angle, expected: &Value, name: &str, what: &str) {
         let at = |suffix: &str| number(&expected[format!("{name}_{suffix}")]);
         self.check(found.radians, at("rad"), 1e-13, what);
         self.check(found.radians.to_degrees(), at("deg"), 1e-13, what);
@@ -201,7 +201,7 @@ fn tolerance(condition: f64) -> f64 {
 }
 
 /// Part of the light passes: angle, transmittances and reflectances.
-fn check_partial(case: &Value, found: &Fresnel<f64>, score: &mut Score) {
+fn check_partial(case: &Value, found: &Fresnel, score: &mut Score) {
     let (n1, n2, what) = (
         number(&case["n1"]),
         number(&case["n2"]),

@@ -1,7 +1,8 @@
 //! Angles at every scale and within a few units in the last place of the edges, against 80-digit numbers.
 #![allow(clippy::print_stdout)]
 
-use test_support as worst;
+#[path = "../../../evidence/worst.rs"]
+mod worst;
 
 use tactile_optics::{Angle, acceptance_angle, critical_angle};
 use worst::{Worst, cases};
@@ -15,7 +16,7 @@ fn angles_have_all_their_digits() {
     for case in cases(include_str!("../reference/angles.json")) {
         let at = |key: &str| case[key].as_f64().unwrap_or(f64::NAN);
         let name = case["name"].as_str().unwrap();
-        let mut enter = |angle: Angle<f64>, which: &str| {
+        let mut enter = |angle: Angle, which: &str| {
             for (found, key) in [(angle.radians, "rad"), (angle.complement, "complement_rad")] {
                 let expected = at(&format!("{which}_{key}"));
                 let units = (found / expected - 1.0).abs() / f64::EPSILON;

@@ -2,13 +2,12 @@
 #![allow(clippy::print_stdout)]
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use num_traits::{Float, FloatConst};
-use tactile_optics::led::{Geometry, Led};
 use tactile_optics::surface::{Dimple, Flat, TopSurface, Touched, TouchingObject};
 use tactile_optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, trace};
+use tactile_optics::{Geometry, Led};
 use tactile_optics::{OpticsError, acceptance_angle, fresnel};
 
-const PAPER: [SlabLayer<f64>; 4] = [
+const PAPER: [SlabLayer; 4] = [
     SlabLayer {
         index: 1.38,
         thickness_m: 2e-3,
@@ -27,30 +26,30 @@ const PAPER: [SlabLayer<f64>; 4] = [
     },
 ];
 
-fn with_rays(rays: u32) -> TraceOptions<f64> {
+fn with_rays(rays: u32) -> TraceOptions {
     TraceOptions::default().with_rays(rays).unwrap()
 }
 
-fn section(rays: u32) -> TraceOptions<f64> {
+fn section(rays: u32) -> TraceOptions {
     with_rays(rays).with_geometry(Geometry::Section)
 }
 
-fn flat(layers: &[SlabLayer<f64>], length: f64, options: &TraceOptions<f64>) -> LightBudget<f64> {
+fn flat(layers: &[SlabLayer], length: f64, options: &TraceOptions) -> LightBudget {
     let slab = Slab::new(layers, 1.0, length).unwrap();
     trace(&slab, &Led::default(), &Flat, options, &mut []).unwrap()
 }
 
 /// Energy is conserved to rounding: a ray splits by `transmitted` and `power − transmitted`, the sums are compensated.
-fn assert_conserved(budget: &LightBudget<f64>) {
+fn assert_conserved(budget: &LightBudget) {
     assert!((total(budget) - 1.0).abs() < 1e-13, "{budget:?}");
 }
 
-fn total<T: Float>(b: &LightBudget<T>) -> T {
+fn total(b: &LightBudget) -> f64 {
     b.entry + b.guided + b.returned + leaked(b) + b.absorbed + b.unresolved
 }
 
 /// What left through top or bottom.
-fn leaked<T: Float>(b: &LightBudget<T>) -> T {
+fn leaked(b: &LightBudget) -> f64 {
     b.above + b.below + b.camera
 }
 
@@ -198,7 +197,7 @@ fn a_press_lights_up_the_camera_more_the_steeper_it_is_and_most_where_an_object_
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
     let led = Led::new(1.0, 70_f64.to_radians()).unwrap();
     let centre = [15e-3, 0.0];
-    let camera = |surface: &dyn TopSurface<f64>| {
+    let camera = |surface: &dyn TopSurface| {
         let options = section(20_000).with_camera_half_angle(1.0).unwrap();
         trace(&slab, &led, surface, &options, &mut [])
             .unwrap()
@@ -282,45 +281,11 @@ fn light_leaves_where_the_press_is() {
     assert!((14..=22).contains(&brightest), "{profile:?}");
 }
 
-fn conserved_in<T: Float + FloatConst + std::fmt::Debug>(tolerance: f64) -> f64 {
-    let r = |v: f64| T::from(v).unwrap();
-    let layers = [
-        SlabLayer {
-            index: r(1.40),
-            thickness_m: r(2e-3),
-        },
-        SlabLayer {
-            index: r(1.41),
-            thickness_m: r(8e-3),
-        },
-    ];
-    let slab = Slab::new(&layers, r(1.0), r(30e-3)).unwrap();
-    let dimple = Dimple::new([r(15e-3), r(0.0)], r(4e-3), r(1.5e-3)).unwrap();
-    let options = TraceOptions::default()
-        .with_rays(20_000)
-        .unwrap()
-        .with_cutoff(r(1e-5))
-        .unwrap();
-    let budget = trace(&slab, &Led::default(), &dimple, &options, &mut []).unwrap();
-    assert!(
-        (total(&budget) - T::one()).abs().to_f64().unwrap() < tolerance,
-        "{budget:?}"
-    );
-    budget.camera.to_f64().unwrap()
-}
-
-#[test]
-fn single_precision_tells_the_same_story() {
-    let (single, double) = (conserved_in::<f32>(1e-6), conserved_in::<f64>(1e-13));
-    // Rays near a threshold end elsewhere in the shorter scalar: as good as another draw of a few of them.
-    assert!((single / double - 1.0).abs() < 0.02, "{single} {double}");
-}
-
 #[test]
 fn options_without_meaning_are_named() {
     let slab = Slab::new(&PAPER, 1.0, 30e-3).unwrap();
-    let default = TraceOptions::<f64>::default();
-    let refused = |result: Result<TraceOptions<f64>, OpticsError>, name: &str| {
+    let default = TraceOptions::default();
+    let refused = |result: Result<TraceOptions, OpticsError>, name: &str| {
         assert!(
             matches!(result, Err(OpticsError::OutOfRange { quantity, .. }) if quantity == name),
             "{name}"
@@ -352,7 +317,7 @@ fn options_without_meaning_are_named() {
         Dimple::new([0.0, f64::NAN], 1.0, 0.1).is_err()
             && Dimple::new([0.0, 0.0], 1.0, -0.1).is_err()
     );
-    assert!(Slab::<f64>::new(&[], 1.0, 1.0).is_err() && Slab::new(&PAPER, 0.0, 1.0).is_err());
+    assert!(Slab::new(&[], 1.0, 1.0).is_err() && Slab::new(&PAPER, 0.0, 1.0).is_err());
     assert!(
         Slab::new(
             &[SlabLayer {

@@ -1,30 +1,30 @@
-//! Slopes to heights: the trait and its implementations.
+//! Slopes to heights: the trait, its implementations, and the constant of integration.
+//!
+//! Heights are solved for in double precision, whatever the type of the slopes: the smallest eigenvalues of the equations
+//! are below single precision in images of usual size.
 
-mod cosine_poisson;
-mod cosine_transform;
-mod divergence;
-mod frankot_chellappa;
+mod fourier;
 mod masked;
-pub(crate) mod shift;
-mod tridiagonal;
+mod poisson;
 
 use std::sync::Arc;
 
 use ndarray::ArrayView2;
 
-pub use cosine_poisson::CosinePoisson;
-pub(crate) use cosine_poisson::PoissonBuffers;
-pub(crate) use frankot_chellappa::FourierBuffers;
-pub use frankot_chellappa::FrankotChellappa;
+pub(crate) use fourier::FourierBuffers;
+pub use fourier::FrankotChellappa;
 pub(crate) use masked::MaskedBuffers;
 pub use masked::MaskedLeastSquares;
+pub use poisson::CosinePoisson;
+pub(crate) use poisson::PoissonBuffers;
 
-use crate::{Domain, Scalar, SfsError, Surface, Workspace};
+use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
 
 /// A way from slopes p = ∂z/∂x and q = ∂z/∂y to heights.
 ///
-/// Slopes are dimensionless (metres per metre); heights come out in the unit of the pixel size. A height is known up
-/// to a constant: the mean is 0, unless the domain's known heights fix it. Object safe.
+/// Slopes are dimensionless (metres per metre), and heights come out in the unit of the pixel size. A height is known up
+/// to a constant: the mean is 0, unless the domain's known heights fix it. Object safe. An implementor writes
+/// [`integrate`](Self::integrate) alone.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -37,13 +37,24 @@ use crate::{Domain, Scalar, SfsError, Surface, Workspace};
 /// assert!((z[[1, 0]] - z[[0, 0]] + 0.2).abs() < 1e-12);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
-pub trait SlopeIntegrator<T: Scalar> {
-    /// Integrates into `surface`, reusing its arrays and the buffers of `workspace`.
+pub trait SlopeIntegrator<T: PixelScalar> {
+    /// Integrates slopes p along x and q along y.
+    ///
+    /// # Errors
+    /// Those of the method: shapes that differ, an empty mask, slopes that it cannot leave out.
+    fn integrate(
+        &self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError>;
+
+    /// The same into `surface`, with its arrays and the buffers of `workspace` used again.
     ///
     /// ```
     /// use ndarray::Array2;
-    /// use tactile_sfs::{Domain, FrankotChellappa, CosinePoisson, SlopeIntegrator, Surface, Workspace};
-    /// let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
+    /// use tactile_sfs::{Domain, FrankotChellappa, CosinePoisson, SlopeIntegrator, Surface, SurfaceWorkspace};
+    /// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
     /// let methods: [&dyn SlopeIntegrator<f64>; 2] = [&CosinePoisson, &FrankotChellappa];
     /// let flat = Array2::zeros((16, 16));
     /// for method in methods {
@@ -54,48 +65,131 @@ pub trait SlopeIntegrator<T: Scalar> {
     /// ```
     ///
     /// # Errors
-    /// What the method documents: shapes that differ, an empty mask, slopes it cannot skip.
+    /// As [`integrate`](Self::integrate).
     fn integrate_with(
         &self,
-        workspace: &mut Workspace<T>,
+        workspace: &mut SurfaceWorkspace<T>,
         p: ArrayView2<'_, T>,
         q: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
-    ) -> Result<(), SfsError>;
+    ) -> Result<(), SfsError> {
+        let _ = workspace;
+        *surface = self.integrate(p, q, domain)?;
+        Ok(())
+    }
+}
 
-    /// Integrates slopes p along x and q along y.
-    ///
-    /// # Errors
-    /// As [`integrate_with`](Self::integrate_with).
+/// A shared integrator is one, as trait objects need it.
+impl<T: PixelScalar, M: SlopeIntegrator<T> + ?Sized> SlopeIntegrator<T> for Arc<M> {
     fn integrate(
         &self,
         p: ArrayView2<'_, T>,
         q: ArrayView2<'_, T>,
         domain: &Domain<'_, T>,
     ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::default();
-        self.integrate_with(&mut Workspace::default(), p, q, domain, &mut surface)?;
-        Ok(surface)
+        (**self).integrate(p, q, domain)
+    }
+
+    fn integrate_with(
+        &self,
+        workspace: &mut SurfaceWorkspace<T>,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        (**self).integrate_with(workspace, p, q, domain, surface)
     }
 }
 
-/// What is implemented for a value is implemented for a pointer to it.
-macro_rules! forward {
-    ($pointer:ident) => {
-        impl<T: Scalar, M: SlopeIntegrator<T> + ?Sized> SlopeIntegrator<T> for $pointer<M> {
-            fn integrate_with(
-                &self,
-                workspace: &mut Workspace<T>,
-                p: ArrayView2<'_, T>,
-                q: ArrayView2<'_, T>,
-                domain: &Domain<'_, T>,
-                surface: &mut Surface<T>,
-            ) -> Result<(), SfsError> {
-                (**self).integrate_with(workspace, p, q, domain, surface)
+/// Copies a row of a box of slopes, with 0 outside the mask.
+///
+/// # Errors
+/// [`SfsError::NonFiniteSlope`] inside the mask.
+fn load_row<T: PixelScalar>(
+    slopes: ArrayView2<'_, T>,
+    domain: &Domain<'_, T>,
+    area: BoundingBox,
+    row: usize,
+    line: &mut [f64],
+) -> Result<(), SfsError> {
+    let from = slopes.row(area.row_start + row);
+    let columns = area.column_start..area.column_end;
+    match from.to_slice() {
+        Some(from) => {
+            let from = from[columns].iter();
+            from.zip(&mut *line).for_each(|(x, to)| *to = x.as_f64());
+        }
+        None => {
+            for (column, to) in columns.zip(&mut *line) {
+                *to = from[column].as_f64();
             }
         }
-    };
+    }
+    if let Some(mask) = domain.mask {
+        let inside = area.of(mask).index_axis_move(ndarray::Axis(0), row);
+        for (x, inside) in line.iter_mut().zip(inside) {
+            *x = if *inside { *x } else { 0.0 };
+        }
+    }
+    // x · 0 is 0 for finite x alone, and a sum is computed in wide instructions.
+    let poison: f64 = line.iter().map(|x| x * 0.0).sum();
+    if poison == 0.0 {
+        return Ok(());
+    }
+    let column = line.iter().position(|x| !x.is_finite()).unwrap_or(0);
+    Err(SfsError::NonFiniteSlope {
+        row: area.row_start + row,
+        column: area.column_start + column,
+    })
 }
-forward!(Box);
-forward!(Arc);
+
+/// Writes heights over the surface's box, row by row, all shifted by a constant: known heights are met on average, or the
+/// mean inside the mask is 0. NaN stands for no height.
+pub(crate) fn write_levelled<T: PixelScalar>(
+    heights: &[f64],
+    domain: &Domain<'_, T>,
+    surface: &mut Surface<T>,
+) {
+    let area = surface.bounding_box;
+    let places = || area.pixels().zip(heights);
+    let solved = || places().filter(|((r, c), z)| domain.contains(*r, *c) && !z.is_nan());
+    let (mut excess, mut known) = (0.0, 0usize);
+    if domain.known_heights.is_some() {
+        for ((row, column), z) in solved() {
+            if let Some(height) = domain.known(row, column) {
+                excess += height.as_f64() - z;
+                known += 1;
+            }
+        }
+    }
+    let shift = if known > 0 {
+        excess / known as f64
+    } else if domain.mask.is_none() && heights.iter().all(|z| !z.is_nan()) {
+        -heights.iter().sum::<f64>() / heights.len() as f64
+    } else {
+        let (sum, count) = solved().fold((0.0, 0usize), |(sum, n), (_, z)| (sum + z, n + 1));
+        -sum / count.max(1) as f64
+    };
+    let mut rows = area.of_mut(surface.heights.view_mut());
+    let mut solved = area.of_mut(surface.mask.view_mut());
+    for (r, line) in heights.chunks(area.columns()).enumerate() {
+        let (mut to, mut solved) = (rows.row_mut(r), solved.row_mut(r));
+        let places = to.iter_mut().zip(line).zip(solved.iter_mut());
+        match domain.mask {
+            None => places.for_each(|((to, z), solved)| {
+                *to = T::of(z + shift);
+                *solved = !z.is_nan();
+            }),
+            Some(mask) => {
+                let mask = area.of(mask);
+                for (((to, z), solved), inside) in places.zip(mask.row(r)) {
+                    if *inside && !z.is_nan() {
+                        (*to, *solved) = (T::of(z + shift), true);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -5,11 +5,9 @@
 
 use ndarray::Array2;
 
-use super::contact_circle::{FEWEST, contact_circle};
-use super::depth_table::DepthTable;
-use super::signal::Signal;
-use crate::error::positive;
-use crate::{Domain, Frame, Scalar, SfsError};
+use super::depth_table::{DepthTable, Signal};
+use crate::{Domain, Frame, PixelScalar, SfsError};
+use tactile_core::Requirement;
 
 /// A depth table and how well the ball fits it; what [`DepthTable::from_ball`] returns.
 ///
@@ -44,7 +42,7 @@ pub struct BallCalibration<T> {
     pub pixels: usize,
 }
 
-impl<T: Scalar> DepthTable<T> {
+impl<T: PixelScalar> DepthTable<T> {
     /// Calibrates a table from one press of a ball.
     ///
     /// The contact is the largest connected patch of the domain where the signal exceeds `threshold`; the mask may leave
@@ -66,7 +64,7 @@ impl<T: Scalar> DepthTable<T> {
     /// ```
     ///
     /// # Errors
-    /// Those of a wrong domain; [`SfsError::NotPositive`] for a radius or threshold that is not positive, or a contact
+    /// Those of a wrong domain; [`SfsError::InvalidOption`] for a radius or threshold that is not positive, or a contact
     /// wider than the ball; [`SfsError::TooFewPixels`] below 100 pixels of contact.
     pub fn from_ball(
         frame: Frame<'_, T>,
@@ -76,8 +74,8 @@ impl<T: Scalar> DepthTable<T> {
         threshold: T,
         circle: Option<([f64; 2], f64)>,
     ) -> Result<BallCalibration<T>, SfsError> {
-        positive("ball radius", ball_radius_m.as_f64())?;
-        positive("contact threshold", threshold.as_f64())?;
+        Requirement::Positive.check("ball radius", ball_radius_m.as_f64())?;
+        Requirement::Positive.check("contact threshold", threshold.as_f64())?;
         let signals = signals(&frame, &signal, domain)?;
         let step = domain.pixel_size_m.map(T::as_f64);
         let found = || contact_circle(&signals, threshold.as_f64(), step);
@@ -107,19 +105,19 @@ impl<T: Scalar> DepthTable<T> {
 }
 
 /// Mean |depth of the table − depth of the ball|.
-fn mean_residual<T: Scalar>(table: &DepthTable<T>, samples: &[(f64, f64)]) -> f64 {
+fn mean_residual<T: PixelScalar>(table: &DepthTable<T>, samples: &[(f64, f64)]) -> f64 {
     let residual =
         |&(signal, depth): &(f64, f64)| (table.depth(T::of(signal)).0.as_f64() - depth).abs();
     samples.iter().map(residual).sum::<f64>() / samples.len() as f64
 }
 
 /// The signal of each pixel, NaN outside the mask.
-fn signals<T: Scalar>(
+fn signals<T: PixelScalar>(
     frame: &Frame<'_, T>,
     signal: &Signal<T>,
     domain: &Domain<'_, T>,
 ) -> Result<Array2<f64>, SfsError> {
-    domain.validate(frame.dim().0, frame.dim().1)?;
+    domain.bounding_box(frame.dim())?;
     signal.check_reference(frame.dim())?;
     Ok(Array2::from_shape_fn(frame.dim(), |(row, column)| {
         let inside = domain.contains(row, column);
@@ -196,4 +194,65 @@ fn monotone_means(samples: &[(f64, f64)]) -> Vec<(f64, f64)> {
             .filter(|e| e.0 > 0.0),
     );
     entries
+}
+
+/// Fewest pixels of contact a calibration makes sense for.
+const FEWEST: usize = 100;
+
+/// Centroid (px) and radius of equal area (m) of the largest connected patch above the threshold: whatever else exceeds
+/// it, uneven light at the frame's edge say, is no contact. O(pixels).
+///
+/// Stray pixels are kept from counting by demanding that four of the eight neighbours are above the threshold too.
+fn contact_circle(
+    signals: &Array2<f64>,
+    threshold: f64,
+    step: [f64; 2],
+) -> Result<([f64; 2], f64), SfsError> {
+    let above = |r: usize, c: usize| signals.get([r, c]).is_some_and(|&s| s > threshold);
+    let counted = Array2::from_shape_fn(signals.dim(), |(r, c)| {
+        let near = (0..9)
+            .filter(|k| above((r + k / 3).wrapping_sub(1), (c + k % 3).wrapping_sub(1)))
+            .count();
+        above(r, c) && near > 4
+    });
+    let patch = largest_patch(counted);
+    if patch.len() < FEWEST {
+        return Err(SfsError::TooFewPixels {
+            needed: FEWEST,
+            available: patch.len(),
+        });
+    }
+    let n = patch.len() as f64;
+    let mean = |axis: usize| patch.iter().map(|at| at[axis] as f64).sum::<f64>() / n;
+    let radius = (n * step[0] * step[1] / core::f64::consts::PI).sqrt();
+    Ok(([mean(1), mean(0)], radius))
+}
+
+/// The most pixels, `[row, column]`, that are connected by their sides.
+fn largest_patch(mut open: Array2<bool>) -> Vec<[usize; 2]> {
+    let (rows, columns) = open.dim();
+    let mut largest = Vec::new();
+    for start in 0..rows * columns {
+        let start = [start / columns, start % columns];
+        let mut patch = Vec::new();
+        if core::mem::take(&mut open[start]) {
+            patch.push(start);
+        }
+        let mut next = 0;
+        while let Some(&[r, c]) = patch.get(next) {
+            next += 1;
+            let (above, left) = (r.wrapping_sub(1), c.wrapping_sub(1));
+            for beside in [[above, c], [r + 1, c], [r, left], [r, c + 1]] {
+                if let Some(pixel) = open.get_mut(beside)
+                    && core::mem::take(pixel)
+                {
+                    patch.push(beside);
+                }
+            }
+        }
+        if patch.len() > largest.len() {
+            largest = patch;
+        }
+    }
+    largest
 }

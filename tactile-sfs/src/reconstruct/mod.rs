@@ -2,13 +2,8 @@
 
 mod ball_calibration;
 mod brooks_horn;
-mod contact_circle;
 mod depth_table;
 mod eikonal;
-mod pentland;
-mod reflectance;
-mod signal;
-mod table_zero;
 mod tsai_shah;
 
 use std::sync::Arc;
@@ -16,20 +11,20 @@ use std::sync::Arc;
 pub use ball_calibration::BallCalibration;
 pub use brooks_horn::BrooksHorn;
 pub(crate) use brooks_horn::SlopeBuffers;
-pub use depth_table::DepthTable;
-pub use eikonal::{BoundaryCondition, Branch, Eikonal};
+pub use depth_table::{DepthTable, Signal};
+pub use eikonal::{BoundaryCondition, Eikonal, EikonalBranch};
 pub(crate) use eikonal::{EikonalBuffers, ProfileBuffers};
-pub use pentland::Pentland;
-pub(crate) use reflectance::FieldBuffers;
-pub use signal::Signal;
 pub use tsai_shah::TsaiShah;
 
-use crate::{Domain, Frame, Scalar, SfsError, SlopeIntegrator, Surface, Workspace};
+use crate::{
+    Domain, Frame, Lighting, PixelFlags, PixelScalar, SfsError, SlopeIntegrator, Surface,
+    SurfaceWorkspace,
+};
 
 /// A way from one image to a surface.
 ///
 /// Object safe: `Box<dyn SurfaceReconstruction<f32>>` lets a user pick at run time. An implementor writes
-/// [`reconstruct_with`](Self::reconstruct_with) alone.
+/// [`reconstruct`](Self::reconstruct) alone.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -45,49 +40,51 @@ use crate::{Domain, Frame, Scalar, SfsError, SlopeIntegrator, Surface, Workspace
 /// assert!((surface.heights[[20, 20]] - radius).abs() < 1.5);
 /// # Ok::<(), tactile_sfs::SfsError>(())
 /// ```
-pub trait SurfaceReconstruction<T: Scalar> {
-    /// Reconstructs into `surface`, reusing its arrays and the buffers of `workspace`.
+pub trait SurfaceReconstruction<T: PixelScalar> {
+    /// Reconstructs from an image: real intensities, or the grey levels of an 8-bit camera.
     ///
     /// # Errors
-    /// What the method documents: mostly shapes that differ, an empty mask, or invalid options.
-    fn reconstruct_with(
+    /// Those of the method: mostly shapes that differ, an empty mask, or invalid options.
+    fn reconstruct(
         &self,
-        workspace: &mut Workspace<T>,
         frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
-        surface: &mut Surface<T>,
-    ) -> Result<(), SfsError>;
+    ) -> Result<Surface<T>, SfsError>;
 
-    /// Reconstructs from an image: real intensities, or the grey levels of an 8-bit camera.
+    /// The same into `surface`, with its arrays and the buffers of `workspace` used again: the methods of this crate do not
+    /// allocate after the first frame of a stream.
     ///
     /// ```
     /// use ndarray::array;
-    /// use tactile_sfs::{DepthTable, Domain, Frame, Surface, SurfaceReconstruction, Workspace};
+    /// use tactile_sfs::{DepthTable, Domain, Frame, Surface, SurfaceReconstruction, SurfaceWorkspace};
     /// let table = DepthTable::new(&[(0.0, 0.0), (200.0, 1e-3)])?;
     /// let (image, domain) = (array![[0_u8, 50, 100]], Domain::new([1e-4, 1e-4])?);
     /// let once = table.reconstruct(image.view().into(), &domain)?;
     /// assert_eq!(once.heights, array![[0.0, 0.25e-3, 0.5e-3]]);
-    /// // The same for a stream of frames: no allocation after the first.
-    /// let (mut workspace, mut surface) = (Workspace::default(), Surface::default());
+    /// let (mut workspace, mut surface) = (SurfaceWorkspace::default(), Surface::default());
     /// table.reconstruct_with(&mut workspace, Frame::Bytes(image.view()), &domain, &mut surface)?;
     /// assert_eq!(surface, once);
     /// # Ok::<(), tactile_sfs::SfsError>(())
     /// ```
     ///
     /// # Errors
-    /// As [`reconstruct_with`](Self::reconstruct_with).
-    fn reconstruct(
+    /// As [`reconstruct`](Self::reconstruct).
+    fn reconstruct_with(
         &self,
+        workspace: &mut SurfaceWorkspace<T>,
         frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
-    ) -> Result<Surface<T>, SfsError> {
-        let mut surface = Surface::default();
-        self.reconstruct_with(&mut Workspace::default(), frame, domain, &mut surface)?;
-        Ok(surface)
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        let _ = workspace;
+        *surface = self.reconstruct(frame, domain)?;
+        Ok(())
     }
 
-    /// The same method with its slopes made into heights by `integrator`; `None`, the default, for a method that goes from the image to
-    /// heights without slopes. Of the methods here [`BrooksHorn`] has slopes.
+    /// The same method with its slopes made into heights by `integrator`.
+    ///
+    /// `None`, the default, for a method that goes from the image to heights without slopes. Of the methods here
+    /// [`BrooksHorn`] has slopes.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -121,30 +118,81 @@ pub trait SurfaceReconstruction<T: Scalar> {
     }
 }
 
-/// What is implemented for a value is implemented for a pointer to it.
-macro_rules! forward {
-    ($pointer:ident) => {
-        impl<T: Scalar, M: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T>
-            for $pointer<M>
-        {
-            fn reconstruct_with(
-                &self,
-                workspace: &mut Workspace<T>,
-                frame: Frame<'_, T>,
-                domain: &Domain<'_, T>,
-                surface: &mut Surface<T>,
-            ) -> Result<(), SfsError> {
-                (**self).reconstruct_with(workspace, frame, domain, surface)
-            }
+/// A shared method is one, as trait objects need it.
+impl<T: PixelScalar, M: SurfaceReconstruction<T> + ?Sized> SurfaceReconstruction<T> for Arc<M> {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        (**self).reconstruct(frame, domain)
+    }
 
-            fn with_slope_integrator(
-                &self,
-                integrator: Arc<dyn SlopeIntegrator<T> + Send + Sync>,
-            ) -> Option<Arc<dyn SurfaceReconstruction<T> + Send + Sync>> {
-                (**self).with_slope_integrator(integrator)
-            }
-        }
-    };
+    fn reconstruct_with(
+        &self,
+        workspace: &mut SurfaceWorkspace<T>,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        (**self).reconstruct_with(workspace, frame, domain, surface)
+    }
+
+    fn with_slope_integrator(
+        &self,
+        integrator: Arc<dyn SlopeIntegrator<T> + Send + Sync>,
+    ) -> Option<Arc<dyn SurfaceReconstruction<T> + Send + Sync>> {
+        (**self).with_slope_integrator(integrator)
+    }
 }
-forward!(Box);
-forward!(Arc);
+
+/// The image of a box as reflectance, and the fields that iterate over it.
+#[derive(Debug, Default)]
+pub(crate) struct FieldBuffers<T> {
+    /// Reflectance in [0, 1]. NaN outside the mask and where the input is not finite.
+    reflectance: Vec<T>,
+    /// Heights, their variances and their next values.
+    heights: Vec<T>,
+    variance: Vec<T>,
+    next_heights: Vec<T>,
+    /// Unit normals and their next values.
+    normals: Vec<[T; 3]>,
+    next: Vec<[T; 3]>,
+    /// Heights to be written to the surface.
+    written: Vec<f64>,
+}
+
+impl<T: PixelScalar> FieldBuffers<T> {
+    /// Loads the reflectance and flags saturated, dark and non-finite pixels.
+    ///
+    /// # Errors
+    /// [`SfsError::EmptyMask`] if no pixel of the mask is finite.
+    fn load(
+        &mut self,
+        frame: &Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        lighting: &Lighting<T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        self.reflectance.clear();
+        let mut usable = false;
+        for (row, column) in surface.bounding_box.pixels() {
+            if !domain.contains(row, column) {
+                self.reflectance.push(T::nan());
+                continue;
+            }
+            let value = lighting.reflectance(frame.at(row, column));
+            surface.flags[[row, column]] =
+                PixelFlags::of_reflectance(value, T::min_positive_value());
+            usable |= value.is_finite();
+            let clamped = value.max(T::zero()).min(T::one());
+            self.reflectance
+                .push(if value.is_finite() { clamped } else { T::nan() });
+        }
+        if usable {
+            Ok(())
+        } else {
+            Err(SfsError::EmptyMask)
+        }
+    }
+}

@@ -15,12 +15,12 @@
 //! start. The eikonal method is better wherever a height is known, Brooks–Horn where none is.
 
 use super::FieldBuffers;
-use crate::error::{finite, positive};
-use crate::integrate::shift::write_levelled;
+use crate::integrate::write_levelled;
 use crate::{
-    Domain, Frame, Lighting, Scalar, SfsError, StopReason, Surface, SurfaceReconstruction,
-    Workspace,
+    Domain, Frame, Lighting, PixelScalar, SfsError, StopReason, Surface, SurfaceReconstruction,
+    SurfaceWorkspace,
 };
+use tactile_core::Requirement;
 
 /// Shape from shading by Newton's method on each pixel.
 ///
@@ -44,7 +44,7 @@ pub struct TsaiShah<T> {
     start_slope: T,
 }
 
-impl<T: Scalar> TsaiShah<T> {
+impl<T: PixelScalar> TsaiShah<T> {
     /// 12 iterations, noise variance 10⁻², slopes up to 5, a start that falls with slope 0.5 at the nearest point of its boundary.
     pub fn new(lighting: Lighting<T>) -> Self {
         let (noise, max_slope, start_slope) = (T::of(1e-2), T::of(5.0), T::of(0.5));
@@ -60,23 +60,23 @@ impl<T: Scalar> TsaiShah<T> {
     /// Number of iterations; more do not make the method converge to the surface.
     ///
     /// # Errors
-    /// [`SfsError::NotPositive`] for 0.
+    /// [`SfsError::InvalidOption`] for 0.
     pub fn with_iterations(self, iterations: usize) -> Result<Self, SfsError> {
-        positive("iterations", iterations as f64)?;
+        Requirement::Positive.check("iterations", iterations as f64)?;
         Ok(Self { iterations, ..self })
     }
 
     /// Variance W of the reflectance: larger damps more.
     ///
     /// # Errors
-    /// [`SfsError::NotPositive`] unless positive and finite.
+    /// [`SfsError::InvalidOption`] unless positive and finite.
     pub fn with_noise(self, noise: T) -> Result<Self, SfsError> {
-        positive("noise variance", noise.as_f64())?;
+        Requirement::Positive.check("noise variance", noise.as_f64())?;
         Ok(Self { noise, ..self })
     }
 }
 
-impl<T: Scalar> TsaiShah<T> {
+impl<T: PixelScalar> TsaiShah<T> {
     /// Slope at the boundary of the paraboloid the iteration starts from: positive for a bump, negative for a hollow, 0 for
     /// the plane (which frontal light never leaves).
     ///
@@ -95,9 +95,9 @@ impl<T: Scalar> TsaiShah<T> {
     /// ```
     ///
     /// # Errors
-    /// [`SfsError::NotFinite`] unless finite.
+    /// [`SfsError::InvalidOption`] unless finite.
     pub fn with_start_slope(self, start_slope: T) -> Result<Self, SfsError> {
-        finite("slope of the start", start_slope.as_f64())?;
+        Requirement::Finite.check("slope of the start", start_slope.as_f64())?;
         Ok(Self {
             start_slope,
             ..self
@@ -153,10 +153,20 @@ struct Grid<T> {
     step: [T; 2],
 }
 
-impl<T: Scalar> SurfaceReconstruction<T> for TsaiShah<T> {
+impl<T: PixelScalar> SurfaceReconstruction<T> for TsaiShah<T> {
+    fn reconstruct(
+        &self,
+        frame: Frame<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| {
+            self.reconstruct_with(workspace, frame, domain, surface)
+        })
+    }
+
     fn reconstruct_with(
         &self,
-        workspace: &mut Workspace<T>,
+        workspace: &mut SurfaceWorkspace<T>,
         frame: Frame<'_, T>,
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
@@ -166,7 +176,11 @@ impl<T: Scalar> SurfaceReconstruction<T> for TsaiShah<T> {
         let loaded = field.load(&frame, domain, &self.lighting, surface);
         if loaded.is_ok() {
             self.solve(&mut field, workspace, domain, surface);
-            write_levelled(&field.heights, domain, surface);
+            field.written.clear();
+            let hx = domain.pixel_size_m[0];
+            let heights = field.heights.iter().map(|&z| (z * hx).as_f64());
+            field.written.extend(heights);
+            write_levelled(&field.written, domain, surface);
             surface.finish(domain);
         }
         workspace.field = field;
@@ -174,23 +188,30 @@ impl<T: Scalar> SurfaceReconstruction<T> for TsaiShah<T> {
     }
 }
 
-impl<T: Scalar> TsaiShah<T> {
-    /// Start and iterations, in widths of a pixel; heights in the domain's unit at the end.
+impl<T: PixelScalar> TsaiShah<T> {
+    /// Start and iterations, in widths of a pixel.
     fn solve(
         &self,
         field: &mut FieldBuffers<T>,
-        workspace: &mut Workspace<T>,
+        workspace: &mut SurfaceWorkspace<T>,
         domain: &Domain<'_, T>,
         surface: &mut Surface<T>,
     ) {
         let area = surface.bounding_box;
         let [hx, hy] = domain.pixel_size_m;
         let grid = Grid {
-            rows: area.rows,
-            columns: area.columns,
+            rows: area.rows(),
+            columns: area.columns(),
             step: [T::one(), hy / hx],
         };
-        field.reset_heights(area.area());
+        for (vector, value) in [
+            (&mut field.heights, T::zero()),
+            (&mut field.variance, T::one()),
+            (&mut field.next_heights, T::zero()),
+        ] {
+            vector.clear();
+            vector.resize(area.area(), value);
+        }
         self.start(field, &grid);
         surface.report.stop = StopReason::IterationLimit;
         for iteration in 0..self.iterations {
@@ -203,7 +224,6 @@ impl<T: Scalar> TsaiShah<T> {
                 break;
             }
         }
-        field.heights.iter_mut().for_each(|z| *z *= hx);
     }
 
     /// One step at every pixel; the root mean square misfit before it.
@@ -247,7 +267,7 @@ impl<T: Scalar> TsaiShah<T> {
 }
 
 /// Height of the neighbour before or after along one axis; the pixel's own at the border.
-fn neighbour<T: Scalar>(
+fn neighbour<T: PixelScalar>(
     z: &[T],
     i: usize,
     at: usize,

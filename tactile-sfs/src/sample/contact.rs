@@ -8,9 +8,9 @@
 use nalgebra::Point3;
 use ndarray::ArrayView2;
 
-use super::strips::Weights;
-use super::{ControlPointSampler, SampleBuffers};
-use crate::{BoundingBox, Domain, Scalar, SfsError, Workspace};
+use super::lattice::Weights;
+use super::{ControlPointSampler, SampleBuffers, made_by};
+use crate::{BoundingBox, Domain, PixelScalar, SfsError, SurfaceWorkspace};
 
 /// Squared slope above which ground counts no steeper (63°), as for [`EquallySpaced`](super::EquallySpaced).
 const STEEPEST_SQUARED: f64 = 4.0;
@@ -36,13 +36,13 @@ const NEIGHBOURS: [(isize, isize, f64); 8] = [
 ///
 /// ```
 /// use ndarray::Array2;
-/// use tactile_sfs::{ContactSampler, ControlPointSampler};
+/// use tactile_sfs::{ContactSampler, ControlPointSampler, Domain};
 /// // Two balls of 12.0 and 14.4 pixels: the second is the first, a fifth larger.
 /// let points = |radius: f64| {
 ///     let z = Array2::from_shape_fn((40, 40), |(r, c)| {
 ///         (radius * radius - (r as f64 - 19.7).powi(2) - (c as f64 - 20.2).powi(2)).max(0.0).sqrt()
 ///     });
-///     ContactSampler.sample(z.view(), Some(z.mapv(|z| z > 0.0).view()), [1.0; 2], 50)
+///     ContactSampler.sample(z.view(), &Domain::default().with_mask(z.mapv(|z| z > 0.0).view()), 50)
 /// };
 /// let centre = nalgebra::Vector3::new(20.2, 19.7, 0.0);
 /// let farthest = points(12.0)?.iter().zip(points(14.4)?).map(|(small, large)| {
@@ -54,31 +54,33 @@ const NEIGHBOURS: [(isize, isize, f64); 8] = [
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ContactSampler;
 
-impl<T: Scalar> ControlPointSampler<T> for ContactSampler {
+impl<T: PixelScalar> ControlPointSampler<T> for ContactSampler {
+    fn sample(
+        &self,
+        heights: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        count: usize,
+    ) -> Result<Vec<Point3<T>>, SfsError> {
+        made_by(|workspace, points| self.sample_with(workspace, heights, domain, count, points))
+    }
+
     fn sample_with(
         &self,
-        workspace: &mut Workspace<T>,
-        surface: ArrayView2<'_, T>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [T; 2],
+        workspace: &mut SurfaceWorkspace<T>,
+        heights: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
         count: usize,
         points: &mut Vec<Point3<T>>,
     ) -> Result<(), SfsError> {
         points.clear();
-        let (rows, columns) = surface.dim();
-        let domain = Domain {
-            mask,
-            pixel_size_m,
-            known_heights: None,
-        };
-        let area = domain.validate(rows, columns)?;
+        let area = domain.bounding_box(heights.dim())?;
         let SampleBuffers {
             squares,
             weight,
             strips,
             ..
         } = &mut workspace.points;
-        let field = Field::load(core::mem::take(squares), weight, surface, &domain, area);
+        let field = Field::load(core::mem::take(squares), weight, heights, domain, area);
         let available = field.solved;
         if available == 0 {
             return Err(SfsError::EmptyMask);
@@ -114,7 +116,7 @@ struct Field<T> {
     solved: usize,
 }
 
-impl<T: Scalar> Field<T> {
+impl<T: PixelScalar> Field<T> {
     fn load(
         mut squares: Vec<f64>,
         spare: &mut Vec<f64>,
@@ -123,17 +125,19 @@ impl<T: Scalar> Field<T> {
         area: BoundingBox,
     ) -> Self {
         let [width, height] = domain.pixel_size_m.map(T::as_f64);
-        let (rows, columns) = (area.rows + 2, area.columns + 2);
+        let (rows, columns) = (area.rows() + 2, area.columns() + 2);
         squares.clear();
         // A row more, which is never filled: what lies above and below the field.
         squares.resize((rows + 1) * columns, f64::NAN);
         let (mut plane, mut solved) = (0.0_f64, 0);
-        let heights = area.view(surface);
+        let heights = area.of(surface);
         let lines = squares.chunks_exact_mut(columns).skip(1);
         for ((row, heights), line) in heights.rows().into_iter().enumerate().zip(lines) {
             for ((column, height), place) in heights.iter().enumerate().zip(&mut line[1..]) {
                 let height = height.as_f64() / width;
-                if height.is_finite() && domain.contains(area.top + row, area.left + column) {
+                if height.is_finite()
+                    && domain.contains(area.row_start + row, area.column_start + column)
+                {
                     *place = height;
                     plane = plane.min(height);
                     solved += 1;
@@ -297,8 +301,8 @@ impl<T: Scalar> Field<T> {
         let height = self.plane + square.max(0.0).sqrt();
         let [width_m, height_m] = self.pixel_size_m;
         Point3::new(
-            T::of(x + self.area.left as f64 - 1.0) * width_m,
-            T::of(y + self.area.top as f64 - 1.0) * height_m,
+            T::of(x + self.area.column_start as f64 - 1.0) * width_m,
+            T::of(y + self.area.row_start as f64 - 1.0) * height_m,
             T::of(height) * width_m,
         )
     }

@@ -1,6 +1,6 @@
 //! Control points of round bodies, whose slope has no end at the rim: they follow the body, not the pixels of its rim.
 use ndarray::Array2;
-use tactile_sfs::{ControlPointSampler, EquallySpaced};
+use tactile_sfs::{ControlPointSampler, Domain, EquallySpaced};
 
 /// Root mean square distance of a hemisphere's control points from its axis, over its radius in pixels.
 fn spread(radius: f64, centre: [f64; 2], count: usize) -> f64 {
@@ -12,7 +12,7 @@ fn spread(radius: f64, centre: [f64; 2], count: usize) -> f64 {
     });
     let mask = Array2::from_shape_fn((n, n), |(r, c)| square(r, c) < radius * radius);
     let points = EquallySpaced
-        .sample(z.view(), Some(mask.view()), [1.0; 2], count)
+        .sample(z.view(), &Domain::default().with_mask(mask.view()), count)
         .unwrap();
     let middle = points
         .iter()

@@ -140,7 +140,7 @@ fn stretch(sampler: &dyn ControlPointSampler<f64>, radii: [f64; 2], centre: [f64
     let [small, large] = radii.map(|radius| {
         let surface = surface(&method, radius, centre);
         let (heights, mask) = (surface.heights.view(), surface.mask.view());
-        let points = sampler.sample(heights, Some(mask), [1.0; 2], 200);
+        let points = sampler.sample(heights, &Domain::default().with_mask(mask), 200);
         points.expect("points")
     });
     let scale = radii[1] / radii[0];
@@ -192,14 +192,13 @@ fn contact_points_lie_inside_the_contour() {
     });
     let mask = z.mapv(|z| z > 0.0);
     let pixels = mask.iter().filter(|inside| **inside).count();
-    let (mut workspace, mut points) = (Workspace::default(), Vec::new());
+    let (mut workspace, mut points) = (SurfaceWorkspace::default(), Vec::new());
     for count in [0, 1, 30, 200] {
         ContactSampler
             .sample_with(
                 &mut workspace,
                 z.view(),
-                Some(mask.view()),
-                [1.0; 2],
+                &Domain::default().with_mask(mask.view()),
                 count,
                 &mut points,
             )
@@ -212,7 +211,8 @@ fn contact_points_lie_inside_the_contour() {
             assert!((point.z * point.z - height * height).abs() < 1.0, "{point}");
         }
     }
-    let sample = |count| ContactSampler.sample(z.view(), Some(mask.view()), [1.0; 2], count);
+    let sample =
+        |count| ContactSampler.sample(z.view(), &Domain::default().with_mask(mask.view()), count);
     let refused = SfsError::TooManyPoints {
         requested: pixels + 1,
         available: pixels,
@@ -220,7 +220,7 @@ fn contact_points_lie_inside_the_contour() {
     assert_eq!(sample(pixels + 1), Err(refused));
     let nothing = mask.mapv(|_| false);
     assert_eq!(
-        ContactSampler.sample(z.view(), Some(nothing.view()), [1.0; 2], 3),
+        ContactSampler.sample(z.view(), &Domain::default().with_mask(nothing.view()), 3),
         Err(SfsError::EmptyMask)
     );
 }

@@ -84,7 +84,7 @@ fn narrow_domains_are_right() {
     let mut known = Array2::from_elem((1, 9), f64::NAN);
     known[[0, 0]] = 2.0;
     let domain = Domain::default().with_known_heights(known.view());
-    let method = Eikonal::new(frontal()).with_branch(Branch::Convex);
+    let method = Eikonal::new(frontal()).with_branch(EikonalBranch::Convex);
     let surface = method.reconstruct(image.view().into(), &domain).unwrap();
     assert!((surface.heights[[0, 8]] - 10.0).abs() < 1e-9);
     for (name, method) in integrators() {
@@ -144,7 +144,7 @@ fn nonsense_is_refused() {
             pixel_size_m: [f64::NAN, 1.0],
             ..Domain::default()
         };
-        assert!(matches!(run(size), SfsError::NotPositive { .. }), "{name}");
+        assert!(matches!(run(size), SfsError::InvalidOption(_)), "{name}");
         let none = method.reconstruct(
             Array2::<f64>::zeros((0, 3)).view().into(),
             &Domain::default(),
@@ -173,8 +173,6 @@ fn nonsense_is_refused() {
         assert!(Eikonal::new(frontal()).with_tolerance(bad).is_err());
         assert!(TsaiShah::new(frontal()).with_noise(bad).is_err());
         assert!(BrooksHorn::new(frontal()).with_smoothness(bad).is_err());
-        assert!(Pentland::new(frontal()).with_regularisation(bad).is_err());
-        assert!(MaskedLeastSquares::default().with_tolerance(bad).is_err());
     }
     assert!(CurvatureAdaptive::new(f64::NAN).is_err());
     assert!(DepthTable::new(&[(0.0, 0.0), (0.0, 1.0)]).is_err());

@@ -21,7 +21,6 @@ pub(crate) fn reconstructions() -> Vec<(&'static str, Box<dyn SurfaceReconstruct
             Box::new(Eikonal::new(oblique()).with_boundary(rim).unwrap()),
         ),
         ("tsai-shah", Box::new(TsaiShah::new(oblique()))),
-        ("pentland", Box::new(Pentland::new(oblique()))),
         (
             "brooks-horn",
             Box::new(BrooksHorn::new(oblique()).with_iterations(40, 10).unwrap()),

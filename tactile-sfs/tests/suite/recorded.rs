@@ -2,14 +2,15 @@
 //!
 //! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` writes the record anew; the commit says why numbers moved.
 
-use test_support as record;
+#[path = "../../../tests/support/recorded.rs"]
+mod record;
 
 use ndarray::Array2;
 use tactile_sfs::{
-    Alignment, BoundaryCondition, Branch, BrooksHorn, ControlPointSampler, CosinePoisson,
-    CurvatureAdaptive, DepthTable, Domain, Eikonal, EquallySpaced, Frame, FrankotChellappa,
-    Lighting, MaskedLeastSquares, Pentland, Random, Signal, SlopeIntegrator, Surface,
-    SurfaceReconstruction, TsaiShah, estimate_lighting, height_error, render, reprojection, slopes,
+    Alignment, BoundaryCondition, BrooksHorn, ControlPointSampler, CosinePoisson,
+    CurvatureAdaptive, DepthTable, Domain, Eikonal, EikonalBranch, EquallySpaced, Frame,
+    FrankotChellappa, Lighting, MaskedLeastSquares, Random, Signal, SlopeIntegrator, Surface,
+    SurfaceReconstruction, TsaiShah, height_error, render, reprojection, slopes,
 };
 
 use self::record::Answers;
@@ -76,19 +77,6 @@ fn reconstructions(answers: &mut Answers) {
                 &scene.image,
             ),
         );
-        add_surface(
-            answers,
-            &format!("pentland/{name}"),
-            &solve(&Pentland::new(oblique), &lit),
-        );
-        let found = estimate_lighting(Frame::Real(lit.view()), &domain).expect("a light");
-        answers.add(
-            format!("estimate/{name}"),
-            found
-                .direction()
-                .into_iter()
-                .chain([found.normal_intensity()]),
-        );
     }
     both_branches(answers, frontal);
     depth_table(answers);
@@ -106,7 +94,7 @@ fn both_branches(answers: &mut Answers, frontal: Lighting<f64>) {
     let lit = Lighting::new([0.3, -0.2, 1.0]).expect("a light");
     let image = render(scene.z.view(), [scene.pixel; 2], &lit);
     for (name, light, image) in [("frontal", frontal, &scene.image), ("oblique", lit, &image)] {
-        let method = Eikonal::new(light).with_branch(Branch::Auto);
+        let method = Eikonal::new(light).with_branch(EikonalBranch::Auto);
         let surface = method
             .reconstruct(image.view().into(), &domain)
             .expect("heights");
@@ -180,8 +168,9 @@ fn samplers(answers: &mut Answers) {
             let points = sampler
                 .sample(
                     scene.z.view(),
-                    Some(scene.mask.view()),
-                    [scene.pixel; 2],
+                    &Domain::new([scene.pixel; 2])
+                        .unwrap()
+                        .with_mask(scene.mask.view()),
                     count,
                 )
                 .expect("points");

@@ -19,11 +19,12 @@ fn samplers_with_a_workspace_do_not_allocate() {
         .iter()
         .flat_map(|sampler| [(sampler, 40), (sampler, 900)])
     {
-        let (z, mask, step) = (case.z.view(), Some(case.mask.view()), [case.pixel; 2]);
-        let (mut workspace, mut points) = (Workspace::default(), Vec::new());
+        let domain = Domain::new([case.pixel; 2]).unwrap();
+        let (z, domain) = (case.z.view(), domain.with_mask(case.mask.view()));
+        let (mut workspace, mut points) = (SurfaceWorkspace::default(), Vec::new());
         let mut run = || {
             sampler
-                .sample_with(&mut workspace, z, mask, step, count, &mut points)
+                .sample_with(&mut workspace, z, &domain, count, &mut points)
                 .unwrap()
         };
         run();
@@ -33,10 +34,10 @@ fn samplers_with_a_workspace_do_not_allocate() {
             "{count}"
         );
         // 40 points move freely, 900 are nearly as dense as the pixels.
-        assert_eq!(points, sampler.sample(z, mask, step, count).unwrap());
+        assert_eq!(points, sampler.sample(z, &domain, count).unwrap());
         assert!(
             sampler
-                .sample_with(&mut workspace, z, mask, step, 9000, &mut points)
+                .sample_with(&mut workspace, z, &domain, 9000, &mut points)
                 .is_err()
         );
         assert!(points.is_empty());
@@ -54,7 +55,13 @@ fn samplers_give_the_count_inside_the_mask() {
     for sampler in samplers() {
         for count in [0, 1, 2, 17, 200, 1000, pixels] {
             let points = sampler
-                .sample(z.view(), Some(case.mask.view()), [case.pixel; 2], count)
+                .sample(
+                    z.view(),
+                    &Domain::new([case.pixel; 2])
+                        .unwrap()
+                        .with_mask(case.mask.view()),
+                    count,
+                )
                 .unwrap();
             assert_eq!(points.len(), count);
             let mut seen = std::collections::HashSet::new();
@@ -68,7 +75,11 @@ fn samplers_give_the_count_inside_the_mask() {
             }
         }
         let error = sampler
-            .sample(z.view(), Some(case.mask.view()), [1.0; 2], pixels + 1)
+            .sample(
+                z.view(),
+                &Domain::default().with_mask(case.mask.view()),
+                pixels + 1,
+            )
             .unwrap_err();
         assert_eq!(
             error,
@@ -108,7 +119,7 @@ fn the_same_surface_larger_gives_the_same_points_of_it() {
     };
     let sample = |n: usize| {
         EquallySpaced
-            .sample(bump(n).view(), None, [1.0; 2], 120)
+            .sample(bump(n).view(), &Domain::default(), 120)
             .unwrap()
     };
     let (small, large) = (sample(90), sample(108));
@@ -128,7 +139,7 @@ fn equal_spacing_is_even_on_the_surface() {
     let case = Sampled::new(200, gaussian);
     let z = case.z.mapv(|z| 3.0 * z);
     let points = EquallySpaced
-        .sample(z.view(), None, [case.pixel; 2], 200)
+        .sample(z.view(), &Domain::new([case.pixel; 2]).unwrap(), 200)
         .unwrap();
     let nearest: Vec<f64> = points
         .iter()
@@ -166,7 +177,11 @@ fn points_of_a_contact_stand_for_equal_areas_on_oblong_pixels_too() {
             (RADIUS * RADIUS - r * r).max(0.0).sqrt()
         });
         let mask = z.mapv(|z| z > 0.0);
-        let points = ContactSampler.sample(z.view(), Some(mask.view()), pixel, COUNT);
+        let points = ContactSampler.sample(
+            z.view(),
+            &Domain::new(pixel).unwrap().with_mask(mask.view()),
+            COUNT,
+        );
         let points = points.unwrap();
         for within in [16.0, 28.0] {
             let inside = points.iter().filter(|p| distance(p.x, p.y) < within);

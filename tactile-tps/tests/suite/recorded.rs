@@ -2,7 +2,8 @@
 //!
 //! `RECORD_ANSWERS=1 cargo test -p tactile-tps --test suite recorded` writes the record anew; the commit says why numbers moved.
 
-use test_support as record;
+#[path = "../../../tests/support/recorded.rs"]
+mod record;
 
 use nalgebra::{Point, Point1, SVector};
 use tactile_tps::{

@@ -2,7 +2,8 @@
 //! singular systems: every error in units of what rounding the inputs alone does to the exact spline.
 #![allow(clippy::print_stdout)]
 
-use test_support as worst;
+#[path = "../../../evidence/worst.rs"]
+mod worst;
 
 use crate::common::{Uniform, bend, options};
 use nalgebra::{Point, SVector};

@@ -16,10 +16,11 @@ use ndarray::ArrayView2;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Skips, Stage};
-use tactile_imaging::sfs::{ControlPointSampler, EquallySpaced, SfsError, Workspace};
-use tactile_simulate::Trial;
-use tactile_simulate::{CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene};
+use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Skips, Stage, Trial};
+use tactile_imaging::sfs::{ControlPointSampler, Domain, EquallySpaced, SfsError};
+use tactile_imaging::simulate::{
+    CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene,
+};
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
 fn trial(forces: &[f64], seed: u64) -> Trial {
@@ -217,16 +218,13 @@ fn surfaces_of_the_box_alone_equal_those_of_the_whole_frame() {
 struct Half;
 
 impl ControlPointSampler<f64> for Half {
-    fn sample_with(
+    fn sample(
         &self,
-        workspace: &mut Workspace<f64>,
-        surface: ArrayView2<'_, f64>,
-        mask: Option<ArrayView2<'_, bool>>,
-        pixel_size_m: [f64; 2],
+        heights: ArrayView2<'_, f64>,
+        domain: &Domain<'_, f64>,
         count: usize,
-        points: &mut Vec<Point3<f64>>,
-    ) -> Result<(), SfsError> {
-        EquallySpaced.sample_with(workspace, surface, mask, pixel_size_m, count / 2, points)
+    ) -> Result<Vec<Point3<f64>>, SfsError> {
+        EquallySpaced.sample(heights, domain, count / 2)
     }
 }
 

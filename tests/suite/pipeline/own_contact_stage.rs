@@ -18,7 +18,7 @@ impl ContactStage for Spoiled {
         workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge: Option<Estimate>,
+        gauge: Option<Estimate<f64>>,
         contact: &mut FrameContact,
     ) -> Result<(), ForceError> {
         self.light

@@ -4,7 +4,8 @@
 //! anew: `RECORD_ANSWERS=1 cargo test --test suite recorded_answers`, and the difference of the text file says what moved.
 
 mod readings;
-use test_support as record;
+#[path = "../../support/recorded.rs"]
+mod record;
 mod scenes;
 
 /// Largest difference from a recorded number, relative to the largest number of its line: sums taken in another order differ by some

@@ -4,7 +4,7 @@ use super::press::{
 };
 use super::table::{EXACT, STRAIN, Table};
 use super::{loads, steps, symmetry};
-use tactile_simulate::Trial;
+use tactile_imaging::pipeline::Trial;
 
 #[test]
 fn the_pipeline_keeps_its_numbers() {

@@ -20,7 +20,7 @@ use crate::modulus::EstimatorKind;
 
 /// A law of contact without friction, with the factors by which sticking changes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NoSlipLaw<L> {
+pub(crate) struct NoSlipLaw<L> {
     frictionless: L,
     kind: EstimatorKind,
     /// ln of the force's factor at one contact radius.
@@ -32,11 +32,7 @@ pub struct NoSlipLaw<L> {
 }
 
 impl NoSlipLaw<Sphere> {
-    /// Of a sphere of radius R (m) on a half-space of Poisson ratio ν.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`].
-    pub fn sphere(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
+    pub(crate) fn sphere(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
         // δ I = a²/2R: at one indentation a² grows as 2I.
         let integral = 2.0 * parabola_integral(theta(nu));
         Ok(Self {
@@ -50,11 +46,7 @@ impl NoSlipLaw<Sphere> {
 }
 
 impl NoSlipLaw<Punch> {
-    /// Of a flat punch of radius a (m).
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`].
-    pub fn punch(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
+    pub(crate) fn punch(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
             frictionless: Punch::new(radius_m)?,
             kind: EstimatorKind::FlatPunchWithoutSlip,
@@ -66,11 +58,7 @@ impl NoSlipLaw<Punch> {
 }
 
 impl NoSlipLaw<ConeLaw> {
-    /// Of a cone, by the tangent of its half angle.
-    ///
-    /// # Errors
-    /// [`ElasticityError::NotPositive`].
-    pub fn cone(half_angle_tangent: f64, nu: f64) -> Result<Self, ElasticityError> {
+    pub(crate) fn cone(half_angle_tangent: f64, nu: f64) -> Result<Self, ElasticityError> {
         // δ I = (π/2) a cot α: at one indentation a grows as I.
         let integral = cone_integral(theta(nu));
         Ok(Self {

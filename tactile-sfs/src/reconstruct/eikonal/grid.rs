@@ -1,63 +1,84 @@
-//! The padded grid of the mask's bounding box the sweeps run on, in units of a pixel's width.
+//! From the frame to the grid: nodes, angles to the light, known heights, boundary offsets and edges. And from the grid to
+//! the surface.
+//!
+//! Boundary offsets: how far the pixels next to a boundary of known height stand above it, to a fraction of a pixel.
 
-use super::front::Front;
-use crate::{Domain, PixelFlags, Scalar, Surface};
+use super::{BoundaryCondition, Eikonal, EikonalBuffers, Node};
+use crate::{Domain, Frame, PixelFlags, PixelScalar, SfsError, Surface};
 
-/// What a node of the grid is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Node {
-    /// Not in the mask.
-    #[default]
-    Outside,
-    /// To be solved for.
-    Unknown,
-    /// In the mask, height given.
-    Known,
-}
+impl<T: PixelScalar> EikonalBuffers<T> {
+    /// Fills the grid and flags the pixels the model does not explain. Returns whether heights are known inside the mask.
+    pub(super) fn load(
+        &mut self,
+        method: &Eikonal<T>,
+        frame: &Frame<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<bool, SfsError> {
+        let area = surface.bounding_box;
+        let [hx, hy] = domain.pixel_size_m;
+        self.clear(area.rows(), area.columns());
+        self.aspect = hy / hx;
+        let at_border = match method.boundary {
+            BoundaryCondition::Height(height) => Some(height),
+            BoundaryCondition::Free => None,
+        };
+        // The darkest reflectance that is told from black.
+        let least = (T::one() + method.max_slope.powi(2)).sqrt().recip();
+        let (frame_rows, frame_columns) = frame.dim();
+        let (mut known_inside, mut known_outside) = (false, false);
+        for i in 0..self.node.len() {
+            // The border of the grid may lie outside the frame.
+            let row = (area.row_start + i / self.width).wrapping_sub(1);
+            let column = (area.column_start + i % self.width).wrapping_sub(1);
+            if row >= frame_rows || column >= frame_columns {
+                continue;
+            }
+            let known = domain.known(row, column);
+            if !domain.contains(row, column) {
+                if let Some(height) = known.or(at_border) {
+                    self.given[i] = height / hx;
+                    known_outside = true;
+                }
+                continue;
+            }
+            self.node[i] = if known.is_some() {
+                Node::Known
+            } else {
+                Node::Unknown
+            };
+            known_inside |= known.is_some();
+            self.given[i] = known.map_or(T::nan(), |height| height / hx);
+            let reflectance = method.lighting.reflectance(frame.at(row, column));
+            let flags = PixelFlags::of_reflectance(reflectance, least);
+            surface.flags[[row, column]] = flags;
+            if flags == PixelFlags::NON_FINITE {
+                self.holes.push(i);
+                self.cosine[i] = T::nan();
+            } else {
+                self.cosine[i] = reflectance.max(least).min(T::one());
+            }
+        }
+        self.fill_holes(area.area())?;
+        for (sine, &cosine) in self.sine.iter_mut().zip(&self.cosine) {
+            *sine = ((T::one() - cosine) * (T::one() + cosine))
+                .max(T::zero())
+                .sqrt();
+        }
+        self.measure_offsets();
+        let at_boundary = known_outside && self.offset.iter().any(|offset| !offset.is_nan());
+        if !(known_inside || at_boundary) {
+            return Err(SfsError::NoKnownHeight);
+        }
+        self.measure_edges();
+        Ok(known_inside)
+    }
 
-/// Buffers of the sweeps: the mask's box with a border of one pixel all around.
-#[derive(Debug, Default)]
-pub(crate) struct EikonalBuffers<T> {
-    /// Nodes per row.
-    pub(super) width: usize,
-    /// Height of a pixel over its width.
-    pub(super) aspect: T,
-    pub(super) node: Vec<Node>,
-    /// Nodes whose value may still improve.
-    pub(super) active: Vec<bool>,
-    /// Rows that may have active nodes.
-    pub(super) busy: Vec<bool>,
-    /// Reflectance R = cos of the angle between normal and light.
-    pub(super) cosine: Vec<T>,
-    /// sin of that angle.
-    pub(super) sine: Vec<T>,
-    /// Given heights: inside the mask at the pixel's centre, outside it at the mask's border; NaN elsewhere.
-    pub(super) given: Vec<T>,
-    /// Height of the convex branch, or minus that of the concave one; +∞ where not reached.
-    pub(super) value: Vec<T>,
-    /// Values of the branch solved first.
-    pub(super) kept: Vec<T>,
-    /// Boundary offset: height of a node above the boundary next to it, NaN away from the boundary.
-    pub(super) offset: Vec<T>,
-    /// 1/(slope · step)² of the edge to the next node in x and in y.
-    pub(super) edges: Vec<[T; 2]>,
-    /// cos²φ of the gradient, whether sweeps use it, and whether a fitted profile has told it before any solution.
-    pub(super) along_x: Vec<T>,
-    pub(super) corrected: bool,
-    pub(super) directed: bool,
-    /// Nodes whose intensity is not finite.
-    pub(super) holes: Vec<usize>,
-    /// Unknown nodes in the order in which the front is expected to reach them; none where nothing is expected.
-    pub(super) front: Front,
-}
-
-impl<T: Scalar> EikonalBuffers<T> {
-    pub(super) fn clear(&mut self, rows: usize, columns: usize) {
+    fn clear(&mut self, rows: usize, columns: usize) {
         self.width = columns + 2;
         let length = self.width * (rows + 2);
         fill(&mut self.node, length, Node::Outside);
         fill(&mut self.active, length, false);
-        fill(&mut self.busy, rows + 2, false);
         fill(&mut self.cosine, length, T::one());
         fill(&mut self.sine, length, T::zero());
         fill(&mut self.given, length, T::nan());
@@ -67,12 +88,64 @@ impl<T: Scalar> EikonalBuffers<T> {
         fill(&mut self.along_x, length, T::nan());
         self.corrected = false;
         self.directed = false;
-        self.front.nodes.clear();
+        self.front.clear();
         self.holes.clear();
     }
 
+    /// Gives pixels without a finite intensity the mean of their finite neighbours, from the edge of a hole inwards. A part of
+    /// the mask without any intensity is taken as flat, for want of better; a mask without any is refused.
+    fn fill_holes(&mut self, pixels: usize) -> Result<(), SfsError> {
+        for _ in 0..pixels {
+            let before = self.holes.len();
+            if before == 0 {
+                break;
+            }
+            // `kept` holds the new values until the pass is over, so that the order does not matter.
+            let mut values = core::mem::take(&mut self.kept);
+            values.clear();
+            values.extend(self.holes.iter().map(|&i| self.mean_around(i)));
+            for (&i, &value) in self.holes.iter().zip(&values) {
+                self.cosine[i] = value;
+            }
+            self.kept = values;
+            let cosine = &self.cosine;
+            self.holes.retain(|&i| cosine[i].is_nan());
+            if self.holes.len() == before {
+                if before
+                    == self
+                        .node
+                        .iter()
+                        .filter(|&&node| node != Node::Outside)
+                        .count()
+                {
+                    return Err(SfsError::EmptyMask);
+                }
+                self.holes.drain(..).for_each(|i| self.cosine[i] = T::one());
+            }
+        }
+        Ok(())
+    }
+
+    /// Mean reflectance of the eight neighbours that have one, NaN if none has.
+    fn mean_around(&self, i: usize) -> T {
+        let (mut sum, mut count) = (T::zero(), 0usize);
+        for line in [i - self.width, i, i + self.width] {
+            for j in [line - 1, line, line + 1] {
+                if self.node[j] != Node::Outside && self.cosine[j].is_finite() {
+                    sum += self.cosine[j];
+                    count += 1;
+                }
+            }
+        }
+        if count > 0 {
+            sum / T::of(count as f64)
+        } else {
+            T::nan()
+        }
+    }
+
     /// 1/(slope · step)² by the chord rule for every edge between two nodes of the mask.
-    pub(super) fn measure_edges(&mut self) {
+    fn measure_edges(&mut self) {
         // A floor keeps flat parts (slope 0) from dividing by zero: 10⁻⁶ pixels per pixel.
         let floor = T::of(1e-6);
         let metric = |sine: [T; 2], cosine: [T; 2], step: T| {
@@ -100,22 +173,11 @@ impl<T: Scalar> EikonalBuffers<T> {
         }
     }
 
-    /// Keeps the values of the branch just solved.
-    pub(super) fn keep(&mut self) {
-        self.kept.clear();
-        self.kept.extend_from_slice(&self.value);
-    }
-
-    /// Takes the kept values back.
-    pub(super) fn restore(&mut self) {
-        core::mem::swap(&mut self.value, &mut self.kept);
-    }
-
     /// Writes value × `scale` to the surface.
     pub(super) fn store(&self, scale: T, domain: &Domain<'_, T>, surface: &mut Surface<T>) {
         let area = surface.bounding_box;
         for (row, column) in area.pixels() {
-            let i = (row - area.top + 1) * self.width + column - area.left + 1;
+            let i = (row - area.row_start + 1) * self.width + column - area.column_start + 1;
             match self.node[i] {
                 Node::Outside => {}
                 Node::Known => surface.set(
@@ -128,6 +190,143 @@ impl<T: Scalar> EikonalBuffers<T> {
                 }
                 Node::Unknown => surface.flags[[row, column]] |= PixelFlags::UNREACHED,
             }
+        }
+    }
+
+    /// Measures the boundary offset of every unknown pixel of the mask that has a given height outside next to it.
+    ///
+    /// The solution is a minimum over the whole boundary: one pixel that noise makes look flatter than it is would draw down
+    /// the whole surface. So the kind of boundary is decided by the majority of the boundary pixels around, and their mean
+    /// |∇ sin θ| is taken.
+    fn measure_offsets(&mut self) {
+        for i in self.width..self.node.len() - self.width {
+            let near = [i - 1, i + 1, i - self.width, i + self.width];
+            // Most nodes have none outside beside them.
+            if !near.iter().any(|&j| self.node[j] == Node::Outside) {
+                continue;
+            }
+            if self.node[i] == Node::Unknown && self.lowest(i, T::one()).is_finite() {
+                // Until the edges are measured their place holds |∇ sin θ| and step.
+                self.edges[i] = self.gradient_and_step(i);
+                self.offset[i] = T::zero();
+            }
+        }
+        for i in self.width..self.node.len() - self.width {
+            if !self.offset[i].is_nan() {
+                self.offset[i] = self.offset_of(i);
+            }
+        }
+    }
+
+    /// Sets the values that sweeps start from: known heights, and boundary heights with their offsets.
+    pub(super) fn start(&mut self, convex: bool) {
+        let sign = if convex { T::one() } else { -T::one() };
+        for i in self.width..self.node.len() - self.width {
+            self.active[i] = self.node[i] == Node::Unknown;
+            self.value[i] = match self.node[i] {
+                Node::Known => sign * self.given[i],
+                Node::Unknown if !self.offset[i].is_nan() => self.lowest(i, sign) + self.offset[i],
+                _ => T::infinity(),
+            };
+        }
+    }
+
+    /// Lowest (highest for sign −1, negated) height given outside the mask next to a pixel, +∞ if there is none.
+    fn lowest(&self, i: usize, sign: T) -> T {
+        let width = self.width;
+        let given = |j: usize| match self.node[j] {
+            Node::Outside if !self.given[j].is_nan() => sign * self.given[j],
+            _ => T::infinity(),
+        };
+        given(i - 1)
+            .min(given(i + 1))
+            .min(given(i - width))
+            .min(given(i + width))
+    }
+
+    /// |∇ sin θ| at a pixel, and how far the boundary can be from it along that gradient.
+    fn gradient_and_step(&self, i: usize) -> [T; 2] {
+        let [gx, gy] = self.gradient(i);
+        let length = gx.hypot(gy);
+        if length > T::zero() {
+            let step = gx.abs().max(gy.abs() * self.aspect) / length;
+            [length, step]
+        } else {
+            [length, T::one().min(self.aspect)]
+        }
+    }
+
+    /// ∇ sin θ at a pixel of the mask.
+    fn gradient(&self, i: usize) -> [T; 2] {
+        [
+            self.derivative(i, 1),
+            self.derivative(i, self.width) / self.aspect,
+        ]
+    }
+
+    /// At an occluding contour sin θ is continued to 1; elsewhere the boundary is half a pixel away.
+    fn offset_of(&self, i: usize) -> T {
+        let (sine, cosine) = (self.sine[i], self.cosine[i]);
+        let (gradient, occluding) = self.around(i);
+        if occluding {
+            return cosine / gradient;
+        }
+        let half_step = T::of(0.5) * self.edges[i][1];
+        let boundary_sine = (sine + half_step * gradient).min(T::one());
+        let boundary_cosine = (T::one() - boundary_sine * boundary_sine)
+            .max(T::zero())
+            .sqrt();
+        half_step * (sine + boundary_sine) / (cosine + boundary_cosine)
+    }
+
+    /// Mean |∇ sin θ| of the boundary pixels around one, and whether most of them lie at an occluding contour.
+    fn around(&self, i: usize) -> (T, bool) {
+        // Over as many pixels the boundary's kind and curvature are taken to be the same.
+        let window = 4;
+        // The boundary is at most one pixel away, the rest is slack for the error of the extrapolation.
+        let reach = 1.25;
+        let (width, rows) = (self.width, self.node.len() / self.width);
+        let span = |middle: usize, length: usize| {
+            middle.saturating_sub(window)..(middle + window + 1).min(length)
+        };
+        let (mut sum, mut count, mut votes) = (T::zero(), 0usize, 0usize);
+        for row in span(i / width, rows) {
+            for j in span(i % width, width).map(|column| row * width + column) {
+                if !self.offset[j].is_nan() {
+                    let [gradient, step] = self.edges[j];
+                    sum += gradient;
+                    count += 1;
+                    votes += usize::from(T::one() - self.sine[j] < T::of(reach) * step * gradient);
+                }
+            }
+        }
+        (sum / T::of(count as f64), 2 * votes > count)
+    }
+
+    /// cos² of the angle between ∇ sin θ and the x axis.
+    pub(super) fn boundary_along_x(&self, i: usize) -> T {
+        let [gx, gy] = self.gradient(i);
+        gx * gx / (gx * gx + gy * gy)
+    }
+
+    /// Derivative of sin θ along one axis, from the neighbours inside the mask; second order where there are enough.
+    fn derivative(&self, i: usize, stride: usize) -> T {
+        let inside = |j: Option<usize>| {
+            j.filter(|&j| self.node.get(j).is_some_and(|&node| node != Node::Outside))
+        };
+        let (before, after) = (inside(Some(i - stride)), inside(Some(i + stride)));
+        let here = self.sine[i];
+        let one_sided = |near: usize, far: Option<usize>| match inside(far) {
+            Some(far) => {
+                T::of(1.5) * here - T::of(2.0) * self.sine[near] + T::of(0.5) * self.sine[far]
+            }
+            None => here - self.sine[near],
+        };
+        match (before, after) {
+            (Some(before), Some(after)) => T::of(0.5) * (self.sine[after] - self.sine[before]),
+            (Some(before), None) => one_sided(before, before.checked_sub(stride)),
+            (None, Some(after)) => -one_sided(after, Some(after + stride)),
+            (None, None) => T::zero(),
         }
     }
 }

@@ -1,0 +1,379 @@
+//! Weighted least squares on a mask of any shape, by a sparse Cholesky factorisation.
+//!
+//! Minimises Σ w_ij (z_j − z_i − h s̄_ij)² over the edges between neighbouring pixels of the mask. Here s̄ is the mean slope
+//! along the edge: of the cubic (at the border: parabola or line) through the slopes of the pixels in line with it. w_ij is
+//! the harmonic mean of the two pixels' weights. Error O(h⁴) inside. On a full rectangle with equal weights
+//! [`CosinePoisson`] solves the same equations directly, and it is asked to. The border of the mask is free (natural).
+//! Connected parts have nothing to do with each other: each gets mean 0, or is fixed by its own known heights.
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::{SparseColMat, Triplet};
+use faer::{Mat, Side};
+use ndarray::ArrayView2;
+
+use super::{CosinePoisson, SlopeIntegrator};
+use crate::domain::same_shape;
+use crate::surface::Component;
+use crate::{BoundingBox, Domain, PixelFlags, PixelScalar, SfsError, Surface, SurfaceWorkspace};
+
+/// Weighted least squares integration on a mask.
+///
+/// Slopes that are NaN or infinite are left out: the edge takes the other pixel's slope alone, or, if both are missing,
+/// a weak zero slope. Such pixels are flagged `NON_FINITE`. Known heights inside the mask are met exactly, and each
+/// connected part without one has mean 0 (`report.components`).
+///
+/// The equations are solved directly, with some 30 numbers a pixel in the factor: 0.1 s for 10⁵ pixels. On a full rectangle
+/// with equal weights and no known height Poisson's equation is solved instead, a hundred times faster.
+///
+/// ```
+/// use ndarray::{Array2, array};
+/// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator};
+/// let mask = array![[true, true, false, true], [false, true, false, true]];
+/// let (p, q) = (Array2::from_elem((2, 4), 1.0), Array2::from_elem((2, 4), 2.0));
+/// let domain = Domain::default().with_mask(mask.view());
+/// let surface = MaskedLeastSquares::default().integrate(p.view(), q.view(), &domain)?;
+/// assert_eq!(surface.report.components.len(), 2);
+/// assert!((surface.heights[[1, 3]] - surface.heights[[0, 3]] - 2.0_f64).abs() < 1e-9);
+/// assert!(surface.heights[[0, 2]].is_nan());
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaskedLeastSquares<'a, T> {
+    weights: Option<ArrayView2<'a, T>>,
+}
+
+/// Equal weights.
+impl<T> Default for MaskedLeastSquares<'_, T> {
+    fn default() -> Self {
+        Self { weights: None }
+    }
+}
+
+impl<'a, T: PixelScalar> MaskedLeastSquares<'a, T> {
+    /// Weight of each pixel's slopes, such as the inverse of their variance. 0, NaN or less leave the slopes out.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use tactile_sfs::{Domain, MaskedLeastSquares, SlopeIntegrator};
+    /// let (mut p, mut weights) = (Array2::from_elem((6, 6), 0.5), Array2::from_elem((6, 6), 1.0));
+    /// (p[[2, 3]], weights[[2, 3]]) = (40.0, 0.0); // a false slope, known to be one
+    /// let method = MaskedLeastSquares::default().with_weights(weights.view());
+    /// let surface = method.integrate(p.view(), Array2::zeros((6, 6)).view(), &Domain::default())?;
+    /// let z = &surface.heights;
+    /// assert!((z[[2, 5]] - z[[2, 0]] - 2.5_f64).abs() < 0.1);
+    /// # Ok::<(), tactile_sfs::SfsError>(())
+    /// ```
+    pub fn with_weights(self, weights: ArrayView2<'a, T>) -> Self {
+        Self {
+            weights: Some(weights),
+        }
+    }
+
+    /// Whether the fit is Poisson's equation on a rectangle: equal weights, no height known, no hole in the mask.
+    fn is_poisson(&self, domain: &Domain<'_, T>, area: BoundingBox) -> bool {
+        let full = |mask: ArrayView2<'_, bool>| area.of(mask).iter().all(|&inside| inside);
+        self.weights.is_none() && domain.known_heights.is_none() && domain.mask.is_none_or(full)
+    }
+
+    /// The slope at a pixel and its weight, if it is to be used.
+    fn usable(&self, slopes: ArrayView2<'_, T>, at: [usize; 2]) -> Option<[f64; 2]> {
+        let weight = self.weights.map_or(1.0, |weights| weights[at].as_f64());
+        let slope = slopes[at].as_f64();
+        (slope.is_finite() && weight > 0.0 && weight.is_finite()).then_some([slope, weight])
+    }
+
+    /// Mean slope and weight of the edge between the middle two of four pixels in line, of which the others may be missing.
+    fn edge(
+        &self,
+        slopes: ArrayView2<'_, T>,
+        [before, from, to, beyond]: [Option<[usize; 2]>; 4],
+    ) -> [f64; 2] {
+        let usable = |at: Option<[usize; 2]>| self.usable(slopes, at?);
+        let slope = |at| usable(at).map(|[slope, _]| slope);
+        match (usable(from), usable(to)) {
+            (Some([b, v]), Some([c, w])) => {
+                let mean = match (slope(before), slope(beyond)) {
+                    (Some(a), Some(d)) => (13.0 * (b + c) - a - d) / 24.0,
+                    (Some(a), None) => (5.0 * c + 8.0 * b - a) / 12.0,
+                    (None, Some(d)) => (5.0 * b + 8.0 * c - d) / 12.0,
+                    (None, None) => 0.5 * (b + c),
+                };
+                [mean, 2.0 * v * w / (v + w)]
+            }
+            (Some(one), None) | (None, Some(one)) => one,
+            // So weak that it only bridges the gap, and strong enough to keep the equations far from singular.
+            (None, None) => [0.0, 1e-4],
+        }
+    }
+}
+
+/// The numbers of the unknowns and the equations between them, kept between calls.
+///
+/// A weighted graph Laplacian: pixels of known height are moved to the right-hand side.
+#[derive(Debug, Default)]
+pub(crate) struct MaskedBuffers {
+    /// Number of the unknown of every pixel of the box, or one of the marks below.
+    number: Vec<usize>,
+    /// Pixels of the unknowns.
+    pixels: Vec<[usize; 2]>,
+    diagonal: Vec<f64>,
+    rhs: Vec<f64>,
+    /// Edges between unknowns: the two numbers and the weight.
+    edges: Vec<(usize, usize, f64)>,
+    /// Connected part of every pixel of the box, [`OUTSIDE`] for those of none.
+    part: Vec<usize>,
+    parts: Vec<Part>,
+    queue: Vec<usize>,
+}
+
+/// A connected part of the mask.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    /// Place in the box of its first pixel in reading order.
+    first: usize,
+    anchored: bool,
+    pixels: usize,
+    sum: f64,
+}
+
+/// Marks of pixels outside the mask, and of known height.
+const OUTSIDE: usize = usize::MAX;
+const KNOWN: usize = usize::MAX - 1;
+
+impl<T: PixelScalar> SlopeIntegrator<T> for MaskedLeastSquares<'_, T> {
+    fn integrate(
+        &self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.integrate_with(workspace, p, q, domain, surface))
+    }
+
+    fn integrate_with(
+        &self,
+        workspace: &mut SurfaceWorkspace<T>,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        let area = domain.bounding_box(p.dim())?;
+        if let Some(weights) = self.weights {
+            same_shape("weights", p.dim(), weights.dim())?;
+        }
+        if self.is_poisson(domain, area) {
+            match CosinePoisson.integrate_with(workspace, p, q, domain, surface) {
+                Err(SfsError::NonFiniteSlope { .. }) => {}
+                other => {
+                    other?;
+                    surface.report.components.push(Component {
+                        pixels: area.area(),
+                        first: [area.row_start, area.column_start],
+                        mean_height: T::zero(),
+                    });
+                    return Ok(());
+                }
+            }
+        }
+        surface.enter_slopes(p, q, domain)?;
+        let buffers = &mut workspace.masked;
+        buffers.enumerate(domain, surface, [p, q]);
+        buffers.label(area.columns());
+        self.assemble(buffers, [p, q], domain, area);
+        let heights = buffers.solve()?;
+        buffers.write_levelled(&heights, surface);
+        surface.finish(domain);
+        Ok(())
+    }
+}
+
+impl<T: PixelScalar> MaskedLeastSquares<'_, T> {
+    /// The equations: heights are in the unit of the pixel size, an edge along x weighs (h_y/h_x)² times its own weight.
+    fn assemble(
+        &self,
+        buffers: &mut MaskedBuffers,
+        slopes: [ArrayView2<'_, T>; 2],
+        domain: &Domain<'_, T>,
+        area: BoundingBox,
+    ) {
+        let [hx, hy] = domain.pixel_size_m.map(T::as_f64);
+        let inside = |row: usize, column: usize| {
+            let in_box = area.row_start <= row && row < area.row_end;
+            let in_box = in_box && area.column_start <= column && column < area.column_end;
+            (in_box && domain.contains(row, column)).then_some([row, column])
+        };
+        for (row, column) in area.pixels() {
+            let before = [
+                inside(row, column.wrapping_sub(1)),
+                inside(row.wrapping_sub(1), column),
+            ];
+            let line = |down: usize, right: usize| {
+                [0, 1, 2].map(|k| inside(row + k * down, column + k * right))
+            };
+            for (axis, [here, next, beyond]) in [line(0, 1), line(1, 0)].into_iter().enumerate() {
+                let (Some(from), Some(to)) = (here, next) else {
+                    continue;
+                };
+                let [slope, weight] = self.edge(slopes[axis], [before[axis], here, next, beyond]);
+                let (step, factor) = [(hx, (hy / hx).powi(2)), (hy, 1.0)][axis];
+                let height = |[row, column]: [usize; 2]| domain.known(row, column).map(T::as_f64);
+                let ends = [from, to].map(|at| (buffers.number_of(at, area), height(at)));
+                buffers.add(ends, factor * weight, slope * step);
+            }
+        }
+    }
+}
+
+impl MaskedBuffers {
+    /// Numbers the pixels without a known height, writes the known ones and flags slopes that are not finite.
+    fn enumerate<T: PixelScalar>(
+        &mut self,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+        [p, q]: [ArrayView2<'_, T>; 2],
+    ) {
+        self.number.clear();
+        self.pixels.clear();
+        for (row, column) in surface.bounding_box.pixels() {
+            let number = if !domain.contains(row, column) {
+                OUTSIDE
+            } else if let Some(height) = domain.known(row, column) {
+                surface.set(row, column, height);
+                KNOWN
+            } else {
+                self.pixels.push([row, column]);
+                self.pixels.len() - 1
+            };
+            self.number.push(number);
+            let at = [row, column];
+            if number != OUTSIDE && !(p[at].is_finite() && q[at].is_finite()) {
+                surface.flags[at] |= PixelFlags::NON_FINITE;
+            }
+        }
+        for vector in [&mut self.diagonal, &mut self.rhs] {
+            vector.clear();
+            vector.resize(self.pixels.len(), 0.0);
+        }
+        self.edges.clear();
+    }
+
+    fn number_of(&self, [row, column]: [usize; 2], area: BoundingBox) -> usize {
+        self.number[(row - area.row_start) * area.columns() + column - area.column_start]
+    }
+
+    /// Adds w (z_j − z_i − rise)² to the fit, of two ends with their numbers and known heights.
+    fn add(&mut self, [i, j]: [(usize, Option<f64>); 2], weight: f64, rise: f64) {
+        for ((end, known), (_, other), sign) in [(i, j, -1.0), (j, i, 1.0)] {
+            if known.is_none() {
+                self.diagonal[end] += weight;
+                self.rhs[end] += weight * (sign * rise + other.unwrap_or(0.0));
+            }
+        }
+        if i.1.is_none() && j.1.is_none() {
+            self.edges.push((i.0, j.0, weight));
+        }
+    }
+
+    /// Finds the connected parts of the mask (four neighbours), in the order of their first pixels.
+    fn label(&mut self, columns: usize) {
+        self.part.clear();
+        self.part.resize(self.number.len(), OUTSIDE);
+        self.parts.clear();
+        for first in 0..self.number.len() {
+            if self.number[first] == OUTSIDE || self.part[first] != OUTSIDE {
+                continue;
+            }
+            let label = self.parts.len();
+            self.part[first] = label;
+            self.queue.clear();
+            self.queue.push(first);
+            let (mut next, mut anchored) = (0, false);
+            while let Some(&place) = self.queue.get(next) {
+                next += 1;
+                anchored |= self.number[place] == KNOWN;
+                let column = place % columns;
+                let beside = [
+                    (column > 0).then(|| place - 1),
+                    (column + 1 < columns).then_some(place + 1),
+                    place.checked_sub(columns),
+                    Some(place + columns).filter(|&below| below < self.number.len()),
+                ];
+                for near in beside.into_iter().flatten() {
+                    if self.number[near] != OUTSIDE && self.part[near] == OUTSIDE {
+                        self.part[near] = label;
+                        self.queue.push(near);
+                    }
+                }
+            }
+            self.parts.push(Part {
+                first,
+                anchored,
+                pixels: self.queue.len(),
+                sum: 0.0,
+            });
+        }
+    }
+
+    /// The heights of the unknowns. A part without a known height is held at height 0 by a spring at its first pixel, which
+    /// exerts no force: the right-hand side of such a part has the sum 0.
+    fn solve(&mut self) -> Result<Vec<f64>, SfsError> {
+        let n = self.pixels.len();
+        if n == 0 {
+            return Ok(Vec::new());
+        }
+        for part in self.parts.iter().filter(|part| !part.anchored) {
+            // A part of one pixel has no edge.
+            let held = &mut self.diagonal[self.number[part.first]];
+            *held = if *held > 0.0 { 2.0 * *held } else { 1.0 };
+        }
+        let entry = Triplet::<usize, usize, f64>::new;
+        let diagonal = self.diagonal.iter().enumerate();
+        let mut entries: Vec<_> = diagonal.map(|(i, &value)| entry(i, i, value)).collect();
+        let edges = self.edges.iter();
+        entries.extend(edges.map(|&(i, j, weight)| entry(i.max(j), i.min(j), -weight)));
+        let matrix =
+            SparseColMat::try_new_from_triplets(n, n, &entries).map_err(SfsError::custom)?;
+        let factor = matrix.sp_cholesky(Side::Lower).map_err(SfsError::custom)?;
+        let mut heights = Mat::from_fn(n, 1, |i, _| self.rhs[i]);
+        factor.solve_in_place(&mut heights);
+        Ok((0..n).map(|i| heights[(i, 0)]).collect())
+    }
+
+    /// Writes the heights, gives parts without a known height the mean 0, and reports all parts.
+    fn write_levelled<T: PixelScalar>(&mut self, heights: &[f64], surface: &mut Surface<T>) {
+        let area = surface.bounding_box;
+        for ((&number, &part), at) in self.number.iter().zip(&self.part).zip(area.pixels()) {
+            if number != OUTSIDE {
+                let known = || surface.heights[at].as_f64();
+                self.parts[part].sum += heights.get(number).copied().unwrap_or_else(known);
+            }
+        }
+        for ((&number, &part), at) in self.number.iter().zip(&self.part).zip(area.pixels()) {
+            if let Some(height) = heights.get(number) {
+                let Part {
+                    sum,
+                    pixels,
+                    anchored,
+                    ..
+                } = self.parts[part];
+                let shift = if anchored { 0.0 } else { sum / pixels as f64 };
+                surface.set(at.0, at.1, T::of(height - shift));
+            }
+        }
+        let columns = area.columns();
+        let reported = self.parts.iter().map(|part| Component {
+            pixels: part.pixels,
+            first: [
+                area.row_start + part.first / columns,
+                area.column_start + part.first % columns,
+            ],
+            mean_height: if part.anchored {
+                T::of(part.sum / part.pixels as f64)
+            } else {
+                T::zero()
+            },
+        });
+        surface.report.components.extend(reported);
+    }
+}

@@ -1,0 +1,256 @@
+//! Poisson's equation with natural (Neumann) borders: cosine transform in one direction, tridiagonal in the other.
+//!
+//! Minimises Σ ((z_{c+1} − z_c)/h_x − p̄)² + Σ ((z_{r+1} − z_r)/h_y − q̄)². Here p̄ and q̄ are the means along the edge
+//! between two pixels of the cubic through the slopes of the four pixels in line with it. The equation is
+//! Δ_h z = div_h (p̄, q̄) with zero flux through the frame's border. (The usual mean of two slopes makes surfaces of second
+//! order. Exact rises make them of fourth.) The cosine transform along x turns it into one tridiagonal system per
+//! frequency, (λ_k − δ_y²) ẑ_k = f̂_k, with λ_k = (h_y/h_x)² (2 − 2 cos(π k/N)) for k from 0 to N − 1. Error O(h⁴), O(h³)
+//! in the rises at the border. Cost O(N M log N).
+//!
+//! Only one direction is transformed, because a tridiagonal solve is cheaper than a transform.
+
+use std::sync::Arc;
+
+use ndarray::ArrayView2;
+use rustdct::{DctPlanner, TransformType2And3};
+
+use super::{SlopeIntegrator, load_row, write_levelled};
+use crate::{BoundingBox, Domain, PixelScalar, SfsError, Surface, SurfaceWorkspace};
+
+/// Poisson integration over the whole rectangle by a cosine transform and tridiagonal solves.
+///
+/// With a mask, the bounding box is solved and slopes outside the mask are taken as 0 (flat where nothing touches). For a
+/// free border along the mask use [`MaskedLeastSquares`](super::MaskedLeastSquares). The mean height inside the mask is 0,
+/// or what the known heights demand (one shift for all).
+///
+/// ```
+/// use ndarray::Array2;
+/// use tactile_sfs::{CosinePoisson, Domain, SlopeIntegrator};
+/// let p = Array2::from_shape_fn((8, 9), |(_, column)| 2.0 * column as f64);
+/// let surface = CosinePoisson.integrate(p.view(), Array2::zeros((8, 9)).view(), &Domain::default())?;
+/// // z = x²: rises are exact for slopes up to cubic ones.
+/// assert!((surface.heights[[3, 8]] - surface.heights[[3, 0]] - 64.0).abs() < 1e-10);
+/// # Ok::<(), tactile_sfs::SfsError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CosinePoisson;
+
+/// Plan, spectrum and lines, kept between calls.
+#[derive(Default)]
+pub(crate) struct PoissonBuffers {
+    transform: Option<Arc<dyn TransformType2And3<f64>>>,
+    scratch: Vec<f64>,
+    pivots: Vec<[f64; LANES]>,
+    /// A row of slopes along x, and a ring of four rows of those along y.
+    p: Vec<f64>,
+    q: [Vec<f64>; 4],
+    /// Right-hand side, spectrum and heights in turn.
+    grid: Vec<f64>,
+}
+
+/// Columns of the spectrum that are solved together: a block of 1000 rows stays in the second-level cache.
+const LANES: usize = 16;
+
+impl<T: PixelScalar> SlopeIntegrator<T> for CosinePoisson {
+    fn integrate(
+        &self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+    ) -> Result<Surface<T>, SfsError> {
+        Surface::made_by(|workspace, surface| self.integrate_with(workspace, p, q, domain, surface))
+    }
+
+    fn integrate_with(
+        &self,
+        workspace: &mut SurfaceWorkspace<T>,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        surface: &mut Surface<T>,
+    ) -> Result<(), SfsError> {
+        let area = surface.enter_slopes(p, q, domain)?;
+        let buffers = &mut workspace.poisson;
+        buffers.load(p, q, domain, area)?;
+        let [hx, hy] = domain.pixel_size_m.map(T::as_f64);
+        buffers.solve(area.rows(), area.columns(), (hy / hx).powi(2));
+        write_levelled(&buffers.grid, domain, surface);
+        surface.finish(domain);
+        Ok(())
+    }
+}
+
+impl PoissonBuffers {
+    /// Fills the grid with h_y² div_h: the difference of the rises on both sides of each pixel.
+    fn load<T: PixelScalar>(
+        &mut self,
+        p: ArrayView2<'_, T>,
+        q: ArrayView2<'_, T>,
+        domain: &Domain<'_, T>,
+        area: BoundingBox,
+    ) -> Result<(), SfsError> {
+        let (rows, columns) = (area.rows(), area.columns());
+        let [hx, hy] = domain.pixel_size_m.map(T::as_f64);
+        self.grid.clear();
+        self.grid.resize(rows * columns, 0.0);
+        for line in self.q.iter_mut().chain([&mut self.p]) {
+            line.clear();
+            line.resize(columns, 0.0);
+        }
+        for row in 0..rows.min(2) {
+            load_row(q, domain, area, row, &mut self.q[row])?;
+        }
+        for row in 0..rows {
+            load_row(p, domain, area, row, &mut self.p)?;
+            let line = &mut self.grid[row * columns..][..columns];
+            add_rises(&self.p, hy * hy / hx, line);
+            if row + 1 == rows {
+                break;
+            }
+            if row + 2 < rows {
+                load_row(q, domain, area, row + 2, &mut self.q[(row + 2) % 4])?;
+            }
+            // Lines beyond the ends have weight 0, whatever the ring holds there.
+            let weights = edge_weights(row, rows).map(|weight| hy * weight);
+            let [before, here, after, beyond] = [3, 0, 1, 2].map(|k| &self.q[(row + k) % 4]);
+            let (above, below) = self.grid[row * columns..].split_at_mut(columns);
+            for c in 0..columns {
+                let rise = weights[0] * before[c]
+                    + weights[1] * here[c]
+                    + weights[2] * after[c]
+                    + weights[3] * beyond[c];
+                above[c] += rise;
+                below[c] -= rise;
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves (aspect² δ_x² + δ_y²) z = f in place of the grid.
+    fn solve(&mut self, rows: usize, columns: usize, aspect2: f64) {
+        let planned = self.transform.take();
+        let transform = planned
+            .filter(|transform| transform.len() == columns)
+            .unwrap_or_else(|| DctPlanner::new().plan_dct2(columns));
+        self.scratch.resize(transform.get_scratch_len(), 0.0);
+        for line in self.grid.chunks_exact_mut(columns) {
+            transform.process_dct2_with_scratch(line, &mut self.scratch);
+        }
+        self.pivots.resize(rows, [0.0; LANES]);
+        for left in (0..columns).step_by(LANES) {
+            self.solve_columns(left, rows, columns, aspect2);
+        }
+        for line in self.grid.chunks_exact_mut(columns) {
+            transform.process_dct3_with_scratch(line, &mut self.scratch);
+        }
+        self.transform = Some(transform);
+    }
+
+    /// Thomas's algorithm for a block of columns: (λ − δ²) z = −2 f/N, whose factor inverts the transforms.
+    ///
+    /// The diagonal is λ plus the number of neighbours, beside it stands −1. System 0 is singular. Its last pivot is taken
+    /// as 1, which fixes the constant that is shifted away later.
+    fn solve_columns(&mut self, left: usize, rows: usize, columns: usize, aspect2: f64) {
+        let lanes = LANES.min(columns - left);
+        let scale = -2.0 / columns as f64;
+        let mut lambda = [1.0; LANES];
+        for (lane, lambda) in lambda.iter_mut().enumerate().take(lanes) {
+            let angle = core::f64::consts::PI * (left + lane) as f64 / (2 * columns) as f64;
+            *lambda = aspect2 * 4.0 * angle.sin().powi(2);
+        }
+        let (mut pivot, mut carry) = ([0.0; LANES], [0.0; LANES]);
+        for row in 0..rows {
+            let neighbours = f64::from(u8::from(row > 0) + u8::from(row + 1 < rows));
+            let line = &mut self.grid[row * columns + left..][..lanes];
+            for (((x, carry), pivot), lambda) in
+                line.iter_mut().zip(&mut carry).zip(&mut pivot).zip(lambda)
+            {
+                let sum = scale * *x + *pivot * *carry;
+                // What decays towards subnormal numbers, which are slow, is 0.
+                *carry = if sum.abs() < 1e-290 { 0.0 } else { sum };
+                *x = *carry;
+                *pivot = (lambda + neighbours - *pivot).recip();
+            }
+            if left == 0 && row + 1 == rows {
+                pivot[0] = 1.0;
+            }
+            self.pivots[row] = pivot;
+        }
+        carry = [0.0; LANES];
+        for row in (0..rows).rev() {
+            let line = &mut self.grid[row * columns + left..][..lanes];
+            let lines = line.iter_mut().zip(&mut carry);
+            for ((x, carry), pivot) in lines.zip(&self.pivots[row]) {
+                let sum = pivot * (*x + *carry);
+                *carry = if sum.abs() < 1e-290 { 0.0 } else { sum };
+                *x = *carry;
+            }
+        }
+    }
+}
+
+/// Weights of the slopes at −1, 0, 1 and 2 whose sum is the mean slope from pixel 0 to pixel 1, for the edge after pixel
+/// `edge` of a line of `n`: the integral of the cubic through the four, of a parabola at the ends.
+fn edge_weights(edge: usize, n: usize) -> [f64; 4] {
+    let weights = match (edge, n) {
+        (_, 2) => [0.0, 12.0, 12.0, 0.0],
+        (0, _) => [0.0, 10.0, 16.0, -2.0],
+        (edge, n) if edge + 2 == n => [-2.0, 16.0, 10.0, 0.0],
+        _ => [-1.0, 13.0, 13.0, -1.0],
+    };
+    weights.map(|weight| weight / 24.0)
+}
+
+/// Adds the divergence along a line of slopes, times `scale`.
+fn add_rises(p: &[f64], scale: f64, out: &mut [f64]) {
+    let n = p.len();
+    // Inside, the difference of the rises on both sides of a pixel is one sum over the five around it.
+    for (out, p) in out.iter_mut().skip(2).zip(p.windows(5)) {
+        *out += scale / 24.0 * (14.0 * (p[3] - p[1]) - (p[4] - p[0]));
+    }
+    // The two pixels at either end are touched by the edges there, the windows by none of them.
+    let ends = |pixel: usize| pixel < 2 || pixel + 2 >= n;
+    for edge in (0..n.saturating_sub(1)).filter(|&edge| ends(edge) || ends(edge + 1)) {
+        let weights = edge_weights(edge, n);
+        let near = (0..4).filter(|&k| weights[k] != 0.0);
+        let rise = scale * near.map(|k| weights[k] * p[edge + k - 1]).sum::<f64>();
+        if ends(edge) {
+            out[edge] += rise;
+        }
+        if ends(edge + 1) {
+            out[edge + 1] -= rise;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The heights satisfy the equations that a dense matrix states.
+    #[test]
+    fn solves_the_equation() {
+        let (rows, columns, aspect2) = (7, 20, 1.7);
+        let mut buffers = PoissonBuffers::default();
+        let mut source: Vec<f64> = (0..rows * columns)
+            .map(|i| ((i * i + 3) % 17) as f64)
+            .collect();
+        let mean = source.iter().sum::<f64>() / source.len() as f64;
+        source.iter_mut().for_each(|f| *f -= mean);
+        buffers.grid.clone_from(&source);
+        buffers.solve(rows, columns, aspect2);
+        let z = |r: usize, c: usize| buffers.grid[r * columns + c];
+        for (i, f) in source.iter().enumerate() {
+            let (r, c) = (i / columns, i % columns);
+            let mut sum = 0.0;
+            for (dr, dc, weight) in [(0, -1, aspect2), (0, 1, aspect2), (-1, 0, 1.0), (1, 0, 1.0)] {
+                let (row, column) = (r.wrapping_add_signed(dr), c.wrapping_add_signed(dc));
+                if row < rows && column < columns {
+                    sum += weight * (z(row, column) - z(r, c));
+                }
+            }
+            // Rounding of heights of some hundreds.
+            assert!((sum - f).abs() < 1e-11, "{i}: {sum} {f}");
+        }
+    }
+}
