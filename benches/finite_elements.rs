@@ -9,11 +9,11 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
-use tactile_imaging::elasticity::contact::{ContactTable, Layer, TableOptions, Waveguide};
-use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Outcome, Press};
+use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::elasticity::modulus::{
     Estimate, LoadSeries, LoadState, ModulusEstimator, TabulatedContact,
 };
+use tactile_imaging::fem::{self, Load, Material, Object, Outcome, Press, TableOptions};
 
 const NU: f64 = 0.495;
 const PAPER_LAYERS: [(f64, f64); 3] = [(2e-3, 136e3), (3e-3, 80e3), (5e-3, 34e3)];
@@ -184,8 +184,9 @@ fn table(is_test: bool) {
             TableOptions::default(),
         )
     };
-    let (table, seconds) =
-        timed(|| ContactTable::solve(3e-3, NU, &guide, &options, |_| ControlFlow::Continue(())));
+    let (table, seconds) = timed(|| {
+        fem::solve_contact_table(3e-3, NU, &guide, &options, |_| ControlFlow::Continue(()))
+    });
     let table = table.expect("a table");
     let contacts: usize = table.curves().iter().map(|c| c.force_n.len()).sum();
     println!(

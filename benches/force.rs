@@ -9,12 +9,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ContactDetector, ContactOptions, DetectorWorkspace,
-    ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, MonotoneCalibration,
-    PolynomialCalibration, ReferenceFrame, StressCalibration,
+    ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame,
 };
-use tactile_imaging::simulate::{
-    CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene,
-};
+use tactile_simulate::{CalibrationOptions as SimulatedRun, Load, PressOptions, PressScene};
 
 struct Scene {
     scene: PressScene,
@@ -79,7 +76,7 @@ fn pass(c: &mut Criterion) {
     let mut workspace = DetectorWorkspace::default();
     let mut detect = |frame: &Array2<u8>| {
         detector
-            .detect_with::<f64>(&mut workspace, frame.view(), &s.reference)
+            .detect_with(&mut workspace, frame.view(), &s.reference)
             .expect("valid")
             .contact
             .is_some()
@@ -96,9 +93,8 @@ fn contact(c: &mut Criterion) {
         let s = scene_of(wider);
         let detector = ContactDetector::new(ContactOptions::default());
         let mut workspace = DetectorWorkspace::default();
-        let mut detect = || {
-            detector.detect_with::<f64>(&mut workspace, black_box(s.pressed.view()), &s.reference)
-        };
+        let mut detect =
+            || detector.detect_with(&mut workspace, black_box(s.pressed.view()), &s.reference);
         let (contact, truth) = (
             detect().expect("valid").contact.expect("contact"),
             s.scene.truth(0),
@@ -192,43 +188,5 @@ fn hertz_fit(c: &mut Criterion) {
     group.finish();
 }
 
-fn calibration(c: &mut Criterion) {
-    let curve = |v: f64| 4e-7 * v + 2.5e-14 * v * v;
-    // A fixed, dense set of pairs with a deterministic "noise" of 2 mN.
-    let pairs: Vec<_> = (0..=200)
-        .map(|k| 2e4 * f64::from(k))
-        .map(|v| CalibrationPair::loading(v, curve(v) + 2e-3 * (v * 1e-3).sin()))
-        .collect();
-    let options = CalibrationOptions::default();
-    let mut group = c.benchmark_group("force/calibration");
-    let error = |c: &dyn StressCalibration<f64>| {
-        (0..40)
-            .map(|k| 1e5 * f64::from(k))
-            .map(|v| (c.force_n(v) - curve(v)).abs())
-            .fold(0.0, f64::max)
-    };
-    let cubic = PolynomialCalibration::fit(&pairs, 3, &options).expect("enough pairs");
-    let monotone = MonotoneCalibration::fit(&pairs, &options).expect("enough pairs");
-    let errors = [error(&cubic), error(&monotone)];
-    assert!(errors[0] < 1e-3 && errors[1] < 4e-3, "{errors:?}");
-    eprintln!(
-        "force/calibration: cubic off by {:.1e} N, monotone by {:.1e} N of 2 N",
-        errors[0], errors[1]
-    );
-    group.bench_function("fit a cubic to 201 pairs", |b| {
-        b.iter(|| PolynomialCalibration::fit(black_box(&pairs), 3, &options))
-    });
-    group.bench_function("fit a monotone curve to 201 pairs", |b| {
-        b.iter(|| MonotoneCalibration::fit(black_box(&pairs), &options))
-    });
-    group.bench_function("read a cubic", |b| {
-        b.iter(|| cubic.force_n(black_box(1.23e6)))
-    });
-    group.bench_function("read a monotone curve", |b| {
-        b.iter(|| monotone.force_n(black_box(1.23e6)))
-    });
-    group.finish();
-}
-
-criterion_group!(benches, pass, contact, hertz_fit, calibration);
+criterion_group!(benches, pass, contact, hertz_fit);
 criterion_main!(benches);

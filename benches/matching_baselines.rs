@@ -64,7 +64,7 @@ fn gcd(a: usize, b: usize) -> usize {
 }
 
 /// Matches once: at least `share` of the pairs must be right, the mean error (percent of the diameter) below `bound`; prints both.
-fn check(name: &str, matcher: &dyn PointMatcher<f64, 3>, scene: &Scene, share: f64, bound: f64) {
+fn check(name: &str, matcher: &dyn PointMatcher<3>, scene: &Scene, share: f64, bound: f64) {
     let matching = matcher
         .match_points(&scene.model, &scene.target)
         .expect("good points");
@@ -94,7 +94,7 @@ fn check(name: &str, matcher: &dyn PointMatcher<f64, 3>, scene: &Scene, share: f
 }
 
 /// Name, matcher, least share of right pairs, largest error in % of the diameter.
-type Row<'a> = (&'a str, Box<dyn PointMatcher<f64, 3>>, f64, f64);
+type Row<'a> = (&'a str, Box<dyn PointMatcher<3>>, f64, f64);
 
 fn standard_case(criterion: &mut Criterion) {
     let scene = scene(105, 0.05);

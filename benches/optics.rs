@@ -8,7 +8,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use tactile_imaging::optics::surface::{Dimple, Flat, TopSurface};
 use tactile_imaging::optics::trace::{Slab, SlabLayer, TraceOptions, trace};
 use tactile_imaging::optics::{Geometry, Led, acceptance_angle, fresnel, normal_incidence};
-use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
+use tactile_simulate::{Camera, PressOptions, PressScene};
 
 fn closed_forms(c: &mut Criterion) {
     let mut group = c.benchmark_group("optics/closed form");

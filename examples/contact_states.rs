@@ -9,8 +9,8 @@
 //! (modulus, radius, layers as thickness:modulus, force, contact radius, approach), then distance from the axis, pressure and height.
 use std::io::{Result, Write, stdout};
 use tactile_imaging::elasticity::ElasticityError;
-use tactile_imaging::elasticity::fem::{Guide, Layer, Load, Material, Object, Press, State};
-use tactile_imaging::simulate::{Elastic, Waveguide};
+use tactile_imaging::fem::{Guide, Layer, Load, Material, Object, Press, State};
+use tactile_simulate::{Elastic, Waveguide};
 
 const POISSON_RATIO: f64 = 0.4999;
 

@@ -11,7 +11,7 @@ fn main() -> Result<(), MatchError> {
     // Moved, sheared, in the opposite order and without some of the points.
     let moved = |p: &Point2<f64>| Point2::new(1.2 * p.x + 0.3 * p.y + 0.4, p.y - 0.1 * p.x * p.x);
     let target: Vec<Point2<f64>> = model.iter().rev().skip(5).map(moved).collect();
-    let matchers: [(&str, &dyn PointMatcher<f64, 2>); 2] = [
+    let matchers: [(&str, &dyn PointMatcher<2>); 2] = [
         ("default matcher", &AnnealedSoftassign::default()),
         ("nearest neighbours", &NearestNeighbour::default()),
     ];

@@ -1,8 +1,8 @@
 //! A user-defined contact law: the pipeline measures force and contact, the law turns them into a modulus.
 #![allow(clippy::print_stdout)]
 use std::error::Error;
-use tactile_imaging::pipeline::Trial;
-use tactile_imaging::simulate::{CalibrationOptions, PressOptions};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, PressOptions};
 
 /// Hertz with a rigid sensor, F = 4/3 E* a³/R, and a factor for contacts that are not small against the ball:
 /// 1 + 0.3 (a/R)², as if the ball grew stiffer while it is squeezed.

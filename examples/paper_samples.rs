@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use tactile_imaging::elasticity::contact::ContactTable;
 use tactile_imaging::pipeline::EstimatorChoice;
 use tactile_imaging::scene::{Scene, read_contact_table};
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     CalibrationOptions, Camera, ContactLaw, Elastic, Load, PressOptions, PressScene, Sphere,
     write_folder,
 };

@@ -1,8 +1,8 @@
 //! Before a block of tissue is pressed: how well would a lump's size, depth and stiffness be known?
 #![allow(clippy::print_stdout)]
 use std::error::Error;
-use tactile_imaging::elasticity::fem::{Guide, Interface, Layer, Material};
-use tactile_imaging::elasticity::inclusion::{AssumedInclusion, InclusionSearch, Specimen};
+use tactile_imaging::fem::{Guide, Interface, Layer, Material};
+use tactile_imaging::inclusion::{AssumedInclusion, InclusionSearch, Specimen};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let layer = |thickness_m, youngs_modulus_pa| {

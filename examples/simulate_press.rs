@@ -5,9 +5,7 @@
 //! ```
 use std::error::Error;
 use std::path::PathBuf;
-use tactile_imaging::simulate::{
-    CalibrationOptions, Camera, PressOptions, PressScene, write_folder,
-};
+use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os().nth(1).unwrap_or("target/press".into());

@@ -2,8 +2,9 @@
 #![allow(clippy::print_stdout)]
 use ndarray::Array2;
 use std::error::Error;
-use tactile_imaging::pipeline::{FrameSource, Session, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, LoadCycle, PressOptions};
+use tactile_imaging::pipeline::{FrameSource, Session};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, LoadCycle, PressOptions};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let camera = Camera::default().coarser(4);

@@ -5,8 +5,9 @@ use std::error::Error;
 use tactile_imaging::matching::{
     AnnealedSoftassign, CoherentPointDrift, MatchError, Matching, PointMatcher, unmatched_rows,
 };
-use tactile_imaging::pipeline::{Pipeline, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, PressOptions};
+use tactile_imaging::pipeline::Pipeline;
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, PressOptions};
 
 /// The default matcher, of whose pairs only those count that are surely right.
 struct Certain {
@@ -14,12 +15,12 @@ struct Certain {
     least_confidence: f64,
 }
 
-impl PointMatcher<f64, 3> for Certain {
+impl PointMatcher<3> for Certain {
     fn match_points(
         &self,
         model: &[Point3<f64>],
         target: &[Point3<f64>],
-    ) -> Result<Matching<f64, 3>, MatchError> {
+    ) -> Result<Matching<3>, MatchError> {
         let mut found = self.inner.match_points(model, target)?;
         for (partner, confidence) in found.assignment.iter_mut().zip(&found.confidence) {
             *partner = partner.filter(|_| *confidence >= self.least_confidence);

@@ -10,6 +10,7 @@
 //! - Strain $E = \frac{1}{2}(F^T F - I)$ (25)–(30) and modulus $E = S_{zz}/\bar e_{zz}$ (31), or Hertz's
 //!   $a^3 = 3FR/(4E^{\ast})$: [`elasticity`].
 #![forbid(unsafe_code)]
+pub use tactile_core as core;
 pub use tactile_elasticity as elasticity;
 pub use tactile_force as force;
 pub use tactile_match as matching;
@@ -17,26 +18,17 @@ pub use tactile_optics as optics;
 pub use tactile_sfs as sfs;
 pub use tactile_tps as tps;
 
-// The program names the library as its users do: tests compile parts of it on their own.
-#[cfg(feature = "cli")]
-extern crate self as tactile_imaging;
+#[cfg(feature = "fem")]
+pub use tactile_fem as fem;
 
-#[cfg(feature = "cli")]
-pub mod cli;
 #[cfg(feature = "inclusion")]
 pub mod inclusion;
 #[cfg(feature = "scene")]
 pub mod io;
 pub mod pipeline;
-#[cfg(feature = "plot")]
-pub mod plot;
-#[cfg(any(feature = "plot", feature = "scene"))]
-mod replace_file;
 #[cfg(feature = "scene")]
 pub mod scene;
 #[cfg(feature = "scene")]
 pub mod sensor;
-#[cfg(feature = "simulate")]
-pub mod simulate;
 
 pub use pipeline::{Measurement, Object, Pipeline, Press};

@@ -10,8 +10,9 @@ use tactile_imaging::force::{
     Branch, CalibrationFrame, ContactOptions, DriftCorrection, ForceOptions, GreyHistogram,
     LensGeometry, PressureCurve,
 };
-use tactile_imaging::pipeline::{LightContact, Object, Session, Trial};
-use tactile_imaging::simulate::{
+use tactile_imaging::pipeline::{LightContact, Object, Session};
+use tactile_simulate::Trial;
+use tactile_simulate::{
     CalibrationOptions, Camera, Gain, Load, PressOptions, PressScene, PressSimulation,
 };
 

@@ -1,10 +1,8 @@
 //! Presses of flat faces.
 use criterion::Criterion;
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::simulate::{
-    PressOptions, PressScene, SurfacePattern, UniaxialOptions, UniaxialScene,
-};
 use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::{PressOptions, PressScene, SurfacePattern, UniaxialOptions, UniaxialScene};
 
 /// Everything of two frames of a flat face as large as the ball's larger contact, plain and speckled: beside `everything_of_two_frames`.
 pub(crate) fn flat_faces(c: &mut Criterion) {

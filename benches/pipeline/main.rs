@@ -17,8 +17,9 @@ use std::time::Instant;
 use stream::stream;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::ReferenceFrame;
-use tactile_imaging::pipeline::{Measurement, Press, Stage, Trial};
-use tactile_imaging::simulate::{
+use tactile_imaging::pipeline::{Measurement, Press, Stage};
+use tactile_simulate::Trial;
+use tactile_simulate::{
     CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, PressSimulation,
     Sphere,
 };

@@ -2,7 +2,8 @@
 use criterion::BenchmarkGroup;
 use criterion::measurement::WallTime;
 use std::hint::black_box;
-use tactile_imaging::pipeline::{Session, Trial};
+use tactile_imaging::pipeline::Session;
+use tactile_simulate::Trial;
 
 /// What a stream of frames takes for each, by what it shows.
 pub(crate) fn stream(group: &mut BenchmarkGroup<'_, WallTime>, trial: &Trial) {

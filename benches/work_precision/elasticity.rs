@@ -6,7 +6,7 @@ use tactile_imaging::elasticity::modulus::{
     Bootstrap, Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator, SphereBetweenPlates,
     SphereOnWaveguide, TataraSphere,
 };
-use tactile_imaging::simulate::{self, ContactLaw, Elastic, PressOptions, PressScene, Sphere};
+use tactile_simulate::{self, ContactLaw, Elastic, PressOptions, PressScene, Sphere};
 
 /// A cube of a normal number, as the modulus is of the contact radius: E ∝ a⁻³ with 1 % in a, whose spread is known by a long run.
 fn cube(normal: &mut dyn FnMut() -> f64) -> Option<f64> {
@@ -54,7 +54,7 @@ pub(crate) fn bootstrap(study: &mut Study) {
 pub(crate) fn laws(study: &mut Study) {
     study.error_label = "rms error of the modulus, relative";
     const RADIUS_M: f64 = 3e-3;
-    let layers = simulate::Waveguide::default().layers;
+    let layers = tactile_simulate::Waveguide::default().layers;
     let layers = layers.iter().map(|l| Layer {
         thickness_m: l.thickness_m,
         youngs_modulus_pa: l.material.youngs_modulus_pa,

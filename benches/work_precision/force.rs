@@ -5,7 +5,7 @@ use tactile_imaging::force::{
     CalibrationOptions, CalibrationPair, ForceMeter, ForceOptions, ForceWorkspace, HertzFitOptions,
     LinearCalibration, ReferenceFrame,
 };
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     CalibrationOptions as SimulatedRun, Camera, Load, PressOptions, PressScene,
 };
 

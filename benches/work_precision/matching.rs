@@ -66,7 +66,7 @@ fn run(
     knob: &'static str,
     setting: &str,
     is_default: bool,
-    matcher: &dyn PointMatcher<f64, 3>,
+    matcher: &dyn PointMatcher<3>,
 ) {
     let job = || {
         let warped = |s: &Scene| {

@@ -3,8 +3,9 @@
 use crate::study::Study;
 use tactile_imaging::Pipeline;
 use tactile_imaging::matching::CoherentPointDrift;
-use tactile_imaging::pipeline::{Binning, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
+use tactile_imaging::pipeline::Binning;
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
 /// Presses on one sensor that differ in force and noise: one alone would say what its noise happened to do.
 fn trials(shape: [usize; 2], count: u64) -> Vec<Trial> {

@@ -1,7 +1,7 @@
 //! An inclusion in a block of tissue, from frames: ring means of pressure images and the scene file that
 //! names them.
 //!
-//! The search itself is [`elasticity::inclusion`](crate::elasticity::inclusion).
+//! The search itself is [`InclusionSearch`], of the crate `tactile-inclusion`.
 mod rings;
 #[cfg(feature = "scene")]
 mod scene;
@@ -9,3 +9,4 @@ mod scene;
 pub use rings::{RingError, RingMeans, ring_means};
 #[cfg(feature = "scene")]
 pub use scene::{InclusionScene, LoadedInclusion};
+pub use tactile_inclusion::*;

@@ -1,14 +1,14 @@
 //! Scene files of a block pressed by the sensor's guide.
 
 use super::rings::{RingMeans, ring_means};
-use crate::elasticity::fem::{Guide, Interface, Layer, Material};
-use crate::elasticity::inclusion::{PressureProfile, Specimen};
 use crate::force::{CalibrationOptions, LinearCalibration, StressCalibration};
 use crate::io::{Grey, read_bytes, read_grey_image};
 use crate::scene::fields::{Fields, poisson, positive};
 use crate::scene::{SceneError, parse_table, read_pairs};
 use ndarray::Array2;
 use std::path::{Path, PathBuf};
+use tactile_fem::{Guide, Interface, Layer, Material};
+use tactile_inclusion::{PressureProfile, Specimen};
 
 /// A block of tissue, the guide pressed onto it, and the frames.
 ///
@@ -120,8 +120,7 @@ impl InclusionScene {
     }
 
     /// The images, in the order of the file.
-    #[cfg(feature = "cli")]
-    pub(crate) fn images(&self) -> Vec<&Path> {
+    pub fn images(&self) -> Vec<&Path> {
         self.frames.iter().map(|f| f.image.as_path()).collect()
     }
 

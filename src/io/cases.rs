@@ -91,10 +91,7 @@ pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<MatchCase>, ReadError> {
 ///
 /// # Errors
 /// As [`read_cases`].
-pub(crate) fn parse_cases(
-    bytes: &[u8],
-    name: impl AsRef<Path>,
-) -> Result<Vec<MatchCase>, ReadError> {
+pub fn parse_cases(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<MatchCase>, ReadError> {
     let path = name.as_ref();
     let text = String::from_utf8_lossy(bytes);
     let mut cases = Vec::new();
@@ -136,7 +133,7 @@ pub(crate) fn parse_cases(
 ///
 /// # Panics
 /// Where `warped` and `assignment` differ in length.
-pub(crate) fn write_case_result<const D: usize>(
+pub fn write_case_result<const D: usize>(
     out: &mut impl Write,
     name: &str,
     time_ms: f64,

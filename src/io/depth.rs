@@ -8,7 +8,7 @@ const TWELVE_BITS: u16 = 4095;
 
 /// The decoded sample that stands for the level 255. The decoder stretches the samples of a PGM, PPM or PAM from the largest
 /// value that the header announces to the full range of 8 or 16 bits.
-pub(crate) fn full_scale(
+pub fn full_scale(
     image: &DynamicImage,
     bytes: &[u8],
     path: &Path,
@@ -65,13 +65,13 @@ fn pnm_maxval(bytes: &[u8]) -> Option<u16> {
 
 /// The samples of a decoded image, pixel by pixel.
 #[derive(Clone, Copy)]
-pub(crate) enum Samples<'a> {
+pub enum Samples<'a> {
     Eight(&'a [u8]),
     Sixteen(&'a [u16]),
 }
 
 impl<'a> Samples<'a> {
-    pub(crate) fn of(image: &'a DynamicImage) -> Self {
+    pub fn of(image: &'a DynamicImage) -> Self {
         match image {
             DynamicImage::ImageLuma16(i) => Self::Sixteen(i.as_raw()),
             DynamicImage::ImageLumaA16(i) => Self::Sixteen(i.as_raw()),
@@ -83,7 +83,7 @@ impl<'a> Samples<'a> {
     }
 
     /// Bits of a sample.
-    pub(crate) fn bits(self) -> u8 {
+    pub fn bits(self) -> u8 {
         match self {
             Self::Eight(_) => 8,
             Self::Sixteen(_) => 16,

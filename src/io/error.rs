@@ -265,7 +265,7 @@ fn list(names: &[String]) -> String {
 }
 
 /// The field as it can stand in a message: at most 40 characters, no control characters.
-pub(crate) fn shorten(field: &str) -> String {
+pub fn shorten(field: &str) -> String {
     let clean: String = field.trim().chars().filter(|c| !c.is_control()).collect();
     match clean.char_indices().nth(40) {
         Some((end, _)) => format!("{}…", &clean[..end]),

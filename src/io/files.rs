@@ -1,15 +1,15 @@
 //! Whole files in and out: what is no file is refused before it is opened, and a file is replaced only by a complete one.
 use super::error::ReadError;
-use crate::replace_file::replace_file;
+use crate::io::replace_file;
 use std::fs::{self, FileType};
 use std::io::Read;
 use std::path::Path;
 
 /// Largest file that is read, in bytes: more is not a measurement.
-pub(crate) const LARGEST_FILE: u64 = 512 << 20;
+pub const LARGEST_FILE: u64 = 512 << 20;
 
 /// Reads a whole file of at most [`LARGEST_FILE`] bytes; the error names it.
-pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let open = |source| ReadError::Open {
         path: path.into(),
         source,
@@ -49,7 +49,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
 ///
 /// # Errors
 /// [`ReadError::Write`], which names the file.
-pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
     replace_file(path, bytes).map_err(|source| ReadError::Write {
         path: path.into(),
         source,

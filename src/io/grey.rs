@@ -28,7 +28,7 @@ pub enum Grey {
 
 impl Grey {
     /// Weights of red, green and blue, of sum 1.
-    pub(crate) fn weights(self) -> [f64; 3] {
+    pub fn weights(self) -> [f64; 3] {
         match self {
             Grey::Rec601 => [0.299, 0.587, 0.114],
             Grey::Rec709 => [0.2126, 0.7152, 0.0722],

@@ -9,10 +9,10 @@ use std::io::Cursor;
 use std::path::Path;
 
 /// Longest side of an image in pixels.
-pub(crate) const LARGEST_SIDE: u32 = 30_000;
+pub const LARGEST_SIDE: u32 = 30_000;
 
 /// Most pixels of an image: 64 million.
-pub(crate) const LARGEST_IMAGE: u64 = 64_000_000;
+pub const LARGEST_IMAGE: u64 = 64_000_000;
 
 /// A grey image, `[row, column]`.
 ///
@@ -122,7 +122,7 @@ fn decode(bytes: &[u8], path: &Path, bits: Option<u8>) -> Result<(DynamicImage, 
 }
 
 /// Reads a grey image in eight bits a pixel: as [`GreyImage::to_u8`], but samples that are grey levels already are taken as they stand.
-pub(crate) fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
+pub fn read_grey_levels(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, ReadError> {
     match decode(&read_bytes(path)?, path, bits)? {
         (DynamicImage::ImageLuma8(image), 255.0) => {
             let shape = (image.height() as usize, image.width() as usize);

@@ -16,7 +16,6 @@
 //! size of the file. Units in the headings of columns are converted to SI (m, N, Pa, s) or refused. A file that is
 //! written takes the place of an older one only when it is complete.
 // Some formats are read and written by the program alone.
-#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
 mod cases;
 mod depth;
@@ -26,20 +25,22 @@ mod grey;
 mod grid;
 mod image;
 mod points;
+mod replace_file;
 mod table;
 mod units;
 
-pub(crate) use cases::write_case_result;
+pub use cases::write_case_result;
 pub use cases::{CasePoints, MatchCase, read_cases};
-pub(crate) use error::shorten;
+pub use error::shorten;
 pub use error::{Expected, ReadError};
-pub(crate) use files::{read_bytes, write_bytes};
+pub use files::{read_bytes, write_bytes};
 pub use grey::Grey;
 pub use grid::read_grid;
-pub(crate) use image::read_grey_levels;
+pub use image::read_grey_levels;
 pub use image::{GreyImage, read_grey_image, write_grey_image};
 pub use points::read_points;
-pub(crate) use points::{PointTable, read_point_table};
+pub use points::{PointTable, read_point_table};
+pub use replace_file::replace_file;
 pub use table::read_columns;
-pub(crate) use table::{Column, read_table};
-pub(crate) use units::Quantity;
+pub use table::{Column, read_table};
+pub use units::Quantity;

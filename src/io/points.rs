@@ -14,7 +14,7 @@ const PIXELS: &str = "px";
 
 /// Points of a file whose number of coordinates is not known beforehand.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum PointTable {
+pub enum PointTable {
     /// Points of two coordinates.
     Plane(Vec<Point2<f64>>),
     /// Points of three coordinates.
@@ -26,7 +26,7 @@ pub(crate) enum PointTable {
 ///
 /// # Errors
 /// [`ReadError`], see the [module](super).
-pub(crate) fn read_point_table(path: impl AsRef<Path>) -> Result<(PointTable, bool), ReadError> {
+pub fn read_point_table(path: impl AsRef<Path>) -> Result<(PointTable, bool), ReadError> {
     let path = path.as_ref();
     let table = parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)?;
     let headings: Vec<Heading> = table.header.iter().map(|h| Heading::parse(h)).collect();

@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// A column that a reader looks for.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Column<'a> {
+pub struct Column<'a> {
     /// Names that it may have, the usual one first, without the unit.
     pub names: &'a [&'a str],
     /// What it measures.
@@ -22,7 +22,7 @@ pub(crate) struct Column<'a> {
 
 /// A rectangular table of numbers with the names of its columns, if it has a header.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Table {
+pub struct Table {
     /// Names of the columns; empty where the file has no header line.
     pub header: Vec<String>,
     /// The numbers, `[row, column]`.
@@ -36,7 +36,7 @@ impl Table {
     /// # Errors
     /// [`ReadError::MissingColumn`], [`ReadError::Unit`], [`ReadError::Overflow`] and, where the number of columns is wrong,
     /// [`ReadError::Line`]; `path` is the name they give to the file.
-    pub(crate) fn columns<const N: usize>(
+    pub fn columns<const N: usize>(
         &self,
         wanted: [Column<'_>; N],
         path: &Path,
@@ -144,7 +144,7 @@ pub fn read_columns<const N: usize>(
 ///
 /// # Errors
 /// [`ReadError`] where the file cannot be read, a field is no finite number, rows differ in length, or there are none.
-pub(crate) fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
+pub fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
     let path = path.as_ref();
     parse_table(&read_bytes(path)?, path, Expected::FiniteNumber)
 }
@@ -152,7 +152,7 @@ pub(crate) fn read_table(path: impl AsRef<Path>) -> Result<Table, ReadError> {
 /// Parses the bytes of a table; `path` is the name that errors give.
 ///
 /// A field becomes a number at once, so that a file of any shape needs little more memory than its numbers.
-pub(crate) fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<Table, ReadError> {
+pub fn parse_table(bytes: &[u8], path: &Path, cell: Expected) -> Result<Table, ReadError> {
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
         return Err(ReadError::Encoding { path: path.into() });
     }

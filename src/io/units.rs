@@ -9,7 +9,7 @@ use std::path::Path;
 /// never read as if it were SI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub(crate) enum Quantity {
+pub enum Quantity {
     /// nm, um (µm), mm, cm, m.
     Length,
     /// nN, uN (µN), mN, N, kN.
@@ -57,7 +57,7 @@ const UNITS: [(Quantity, &[(&str, f64)]); 5] = [
 
 impl Quantity {
     /// The value of one `unit` in SI; `None` where the quantity has no such unit. Both signs for micro are `u`.
-    pub(crate) fn in_si(self, unit: &str) -> Option<f64> {
+    pub fn in_si(self, unit: &str) -> Option<f64> {
         let plain = unit.replace(['µ', 'μ'], "u");
         let units = UNITS.iter().find(|(quantity, _)| *quantity == self)?.1;
         let found = units.iter().find(|(name, _)| *name == plain)?;
@@ -65,7 +65,7 @@ impl Quantity {
     }
 
     /// The quantity that `unit` measures; a number where none has it.
-    pub(crate) fn of_unit(unit: &str) -> Self {
+    pub fn of_unit(unit: &str) -> Self {
         let has = |quantity: &Self| quantity.in_si(unit).is_some();
         let mut quantities = UNITS.iter().map(|(quantity, _)| *quantity);
         quantities.find(has).unwrap_or(Self::Number)
@@ -81,13 +81,13 @@ impl Quantity {
 
 /// A heading cut into its name, in lower case, and its unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Heading {
-    pub(crate) name: String,
-    pub(crate) unit: Option<String>,
+pub struct Heading {
+    pub name: String,
+    pub unit: Option<String>,
 }
 
 impl Heading {
-    pub(crate) fn parse(text: &str) -> Self {
+    pub fn parse(text: &str) -> Self {
         let text = text.trim();
         let bracketed = [('(', ')'), ('[', ']')]
             .into_iter()
@@ -115,7 +115,7 @@ impl Heading {
     }
 
     /// The factor that takes the column's values to SI.
-    pub(crate) fn factor(
+    pub fn factor(
         &self,
         quantity: Quantity,
         otherwise: &str,

@@ -97,7 +97,7 @@ impl ContactStage for DarkContact {
         _workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         contact: &mut FrameContact,
     ) -> Result<(), ForceError> {
         let image = reference.image();
@@ -144,7 +144,7 @@ impl DarkContact {
         &self,
         patch: &Patch,
         (rows, columns): (usize, usize),
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         peak: f64,
         saturated: usize,
     ) -> ContactReading {
@@ -162,18 +162,9 @@ impl DarkContact {
             force_n: gauge,
             force_noise_n: gauge.map_or(0.0, |gauge| gauge.standard_error),
             force_calibration_n: 0.0,
-            contact_radius_m: Estimate {
-                value: radius_px * pixel,
-                standard_error: 0.5 * pixel,
-            },
-            indentation_m: Some(Estimate {
-                value: depth,
-                standard_error: (depth - step).abs(),
-            }),
-            centroid_px: [mean(1), mean(0)].map(|value| Estimate {
-                value,
-                standard_error: centroid_error,
-            }),
+            contact_radius_m: Estimate::new(radius_px * pixel, 0.5 * pixel),
+            indentation_m: Some(Estimate::new(depth, (depth - step).abs())),
+            centroid_px: [mean(1), mean(0)].map(|value| Estimate::new(value, centroid_error)),
             area_m2: n * hx * hy,
             peak_grey: peak,
             saturated_share: saturated as f64 / n,

@@ -3,7 +3,7 @@
 use crate::force::Estimate;
 
 /// A value with its standard error, scaled to a unit: two significant digits of the error decide the decimals.
-pub(crate) fn with_error(value: f64, error: f64, scale: f64) -> String {
+pub fn with_error(value: f64, error: f64, scale: f64) -> String {
     let (value, error) = (value * scale, error * scale);
     if !(error > 0.0 && error.is_finite()) {
         return format!("{value:.4}");
@@ -17,7 +17,7 @@ pub(crate) fn with_error(value: f64, error: f64, scale: f64) -> String {
 }
 
 /// An estimate with its standard error, scaled to a unit.
-pub(super) fn estimate(e: Estimate<f64>, scale: f64) -> String {
+pub(super) fn estimate(e: Estimate, scale: f64) -> String {
     with_error(e.value, e.standard_error, scale)
 }
 

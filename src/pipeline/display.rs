@@ -124,7 +124,7 @@ fn stop_text(stop: StopReason) -> &'static str {
         StopReason::Converged => "converged",
         StopReason::Exact => "exact",
         StopReason::IterationLimit => "not converged",
-        StopReason::Callback => "stopped by the caller",
+        StopReason::Cancelled => "stopped by the caller",
         StopReason::Degenerate => "degenerate",
         _ => "stopped",
     }

@@ -1,8 +1,7 @@
 //! Why a measurement could not be made.
 use super::choice::EstimatorChoice;
-use super::face::ShapeProblem;
 use crate::elasticity::ElasticityError;
-use crate::force::ForceError;
+use crate::force::{ForceError, ShapeProblem};
 use crate::matching::MatchError;
 use crate::sfs::SfsError;
 use crate::tps::TpsError;

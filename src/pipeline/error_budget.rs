@@ -50,7 +50,7 @@ impl fmt::Display for ErrorSource {
 /// The part of a modulus' relative standard error that one input is responsible for; the parts' squares add up to the whole.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::{ErrorShare, ErrorSource};

@@ -18,7 +18,7 @@ use std::fmt;
 /// // The camera sees the right half of the contact, and a gauge reads 1 N.
 /// let [reference, half] = [&reference, &frame].map(|image| image.slice(ndarray::s![.., 32..]));
 /// let mut press = pipeline.press(reference)?;
-/// press.add_gauged_frame(half, Some(Estimate { value: 1.0, standard_error: 0.0 }));
+/// press.add_gauged_frame(half, Some(Estimate::new(1.0, 0.0)));
 /// let flags = press.measure().flags;
 /// assert!(flags.contains(&Flag::TouchesEdge { frame: 0 }));
 /// assert!(flags.iter().any(|flag| matches!(flag, Flag::GaugeDisagrees { measured_n, .. } if *measured_n < 0.6)));

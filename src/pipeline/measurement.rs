@@ -53,7 +53,7 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
 /// What one frame says.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::FrameResult;
@@ -76,11 +76,11 @@ impl From<&ModulusEstimate<f64>> for ModulusResult {
 pub struct FrameResult {
     /// Normal force in newtons.
     #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
-    pub force_n: Result<Estimate<f64>, PipelineError>,
+    pub force_n: Result<Estimate, PipelineError>,
     /// What a gauge read, in newtons.
     pub gauge_force_n: Option<f64>,
     /// Contact radius in metres; of a flat face that of a disc of its area.
-    pub contact_radius_m: Estimate<f64>,
+    pub contact_radius_m: Estimate,
     /// Contact radius over the ball's radius: small-contact theory holds up to 0.3.
     pub contact_ratio: Option<f64>,
     /// Centroid (x, y) in pixels.
@@ -90,7 +90,7 @@ pub struct FrameResult {
     /// Area of the contact in square metres.
     pub contact_area_m2: f64,
     /// F/(π a²) in pascals.
-    pub mean_stress_pa: Option<Estimate<f64>>,
+    pub mean_stress_pa: Option<Estimate>,
     /// Greatest height of the reconstructed surface in metres.
     #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::one"))]
     pub surface_height_m: Result<f64, PipelineError>,
@@ -99,7 +99,7 @@ pub struct FrameResult {
 /// How the control points of the first and the last frame were matched.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::MatchResult;
@@ -132,7 +132,7 @@ pub struct MatchResult {
 /// The strain between the first and the last frame.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::StrainResult;
@@ -163,7 +163,7 @@ pub struct StrainResult {
 /// All results of a press: what a stage computed, or why it could not, whatever became of the others.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::Measurement;

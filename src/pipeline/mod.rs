@@ -22,7 +22,6 @@
 //! result carries a flag. Specimens with a flat face are what (31) is exact for: stress over strain, regressed over all loads, the strain from the growth of the
 //! face's area. An object of unknown shape is read so if its contacts are those of a flat face, and refused with what to tell the program if not
 //! ([`PipelineError::NotUniaxial`]).
-mod background;
 mod batch;
 mod choice;
 mod composition;
@@ -54,12 +53,9 @@ mod source;
 mod strain_error;
 mod surface;
 mod time;
-#[cfg(feature = "simulate")]
-mod trial;
 
+pub use crate::force::{FaceReading, ShapeProblem};
 pub use crate::sfs::{BallFit, Binning};
-#[cfg(feature = "cli")]
-pub(crate) use background::clear_step;
 pub use batch::contacts;
 pub use choice::{
     EstimatorChoice, IntegratorChoice, MatcherChoice, ReconstructionChoice, SamplerChoice,
@@ -69,11 +65,9 @@ pub use composition::Pipeline;
 pub use config::StagesConfig;
 pub use contact::{ContactReading, ContactStage, FrameContact, LightContact};
 pub use depth::DarkContact;
-#[cfg(any(feature = "cli", feature = "plot"))]
-pub(crate) use digits::with_error;
+pub use digits::with_error;
 pub use error::PipelineError;
 pub use error_budget::{ErrorShare, ErrorSource};
-pub use face::{FaceReading, ShapeProblem};
 pub use flag::Flag;
 pub use measurement::{FrameResult, MatchResult, Measurement, ModulusResult, StrainResult};
 pub use object::Object;
@@ -87,5 +81,3 @@ pub use source::FrameSource;
 pub use source::ImageFolder;
 pub use surface::ContactSurface;
 pub use time::TimeResult;
-#[cfg(feature = "simulate")]
-pub use trial::Trial;

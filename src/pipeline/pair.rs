@@ -16,7 +16,7 @@ pub(crate) const LEAST_MATCHES: usize = 8;
 /// The strain between two frames.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::PairStrain;

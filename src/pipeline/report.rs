@@ -5,7 +5,7 @@ use std::time::Duration;
 /// A stage of the pipeline.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Stage;
@@ -163,7 +163,7 @@ pub struct Work {
 /// What was computed, what was skipped and why.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::{Report, Stage};

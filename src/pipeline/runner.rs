@@ -2,13 +2,15 @@
 use super::composition::Pipeline;
 use super::contact::{ContactReading, ContactStage, FrameContact};
 use super::error::PipelineError;
-use super::face::{self, FaceWorkspace, TextureStretch};
 use super::load_reading::{self, LoadReading};
 use super::pair::{self, MatchedPoints, PairStrain, StrainWorkspace};
 use super::report::{Report, SkipReason, Stage};
 use super::surface::{self, ContactSurface, ControlPoints, SurfaceWorkspace};
 use crate::elasticity::modulus::{LoadSeries, ModulusEstimate, ModulusEstimator, UniaxialLoads};
-use crate::force::{Estimate, ForceWorkspace, FrameCondition, Polarity, ReferenceFrame};
+use crate::force::{
+    Estimate, FaceReading, FaceWorkspace, ForceWorkspace, FrameCondition, ReferenceFrame,
+    TextureStretch, texture_spots,
+};
 use crate::matching::{MatchError, MatchedPairs, Matching, WarmStart};
 use nalgebra::{Point2, Point3};
 use ndarray::ArrayView2;
@@ -92,7 +94,7 @@ impl StageRunner {
         &mut self,
         frame: usize,
         image: ArrayView2<'_, u8>,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         contact: &mut FrameContact,
     ) -> Result<(), PipelineError> {
         let start = Instant::now();
@@ -119,14 +121,16 @@ impl StageRunner {
     fn face(&mut self, image: ArrayView2<'_, u8>, contact: &mut FrameContact) {
         let stage = self.pipeline.contact();
         let may_be_flat = self.pipeline.settings().object.flat_face().is_some();
-        if !may_be_flat || contact.reading.is_none() {
+        let (true, Some(region)) = (may_be_flat && contact.reading.is_some(), contact.region)
+        else {
             return;
-        }
-        let sign = sign_of(stage.polarity());
+        };
         let images = [image, self.reference.image()];
+        let mask = contact.mask.view();
+        let (polarity, pixel_size_m) = (stage.polarity(), stage.pixel_size_m());
         let mut face = self
             .face
-            .measure(images, contact, sign, stage.pixel_size_m());
+            .measure(images, region, mask, polarity, pixel_size_m);
         if let (Some(face), Some(lens), Some(reading)) = (&mut face, stage.lens(), &contact.reading)
         {
             // Pixels of a lens that distorts differ in size.
@@ -138,7 +142,7 @@ impl StageRunner {
         }
         if let Some(reading) = &mut contact.reading {
             reading.face = face;
-            if let Some(face) = face.filter(face::has_edge) {
+            if let Some(face) = face.filter(FaceReading::has_edge) {
                 reading.take_area(face.area_m2);
             }
         }
@@ -195,7 +199,7 @@ impl StageRunner {
         frames: [usize; 2],
         model: &[Point3<f64>],
         target: &[Point3<f64>],
-    ) -> Result<Matching<f64, 3>, PipelineError> {
+    ) -> Result<Matching<3>, PipelineError> {
         self.matched(frames, |pipeline| {
             pipeline.matcher().match_points(model, target)
         })
@@ -208,7 +212,7 @@ impl StageRunner {
         history: &mut MatchHistory,
         model: &[Point3<f64>],
         target: &[Point3<f64>],
-        pairs: &mut MatchedPairs<f64>,
+        pairs: &mut MatchedPairs,
     ) -> Result<(), PipelineError> {
         if !self.pipeline.settings().skips.last_answer {
             let Matching {
@@ -217,11 +221,7 @@ impl StageRunner {
                 report,
                 ..
             } = self.matching(frames, model, target)?;
-            *pairs = MatchedPairs {
-                assignment,
-                confidence,
-                report,
-            };
+            (pairs.assignment, pairs.confidence, pairs.report) = (assignment, confidence, report);
             return Ok(());
         }
         let warm = &mut history.warm;
@@ -289,7 +289,7 @@ impl StageRunner {
         let start = Instant::now();
         let stage = self.pipeline.contact();
         let [hx, hy] = stage.pixel_size_m();
-        let sign = sign_of(stage.polarity());
+        let polarity = stage.polarity();
         let none = PipelineError::NoTexture { from, to };
         let mut points = [Vec::new(), Vec::new()];
         let mut faces = Vec::with_capacity(2);
@@ -299,23 +299,18 @@ impl StageRunner {
                 return Err(none);
             };
             let pair = [image, self.reference.image()];
-            *points = face::spots(pair, region, &contact.mask, sign, [hx, hy]);
+            *points = texture_spots(pair, region, contact.mask.view(), polarity, [hx, hy]);
             let [x, y] = reading.centroid_px.map(|c| c.value);
             centres.push(Point2::new(x * hx, y * hy));
             faces.push(reading.face.ok_or_else(|| none.clone())?);
         }
         let pixel_m = (hx * hy).sqrt();
+        let growth = (faces[1].area_m2.value / faces[0].area_m2.value).sqrt();
+        let predict = |p: &Point2<f64>| centres[1] + growth * (p - centres[0]);
         let [one, two] = &points;
-        let stretch = face::stretch(
-            [one, two],
-            [&faces[0], &faces[1]],
-            [centres[0], centres[1]],
-            pixel_m,
-        );
+        let stretch = TextureStretch::between([one, two], predict, 4.0 * pixel_m);
         self.report.ran(Stage::Match, start.elapsed());
-        stretch
-            .map_err(|source| PipelineError::Match { from, to, source })?
-            .ok_or(none)
+        stretch.ok_or(none)
     }
 
     /// The loads of a specimen with a flat face: its areas turned into strains.
@@ -348,15 +343,6 @@ impl StageRunner {
         let estimate = estimator.estimate(loads).map_err(PipelineError::Modulus);
         self.report.ran(Stage::Modulus, start.elapsed());
         estimate
-    }
-}
-
-/// What makes the signal of a contact positive.
-fn sign_of(polarity: Polarity) -> f32 {
-    if polarity == Polarity::Darker {
-        -1.0
-    } else {
-        1.0
     }
 }
 

@@ -13,7 +13,7 @@ pub(crate) const DEFAULT_CONTROL_POINTS: usize = 200;
 /// matches that begin where the last one ended leave strains the same within half their standard error.
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Skips;

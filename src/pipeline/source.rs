@@ -31,18 +31,6 @@ pub trait FrameSource {
     fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error>;
 }
 
-#[cfg(feature = "simulate")]
-impl FrameSource for crate::simulate::FrameStream {
-    type Error = std::convert::Infallible;
-
-    fn next_frame(&mut self, frame: &mut Array2<u8>) -> Result<Option<f64>, Self::Error> {
-        Ok(self.next().map(|streamed| {
-            *frame = streamed.frame;
-            streamed.time_s
-        }))
-    }
-}
-
 /// The images of a folder in the order of their names, at a given rate.
 ///
 /// ```

@@ -1,17 +1,17 @@
 //! Contact tables as files, and from the description of a ball and a guide.
-#[cfg(feature = "cli")]
+#[cfg(feature = "fem")]
 use super::fields::Fields;
-#[cfg(feature = "cli")]
+#[cfg(feature = "fem")]
 use super::tables;
 use super::{SceneError, SceneLayer};
 use crate::elasticity::ElasticityError;
 use crate::elasticity::contact::{ContactTable, Layer, Waveguide};
-#[cfg(feature = "cli")]
-use crate::elasticity::contact::{TableOptions, TableProgress};
+#[cfg(feature = "fem")]
+use crate::fem::{TableOptions, TableProgress, solve_contact_table as solve_by_elements};
 use crate::io::{ReadError, read_bytes, write_bytes};
-#[cfg(feature = "cli")]
+#[cfg(feature = "fem")]
 use crate::pipeline::{Object, PipelineError};
-#[cfg(feature = "cli")]
+#[cfg(feature = "fem")]
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -72,8 +72,8 @@ pub fn write_contact_table(path: impl AsRef<Path>, table: &ContactTable) -> Resu
 ///
 /// # Errors
 /// Those of a scene's `object` and `waveguide`; [`SceneError::Measure`] where the object is no ball, or the table cannot be computed.
-#[cfg(feature = "cli")]
-pub(crate) fn solve_contact_table(
+#[cfg(feature = "fem")]
+pub fn solve_contact_table(
     path: impl AsRef<Path>,
     options: &TableOptions,
     progress: impl FnMut(TableProgress) -> ControlFlow<()>,
@@ -101,7 +101,7 @@ pub(crate) fn solve_contact_table(
         return Err(failed("object.shape", error));
     };
     let solved = |guide: Waveguide<f64>| -> Result<_, ElasticityError> {
-        ContactTable::solve(radius_m, poisson_ratio, &guide, options, progress)
+        solve_by_elements(radius_m, poisson_ratio, &guide, options, progress)
     };
     guide(&layers)
         .and_then(solved)

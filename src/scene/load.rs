@@ -25,7 +25,7 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoadedCalibration {
     /// Integrated pixel value and force.
-    Pairs(Vec<CalibrationPair<f64>>),
+    Pairs(Vec<CalibrationPair>),
     /// Darkness in grey levels and depth in metres.
     DepthTable(Vec<(f64, f64)>),
     /// None: the forces are a gauge's.
@@ -38,7 +38,7 @@ pub enum LoadedCalibration {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
 /// use tactile_imaging::scene::{LoadedCalibration, Scene};
 /// # let camera = Camera::default().coarser(16);
 /// # let made = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
@@ -79,7 +79,7 @@ impl Scene {
 
     /// As [`load`](Self::load) without the frames: a [`press`](Self::press) then reads each when it is added and again when a stage needs it, so
     /// that any number of them fits into memory.
-    pub(crate) fn load_without_frames(&self) -> Result<SceneData, SceneError> {
+    pub fn load_without_frames(&self) -> Result<SceneData, SceneError> {
         Ok(SceneData {
             reference: self.image("reference", &self.reference)?,
             frames: Vec::new(),
@@ -154,7 +154,7 @@ pub(super) fn read_image(path: &Path, bits: Option<u8>) -> Result<Array2<u8>, Re
 }
 
 /// Pairs of integrated pixel value and force from a CSV file.
-pub(crate) fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair<f64>>, ReadError> {
+pub fn read_pairs(path: &Path) -> Result<Vec<CalibrationPair>, ReadError> {
     let value = (&["integrated_pixel_value"][..], "grey_levels");
     let [values, forces] = read_columns(path, [value, (&["force"], "N")])?;
     let pairs = values.into_iter().zip(forces);

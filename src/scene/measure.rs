@@ -16,7 +16,7 @@ impl Scene {
     ///
     /// ```
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene, write_folder};
+    /// # use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions, PressScene, write_folder};
     /// use tactile_imaging::scene::Scene;
     /// # let camera = Camera::default().coarser(16);
     /// # let made = PressScene::new(PressOptions { camera, loads: vec![Load::normal(0.7)], ..Default::default() })?;
@@ -86,10 +86,9 @@ impl Scene {
             .press(data.reference.view())
             .map_err(|e| self.measure_error(e))?;
         for (index, frame) in self.frames.iter().enumerate() {
-            let gauge = frame.force_n.map(|value| Estimate {
-                value,
-                standard_error: frame.force_error_n.unwrap_or(0.0),
-            });
+            let gauge = frame
+                .force_n
+                .map(|value| Estimate::new(value, frame.force_error_n.unwrap_or(0.0)));
             let added = match data.frames.get(index) {
                 Some(image) => press.add_gauged_frame(image.view(), gauge),
                 None => {

@@ -66,13 +66,13 @@ mod error;
 pub(crate) mod fields;
 mod load;
 #[cfg(feature = "inclusion")]
-pub(crate) use load::read_pairs;
+pub use load::read_pairs;
 mod measure;
 mod stages;
 mod tables;
 
-#[cfg(feature = "cli")]
-pub(crate) use contact_table::solve_contact_table;
+#[cfg(feature = "fem")]
+pub use contact_table::solve_contact_table;
 pub use contact_table::{read_contact_table, write_contact_table};
 pub use error::SceneError;
 pub use load::{LoadedCalibration, SceneData};
@@ -184,8 +184,8 @@ pub struct SceneLayer {
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
-/// # use tactile_imaging::simulate::{Elastic, Sphere};
+/// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// # use tactile_simulate::{Elastic, Sphere};
 /// use tactile_imaging::scene::Scene;
 /// # let camera = Camera::default().coarser(16);
 /// # let object = Sphere { radius_m: 20e-3, material: Elastic::CL2000X };

@@ -78,7 +78,7 @@ pub struct SensorCalibration {
     /// Standard deviation of the gauge's noise in newtons.
     pub gauge_noise_n: f64,
     /// Springs of shear, passed on as they are.
-    pub shear: Option<ShearCalibration<f64>>,
+    pub shear: Option<ShearCalibration>,
     /// Least and greatest force in newtons that scenes will have: presses that do not cover them are refused.
     pub covers_n: Option<[f64; 2]>,
 }
@@ -184,7 +184,7 @@ impl SensorCalibration {
         let mut seen = Vec::new();
         for (press, given) in self.presses.iter().enumerate() {
             let failed = |source: ForceError| SensorError::Press { press, source };
-            let found: Detection<f64> = detector
+            let found: Detection = detector
                 .detect_with(&mut workspace, given.frame.view(), reference)
                 .map_err(failed)?;
             let Some(contact) = found.contact else {

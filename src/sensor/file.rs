@@ -7,8 +7,8 @@ use crate::force::{
     ShearCalibration,
 };
 use crate::io::read_bytes;
+use crate::io::replace_file;
 use crate::pipeline::{LightContact, Object, Pipeline, PipelineError};
-use crate::replace_file::replace_file;
 use crate::scene::{SceneError, SceneLayer};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ pub struct SensorGeometry {
 impl SensorGeometry {
     /// Relative standard error that all lengths share: that of √(h_x h_y), of the distortion at half the frame's diagonal (ρ² = ¼) and
     /// of the target.
-    pub(crate) fn length_scale_error(&self) -> f64 {
+    pub fn length_scale_error(&self) -> f64 {
         let [hx, hy] = self.lens.pixel_size_m();
         // ln √(h_x h_y (1 + 4 k₁ρ² + 6 k₂ρ⁴)) to first order, at ρ² = ¼.
         let slopes = [0.5 / hx, 0.5 / hy, 0.5, 0.1875];
@@ -100,7 +100,7 @@ pub struct Sensor {
     pub noise: NoiseModel,
     /// Springs of shear, where they are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shear: Option<ShearCalibration<f64>>,
+    pub shear: Option<ShearCalibration>,
     /// The guide's layers from the object's side; empty: rigid.
     #[serde(default)]
     pub layers: Vec<SceneLayer>,

@@ -13,7 +13,7 @@ use crate::force::{Branch, Estimate, LensFit};
 ///     branch: Branch::Loading,
 ///     force_n: 0.5,
 ///     read_force_n: Some(0.503),
-///     contact_radius_m: Some(Estimate { value: 2.01e-3, standard_error: 2e-6 }),
+///     contact_radius_m: Some(Estimate::new(2.01e-3, 2e-6)),
 ///     layers_force_n: None,
 /// };
 /// assert!(finding.read_force_n.is_some_and(|read| (read / finding.force_n - 1.0).abs() < 0.01));
@@ -29,7 +29,7 @@ pub struct PressFinding {
     /// The force read from the frame with the fitted curve; `None` where no contact is seen, and the press was not used.
     pub read_force_n: Option<f64>,
     /// The fitted contact radius.
-    pub contact_radius_m: Option<Estimate<f64>>,
+    pub contact_radius_m: Option<Estimate>,
     /// The force that the fitted layers have at that radius; `None` for presses that the layers were not fitted to.
     pub layers_force_n: Option<f64>,
 }
@@ -41,8 +41,8 @@ pub struct PressFinding {
 /// let modulus = LayerFinding {
 ///     layer: 0,
 ///     parameter: "youngs_modulus_pa",
-///     stated: Estimate { value: 120e3, standard_error: 15e3 },
-///     fitted: Estimate { value: 135e3, standard_error: 3e3 },
+///     stated: Estimate::new(120e3, 15e3),
+///     fitted: Estimate::new(135e3, 3e3),
 ///     identified: true,
 /// };
 /// assert!(modulus.fitted.standard_error < 0.7 * modulus.stated.standard_error);
@@ -54,9 +54,9 @@ pub struct LayerFinding {
     /// The field of the sensor file.
     pub parameter: &'static str,
     /// What the user stated.
-    pub stated: Estimate<f64>,
+    pub stated: Estimate,
     /// What the presses and the statement say together.
-    pub fitted: Estimate<f64>,
+    pub fitted: Estimate,
     /// Whether the presses told of it: its error fell below 0.7 times the stated one. What was not identified is the statement.
     pub identified: bool,
 }

@@ -9,7 +9,6 @@ use crate::scene::SceneLayer;
 /// assert_ne!(ball, Indenter::Punch { radius_m: 4e-3 });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Indenter {
     /// A rigid ball: it teaches the curve and, by its contact radii, the layers.
     Ball {

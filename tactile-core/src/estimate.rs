@@ -54,6 +54,17 @@ impl Estimate {
         Self::new(value, 0.0)
     }
 
+    /// A value with its variance. Rounding may leave a variance below zero, which counts as zero.
+    ///
+    /// ```
+    /// use tactile_core::Estimate;
+    /// assert_eq!(Estimate::from_variance(2.0, 0.25), Estimate::new(2.0, 0.5));
+    /// ```
+    #[must_use]
+    pub fn from_variance(value: f64, variance: f64) -> Self {
+        Self::new(value, variance.max(0.0).sqrt())
+    }
+
     /// With the degrees of freedom of a standard error that was estimated from few repetitions.
     /// Fewer degrees make a wider interval.
     ///

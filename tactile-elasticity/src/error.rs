@@ -250,37 +250,69 @@ impl core::fmt::Display for Quantity {
     }
 }
 
+impl Quantity {
+    /// `value` if it is finite and above zero.
+    ///
+    /// ```
+    /// use tactile_elasticity::Quantity;
+    /// assert_eq!(Quantity::Radius.positive(3e-3), Ok(3e-3));
+    /// assert!(Quantity::Radius.positive(f64::NAN).is_err());
+    /// ```
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`].
+    pub fn positive(self, value: f64) -> Result<f64, ElasticityError> {
+        if value > 0.0 && value.is_finite() {
+            Ok(value)
+        } else {
+            Err(ElasticityError::NotPositive {
+                quantity: self,
+                found: value,
+            })
+        }
+    }
+
+    /// `value` if it is finite and not below zero.
+    ///
+    /// # Errors
+    /// [`ElasticityError::Negative`].
+    pub fn not_negative(self, value: f64) -> Result<f64, ElasticityError> {
+        if value >= 0.0 && value.is_finite() {
+            Ok(value)
+        } else {
+            Err(ElasticityError::Negative {
+                quantity: self,
+                found: value,
+            })
+        }
+    }
+
+    /// `value` if it is finite.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotFinite`].
+    pub fn finite(self, value: f64) -> Result<f64, ElasticityError> {
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(ElasticityError::NotFinite { quantity: self })
+        }
+    }
+}
+
 /// `value` if it is finite and above zero.
 pub(crate) fn positive(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(ElasticityError::NotPositive {
-            quantity,
-            found: value,
-        })
-    }
+    quantity.positive(value)
 }
 
 /// `value` if it is finite and not below zero.
 pub(crate) fn not_negative(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
-    if value >= 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(ElasticityError::Negative {
-            quantity,
-            found: value,
-        })
-    }
+    quantity.not_negative(value)
 }
 
 /// `value` if it is finite.
 pub(crate) fn finite(value: f64, quantity: Quantity) -> Result<f64, ElasticityError> {
-    if value.is_finite() {
-        Ok(value)
-    } else {
-        Err(ElasticityError::NotFinite { quantity })
-    }
+    quantity.finite(value)
 }
 
 /// `value` if it is a Poisson ratio in (−1, ½].

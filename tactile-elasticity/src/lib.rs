@@ -28,12 +28,8 @@
 pub mod contact;
 pub mod curve;
 mod error;
-#[cfg(feature = "fem")]
-pub mod fem;
 pub mod field;
 mod golden_section;
-#[cfg(feature = "fem")]
-pub mod inclusion;
 pub mod modulus;
 pub mod relaxation;
 mod scalar;

@@ -5,11 +5,10 @@ use rayon::prelude::*;
 
 use crate::calibration::StressCalibration;
 use crate::error::ForceError;
-use crate::estimate::Real;
 use crate::frame::ReferenceFrame;
 use crate::measure::{ForceMeasurement, ForceMeter, ForceWorkspace};
 
-impl<T: Real> ForceMeter<T> {
+impl ForceMeter {
     /// Measures frames on all threads of the current pool; the results are those of [`measure_with`](Self::measure_with) frame by frame,
     /// bit for bit.
     ///
@@ -23,7 +22,7 @@ impl<T: Real> ForceMeter<T> {
     /// let mut pressed = at_rest.clone();
     /// pressed.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
     /// let (reference, frames) = (ReferenceFrame::new(at_rest.view())?, [at_rest.view(), pressed.view()]);
-    /// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?;
+    /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
     /// let parallel = meter.measure_all_in_parallel(&frames, &reference, &calibration);
     /// let serial = meter.measure_with(&mut ForceWorkspace::default(), pressed.view(), &reference, &calibration)?;
     /// assert_eq!(parallel[1], Ok(serial));
@@ -33,8 +32,8 @@ impl<T: Real> ForceMeter<T> {
         &self,
         frames: &[ArrayView2<'_, u8>],
         reference: &ReferenceFrame,
-        calibration: &(impl StressCalibration<T> + ?Sized),
-    ) -> Vec<Result<ForceMeasurement<T>, ForceError>> {
+        calibration: &(impl StressCalibration + ?Sized),
+    ) -> Vec<Result<ForceMeasurement, ForceError>> {
         frames
             .par_iter()
             .map_init(ForceWorkspace::default, |workspace, f| {

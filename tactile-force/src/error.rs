@@ -1,25 +1,7 @@
 //! The errors of this crate, with the numbers that explain them.
 
+use tactile_core::{CustomError, InvalidOption};
 use thiserror::Error;
-
-/// The rule that an option's value has to satisfy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Requirement {
-    /// Finite and greater than zero.
-    Positive,
-    /// Finite and not negative.
-    NonNegative,
-    /// Strictly between zero and one.
-    OpenUnitInterval,
-    /// Between zero and one, both included.
-    UnitInterval,
-    /// Finite.
-    Finite,
-    /// An odd whole number, at least one.
-    Odd,
-    /// A whole number, at least one.
-    AtLeastOne,
-}
 
 /// The reason why an input was rejected.
 ///
@@ -109,57 +91,22 @@ pub enum ForceError {
         to: f64,
     },
     /// An option outside its domain.
-    #[error("`{name}` is {found}, expected {expected}")]
-    InvalidOption {
-        /// The option's name.
-        name: &'static str,
-        /// The value given.
-        found: f64,
-        /// The rule it breaks.
-        expected: &'static str,
-    },
-    /// A pixel of a floating-point image is NaN or infinite.
-    #[error("pixel (row {row}, column {column}) is not finite")]
-    NonFinitePixel {
-        /// Its row.
-        row: usize,
-        /// Its column.
-        column: usize,
-    },
+    #[error(transparent)]
+    InvalidOption(#[from] InvalidOption),
+    /// The failure of a user's own stage, such as a calibration.
+    #[error(transparent)]
+    Custom(CustomError),
 }
 
-impl Requirement {
-    fn text(self) -> &'static str {
-        match self {
-            Self::Positive => "a finite number above zero",
-            Self::NonNegative => "a finite number that is not negative",
-            Self::OpenUnitInterval => "a number above zero and below one",
-            Self::UnitInterval => "a number from zero to one",
-            Self::Finite => "a finite number",
-            Self::Odd => "an odd whole number",
-            Self::AtLeastOne => "a whole number of at least one",
-        }
-    }
-
-    /// The value, if it satisfies the rule.
-    pub(crate) fn check(self, name: &'static str, value: f64) -> Result<f64, ForceError> {
-        let holds = match self {
-            Self::Positive => value > 0.0 && value.is_finite(),
-            Self::NonNegative => value >= 0.0 && value.is_finite(),
-            Self::OpenUnitInterval => value > 0.0 && value < 1.0,
-            Self::UnitInterval => (0.0..=1.0).contains(&value),
-            Self::Finite => value.is_finite(),
-            Self::Odd => value >= 1.0 && value % 2.0 == 1.0,
-            Self::AtLeastOne => value >= 1.0 && value.is_finite(),
-        };
-        if holds {
-            Ok(value)
-        } else {
-            Err(ForceError::InvalidOption {
-                name,
-                found: value,
-                expected: self.text(),
-            })
-        }
+impl ForceError {
+    /// The failure of a user's own stage: an error, or a message.
+    ///
+    /// ```
+    /// use tactile_force::ForceError;
+    /// let error = ForceError::custom("the gauge is not connected");
+    /// assert_eq!(error.to_string(), "the gauge is not connected");
+    /// ```
+    pub fn custom(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Custom(CustomError::new(error))
     }
 }

@@ -9,6 +9,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `frame` | the pass over a frame, the reference, the noise of both, vignetting |
+//! | `face` | area and shape of flat faces, stretch of their texture |
 //! | `drift` | drift of illumination and stray light since the reference was taken |
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
@@ -17,7 +18,6 @@
 //! | `pressure` | the local curve f of (5), fitted from frames |
 //! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
-//! | `image` | moments of float images, blobs averaged over pixels |
 //! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |
 //!
 //! # Equations
@@ -36,11 +36,10 @@ mod calibration;
 mod contact;
 mod drift;
 mod error;
-mod estimate;
+mod face;
 mod frame;
 mod health;
 mod hertz;
-mod image;
 mod lens;
 mod measure;
 mod pressure;
@@ -49,26 +48,24 @@ mod simd;
 
 pub use calibration::{
     Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, GreyHistogram,
-    Hysteresis, LinearCalibration, LocalCalibration, MonotoneCalibration, PolynomialCalibration,
-    Robustness, StopReason, StressCalibration,
+    Hysteresis, LinearCalibration, LocalCalibration, Robustness, StressCalibration,
 };
-pub use contact::{
-    Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace, Polarity,
+pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
+pub use drift::{
+    DriftCorrection, DriftOutcome, IlluminationDrift, background_shift, median_shift_outside,
 };
-pub use drift::{DriftCorrection, DriftOutcome, IlluminationDrift};
 pub use error::ForceError;
-pub use estimate::{Estimate, Real};
-pub use frame::{
-    BoundingBox, DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame,
-};
+pub use face::{FaceReading, FaceWorkspace, ShapeProblem, TextureStretch, texture_spots};
+pub use frame::{DifferenceNoise, FlatField, FrameStatistics, NoiseModel, ReferenceFrame};
 pub use health::{
     ChartState, FrameCondition, HealthMonitor, HealthOptions, HealthReport, StuckPixels,
 };
 pub use hertz::{HertzFit, HertzFitOptions, ProfileShape};
-pub use image::{GaussianProfile, HertzProfile, ImageMoments, PixelGrid, ProfileMoments};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
 pub use pressure::{
     CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
 };
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
+pub use tactile_core::{BoundingBox, CustomError, Estimate, InvalidOption, Polarity, StopReason};
+pub use {nalgebra, ndarray};

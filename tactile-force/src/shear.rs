@@ -1,7 +1,7 @@
 //! Shear from the step of the centroid: F_x = K_x u_x, F_y = K_y u_y (equations (9)–(12)).
 
 use crate::error::ForceError;
-use crate::estimate::{Estimate, Real};
+use tactile_core::Estimate;
 
 /// One measurement for the shear calibration: how far the centroid went under a known shear force.
 ///
@@ -13,11 +13,11 @@ use crate::estimate::{Estimate, Real};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ShearPair<T> {
+pub struct ShearPair {
     /// Step [x, y] of the centroid, in metres.
-    pub centroid_step_m: [T; 2],
+    pub centroid_step_m: [f64; 2],
     /// Shear force [x, y], in newtons.
-    pub force_n: [T; 2],
+    pub force_n: [f64; 2],
 }
 
 /// The stiffnesses K_x and K_y, in newtons per metre.
@@ -29,35 +29,35 @@ pub struct ShearPair<T> {
 /// let pairs: Vec<_> = [1e-5, 2e-5, 5e-5]
 ///     .map(|u| ShearPair { centroid_step_m: [u, -u], force_n: [2e3 * u, -3e3 * u] })
 ///     .to_vec();
-/// let calibration = ShearCalibration::<f64>::fit(&pairs)?;
+/// let calibration = ShearCalibration::fit(&pairs)?;
 /// assert!((calibration.stiffness_n_per_m[1].value - 3e3).abs() < 1e-9);
-/// let step = Estimate { value: 1e-5_f64, standard_error: 1e-7 };
+/// let step = Estimate::new(1e-5_f64, 1e-7);
 /// let [x, _] = calibration.force_n([step, step]);
 /// assert!((x.value - 0.02).abs() < 1e-12 && (x.standard_error - 2e-4).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ShearCalibration<T> {
+pub struct ShearCalibration {
     /// [K_x, K_y] in newtons per metre.
-    pub stiffness_n_per_m: [Estimate<T>; 2],
+    pub stiffness_n_per_m: [Estimate; 2],
     /// Standard deviation of the residuals along each axis, in newtons.
-    pub residual_sd_n: [T; 2],
+    pub residual_sd_n: [f64; 2],
 }
 
-impl<T: Real> ShearCalibration<T> {
+impl ShearCalibration {
     /// Least squares through the origin, each axis on its own: K = Σ u F / Σ u².
     ///
     /// # Errors
     /// Fewer than two pairs, a pair that is not finite, or an axis along which nothing moved.
-    pub fn fit(pairs: &[ShearPair<T>]) -> Result<Self, ForceError> {
+    pub fn fit(pairs: &[ShearPair]) -> Result<Self, ForceError> {
         if pairs.len() < 2 {
             return Err(ForceError::TooFewPairs {
                 required: 2,
                 found: pairs.len(),
             });
         }
-        let finite = |p: &ShearPair<T>| {
+        let finite = |p: &ShearPair| {
             p.centroid_step_m
                 .iter()
                 .chain(&p.force_n)
@@ -67,22 +67,22 @@ impl<T: Real> ShearCalibration<T> {
             return Err(ForceError::NonFinitePair { index });
         }
         let [x, y] = [Spring::fit(pairs, 0)?, Spring::fit(pairs, 1)?];
-        let stiffness = |s: &Spring| Estimate::nearest(s.stiffness, s.variance);
+        let stiffness = |s: &Spring| Estimate::from_variance(s.stiffness, s.variance);
         Ok(Self {
             stiffness_n_per_m: [stiffness(&x), stiffness(&y)],
-            residual_sd_n: [T::nearest(x.residual_sd), T::nearest(y.residual_sd)],
+            residual_sd_n: [x.residual_sd, y.residual_sd],
         })
     }
 
     /// Shear force [x, y] of a centroid step, in newtons.
-    pub fn force_n(&self, centroid_step_m: [Estimate<T>; 2]) -> [Estimate<T>; 2] {
+    pub fn force_n(&self, centroid_step_m: [Estimate; 2]) -> [Estimate; 2] {
         std::array::from_fn(|k| {
             let (stiffness, step) = (self.stiffness_n_per_m[k], centroid_step_m[k]);
-            Estimate {
-                value: stiffness.value * step.value,
-                standard_error: (stiffness.value * step.standard_error)
+            Estimate::new(
+                stiffness.value * step.value,
+                (stiffness.value * step.standard_error)
                     .hypot(stiffness.standard_error * step.value),
-            }
+            )
         })
     }
 }
@@ -96,9 +96,9 @@ struct Spring {
 }
 
 impl Spring {
-    fn fit<T: Real>(pairs: &[ShearPair<T>], axis: usize) -> Result<Self, ForceError> {
-        let step = |p: &ShearPair<T>| p.centroid_step_m[axis].as_f64();
-        let force = |p: &ShearPair<T>| p.force_n[axis].as_f64();
+    fn fit(pairs: &[ShearPair], axis: usize) -> Result<Self, ForceError> {
+        let step = |p: &ShearPair| p.centroid_step_m[axis];
+        let force = |p: &ShearPair| p.force_n[axis];
         let (mut uu, mut uf) = (0.0, 0.0);
         for p in pairs {
             uu += step(p) * step(p);
@@ -126,23 +126,23 @@ impl Spring {
 /// ```
 /// use tactile_force::{Estimate, ShearMeasurement};
 ///
-/// let along = |measured: &ShearMeasurement<f64>| {
+/// let along = |measured: &ShearMeasurement| {
 ///     let [x, y] = measured.force_n.map(|f| f.value);
 ///     x.hypot(y)
 /// };
 /// let at_rest = [Estimate::default(); 2];
-/// let pulled = ShearMeasurement { displacement_m: at_rest, step_m: at_rest, force_n: [0.3, 0.4].map(|value| Estimate { value, standard_error: 0.01 }) };
+/// let pulled = ShearMeasurement { displacement_m: at_rest, step_m: at_rest, force_n: [0.3, 0.4].map(|value| Estimate::new(value, 0.01)) };
 /// assert_eq!(along(&pulled), 0.5);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ShearMeasurement<T> {
+pub struct ShearMeasurement {
     /// Centroid now minus centroid when contact began, [x, y] in metres.
-    pub displacement_m: [Estimate<T>; 2],
+    pub displacement_m: [Estimate; 2],
     /// Centroid now minus centroid of the frame before, [x, y] in metres: u of equations (9) and (10).
-    pub step_m: [Estimate<T>; 2],
+    pub step_m: [Estimate; 2],
     /// Shear force since contact began, [x, y] in newtons, equations (11) and (12).
-    pub force_n: [Estimate<T>; 2],
+    pub force_n: [Estimate; 2],
 }
 
 /// Follows the centroid from frame to frame.
@@ -172,15 +172,15 @@ pub struct ShearMeasurement<T> {
 /// # Ok::<(), ForceError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct ShearTracker<T> {
-    calibration: ShearCalibration<T>,
-    first: Option<[Estimate<T>; 2]>,
-    last: Option<[Estimate<T>; 2]>,
+pub struct ShearTracker {
+    calibration: ShearCalibration,
+    first: Option<[Estimate; 2]>,
+    last: Option<[Estimate; 2]>,
 }
 
-impl<T: Real> ShearTracker<T> {
+impl ShearTracker {
     /// A tracker that waits for contact.
-    pub fn new(calibration: ShearCalibration<T>) -> Self {
+    pub fn new(calibration: ShearCalibration) -> Self {
         Self {
             calibration,
             first: None,
@@ -190,7 +190,7 @@ impl<T: Real> ShearTracker<T> {
 
     /// Takes the centroid [x, y] of the next frame in metres, however it was measured; `None` without contact. The first frame
     /// of a contact has zero shear by definition; after a frame without contact the next contact starts anew.
-    pub fn update(&mut self, centroid_m: Option<[Estimate<T>; 2]>) -> Option<ShearMeasurement<T>> {
+    pub fn update(&mut self, centroid_m: Option<[Estimate; 2]>) -> Option<ShearMeasurement> {
         let Some(now) = centroid_m else {
             (self.first, self.last) = (None, None);
             return None;
@@ -208,9 +208,11 @@ impl<T: Real> ShearTracker<T> {
     }
 }
 
-fn difference<T: Real>(to: [Estimate<T>; 2], from: [Estimate<T>; 2]) -> [Estimate<T>; 2] {
-    std::array::from_fn(|k| Estimate {
-        value: to[k].value - from[k].value,
-        standard_error: to[k].standard_error.hypot(from[k].standard_error),
+fn difference(to: [Estimate; 2], from: [Estimate; 2]) -> [Estimate; 2] {
+    std::array::from_fn(|k| {
+        Estimate::new(
+            to[k].value - from[k].value,
+            to[k].standard_error.hypot(from[k].standard_error),
+        )
     })
 }

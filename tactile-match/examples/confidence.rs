@@ -197,7 +197,7 @@ fn add<const D: usize>(
     Ok(())
 }
 
-fn count_within<const D: usize>(scene: &Scene<D>, found: &Matching<f64, D>, tally: &mut Tally) {
+fn count_within<const D: usize>(scene: &Scene<D>, found: &Matching<D>, tally: &mut Tally) {
     for &i in &scene.order {
         for k in 0..D {
             let deviation = found.displacement_covariance[i][(k, k)].sqrt();

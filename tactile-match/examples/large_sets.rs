@@ -89,7 +89,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .count();
     let width = 3.0 * noise.max(1e-3);
     let within = found
-        .warped::<f64>()
+        .warped()
         .zip(&truth)
         .filter(|(w, t)| (w - *t).norm() < width)
         .count();

@@ -4,7 +4,6 @@ use crate::hard::{self, Distances};
 use crate::validate::{point_sets, valid_distance};
 use crate::{MatchError, Matching, PointMatcher, linear_assignment};
 use nalgebra::Point;
-use tactile_tps::Scalar;
 
 /// Pairs the sets so that the sum of squared distances is least, by [`linear_assignment`].
 ///
@@ -47,12 +46,12 @@ impl LinearAssignment {
     }
 }
 
-impl<T: Scalar, const D: usize> PointMatcher<T, D> for LinearAssignment {
+impl<const D: usize> PointMatcher<D> for LinearAssignment {
     fn match_points(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         let distances = Distances::new(model, target);
         let limit = distances.limit(self.max_distance);

@@ -1,6 +1,7 @@
 //! The crate's one error type.
 
-use thiserror::Error;
+use std::error::Error;
+use tactile_core::CustomError;
 
 /// Why a match could not be attempted. Not converging is no error: see [`StopReason`](crate::StopReason).
 ///
@@ -15,7 +16,7 @@ use thiserror::Error;
 /// let error = NearestNeighbour::within(-1.0).unwrap_err();
 /// assert_eq!(error.to_string(), "option max_distance = -1 is outside (0, ∞)");
 /// ```
-#[derive(Clone, Debug, PartialEq, Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
     /// A point set has no points.
@@ -76,6 +77,16 @@ pub enum MatchError {
         /// The landmark's row.
         row: usize,
     },
+    /// A pair has a row that its set does not have, or a row that an earlier pair has.
+    #[error("pair {pair} has row {row} of the {set}, which does not exist or is taken")]
+    PairRow {
+        /// Index of the pair.
+        pair: usize,
+        /// The set, "model" or "target".
+        set: &'static str,
+        /// The row in that set.
+        row: usize,
+    },
     /// The standard deviation of a target is not positive and finite.
     #[error("the standard deviation of target {row} is {value}, not positive and finite")]
     TargetDeviation {
@@ -84,4 +95,19 @@ pub enum MatchError {
         /// The value found.
         value: f64,
     },
+    /// The failure of a matcher of the user's own.
+    #[error(transparent)]
+    Custom(CustomError),
+}
+
+impl MatchError {
+    /// The failure of a matcher of your own.
+    ///
+    /// ```
+    /// use tactile_match::MatchError;
+    /// assert_eq!(MatchError::custom("no descriptors").to_string(), "no descriptors");
+    /// ```
+    pub fn custom(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::Custom(CustomError::new(error))
+    }
 }

@@ -1,7 +1,7 @@
 //! A frame to work in: centre and size taken out, so that no parameter depends on the units of the points and no square
 //! under- or overflows.
 
-use nalgebra::{Point, RealField, SVector};
+use nalgebra::{Point, SVector};
 
 /// `x ↦ (x − centre) / scale`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,13 +20,13 @@ impl<const D: usize> Default for Frame<D> {
 }
 
 /// The point in double precision.
-pub(crate) fn widened<T: RealField + Copy, const D: usize>(point: &Point<T, D>) -> SVector<f64, D> {
-    point.coords.map(|c| nalgebra::convert_unchecked(c))
+pub(crate) fn widened<const D: usize>(point: &Point<f64, D>) -> SVector<f64, D> {
+    point.coords.map(|c| c)
 }
 
 impl<const D: usize> Frame<D> {
     /// Centre and root mean square radius of a set; scale one where all points coincide.
-    pub(crate) fn of<T: RealField + Copy>(points: &[Point<T, D>]) -> Self {
+    pub(crate) fn of(points: &[Point<f64, D>]) -> Self {
         let (centre, radius) = centre_and_radius(points);
         Self {
             centre,
@@ -35,10 +35,7 @@ impl<const D: usize> Frame<D> {
     }
 
     /// The model's centre and the largest distance from it along an axis in either set: for sets compared as they lie.
-    pub(crate) fn of_both<T: RealField + Copy>(
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Self {
+    pub(crate) fn of_both(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let centre = Self::of(model).centre;
         let largest = model
             .iter()
@@ -52,16 +49,12 @@ impl<const D: usize> Frame<D> {
     }
 
     /// A point in this frame.
-    pub(crate) fn inside<T: RealField + Copy>(&self, point: &Point<T, D>) -> SVector<f64, D> {
+    pub(crate) fn inside(&self, point: &Point<f64, D>) -> SVector<f64, D> {
         (widened(point) - self.centre) / self.scale
     }
 
     /// All points in this frame.
-    pub(crate) fn enter<T: RealField + Copy>(
-        &self,
-        points: &[Point<T, D>],
-        columns: &mut [Vec<f64>; D],
-    ) {
+    pub(crate) fn enter(&self, points: &[Point<f64, D>], columns: &mut [Vec<f64>; D]) {
         columns.iter_mut().for_each(Vec::clear);
         for point in points {
             columns
@@ -72,14 +65,14 @@ impl<const D: usize> Frame<D> {
     }
 
     /// A point of this frame in the units of the caller.
-    pub(crate) fn leave<T: RealField + Copy>(&self, inside: SVector<f64, D>) -> Point<T, D> {
-        Point::from((inside * self.scale + self.centre).map(nalgebra::convert))
+    pub(crate) fn leave(&self, inside: SVector<f64, D>) -> Point<f64, D> {
+        Point::from(inside * self.scale + self.centre)
     }
 }
 
 /// Centroid of a set and its root mean square radius, zero where all points coincide.
-pub(crate) fn centre_and_radius<T: RealField + Copy, const D: usize>(
-    points: &[Point<T, D>],
+pub(crate) fn centre_and_radius<const D: usize>(
+    points: &[Point<f64, D>],
 ) -> (SVector<f64, D>, f64) {
     let n = points.len() as f64;
     let origin = widened(&points[0]); // sums of differences keep the digits of sets far from the origin

@@ -3,9 +3,7 @@
 use crate::frame::Frame;
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{DMatrix, Point, SMatrix, SVector};
-use tactile_tps::{
-    Affine, Factorization, FitOptions, NegR, R2LogR, Scalar, Smoothing, TpsError, Warp,
-};
+use tactile_tps::{Affine, Factorization, FitOptions, NegR, R2LogR, Smoothing, TpsError, Warp};
 
 /// Soft matches below this weight are left out.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -20,10 +18,10 @@ pub(crate) struct Distances<const D: usize> {
 }
 
 impl<const D: usize> Distances<D> {
-    pub(crate) fn new<T: Scalar>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
+    pub(crate) fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let frame = Frame::of_both(model, target);
         let inside =
-            |points: &[Point<T, D>]| points.iter().map(|p| frame.inside(p)).collect::<Vec<_>>();
+            |points: &[Point<f64, D>]| points.iter().map(|p| frame.inside(p)).collect::<Vec<_>>();
         let (model, target) = (inside(model), inside(target));
         let squared = DMatrix::from_fn(model.len(), target.len(), |i, j| {
             (model[i] - target[j]).norm_squared()
@@ -75,12 +73,12 @@ impl<const D: usize> Distances<D> {
 
 /// The result for these pairs: the warp interpolates them, confidences and covariances come from how the displacements are
 /// distributed.
-pub(crate) fn matching<T: Scalar, const D: usize>(
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
+pub(crate) fn matching<const D: usize>(
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
     distances: &Distances<D>,
     assignment: Vec<Option<usize>>,
-) -> Matching<T, D> {
+) -> Matching<D> {
     let pairs: Vec<(usize, usize)> = assignment
         .iter()
         .enumerate()
@@ -92,13 +90,13 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
         (SoftMatches::default(), Vec::new(), Vec::new());
     for (i, partner) in assignment.iter().enumerate() {
         let p = distances.posterior(i, variance);
-        confidence.push(partner.map_or_else(T::zero, |j| nalgebra::convert(p[j])));
-        covariance.push(distances.spread(&p).map(nalgebra::convert));
+        confidence.push(partner.map_or(0.0, |j| p[j]));
+        covariance.push(distances.spread(&p));
         let kept = p
             .iter()
             .enumerate()
             .filter(|(_, p)| partner.is_some() && **p > NEGLIGIBLE);
-        soft.push_row(kept.map(|(j, &p)| (j, nalgebra::convert::<f64, T>(p))));
+        soft.push_row(kept.map(|(j, &p)| (j, p)));
     }
     let sources: Vec<_> = pairs.iter().map(|&(i, _)| model[i]).collect();
     let images: Vec<_> = pairs.iter().map(|&(_, j)| target[j]).collect();
@@ -106,8 +104,8 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
     let residual = pairs
         .iter()
         .map(|&(i, j)| (warped[i] - target[j]).norm_squared())
-        .fold(T::zero(), |s, r| s + r);
-    let count: T = nalgebra::convert(pairs.len().max(1) as f64);
+        .fold(0.0, |s, r| s + r);
+    let count: f64 = pairs.len().max(1) as f64;
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
     let scale = distances.frame.scale;
     Matching {
@@ -119,25 +117,25 @@ pub(crate) fn matching<T: Scalar, const D: usize>(
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
-        energy: vec![nalgebra::convert(total * scale * scale)],
+        energy: vec![(total * scale * scale)],
         report: MatchReport {
             stop: StopReason::Converged,
             iterations: 1,
             starts: 1,
             residual: (residual / count).sqrt(),
-            sigma: T::zero(),
+            sigma: 0.0,
             doubt: None,
         },
     }
 }
 
 /// The spline through these pairs and where it takes the model; where that is beyond all numbers, the affine map, or none.
-fn through<T: Scalar, const D: usize>(
-    model: &[Point<T, D>],
-    sources: &[Point<T, D>],
-    images: &[Point<T, D>],
-) -> (Box<dyn Warp<T, D> + Send + Sync>, Vec<Point<T, D>>) {
-    let finite = |warp: &dyn Warp<T, D>| {
+fn through<const D: usize>(
+    model: &[Point<f64, D>],
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
+) -> (Box<dyn Warp<f64, D> + Send + Sync>, Vec<Point<f64, D>>) {
+    let finite = |warp: &dyn Warp<f64, D>| {
         let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
         warped
             .iter()
@@ -157,31 +155,31 @@ fn through<T: Scalar, const D: usize>(
 
 /// The factorised thin-plate system of some sources: `r² ln r²` in the plane, `−r` in space.
 #[derive(Clone, Debug)]
-enum System<T: Scalar, const D: usize> {
-    Plane(Box<Factorization<T, D, R2LogR>>),
-    Space(Box<Factorization<T, D, NegR>>),
+enum System<const D: usize> {
+    Plane(Box<Factorization<f64, D, R2LogR>>),
+    Space(Box<Factorization<f64, D, NegR>>),
 }
 
 /// Interpolation between one set of sources and any images of them: factorised once.
 #[derive(Clone, Debug)]
-pub(crate) struct Interpolation<T: Scalar, const D: usize> {
+pub(crate) struct Interpolation<const D: usize> {
     /// None where the sources determine no spline.
-    system: Option<System<T, D>>,
-    weights: Option<Vec<T>>,
-    smoothing: Smoothing<T>,
+    system: Option<System<D>>,
+    weights: Option<Vec<f64>>,
+    smoothing: Smoothing<f64>,
 }
 
-impl<T: Scalar, const D: usize> Interpolation<T, D> {
+impl<const D: usize> Interpolation<D> {
     pub(crate) fn new(
-        sources: &[Point<T, D>],
-        weights: Option<Vec<T>>,
-        smoothing: Smoothing<T>,
+        sources: &[Point<f64, D>],
+        weights: Option<Vec<f64>>,
+        smoothing: Smoothing<f64>,
     ) -> Self {
-        fn options<T: Scalar, K>(
+        fn options<K>(
             kernel: K,
-            smoothing: Smoothing<T>,
-            weights: &Option<Vec<T>>,
-        ) -> Result<FitOptions<T, K>, TpsError> {
+            smoothing: Smoothing<f64>,
+            weights: &Option<Vec<f64>>,
+        ) -> Result<FitOptions<f64, K>, TpsError> {
             let options = FitOptions::new(kernel).with_smoothing(smoothing)?;
             match weights {
                 Some(weights) => options.with_weights(weights.clone()),
@@ -207,10 +205,10 @@ impl<T: Scalar, const D: usize> Interpolation<T, D> {
     /// The spline through these pairs; an affine map where they determine none, the identity where there are none.
     pub(crate) fn through(
         &self,
-        sources: &[Point<T, D>],
-        images: &[Point<T, D>],
-    ) -> Box<dyn Warp<T, D> + Send + Sync> {
-        let spline: Option<Box<dyn Warp<T, D> + Send + Sync>> = match &self.system {
+        sources: &[Point<f64, D>],
+        images: &[Point<f64, D>],
+    ) -> Box<dyn Warp<f64, D> + Send + Sync> {
+        let spline: Option<Box<dyn Warp<f64, D> + Send + Sync>> = match &self.system {
             Some(System::Plane(plane)) => {
                 plane.fit(images).ok().map(|spline| Box::new(spline) as _)
             }
@@ -229,29 +227,47 @@ impl<T: Scalar, const D: usize> Interpolation<T, D> {
     }
 }
 
+/// The warp of weighted pairs: a spline smoothed by cross-validation, an affine map for few of them, a rigid motion
+/// for fewer, the identity for none.
+pub(crate) fn fitted<const D: usize>(
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
+    weights: Vec<f64>,
+) -> Box<dyn Warp<f64, D> + Send + Sync> {
+    if sources.len() >= 3 * (D + 1) {
+        return spline(sources, images, Some(weights), Smoothing::Gcv);
+    }
+    let fit = if sources.len() > D {
+        Affine::fit
+    } else {
+        Affine::fit_rigid
+    };
+    Box::new(fit(sources, images, Some(&weights)).unwrap_or_default())
+}
+
 /// The thin-plate spline through these pairs; see [`Interpolation`].
-pub(crate) fn spline<T: Scalar, const D: usize>(
-    sources: &[Point<T, D>],
-    images: &[Point<T, D>],
-    weights: Option<Vec<T>>,
-    smoothing: Smoothing<T>,
-) -> Box<dyn Warp<T, D> + Send + Sync> {
+pub(crate) fn spline<const D: usize>(
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
+    weights: Option<Vec<f64>>,
+    smoothing: Smoothing<f64>,
+) -> Box<dyn Warp<f64, D> + Send + Sync> {
     Interpolation::new(sources, weights, smoothing).through(sources, images)
 }
 
 /// Whether the spline is any good: where sources nearly coincide and their images do not, no digit is left in it.
-fn follows<T: Scalar, const D: usize>(
-    spline: &(dyn Warp<T, D> + Send + Sync),
-    sources: &[Point<T, D>],
-    images: &[Point<T, D>],
+fn follows<const D: usize>(
+    spline: &(dyn Warp<f64, D> + Send + Sync),
+    sources: &[Point<f64, D>],
+    images: &[Point<f64, D>],
     exact: bool,
 ) -> bool {
-    let size = images.iter().fold(T::zero(), |m, p| m.max(p.coords.amax()));
+    let size = images.iter().fold(0.0_f64, |m, p| m.max(p.coords.amax()));
     // All at once: a spline samples points several at a time.
     let mut found = sources.to_vec();
     spline.apply_into(sources, &mut found).is_ok()
         && found.iter().zip(images).all(|(found, image)| {
             let miss = (found - image).amax();
-            miss.is_finite() && (!exact || miss <= size * nalgebra::convert(1e-3))
+            miss.is_finite() && (!exact || miss <= size * (1e-3))
         })
 }

@@ -10,26 +10,22 @@ use crate::{
 use nalgebra::Point;
 
 type Once<M, const D: usize> =
-    fn(&M, &[Point<f64, D>], &[Point<f64, D>]) -> Result<Matching<f64, D>, MatchError>;
-type Next<M, const D: usize> = fn(
-    &M,
-    &mut WarmStart,
-    &[Point<f64, D>],
-    &[Point<f64, D>],
-) -> Result<Matching<f64, D>, MatchError>;
+    fn(&M, &[Point<f64, D>], &[Point<f64, D>]) -> Result<Matching<D>, MatchError>;
+type Next<M, const D: usize> =
+    fn(&M, &mut WarmStart, &[Point<f64, D>], &[Point<f64, D>]) -> Result<Matching<D>, MatchError>;
 
 type NextPairs<M, const D: usize> = fn(
     &M,
     &mut WarmStart,
     &[Point<f64, D>],
     &[Point<f64, D>],
-    &mut MatchedPairs<f64>,
+    &mut MatchedPairs,
 ) -> Result<(), MatchError>;
 
 /// A matcher's ways to match.
 type Ways<M, const D: usize> = (Once<M, D>, Next<M, D>, NextPairs<M, D>);
 
-const fn ways<M: PointMatcher<f64, D>, const D: usize>() -> Ways<M, D> {
+const fn ways<M: PointMatcher<D>, const D: usize>() -> Ways<M, D> {
     (M::match_points, M::match_next, M::match_next_pairs)
 }
 

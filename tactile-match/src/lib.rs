@@ -52,9 +52,8 @@ pub use assignment_matcher::LinearAssignment;
 pub use cpd::{CoherentPointDrift, DriftWorkspace, Motion, Normalization};
 pub use error::MatchError;
 pub use labelling::RelaxationLabelling;
-pub use matching::{
-    Doubt, MatchReport, MatchedPairs, Matching, PointMatcher, StopReason, unmatched_rows,
-};
+pub use matching::{Doubt, MatchReport, MatchedPairs, Matching, PointMatcher, unmatched_rows};
+pub use nalgebra;
 pub use nearest::NearestNeighbour;
 pub use shape_context::ShapeContexts;
 pub use soft::SoftMatches;
@@ -62,4 +61,5 @@ pub use softassign::{
     AnnealedSoftassign, Landmark, Outliers, Rotation, Search, SoftassignMatch, SoftassignWorkspace,
     Transformation,
 };
+pub use tactile_core::{CustomError, StopReason};
 pub use warm_start::WarmStart;

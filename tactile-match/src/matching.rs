@@ -1,21 +1,22 @@
 //! What every matcher takes and returns: [`PointMatcher`], [`Matching`] and its [`MatchReport`].
 
-use crate::{MatchError, SoftMatches, WarmStart};
+use crate::validate::{option_within, point_sets};
+use crate::{MatchError, SoftMatches, WarmStart, hard};
 use nalgebra::{Point, SMatrix};
-use std::sync::Arc;
-use tactile_tps::{Scalar, Warp};
+use tactile_core::StopReason;
+use tactile_tps::Warp;
 
 /// Finds which model point is which target point, and the warp that takes the model onto the target.
 ///
 /// Object safe, so that a user picks the method at run time:
-/// `let matcher: Box<dyn PointMatcher<f64, 2>> = …`.
+/// `let matcher: Box<dyn PointMatcher<2>> = …`.
 ///
 /// ```
 /// use nalgebra::Point2;
 /// use tactile_match::{CoherentPointDrift, NearestNeighbour, PointMatcher, AnnealedSoftassign};
 /// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
 /// let target = model.map(|p| Point2::new(p.x + 0.05 * p.y, p.y));
-/// let matchers: [Box<dyn PointMatcher<f64, 2>>; 3] = [
+/// let matchers: [Box<dyn PointMatcher<2>>; 3] = [
 ///     Box::new(NearestNeighbour::default()),
 ///     Box::new(CoherentPointDrift::default()),
 ///     Box::new(AnnealedSoftassign::default()),
@@ -26,16 +27,16 @@ use tactile_tps::{Scalar, Warp};
 /// }
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-pub trait PointMatcher<T: Scalar, const D: usize> {
+pub trait PointMatcher<const D: usize> {
     /// Matches `model` (I points) to `target` (J points); I and J may differ and either may be 1.
     ///
     /// # Errors
     /// [`MatchError`] for empty sets, coordinates that are not finite and options out of range.
     fn match_points(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError>;
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError>;
 
     /// As [`match_points`](Self::match_points), for the next target of a series: a matcher may begin where its last match of the same
     /// model ended, with what it keeps in `warm` ([`WarmStart`]). By default the match is made anew.
@@ -57,9 +58,9 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
     fn match_next(
         &self,
         warm: &mut WarmStart,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         let _ = warm;
         self.match_points(model, target)
     }
@@ -85,9 +86,9 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
     fn match_next_pairs(
         &self,
         warm: &mut WarmStart,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-        pairs: &mut MatchedPairs<T>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        pairs: &mut MatchedPairs,
     ) -> Result<(), MatchError> {
         let found = self.match_next(warm, model, target)?;
         (pairs.assignment, pairs.confidence, pairs.report) =
@@ -108,89 +109,44 @@ pub trait PointMatcher<T: Scalar, const D: usize> {
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct MatchedPairs<T> {
+#[non_exhaustive]
+pub struct MatchedPairs {
     /// Target row of every model point.
     pub assignment: Vec<Option<usize>>,
     /// As [`Matching::confidence`].
-    pub confidence: Vec<T>,
+    pub confidence: Vec<f64>,
     /// How it went.
-    pub report: MatchReport<T>,
+    pub report: MatchReport,
 }
 
-/// Passes the calls on to what a pointer points to, so that a boxed or shared matcher is a matcher.
-macro_rules! matcher_behind {
-    ($pointer:ident) => {
-        impl<T: Scalar, const D: usize, M: PointMatcher<T, D> + ?Sized> PointMatcher<T, D>
-            for $pointer<M>
-        {
-            fn match_points(
-                &self,
-                model: &[Point<T, D>],
-                target: &[Point<T, D>],
-            ) -> Result<Matching<T, D>, MatchError> {
-                (**self).match_points(model, target)
-            }
+/// A matcher chosen at run time is a matcher.
+impl<const D: usize, M: PointMatcher<D> + ?Sized> PointMatcher<D> for Box<M> {
+    fn match_points(
+        &self,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        (**self).match_points(model, target)
+    }
 
-            fn match_next(
-                &self,
-                warm: &mut WarmStart,
-                model: &[Point<T, D>],
-                target: &[Point<T, D>],
-            ) -> Result<Matching<T, D>, MatchError> {
-                (**self).match_next(warm, model, target)
-            }
+    fn match_next(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        (**self).match_next(warm, model, target)
+    }
 
-            fn match_next_pairs(
-                &self,
-                warm: &mut WarmStart,
-                model: &[Point<T, D>],
-                target: &[Point<T, D>],
-                pairs: &mut MatchedPairs<T>,
-            ) -> Result<(), MatchError> {
-                (**self).match_next_pairs(warm, model, target, pairs)
-            }
-        }
-    };
-}
-
-matcher_behind!(Box);
-matcher_behind!(Arc);
-
-/// Why a matcher stopped.
-///
-/// ```
-/// use nalgebra::Point2;
-/// use std::ops::ControlFlow;
-/// use tactile_match::{AnnealedSoftassign, SoftassignWorkspace, StopReason};
-/// let model = [[0.0, 0.0], [1.0, 0.1], [0.2, 1.0], [1.1, 1.2], [0.5, 0.4], [1.8, 0.3]].map(Point2::from);
-/// let target = model.map(|p| Point2::new(1.1 * p.x + 0.1 * p.y, p.y));
-/// let (matcher, mut workspace) = (AnnealedSoftassign::default(), SoftassignWorkspace::default());
-/// let found = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
-/// assert_eq!(found.report.stop, StopReason::Exact); // no noise: every pair fits to rounding
-/// let cut = matcher.match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Break(()))?;
-/// assert_eq!(cut.report.stop, StopReason::Callback);
-/// # Ok::<(), tactile_match::MatchError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum StopReason {
-    /// The warp and the assignment stand still.
-    #[default]
-    Converged,
-    /// The temperature fell to its floor, a thousandth of the model's radius, with nearly all points matched: what noise there is cannot
-    /// be told from none.
-    Exact,
-    /// The iteration limit was reached.
-    IterationLimit,
-    /// The caller's callback asked to stop.
-    Callback,
-    /// Too few distinct points for more than a rigid or affine answer.
-    Degenerate,
+    fn match_next_pairs(
+        &self,
+        warm: &mut WarmStart,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        pairs: &mut MatchedPairs,
+    ) -> Result<(), MatchError> {
+        (**self).match_next_pairs(warm, model, target, pairs)
+    }
 }
 
 /// Why the pairs of an answer are not to be relied on.
@@ -242,7 +198,8 @@ pub enum Doubt {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct MatchReport<T> {
+#[non_exhaustive]
+pub struct MatchReport {
     /// Why it stopped.
     pub stop: StopReason,
     /// Outer iterations (match, then warp) of the start that won.
@@ -250,9 +207,9 @@ pub struct MatchReport<T> {
     /// Starts that were tried.
     pub starts: usize,
     /// Root mean square distance between warped model points and their partners, in the units of the points.
-    pub residual: T,
+    pub residual: f64,
     /// Estimated standard deviation of the position noise along one axis, in the units of the points.
-    pub sigma: T,
+    pub sigma: f64,
     /// Why the pairs are not to be relied on, where the matcher can tell.
     #[cfg_attr(feature = "serde", serde(default))]
     pub doubt: Option<Doubt>,
@@ -272,30 +229,126 @@ pub struct MatchReport<T> {
 /// assert!((matching.warped[3] - target[3]).norm() < 1e-9 && matching.confidence[3] > 0.99);
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-pub struct Matching<T: Scalar, const D: usize> {
+#[non_exhaustive]
+pub struct Matching<const D: usize> {
     /// The warp; it takes the model points to [`warped`](Self::warped), of a model of four thousand points and more a sample of them.
-    pub warp: Box<dyn Warp<T, D> + Send + Sync>,
+    pub warp: Box<dyn Warp<f64, D> + Send + Sync>,
     /// The warped model points.
-    pub warped: Vec<Point<T, D>>,
+    pub warped: Vec<Point<f64, D>>,
     /// Target row of every model point; `None` for a point without a partner. No target row occurs twice.
     pub assignment: Vec<Option<usize>>,
     /// Probability that the assignment (or the lack of one) of each model point is right, in [0, 1]. Of the default matcher and noisy points:
     /// of all pairs given a confidence c, a share c is right, within some five points above 0.6 and thirteen below, over bent, cropped, turned
     /// and stretched scenes that were not tuned on (`--example confidence`).
-    pub confidence: Vec<T>,
+    pub confidence: Vec<f64>,
     /// The soft matches M the assignment was read from.
-    pub soft: SoftMatches<T>,
+    pub soft: SoftMatches,
     /// Model rows without a partner, ascending.
     pub unmatched_model: Vec<usize>,
     /// Target rows without a partner, ascending.
     pub unmatched_target: Vec<usize>,
     /// Covariance of each model point's position under the warp, in squared units of the points. Of the default matcher it is the posterior
     /// covariance given that the pairs are right: about 68 % of the true positions lie within one standard deviation along an axis.
-    pub displacement_covariance: Vec<SMatrix<T, D, D>>,
+    pub displacement_covariance: Vec<SMatrix<f64, D, D>>,
     /// The matcher's energy after every outer iteration.
-    pub energy: Vec<T>,
+    pub energy: Vec<f64>,
     /// How it went.
-    pub report: MatchReport<T>,
+    pub report: MatchReport,
+}
+
+impl<const D: usize> Matching<D> {
+    /// The match of these pairs, each (model row, target row, confidence in [0, 1]), as a matcher of your own may return it.
+    ///
+    /// The warp is a thin-plate spline smoothed by cross-validation where there are three times as many pairs as
+    /// coefficients of an affine map along an axis, an affine map for fewer, and a rigid motion for D or fewer. Pairs
+    /// weigh as their confidences. The covariance of every warped point is that of the weighted residuals of the pairs.
+    /// Model points without a pair have confidence zero. O(n³) for up to 3000 pairs.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::Matching;
+    /// let model = [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0]].map(Point2::from);
+    /// let target = [[2.1, 0.0], [0.1, 2.0], [0.1, 0.0]].map(Point2::from);
+    /// let found = Matching::from_pairs(&model, &target, &[(0, 2, 1.0), (1, 0, 1.0), (2, 1, 0.9)])?;
+    /// assert_eq!(found.pairs().nth(1), Some((1, 0, 1.0)));
+    /// assert_eq!(found.unmatched_model, [3]);
+    /// assert!((found.warped[3] - Point2::new(2.1, 2.0)).norm() < 1e-12);
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`MatchError`] for empty sets, coordinates that are not finite, rows that do not exist or occur twice, and
+    /// confidences outside [0, 1].
+    pub fn from_pairs(
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        pairs: &[(usize, usize, f64)],
+    ) -> Result<Self, MatchError> {
+        point_sets(model, target)?;
+        let (mut assignment, mut confidence) = (vec![None; model.len()], vec![0.0; model.len()]);
+        let mut taken = vec![false; target.len()];
+        let mut rows = vec![Vec::new(); model.len()];
+        for (pair, &(i, j, probability)) in pairs.iter().enumerate() {
+            let invalid = |set, row| MatchError::PairRow { pair, set, row };
+            if assignment.get(i) != Some(&None) {
+                return Err(invalid("model", i));
+            }
+            if taken.get(j) != Some(&false) {
+                return Err(invalid("target", j));
+            }
+            option_within("confidence", probability, 0.0, 1.0, "[0, 1]")?;
+            (assignment[i], confidence[i], taken[j]) = (Some(j), probability, true);
+            rows[i].push((j, probability));
+        }
+        let sources: Vec<_> = pairs.iter().map(|&(i, _, _)| model[i]).collect();
+        let images: Vec<_> = pairs.iter().map(|&(_, j, _)| target[j]).collect();
+        // A confidence of zero would take the pair out of the fit.
+        let weights: Vec<f64> = pairs.iter().map(|&(_, _, c)| c.max(1e-3)).collect();
+        let warp = hard::fitted(&sources, &images, weights.clone());
+        let warped: Vec<_> = model.iter().map(|p| warp.apply(p)).collect();
+        let residuals = pairs.iter().map(|&(i, j, _)| target[j] - warped[i]);
+        let (mut squares, mut scatter) = (0.0, SMatrix::zeros());
+        for (residual, weight) in residuals.zip(&weights) {
+            squares += residual.norm_squared();
+            scatter += residual * residual.transpose() * *weight;
+        }
+        let covariance = scatter / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let residual = (squares / pairs.len().max(1) as f64).sqrt();
+        let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
+        Ok(Self {
+            warp,
+            warped,
+            assignment,
+            confidence,
+            soft: rows.into_iter().collect(),
+            unmatched_model,
+            unmatched_target,
+            displacement_covariance: vec![covariance; model.len()],
+            energy: Vec::new(),
+            report: MatchReport {
+                stop: StopReason::Direct,
+                starts: 1,
+                residual,
+                sigma: residual / (D as f64).sqrt(),
+                ..MatchReport::default()
+            },
+        })
+    }
+
+    /// The pairs, each (model row, target row, confidence), by rising model row.
+    ///
+    /// ```
+    /// use nalgebra::Point2;
+    /// use tactile_match::{NearestNeighbour, PointMatcher};
+    /// let model = [[0.0, 0.0], [2.0, 0.0]].map(Point2::from);
+    /// let found = NearestNeighbour::default().match_points(&model, &[Point2::new(2.1, 0.0)])?;
+    /// assert!(found.pairs().all(|(i, j, confidence)| (i, j) == (1, 0) && confidence > 0.9));
+    /// # Ok::<(), tactile_match::MatchError>(())
+    /// ```
+    pub fn pairs(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        let rows = self.assignment.iter().zip(&self.confidence).enumerate();
+        rows.filter_map(|(i, (j, &confidence))| Some((i, (*j)?, confidence)))
+    }
 }
 
 /// Rows without a partner on both sides, `(model, target)`, ascending, for `target_len` target points.
@@ -333,6 +386,6 @@ mod tests {
     /// Compiles only while the trait can be made into an object.
     #[test]
     fn matchers_are_objects() {
-        fn _takes(_: &dyn PointMatcher<f64, 3>) {}
+        fn _takes(_: &dyn PointMatcher<3>) {}
     }
 }

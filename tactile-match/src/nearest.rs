@@ -4,7 +4,6 @@ use crate::hard::{self, Distances};
 use crate::validate::{point_sets, valid_distance};
 use crate::{MatchError, Matching, PointMatcher};
 use nalgebra::Point;
-use tactile_tps::Scalar;
 
 /// Gives every model point the target point nearest to it; of several model points that want one target, the nearest has it.
 ///
@@ -35,12 +34,12 @@ impl NearestNeighbour {
     }
 }
 
-impl<T: Scalar, const D: usize> PointMatcher<T, D> for NearestNeighbour {
+impl<const D: usize> PointMatcher<D> for NearestNeighbour {
     fn match_points(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         let distances = Distances::new(model, target);
         let limit = distances.limit(self.max_distance);

@@ -6,19 +6,19 @@
 /// ```
 /// use tactile_match::SoftMatches;
 /// // Model point 0: target 3 or 1, or with probability 0.25 none; model point 1: none.
-/// let soft: SoftMatches<f64> = [vec![(3, 0.5), (1, 0.25)], vec![]].into_iter().collect();
+/// let soft: SoftMatches = [vec![(3, 0.5), (1, 0.25)], vec![]].into_iter().collect();
 /// assert_eq!(soft.rows(), 2);
 /// assert_eq!(1.0 - soft.row(0).map(|(_, p)| p).sum::<f64>(), 0.25);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct SoftMatches<T> {
+pub struct SoftMatches {
     starts: Vec<usize>,
     columns: Vec<usize>,
-    weights: Vec<T>,
+    weights: Vec<f64>,
 }
 
-impl<T> Default for SoftMatches<T> {
+impl Default for SoftMatches {
     fn default() -> Self {
         Self {
             starts: vec![0],
@@ -28,7 +28,7 @@ impl<T> Default for SoftMatches<T> {
     }
 }
 
-impl<T: Copy, R: IntoIterator<Item = (usize, T)>> FromIterator<R> for SoftMatches<T> {
+impl<R: IntoIterator<Item = (usize, f64)>> FromIterator<R> for SoftMatches {
     /// The matrix of these rows, each the target points of one model point with their weights.
     fn from_iter<I: IntoIterator<Item = R>>(rows: I) -> Self {
         let mut soft = Self::default();
@@ -37,9 +37,9 @@ impl<T: Copy, R: IntoIterator<Item = (usize, T)>> FromIterator<R> for SoftMatche
     }
 }
 
-impl<T: Copy> SoftMatches<T> {
+impl SoftMatches {
     /// Appends the row of the next model point.
-    pub(crate) fn push_row(&mut self, row: impl IntoIterator<Item = (usize, T)>) {
+    pub(crate) fn push_row(&mut self, row: impl IntoIterator<Item = (usize, f64)>) {
         for (column, weight) in row {
             self.columns.push(column);
             self.weights.push(weight);
@@ -54,7 +54,7 @@ impl<T: Copy> SoftMatches<T> {
     }
 
     /// The target rows and weights of model point `row`; nothing for a row that does not exist.
-    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, T)> + '_ {
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = match (self.starts.get(row), self.starts.get(row + 1)) {
             (Some(&start), Some(&end)) => start..end,
             _ => 0..0,
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn rows_come_back_as_pushed() {
         let rows = [vec![(3, 0.5), (1, 0.25)], vec![], vec![(0, 1.0)]];
-        let soft: SoftMatches<f64> = rows.into_iter().collect();
+        let soft: SoftMatches = rows.into_iter().collect();
         assert_eq!(soft.rows(), 3);
         assert_eq!(soft.row(0).collect::<Vec<_>>(), [(3, 0.5), (1, 0.25)]);
         assert_eq!(soft.row(1).count(), 0);

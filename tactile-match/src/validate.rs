@@ -2,30 +2,30 @@
 //! large to be squared.
 
 use crate::MatchError;
-use nalgebra::{Point, RealField};
+use nalgebra::Point;
 
 /// Rejects empty sets and coordinates that are NaN, infinite or too large to be squared; `O(I + J)`.
 ///
 /// # Errors
 /// [`MatchError::Empty`] and [`MatchError::NotFinite`].
-pub(crate) fn point_sets<T: RealField + Copy, const D: usize>(
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
+pub(crate) fn point_sets<const D: usize>(
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
 ) -> Result<(), MatchError> {
     point_set("model", model)?;
     point_set("target", target)
 }
 
 /// The same for one set.
-pub(crate) fn point_set<T: RealField + Copy, const D: usize>(
+pub(crate) fn point_set<const D: usize>(
     set: &'static str,
-    points: &[Point<T, D>],
+    points: &[Point<f64, D>],
 ) -> Result<(), MatchError> {
     if points.is_empty() {
         return Err(MatchError::Empty { set });
     }
     // Sixteen: room for differences, and for the sum of their squares.
-    let usable = |c: T| (c * c * nalgebra::convert(16.0)).is_finite();
+    let usable = |c: f64| (c * c * 16.0).is_finite();
     match points.iter().position(|p| p.iter().any(|&c| !usable(c))) {
         Some(row) => Err(MatchError::NotFinite { set, row }),
         None => Ok(()),

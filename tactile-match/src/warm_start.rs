@@ -40,13 +40,13 @@ impl WarmStart {
     /// use tactile_match::{MatchError, Matching, NearestNeighbour, PointMatcher, WarmStart};
     /// /// Nearest neighbours of where the model came to lie last.
     /// struct Follower;
-    /// impl PointMatcher<f64, 2> for Follower {
-    ///     fn match_points(&self, model: &[Point2<f64>], target: &[Point2<f64>]) -> Result<Matching<f64, 2>, MatchError> {
+    /// impl PointMatcher<2> for Follower {
+    ///     fn match_points(&self, model: &[Point2<f64>], target: &[Point2<f64>]) -> Result<Matching<2>, MatchError> {
     ///         NearestNeighbour::default().match_points(model, target)
     ///     }
     ///     fn match_next(
     ///         &self, warm: &mut WarmStart, model: &[Point2<f64>], target: &[Point2<f64>],
-    ///     ) -> Result<Matching<f64, 2>, MatchError> {
+    ///     ) -> Result<Matching<2>, MatchError> {
     ///         let last: &mut Vec<Point2<f64>> = warm.state();
     ///         let found = self.match_points(if last.len() == model.len() { last } else { model }, target)?;
     ///         last.clone_from(&found.warped);

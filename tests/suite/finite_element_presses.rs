@@ -9,8 +9,9 @@ use std::sync::Arc;
 use tactile_imaging::elasticity::contact::{ContactTable, Layer, Waveguide as Guide};
 use tactile_imaging::elasticity::modulus::{HertzSphere, ModulusEstimate, TabulatedContact};
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::pipeline::{Object, Pipeline, Trial};
-use tactile_imaging::simulate::{
+use tactile_imaging::pipeline::{Object, Pipeline};
+use tactile_simulate::Trial;
+use tactile_simulate::{
     CalibrationOptions, Camera, ContactLaw, ContactState, Elastic, Load, PressOptions, Sphere,
     Waveguide, WaveguideLayer,
 };

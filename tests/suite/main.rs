@@ -9,7 +9,7 @@ mod force_on_simulated_frames;
 #[path = "../support/hostile.rs"]
 mod hostile;
 mod io_properties;
-#[path = "../../src/cli/strain/measure.rs"]
+#[path = "../../tactile-cli/src/strain/measure.rs"]
 #[allow(unreachable_pub, dead_code)]
 mod measure;
 mod modulus_on_simulated_scenes;

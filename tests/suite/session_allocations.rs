@@ -1,6 +1,7 @@
 //! A session allocates nothing per frame once its buffers have their size.
-use tactile_imaging::pipeline::{Session, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Load, PressOptions};
+use tactile_imaging::pipeline::Session;
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, Load, PressOptions};
 
 #[test]
 fn pushing_frames_allocates_nothing_after_warm_up() {

@@ -4,7 +4,7 @@
 //! change frames records the new checksums (each failing line prints them) and says so in its commit.
 use crate::hostile::Hostile;
 use ndarray::Array2;
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     CalibrationOptions, Camera, ContactLaw, Gain, Illumination, Load, LoadCycle, PressOptions,
     PressScene, Response, UniaxialOptions, UniaxialScene,
 };

@@ -1,7 +1,7 @@
 //! Scenes on which a measurement must end with a flag, an error or a value, never a panic.
 
 use ndarray::Array2;
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     Gain, Illumination, Load, PressOptions, PressScene, PressSimulation, SimulateError,
 };
 

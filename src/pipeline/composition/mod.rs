@@ -60,7 +60,7 @@ pub struct Pipeline {
     surface: Arc<dyn SurfaceReconstruction<f64> + Send + Sync>,
     /// None: the default for what the surface is read from.
     sampler: Option<Arc<dyn ControlPointSampler<f64> + Send + Sync>>,
-    matcher: Arc<dyn PointMatcher<f64, 3> + Send + Sync>,
+    matcher: Arc<dyn PointMatcher<3> + Send + Sync>,
     warp: Arc<dyn WarpModel<f64, 3> + Send + Sync>,
     strain: Arc<dyn StrainMeasure<f64> + Send + Sync>,
     estimator: EstimatorStage,
@@ -102,7 +102,7 @@ impl Pipeline {
     /// # Errors
     /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`]; those of [`new`](Self::new).
     pub fn from_pairs(
-        pairs: &[CalibrationPair<f64>],
+        pairs: &[CalibrationPair],
         pixel_size_m: [f64; 2],
         object: Object,
     ) -> Result<Self, PipelineError> {
@@ -115,7 +115,7 @@ impl Pipeline {
     }
 
     /// The contact stage.
-    pub(crate) fn contact(&self) -> &dyn ContactStage {
+    pub fn contact(&self) -> &dyn ContactStage {
         self.contact.as_ref()
     }
 
@@ -142,7 +142,7 @@ impl Pipeline {
         }
     }
 
-    pub(super) fn matcher(&self) -> &dyn PointMatcher<f64, 3> {
+    pub(super) fn matcher(&self) -> &dyn PointMatcher<3> {
         self.matcher.as_ref()
     }
 

@@ -72,7 +72,7 @@ pub(super) fn near_by() -> AnnealedSoftassign {
     AnnealedSoftassign::default().with_search(Search::Near)
 }
 
-pub(super) fn matcher(choice: MatcherChoice) -> Arc<dyn PointMatcher<f64, 3> + Send + Sync> {
+pub(super) fn matcher(choice: MatcherChoice) -> Arc<dyn PointMatcher<3> + Send + Sync> {
     match choice {
         MatcherChoice::AnnealedSoftassign => Arc::new(near_by()),
         MatcherChoice::RelaxationLabelling => Arc::new(RelaxationLabelling::default()),

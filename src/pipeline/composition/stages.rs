@@ -16,7 +16,7 @@ impl Pipeline {
     /// Takes the stages that a configuration names; a surface stage looks at shading.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::{StagesConfig, StrainChoice};
@@ -70,7 +70,7 @@ impl Pipeline {
     /// Takes another way from image to surface, looking at `input`.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::SurfaceInput;
@@ -102,7 +102,7 @@ impl Pipeline {
     /// Takes another way from slopes to heights, inside the reconstruction that the pipeline has by now.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::{PipelineError, SurfaceInput};
@@ -141,8 +141,8 @@ impl Pipeline {
     /// Takes another estimator of the modulus. Strains of the loads are counted from the first.
     ///
     /// ```
-    /// # use tactile_imaging::pipeline::Trial;
-    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::Trial;
+    /// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::elasticity::modulus::{EstimatorKind, TataraSphere};
@@ -163,7 +163,7 @@ impl Pipeline {
     /// Takes another choice of control points.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::sfs::Random;
@@ -186,7 +186,7 @@ impl Pipeline {
     /// Takes another matcher, one of your own too, or one chosen at run time.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::matching::{LinearAssignment, PointMatcher};
@@ -194,16 +194,13 @@ impl Pipeline {
     /// let mut press = trial.press(&pipeline)?;
     /// let matching = press.matching(1)?;
     /// assert!(matching.assignment.iter().all(Option::is_some), "without a limit to the distance every point has a partner");
-    /// let chosen: Box<dyn PointMatcher<f64, 3> + Send + Sync> = Box::new(LinearAssignment::default());
+    /// let chosen: Box<dyn PointMatcher<3> + Send + Sync> = Box::new(LinearAssignment::default());
     /// let pipeline = pipeline.with_matcher(chosen);
     /// assert_eq!(trial.press(&pipeline)?.matching(1)?.assignment, matching.assignment);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_matcher(
-        mut self,
-        matcher: impl PointMatcher<f64, 3> + Send + Sync + 'static,
-    ) -> Self {
+    pub fn with_matcher(mut self, matcher: impl PointMatcher<3> + Send + Sync + 'static) -> Self {
         self.matcher = Arc::new(matcher);
         self
     }
@@ -211,7 +208,7 @@ impl Pipeline {
     /// Takes another measure of strain.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::elasticity::strain::Hencky;
@@ -232,7 +229,7 @@ impl Pipeline {
     /// Takes another family of warps for the strain.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::tps::AffineModel;

@@ -13,15 +13,15 @@ const FEWEST: usize = 6;
 /// Departure of a parabola through the pairs from its chord at half scale, as a share of the full scale; `None` where it is small or
 /// does not stand out of the pairs' scatter. With light ∝ pᵉ under a ball of growing load the sum goes as F^((2+e)/3), a line for e = 1
 /// alone. O(pairs).
-pub(super) fn of(pairs: &[CalibrationPair<f64>]) -> Option<f64> {
-    let scale = |value: fn(&CalibrationPair<f64>) -> f64| {
+pub(super) fn of(pairs: &[CalibrationPair]) -> Option<f64> {
+    let scale = |value: fn(&CalibrationPair) -> f64| {
         pairs.iter().map(value).map(f64::abs).fold(0.0, f64::max)
     };
     let (sum, force) = (scale(|p| p.integrated_pixel_value), scale(|p| p.force_n));
     if pairs.len() < FEWEST || !(sum > 0.0 && force > 0.0) {
         return None;
     }
-    let powers = |pair: &CalibrationPair<f64>| {
+    let powers = |pair: &CalibrationPair| {
         let v = pair.integrated_pixel_value / sum;
         (Vector3::new(1.0, v, v * v), pair.force_n / force)
     };
@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     /// Pairs of light ∝ pᵉ under a ball, forces off by a share of the full scale to either side in turn.
-    fn pairs(exponent: f64, error: f64) -> Vec<CalibrationPair<f64>> {
+    fn pairs(exponent: f64, error: f64) -> Vec<CalibrationPair> {
         let pair = |k: i32| {
             let force = f64::from(k) / 12.0;
             let noise = if k % 2 == 0 { error } else { -error };

@@ -30,7 +30,7 @@ use std::sync::Arc;
 /// let mut moduli = Vec::new();
 /// for contact in [line, quick, gauged] {
 ///     let mut press = Pipeline::new(contact, Object::sphere(3e-3))?.press(reference.view())?;
-///     press.add_gauged_frame(frame.view(), Some(Estimate { value: 1.005, standard_error: 2e-3 }));
+///     press.add_gauged_frame(frame.view(), Some(Estimate::new(1.005, 2e-3)));
 ///     moduli.push(press.modulus()?.youngs_modulus_pa);
 /// }
 /// // A radius read off the mask is uncertain by half a pixel in twenty: E, which goes as a⁻³, by 8 %.
@@ -39,8 +39,8 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone)]
 pub struct LightContact {
-    meter: ForceMeter<f64>,
-    calibration: Arc<dyn StressCalibration<f64>>,
+    meter: ForceMeter,
+    calibration: Arc<dyn StressCalibration>,
     force_from: ForceFrom,
     pixel_size_m: [f64; 2],
     polarity: Polarity,
@@ -61,7 +61,7 @@ impl LightContact {
     /// # Errors
     /// [`PipelineError::Calibration`] and [`PipelineError::Sensor`].
     pub fn from_pairs(
-        pairs: &[CalibrationPair<f64>],
+        pairs: &[CalibrationPair],
         pixel_size_m: [f64; 2],
     ) -> Result<Self, PipelineError> {
         Self::from_pairs_with(pairs, pixel_size_m, &ForceOptions::default())
@@ -69,7 +69,7 @@ impl LightContact {
 
     /// [`from_pairs`](Self::from_pairs) with options of the contact.
     pub(crate) fn from_pairs_with(
-        pairs: &[CalibrationPair<f64>],
+        pairs: &[CalibrationPair],
         pixel_size_m: [f64; 2],
         options: &ForceOptions,
     ) -> Result<Self, PipelineError> {
@@ -86,7 +86,7 @@ impl LightContact {
     /// # Errors
     /// [`PipelineError::Sensor`].
     pub fn new(
-        calibration: impl StressCalibration<f64> + 'static,
+        calibration: impl StressCalibration + 'static,
         pixel_size_m: [f64; 2],
         options: &ForceOptions,
     ) -> Result<Self, PipelineError> {
@@ -144,7 +144,7 @@ impl ContactStage for LightContact {
         workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         contact: &mut FrameContact,
     ) -> Result<(), ForceError> {
         let force =

@@ -29,7 +29,7 @@ use std::sync::Arc;
 /// impl ContactStage for Gauged {
 ///     fn measure(
 ///         &self, workspace: &mut ForceWorkspace, frame: ArrayView2<'_, u8>, reference: &ReferenceFrame,
-///         gauge: Option<Estimate<f64>>, contact: &mut FrameContact,
+///         gauge: Option<Estimate>, contact: &mut FrameContact,
 ///     ) -> Result<(), ForceError> {
 ///         self.0.measure(workspace, frame, reference, gauge, contact)?;
 ///         if let Some(reading) = &mut contact.reading {
@@ -46,7 +46,7 @@ use std::sync::Arc;
 /// assert!(stage.lens().is_none() && stage.pressure_curve().is_none());
 /// let pipeline = Pipeline::new(stage, Object::sphere(3e-3))?;
 /// let mut press = pipeline.press(reference.view())?;
-/// press.add_gauged_frame(frame.view(), Some(Estimate { value: 0.98, standard_error: 1e-3 }));
+/// press.add_gauged_frame(frame.view(), Some(Estimate::new(0.98, 1e-3)));
 /// assert_eq!(press.contact(0)?.and_then(|c| c.force_n).map(|f| f.value), Some(0.98));
 /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
 /// ```
@@ -60,7 +60,7 @@ pub trait ContactStage: Send + Sync {
         workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         contact: &mut FrameContact,
     ) -> Result<(), ForceError>;
 
@@ -103,7 +103,7 @@ macro_rules! forward {
                 workspace: &mut ForceWorkspace,
                 frame: ArrayView2<'_, u8>,
                 reference: &ReferenceFrame,
-                gauge: Option<Estimate<f64>>,
+                gauge: Option<Estimate>,
                 contact: &mut FrameContact,
             ) -> Result<(), ForceError> {
                 (**self).measure(workspace, frame, reference, gauge, contact)

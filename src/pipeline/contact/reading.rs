@@ -1,6 +1,7 @@
 //! What a frame says of its contact, and where in the frame the contact is.
-use crate::force::{BoundingBox, Estimate, ForceMeasurement, ProfileShape, StopReason};
-use crate::pipeline::face::FaceReading;
+use crate::force::{
+    BoundingBox, Estimate, FaceReading, ForceMeasurement, ProfileShape, StopReason,
+};
 use ndarray::Array2;
 
 /// What a frame says of its contact.
@@ -29,17 +30,17 @@ use ndarray::Array2;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ContactReading {
     /// Normal force in newtons; `None` where neither calibration nor gauge gives it.
-    pub force_n: Option<Estimate<f64>>,
+    pub force_n: Option<Estimate>,
     /// The part of the force's error that comes from noise in the frames, in newtons.
     pub force_noise_n: f64,
     /// The part that comes from the calibration and is common to all frames, in newtons.
     pub force_calibration_n: f64,
     /// Contact radius in metres; of a flat face √(A/π), that of a disc of its area.
-    pub contact_radius_m: Estimate<f64>,
+    pub contact_radius_m: Estimate,
     /// Indentation in metres, where the sensor measures depth.
-    pub indentation_m: Option<Estimate<f64>>,
+    pub indentation_m: Option<Estimate>,
     /// Centroid (x, y) in pixels.
-    pub centroid_px: [Estimate<f64>; 2],
+    pub centroid_px: [Estimate; 2],
     /// Area of the contact in square metres.
     pub area_m2: f64,
     /// Greatest signal: grey levels above (or below) the reference.
@@ -66,19 +67,16 @@ pub struct ContactReading {
 
 impl ContactReading {
     /// F/(π a²) in pascals.
-    pub(crate) fn mean_stress_pa(&self) -> Option<Estimate<f64>> {
+    pub(crate) fn mean_stress_pa(&self) -> Option<Estimate> {
         let (force, radius) = (self.force_n?, self.contact_radius_m);
         let value = force.value / (std::f64::consts::PI * radius.value * radius.value);
         let relative =
             (force.standard_error / force.value).hypot(2.0 * radius.standard_error / radius.value);
-        Some(Estimate {
-            value,
-            standard_error: value.abs() * relative,
-        })
+        Some(Estimate::new(value, value.abs() * relative))
     }
 
     /// The force is the gauge's.
-    pub(super) fn take_gauge(&mut self, gauge: Option<Estimate<f64>>) {
+    pub(super) fn take_gauge(&mut self, gauge: Option<Estimate>) {
         self.force_n = gauge;
         self.force_noise_n = gauge.map_or(0.0, |gauge| gauge.standard_error);
         self.force_calibration_n = 0.0;
@@ -86,16 +84,16 @@ impl ContactReading {
     }
 
     /// The contact is a flat face of that area: the radius is that of a disc as large.
-    pub(in crate::pipeline) fn take_area(&mut self, area_m2: Estimate<f64>) {
+    pub(in crate::pipeline) fn take_area(&mut self, area_m2: Estimate) {
         let radius_m = (area_m2.value / std::f64::consts::PI).sqrt();
         self.area_m2 = area_m2.value;
-        self.contact_radius_m = Estimate {
-            value: radius_m,
-            standard_error: 0.5 * radius_m * area_m2.standard_error / area_m2.value,
-        };
+        self.contact_radius_m = Estimate::new(
+            radius_m,
+            0.5 * radius_m * area_m2.standard_error / area_m2.value,
+        );
     }
 
-    pub(super) fn of_light(force: &ForceMeasurement<f64>) -> Option<Self> {
+    pub(super) fn of_light(force: &ForceMeasurement) -> Option<Self> {
         let (contact, reading, radius) = (force.contact?, force.reading?, force.contact_radius_m?);
         Some(Self {
             force_n: Some(force.force_n),

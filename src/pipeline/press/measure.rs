@@ -1,8 +1,7 @@
 //! Everything that the frames of a press say, in one go.
 use super::Press;
-use crate::force::Estimate;
+use crate::force::{Estimate, median_shift_outside};
 use crate::matching::StopReason;
-use crate::pipeline::background;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::face;
 use crate::pipeline::flag::Flag;
@@ -31,7 +30,7 @@ impl Press<'_> {
     /// Runs all stages on all frames. A stage that fails withholds nothing of the others: its error stands in its place.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
@@ -86,7 +85,7 @@ impl Press<'_> {
                 return known.light_step_grey;
             }
             let image = frame.image.get(index).ok()?;
-            background::median_step_outside(image.view(), reference, known.contact.bounds()?)
+            median_shift_outside(image.view(), reference, known.contact.bounds()?)
         });
         let greatest = steps.max_by_key(|step| step.abs())?;
         (greatest != 0).then_some(Flag::LightDrifted {
@@ -126,7 +125,7 @@ impl Press<'_> {
             }),
         );
         if let Some(face) = &reading.face
-            && face::sticks(face)
+            && face.sticks()
         {
             let edge_ratio = face.edge_ratio;
             flags.push(Flag::FaceSticks { frame, edge_ratio });
@@ -223,7 +222,7 @@ impl Press<'_> {
         let areas = [0, last].map(|frame| Some(self.reading(frame).ok()?.face?.area_m2));
         if let [Some(first), Some(second)] = areas {
             let outline = (second.value / first.value).sqrt();
-            let relative = |area: Estimate<f64>| area.standard_error / area.value;
+            let relative = |area: Estimate| area.standard_error / area.value;
             let error = 0.5 * outline * relative(first).hypot(relative(second));
             let apart = (outline - texture.stretch.value).abs();
             let allowed = SLIP_ERRORS * error.hypot(texture.stretch.standard_error);

@@ -16,7 +16,6 @@ use crate::force::{Estimate, ReferenceFrame};
 use crate::matching::Matching;
 use frame_image::{FrameImage, fingerprint};
 use ndarray::{Array2, ArrayView2};
-#[cfg(feature = "plot")]
 use ndarray::{CowArray, Ix2};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -24,14 +23,14 @@ use std::sync::Arc;
 /// A frame and what is known of it so far.
 struct Loaded<'a> {
     image: FrameImage<'a>,
-    gauge: Option<Estimate<f64>>,
+    gauge: Option<Estimate>,
     /// Seconds since the object touched, where they are known.
     time_s: Option<f64>,
     // Boxed, so that thousands of frames, whose strain nobody asks for, take no room for it.
     contact: Option<Box<KnownContact>>,
     surface: Option<Box<ContactSurface>>,
     points: Option<ControlPoints>,
-    matching: Option<Box<Matching<f64, 3>>>,
+    matching: Option<Box<Matching<3>>>,
     strain: Option<Box<PairStrain>>,
 }
 
@@ -51,7 +50,7 @@ struct KnownContact {
 /// Made by [`Pipeline::press`].
 ///
 /// ```
-/// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+/// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// use tactile_imaging::pipeline::Stage;
@@ -118,9 +117,8 @@ impl Pipeline {
 
 impl<'a> Press<'a> {
     /// The same frames on the same reference, of which nothing is computed yet: to time it again.
-    #[cfg(feature = "cli")]
     #[must_use]
-    pub(crate) fn renewed(&self) -> Self {
+    pub fn renewed(&self) -> Self {
         let reference = Arc::clone(self.runner.reference());
         let mut press = self.pipeline().press_on(reference);
         for (index, frame) in self.frames.iter().enumerate() {
@@ -151,7 +149,7 @@ impl<'a> Press<'a> {
     /// let pipeline = Pipeline::new(contact, Object::sphere(3e-3))?;
     /// let (reference, frame) = (hertz(0.0).mapv(|v| 255 - v), hertz(120.0).mapv(|v| 255 - v));
     /// let mut press = pipeline.press(reference.view())?;
-    /// let gauge = Estimate { value: 0.9, standard_error: 2e-3 };
+    /// let gauge = Estimate::new(0.9, 2e-3);
     /// assert_eq!(press.add_gauged_frame(frame.view(), Some(gauge)), 0);
     /// assert!(press.modulus().is_ok());
     /// press.add_frame(frame.view());
@@ -161,7 +159,7 @@ impl<'a> Press<'a> {
     pub fn add_gauged_frame(
         &mut self,
         image: ArrayView2<'a, u8>,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
     ) -> usize {
         let frame = FrameImage::Lent(image);
         let twin = self.twin_of(&frame, fingerprint(image), gauge);
@@ -193,7 +191,7 @@ impl<'a> Press<'a> {
     pub fn add_frame_on_demand(
         &mut self,
         image: ArrayView2<'_, u8>,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         read: impl Fn() -> Result<Array2<u8>, String> + Send + Sync + 'static,
     ) -> usize {
         let frame = FrameImage::on_demand(image, Arc::new(read));
@@ -206,7 +204,7 @@ impl<'a> Press<'a> {
         &mut self,
         image: &FrameImage<'a>,
         fingerprint: u64,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
     ) -> usize {
         let index = self.frames.len();
         let equal = |&&at: &&usize| {
@@ -221,7 +219,7 @@ impl<'a> Press<'a> {
         })
     }
 
-    fn push(&mut self, image: FrameImage<'a>, gauge: Option<Estimate<f64>>, twin: usize) -> usize {
+    fn push(&mut self, image: FrameImage<'a>, gauge: Option<Estimate>, twin: usize) -> usize {
         let index = self.frames.len();
         if twin != index && self.pipeline().settings().skips.equal_frames {
             let pixels = self.runner.reference().image().len();
@@ -243,13 +241,12 @@ impl<'a> Press<'a> {
     }
 
     /// The pipeline.
-    pub(crate) fn pipeline(&self) -> &Pipeline {
+    pub fn pipeline(&self) -> &Pipeline {
         self.runner.pipeline()
     }
 
     /// The image of a frame.
-    #[cfg(feature = "plot")]
-    pub(crate) fn image(&self, frame: usize) -> Result<CowArray<'a, u8, Ix2>, PipelineError> {
+    pub fn image(&self, frame: usize) -> Result<CowArray<'a, u8, Ix2>, PipelineError> {
         let frames = self.frames.len();
         let loaded = self.frames.get(frame);
         let loaded = loaded.ok_or(PipelineError::NoSuchFrame { frame, frames })?;
@@ -267,7 +264,7 @@ impl<'a> Press<'a> {
     }
 
     /// The gauge's reading of a frame's force, if there was one.
-    pub(crate) fn gauge(&self, frame: usize) -> Option<Estimate<f64>> {
+    pub fn gauge(&self, frame: usize) -> Option<Estimate> {
         self.frames.get(frame)?.gauge
     }
 

@@ -29,8 +29,8 @@ impl Press<'_> {
     /// [estimators](crate::elasticity::modulus::ModulusEstimator) take.
     ///
     /// ```
-    /// # use tactile_imaging::pipeline::Trial;
-    /// # use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+    /// # use tactile_simulate::Trial;
+    /// # use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// # let pipeline = trial.pipeline()?;
@@ -60,7 +60,7 @@ impl Press<'_> {
     /// Young's modulus by every estimator that the frames allow, the paper's ratio first.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::elasticity::modulus::EstimatorKind;

@@ -1,10 +1,9 @@
 //! What a press says of its frames, one stage after the other: contact, surface, control points, match, strain.
 use super::{KnownContact, Loaded, Press};
+use crate::force::{TextureStretch, background_shift, median_shift_outside};
 use crate::matching::Matching;
-use crate::pipeline::background;
 use crate::pipeline::contact::{ContactReading, FrameContact};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::face::TextureStretch;
 use crate::pipeline::pair::{MatchedPoints, PairStrain};
 use crate::pipeline::surface::{ContactSurface, ControlPoints};
 use nalgebra::Point3;
@@ -25,9 +24,8 @@ impl<'a> Press<'a> {
             if self.frames[at].image.is_on_demand() {
                 let reference = self.runner.reference().image();
                 let around = contact.bounds();
-                light_step_grey = around.and_then(|contact| {
-                    background::median_step_outside(image.view(), reference, contact)
-                });
+                light_step_grey = around
+                    .and_then(|contact| median_shift_outside(image.view(), reference, contact));
                 contact.mask = Array2::default((0, 0));
             }
             self.frames[at].contact = Some(Box::new(KnownContact {
@@ -72,7 +70,7 @@ impl<'a> Press<'a> {
         }
         let image = self.frames[self.twin(frame)?].image.get(frame)?;
         let reference = self.runner.reference().image();
-        Err(match background::clear_step(image.view(), reference) {
+        Err(match background_shift(image.view(), reference) {
             Some(grey) => PipelineError::OppositeSignal { frame, grey },
             None => PipelineError::NoContact { frame },
         })
@@ -81,7 +79,7 @@ impl<'a> Press<'a> {
     /// The surface of a frame's contact.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?;
@@ -136,7 +134,7 @@ impl<'a> Press<'a> {
     /// Control points on a frame's surface, in metres from the frame's first pixel.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
@@ -169,7 +167,7 @@ impl<'a> Press<'a> {
     /// The matches of the first frame's control points to those of a later frame.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// let pipeline = trial.pipeline()?.with_control_points(60);
@@ -183,7 +181,7 @@ impl<'a> Press<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Match`] and those of [`control_points`](Self::control_points).
-    pub fn matching(&mut self, frame: usize) -> Result<&Matching<f64, 3>, PipelineError> {
+    pub fn matching(&mut self, frame: usize) -> Result<&Matching<3>, PipelineError> {
         self.control_points(0)?;
         self.control_points(frame)?;
         let at = self.twin(frame)?;

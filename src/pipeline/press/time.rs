@@ -10,7 +10,7 @@ impl Press<'_> {
     /// Says when a frame was taken, in seconds since the object touched. Frames without a time do not count where time does.
     ///
     /// ```
-    /// # use tactile_imaging::{pipeline::Trial, simulate::{CalibrationOptions, Camera, PressOptions}};
+    /// # use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// use tactile_imaging::pipeline::PipelineError;

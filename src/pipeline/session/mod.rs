@@ -33,8 +33,9 @@ pub use update::Update;
 ///
 /// ```
 /// use std::sync::Arc;
-/// use tactile_imaging::pipeline::{Session, Trial};
-/// use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+/// use tactile_imaging::pipeline::Session;
+/// use tactile_simulate::Trial;
+/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
 /// let camera = Camera::default().coarser(8);
 /// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
@@ -54,7 +55,7 @@ pub struct Session {
     measured_frame: u64,
     frames: u64,
     loads: SeenLoads,
-    shear: Option<ShearTracker<f64>>,
+    shear: Option<ShearTracker>,
     strain: FollowedStrain,
     /// The first contact that a flat face's loads are compared with.
     first_contact: Option<ContactReading>,
@@ -122,7 +123,7 @@ impl Session {
     ///     let d = ((r as f64 - 32.0).hypot(c as f64 - x) / 20.0).min(1.0);
     ///     10 + (120.0 * (1.0 - d * d).sqrt()).round() as u8
     /// });
-    /// let stiffness_n_per_m = [Estimate { value: 400.0, standard_error: 4.0 }; 2];
+    /// let stiffness_n_per_m = [Estimate::new(400.0, 4.0); 2];
     /// let pipeline = Pipeline::from_pairs(&pairs, [50e-6; 2], Object::sphere(3e-3))?;
     /// let mut session = Session::new(&pipeline, &[Array2::from_elem((64, 64), 10).view()])?
     ///     .with_shear(ShearCalibration { stiffness_n_per_m, residual_sd_n: [0.0; 2] });
@@ -132,7 +133,7 @@ impl Session {
     /// # Ok::<(), tactile_imaging::pipeline::PipelineError>(())
     /// ```
     #[must_use]
-    pub fn with_shear(mut self, calibration: ShearCalibration<f64>) -> Self {
+    pub fn with_shear(mut self, calibration: ShearCalibration) -> Self {
         self.shear = Some(ShearTracker::new(calibration));
         self
     }

@@ -12,8 +12,9 @@ impl Session {
     ///
     /// ```
     /// use std::sync::Arc;
-    /// use tactile_imaging::pipeline::{Session, Trial};
-    /// use tactile_imaging::simulate::{Camera, CalibrationOptions, Load, PressOptions};
+    /// use tactile_imaging::pipeline::Session;
+    /// use tactile_simulate::Trial;
+    /// use tactile_simulate::{Camera, CalibrationOptions, Load, PressOptions};
     /// let camera = Camera::default().coarser(4);
     /// let loads = [0.7, 1.0, 1.2].map(Load::normal).to_vec();
     /// let trial = Trial::new(PressOptions { camera, loads, ..PressOptions::default() }, &CalibrationOptions::default())?;
@@ -51,8 +52,9 @@ impl Session {
     ///
     /// ```
     /// # use std::sync::Arc;
-    /// # use tactile_imaging::pipeline::{Session, Trial};
-    /// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
+    /// # use tactile_imaging::pipeline::Session;
+    /// # use tactile_simulate::Trial;
+    /// # use tactile_simulate::{Camera, CalibrationOptions, PressOptions};
     /// # let camera = Camera::default().coarser(8);
     /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
     /// # let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;

@@ -15,8 +15,9 @@ use ndarray::ArrayView2;
 ///
 /// ```
 /// # use std::sync::Arc;
-/// # use tactile_imaging::pipeline::{Session, Trial};
-/// # use tactile_imaging::simulate::{Camera, CalibrationOptions, PressOptions};
+/// # use tactile_imaging::pipeline::Session;
+/// # use tactile_simulate::Trial;
+/// # use tactile_simulate::{Camera, CalibrationOptions, PressOptions};
 /// # let camera = Camera::default().coarser(8);
 /// # let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
 /// let mut session = Session::new(&trial.pipeline()?, &[trial.simulation.reference.view()])?;
@@ -38,7 +39,7 @@ pub struct SessionStrain {
     /// Control points with a partner on the strained surface; 0 of a flat face, whose strain is that of its area.
     pub matched: usize,
     /// How the match went.
-    pub report: MatchReport<f64>,
+    pub report: MatchReport,
     /// The strain at the control points of the load it is counted from.
     pub strain: PairStrain,
 }
@@ -77,7 +78,7 @@ struct Anchor {
 struct Buffers {
     surface: ContactSurface,
     points: ControlPoints,
-    pairs: MatchedPairs<f64>,
+    pairs: MatchedPairs,
 }
 
 impl Default for Buffers {

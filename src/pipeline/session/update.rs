@@ -32,5 +32,5 @@ pub struct Update {
     /// The frame equals the one before it, bit for bit, and was not measured again.
     pub repeated: bool,
     /// Shear since contact began, where the session knows the stiffnesses.
-    pub shear: Option<ShearMeasurement<f64>>,
+    pub shear: Option<ShearMeasurement>,
 }

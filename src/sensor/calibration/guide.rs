@@ -100,10 +100,7 @@ impl SensorCalibration {
             ];
             for (k, (parameter, value, logarithm)) in rows.into_iter().enumerate() {
                 let unit = |value: f64| if logarithm { value } else { 1.0 };
-                let stated = Estimate {
-                    value,
-                    standard_error: input.parameter_errors()[k] * unit(value),
-                };
+                let stated = Estimate::new(value, input.parameter_errors()[k] * unit(value));
                 let fitted = fit.map_or(stated, |fit| {
                     let found = &fit.layers[layer];
                     let values = [
@@ -112,10 +109,7 @@ impl SensorCalibration {
                         found.poisson_ratio,
                     ];
                     let error = fit.covariance[(k * n + layer, k * n + layer)].sqrt();
-                    Estimate {
-                        value: values[k],
-                        standard_error: error * unit(values[k]),
-                    }
+                    Estimate::new(values[k], error * unit(values[k]))
                 });
                 findings.push(LayerFinding {
                     layer,

@@ -34,8 +34,6 @@ pub use layer_kernel::Bond;
 pub use layer_series::LayerSeries;
 pub use punch::{ConeContact, PunchContact, cone, flat_punch, tangent_of_degrees};
 pub use table::{ContactCurve, ContactTable};
-#[cfg(feature = "fem")]
-pub use table::{TableOptions, TableProgress};
 pub use tatara::tatara_indentation_m;
 pub use waveguide::{Layer, Waveguide};
 

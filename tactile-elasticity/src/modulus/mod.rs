@@ -24,10 +24,8 @@ pub use contact::{
 pub use estimate::{
     EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-pub use law::LayerTheory;
-pub(crate) use law::{
-    ConeLaw, ContactLaw, LayerLaw, NoSlipLaw, Punch, Sphere, TataraLaw, TipOnBallLaw, WaveguideLaw,
-};
+pub(crate) use law::{ConeLaw, LayerLaw, Punch, Sphere, TataraLaw, TipOnBallLaw};
+pub use law::{ContactLaw, LayerTheory, LogForce, NoSlipLaw, WaveguideLaw};
 pub use load::{Estimate, LoadState};
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::StressStrainRegression;

@@ -2,8 +2,7 @@
 //!
 //! `RECORD_ANSWERS=1 cargo test -p tactile-elasticity --test suite recorded` writes the file anew; the reason belongs in the commit.
 
-#[path = "../../../tests/support/recorded.rs"]
-mod record;
+use test_support as record;
 
 use nalgebra::{DMatrix, Matrix3};
 use tactile_elasticity::contact::*;

@@ -1,8 +1,7 @@
 //! Tiny strain under large rotation, nearly singular deformations, contacts of every size, against 80-digit numbers.
 #![allow(clippy::print_stdout)]
 
-#[path = "../../../evidence/worst.rs"]
-mod worst;
+use test_support as worst;
 
 use nalgebra::Matrix3;
 use serde_json::Value;

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::options::Robustness;
-use super::stop::StopReason;
 use crate::error::ForceError;
+use tactile_core::StopReason;
 
 const HUBER: f64 = 1.345;
 const TUKEY: f64 = 4.685;
@@ -24,25 +24,6 @@ pub(crate) struct Fit {
     pub(crate) residual_sd: f64,
     pub(crate) iterations: usize,
     pub(crate) stop: StopReason,
-}
-
-impl Fit {
-    /// A fit whose curve is not a combination of columns.
-    pub(super) fn without_coefficients(
-        residuals: Vec<f64>,
-        weights: Vec<f64>,
-        residual_sd: f64,
-    ) -> Self {
-        Self {
-            coefficients: Vec::new(),
-            covariance: DMatrix::zeros(0, 0),
-            residuals,
-            weights,
-            residual_sd,
-            iterations: 1,
-            stop: StopReason::Direct,
-        }
-    }
 }
 
 /// Solves for the coefficients of the design's columns.
@@ -155,7 +136,7 @@ fn robust_scale(residuals: &[f64], parameters: usize) -> f64 {
     MAD_TO_SD * 0.5 * (kept[kept.len() / 2] + kept[(kept.len() - 1) / 2])
 }
 
-pub(super) fn robust_weight(stage: Robustness, residual: f64, scale: f64) -> f64 {
+fn robust_weight(stage: Robustness, residual: f64, scale: f64) -> f64 {
     if residual == 0.0 {
         return 1.0;
     }

@@ -3,13 +3,12 @@
 use nalgebra::DMatrix;
 
 use super::StressCalibration;
-use super::curve::extremes;
 use super::least_squares::{self, Fit};
 use super::options::CalibrationOptions;
 use super::pair::{CalibrationPair, check_pairs};
 use super::report::{self, CalibrationReport, Parameters, Shape};
 use crate::error::ForceError;
-use crate::estimate::{Estimate, Real};
+use tactile_core::Estimate;
 
 /// A straight line from integrated pixel value to force, F = b + s V, or F = s V through the origin.
 ///
@@ -26,32 +25,29 @@ use crate::estimate::{Estimate, Real};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct LinearCalibration<T> {
+pub struct LinearCalibration {
     /// Pixel value about which the line is held: there level and slope are (nearly) uncorrelated.
-    centre: T,
-    level_n: Estimate<T>,
-    slope_n: Estimate<T>,
-    covariance: T,
-    range: [T; 2],
-    report: CalibrationReport<T>,
+    centre: f64,
+    level_n: Estimate,
+    slope_n: Estimate,
+    covariance: f64,
+    range: [f64; 2],
+    report: CalibrationReport,
 }
 
-impl<T: Real> LinearCalibration<T> {
+impl LinearCalibration {
     /// Fits the line to pairs of integrated pixel value and force.
     ///
     /// # Errors
     /// Fewer pairs than parameters + 1, a pair that is not finite, or pairs at one pixel value only.
     pub fn fit(
-        pairs: &[CalibrationPair<T>],
+        pairs: &[CalibrationPair],
         options: &CalibrationOptions,
     ) -> Result<Self, ForceError> {
         let columns = if options.through_origin { 1 } else { 2 };
         check_pairs(pairs, columns)?;
-        let values: Vec<f64> = pairs
-            .iter()
-            .map(|p| p.integrated_pixel_value.as_f64())
-            .collect();
-        let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
+        let values: Vec<f64> = pairs.iter().map(|p| p.integrated_pixel_value).collect();
+        let forces: Vec<f64> = pairs.iter().map(|p| p.force_n).collect();
         let (centre, scale) = axis(&values, options.through_origin)?;
         let entry = |i: usize, j: usize| {
             if j + 1 == columns {
@@ -73,11 +69,11 @@ impl<T: Real> LinearCalibration<T> {
             degrees_of_freedom: pairs.len() - columns,
         };
         Ok(Self {
-            centre: T::nearest(centre),
-            level_n: Estimate::nearest(line.level.0, line.level.1),
-            slope_n: Estimate::nearest(line.slope.0, line.slope.1),
-            covariance: T::nearest(line.covariance),
-            range: extremes(&values).map(T::nearest),
+            centre: centre,
+            level_n: Estimate::from_variance(line.level.0, line.level.1),
+            slope_n: Estimate::from_variance(line.slope.0, line.slope.1),
+            covariance: line.covariance,
+            range: report::extremes(&values),
             report: report::build(pairs, &fit, parameters, shape),
         })
     }
@@ -152,38 +148,38 @@ fn nonlinearity(forces: &[f64], residuals: &[f64]) -> f64 {
     residuals.iter().fold(0.0_f64, |m, r| m.max(r.abs())) / report::full_scale(forces)
 }
 
-impl<T: Real> StressCalibration<T> for LinearCalibration<T> {
-    fn force_n(&self, integrated_pixel_value: T) -> T {
+impl StressCalibration for LinearCalibration {
+    fn force_n(&self, integrated_pixel_value: f64) -> f64 {
         self.level_n.value + self.slope_n.value * (integrated_pixel_value - self.centre)
     }
 
-    fn sensitivity_n(&self, _integrated_pixel_value: T) -> T {
+    fn sensitivity_n(&self, _integrated_pixel_value: f64) -> f64 {
         self.slope_n.value
     }
 
-    fn standard_error_n(&self, integrated_pixel_value: T) -> T {
+    fn standard_error_n(&self, integrated_pixel_value: f64) -> f64 {
         self.error_covariance_n2(integrated_pixel_value, integrated_pixel_value)
-            .max(T::zero())
+            .max(0.0)
             .sqrt()
     }
 
-    fn error_covariance_n2(&self, a: T, b: T) -> T {
+    fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
         let (level, slope) = (self.level_n.standard_error, self.slope_n.standard_error);
         let (a, b) = (a - self.centre, b - self.centre);
         let branch = self.report.branch_error_n();
         level * level + slope * a * (slope * b) + self.covariance * (a + b) + branch * branch
     }
 
-    fn integrated_pixel_value(&self, force_n: T) -> Option<T> {
+    fn integrated_pixel_value(&self, force_n: f64) -> Option<f64> {
         let v = self.centre + (force_n - self.level_n.value) / self.slope_n.value;
         v.is_finite().then_some(v)
     }
 
-    fn range(&self) -> [T; 2] {
+    fn range(&self) -> [f64; 2] {
         self.range
     }
 
-    fn report(&self) -> &CalibrationReport<T> {
+    fn report(&self) -> &CalibrationReport {
         &self.report
     }
 }

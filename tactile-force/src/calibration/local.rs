@@ -1,8 +1,8 @@
 //! Calibrations that hold pixel by pixel.
 
 use super::{ForceReading, GreyHistogram};
-use crate::estimate::Estimate;
 use crate::frame::DifferenceNoise;
+use tactile_core::Estimate;
 
 /// Grey level to pressure pixel by pixel: f of (5) itself, not only its integral over a contact.
 ///
@@ -19,12 +19,12 @@ use crate::frame::DifferenceNoise;
 /// }
 ///
 /// impl LocalCalibration for Proportional {
-///     fn pressure_pa(&self, grey: f64) -> Estimate<f64> {
-///         Estimate { value: self.pa_per_grey * grey, standard_error: 0.0 }
+///     fn pressure_pa(&self, grey: f64) -> Estimate {
+///         Estimate::new(self.pa_per_grey * grey, 0.0)
 ///     }
 ///
-///     fn read(&self, histogram: &GreyHistogram, _noise: &DifferenceNoise) -> ForceReading<f64> {
-///         let force_n = Estimate { value: histogram.integral(|g| self.value_pa(g)), standard_error: 0.0 };
+///     fn read(&self, histogram: &GreyHistogram, _noise: &DifferenceNoise) -> ForceReading {
+///         let force_n = Estimate::new(histogram.integral(|g| self.value_pa(g)), 0.0);
 ///         ForceReading { force_n, noise_n: 0.0, calibration_n: 0.0, degrees_of_freedom: None, out_of_range: false }
 ///     }
 /// }
@@ -36,7 +36,7 @@ use crate::frame::DifferenceNoise;
 /// ```
 pub trait LocalCalibration: Send + Sync {
     /// Pressure in pascals of a grey-level difference, with its standard error. Rises with the grey level and is zero at zero.
-    fn pressure_pa(&self, grey: f64) -> Estimate<f64>;
+    fn pressure_pa(&self, grey: f64) -> Estimate;
 
     /// The pressure alone, for tables: what [`pressure_pa`](Self::pressure_pa) has as its value.
     fn value_pa(&self, grey: f64) -> f64 {
@@ -44,5 +44,5 @@ pub trait LocalCalibration: Send + Sync {
     }
 
     /// Force of a contact from its histogram, Σ A(g) f(g), with its errors.
-    fn read(&self, histogram: &GreyHistogram, noise: &DifferenceNoise) -> ForceReading<f64>;
+    fn read(&self, histogram: &GreyHistogram, noise: &DifferenceNoise) -> ForceReading;
 }

@@ -8,31 +8,24 @@
 //! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V)  exactly.
 //! ```
 
-mod curve;
 mod histogram;
 mod least_squares;
 mod linear;
 mod local;
-mod monotone;
 mod options;
 mod pair;
-mod polynomial;
 mod report;
-mod stop;
 
 pub use histogram::GreyHistogram;
 pub use linear::LinearCalibration;
 pub use local::LocalCalibration;
-pub use monotone::MonotoneCalibration;
 pub use options::{CalibrationOptions, Robustness};
 pub use pair::{Branch, CalibrationPair};
-pub use polynomial::PolynomialCalibration;
 pub use report::{CalibrationReport, Hysteresis};
-pub use stop::StopReason;
 
 use ndarray::Array2;
 
-use crate::estimate::{Estimate, Real};
+use tactile_core::Estimate;
 
 /// A force read from a calibration.
 ///
@@ -40,8 +33,8 @@ use crate::estimate::{Estimate, Real};
 /// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
 ///
 /// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)].map(|(v, f)| CalibrationPair::loading(v, f));
-/// let line = LinearCalibration::<f64>::fit(&pairs, &Default::default())?;
-/// let reading = line.read(Estimate { value: 2.5e5, standard_error: 400.0 });
+/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
+/// let reading = line.read(Estimate::new(2.5e5, 400.0));
 /// assert!(reading.noise_n < reading.calibration_n && !reading.out_of_range);
 /// let both = reading.noise_n.hypot(reading.calibration_n);
 /// assert!((reading.force_n.standard_error - both).abs() < 1e-15);
@@ -49,17 +42,17 @@ use crate::estimate::{Estimate, Real};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct ForceReading<T> {
+pub struct ForceReading {
     /// Force and its standard error from all sources, in newtons.
-    pub force_n: Estimate<T>,
+    pub force_n: Estimate,
     /// The part of the standard error that comes from noise in the frames, in newtons.
-    pub noise_n: T,
+    pub noise_n: f64,
     /// The part of the standard error that comes from the calibration's parameters, in newtons: it is the same for
     /// every frame read with one calibration.
-    pub calibration_n: T,
+    pub calibration_n: f64,
     /// Degrees of freedom of the standard error, for Student's t: the calibration's share was estimated from the scatter of a
     /// few pairs, the frame's is known (Welch–Satterthwaite); `None` where the calibration adds no error.
-    pub degrees_of_freedom: Option<T>,
+    pub degrees_of_freedom: Option<f64>,
     /// The pixel value lies outside the range the calibration was fitted on.
     pub out_of_range: bool,
 }
@@ -72,7 +65,7 @@ pub struct ForceReading<T> {
 /// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
 ///
 /// let pairs = [0.0, 1e5, 2e5, 3e5].map(|v| CalibrationPair::loading(v, 5e-6 * v));
-/// let line = LinearCalibration::<f64>::fit(&pairs, &Default::default())?;
+/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
 /// assert!((line.force_n(1e5) - 0.5).abs() < 1e-12 && (line.sensitivity_n(1e5) - 5e-6_f64).abs() < 1e-15);
 /// assert_eq!(line.range(), [0.0, 3e5]);
 /// // Exact pairs leave the parameters no error, at one value or between two.
@@ -85,23 +78,23 @@ pub struct ForceReading<T> {
 /// let step = line.stress_per_grey_level_pa(1e5, 4e-10);
 /// assert!((step - 12_500.0).abs() < 1e-6);
 /// // Beyond the range: read, and flagged.
-/// assert!(line.read(Estimate { value: 4e5, standard_error: 0.0 }).out_of_range);
+/// assert!(line.read(Estimate::new(4e5, 0.0)).out_of_range);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
-pub trait StressCalibration<T: Real>: Send + Sync {
+pub trait StressCalibration: Send + Sync {
     /// Force at an integrated pixel value, in newtons.
-    fn force_n(&self, integrated_pixel_value: T) -> T;
+    fn force_n(&self, integrated_pixel_value: f64) -> f64;
 
     /// dF/dV, in newtons per grey level.
-    fn sensitivity_n(&self, integrated_pixel_value: T) -> T;
+    fn sensitivity_n(&self, integrated_pixel_value: f64) -> f64;
 
     /// Standard error of the force due to the uncertainty of the calibration's own parameters and to the difference of its branches
     /// ([`Hysteresis::width_n`]), in newtons.
-    fn standard_error_n(&self, integrated_pixel_value: T) -> T;
+    fn standard_error_n(&self, integrated_pixel_value: f64) -> f64;
 
     /// Covariance of the calibration's errors at two integrated pixel values, in N²; at one and the same it is the square of
     /// [`standard_error_n`](Self::standard_error_n). By default errors at all pixel values are fully correlated.
-    fn error_covariance_n2(&self, a: T, b: T) -> T {
+    fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
         self.standard_error_n(a) * self.standard_error_n(b)
     }
 
@@ -117,14 +110,14 @@ pub trait StressCalibration<T: Real>: Send + Sync {
     ///     .map(|(f, k)| CalibrationPair::loading(1e5 * f64::from(k), *f))
     ///     .collect();
     /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
-    /// let values = [1e5, 3e5].map(|value| Estimate { value, standard_error: 300.0 });
+    /// let values = [1e5, 3e5].map(|value| Estimate::new(value, 300.0));
     /// let covariance = line.force_covariance_n2(&values);
     /// let alone = line.read(values[1]).force_n.standard_error;
     /// assert!((covariance[[1, 1]].sqrt() - alone).abs() < 1e-12);
     /// assert_eq!(covariance[[0, 1]], covariance[[1, 0]]);
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
-    fn force_covariance_n2(&self, integrated_pixel_values: &[Estimate<T>]) -> Array2<T> {
+    fn force_covariance_n2(&self, integrated_pixel_values: &[Estimate]) -> Array2<f64> {
         let n = integrated_pixel_values.len();
         Array2::from_shape_fn((n, n), |(i, j)| {
             let (a, b) = (
@@ -138,13 +131,13 @@ pub trait StressCalibration<T: Real>: Send + Sync {
     }
 
     /// The integrated pixel value of a force, or `None` where the curve does not take it exactly once.
-    fn integrated_pixel_value(&self, force_n: T) -> Option<T>;
+    fn integrated_pixel_value(&self, force_n: f64) -> Option<f64>;
 
     /// The least and the greatest integrated pixel value of the fit.
-    fn range(&self) -> [T; 2];
+    fn range(&self) -> [f64; 2];
 
     /// How well the calibration fits its pairs.
-    fn report(&self) -> &CalibrationReport<T>;
+    fn report(&self) -> &CalibrationReport;
 
     /// The curve that holds pixel by pixel, if the calibration has one; by default it has none.
     fn local(&self) -> Option<&dyn LocalCalibration> {
@@ -152,31 +145,28 @@ pub trait StressCalibration<T: Real>: Send + Sync {
     }
 
     /// Force with its standard error: √((dF/dV)² σ_V² + σ_cal²).
-    fn read(&self, integrated_pixel_value: Estimate<T>) -> ForceReading<T> {
+    fn read(&self, integrated_pixel_value: Estimate) -> ForceReading {
         let v = integrated_pixel_value.value;
         let noise_n = (self.sensitivity_n(v) * integrated_pixel_value.standard_error).abs();
         let calibration_n = self.standard_error_n(v);
         let [low, high] = self.range();
         let standard_error = noise_n.hypot(calibration_n);
         let share = (calibration_n / standard_error).powi(4);
-        let degrees = T::nearest(self.report().degrees_of_freedom as f64);
+        let degrees = self.report().degrees_of_freedom as f64;
         ForceReading {
-            force_n: Estimate {
-                value: self.force_n(v),
-                standard_error,
-            },
+            force_n: Estimate::new(self.force_n(v), standard_error),
             noise_n,
             calibration_n,
-            degrees_of_freedom: (share > T::zero()).then(|| degrees / share),
+            degrees_of_freedom: (share > 0.0).then(|| degrees / share),
             out_of_range: !(v >= low && v <= high),
         }
     }
 
     /// Stress per grey level of difference, in pascals, in a contact of the given integrated pixel value:
     /// F(V)/(V A). Where V is zero, its limit along the curve, (dF/dV)/A.
-    fn stress_per_grey_level_pa(&self, integrated_pixel_value: T, pixel_area_m2: T) -> T {
+    fn stress_per_grey_level_pa(&self, integrated_pixel_value: f64, pixel_area_m2: f64) -> f64 {
         let v = integrated_pixel_value;
-        let secant = if v == T::zero() {
+        let secant = if v == 0.0 {
             self.sensitivity_n(v)
         } else {
             self.force_n(v) / v

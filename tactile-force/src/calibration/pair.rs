@@ -1,7 +1,6 @@
 //! Pairs of integrated pixel value and known force.
 
 use crate::error::ForceError;
-use crate::estimate::Real;
 
 /// Whether the force was rising or falling when a pair was taken.
 ///
@@ -37,18 +36,18 @@ pub enum Branch {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CalibrationPair<T> {
+pub struct CalibrationPair {
     /// Sum of the grey-level differences over the contact.
-    pub integrated_pixel_value: T,
+    pub integrated_pixel_value: f64,
     /// Force from a reference instrument, in newtons.
-    pub force_n: T,
+    pub force_n: f64,
     /// Whether the force was rising or falling.
     pub branch: Branch,
 }
 
-impl<T> CalibrationPair<T> {
+impl CalibrationPair {
     /// A pair taken while the force was rising.
-    pub fn loading(integrated_pixel_value: T, force_n: T) -> Self {
+    pub fn loading(integrated_pixel_value: f64, force_n: f64) -> Self {
         Self {
             integrated_pixel_value,
             force_n,
@@ -57,7 +56,7 @@ impl<T> CalibrationPair<T> {
     }
 
     /// A pair taken while the force was falling.
-    pub fn unloading(integrated_pixel_value: T, force_n: T) -> Self {
+    pub fn unloading(integrated_pixel_value: f64, force_n: f64) -> Self {
         Self {
             integrated_pixel_value,
             force_n,
@@ -67,12 +66,9 @@ impl<T> CalibrationPair<T> {
 }
 
 /// Refuses pairs that no fit can use: too few for the parameters, or not finite.
-pub(super) fn check_pairs<T: Real>(
-    pairs: &[CalibrationPair<T>],
-    parameters: usize,
-) -> Result<(), ForceError> {
+pub(super) fn check_pairs(pairs: &[CalibrationPair], parameters: usize) -> Result<(), ForceError> {
     let finite =
-        |p: &CalibrationPair<T>| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
+        |p: &CalibrationPair| p.integrated_pixel_value.is_finite() && p.force_n.is_finite();
     if let Some(index) = pairs.iter().position(|p| !finite(p)) {
         return Err(ForceError::NonFinitePair { index });
     }

@@ -1,14 +1,11 @@
 //! The quality of a calibration's fit.
 
-use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::least_squares::{self, Fit};
-use super::options::Robustness;
+use super::least_squares::Fit;
 use super::pair::{Branch, CalibrationPair};
-use super::stop::StopReason;
-use crate::error::ForceError;
-use crate::estimate::{Estimate, Real};
+use tactile_core::Estimate;
+use tactile_core::StopReason;
 
 /// The difference between loading and unloading.
 ///
@@ -31,16 +28,16 @@ use crate::estimate::{Estimate, Real};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Hysteresis<T> {
+pub struct Hysteresis {
     /// Greatest difference of the two branches at one pixel value, loading minus unloading, in newtons.
-    pub greatest_n: T,
+    pub greatest_n: f64,
     /// Mean difference over the range both branches cover, and its standard error, in newtons.
-    pub mean_n: Estimate<T>,
+    pub mean_n: Estimate,
     /// Half of the mean difference where it exceeds three times its own error, else zero, in newtons: the standard error of every force
     /// whose branch is not known, common to all of them, and part of what the calibration states.
-    pub width_n: T,
+    pub width_n: f64,
     /// |greatest| as a share of the full scale.
-    pub share_of_full_scale: T,
+    pub share_of_full_scale: f64,
 }
 
 /// Quality of a calibration.
@@ -49,7 +46,7 @@ pub struct Hysteresis<T> {
 /// use tactile_force::{CalibrationPair, LinearCalibration, StressCalibration};
 ///
 /// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)].map(|(v, f)| CalibrationPair::loading(v, f));
-/// let line = LinearCalibration::<f64>::fit(&pairs, &Default::default())?;
+/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
 /// let report = line.report();
 /// assert!(report.r_squared > 0.999 && report.monotone);
 /// assert_eq!((report.pairs, report.degrees_of_freedom), (4, 2));
@@ -59,35 +56,35 @@ pub struct Hysteresis<T> {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct CalibrationReport<T> {
+pub struct CalibrationReport {
     /// Number of pairs.
     pub pairs: usize,
     /// Parameters with their standard errors: [offset, slope] of a line (slope alone through the origin), Chebyshev
     /// coefficients of a polynomial, levels of a monotone curve.
-    pub parameters: Vec<Estimate<T>>,
+    pub parameters: Vec<Estimate>,
     /// 95 % confidence interval of every parameter, by Student's t.
-    pub intervals_95: Vec<[T; 2]>,
+    pub intervals_95: Vec<[f64; 2]>,
     /// Pairs less parameters.
     pub degrees_of_freedom: usize,
     /// Coefficient of determination, 1 − Σr²/Σ(F − F̄)².
-    pub r_squared: T,
+    pub r_squared: f64,
     /// Standard deviation of the residuals, √(Σr²/(n − p)); a robust scale where outliers were discounted. Newtons.
-    pub residual_sd_n: T,
+    pub residual_sd_n: f64,
     /// Residual of every pair, measured minus fitted, in newtons.
-    pub residuals_n: Vec<T>,
+    pub residuals_n: Vec<f64>,
     /// Weight of every pair: 1 for a trusted one, 0 for an outlier that counts nothing.
-    pub weights: Vec<T>,
+    pub weights: Vec<f64>,
     /// Loading against unloading; `None` unless both branches were given and overlap.
-    pub hysteresis: Option<Hysteresis<T>>,
+    pub hysteresis: Option<Hysteresis>,
     /// Greatest departure of the fitted curve from the straight line through its data, as a share of the full scale; of a
     /// straight line, the greatest departure of a pair.
-    pub linearity_error: T,
+    pub linearity_error: f64,
     /// Mean sensitivity over the range, (F(V₁) − F(V₀))/(V₁ − V₀), in newtons per grey level.
-    pub sensitivity_n: T,
+    pub sensitivity_n: f64,
     /// Smallest force resolved: three residual standard deviations, in newtons.
-    pub smallest_force_n: T,
+    pub smallest_force_n: f64,
     /// Greatest force minus least force of the pairs, in newtons.
-    pub full_scale_n: T,
+    pub full_scale_n: f64,
     /// The curve rises everywhere in its range.
     pub monotone: bool,
     /// Solves, one if nothing was reweighted.
@@ -96,10 +93,10 @@ pub struct CalibrationReport<T> {
     pub stop: StopReason,
 }
 
-impl<T: Real> CalibrationReport<T> {
+impl CalibrationReport {
     /// Standard error of a force whose branch is not known; 0 where the branches were not compared.
-    pub(super) fn branch_error_n(&self) -> T {
-        self.hysteresis.map_or(T::zero(), |h| h.width_n)
+    pub(super) fn branch_error_n(&self) -> f64 {
+        self.hysteresis.map_or(0.0, |h| h.width_n)
     }
 }
 
@@ -117,51 +114,24 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    /// Coefficients as fitted.
-    pub(super) fn of(fit: &Fit) -> Self {
-        let estimates = fit
-            .coefficients
-            .iter()
-            .zip(fit.covariance.diagonal().iter())
-            .map(|(c, v)| (*c, *v))
-            .collect();
-        Self {
-            estimates,
-            degrees_of_freedom: fit.residuals.len() - fit.coefficients.len(),
-        }
-    }
-
-    /// Levels, each of (force, sd of a pair, number of pairs).
-    pub(super) fn levels(levels: &[(f64, f64, usize)], pairs: usize) -> Self {
-        let estimates = levels
-            .iter()
-            .map(|(f, sd, n)| (*f, sd * sd / *n as f64))
-            .collect();
-        Self {
-            estimates,
-            degrees_of_freedom: pairs.saturating_sub(levels.len()).max(1),
-        }
-    }
-
-    fn intervals<T: Real>(&self) -> Vec<[T; 2]> {
+    fn intervals(&self) -> Vec<[f64; 2]> {
         let t = StudentsT::new(0.0, 1.0, self.degrees_of_freedom.max(1) as f64)
             .map_or(f64::NAN, |d| d.inverse_cdf(0.975));
-        let interval = |(value, variance): &(f64, f64)| {
-            [-t, t].map(|t| T::nearest(value + t * variance.sqrt()))
-        };
+        let interval =
+            |(value, variance): &(f64, f64)| [-t, t].map(|t| value + t * variance.sqrt());
         self.estimates.iter().map(interval).collect()
     }
 }
 
-pub(super) fn build<T: Real>(
-    pairs: &[CalibrationPair<T>],
+pub(super) fn build(
+    pairs: &[CalibrationPair],
     fit: &Fit,
     parameters: Parameters,
     shape: Shape,
-) -> CalibrationReport<T> {
-    let forces: Vec<f64> = pairs.iter().map(|p| p.force_n.as_f64()).collect();
+) -> CalibrationReport {
+    let forces: Vec<f64> = pairs.iter().map(|p| p.force_n).collect();
     let full_scale = full_scale(&forces);
-    let cast = |values: &[f64]| values.iter().map(|&v| T::nearest(v)).collect();
+    let cast = |values: &[f64]| values.iter().map(|&v| v).collect();
     CalibrationReport {
         pairs: pairs.len(),
         intervals_95: parameters.intervals(),
@@ -169,17 +139,17 @@ pub(super) fn build<T: Real>(
         parameters: parameters
             .estimates
             .iter()
-            .map(|(c, v)| Estimate::nearest(*c, *v))
+            .map(|(c, v)| Estimate::from_variance(*c, *v))
             .collect(),
-        r_squared: T::nearest(r_squared(&forces, &fit.residuals)),
-        residual_sd_n: T::nearest(fit.residual_sd),
+        r_squared: r_squared(&forces, &fit.residuals),
+        residual_sd_n: fit.residual_sd,
         residuals_n: cast(&fit.residuals),
         weights: cast(&fit.weights),
         hysteresis: hysteresis(pairs, &fit.residuals, full_scale),
-        linearity_error: T::nearest(shape.linearity_error),
-        sensitivity_n: T::nearest(shape.sensitivity),
-        smallest_force_n: T::nearest(3.0 * fit.residual_sd),
-        full_scale_n: T::nearest(full_scale),
+        linearity_error: shape.linearity_error,
+        sensitivity_n: shape.sensitivity,
+        smallest_force_n: 3.0 * fit.residual_sd,
+        full_scale_n: full_scale,
         monotone: shape.monotone,
         iterations: fit.iterations,
         stop: fit.stop,
@@ -195,47 +165,25 @@ fn r_squared(forces: &[f64], residuals: &[f64]) -> f64 {
 }
 
 pub(super) fn full_scale(forces: &[f64]) -> f64 {
-    let least = forces.iter().copied().fold(f64::INFINITY, f64::min);
-    forces.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
+    let [least, greatest] = extremes(forces);
+    greatest - least
 }
 
-/// Greatest distance of a curve from the least-squares line of its data, over the full scale.
-pub(super) fn linearity_error(
-    values: &[f64],
-    forces: &[f64],
-    grid: &[f64],
-    curve: impl Fn(f64) -> f64,
-) -> Result<f64, ForceError> {
-    let middle = values.iter().sum::<f64>() / values.len() as f64;
-    let half = values
-        .iter()
-        .map(|v| (v - middle).abs())
-        .fold(0.0, f64::max);
-    let design = DMatrix::from_fn(values.len(), 2, |i, j| {
-        if j == 0 {
-            1.0
-        } else {
-            (values[i] - middle) / half
-        }
-    });
-    let line = least_squares::solve(&design, forces, Robustness::None)?.coefficients;
-    let distance = |v: &f64| (curve(*v) - line[0] - line[1] * (v - middle) / half).abs();
-    Ok(grid.iter().map(distance).fold(0.0, f64::max) / full_scale(forces))
+pub(super) fn extremes(values: &[f64]) -> [f64; 2] {
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    [least, greatest]
 }
 
 /// Compares the residuals of each branch with the other branch's, interpolated at the same pixel value. Residuals are
 /// nearly flat where forces are steep, so that interpolation adds next to nothing.
-fn hysteresis<T: Real>(
-    pairs: &[CalibrationPair<T>],
-    residuals: &[f64],
-    full_scale: f64,
-) -> Option<Hysteresis<T>> {
+fn hysteresis(pairs: &[CalibrationPair], residuals: &[f64], full_scale: f64) -> Option<Hysteresis> {
     let branch = |wanted: Branch| {
         let mut points: Vec<(f64, f64)> = pairs
             .iter()
             .zip(residuals)
             .filter(|(p, _)| p.branch == wanted)
-            .map(|(p, &r)| (p.integrated_pixel_value.as_f64(), r))
+            .map(|(p, &r)| (p.integrated_pixel_value, r))
             .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
@@ -257,10 +205,10 @@ fn hysteresis<T: Real>(
     let variance =
         differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0) / n;
     Some(Hysteresis {
-        greatest_n: T::nearest(greatest),
-        mean_n: Estimate::nearest(mean, variance),
-        width_n: T::nearest(width(mean, variance)),
-        share_of_full_scale: T::nearest(greatest.abs() / full_scale),
+        greatest_n: greatest,
+        mean_n: Estimate::from_variance(mean, variance),
+        width_n: width(mean, variance),
+        share_of_full_scale: greatest.abs() / full_scale,
     })
 }
 

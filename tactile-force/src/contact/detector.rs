@@ -12,8 +12,9 @@ use super::workspace::DetectorWorkspace;
 use super::{Contact, ContactOptions, Detection};
 use crate::drift::{self, DriftCorrection, IlluminationDrift};
 use crate::error::ForceError;
-use crate::estimate::{Estimate, Real};
-use crate::frame::{BoundingBox, DifferenceNoise, ReferenceFrame, TILE_COLUMNS};
+use crate::frame::{DifferenceNoise, ReferenceFrame, TILE_COLUMNS};
+use tactile_core::BoundingBox;
+use tactile_core::Estimate;
 
 /// Finds the contact in frames of one sensor.
 ///
@@ -26,7 +27,7 @@ use crate::frame::{BoundingBox, DifferenceNoise, ReferenceFrame, TILE_COLUMNS};
 /// frame.slice_mut(ndarray::s![20..30, 30..44]).fill(90);
 /// let detector = ContactDetector::new(ContactOptions::default());
 /// let mut workspace = DetectorWorkspace::default();
-/// let found = detector.detect_with::<f64>(&mut workspace, frame.view(), &reference)?;
+/// let found = detector.detect_with(&mut workspace, frame.view(), &reference)?;
 /// let contact = found.contact.expect("a bright patch");
 /// assert_eq!(contact.area_px, 140);
 /// assert_eq!(contact.centroid_px[0].value, 36.5);
@@ -47,12 +48,12 @@ impl ContactDetector {
     ///
     /// # Errors
     /// The frame has not the reference's size, or too much of the contact is saturated.
-    pub fn detect_with<T: Real>(
+    pub fn detect_with(
         &self,
         workspace: &mut DetectorWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-    ) -> Result<Detection<T>, ForceError> {
+    ) -> Result<Detection, ForceError> {
         reference.check(frame)?;
         workspace.region.place = None;
         let sd = reference.difference_variance().sqrt();
@@ -168,7 +169,7 @@ impl ContactDetector {
         let DetectorWorkspace { region, noise, .. } = workspace;
         let (x, y) = region
             .bounds(&region.mask)
-            .map_or((0.0, 0.0), |b| b.middle());
+            .map_or((0.0, 0.0), |b| b.centre());
         // Flattening divides signal and noise alike.
         let (light, uncertain) = reference
             .flat_field()
@@ -224,7 +225,7 @@ impl ContactDetector {
 }
 
 /// The contact of a region.
-fn summarise<T: Real>(
+fn summarise(
     region: &Region,
     sums: &Sums,
     extent: Extent,
@@ -232,7 +233,7 @@ fn summarise<T: Real>(
     saturated_px: usize,
     size: (usize, usize),
     noise: &DifferenceNoise,
-) -> Contact<T> {
+) -> Contact {
     let whole = BoundingBox {
         row_start: 0,
         row_end: size.0,
@@ -243,15 +244,15 @@ fn summarise<T: Real>(
     let local = sums.centroid();
     let origin = [place.column_start as f64, place.row_start as f64];
     let centroid =
-        |k: usize| Estimate::nearest(origin[k] + local[k], sums.centroid_variance(k, noise));
+        |k: usize| Estimate::from_variance(origin[k] + local[k], sums.centroid_variance(k, noise));
     let aperture = region.bounds(&region.aperture).unwrap_or(place);
     Contact {
         bounding_box: region.bounds(&region.mask).unwrap_or(place),
         area_px: extent.area,
-        equivalent_radius_px: T::nearest((extent.area as f64 / std::f64::consts::PI).sqrt()),
-        integrated_pixel_value: Estimate::nearest(sums.sum(), sums.variance(noise)),
+        equivalent_radius_px: (extent.area as f64 / std::f64::consts::PI).sqrt(),
+        integrated_pixel_value: Estimate::from_variance(sums.sum(), sums.variance(noise)),
         centroid_px: [centroid(0), centroid(1)],
-        peak: T::nearest(f64::from(peak)),
+        peak: f64::from(peak),
         aperture_px: region.aperture.iter().map(Run::len).sum(),
         saturated_px,
         other_contacts: extent.others,

@@ -3,8 +3,9 @@
 use ndarray::ArrayView2;
 
 use crate::drift::{DriftLine, IlluminationDrift};
-use crate::frame::{BoundingBox, FlatField, FlatLine, Levels};
+use crate::frame::{FlatField, FlatLine, Levels};
 use crate::simd::vectorized;
+use tactile_core::BoundingBox;
 
 /// The rows of a box, and how their differences are corrected.
 pub(super) struct Rows<'a> {

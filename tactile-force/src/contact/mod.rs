@@ -26,42 +26,9 @@ pub(crate) use region::Region;
 pub(crate) use runs::Run;
 
 use crate::drift::IlluminationDrift;
-use crate::estimate::Estimate;
-use crate::frame::{BoundingBox, DifferenceNoise, FrameStatistics};
-
-/// Whether pressing makes the image brighter (light leaks out) or darker (light is blocked).
-///
-/// ```
-/// use ndarray::Array2;
-/// use tactile_force::{ContactDetector, ContactOptions, Detection, Polarity, ReferenceFrame};
-///
-/// let mut frame = Array2::from_elem((64, 64), 120_u8);
-/// let reference = ReferenceFrame::new(frame.view())?;
-/// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(60);
-/// let options = ContactOptions::default().with_polarity(Polarity::Darker);
-/// let found: Detection<f64> =
-///     ContactDetector::new(options).detect_with(&mut Default::default(), frame.view(), &reference)?;
-/// assert_eq!(found.contact.map(|c| c.integrated_pixel_value.value), Some(400.0 * 60.0));
-/// # Ok::<(), tactile_force::ForceError>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Polarity {
-    /// Contact is brighter than the reference.
-    #[default]
-    Brighter,
-    /// Contact is darker than the reference.
-    Darker,
-}
-
-impl Polarity {
-    pub(crate) fn sign(self) -> i32 {
-        match self {
-            Self::Brighter => 1,
-            Self::Darker => -1,
-        }
-    }
-}
+use crate::frame::{DifferenceNoise, FrameStatistics};
+use tactile_core::BoundingBox;
+use tactile_core::Estimate;
 
 /// One contact. Its mask stays in the workspace.
 ///
@@ -73,7 +40,7 @@ impl Polarity {
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
 /// frame[[30, 30]] = 255;
-/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())
+/// let found: Detection = ContactDetector::new(ContactOptions::default())
 ///     .detect_with(&mut Default::default(), frame.view(), &reference)?;
 /// let contact = found.contact.expect("contact");
 /// assert_eq!((contact.area_px, contact.peak, contact.touches_edge), (400, 243.0, false));
@@ -82,19 +49,19 @@ impl Polarity {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Contact<T> {
+pub struct Contact {
     /// Box around the mask.
     pub bounding_box: BoundingBox,
     /// Number of pixels of the mask.
     pub area_px: usize,
     /// Radius of the circle of the mask's area, √(area/π), in pixels.
-    pub equivalent_radius_px: T,
+    pub equivalent_radius_px: f64,
     /// Σ d over the aperture, positive for contact of either polarity.
-    pub integrated_pixel_value: Estimate<T>,
+    pub integrated_pixel_value: Estimate,
     /// Intensity centroid [x, y] in pixels, equations (7) and (8).
-    pub centroid_px: [Estimate<T>; 2],
+    pub centroid_px: [Estimate; 2],
     /// Greatest difference inside the mask.
-    pub peak: T,
+    pub peak: f64,
     /// Number of pixels of the aperture.
     pub aperture_px: usize,
     /// Saturated pixels of the mask (255 if brighter, 0 if darker).
@@ -113,7 +80,7 @@ pub struct Contact<T> {
 ///
 /// let at_rest = Array2::from_elem((64, 64), 12_u8);
 /// let reference = ReferenceFrame::new(at_rest.view())?;
-/// let found: Detection<f64> = ContactDetector::new(ContactOptions::default())
+/// let found: Detection = ContactDetector::new(ContactOptions::default())
 ///     .detect_with(&mut Default::default(), at_rest.view(), &reference)?;
 /// assert!(found.contact.is_none() && found.noise.is_none());
 /// assert_eq!(found.statistics.sum, 0);
@@ -121,7 +88,7 @@ pub struct Contact<T> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Detection<T> {
+pub struct Detection {
     /// Sums over the whole frame.
     pub statistics: FrameStatistics,
     /// The correction of illumination and stray light.
@@ -129,5 +96,5 @@ pub struct Detection<T> {
     /// The noise that the errors are computed from; `None` without contact.
     pub noise: Option<DifferenceNoise>,
     /// The contact, if there is one.
-    pub contact: Option<Contact<T>>,
+    pub contact: Option<Contact>,
 }

@@ -1,8 +1,9 @@
 //! The options of contact detection.
 
-use super::Polarity;
 use crate::drift::DriftCorrection;
-use crate::error::{ForceError, Requirement};
+use crate::error::ForceError;
+use tactile_core::Polarity;
+use tactile_core::Requirement;
 
 /// The options of contact detection.
 ///

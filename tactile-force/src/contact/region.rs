@@ -6,8 +6,9 @@ use super::differences;
 use super::every_nth::EveryNth;
 use super::runs::{self, Components, Run, push_runs};
 use crate::drift::IlluminationDrift;
-use crate::frame::{BoundingBox, ReferenceFrame};
+use crate::frame::ReferenceFrame;
 use crate::simd::vectorized;
+use tactile_core::BoundingBox;
 
 /// Differences over one box, row-major, and the contact in it as runs.
 #[derive(Clone, Debug, Default)]

@@ -3,7 +3,8 @@
 use super::ContactDetector;
 use super::threshold::quantile;
 use crate::drift::IlluminationDrift;
-use crate::frame::{BoundingBox, FrameStatistics, PassWorkspace, ReferenceFrame, Tiles};
+use crate::frame::{FrameStatistics, PassWorkspace, ReferenceFrame, Tiles};
+use tactile_core::BoundingBox;
 
 impl ContactDetector {
     /// Box around every tile whose sum exceeds its noise, and every pixel that exceeds its own.

@@ -6,8 +6,9 @@ use super::noise::NoiseWorkspace;
 use super::region::Region;
 use crate::calibration::GreyHistogram;
 use crate::drift::FitWorkspace;
-use crate::frame::{BoundingBox, PassWorkspace, ReferenceFrame};
+use crate::frame::{PassWorkspace, ReferenceFrame};
 use crate::health::FrameCondition;
+use tactile_core::BoundingBox;
 
 /// Buffers that detection reuses from frame to frame.
 ///
@@ -20,7 +21,7 @@ use crate::health::FrameCondition;
 /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
 /// frame.slice_mut(ndarray::s![28..32, 28..32]).fill(12); // a hole, which is filled
 /// let mut workspace = DetectorWorkspace::default();
-/// let _: Detection<f64> = ContactDetector::new(ContactOptions::default())
+/// let _: Detection = ContactDetector::new(ContactOptions::default())
 ///     .detect_with(&mut workspace, frame.view(), &reference)?;
 /// let (_, mask) = workspace.mask().expect("contact");
 /// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 400);
@@ -56,7 +57,7 @@ impl DetectorWorkspace {
     /// let mut workspace = DetectorWorkspace::default();
     /// assert!(workspace.condition(&reference).is_none(), "no frame yet");
     /// # let dimmed = Array2::from_elem((160, 160), 49_u8);
-    /// let _: Detection<f64> =
+    /// let _: Detection =
     ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, dimmed.view(), &reference)?;
     /// let condition = workspace.condition(&reference).expect("a frame");
     /// assert!((condition.brightness.value - 0.98).abs() < 1e-9);
@@ -81,7 +82,7 @@ impl DetectorWorkspace {
     /// let reference = ReferenceFrame::new(frame.view())?;
     /// frame.slice_mut(ndarray::s![20..40, 20..40]).fill(90);
     /// let mut workspace = DetectorWorkspace::default();
-    /// let found: Detection<f64> =
+    /// let found: Detection =
     ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, frame.view(), &reference)?;
     /// let histogram = workspace.grey_histogram(4e-10).expect("a contact");
     /// let sum = found.contact.expect("a contact").integrated_pixel_value.value;

@@ -6,9 +6,9 @@
 
 use std::ops::Range;
 
-use super::statistics::BoundingBox;
 use super::tiles::{TILE_COLUMNS, Tiles};
 use crate::simd::vectorized;
+use tactile_core::BoundingBox;
 
 /// An image in standard layout with its tiles.
 #[derive(Clone, Copy)]

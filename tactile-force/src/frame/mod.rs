@@ -13,7 +13,7 @@ mod tiles;
 pub use flat_field::FlatField;
 pub use noise::{DifferenceNoise, NoiseModel};
 pub use reference::ReferenceFrame;
-pub use statistics::{BoundingBox, FrameStatistics};
+pub use statistics::FrameStatistics;
 
 pub(crate) use flat_field::FlatLine;
 pub(crate) use noise::trimmed_variance;

@@ -3,7 +3,8 @@
 use ndarray::ArrayView2;
 use pulp::Arch;
 
-use crate::error::{ForceError, Requirement};
+use crate::error::ForceError;
+use tactile_core::Requirement;
 
 /// Variance of one pixel of one frame: read variance + gain × grey level, in squared grey levels.
 ///

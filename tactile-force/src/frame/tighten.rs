@@ -1,8 +1,8 @@
 //! The box of the pixels above a threshold, within a box of whole tiles.
 
-use super::statistics::BoundingBox;
 use super::tiles::TILE_COLUMNS;
 use crate::simd::vectorized;
+use tactile_core::BoundingBox;
 
 /// Shrinks a box of whole tiles to the pixels with |frame − reference| > threshold, side by side. Both images lie in memory row by row.
 pub(super) fn tighten(

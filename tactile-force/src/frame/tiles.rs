@@ -1,6 +1,6 @@
 //! Sums over tiles of 8 rows by 32 columns: signals fainter than the noise of one pixel show in them.
 
-use super::statistics::BoundingBox;
+use tactile_core::BoundingBox;
 
 /// Rows of a tile.
 pub(crate) const TILE_ROWS: usize = 8;

@@ -1,8 +1,8 @@
 //! Brightness and noise of a frame outside the contact.
 
 use crate::drift::{DriftCorrection, FitWorkspace, IlluminationDrift, fit, median};
-use crate::estimate::Estimate;
 use crate::frame::TileSum;
+use tactile_core::Estimate;
 
 /// The state of a sensor as one frame shows it outside the contact.
 ///
@@ -13,7 +13,7 @@ use crate::frame::TileSum;
 /// let reference = ReferenceFrame::new(Array2::from_elem((160, 160), 50_u8).view())?;
 /// let frame = Array2::from_elem((160, 160), 51_u8);
 /// let mut workspace = DetectorWorkspace::default();
-/// let _: Detection<f64> =
+/// let _: Detection =
 ///     ContactDetector::new(ContactOptions::default()).detect_with(&mut workspace, frame.view(), &reference)?;
 /// let condition = workspace.condition(&reference).expect("a frame of that size");
 /// assert!((condition.brightness.value - 1.02).abs() < 1e-9);
@@ -24,7 +24,7 @@ use crate::frame::TileSum;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrameCondition {
     /// Background relative to the reference's: illumination times the camera's gain.
-    pub brightness: Estimate<f64>,
+    pub brightness: Estimate,
     /// Mean grey level of the background.
     pub background_grey: f64,
     /// Scatter of the background over what the reference's noise explains, as a ratio of standard deviations.
@@ -93,11 +93,8 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
     }
 }
 
-fn brightness(drift: &IlluminationDrift) -> Estimate<f64> {
-    Estimate {
-        value: drift.coefficients[0],
-        standard_error: drift.standard_error,
-    }
+fn brightness(drift: &IlluminationDrift) -> Estimate {
+    Estimate::new(drift.coefficients[0], drift.standard_error)
 }
 
 /// A tile within five standard deviations of the fitted brightness is background.

@@ -2,7 +2,8 @@
 
 use super::FrameCondition;
 use super::cusum::Cusum;
-use crate::error::{ForceError, Requirement};
+use crate::error::ForceError;
+use tactile_core::Requirement;
 
 /// What counts as a change, and how often a healthy sensor may be suspected.
 ///
@@ -85,7 +86,7 @@ impl HealthOptions {
 /// use tactile_force::{Estimate, FrameCondition, HealthMonitor, HealthOptions, ChartState};
 ///
 /// let mut monitor = HealthMonitor::new(HealthOptions::default());
-/// let brightness = Estimate { value: 1.0, standard_error: 1e-3 };
+/// let brightness = Estimate::new(1.0, 1e-3);
 /// let report = monitor.update(&FrameCondition { brightness, background_grey: 40.0, noise_ratio: 1.0 });
 /// assert_eq!(report.brightness, ChartState::Learning);
 /// ```
@@ -147,7 +148,7 @@ impl HealthReport {
 /// let mut frame = |k: u32, gain: f64| {
 ///     let flicker = 0.004 * (f64::from(k) * 2.3).sin();
 ///     monitor.update(&FrameCondition {
-///         brightness: Estimate { value: gain * (1.0 + flicker), standard_error: 1e-4 },
+///         brightness: Estimate::new(gain * (1.0 + flicker), 1e-4),
 ///         background_grey: 40.0,
 ///         noise_ratio: 1.0 + 0.02 * (f64::from(k) * 1.7).sin(),
 ///     })

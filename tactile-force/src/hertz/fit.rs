@@ -7,9 +7,9 @@ use super::profile::{Shape, level};
 use super::rings::Rings;
 use super::variance::PixelVariance;
 use super::{HertzFit, HertzFitOptions};
-use crate::calibration::StopReason;
 use crate::contact::Region;
-use crate::estimate::{Estimate, Real};
+use tactile_core::Estimate;
+use tactile_core::StopReason;
 
 /// Variance along one axis of a position spread evenly over a pixel.
 const PIXEL: f64 = 1.0 / 12.0;
@@ -70,14 +70,14 @@ impl HertzFitter {
     }
 
     /// Fits the aperture's pixels. `None` if they do not determine the parameters.
-    pub(crate) fn fit_with<T: Real>(
+    pub(crate) fn fit_with(
         &self,
         rings: &mut Rings,
         region: &Region,
         start: Start,
         variance: PixelVariance<'_>,
         pixel_size_m: [f64; 2],
-    ) -> Option<HertzFit<T>> {
+    ) -> Option<HertzFit> {
         let place = region.place?;
         let aspect = pixel_size_m[1] / pixel_size_m[0];
         let blur = self.options.blur_px.map_or(0.5, |b| b * b) + PIXEL;
@@ -274,35 +274,34 @@ impl HertzFitter {
         Some((covariance, reduced))
     }
 
-    fn report<T: Real>(
+    fn report(
         &self,
         state: &State,
         equations: &Equations,
         misfit: Misfit,
         origin: [f64; 2],
         pixel_size_m: [f64; 2],
-    ) -> Option<HertzFit<T>> {
+    ) -> Option<HertzFit> {
         let aspect = pixel_size_m[1] / pixel_size_m[0];
         let (covariance, reduced) = self.covariance(state, equations, aspect)?;
         let s = &state.shape;
-        let radius_px = Estimate::<T>::nearest(s.radius, covariance[(2, 2)]);
-        let centre =
-            |k: usize| Estimate::nearest(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)]);
+        let radius_px = Estimate::from_variance(s.radius, covariance[(2, 2)]);
+        let centre = |k: usize| {
+            Estimate::from_variance(origin[k] + state.centre[k], covariance[(4 + k, 4 + k)])
+        };
         Some(HertzFit {
             centre_px: [centre(0), centre(1)],
             radius_px,
-            radius_m: radius_px * T::nearest(pixel_size_m[0]),
-            peak: Estimate::nearest(s.peak, covariance[(0, 0)]),
-            background: Estimate::nearest(s.background, covariance[(1, 1)]),
-            blur_px: T::nearest((s.blur - PIXEL).max(0.0).sqrt()),
-            bend: Estimate::nearest(s.bend, covariance[(BEND, BEND)]),
+            radius_m: radius_px * pixel_size_m[0],
+            peak: Estimate::from_variance(s.peak, covariance[(0, 0)]),
+            background: Estimate::from_variance(s.background, covariance[(1, 1)]),
+            blur_px: (s.blur - PIXEL).max(0.0).sqrt(),
+            bend: Estimate::from_variance(s.bend, covariance[(BEND, BEND)]),
             integrated_pixel_value: integral(s, &covariance, aspect),
-            covariance: std::array::from_fn(|i| {
-                std::array::from_fn(|j| T::nearest(covariance[(i, j)]))
-            }),
-            reduced_chi_squared: T::nearest(reduced),
-            radial_misfit: T::nearest(misfit.radial),
-            azimuthal_misfit: T::nearest(misfit.azimuthal),
+            covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+            reduced_chi_squared: reduced,
+            radial_misfit: misfit.radial,
+            azimuthal_misfit: misfit.azimuthal,
             shape: misfit.shape,
             iterations: state.iterations,
             stop: state.stop,
@@ -311,7 +310,7 @@ impl HertzFitter {
 }
 
 /// Integral of the profile, 2π/3 A a² (1 − 2c/5) over a pixel's area, and its error.
-fn integral<T: Real>(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate<T> {
+fn integral(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate {
     let hertz = 2.0 / 3.0 * std::f64::consts::PI / aspect * s.radius;
     let volume = hertz * (1.0 - 0.4 * s.bend);
     let (by_peak, by_radius) = (volume * s.radius, 2.0 * volume * s.peak);
@@ -321,7 +320,7 @@ fn integral<T: Real>(s: &Shape, covariance: &Normal, aspect: f64) -> Estimate<T>
         + by_radius * by_radius * covariance[(2, 2)];
     variance += by_bend * by_bend * covariance[(BEND, BEND)]
         + 2.0 * by_bend * (by_peak * covariance[(0, BEND)] + by_radius * covariance[(2, BEND)]);
-    Estimate::nearest(volume * s.radius * s.peak, variance)
+    Estimate::from_variance(volume * s.radius * s.peak, variance)
 }
 
 /// Nothing moves by more than a millionth.

@@ -1,6 +1,7 @@
 //! The options of the profile fit.
 
-use crate::error::{ForceError, Requirement};
+use crate::error::ForceError;
+use tactile_core::Requirement;
 
 /// The parameters of the profile that are known, and the length of the fit.
 ///
@@ -9,7 +10,7 @@ use crate::error::{ForceError, Requirement};
 ///
 /// // A lens whose blur is known, over a background that is not.
 /// let hertz = HertzFitOptions::default().with_blur_px(1.2)?.with_fitted_background().with_max_iterations(20)?;
-/// assert!(ForceMeter::<f64>::new([20e-6; 2], &ForceOptions::default().with_hertz(hertz)).is_ok());
+/// assert!(ForceMeter::new([20e-6; 2], &ForceOptions::default().with_hertz(hertz)).is_ok());
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

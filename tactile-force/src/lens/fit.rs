@@ -3,9 +3,9 @@
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::LensGeometry;
-use crate::calibration::StopReason;
 use crate::error::ForceError;
-use crate::estimate::Estimate;
+use tactile_core::Estimate;
+use tactile_core::StopReason;
 
 /// A dot of a target: where the camera sees it, and where the target's drawing has it.
 ///
@@ -51,9 +51,9 @@ pub struct LensFit {
     /// The geometry.
     pub geometry: LensGeometry,
     /// Pixel sizes [h_x, h_y] in metres with their standard errors.
-    pub pixel_size_m: [Estimate<f64>; 2],
+    pub pixel_size_m: [Estimate; 2],
     /// Brown's coefficients [k₁, k₂] with their standard errors.
-    pub distortion: [Estimate<f64>; 2],
+    pub distortion: [Estimate; 2],
     /// Covariance of [h_x, h_y, k₁, k₂].
     pub covariance: [[f64; 4]; 4],
     /// Standard deviation of a dot's residual along one axis, in pixels.
@@ -274,7 +274,7 @@ impl Problem<'_> {
             .ok_or(ForceError::DegeneratePairs { span: 0.0 })?;
         let covariance: [[f64; 4]; 4] =
             std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)] * variance));
-        let estimate = |k: usize| Estimate::nearest(parameters[k], covariance[k][k]);
+        let estimate = |k: usize| Estimate::from_variance(parameters[k], covariance[k][k]);
         Ok(LensFit {
             geometry,
             pixel_size_m: [estimate(0), estimate(1)],

@@ -4,7 +4,8 @@ mod fit;
 
 pub use fit::{DotPair, LensFit};
 
-use crate::error::{ForceError, Requirement};
+use crate::error::ForceError;
+use tactile_core::Requirement;
 
 /// The map from pixels to undistorted metres: pixel sizes h_x and h_y, and Brown's radial distortion about a centre c.
 ///

@@ -2,9 +2,9 @@
 
 use crate::calibration::{ForceReading, GreyHistogram, LocalCalibration};
 use crate::contact::{Contact, Region};
-use crate::estimate::{Estimate, Real};
 use crate::frame::DifferenceNoise;
 use crate::hertz::{LEVELS, PixelVariance};
+use tactile_core::Estimate;
 
 /// Steps of a grey level at which the curve is tabulated and pixels are counted: rounding to a sixteenth adds 2 % to the smallest
 /// variance that a grey level can have, that of rounding to whole ones.
@@ -17,9 +17,9 @@ const BLOCK: usize = 64;
 
 /// Force of a contact, and pascals per grey level of its integrated pixel value.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stress<T> {
-    pub(super) reading: ForceReading<T>,
-    pub(super) per_grey_pa: T,
+pub(super) struct Stress {
+    pub(super) reading: ForceReading,
+    pub(super) per_grey_pa: f64,
 }
 
 /// Buffers of the conversion, and its result for the last contact.
@@ -63,14 +63,14 @@ impl Local {
     }
 
     /// Reads the force off the histogram of the aperture and turns the aperture's differences into pressures.
-    pub(super) fn convert<T: Real>(
+    pub(super) fn convert(
         &mut self,
         curve: &dyn LocalCalibration,
         region: &mut Region,
-        contact: &Contact<T>,
+        contact: &Contact,
         noise: DifferenceNoise,
         pixel_area_m2: f64,
-    ) -> Stress<T> {
+    ) -> Stress {
         self.tabulate(curve);
         self.counts.clear();
         self.counts.resize(TABLE, 0);
@@ -95,12 +95,12 @@ impl Local {
                 .add_many(grey_at(k) as f32, f64::from(*count));
         }
         let reading = curve.read(&self.histogram, &noise);
-        let integral = contact.integrated_pixel_value.value.as_f64();
+        let integral = contact.integrated_pixel_value.value;
         let per_grey_pa = reading.force_n.value / (integral * pixel_area_m2);
-        self.converted = Some(self.variances(noise, contact.peak.as_f64(), per_grey_pa));
+        self.converted = Some(self.variances(noise, contact.peak, per_grey_pa));
         Stress {
             reading: rounded(reading),
-            per_grey_pa: T::nearest(per_grey_pa),
+            per_grey_pa: per_grey_pa,
         }
     }
 
@@ -158,15 +158,12 @@ fn grey_at(place: usize) -> f64 {
     f64::from(LEAST) + place as f64 / STEPS as f64
 }
 
-fn rounded<T: Real>(reading: ForceReading<f64>) -> ForceReading<T> {
+fn rounded(reading: ForceReading) -> ForceReading {
     ForceReading {
-        force_n: Estimate {
-            value: T::nearest(reading.force_n.value),
-            standard_error: T::nearest(reading.force_n.standard_error),
-        },
-        noise_n: T::nearest(reading.noise_n),
-        calibration_n: T::nearest(reading.calibration_n),
-        degrees_of_freedom: reading.degrees_of_freedom.map(T::nearest),
+        force_n: Estimate::new(reading.force_n.value, reading.force_n.standard_error),
+        noise_n: reading.noise_n,
+        calibration_n: reading.calibration_n,
+        degrees_of_freedom: reading.degrees_of_freedom,
         out_of_range: reading.out_of_range,
     }
 }

@@ -14,13 +14,14 @@ use ndarray::ArrayView2;
 
 use crate::calibration::StressCalibration;
 use crate::contact::{Contact, ContactDetector, Detection, Region};
-use crate::error::{ForceError, Requirement};
-use crate::estimate::{Estimate, Real};
+use crate::error::ForceError;
 use crate::frame::ReferenceFrame;
 use crate::hertz::{HertzFit, HertzFitter, Start};
 use crate::lens::LensGeometry;
 use local::Stress;
 use outcome::{contact_radius, mean_stress};
+use tactile_core::Estimate;
+use tactile_core::Requirement;
 
 /// Measures forces with one sensor: options checked and tables built once.
 ///
@@ -41,22 +42,22 @@ use outcome::{contact_radius, mean_stress};
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct ForceMeter<T> {
+pub struct ForceMeter {
     detector: ContactDetector,
     fitter: HertzFitter,
     skip_profile: bool,
-    pixel_size_m: [T; 2],
+    pixel_size_m: [f64; 2],
     lens: Option<LensGeometry>,
 }
 
-impl<T: Real> ForceMeter<T> {
+impl ForceMeter {
     /// A meter for pixels of the given size [x, y].
     ///
     /// # Errors
     /// A pixel size that is not positive and finite.
-    pub fn new(pixel_size_m: [T; 2], options: &ForceOptions) -> Result<Self, ForceError> {
+    pub fn new(pixel_size_m: [f64; 2], options: &ForceOptions) -> Result<Self, ForceError> {
         for size in pixel_size_m {
-            Requirement::Positive.check("pixel_size_m", size.as_f64())?;
+            Requirement::Positive.check("pixel_size_m", size)?;
         }
         Ok(Self {
             detector: ContactDetector::new(options.contact),
@@ -74,7 +75,7 @@ impl<T: Real> ForceMeter<T> {
     /// use tactile_force::{ForceMeter, LensGeometry};
     ///
     /// let lens = LensGeometry::new([21.6e-6, 22e-6])?.with_distortion([695.5, 520.5], 869.0, [0.03, 0.0])?;
-    /// let meter = ForceMeter::<f64>::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
+    /// let meter = ForceMeter::new(lens.pixel_size_m(), &Default::default())?.with_lens(lens);
     /// # let _ = meter;
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
@@ -88,7 +89,7 @@ impl<T: Real> ForceMeter<T> {
     /// ```
     /// use tactile_force::ForceMeter;
     ///
-    /// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?.without_profile();
+    /// let meter = ForceMeter::new([20e-6; 2], &Default::default())?.without_profile();
     /// # let _ = meter;
     /// # Ok::<(), tactile_force::ForceError>(())
     /// ```
@@ -107,8 +108,8 @@ impl<T: Real> ForceMeter<T> {
         workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        calibration: &(impl StressCalibration<T> + ?Sized),
-    ) -> Result<ForceMeasurement<T>, ForceError> {
+        calibration: &(impl StressCalibration + ?Sized),
+    ) -> Result<ForceMeasurement, ForceError> {
         let ForceWorkspace {
             detector,
             rings,
@@ -122,7 +123,7 @@ impl<T: Real> ForceMeter<T> {
         let pixel = self.pixel_at(&contact);
         let region = &mut detector.region;
         let stress = match calibration.local() {
-            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area.as_f64()),
+            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area),
             None => Stress {
                 reading: calibration.read(contact.integrated_pixel_value),
                 per_grey_pa: calibration
@@ -131,37 +132,37 @@ impl<T: Real> ForceMeter<T> {
         };
         let mut profile = None;
         if !self.skip_profile {
-            let integral = contact.integrated_pixel_value.value.as_f64();
+            let integral = contact.integrated_pixel_value.value;
             let levels = local.per_grey_pa().unwrap_or(1.0);
             let start = self.start(region, &contact, pixel, integral * levels);
             let variance = local.variance(&noise);
-            let sizes = pixel.step.map(T::as_f64);
+            let sizes = pixel.step;
             profile = start
                 .and_then(|start| self.fitter.fit_with(rings, region, start, variance, sizes))
-                .map(|fit: HertzFit<T>| match local.per_grey_pa() {
-                    Some(per_grey) => fit.with_levels_scaled(T::nearest(per_grey).recip()),
+                .map(|fit: HertzFit| match local.per_grey_pa() {
+                    Some(per_grey) => fit.with_levels_scaled(per_grey.recip()),
                     None => fit,
                 });
         }
         // A part of an outline, or one that noise has frayed, says nothing of its shape.
         let whole = !contact.touches_edge && contact.other_contacts == 0;
-        let clear = contact.peak.as_f64() > CLEAR * noise.background.sqrt();
+        let clear = contact.peak > CLEAR * noise.background.sqrt();
         let elongation = (whole && clear)
             .then(|| outline::elongation(&workspace.detector.region.mask, self.jacobian(&contact)))
             .flatten();
         Ok(ForceMeasurement {
-            elongation: elongation.map(T::nearest),
+            elongation: elongation,
             ..self.combine(found, contact, profile, stress, pixel)
         })
     }
 
     /// Metres [x, y] for a step of one pixel along x and along y at a contact, in rows.
-    fn jacobian(&self, contact: &Contact<T>) -> [[f64; 2]; 2] {
+    fn jacobian(&self, contact: &Contact) -> [[f64; 2]; 2] {
         let Some(lens) = &self.lens else {
-            let [hx, hy] = self.pixel_size_m.map(T::as_f64);
+            let [hx, hy] = self.pixel_size_m;
             return [[hx, 0.0], [0.0, hy]];
         };
-        let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
+        let [x, y] = contact.centroid_px.map(|c| c.value);
         let step = |from: [f64; 2], to: [f64; 2]| {
             let (from, to) = (lens.to_metres(from), lens.to_metres(to));
             [to[0] - from[0], to[1] - from[1]]
@@ -172,7 +173,7 @@ impl<T: Real> ForceMeter<T> {
     }
 
     /// The size of a pixel at a contact.
-    fn pixel_at(&self, contact: &Contact<T>) -> PixelSize<T> {
+    fn pixel_at(&self, contact: &Contact) -> PixelSize {
         let Some(lens) = &self.lens else {
             let [hx, hy] = self.pixel_size_m;
             return PixelSize {
@@ -180,11 +181,11 @@ impl<T: Real> ForceMeter<T> {
                 area: hx * hy,
             };
         };
-        let place = contact.centroid_px.map(|c| c.value.as_f64());
-        let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px.as_f64());
+        let place = contact.centroid_px.map(|c| c.value);
+        let area = lens.mean_pixel_area_m2(place, contact.equivalent_radius_px);
         PixelSize {
-            step: lens.pixel_step_m(place).map(T::nearest),
-            area: T::nearest(area),
+            step: lens.pixel_step_m(place),
+            area: area,
         }
     }
 
@@ -192,28 +193,28 @@ impl<T: Real> ForceMeter<T> {
     fn start(
         &self,
         region: &Region,
-        contact: &Contact<T>,
-        pixel: PixelSize<T>,
+        contact: &Contact,
+        pixel: PixelSize,
         integral: f64,
     ) -> Option<Start> {
         let place = region.place?;
-        let [x, y] = contact.centroid_px.map(|c| c.value.as_f64());
-        let [hx, hy] = pixel.step.map(T::as_f64);
+        let [x, y] = contact.centroid_px.map(|c| c.value);
+        let [hx, hy] = pixel.step;
         Some(Start {
             centre: [x - place.column_start as f64, y - place.row_start as f64],
-            radius: contact.equivalent_radius_px.as_f64() * (hy / hx).sqrt(),
+            radius: contact.equivalent_radius_px * (hy / hx).sqrt(),
             integral,
         })
     }
 
     fn combine(
         &self,
-        found: Detection<T>,
-        contact: Contact<T>,
-        profile: Option<HertzFit<T>>,
-        stress: Stress<T>,
-        pixel: PixelSize<T>,
-    ) -> ForceMeasurement<T> {
+        found: Detection,
+        contact: Contact,
+        profile: Option<HertzFit>,
+        stress: Stress,
+        pixel: PixelSize,
+    ) -> ForceMeasurement {
         let Stress {
             reading,
             per_grey_pa,
@@ -222,28 +223,25 @@ impl<T: Real> ForceMeter<T> {
         let mut centroid_m = [x * pixel.step[0], y * pixel.step[1]];
         let mut profile = profile;
         if let Some(lens) = &self.lens {
-            let aspect = (pixel.step[1] / pixel.step[0]).as_f64();
+            let aspect = pixel.step[1] / pixel.step[0];
             let seen = profile.map_or(contact.equivalent_radius_px, |p| p.radius_px.value);
-            let centre = [x.value.as_f64(), y.value.as_f64()];
-            let (place, radius_m) = lens.contact_m(centre, seen.as_f64(), aspect);
-            centroid_m[0].value = T::nearest(place[0]);
-            centroid_m[1].value = T::nearest(place[1]);
+            let centre = [x.value, y.value];
+            let (place, radius_m) = lens.contact_m(centre, seen, aspect);
+            centroid_m[0].value = place[0];
+            centroid_m[1].value = place[1];
             if let Some(profile) = &mut profile {
-                let undistorted = T::nearest(radius_m) / profile.radius_m.value;
+                let undistorted = radius_m / profile.radius_m.value;
                 profile.radius_m = profile.radius_m * undistorted;
             }
         }
         let radius = contact_radius(&contact, profile, pixel.area.sqrt());
-        let brightest = Estimate {
-            value: contact.peak,
-            standard_error: T::one(),
-        };
+        let brightest = Estimate::new(contact.peak, 1.0);
         let peak = profile.map_or(brightest, |p| p.peak);
         ForceMeasurement {
             force_n: reading.force_n,
             reading: Some(reading),
             centroid_m: Some(centroid_m),
-            contact_area_m2: Some(T::nearest(contact.area_px as f64) * pixel.area),
+            contact_area_m2: Some((contact.area_px as f64) * pixel.area),
             contact_radius_m: Some(radius),
             mean_stress_pa: Some(mean_stress(reading.force_n, radius)),
             peak_stress_pa: Some(peak * per_grey_pa),
@@ -262,9 +260,9 @@ const CLEAR: f64 = 20.0;
 
 /// Steps [x, y] of a pixel in metres, and its area.
 #[derive(Clone, Copy, Debug)]
-struct PixelSize<T> {
-    step: [T; 2],
-    area: T,
+struct PixelSize {
+    step: [f64; 2],
+    area: f64,
 }
 
 /// Measures the force of one frame against one reference frame. For many frames keep a [`ForceMeter`], a
@@ -290,13 +288,13 @@ struct PixelSize<T> {
 /// assert!((measured.force_n.value - 2.51).abs() < 0.01);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
-pub fn measure_force<T: Real>(
+pub fn measure_force(
     frame: ArrayView2<'_, u8>,
     reference: ArrayView2<'_, u8>,
-    pixel_size_m: [T; 2],
-    calibration: &(impl StressCalibration<T> + ?Sized),
+    pixel_size_m: [f64; 2],
+    calibration: &(impl StressCalibration + ?Sized),
     options: &ForceOptions,
-) -> Result<ForceMeasurement<T>, ForceError> {
+) -> Result<ForceMeasurement, ForceError> {
     let meter = ForceMeter::new(pixel_size_m, options)?;
     let reference = ReferenceFrame::new(reference)?;
     meter.measure_with(

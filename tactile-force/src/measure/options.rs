@@ -1,7 +1,8 @@
 //! The options of a force measurement.
 
-use crate::contact::{ContactOptions, Polarity};
+use crate::contact::ContactOptions;
 use crate::hertz::HertzFitOptions;
+use tactile_core::Polarity;
 
 /// The options of a force measurement.
 ///
@@ -12,7 +13,7 @@ use crate::hertz::HertzFitOptions;
 /// let contact = ContactOptions::default().with_false_alarm_rate(1e-6)?;
 /// let options = ForceOptions::default().with_contact(contact).without_profile();
 /// assert_eq!(options.polarity(), Polarity::Brighter);
-/// assert!(ForceMeter::<f64>::new([20e-6; 2], &options).is_ok());
+/// assert!(ForceMeter::new([20e-6; 2], &options).is_ok());
 /// // The profile over a background that is fitted too.
 /// let hertz = HertzFitOptions::default().with_fitted_background();
 /// assert_ne!(ForceOptions::default().with_hertz(hertz), ForceOptions::default());

@@ -4,8 +4,8 @@ use ndarray::Array2;
 
 use super::local::Local;
 use crate::contact::DetectorWorkspace;
-use crate::frame::BoundingBox;
 use crate::hertz::Rings;
+use tactile_core::BoundingBox;
 
 /// Buffers that measurements reuse from frame to frame; after the first frames nothing is allocated.
 ///
@@ -19,7 +19,7 @@ use crate::hertz::Rings;
 /// let reference = ReferenceFrame::new(frame.view())?;
 /// frame.slice_mut(ndarray::s![20..40, 24..48]).fill(90);
 /// let mut workspace = ForceWorkspace::default();
-/// let meter = ForceMeter::<f64>::new([20e-6; 2], &Default::default())?;
+/// let meter = ForceMeter::new([20e-6; 2], &Default::default())?;
 /// meter.measure_with(&mut workspace, frame.view(), &reference, &calibration)?;
 /// let (place, mask) = workspace.detector.mask().expect("contact");
 /// assert_eq!(mask.iter().filter(|inside| **inside == 1).count(), 20 * 24);

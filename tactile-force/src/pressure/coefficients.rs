@@ -3,8 +3,9 @@
 use super::basis::{Basis, KNOTS, Knots};
 use super::nonnegative::Normal;
 #[cfg(feature = "serde")]
-use crate::error::{ForceError, Requirement};
-use crate::estimate::Estimate;
+use crate::error::ForceError;
+use tactile_core::Estimate;
+use tactile_core::Requirement;
 
 /// Slopes at the knots in Pa per grey level, and their covariance.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,9 +40,9 @@ impl Coefficients {
         Ok(self)
     }
 
-    pub(super) fn pressure_pa(&self, grey: f64) -> Estimate<f64> {
+    pub(super) fn pressure_pa(&self, grey: f64) -> Estimate {
         let row = self.basis.integrals(grey);
-        Estimate::nearest(row.dot(&self.slopes()), self.variance(&row))
+        Estimate::from_variance(row.dot(&self.slopes()), self.variance(&row))
     }
 
     /// Slopes at the knots.

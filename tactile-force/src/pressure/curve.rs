@@ -6,11 +6,11 @@ use super::fit;
 use super::{CalibrationFrame, PressureCurveOptions, PressureCurveReport};
 use crate::calibration::{
     CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, GreyHistogram,
-    LocalCalibration, MonotoneCalibration, StressCalibration,
+    LinearCalibration, LocalCalibration, StressCalibration,
 };
 use crate::error::ForceError;
-use crate::estimate::Estimate;
 use crate::frame::DifferenceNoise;
+use tactile_core::Estimate;
 
 /// The local light-to-pressure curve f of (5): pressure in pascals of a pixel's grey-level difference.
 ///
@@ -54,8 +54,8 @@ pub struct PressureCurve {
     coefficients: Coefficients,
     /// How well the curve fits its frames, and which grey levels these determine.
     pub report: PressureCurveReport,
-    /// F(V) of the same frames.
-    sums: MonotoneCalibration<f64>,
+    /// F(V) of the same frames, for integrated pixel values without a frame.
+    sums: LinearCalibration,
 }
 
 /// A curve as a file has it.
@@ -65,7 +65,7 @@ pub struct PressureCurve {
 struct Unchecked {
     coefficients: Coefficients,
     report: PressureCurveReport,
-    sums: MonotoneCalibration<f64>,
+    sums: LinearCalibration,
 }
 
 #[cfg(feature = "serde")]
@@ -98,7 +98,7 @@ impl PressureCurve {
         };
         let pairs: Vec<_> = frames.iter().map(pair).collect();
         let options = CalibrationOptions::default().with_zero_at_origin();
-        let sums = MonotoneCalibration::fit(&pairs, &options)?;
+        let sums = LinearCalibration::fit(&pairs, &options)?;
         Ok(Self {
             coefficients,
             report,
@@ -108,7 +108,7 @@ impl PressureCurve {
 }
 
 impl LocalCalibration for PressureCurve {
-    fn pressure_pa(&self, grey: f64) -> Estimate<f64> {
+    fn pressure_pa(&self, grey: f64) -> Estimate {
         self.coefficients.pressure_pa(grey)
     }
 
@@ -117,7 +117,7 @@ impl LocalCalibration for PressureCurve {
         c.basis.integrals(grey).dot(&c.slopes())
     }
 
-    fn read(&self, histogram: &GreyHistogram, noise: &DifferenceNoise) -> ForceReading<f64> {
+    fn read(&self, histogram: &GreyHistogram, noise: &DifferenceNoise) -> ForceReading {
         let c = &self.coefficients;
         let slopes = c.slopes();
         let mut row = Knots::zeros();
@@ -146,10 +146,7 @@ impl LocalCalibration for PressureCurve {
         let standard_error = noise_n.hypot(calibration_n);
         let share = (calibration_n / standard_error).powi(4);
         ForceReading {
-            force_n: Estimate {
-                value: force,
-                standard_error,
-            },
+            force_n: Estimate::new(force, standard_error),
             noise_n,
             calibration_n,
             degrees_of_freedom: (share > 0.0).then(|| c.degrees_of_freedom / share),
@@ -159,7 +156,7 @@ impl LocalCalibration for PressureCurve {
     }
 }
 
-impl StressCalibration<f64> for PressureCurve {
+impl StressCalibration for PressureCurve {
     fn force_n(&self, integrated_pixel_value: f64) -> f64 {
         self.sums.force_n(integrated_pixel_value)
     }
@@ -180,7 +177,7 @@ impl StressCalibration<f64> for PressureCurve {
         self.sums.range()
     }
 
-    fn report(&self) -> &CalibrationReport<f64> {
+    fn report(&self) -> &CalibrationReport {
         self.sums.report()
     }
 

@@ -7,7 +7,7 @@ use super::report::{CurveHysteresis, PressureCurveReport};
 use super::{CalibrationFrame, PressureCurveOptions};
 use crate::calibration::Branch;
 use crate::error::ForceError;
-use crate::estimate::Estimate;
+use tactile_core::Estimate;
 
 /// Fewest frames: five forces leave degrees of freedom beside a curve of three.
 const FEWEST_FRAMES: usize = 5;
@@ -204,16 +204,13 @@ impl Problem {
             }
             let scale = pf / pp;
             let variance = (ff - scale * pf).max(0.0) / f64::from(count - 1) / pp;
-            (count >= 3).then_some(Estimate {
-                value: scale,
-                standard_error: variance.sqrt(),
-            })
+            (count >= 3).then_some(Estimate::new(scale, variance.sqrt()))
         };
         let (loading, unloading) = (scale(Branch::Loading)?, scale(Branch::Unloading)?);
-        let relative = Estimate {
-            value: loading.value - unloading.value,
-            standard_error: loading.standard_error.hypot(unloading.standard_error),
-        };
+        let relative = Estimate::new(
+            loading.value - unloading.value,
+            loading.standard_error.hypot(unloading.standard_error),
+        );
         let excess = relative.value.powi(2) - relative.standard_error.powi(2);
         Some(CurveHysteresis {
             relative,

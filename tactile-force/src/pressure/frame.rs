@@ -1,7 +1,8 @@
 //! One frame of a calibration.
 
 use crate::calibration::{Branch, GreyHistogram};
-use crate::error::{ForceError, Requirement};
+use crate::error::ForceError;
+use tactile_core::Requirement;
 
 /// The grey histogram of a contact under a known force.
 ///

@@ -1,6 +1,7 @@
 //! The options of a curve's fit.
 
-use crate::error::{ForceError, Requirement};
+use crate::error::ForceError;
+use tactile_core::Requirement;
 
 /// The weights of the frames and the smoothness of the curve.
 ///

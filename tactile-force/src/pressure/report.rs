@@ -1,13 +1,13 @@
 //! The quality of a curve's fit.
 
-use crate::estimate::Estimate;
+use tactile_core::Estimate;
 
 /// The difference between the curves of loading and unloading.
 ///
 /// ```
 /// use tactile_force::{CurveHysteresis, Estimate};
 ///
-/// let lag = CurveHysteresis { relative: Estimate { value: 0.02, standard_error: 0.003 }, width: 0.0099 };
+/// let lag = CurveHysteresis { relative: Estimate::new(0.02, 0.003), width: 0.0099 };
 /// // Half of the difference, where it stands out of its error, is what a force of unknown branch is uncertain by.
 /// assert!(lag.width < 0.5 * lag.relative.value);
 /// ```
@@ -15,7 +15,7 @@ use crate::estimate::Estimate;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CurveHysteresis {
     /// (f_loading − f_unloading)/f, each branch scaled to its own frames.
-    pub relative: Estimate<f64>,
+    pub relative: Estimate,
     /// Half of the difference beyond its own error, √(relative² − error²)/2 or zero: the relative error of a force whose branch
     /// is unknown. Every reading includes it.
     pub width: f64,

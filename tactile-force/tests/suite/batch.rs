@@ -2,20 +2,15 @@
 
 use ndarray::{Array2, ArrayView2};
 use tactile_force::{
-    CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, HertzProfile,
-    LinearCalibration, PixelGrid, ReferenceFrame, measure_force,
+    CalibrationPair, ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, LinearCalibration,
+    ReferenceFrame, measure_force,
 };
 
+use crate::blob::hertz;
+
 fn frame(radius: f64, x: f64) -> Array2<u8> {
-    let grid = PixelGrid {
-        rows: 120,
-        columns: 150,
-        size: [1.0; 2],
-        first: [0.0; 2],
-    };
-    let blob =
-        HertzProfile::new([x, 61.3], radius, if radius > 1.0 { 140.0 } else { 0.0 }).unwrap();
-    let mut image = blob.image(&grid);
+    let peak = if radius > 1.0 { 140.0 } else { 0.0 };
+    let mut image = hertz((120, 150), [x, 61.3], radius, peak);
     image
         .indexed_iter_mut()
         .for_each(|((r, c), v)| *v += 20.0 + ((r * 7919 + c * 104_729) % 11) as f64 / 4.0);
@@ -37,7 +32,7 @@ fn the_same_bits_alone_in_series_and_in_parallel() {
     let calibration = LinearCalibration::fit(&pairs, &Default::default()).unwrap();
     let options = ForceOptions::default();
     let meter = ForceMeter::new([2e-5; 2], &options).unwrap();
-    let single: Vec<ForceMeasurement<f64>> = views
+    let single: Vec<ForceMeasurement> = views
         .iter()
         .map(|v| measure_force(v.view(), dark.view(), [2e-5; 2], &calibration, &options).unwrap())
         .collect();
@@ -61,7 +56,7 @@ fn the_same_bits_alone_in_series_and_in_parallel() {
     {
         let text = serde_json::to_string(&single).unwrap();
         assert_eq!(
-            serde_json::from_str::<Vec<ForceMeasurement<f64>>>(&text).unwrap(),
+            serde_json::from_str::<Vec<ForceMeasurement>>(&text).unwrap(),
             single
         );
     }

@@ -29,10 +29,7 @@ impl Stream {
             StandardNormal.sample(&mut self.rng),
         ];
         FrameCondition {
-            brightness: Estimate {
-                value: gain * (1.0 + self.sd * z[0]),
-                standard_error: self.sd,
-            },
+            brightness: Estimate::new(gain * (1.0 + self.sd * z[0]), self.sd),
             background_grey: 40.0 * gain,
             noise_ratio: noise * (1.0 + 0.02 * z[1]),
         }
@@ -118,7 +115,7 @@ fn frames_show_gain_background_and_noise_under_a_contact_too() {
     let mut workspace = DetectorWorkspace::default();
     let mut condition = |sensor: Sensor, force: f64, seed: u64| {
         let frame = sensor.frame(force, 2.5e-3, [121.3, 97.6], Branch::Loading, seed);
-        let _: Detection<f64> = detector
+        let _: Detection = detector
             .detect_with(&mut workspace, frame.view(), &reference)
             .unwrap();
         workspace.condition(&reference).unwrap()

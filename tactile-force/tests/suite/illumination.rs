@@ -10,10 +10,10 @@ use crate::simulated::{PIXEL_M, Sensor, contact_radius};
 fn measure(
     sensor: &Sensor,
     reference: &ReferenceFrame,
-    calibration: &dyn StressCalibration<f64>,
+    calibration: &dyn StressCalibration,
     (force, ball, seed): (f64, f64, u64),
     drift: DriftCorrection,
-) -> ForceMeasurement<f64> {
+) -> ForceMeasurement {
     let options = ForceOptions::default().with_contact(ContactOptions::default().with_drift(drift));
     let frame = sensor.frame(force, ball, [121.3, 97.6], Branch::Loading, seed);
     ForceMeter::new([PIXEL_M; 2], &options)

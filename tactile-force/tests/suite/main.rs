@@ -1,7 +1,8 @@
-//! The tests of `tactile-force`, in one program: the generic code is compiled once for all of them.
+//! The tests of `tactile-force`, in one program.
 
 mod bad_input;
 mod batch;
+mod blob;
 mod calibration;
 mod frame_statistics;
 mod health;
@@ -11,8 +12,6 @@ mod no_allocation;
 mod pressure;
 mod profile_shape;
 mod recorded;
-mod reference;
 mod sensor;
 mod simulated;
 mod stability;
-mod stability_scale;

@@ -33,7 +33,7 @@ fn force_and_radius_of_another_ball_are_right_whatever_the_power() {
             let frame = sensor.frame(force, 2.5e-3, [121.3, 97.6], Branch::Loading, 77 + k as u64);
             let radius = contact_radius(force, 2.5e-3);
             for (worst, calibration) in [
-                (&mut local, &curve as &dyn StressCalibration<f64>),
+                (&mut local, &curve as &dyn StressCalibration),
                 (&mut summed, &sums),
             ] {
                 let m = measure(&frame, &reference, calibration);

@@ -15,7 +15,7 @@ use crate::simulated::{SHAPE, Sensor, measure};
 type Level = dyn Fn(f64, f64) -> f64;
 
 /// The profile fitted to a contact whose light is `level` at (x, y) in units of a radius of 35 pixels, 120 grey levels at 1.
-fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit<f64> {
+fn fitted(level: impl Fn(f64, f64) -> f64, seed: u64) -> HertzFit {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut frame = |pressed: bool| {
         Array2::from_shape_fn(SHAPE, |(y, x)| {

@@ -55,7 +55,7 @@ fn moduli_are_right_with_every_effect_at_once() {
                 90.0 + 25.0 * rng.random::<f64>(),
             ];
             let frame = flickering(sensor, &mut rng).frame(force, 4e-3, place, Branch::Loading, k);
-            let found: Detection<f64> = detector
+            let found: Detection = detector
                 .detect_with(&mut workspace, frame.view(), &reference)
                 .unwrap();
             let seen = found.contact.unwrap();

@@ -138,7 +138,7 @@ impl Sensor {
         &self,
         reference: &ReferenceFrame,
         seed: u64,
-    ) -> (Vec<CalibrationFrame>, Vec<CalibrationPair<f64>>) {
+    ) -> (Vec<CalibrationFrame>, Vec<CalibrationPair>) {
         let detector = ContactDetector::new(ContactOptions::default());
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut workspace = DetectorWorkspace::default();
@@ -156,7 +156,7 @@ impl Sensor {
                 85.0 + 25.0 * rng.random::<f64>(),
             ];
             let frame = self.frame(force, 4e-3, place, branch, 1000 * seed + k as u64);
-            let found: Detection<f64> = detector
+            let found: Detection = detector
                 .detect_with(&mut workspace, frame.view(), reference)
                 .unwrap();
             let noise: f64 = StandardNormal.sample(&mut rng);
@@ -185,8 +185,8 @@ impl Sensor {
 pub(crate) fn measure(
     frame: &Array2<u8>,
     reference: &ReferenceFrame,
-    calibration: &dyn StressCalibration<f64>,
-) -> ForceMeasurement<f64> {
+    calibration: &dyn StressCalibration,
+) -> ForceMeasurement {
     let meter = ForceMeter::new([PIXEL_M; 2], &ForceOptions::default()).unwrap();
     meter
         .measure_with(

@@ -1,27 +1,25 @@
 //! The search: augmenting row reduction, then shortest augmenting paths on the reduced costs.
 
-use nalgebra::RealField;
-
 /// No row, no column.
 pub(super) const NONE: usize = usize::MAX;
 
 /// Memory of the algorithm proper, for a matrix that is not taller than wide.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Search<T> {
+pub(super) struct Search {
     pub(super) column_of: Vec<usize>,
     pub(super) row_of: Vec<usize>,
     /// v; u follows from it.
-    pub(super) prices: Vec<T>,
+    pub(super) prices: Vec<f64>,
     free: Vec<usize>,
     waiting: Vec<usize>,
     /// Length of the shortest path to every column, and the row before it.
-    distance: Vec<T>,
+    distance: Vec<f64>,
     before: Vec<usize>,
     /// Columns the search has not settled yet, in any order, then those it has.
     order: Vec<usize>,
 }
 
-impl<T: RealField + Copy> Search<T> {
+impl Search {
     pub(super) fn new() -> Self {
         Self {
             column_of: Vec::new(),
@@ -35,11 +33,11 @@ impl<T: RealField + Copy> Search<T> {
         }
     }
 
-    pub(super) fn run(&mut self, costs: &[T], rows: usize, columns: usize) {
+    pub(super) fn run(&mut self, costs: &[f64], rows: usize, columns: usize) {
         reset(&mut self.column_of, rows, NONE);
         reset(&mut self.row_of, columns, NONE);
-        reset(&mut self.prices, columns, T::zero());
-        reset(&mut self.distance, columns, T::zero());
+        reset(&mut self.prices, columns, 0.0);
+        reset(&mut self.distance, columns, 0.0);
         reset(&mut self.before, columns, NONE);
         self.free.clear();
         self.free.extend(0..rows);
@@ -59,7 +57,7 @@ impl<T: RealField + Copy> Search<T> {
     ///
     /// Only columns that become assigned, and stay so, change their price: those left over keep `v = 0`, which the
     /// rectangular problem needs.
-    fn reduce_rows(&mut self, costs: &[T], columns: usize) {
+    fn reduce_rows(&mut self, costs: &[f64], columns: usize) {
         self.waiting.clear();
         self.free.reverse();
         let mut bids = 8 * self.free.len(); // a price war of many steps is cheaper by augmentation
@@ -96,7 +94,7 @@ impl<T: RealField + Copy> Search<T> {
     }
 
     /// The shortest augmenting path from a free row; none if only forbidden pairs lead on.
-    fn augment(&mut self, costs: &[T], columns: usize, free_row: usize) {
+    fn augment(&mut self, costs: &[f64], columns: usize, free_row: usize) {
         for (j, &c) in costs[free_row * columns..][..columns].iter().enumerate() {
             self.distance[j] = c - self.prices[j];
             self.before[j] = free_row;
@@ -141,7 +139,7 @@ impl<T: RealField + Copy> Search<T> {
     }
 
     /// Paths through a column that has just been settled, at `reach`, and the row it belongs to.
-    fn relax(&mut self, costs: &[T], columns: usize, (column, reach): (usize, T), open: usize) {
+    fn relax(&mut self, costs: &[f64], columns: usize, (column, reach): (usize, f64), open: usize) {
         let row = self.row_of[column];
         let costs = &costs[row * columns..][..columns];
         let through = reach - (costs[column] - self.prices[column]);
@@ -167,17 +165,17 @@ impl<T: RealField + Copy> Search<T> {
     }
 
     /// `u_i` from complementary slackness; zero for a row left over.
-    pub(super) fn row_price(&self, costs: &[T], row: usize) -> T {
+    pub(super) fn row_price(&self, costs: &[f64], row: usize) -> f64 {
         match self.column_of[row] {
-            NONE => T::zero(),
+            NONE => 0.0,
             column => costs[row * self.prices.len() + column] - self.prices[column],
         }
     }
 }
 
 /// The columns with the least and the second least reduced cost `c − v`, with these costs; `+∞` where there is no second.
-fn two_cheapest<T: RealField + Copy>(costs: &[T], prices: &[T]) -> ((usize, T), (usize, T)) {
-    let infinite = T::one() / T::zero();
+fn two_cheapest(costs: &[f64], prices: &[f64]) -> ((usize, f64), (usize, f64)) {
+    let infinite = 1.0 / 0.0;
     let (mut best, mut second) = ((0, infinite), (0, infinite));
     for (j, (&c, &v)) in costs.iter().zip(prices).enumerate() {
         let reduced = c - v;

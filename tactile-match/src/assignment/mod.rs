@@ -12,7 +12,6 @@ mod augment;
 
 use crate::MatchError;
 use augment::{NONE, Search};
-use nalgebra::RealField;
 
 /// Columns for the rows of a cost matrix (`rows × columns`, row-major) at the least total cost.
 ///
@@ -31,8 +30,8 @@ use nalgebra::RealField;
 /// assert_eq!(linear_assignment(&costs, 2, 3)?, [Some(1), Some(0)]); // 1 + 2; the greedy 0 + 3 costs as much
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
-pub fn linear_assignment<T: RealField + Copy>(
-    costs: &[T],
+pub fn linear_assignment(
+    costs: &[f64],
     rows: usize,
     columns: usize,
 ) -> Result<Vec<Option<usize>>, MatchError> {
@@ -51,18 +50,18 @@ pub fn linear_assignment<T: RealField + Copy>(
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct AssignmentWorkspace<T> {
+pub struct AssignmentWorkspace {
     assignment: Vec<Option<usize>>,
     /// `u` of the last solution.
-    pub row_prices: Vec<T>,
+    pub row_prices: Vec<f64>,
     /// `v` of the last solution.
-    pub column_prices: Vec<T>,
+    pub column_prices: Vec<f64>,
     /// The matrix turned so that it is not taller than wide.
-    turned: Vec<T>,
-    search: Search<T>,
+    turned: Vec<f64>,
+    search: Search,
 }
 
-impl<T: RealField + Copy> Default for AssignmentWorkspace<T> {
+impl Default for AssignmentWorkspace {
     /// Without memory yet.
     fn default() -> Self {
         Self {
@@ -75,14 +74,14 @@ impl<T: RealField + Copy> Default for AssignmentWorkspace<T> {
     }
 }
 
-impl<T: RealField + Copy> AssignmentWorkspace<T> {
+impl AssignmentWorkspace {
     /// As [`linear_assignment`].
     ///
     /// # Errors
     /// As [`linear_assignment`].
     pub fn solve(
         &mut self,
-        costs: &[T],
+        costs: &[f64],
         rows: usize,
         columns: usize,
     ) -> Result<&[Option<usize>], MatchError> {
@@ -116,7 +115,7 @@ impl<T: RealField + Copy> AssignmentWorkspace<T> {
     }
 }
 
-fn check<T: RealField + Copy>(costs: &[T], rows: usize, columns: usize) -> Result<(), MatchError> {
+fn check(costs: &[f64], rows: usize, columns: usize) -> Result<(), MatchError> {
     let expected = rows.saturating_mul(columns);
     if costs.len() != expected {
         return Err(MatchError::Shape {
@@ -125,10 +124,7 @@ fn check<T: RealField + Copy>(costs: &[T], rows: usize, columns: usize) -> Resul
             found: costs.len(),
         });
     }
-    match costs
-        .iter()
-        .position(|&c| !(c.is_finite() || c > T::zero()))
-    {
+    match costs.iter().position(|&c| !(c.is_finite() || c > 0.0)) {
         Some(at) => Err(MatchError::Cost {
             row: at / columns,
             column: at % columns,

@@ -31,7 +31,6 @@ pub use registration::DriftWorkspace;
 use crate::validate::point_sets;
 use crate::{MatchError, Matching, PointMatcher};
 use nalgebra::Point;
-use tactile_tps::Scalar;
 
 /// How the model may move.
 ///
@@ -125,12 +124,12 @@ impl CoherentPointDrift {
     ///
     /// # Errors
     /// As [`PointMatcher::match_points`].
-    pub fn match_with<T: Scalar, const D: usize>(
+    pub fn match_with<const D: usize>(
         &self,
         workspace: &mut DriftWorkspace<D>,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         point_sets(model, target)?;
         workspace.register(self, model, target);
         Ok(outcome::matching(
@@ -142,12 +141,12 @@ impl CoherentPointDrift {
     }
 }
 
-impl<T: Scalar, const D: usize> PointMatcher<T, D> for CoherentPointDrift {
+impl<const D: usize> PointMatcher<D> for CoherentPointDrift {
     fn match_points(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         self.match_with(&mut DriftWorkspace::default(), model, target)
     }
 }
@@ -163,7 +162,7 @@ mod tests {
         let mut workspace = DriftWorkspace::default();
         let sets: Vec<_> = [(40, 5), (20, 6), (40, 7)]
             .into_iter()
-            .map(|(n, seed)| scattered::<f64, 3>(n, seed))
+            .map(|(n, seed)| scattered::<3>(n, seed))
             .map(|model| (bend(&model, 0.05), model))
             .collect();
         for (target, model) in &sets {

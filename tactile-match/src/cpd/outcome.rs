@@ -5,7 +5,6 @@ use super::expectation::gaussians;
 use super::registration::DriftWorkspace;
 use crate::{AssignmentWorkspace, MatchReport, Matching, SoftMatches, unmatched_rows};
 use nalgebra::{SMatrix, SVector};
-use tactile_tps::Scalar;
 
 /// Soft matches below this weight are left out.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -54,12 +53,12 @@ fn pairs(posterior: &[f64], model_len: usize, target_len: usize) -> Vec<Option<u
 }
 
 /// Assembles the result; lengths are those of the model and the target.
-pub(super) fn matching<T: Scalar, const D: usize>(
+pub(super) fn matching<const D: usize>(
     options: &CoherentPointDrift,
     workspace: &DriftWorkspace<D>,
     model_len: usize,
     target_len: usize,
-) -> Matching<T, D> {
+) -> Matching<D> {
     let posterior = posterior(options, workspace);
     let assignment = pairs(&posterior, model_len, target_len);
     let scale = workspace.target_frame.scale;
@@ -72,13 +71,10 @@ pub(super) fn matching<T: Scalar, const D: usize>(
             .collect();
         let mass = row.iter().map(|p| p.1).sum::<f64>();
         let share = |p: f64| p / mass.max(1.0); // many targets may have one model point; a row of M has sum one
-        soft.push_row(
-            row.iter()
-                .map(|&(n, p)| (n, nalgebra::convert::<f64, T>(share(p)))),
-        );
+        soft.push_row(row.iter().map(|&(n, p)| (n, share(p))));
         let sure = partner.map_or(1.0 - mass.min(1.0), |n| share(posterior[n * model_len + m]));
-        confidence.push(nalgebra::convert(sure.clamp(0.0, 1.0)));
-        covariance.push((spread(workspace, &row, mass) * (scale * scale)).map(nalgebra::convert));
+        confidence.push(sure.clamp(0.0, 1.0));
+        covariance.push(spread(workspace, &row, mass) * (scale * scale));
     }
     let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target_len);
     Matching {
@@ -89,11 +85,7 @@ pub(super) fn matching<T: Scalar, const D: usize>(
         unmatched_model,
         unmatched_target,
         displacement_covariance: covariance,
-        energy: workspace
-            .energy
-            .iter()
-            .map(|&e| nalgebra::convert(e))
-            .collect(),
+        energy: workspace.energy.iter().map(|&e| e).collect(),
         report: report(workspace, &assignment),
         assignment,
     }
@@ -117,10 +109,10 @@ fn spread<const D: usize>(
     })
 }
 
-fn report<T: Scalar, const D: usize>(
+fn report<const D: usize>(
     workspace: &DriftWorkspace<D>,
     assignment: &[Option<usize>],
-) -> MatchReport<T> {
+) -> MatchReport {
     let squares = assignment
         .iter()
         .enumerate()
@@ -136,8 +128,8 @@ fn report<T: Scalar, const D: usize>(
         stop: workspace.stop,
         iterations: workspace.iterations(),
         starts: 1,
-        residual: nalgebra::convert(scale * (sum / count.max(1.0)).sqrt()),
-        sigma: nalgebra::convert(scale * workspace.sigma2.sqrt()),
+        residual: (scale * (sum / count.max(1.0)).sqrt()),
+        sigma: (scale * workspace.sigma2.sqrt()),
         doubt: None,
     }
 }

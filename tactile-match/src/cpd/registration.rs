@@ -8,7 +8,7 @@ use super::warp::DriftWarp;
 use super::{CoherentPointDrift, Motion, Normalization};
 use crate::StopReason;
 use crate::frame::Frame;
-use nalgebra::{Point, RealField, SMatrix, SVector};
+use nalgebra::{Point, SMatrix, SVector};
 
 /// What is left of the kernel's diagonal when its factorisation ends: far below what the ridge `λσ²` lets through.
 const KERNEL_TOLERANCE: f64 = 1e-12;
@@ -73,11 +73,11 @@ impl<const D: usize> DriftWorkspace<D> {
     }
 
     /// Registers `model` to `target`; both have points and finite coordinates.
-    pub(super) fn register<T: RealField + Copy>(
+    pub(super) fn register(
         &mut self,
         options: &CoherentPointDrift,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
     ) {
         self.enter_frames(options, model, target);
         self.global.reset();
@@ -107,11 +107,11 @@ impl<const D: usize> DriftWorkspace<D> {
         }
     }
 
-    fn enter_frames<T: RealField + Copy>(
+    fn enter_frames(
         &mut self,
         options: &CoherentPointDrift,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
     ) {
         self.model_frame = Frame::of(model);
         self.target_frame = match options.normalization {
@@ -214,7 +214,7 @@ impl<const D: usize> DriftWorkspace<D> {
     }
 
     /// The model points where the last registration left them.
-    pub(super) fn warped<T: RealField + Copy>(&self) -> Vec<Point<T, D>> {
+    pub(super) fn warped(&self) -> Vec<Point<f64, D>> {
         let at = |m: usize| SVector::from_fn(|d, _| self.moved[d][m]);
         (0..self.moved[0].len())
             .map(|m| self.target_frame.leave(at(m)))

@@ -2,7 +2,7 @@
 
 use crate::frame::Frame;
 use nalgebra::{Point, SMatrix, SVector};
-use tactile_tps::{Scalar, Warp};
+use tactile_tps::Warp;
 
 /// The map found by [`CoherentPointDrift`](super::CoherentPointDrift): in the frame of the registration
 /// `y ↦ A y + b + Σ_k w_k exp(−|y − p_k|² / 2β²)`, with no Gaussians for rigid, similarity and affine motion, and `A = I`, `b = 0` for
@@ -24,8 +24,8 @@ impl<const D: usize> DriftWarp<D> {
     }
 }
 
-impl<T: Scalar, const D: usize> Warp<T, D> for DriftWarp<D> {
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+impl<const D: usize> Warp<f64, D> for DriftWarp<D> {
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         let y = self.model.inside(point);
         let mut image = self.linear * y + self.offset;
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
@@ -34,7 +34,7 @@ impl<T: Scalar, const D: usize> Warp<T, D> for DriftWarp<D> {
         self.target.leave(image)
     }
 
-    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
+    fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
         let y = self.model.inside(point);
         let mut jacobian = self.linear;
         for (centre, weight) in self.centres.iter().zip(&self.weights) {
@@ -42,6 +42,6 @@ impl<T: Scalar, const D: usize> Warp<T, D> for DriftWarp<D> {
             jacobian -=
                 weight * step.transpose() * (self.gaussian(&step) / (self.beta * self.beta));
         }
-        (jacobian * (self.target.scale / self.model.scale)).map(nalgebra::convert)
+        jacobian * (self.target.scale / self.model.scale)
     }
 }

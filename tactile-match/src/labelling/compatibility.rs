@@ -1,7 +1,7 @@
 //! (15)–(18): how alike two edges are.
 
 use super::Edge;
-use nalgebra::{RealField, SVector};
+use nalgebra::SVector;
 
 /// What the maximum in α (15) is taken over.
 ///
@@ -61,22 +61,18 @@ pub enum Compatibility {
 ///
 /// The quotient keeps its digits where the lengths differ by many decades; the printed difference loses them.
 #[must_use]
-pub(crate) fn alpha<T: RealField + Copy>(d: T, e: T) -> T {
+pub(crate) fn alpha(d: f64, e: f64) -> f64 {
     let longer = d.max(e);
-    if longer > T::zero() {
-        d.min(e) / longer
-    } else {
-        T::one()
-    }
+    if longer > 0.0 { d.min(e) / longer } else { 1.0 }
 }
 
 /// α (15), the maximum over all edges: `1 − |d − e| / longest`; one where `longest` is zero.
 #[must_use]
-pub(crate) fn alpha_global<T: RealField + Copy>(d: T, e: T, longest: T) -> T {
-    if longest > T::zero() {
-        T::one() - (d - e).abs() / longest
+pub(crate) fn alpha_global(d: f64, e: f64, longest: f64) -> f64 {
+    if longest > 0.0 {
+        1.0 - (d - e).abs() / longest
     } else {
-        T::one()
+        1.0
     }
 }
 
@@ -85,14 +81,14 @@ pub(crate) fn alpha_global<T: RealField + Copy>(d: T, e: T, longest: T) -> T {
 ///
 /// The angle is `atan2(|u ∧ v|, u · v)`, exact at 0 and π where `acos` loses half the digits or returns NaN.
 #[must_use]
-pub(crate) fn beta<T: RealField + Copy, const D: usize>(u: &SVector<T, D>, v: &SVector<T, D>) -> T {
+pub(crate) fn beta<const D: usize>(u: &SVector<f64, D>, v: &SVector<f64, D>) -> f64 {
     // Largest components scaled to one: no square under- or overflows, and parallel vectors stay exactly parallel.
     let (largest_u, largest_v) = (u.amax(), v.amax());
-    if largest_u <= T::zero() || largest_v <= T::zero() {
-        return T::zero();
+    if largest_u <= 0.0 || largest_v <= 0.0 {
+        return 0.0;
     }
     let (u, v) = (u / largest_u, v / largest_v);
-    let mut wedge = T::zero();
+    let mut wedge = 0.0;
     for p in 0..D {
         for q in p + 1..D {
             let minor = u[p] * v[q] - u[q] * v[p];
@@ -100,38 +96,38 @@ pub(crate) fn beta<T: RealField + Copy, const D: usize>(u: &SVector<T, D>, v: &S
         }
     }
     // π − ∠(u, v) = ∠(u, −v): near opposite edges keep the digits of a small β.
-    wedge.sqrt().atan2(-u.dot(&v)) / T::pi()
+    wedge.sqrt().atan2(-u.dot(&v)) / std::f64::consts::PI
 }
 
 /// γ (17): `1 − d / longest`, `longest` among the edges of the same point; one where `longest` is zero.
 #[must_use]
-pub(crate) fn gamma<T: RealField + Copy>(d: T, longest: T) -> T {
-    if longest > T::zero() {
+pub(crate) fn gamma(d: f64, longest: f64) -> f64 {
+    if longest > 0.0 {
         (longest - d) / longest
     } else {
-        T::one()
+        1.0
     }
 }
 
 /// A [`Compatibility`] ready to be evaluated: the factors and the maximum in α.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct CompatibilityRule<T> {
+pub(crate) struct CompatibilityRule {
     /// The factors.
     pub factors: Compatibility,
     /// Longest edge of both graphs for [`alpha_global`]; `None` for [`alpha`].
-    pub longest: Option<T>,
+    pub longest: Option<f64>,
 }
 
-impl<T: RealField + Copy> CompatibilityRule<T> {
+impl CompatibilityRule {
     /// r (18) of model edge `x` and target edge `y`.
     #[must_use]
-    pub(crate) fn of<const D: usize>(&self, x: &Edge<T, D>, y: &Edge<T, D>) -> T {
+    pub(crate) fn of<const D: usize>(&self, x: &Edge<D>, y: &Edge<D>) -> f64 {
         let length = || match self.longest {
             None => alpha(x.length, y.length),
             Some(longest) => alpha_global(x.length, y.length, longest),
         };
         match self.factors {
-            Compatibility::Count => T::one(),
+            Compatibility::Count => 1.0,
             Compatibility::Length => length(),
             Compatibility::LengthDirection => length() * beta(&x.vector, &y.vector),
             Compatibility::Printed => length() * beta(&x.vector, &y.vector) * x.gamma,

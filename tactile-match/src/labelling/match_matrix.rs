@@ -1,25 +1,23 @@
 //! The match matrix `M` with its slack row and column.
 
-use nalgebra::RealField;
-
 /// The match matrix `M` of the paper, `(I + 1) × (J + 1)`, row-major: entry `(i, j)` is the probability that model
 /// point `i` is target point `j`; row `I` and column `J` are the slack for points without a partner, and the corner
 /// `(I, J)` is not used.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct MatchMatrix<T> {
+pub(crate) struct MatchMatrix {
     rows: usize,
     columns: usize,
-    entries: Vec<T>,
+    entries: Vec<f64>,
 }
 
-impl<T: RealField + Copy> MatchMatrix<T> {
+impl MatchMatrix {
     /// All entries zero.
     #[must_use]
     pub(crate) fn zeros(rows: usize, columns: usize) -> Self {
         Self {
             rows,
             columns,
-            entries: vec![T::zero(); (rows + 1) * (columns + 1)],
+            entries: vec![0.0; (rows + 1) * (columns + 1)],
         }
     }
 
@@ -28,7 +26,7 @@ impl<T: RealField + Copy> MatchMatrix<T> {
     pub(crate) fn from_fn(
         rows: usize,
         columns: usize,
-        mut entry: impl FnMut(usize, usize) -> T,
+        mut entry: impl FnMut(usize, usize) -> f64,
     ) -> Self {
         let mut m = Self::zeros(rows, columns);
         for i in 0..=rows {
@@ -58,11 +56,11 @@ impl<T: RealField + Copy> MatchMatrix<T> {
     /// # Panics
     /// If `i` exceeds the number of rows.
     #[must_use]
-    pub(crate) fn row(&self, i: usize) -> &[T] {
+    pub(crate) fn row(&self, i: usize) -> &[f64] {
         &self.entries[i * (self.columns + 1)..][..=self.columns]
     }
 
-    pub(super) fn row_mut(&mut self, i: usize) -> &mut [T] {
+    pub(super) fn row_mut(&mut self, i: usize) -> &mut [f64] {
         &mut self.entries[i * (self.columns + 1)..][..=self.columns]
     }
 
@@ -71,30 +69,30 @@ impl<T: RealField + Copy> MatchMatrix<T> {
     /// # Panics
     /// If `i` exceeds the number of rows.
     #[must_use]
-    pub(crate) fn slack_of_row(&self, i: usize) -> T {
+    pub(crate) fn slack_of_row(&self, i: usize) -> f64 {
         self[(i, self.columns)]
     }
 
     /// The largest change of an entry, `max |M − M'|`; the matrices must have the same size.
     #[must_use]
-    pub(crate) fn largest_change(&self, other: &Self) -> T {
+    pub(crate) fn largest_change(&self, other: &Self) -> f64 {
         self.entries
             .iter()
             .zip(&other.entries)
-            .fold(T::zero(), |worst, (&a, &b)| worst.max((a - b).abs()))
+            .fold(0.0, |worst, (&a, &b)| worst.max((a - b).abs()))
     }
 }
 
-impl<T> std::ops::Index<(usize, usize)> for MatchMatrix<T> {
-    type Output = T;
-    fn index(&self, (i, j): (usize, usize)) -> &T {
+impl std::ops::Index<(usize, usize)> for MatchMatrix {
+    type Output = f64;
+    fn index(&self, (i, j): (usize, usize)) -> &f64 {
         debug_assert!(j <= self.columns);
         &self.entries[i * (self.columns + 1) + j]
     }
 }
 
-impl<T> std::ops::IndexMut<(usize, usize)> for MatchMatrix<T> {
-    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut T {
+impl std::ops::IndexMut<(usize, usize)> for MatchMatrix {
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut f64 {
         debug_assert!(j <= self.columns);
         &mut self.entries[i * (self.columns + 1) + j]
     }

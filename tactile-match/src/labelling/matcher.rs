@@ -8,7 +8,7 @@ use crate::frame::Frame;
 use crate::validate::point_sets;
 use crate::{MatchError, Matching, PointMatcher, StopReason};
 use nalgebra::Point;
-use tactile_tps::{Scalar, Smoothing};
+use tactile_tps::Smoothing;
 
 /// Edge pairs whose compatibilities are kept between sweeps; more than these are computed anew every time.
 const TABLE_LIMIT: usize = 1 << 25;
@@ -19,11 +19,11 @@ impl RelaxationLabelling {
     /// # Panics
     /// Never for finite points.
     #[must_use]
-    pub(crate) fn relax<T: Scalar, const D: usize>(
+    pub(crate) fn relax<const D: usize>(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> MatchMatrix<T> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> MatchMatrix {
         let options = self;
         if let Some(candidates) = options.candidates {
             return super::sparse::relax(options, candidates, model, target);
@@ -39,18 +39,18 @@ impl RelaxationLabelling {
 }
 
 /// The outer iterations: `relax` gives the match matrix of the warped model and the target, the spline warps the model, and again.
-fn match_with<T: Scalar, const D: usize>(
+fn match_with<const D: usize>(
     options: &RelaxationLabelling,
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
-    relax: impl Fn(&[Point<T, D>], &[Point<T, D>]) -> MatchMatrix<T>,
-) -> Result<Matching<T, D>, MatchError> {
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+    relax: impl Fn(&[Point<f64, D>], &[Point<f64, D>]) -> MatchMatrix,
+) -> Result<Matching<D>, MatchError> {
     point_sets(model, target)?;
     let frames = [Frame::of(model), Frame::of(target)];
-    let enter = |frame: &Frame<D>, points: &[Point<T, D>]| -> Vec<Point<T, D>> {
+    let enter = |frame: &Frame<D>, points: &[Point<f64, D>]| -> Vec<Point<f64, D>> {
         points
             .iter()
-            .map(|p| Point::from(frame.inside(p).map(nalgebra::convert)))
+            .map(|p| Point::from(frame.inside(p)))
             .collect()
     };
     let (start, goal) = (enter(&frames[0], model), enter(&frames[1], target));
@@ -59,8 +59,8 @@ fn match_with<T: Scalar, const D: usize>(
         run.matches = relax(&run.warped, &run.target);
         run.record_energy(options.neighbourhood);
         let lambda = options.smoothing * 0.5_f64.powi(i32::try_from(k).unwrap_or(i32::MAX));
-        let step = run.fit(Smoothing::Lambda(nalgebra::convert(lambda)));
-        if step <= nalgebra::convert(1e-3) {
+        let step = run.fit(Smoothing::Lambda(lambda));
+        if step <= 1e-3 {
             run.stop = StopReason::Converged;
             break;
         }
@@ -69,14 +69,14 @@ fn match_with<T: Scalar, const D: usize>(
 }
 
 /// `r` of all edge pairs: tabulated while that is possible, computed otherwise.
-struct Compatibilities<'a, T: Scalar, const D: usize> {
-    graphs: &'a [NeighbourGraph<T, D>; 2],
-    rule: CompatibilityRule<T>,
-    table: Vec<T>,
+struct Compatibilities<'a, const D: usize> {
+    graphs: &'a [NeighbourGraph<D>; 2],
+    rule: CompatibilityRule,
+    table: Vec<f64>,
 }
 
-impl<'a, T: Scalar, const D: usize> Compatibilities<'a, T, D> {
-    fn new(graphs: &'a [NeighbourGraph<T, D>; 2], rule: CompatibilityRule<T>) -> Self {
+impl<'a, const D: usize> Compatibilities<'a, D> {
+    fn new(graphs: &'a [NeighbourGraph<D>; 2], rule: CompatibilityRule) -> Self {
         let [x, y] = [0, 1].map(|g| graphs[g].edges());
         let mut table = Vec::new();
         if x.len().saturating_mul(y.len()) <= TABLE_LIMIT {
@@ -89,7 +89,7 @@ impl<'a, T: Scalar, const D: usize> Compatibilities<'a, T, D> {
         }
     }
 
-    fn of(&self, x: usize, y: usize) -> T {
+    fn of(&self, x: usize, y: usize) -> f64 {
         let [model, target] = [0, 1].map(|g| self.graphs[g].edges());
         match self.table.get(x * target.len() + y) {
             Some(&r) => r,
@@ -98,12 +98,12 @@ impl<'a, T: Scalar, const D: usize> Compatibilities<'a, T, D> {
     }
 }
 
-impl<T: Scalar, const D: usize> PointMatcher<T, D> for RelaxationLabelling {
+impl<const D: usize> PointMatcher<D> for RelaxationLabelling {
     fn match_points(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         match_with(self, model, target, |model, target| {
             self.relax(model, target)
         })

@@ -1,7 +1,7 @@
 //! (13): which points are neighbours, and the edges that join them.
 
 use super::gamma;
-use nalgebra::{Point, RealField, SVector};
+use nalgebra::{Point, SVector};
 
 /// Which points are a point's neighbours.
 ///
@@ -32,30 +32,30 @@ pub enum Neighbourhood {
 
 /// The edge from a point to one of its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Edge<T, const D: usize> {
+pub(crate) struct Edge<const D: usize> {
     /// Row of the point.
     pub from: usize,
     /// Row of its neighbour.
     pub to: usize,
     /// Position of the neighbour relative to the point.
-    pub vector: SVector<T, D>,
+    pub vector: SVector<f64, D>,
     /// Its length `d`.
-    pub length: T,
+    pub length: f64,
     /// [`gamma`] of this edge among the edges of its point.
-    pub gamma: T,
+    pub gamma: f64,
 }
 
 /// A point set as a graph: every point with the edges to its neighbours.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct NeighbourGraph<T, const D: usize> {
-    edges: Vec<Edge<T, D>>,
+pub(crate) struct NeighbourGraph<const D: usize> {
+    edges: Vec<Edge<D>>,
     starts: Vec<usize>,
 }
 
-impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
+impl<const D: usize> NeighbourGraph<D> {
     /// Joins every point to its neighbours; `O(n² log n)`.
     #[must_use]
-    pub(crate) fn new(points: &[Point<T, D>], neighbourhood: Neighbourhood) -> Self {
+    pub(crate) fn new(points: &[Point<f64, D>], neighbourhood: Neighbourhood) -> Self {
         let radius = median_pairwise_distance(points);
         let mut graph = Self {
             edges: Vec::new(),
@@ -65,7 +65,7 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
             let mut neighbours: Vec<usize> = (0..points.len()).filter(|&a| a != i).collect();
             match neighbourhood {
                 Neighbourhood::MedianRadius => {
-                    let reach = radius.map_or(T::zero(), |r| r + rounding(points, r));
+                    let reach = radius.map_or(0.0, |r| r + rounding(points, r));
                     neighbours.retain(|&a| (points[a] - points[i]).norm() <= reach);
                 }
                 Neighbourhood::Nearest(k) => {
@@ -84,7 +84,7 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
         graph
     }
 
-    fn push_point(&mut self, points: &[Point<T, D>], i: usize, neighbours: &[usize]) {
+    fn push_point(&mut self, points: &[Point<f64, D>], i: usize, neighbours: &[usize]) {
         let first = self.edges.len();
         for &a in neighbours {
             let vector = points[a] - points[i];
@@ -93,12 +93,12 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
                 to: a,
                 vector,
                 length: vector.norm(),
-                gamma: T::zero(),
+                gamma: 0.0,
             });
         }
         let longest = self.edges[first..]
             .iter()
-            .fold(T::zero(), |m, e| m.max(e.length));
+            .fold(0.0_f64, |m, e| m.max(e.length));
         for edge in &mut self.edges[first..] {
             edge.gamma = gamma(edge.length, longest);
         }
@@ -107,7 +107,7 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
 
     /// All edges, in the order of the points they start from.
     #[must_use]
-    pub(crate) fn edges(&self) -> &[Edge<T, D>] {
+    pub(crate) fn edges(&self) -> &[Edge<D>] {
         &self.edges
     }
 
@@ -116,7 +116,7 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
     /// # Panics
     /// If there is no such point.
     #[must_use]
-    pub(crate) fn of(&self, i: usize) -> &[Edge<T, D>] {
+    pub(crate) fn of(&self, i: usize) -> &[Edge<D>] {
         &self.edges[self.range(i)]
     }
 
@@ -133,33 +133,31 @@ impl<T: RealField + Copy, const D: usize> NeighbourGraph<T, D> {
 
     /// Length of the longest edge; zero without edges.
     #[must_use]
-    pub(crate) fn longest(&self) -> T {
-        self.edges.iter().fold(T::zero(), |m, e| m.max(e.length))
+    pub(crate) fn longest(&self) -> f64 {
+        self.edges.iter().fold(0.0_f64, |m, e| m.max(e.length))
     }
 }
 
 /// What rounding may add to a distance of about `radius`: the coordinates themselves carry half a unit in the last place.
-fn rounding<T: RealField + Copy, const D: usize>(points: &[Point<T, D>], radius: T) -> T {
+fn rounding<const D: usize>(points: &[Point<f64, D>], radius: f64) -> f64 {
     let largest = points
         .iter()
         .flat_map(|p| p.iter())
         .fold(radius, |m, c| m.max(c.abs()));
-    T::default_epsilon() * (largest + largest)
+    f64::EPSILON * (largest + largest)
 }
 
 /// The median of all pairwise distances (the mean of the two middle ones where their number is even); `None` for fewer
 /// than two points. `O(n² log n)`.
 #[must_use]
-pub(crate) fn median_pairwise_distance<T: RealField + Copy, const D: usize>(
-    points: &[Point<T, D>],
-) -> Option<T> {
+pub(crate) fn median_pairwise_distance<const D: usize>(points: &[Point<f64, D>]) -> Option<f64> {
     let mut distances = Vec::with_capacity(points.len() * points.len().saturating_sub(1) / 2);
     for (i, p) in points.iter().enumerate() {
         distances.extend(points[i + 1..].iter().map(|q| (q - p).norm()));
     }
     distances.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
     let n = distances.len();
-    let half: T = nalgebra::convert(0.5);
+    let half: f64 = 0.5;
     match n {
         0 => None,
         n if n % 2 == 1 => Some(distances[n / 2]),

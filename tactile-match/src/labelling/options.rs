@@ -3,7 +3,6 @@
 use super::{Compatibility, CompatibilityRule, LengthMaximum, NeighbourGraph, Neighbourhood};
 use crate::MatchError;
 use crate::validate::{at_least_one, option_within};
-use tactile_tps::Scalar;
 
 /// The paper's matching method (13)–(20) as printed: relaxation labelling, then a thin-plate spline, in turn.
 ///
@@ -178,10 +177,10 @@ impl RelaxationLabelling {
     }
 
     /// How edges of these two graphs are compared.
-    pub(super) fn rule<T: Scalar, const D: usize>(
+    pub(super) fn rule<const D: usize>(
         &self,
-        graphs: &[NeighbourGraph<T, D>; 2],
-    ) -> CompatibilityRule<T> {
+        graphs: &[NeighbourGraph<D>; 2],
+    ) -> CompatibilityRule {
         let longest = match self.length_maximum {
             LengthMaximum::PerPair => None,
             LengthMaximum::Global => Some(graphs[0].longest().max(graphs[1].longest())),

@@ -6,24 +6,28 @@ use crate::{
     MatchReport, Matching, SoftMatches, StopReason, hard, linear_assignment, unmatched_rows,
 };
 use nalgebra::{Point, SMatrix, SVector};
-use tactile_tps::{Scalar, Smoothing};
+use tactile_tps::Smoothing;
 
 /// Soft matches below this weight are left out.
 const NEGLIGIBLE: f64 = 1e-4;
 
 /// A match under way, both sets centred and of size one.
-pub(super) struct Run<T: Scalar, const D: usize> {
-    model: Vec<Point<T, D>>,
-    pub(super) target: Vec<Point<T, D>>,
-    pub(super) warped: Vec<Point<T, D>>,
-    pub(super) matches: MatchMatrix<T>,
+pub(super) struct Run<const D: usize> {
+    model: Vec<Point<f64, D>>,
+    pub(super) target: Vec<Point<f64, D>>,
+    pub(super) warped: Vec<Point<f64, D>>,
+    pub(super) matches: MatchMatrix,
     pub(super) stop: StopReason,
-    energy: Vec<T>,
+    energy: Vec<f64>,
     frame: Frame<D>,
 }
 
-impl<T: Scalar, const D: usize> Run<T, D> {
-    pub(super) fn new(model: Vec<Point<T, D>>, target: Vec<Point<T, D>>, frame: Frame<D>) -> Self {
+impl<const D: usize> Run<D> {
+    pub(super) fn new(
+        model: Vec<Point<f64, D>>,
+        target: Vec<Point<f64, D>>,
+        frame: Frame<D>,
+    ) -> Self {
         let matches = MatchMatrix::zeros(model.len(), target.len());
         Self {
             warped: model.clone(),
@@ -44,15 +48,15 @@ impl<T: Scalar, const D: usize> Run<T, D> {
     }
 
     /// Mean partner of model point `i` and its weight, one less the slack.
-    fn partner(&self, i: usize) -> (SVector<T, D>, T) {
+    fn partner(&self, i: usize) -> (SVector<f64, D>, f64) {
         let weights = &self.matches.row(i)[..self.target.len()];
-        let mass = weights.iter().fold(T::zero(), |sum, &w| sum + w);
+        let mass = weights.iter().fold(0.0, |sum, &w| sum + w);
         let sum = self
             .target
             .iter()
             .zip(weights)
             .fold(SVector::zeros(), |sum, (y, &w)| sum + y.coords * w);
-        if mass > T::zero() {
+        if mass > 0.0 {
             (sum / mass, mass)
         } else {
             (self.warped[i].coords, mass)
@@ -60,13 +64,13 @@ impl<T: Scalar, const D: usize> Run<T, D> {
     }
 
     /// Fits the spline to the mean partners, moves the model, and returns the largest step.
-    pub(super) fn fit(&mut self, smoothing: Smoothing<T>) -> T {
+    pub(super) fn fit(&mut self, smoothing: Smoothing<f64>) -> f64 {
         let (means, weights): (Vec<_>, Vec<_>) =
             (0..self.model.len()).map(|i| self.partner(i)).unzip();
-        let floor: T = nalgebra::convert(1e-6);
+        let floor: f64 = 1e-6;
         let kept: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > floor).collect();
         if kept.is_empty() {
-            return T::zero();
+            return 0.0;
         }
         let sources: Vec<_> = kept.iter().map(|&i| self.model[i]).collect();
         let images: Vec<_> = kept.iter().map(|&i| Point::from(means[i])).collect();
@@ -80,7 +84,7 @@ impl<T: Scalar, const D: usize> Run<T, D> {
         let step = moved
             .iter()
             .zip(&self.warped)
-            .fold(T::zero(), |m, (a, b)| m.max((a - b).norm()));
+            .fold(0.0_f64, |m, (a, b)| m.max((a - b).norm()));
         self.warped = moved;
         step
     }
@@ -88,7 +92,7 @@ impl<T: Scalar, const D: usize> Run<T, D> {
     /// Distinct partners of most probability in sum; none where the slack is likelier.
     fn assignment(&self) -> Vec<Option<usize>> {
         let (rows, columns) = (self.model.len(), self.target.len());
-        let costs: Vec<T> = (0..rows)
+        let costs: Vec<f64> = (0..rows)
             .flat_map(|i| self.matches.row(i)[..columns].iter().map(|&p| -p))
             .collect();
         // Probabilities: finite, and as many as there are pairs.
@@ -96,19 +100,19 @@ impl<T: Scalar, const D: usize> Run<T, D> {
             linear_assignment(&costs, rows, columns).unwrap_or_else(|_| vec![None; rows]);
         for (i, partner) in assignment.iter_mut().enumerate() {
             let slack = self.matches.slack_of_row(i);
-            *partner = partner
-                .filter(|&j| self.matches[(i, j)] > T::zero() && self.matches[(i, j)] >= slack);
+            *partner =
+                partner.filter(|&j| self.matches[(i, j)] > 0.0 && self.matches[(i, j)] >= slack);
         }
         assignment
     }
 
     /// The result, in the units of the caller.
-    pub(super) fn finish(self, model: &[Point<T, D>], target: &[Point<T, D>]) -> Matching<T, D> {
+    pub(super) fn finish(self, model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Matching<D> {
         let assignment = self.assignment();
-        let positions: Vec<Point<T, D>> = self
+        let positions: Vec<Point<f64, D>> = self
             .warped
             .iter()
-            .map(|p| self.frame.leave(p.coords.map(nalgebra::convert_unchecked)))
+            .map(|p| self.frame.leave(p.coords))
             .collect();
         // The spline's values determine it: interpolating them gives it back in the units of the caller.
         let warp = hard::spline(model, &positions, None, Smoothing::None);
@@ -122,13 +126,9 @@ impl<T: Scalar, const D: usize> Run<T, D> {
                 .matches
                 .row(i)
                 .iter()
-                .fold(T::zero(), |sum, &p| sum + p)
-                .max(T::one());
-            let kept = row
-                .iter()
-                .copied()
-                .enumerate()
-                .filter(|p| p.1 > nalgebra::convert(NEGLIGIBLE));
+                .fold(0.0, |sum, &p| sum + p)
+                .max(1.0);
+            let kept = row.iter().copied().enumerate().filter(|p| p.1 > NEGLIGIBLE);
             soft.push_row(kept.map(|(j, p)| (j, p / sum)));
             confidence.push(partner.map_or(self.matches.slack_of_row(i), |j| row[j]) / sum);
             covariance.push(spread(target, row));
@@ -140,15 +140,15 @@ impl<T: Scalar, const D: usize> Run<T, D> {
                 .enumerate()
                 .filter_map(|(i, j)| j.map(|j| (i, j)))
         };
-        let count: T = nalgebra::convert(pairs().count().max(1) as f64);
-        let residual = (pairs().map(squares).fold(T::zero(), |s, r| s + r) / count).sqrt();
+        let count: f64 = pairs().count().max(1) as f64;
+        let residual = (pairs().map(squares).fold(0.0, |s, r| s + r) / count).sqrt();
         let (unmatched_model, unmatched_target) = unmatched_rows(&assignment, target.len());
         let report = MatchReport {
             stop: self.stop,
             iterations: self.energy.len(),
             starts: 1,
             residual,
-            sigma: residual / nalgebra::convert((D as f64).sqrt()),
+            sigma: residual / ((D as f64).sqrt()),
             doubt: None,
         };
         let energy = self.energy;
@@ -168,9 +168,9 @@ impl<T: Scalar, const D: usize> Run<T, D> {
 }
 
 /// Covariance of the partners of one model point.
-fn spread<T: Scalar, const D: usize>(target: &[Point<T, D>], row: &[T]) -> SMatrix<T, D, D> {
-    let mass = row.iter().fold(T::zero(), |sum, &p| sum + p);
-    if mass <= T::zero() {
+fn spread<const D: usize>(target: &[Point<f64, D>], row: &[f64]) -> SMatrix<f64, D, D> {
+    let mass = row.iter().fold(0.0, |sum, &p| sum + p);
+    if mass <= 0.0 {
         return SMatrix::zeros();
     }
     let origin = target[0];

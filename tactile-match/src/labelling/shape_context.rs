@@ -4,28 +4,27 @@
 use super::MatchMatrix;
 use crate::ShapeContexts;
 use nalgebra::Point;
-use tactile_tps::Scalar;
 
 /// The contexts reach twice the mean distance of two points; none where all coincide.
-fn contexts<T: Scalar, const D: usize>(points: &[Point<T, D>]) -> Option<ShapeContexts> {
+fn contexts<const D: usize>(points: &[Point<f64, D>]) -> Option<ShapeContexts> {
     let distances = points
         .iter()
         .flat_map(|p| points.iter().map(move |q| (q - p).norm()));
-    let sum = distances.fold(T::zero(), |sum, d| sum + d);
+    let sum = distances.fold(0.0, |sum, d| sum + d);
     let pairs = points.len() * points.len().saturating_sub(1);
-    let two: T = nalgebra::convert(2.0);
-    ShapeContexts::new(points, two * sum / nalgebra::convert(pairs.max(1) as f64)).ok()
+    let two: f64 = 2.0;
+    ShapeContexts::new(points, two * sum / (pairs.max(1) as f64)).ok()
 }
 
 /// The first match matrix: `exp(−C_ij / temperature)` of the shape-context distances `C`, `slack` relative to the likeliest partner
 /// in the slack entries, after one sweep of [`sinkhorn`](super::sinkhorn()); `O(I J)` times the number of bins.
 #[must_use]
-pub(crate) fn first_matches<T: Scalar, const D: usize>(
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
+pub(crate) fn first_matches<const D: usize>(
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
     temperature: f64,
     slack: f64,
-) -> MatchMatrix<T> {
+) -> MatchMatrix {
     let contexts = contexts(model).zip(contexts(target));
     let cost = |i, j| {
         contexts
@@ -42,8 +41,8 @@ pub(crate) fn first_matches<T: Scalar, const D: usize>(
             Some(row) if j < columns => (-(row[j] - least(row)) / temperature).exp(),
             _ => slack,
         };
-        nalgebra::convert(weight)
+        weight
     });
-    super::update::sinkhorn(&mut m, 1, T::zero());
+    super::update::sinkhorn(&mut m, 1, 0.0);
     m
 }

@@ -8,12 +8,12 @@ use tactile_tps::Scalar;
 
 /// One outer iteration's match matrix, as [`RelaxationLabelling::relax`](super::RelaxationLabelling::relax) with all but the likeliest
 /// candidates at zero.
-pub(super) fn relax<T: Scalar, const D: usize>(
+pub(super) fn relax<const D: usize>(
     options: &RelaxationLabelling,
     candidates: usize,
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
-) -> MatchMatrix<T> {
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+) -> MatchMatrix {
     let graphs = [model, target].map(|points| NeighbourGraph::new(points, options.neighbourhood));
     let mut m = first_matches(model, target, options.temperature, options.slack);
     keep_likeliest(&mut m, candidates);
@@ -22,16 +22,16 @@ pub(super) fn relax<T: Scalar, const D: usize>(
 }
 
 /// The target that has all of a row, so that no other can still come up: what they have is below a hundred roundings.
-fn settled_on<T: Scalar>(row: &[T]) -> Option<usize> {
-    let sum = row.iter().fold(T::zero(), |sum, &p| sum + p);
-    let enough = sum * nalgebra::convert(1.0 - 100.0 * T::UNIT_ROUNDOFF);
+fn settled_on(row: &[f64]) -> Option<usize> {
+    let sum = row.iter().fold(0.0, |sum, &p| sum + p);
+    let enough = sum * (1.0 - 100.0 * f64::UNIT_ROUNDOFF);
     row[..row.len() - 1]
         .iter()
-        .position(|&p| p > T::zero() && p >= enough)
+        .position(|&p| p > 0.0 && p >= enough)
 }
 
 /// Sets all but the `count` likeliest partners of every model point to zero; of equal ones the lower rows stay.
-fn keep_likeliest<T: Scalar>(m: &mut MatchMatrix<T>, count: usize) {
+fn keep_likeliest(m: &mut MatchMatrix, count: usize) {
     let columns = m.columns();
     let mut order: Vec<usize> = Vec::with_capacity(columns);
     for i in 0..m.rows() {
@@ -45,32 +45,32 @@ fn keep_likeliest<T: Scalar>(m: &mut MatchMatrix<T>, count: usize) {
                 .then(a.cmp(b))
         };
         order.sort_unstable_by(unlikely);
-        order.iter().skip(count).for_each(|&j| row[j] = T::zero());
+        order.iter().skip(count).for_each(|&j| row[j] = 0.0);
     }
 }
 
 /// What every candidate pair hears from the candidate pairs of its neighbours: entries of M and their compatibilities, in flat rows.
-struct Links<T> {
+struct Links {
     columns: usize,
     /// The candidate pairs `(i, j)`, where their links start, and where the last of them ends.
     pairs: Vec<(usize, usize)>,
     starts: Vec<usize>,
     from: Vec<(u32, u32)>,
-    compatibility: Vec<T>,
+    compatibility: Vec<f64>,
 }
 
-impl<T: Scalar> Links<T> {
+impl Links {
     fn new<const D: usize>(
-        m: &MatchMatrix<T>,
-        graphs: &[NeighbourGraph<T, D>; 2],
-        rule: CompatibilityRule<T>,
+        m: &MatchMatrix,
+        graphs: &[NeighbourGraph<D>; 2],
+        rule: CompatibilityRule,
     ) -> Self {
         let columns = m.columns();
         let candidates = |i: usize| {
             m.row(i)[..columns]
                 .iter()
                 .enumerate()
-                .filter(|(_, p)| **p > T::zero())
+                .filter(|(_, p)| **p > 0.0)
                 .map(|(j, _)| j)
         };
         let mut links = Self {
@@ -105,8 +105,8 @@ impl<T: Scalar> Links<T> {
 
     /// The support (19) of the candidate pairs; zero for all others. Of points whose match is settled
     /// only the pair they settled on is heard.
-    fn support(&self, m: &MatchMatrix<T>) -> Vec<T> {
-        let mut support = vec![T::zero(); m.rows() * self.columns];
+    fn support(&self, m: &MatchMatrix) -> Vec<f64> {
+        let mut support = vec![0.0; m.rows() * self.columns];
         let settled: Vec<Option<usize>> = (0..m.rows()).map(|i| settled_on(m.row(i))).collect();
         for (&(i, j), ends) in self.pairs.iter().zip(self.starts.windows(2)) {
             if settled[i].is_some_and(|on| on != j) {
@@ -115,7 +115,7 @@ impl<T: Scalar> Links<T> {
             let links = self.from[ends[0]..ends[1]]
                 .iter()
                 .zip(&self.compatibility[ends[0]..ends[1]]);
-            support[i * self.columns + j] = links.fold(T::zero(), |sum, (&(a, b), &r)| {
+            support[i * self.columns + j] = links.fold(0.0, |sum, (&(a, b), &r)| {
                 sum + m[(a as usize, b as usize)] * r
             });
         }

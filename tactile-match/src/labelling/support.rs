@@ -3,19 +3,18 @@
 #[cfg(test)]
 use super::CompatibilityRule;
 use super::{MatchMatrix, NeighbourGraph};
-use nalgebra::RealField;
 
 /// (19) as printed: `S_ij = Σ_{a∈N(i)} Σ_{b∈N(j)} M_ab r(ia, jb)`, row-major `I × J`; `O(I J A B)`.
 ///
 /// # Panics
 /// If `m` has not the size of the graphs.
 #[cfg(test)]
-pub(crate) fn support<T: RealField + Copy, const D: usize>(
-    m: &MatchMatrix<T>,
-    model: &NeighbourGraph<T, D>,
-    target: &NeighbourGraph<T, D>,
-    rule: &CompatibilityRule<T>,
-) -> Vec<T> {
+pub(crate) fn support<const D: usize>(
+    m: &MatchMatrix,
+    model: &NeighbourGraph<D>,
+    target: &NeighbourGraph<D>,
+    rule: &CompatibilityRule,
+) -> Vec<f64> {
     support_by(m, model, target, |x, y| {
         rule.of(&model.edges()[x], &target.edges()[y])
     })
@@ -27,12 +26,12 @@ pub(crate) fn support<T: RealField + Copy, const D: usize>(
 /// # Panics
 /// If `m` has not the size of the graphs.
 #[must_use]
-pub(crate) fn support_by<T: RealField + Copy, const D: usize>(
-    m: &MatchMatrix<T>,
-    model: &NeighbourGraph<T, D>,
-    target: &NeighbourGraph<T, D>,
-    r: impl Fn(usize, usize) -> T,
-) -> Vec<T> {
+pub(crate) fn support_by<const D: usize>(
+    m: &MatchMatrix,
+    model: &NeighbourGraph<D>,
+    target: &NeighbourGraph<D>,
+    r: impl Fn(usize, usize) -> f64,
+) -> Vec<f64> {
     assert_eq!(
         (m.rows(), m.columns()),
         (model.points(), target.points()),
@@ -41,7 +40,7 @@ pub(crate) fn support_by<T: RealField + Copy, const D: usize>(
     let mut support = Vec::with_capacity(m.rows() * m.columns());
     for i in 0..m.rows() {
         for j in 0..m.columns() {
-            let mut sum = T::zero();
+            let mut sum = 0.0;
             for x in model.range(i) {
                 let row = m.row(model.edges()[x].to);
                 for y in target.range(j) {
@@ -60,20 +59,20 @@ pub(crate) fn support_by<T: RealField + Copy, const D: usize>(
 /// # Panics
 /// If `m` has not the size of the graphs.
 #[must_use]
-pub(crate) fn energy<T: RealField + Copy, const D: usize>(
-    m: &MatchMatrix<T>,
-    model: &NeighbourGraph<T, D>,
-    target: &NeighbourGraph<T, D>,
-) -> T {
+pub(crate) fn energy<const D: usize>(
+    m: &MatchMatrix,
+    model: &NeighbourGraph<D>,
+    target: &NeighbourGraph<D>,
+) -> f64 {
     assert_eq!(
         (m.rows(), m.columns()),
         (model.points(), target.points()),
         "size of M"
     );
-    let mut energy = T::zero();
+    let mut energy = 0.0;
     for i in 0..m.rows() {
-        for j in (0..m.columns()).filter(|&j| m[(i, j)] > T::zero()) {
-            let mut kept = T::zero();
+        for j in (0..m.columns()).filter(|&j| m[(i, j)] > 0.0) {
+            let mut kept = 0.0;
             for a in model.of(i) {
                 let row = m.row(a.to);
                 kept = target.of(j).iter().fold(kept, |sum, b| sum + row[b.to]);

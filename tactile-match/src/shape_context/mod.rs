@@ -9,7 +9,6 @@
 use crate::simd::vectorised;
 use crate::{MatchError, validate};
 use nalgebra::Point;
-use tactile_tps::Scalar;
 
 /// Radial bins: the outermost ends at the largest radius, each further one at half the radius.
 const SHELLS: usize = 5;
@@ -45,26 +44,17 @@ impl ShapeContexts {
     /// # Errors
     /// [`MatchError::NotFinite`] for a coordinate that is not finite, [`MatchError::InvalidOption`] for a radius that is
     /// not positive and finite.
-    pub fn new<T: Scalar, const D: usize>(
-        points: &[Point<T, D>],
-        radius: T,
-    ) -> Result<Self, MatchError> {
-        validate::option_within(
-            "radius",
-            nalgebra::convert_unchecked::<T, f64>(radius),
-            f64::MIN_POSITIVE,
-            f64::MAX,
-            "(0, ∞)",
-        )?;
+    pub fn new<const D: usize>(points: &[Point<f64, D>], radius: f64) -> Result<Self, MatchError> {
+        validate::option_within("radius", radius, f64::MIN_POSITIVE, f64::MAX, "(0, ∞)")?;
         if !points.is_empty() {
             validate::point_set("model", points)?;
         }
         let plain: Vec<[f64; D]> = points
             .iter()
-            .map(|p| std::array::from_fn(|k| nalgebra::convert_unchecked::<T, f64>(p[k])))
+            .map(|p| std::array::from_fn(|k| p[k]))
             .collect();
         let mut contexts = Self::default();
-        contexts.build(&plain, nalgebra::convert_unchecked::<T, f64>(radius));
+        contexts.build(&plain, radius);
         Ok(contexts)
     }
 

@@ -7,10 +7,9 @@ use crate::{MatchError, Matching};
 use nalgebra::Point;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
-use tactile_tps::Scalar;
 
 /// A model and a target.
-type Pair<'a, T, const D: usize> = (&'a [Point<T, D>], &'a [Point<T, D>]);
+type Pair<'a, const D: usize> = (&'a [Point<f64, D>], &'a [Point<f64, D>]);
 
 impl AnnealedSoftassign {
     /// Matches every `(model, target)` on all threads of the current pool, with the bits of [`PointMatcher::match_points`]; a pair that cannot be
@@ -26,10 +25,10 @@ impl AnnealedSoftassign {
     /// assert_eq!(serial.warped, parallel[2].as_ref().unwrap().warped);
     /// # Ok::<(), tactile_match::MatchError>(())
     /// ```
-    pub fn match_all_in_parallel<T: Scalar, const D: usize>(
+    pub fn match_all_in_parallel<const D: usize>(
         &self,
-        pairs: &[Pair<'_, T, D>],
-    ) -> Vec<Result<Matching<T, D>, MatchError>> {
+        pairs: &[Pair<'_, D>],
+    ) -> Vec<Result<Matching<D>, MatchError>> {
         let go = |_, _| ControlFlow::Continue(());
         let one = |workspace: &mut _, &(model, target): &_| {
             Ok(self

@@ -30,7 +30,7 @@ fn agrees<const D: usize>(x: &[Point<f64, D>], y: &[Point<f64, D>]) -> Result<()
         longest: None,
     };
     let weight = |(i, j): (usize, usize), (a, b): (usize, usize)| {
-        let edge = |graph: &NeighbourGraph<f64, D>, from: usize, to: usize| {
+        let edge = |graph: &NeighbourGraph<D>, from: usize, to: usize| {
             graph.of(from).iter().find(|edge| edge.to == to).copied()
         };
         match (edge(&graph_x, i, a), edge(&graph_y, j, b)) {

@@ -4,7 +4,6 @@ use super::spline::ModelSpline;
 use super::{SoftassignWorkspace, finish};
 use crate::{MatchReport, Matching, SoftMatches, StopReason, unmatched_rows};
 use nalgebra::{Point, SMatrix};
-use tactile_tps::Scalar;
 
 /// The answer in a workspace.
 ///
@@ -18,7 +17,7 @@ use tactile_tps::Scalar;
 /// let found = AnnealedSoftassign::default()
 ///     .match_points_with(&mut workspace, &model, &target, |_, _| ControlFlow::Continue(()))?;
 /// assert_eq!((found.assignment[2], found.confidence[2] > 0.9), (Some(2), true));
-/// assert!(found.warped::<f64>().zip(&target).all(|(w, t)| (w - t).norm() < 1e-9));
+/// assert!(found.warped().zip(&target).all(|(w, t)| (w - t).norm() < 1e-9));
 /// assert!(found.report.residual < 1e-9); // units of the points
 /// let matching = found.to_matching(&model);
 /// assert!((matching.warp.jacobian(&model[4]).determinant() - 1.1).abs() < 1e-6); // areas grow by a tenth
@@ -32,7 +31,7 @@ pub struct SoftassignMatch<'w, const D: usize> {
     /// Probability that each assignment is right.
     pub confidence: &'w [f64],
     /// How it went.
-    pub report: MatchReport<f64>,
+    pub report: MatchReport,
 }
 
 impl<'w, const D: usize> SoftassignMatch<'w, D> {
@@ -55,7 +54,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
     }
 
     /// The warped model points.
-    pub fn warped<T: Scalar>(&self) -> impl ExactSizeIterator<Item = Point<T, D>> + use<'w, T, D> {
+    pub fn warped(&self) -> impl ExactSizeIterator<Item = Point<f64, D>> + use<'w, D> {
         let workspace = self.workspace;
         workspace
             .answer
@@ -66,66 +65,54 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
 
     /// The answer with its warp, soft matches and covariances; `model` are the points that were matched.
     #[must_use]
-    pub fn to_matching<T: Scalar>(&self, model: &[Point<T, D>]) -> Matching<T, D> {
+    pub fn to_matching(&self, model: &[Point<f64, D>]) -> Matching<D> {
         self.interpolated(model, &ModelSpline::new(model))
     }
 
     /// The report in the type of the points.
-    pub(super) fn narrow_report<T: Scalar>(&self) -> MatchReport<T> {
+    pub(super) fn narrow_report(&self) -> MatchReport {
         let report = &self.report;
         MatchReport {
             stop: report.stop,
             iterations: report.iterations,
             starts: report.starts,
-            residual: nalgebra::convert(report.residual),
-            sigma: nalgebra::convert(report.sigma),
+            residual: report.residual,
+            sigma: report.sigma,
             doubt: report.doubt,
         }
     }
 
     /// As [`to_matching`](Self::to_matching), with the factorised system of the model's spline.
-    pub(super) fn interpolated<T: Scalar>(
+    pub(super) fn interpolated(
         &self,
-        model: &[Point<T, D>],
-        spline: &ModelSpline<T, D>,
-    ) -> Matching<T, D> {
+        model: &[Point<f64, D>],
+        spline: &ModelSpline<D>,
+    ) -> Matching<D> {
         let workspace = self.workspace;
         let (answer, frame) = (&workspace.answer, &workspace.frame);
-        let mut warped: Vec<Point<T, D>> = self.warped().collect();
+        let mut warped: Vec<Point<f64, D>> = self.warped().collect();
         let warp = spline.through(&mut warped);
         let (mut soft, mut row) = (SoftMatches::default(), Vec::new());
         for i in 0..model.len() {
             row.clear();
-            row.extend(
-                finish::soft_row(&workspace.annealer.soft, i)
-                    .map(|(j, p)| (j, nalgebra::convert(p))),
-            );
+            row.extend(finish::soft_row(&workspace.annealer.soft, i).map(|(j, p)| (j, p)));
             row.sort_unstable_by_key(|entry| entry.0);
             soft.push_row(row.iter().copied());
         }
         let square = frame.scale * frame.scale;
-        let covariance = |v: &f64| SMatrix::from_diagonal_element(nalgebra::convert(v * square));
+        let covariance = |v: &f64| SMatrix::from_diagonal_element(v * square);
         let (unmatched_model, unmatched_target) =
             unmatched_rows(&answer.assignment, workspace.target.len());
         Matching {
             warp,
             warped,
             assignment: answer.assignment.clone(),
-            confidence: answer
-                .confidence
-                .iter()
-                .map(|&c| nalgebra::convert(c))
-                .collect(),
+            confidence: answer.confidence.iter().map(|&c| c).collect(),
             soft,
             unmatched_model,
             unmatched_target,
             displacement_covariance: answer.variance.iter().map(covariance).collect(),
-            energy: workspace
-                .best
-                .trace
-                .iter()
-                .map(|&e| nalgebra::convert(e))
-                .collect(),
+            energy: workspace.best.trace.iter().map(|&e| e).collect(),
             report: self.narrow_report(),
         }
     }
@@ -133,7 +120,7 @@ impl<'w, const D: usize> SoftassignMatch<'w, D> {
 
 fn stop_reason<const D: usize>(workspace: &SoftassignWorkspace<D>) -> StopReason {
     match () {
-        () if workspace.stopped => StopReason::Callback,
+        () if workspace.stopped => StopReason::Cancelled,
         // The floor is reached to rounding.
         () if workspace.best.sigma <= 1.000_001 * finish::FLOOR
             && !workspace.annealer.soft.errors.differ()

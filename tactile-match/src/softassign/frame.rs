@@ -4,7 +4,6 @@
 
 use crate::frame::{centre_and_radius, widened};
 use nalgebra::{Point, SVector};
-use tactile_tps::Scalar;
 
 /// Beyond this many radii a coordinate is as good as at infinity, and its square is still finite in single precision.
 const FARTHEST: f64 = 1e12;
@@ -29,7 +28,7 @@ impl<const D: usize> Default for Frame<D> {
 
 impl<const D: usize> Frame<D> {
     /// The frame of two sets; the radius of `target` stands in for a model without extent, 1 if that has none either.
-    pub(crate) fn new<T: Scalar>(model: &[Point<T, D>], target: &[Point<T, D>]) -> Self {
+    pub(crate) fn new(model: &[Point<f64, D>], target: &[Point<f64, D>]) -> Self {
         let sets = [model, target].map(centre_and_radius);
         // Below the rounding of the coordinates the radius is noise: such a set is one point.
         let extended = |(centre, radius): &(SVector<f64, D>, f64)| {
@@ -47,12 +46,12 @@ impl<const D: usize> Frame<D> {
     }
 
     /// A model point in the frame.
-    pub(crate) fn model<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
+    pub(crate) fn model(&self, point: &Point<f64, D>) -> [f64; D] {
         self.inward(widened(point) - self.model)
     }
 
     /// A target point in the frame.
-    pub(crate) fn target<T: Scalar>(&self, point: &Point<T, D>) -> [f64; D] {
+    pub(crate) fn target(&self, point: &Point<f64, D>) -> [f64; D] {
         self.inward(widened(point) - self.target)
     }
 
@@ -61,9 +60,9 @@ impl<const D: usize> Frame<D> {
     }
 
     /// A warped point, which lies among the targets, in the units of the caller.
-    pub(crate) fn outward<T: Scalar>(&self, point: &[f64; D]) -> Point<T, D> {
+    pub(crate) fn outward(&self, point: &[f64; D]) -> Point<f64, D> {
         Point::from(std::array::from_fn(|k| {
-            nalgebra::convert(point[k] * self.scale + self.target[k])
+            point[k] * self.scale + self.target[k]
         }))
     }
 }

@@ -7,7 +7,6 @@ use crate::validate::option_within;
 use crate::{MatchError, Matching};
 use nalgebra::Point;
 use std::ops::ControlFlow;
-use tactile_tps::Scalar;
 
 /// Where a model point is known to go, as a normal distribution: the fit counts it beside the soft matches, with the weight σ²/s² of its
 /// standard deviation s at the temperature σ.
@@ -27,23 +26,23 @@ use tactile_tps::Scalar;
 /// # Ok::<(), tactile_match::MatchError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Landmark<T: Scalar, const D: usize> {
+pub struct Landmark<const D: usize> {
     /// Row of the model point.
     pub row: usize,
     /// Where it goes.
-    pub position: Point<T, D>,
+    pub position: Point<f64, D>,
     /// Standard deviation along an axis, in the units of the points; 0 for a hard landmark, which is kept to a thousandth of the model's
     /// radius, and where its position is a target exactly.
-    pub deviation: T,
+    pub deviation: f64,
 }
 
-impl<T: Scalar, const D: usize> Landmark<T, D> {
+impl<const D: usize> Landmark<D> {
     fn check(&self, points: usize) -> Result<(), MatchError> {
         let row = self.row;
         if row >= points {
             return Err(MatchError::LandmarkRow { row, points });
         }
-        let deviation = nalgebra::convert_unchecked::<T, f64>(self.deviation);
+        let deviation = self.deviation;
         option_within("deviation", deviation, 0.0, f64::MAX, "[0, ∞)")?;
         if !self.position.iter().all(|c| c.is_finite()) {
             return Err(MatchError::LandmarkPosition { row });
@@ -71,26 +70,22 @@ impl AnnealedSoftassign {
     /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::LandmarkRow`] for a landmark of a point that the model does not
     /// have, [`MatchError::LandmarkPosition`] for a position that is not finite, and [`MatchError::InvalidOption`] for a deviation that is
     /// negative or not finite.
-    pub fn match_with_landmarks<T: Scalar, const D: usize>(
+    pub fn match_with_landmarks<const D: usize>(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-        landmarks: &[Landmark<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        landmarks: &[Landmark<D>],
+    ) -> Result<Matching<D>, MatchError> {
         for landmark in landmarks {
             landmark.check(model.len())?;
         }
         let mut workspace = SoftassignWorkspace::default();
         workspace.take(model, target)?;
         let frame = workspace.frame;
-        workspace.known.extend(landmarks.iter().map(|known| {
-            Known {
-                row: known.row,
-                position: frame.target(&known.position),
-                variance: (nalgebra::convert_unchecked::<T, f64>(known.deviation) / frame.scale)
-                    .max(finish::FLOOR)
-                    .powi(2),
-            }
+        workspace.known.extend(landmarks.iter().map(|known| Known {
+            row: known.row,
+            position: frame.target(&known.position),
+            variance: (known.deviation / frame.scale).max(finish::FLOOR).powi(2),
         }));
         self.solve(&mut workspace, &mut |_, _| ControlFlow::Continue(()));
         Ok(SoftassignMatch::of(&workspace).to_matching(model))

@@ -78,7 +78,6 @@ use scales::ScaleAverage;
 use schedule::State;
 use series::Series;
 use std::ops::ControlFlow;
-use tactile_tps::Scalar;
 use tuples::Tuples;
 
 /// Memory that matches use again and again.
@@ -164,10 +163,10 @@ impl<const D: usize> SoftassignWorkspace<D> {
     }
 
     /// Takes two sets, in the frame's units.
-    fn take<T: Scalar>(
+    fn take(
         &mut self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
     ) -> Result<(), MatchError> {
         validate::point_sets(model, target)?;
         let frame = Frame::new(model, target);
@@ -206,11 +205,11 @@ impl AnnealedSoftassign {
     ///
     /// # Errors
     /// As [`PointMatcher::match_points`].
-    pub fn match_points_with<'w, T: Scalar, const D: usize>(
+    pub fn match_points_with<'w, const D: usize>(
         &self,
         workspace: &'w mut SoftassignWorkspace<D>,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
         mut observe: impl FnMut(usize, f64) -> ControlFlow<()>,
     ) -> Result<SoftassignMatch<'w, D>, MatchError> {
         workspace.take(model, target)?;
@@ -219,12 +218,12 @@ impl AnnealedSoftassign {
     }
 }
 
-impl<T: Scalar, const D: usize> PointMatcher<T, D> for AnnealedSoftassign {
+impl<const D: usize> PointMatcher<D> for AnnealedSoftassign {
     fn match_points(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
         let mut workspace = SoftassignWorkspace::default();
         let found = self.match_points_with(&mut workspace, model, target, |_, _| {
             ControlFlow::Continue(())
@@ -235,10 +234,10 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for AnnealedSoftassign {
     fn match_next(
         &self,
         warm: &mut WarmStart,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-    ) -> Result<Matching<T, D>, MatchError> {
-        let series: &mut Series<T, D> = warm.state();
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+    ) -> Result<Matching<D>, MatchError> {
+        let series: &mut Series<D> = warm.state();
         self.follow(series, model, target)?;
         Ok(series.matching())
     }
@@ -246,11 +245,11 @@ impl<T: Scalar, const D: usize> PointMatcher<T, D> for AnnealedSoftassign {
     fn match_next_pairs(
         &self,
         warm: &mut WarmStart,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-        pairs: &mut MatchedPairs<T>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        pairs: &mut MatchedPairs,
     ) -> Result<(), MatchError> {
-        let series: &mut Series<T, D> = warm.state();
+        let series: &mut Series<D> = warm.state();
         self.follow(series, model, target)?;
         series.pairs(pairs);
         Ok(())

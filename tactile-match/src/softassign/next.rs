@@ -6,7 +6,6 @@ use super::{AnnealedSoftassign, finish};
 use crate::{MatchError, validate};
 use nalgebra::Point;
 use std::ops::ControlFlow;
-use tactile_tps::Scalar;
 
 /// A match that finds partners for less than this share of what the last one found, or leaves so many times its residuals, is
 /// made anew.
@@ -18,11 +17,11 @@ const MARGIN: f64 = 2.0;
 impl AnnealedSoftassign {
     /// A short run from where the last match put the model, as warm as the target is far from there; the usual search where
     /// there is no last match, or the run loses partners. The answer is left in the series.
-    pub(super) fn follow<T: Scalar, const D: usize>(
+    pub(super) fn follow<const D: usize>(
         &self,
-        series: &mut Series<T, D>,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
+        series: &mut Series<D>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
     ) -> Result<(), MatchError> {
         // Before the series takes notice of the model.
         validate::point_sets(model, target)?;
@@ -36,11 +35,11 @@ impl AnnealedSoftassign {
     }
 
     /// Whether a run from the last answer is one: it keeps the partners, and fits as well.
-    fn go_on<T: Scalar, const D: usize>(
+    fn go_on<const D: usize>(
         &self,
-        series: &mut Series<T, D>,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
+        series: &mut Series<D>,
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
     ) -> Result<bool, MatchError> {
         let Series {
             last,

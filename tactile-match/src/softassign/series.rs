@@ -4,15 +4,14 @@ use super::spline::ModelSpline;
 use super::{SoftassignMatch, SoftassignWorkspace};
 use crate::{MatchedPairs, Matching};
 use nalgebra::Point;
-use tactile_tps::Scalar;
 
 /// Where the last match put the model, the factorisation of the spline between its points, the matcher's memory. Given another model it
 /// forgets the old one.
 #[derive(Clone, Debug)]
-pub(super) struct Series<T: Scalar, const D: usize> {
-    model: Vec<Point<T, D>>,
+pub(super) struct Series<const D: usize> {
+    model: Vec<Point<f64, D>>,
     /// Empty where nothing was matched yet.
-    pub(super) last: Vec<Point<T, D>>,
+    pub(super) last: Vec<Point<f64, D>>,
     /// `last` in the frame of the match that begins there.
     pub(super) start: Vec<[f64; D]>,
     /// How many points had a partner.
@@ -21,10 +20,10 @@ pub(super) struct Series<T: Scalar, const D: usize> {
     pub(super) sigma: f64,
     /// Holds the answer of the last match.
     pub(super) workspace: SoftassignWorkspace<D>,
-    spline: Option<ModelSpline<T, D>>,
+    spline: Option<ModelSpline<D>>,
 }
 
-impl<T: Scalar, const D: usize> Default for Series<T, D> {
+impl<const D: usize> Default for Series<D> {
     fn default() -> Self {
         Self {
             model: Vec::new(),
@@ -38,9 +37,9 @@ impl<T: Scalar, const D: usize> Default for Series<T, D> {
     }
 }
 
-impl<T: Scalar, const D: usize> Series<T, D> {
+impl<const D: usize> Series<D> {
     /// Forgets the past of another model.
-    pub(super) fn switch_to(&mut self, model: &[Point<T, D>]) {
+    pub(super) fn switch_to(&mut self, model: &[Point<f64, D>]) {
         if self.model != model {
             self.model.clear();
             self.model.extend_from_slice(model);
@@ -53,13 +52,13 @@ impl<T: Scalar, const D: usize> Series<T, D> {
     pub(super) fn keep(&mut self) {
         let found = SoftassignMatch::of(&self.workspace);
         self.last.clear();
-        self.last.extend(found.warped::<T>());
+        self.last.extend(found.warped());
         self.matched = found.assignment.iter().flatten().count();
         self.sigma = found.report.sigma;
     }
 
     /// The last answer, its warp through the factorised system of the model's spline.
-    pub(super) fn matching(&mut self) -> Matching<T, D> {
+    pub(super) fn matching(&mut self) -> Matching<D> {
         let Self {
             spline,
             workspace,
@@ -71,15 +70,13 @@ impl<T: Scalar, const D: usize> Series<T, D> {
     }
 
     /// The pairs of the last answer.
-    pub(super) fn pairs(&self, pairs: &mut MatchedPairs<T>) {
+    pub(super) fn pairs(&self, pairs: &mut MatchedPairs) {
         let found = SoftassignMatch::of(&self.workspace);
         pairs.assignment.clear();
         pairs.assignment.extend_from_slice(found.assignment);
         pairs.confidence.clear();
         let confidence = found.confidence.iter();
-        pairs
-            .confidence
-            .extend(confidence.map(|&c| nalgebra::convert::<f64, T>(c)));
+        pairs.confidence.extend(confidence.map(|&c| c));
         pairs.report = found.narrow_report();
     }
 }

@@ -23,29 +23,29 @@ const ORDINARY: std::ops::Range<f64> = 1e-12..1e12;
 /// A model's interpolating spline: through all points, or through a well-spread sample of a large set. Its system is factorised when a warp first
 /// needs it, and once for all targets.
 #[derive(Clone, Debug)]
-pub(super) struct ModelSpline<T: Scalar, const D: usize> {
-    sources: Arc<Sources<T, D>>,
+pub(super) struct ModelSpline<const D: usize> {
+    sources: Arc<Sources<D>>,
 }
 
 #[derive(Debug)]
-struct Sources<T: Scalar, const D: usize> {
-    points: Vec<Point<T, D>>,
+struct Sources<const D: usize> {
+    points: Vec<Point<f64, D>>,
     /// Their rows in the model; empty for all.
     rows: Vec<usize>,
     /// Whether a spline goes through any positions.
     apart: bool,
-    system: OnceLock<Interpolation<T, D>>,
+    system: OnceLock<Interpolation<D>>,
 }
 
-impl<T: Scalar, const D: usize> Sources<T, D> {
-    fn system(&self) -> &Interpolation<T, D> {
+impl<const D: usize> Sources<D> {
+    fn system(&self) -> &Interpolation<D> {
         self.system
             .get_or_init(|| Interpolation::new(&self.points, None, Smoothing::None))
     }
 }
 
-impl<T: Scalar, const D: usize> ModelSpline<T, D> {
-    pub(super) fn new(model: &[Point<T, D>]) -> Self {
+impl<const D: usize> ModelSpline<D> {
+    pub(super) fn new(model: &[Point<f64, D>]) -> Self {
         let mut rows = Vec::new();
         if model.len() >= LARGE {
             let frame = Frame::new(model, model);
@@ -72,7 +72,10 @@ impl<T: Scalar, const D: usize> ModelSpline<T, D> {
 
     /// The spline that takes the model, or its sample, to `warped`. Where none goes through these positions a smoothed one, and `warped`, unless
     /// that is of a sample, becomes what it gives.
-    pub(super) fn through(&self, warped: &mut [Point<T, D>]) -> Box<dyn Warp<T, D> + Send + Sync> {
+    pub(super) fn through(
+        &self,
+        warped: &mut [Point<f64, D>],
+    ) -> Box<dyn Warp<f64, D> + Send + Sync> {
         let Sources { rows, apart, .. } = &*self.sources;
         let mut images = if rows.is_empty() {
             warped.to_vec()
@@ -96,60 +99,60 @@ impl<T: Scalar, const D: usize> ModelSpline<T, D> {
 
 /// A spline that is fitted when it is first asked for: who wants the pairs alone does not wait for it.
 #[derive(Debug)]
-struct Lazy<T: Scalar, const D: usize> {
-    sources: Arc<Sources<T, D>>,
-    images: Vec<Point<T, D>>,
-    spline: OnceLock<Fitted<T, D>>,
+struct Lazy<const D: usize> {
+    sources: Arc<Sources<D>>,
+    images: Vec<Point<f64, D>>,
+    spline: OnceLock<Fitted<D>>,
 }
 
-struct Fitted<T: Scalar, const D: usize>(Box<dyn Warp<T, D> + Send + Sync>);
+struct Fitted<const D: usize>(Box<dyn Warp<f64, D> + Send + Sync>);
 
-impl<T: Scalar, const D: usize> std::fmt::Debug for Fitted<T, D> {
+impl<const D: usize> std::fmt::Debug for Fitted<D> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Fitted").finish_non_exhaustive()
     }
 }
 
-impl<T: Scalar, const D: usize> Lazy<T, D> {
-    fn spline(&self) -> &dyn Warp<T, D> {
+impl<const D: usize> Lazy<D> {
+    fn spline(&self) -> &dyn Warp<f64, D> {
         let fit = || Fitted(warp_through(&self.sources, &mut self.images.clone()));
         &*self.spline.get_or_init(fit).0
     }
 }
 
-impl<T: Scalar, const D: usize> Warp<T, D> for Lazy<T, D> {
-    fn apply(&self, point: &Point<T, D>) -> Point<T, D> {
+impl<const D: usize> Warp<f64, D> for Lazy<D> {
+    fn apply(&self, point: &Point<f64, D>) -> Point<f64, D> {
         self.spline().apply(point)
     }
 
-    fn jacobian(&self, point: &Point<T, D>) -> SMatrix<T, D, D> {
+    fn jacobian(&self, point: &Point<f64, D>) -> SMatrix<f64, D, D> {
         self.spline().jacobian(point)
     }
 
     fn apply_into(
         &self,
-        points: &[Point<T, D>],
-        images: &mut [Point<T, D>],
+        points: &[Point<f64, D>],
+        images: &mut [Point<f64, D>],
     ) -> Result<(), TpsError> {
         self.spline().apply_into(points, images)
     }
 
     fn jacobian_into(
         &self,
-        points: &[Point<T, D>],
-        jacobians: &mut [SMatrix<T, D, D>],
+        points: &[Point<f64, D>],
+        jacobians: &mut [SMatrix<f64, D, D>],
     ) -> Result<(), TpsError> {
         self.spline().jacobian_into(points, jacobians)
     }
 }
 
 /// Whether all points are so far from each other, and their set of such a size, that a spline goes through any positions.
-fn are_apart<T: Scalar, const D: usize>(points: &[Point<T, D>]) -> bool {
+fn are_apart<const D: usize>(points: &[Point<f64, D>]) -> bool {
     let (centre, radius) = centre_and_radius(points);
     if !ORDINARY.contains(&radius) {
         return false;
     }
-    let inside = |p: &Point<T, D>| (widened(p) - centre) / radius;
+    let inside = |p: &Point<f64, D>| (widened(p) - centre) / radius;
     let mut sorted: Vec<_> = points.iter().map(inside).collect();
     // Only neighbours along the first axis can be near.
     sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
@@ -165,36 +168,31 @@ const SMOOTHING: f64 = 1e-6;
 
 /// The interpolating spline through the estimated positions. Where there is none (model points that coincide and go different
 /// ways) a smoothed one, and `warped` becomes what that gives.
-fn warp_through<T: Scalar, const D: usize>(
-    sources: &Sources<T, D>,
-    warped: &mut [Point<T, D>],
-) -> Box<dyn Warp<T, D> + Send + Sync> {
+fn warp_through<const D: usize>(
+    sources: &Sources<D>,
+    warped: &mut [Point<f64, D>],
+) -> Box<dyn Warp<f64, D> + Send + Sync> {
     let model = &sources.points;
     let exact = sources.system().through(model, warped);
     if agrees(&*exact, model, warped) {
         return exact;
     }
-    let warp = hard::spline(
-        model,
-        warped,
-        None,
-        Smoothing::Lambda(nalgebra::convert(SMOOTHING)),
-    );
+    let warp = hard::spline(model, warped, None, Smoothing::Lambda(SMOOTHING));
     // As many points in as out.
     let _ = warp.apply_into(model, warped);
     warp
 }
 
 /// Whether a warp takes the model to these positions, to half the digits.
-fn agrees<T: Scalar, const D: usize>(
-    warp: &(dyn Warp<T, D> + Send + Sync),
-    model: &[Point<T, D>],
-    warped: &[Point<T, D>],
+fn agrees<const D: usize>(
+    warp: &(dyn Warp<f64, D> + Send + Sync),
+    model: &[Point<f64, D>],
+    warped: &[Point<f64, D>],
 ) -> bool {
     let size = warped
         .iter()
-        .fold(T::zero(), |size, p| size.max(p.coords.amax()));
-    let tolerance = size * nalgebra::convert(T::UNIT_ROUNDOFF.sqrt());
+        .fold(0.0_f64, |size, p| size.max(p.coords.amax()));
+    let tolerance = size * (f64::UNIT_ROUNDOFF.sqrt());
     // All at once: a spline samples points several at a time.
     let mut images = model.to_vec();
     warp.apply_into(model, &mut images).is_ok()

@@ -10,7 +10,6 @@ use super::{AnnealedSoftassign, SoftassignMatch, SoftassignWorkspace};
 use crate::{MatchError, Matching};
 use nalgebra::Point;
 use std::ops::ControlFlow;
-use tactile_tps::Scalar;
 
 /// The excess variances of the targets, and what they are at one temperature.
 #[derive(Clone, Debug, Default)]
@@ -121,12 +120,12 @@ impl AnnealedSoftassign {
     /// # Errors
     /// As [`match_points`](crate::PointMatcher::match_points), [`MatchError::Shape`] where there is not one deviation a target, and
     /// [`MatchError::TargetDeviation`] for one that is not positive and finite.
-    pub fn match_with_target_errors<T: Scalar, const D: usize>(
+    pub fn match_with_target_errors<const D: usize>(
         &self,
-        model: &[Point<T, D>],
-        target: &[Point<T, D>],
-        deviations: &[T],
-    ) -> Result<Matching<T, D>, MatchError> {
+        model: &[Point<f64, D>],
+        target: &[Point<f64, D>],
+        deviations: &[f64],
+    ) -> Result<Matching<D>, MatchError> {
         let mut workspace = SoftassignWorkspace::default();
         workspace.take(model, target)?;
         workspace.take_deviations(deviations)?;
@@ -136,7 +135,7 @@ impl AnnealedSoftassign {
 }
 
 impl<const D: usize> SoftassignWorkspace<D> {
-    fn take_deviations<T: Scalar>(&mut self, deviations: &[T]) -> Result<(), MatchError> {
+    fn take_deviations(&mut self, deviations: &[f64]) -> Result<(), MatchError> {
         if deviations.len() != self.target.len() {
             return Err(MatchError::Shape {
                 what: "deviations of the targets",
@@ -145,11 +144,9 @@ impl<const D: usize> SoftassignWorkspace<D> {
             });
         }
         let positive = |s: &f64| *s > 0.0 && s.is_finite();
-        let widened = deviations
-            .iter()
-            .map(|&s| nalgebra::convert_unchecked::<T, f64>(s));
+        let widened = deviations.iter().map(|&s| s);
         if let Some(row) = widened.clone().position(|s| !positive(&s)) {
-            let value = nalgebra::convert_unchecked::<T, f64>(deviations[row]);
+            let value = deviations[row];
             return Err(MatchError::TargetDeviation { row, value });
         }
         let scale = self.frame.scale;

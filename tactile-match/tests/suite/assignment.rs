@@ -97,7 +97,7 @@ fn assert_optimal(
     costs: &[f64],
     rows: usize,
     columns: usize,
-    workspace: &AssignmentWorkspace<f64>,
+    workspace: &AssignmentWorkspace,
     assignment: &[Option<usize>],
 ) {
     let scale = costs
@@ -193,16 +193,6 @@ proptest! {
         prop_assert_eq!(linear_assignment(&costs, n, n).unwrap(), linear_assignment(&shifted, n, n).unwrap());
     }
 
-    #[test]
-    fn single_precision_finds_the_same_pairs((n, costs) in (1..=12_usize).prop_flat_map(|n|
-        (Just(n), prop::collection::vec(0..1_000_000_u32, n * n)))
-    ) {
-        // Integers below 2^24 / 16: sums are exact in f32, so the least costs agree exactly.
-        let double: Vec<f64> = costs.iter().map(|&c| f64::from(c)).collect();
-        let single: Vec<f32> = costs.iter().map(|&c| c as f32).collect();
-        let (a, b) = (linear_assignment(&double, n, n).unwrap(), linear_assignment(&single, n, n).unwrap());
-        prop_assert_eq!(total(&double, n, &a), total(&double, n, &b));
-    }
 }
 
 #[test]
@@ -218,9 +208,9 @@ fn a_workspace_forgets_the_last_matrix() {
 
 #[test]
 fn nothing_to_assign_is_an_answer() {
-    assert_eq!(linear_assignment::<f64>(&[], 0, 0), Ok(vec![]));
-    assert_eq!(linear_assignment::<f64>(&[], 3, 0), Ok(vec![None; 3]));
-    assert_eq!(linear_assignment::<f64>(&[], 0, 3), Ok(vec![]));
+    assert_eq!(linear_assignment(&[], 0, 0), Ok(vec![]));
+    assert_eq!(linear_assignment(&[], 3, 0), Ok(vec![None; 3]));
+    assert_eq!(linear_assignment(&[], 0, 3), Ok(vec![]));
     assert_eq!(linear_assignment(&[f64::INFINITY], 1, 1), Ok(vec![None]));
 }
 

@@ -13,7 +13,7 @@ fn drift<const D: usize>(
     options: CoherentPointDrift,
     model: &[Point<f64, D>],
     target: &[Point<f64, D>],
-) -> Matching<f64, D> {
+) -> Matching<D> {
     options.match_points(model, target).expect("valid points")
 }
 
@@ -87,9 +87,9 @@ fn check_against_slow<const D: usize>(
     lambda: f64,
     w: f64,
 ) {
-    let model = scattered::<f64, D>(rows, seed);
+    let model = scattered::<D>(rows, seed);
     let target = reordered(
-        &bend(&scattered::<f64, D>(columns, seed), 0.1),
+        &bend(&scattered::<D>(columns, seed), 0.1),
         &Stream::new(seed).permutation(columns),
     );
     let motion = Motion::NonRigid {
@@ -132,7 +132,7 @@ proptest! {
         let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
         let normalization = if each { Normalization::Each } else { Normalization::Model };
         let options = CoherentPointDrift::default().with_motion(motion).unwrap().with_normalization(normalization);
-        let model = scattered::<f64, 3>(30, seed);
+        let model = scattered::<3>(30, seed);
         let target = bend(&model, 0.05);
         let scale = 10_f64.powi(exponent);
         let moved = |points: &[Point3<f64>]| points.iter().map(|p| (p + Vector3::repeat(offset)) * scale).collect::<Vec<_>>();
@@ -148,9 +148,9 @@ proptest! {
     fn a_common_rotation_turns_the_answer(seed in 0..1000_u64, angle in -3.0..3.0_f64, motion in 0..4_usize) {
         let motion = [Motion::Rigid, Motion::Similarity, Motion::Affine, Motion::NON_RIGID][motion];
         let options = CoherentPointDrift::default().with_motion(motion).unwrap();
-        let model = scattered::<f64, 2>(30, seed);
+        let model = scattered::<2>(30, seed);
         let target = bend(&model, 0.05);
-        let turn = rotation::<f64, 2>(angle);
+        let turn = rotation::<2>(angle);
         let turned = |points: &[Point2<f64>]| points.iter().map(|p| turn * p).collect::<Vec<_>>();
         let (plain, other) = (drift(options, &model, &target), drift(options, &turned(&model), &turned(&target)));
         prop_assert_eq!(&other.assignment, &plain.assignment);
@@ -159,8 +159,8 @@ proptest! {
 
     #[test]
     fn rigid_similar_and_affine_motions_are_recovered(seed in 0..1000_u64, angle in -0.3..0.3_f64, size in 0.5..2.0_f64) {
-        let model = scattered::<f64, 3>(40, seed);
-        let turn = rotation::<f64, 3>(angle);
+        let model = scattered::<3>(40, seed);
+        let turn = rotation::<3>(angle);
         let shear = nalgebra::Matrix3::new(1.0, 0.2, 0.0, 0.0, 0.9, 0.1, 0.1, 0.0, 1.1);
         for (motion, map) in [(Motion::Rigid, turn), (Motion::Similarity, turn * size), (Motion::Affine, shear)] {
             let target: Vec<_> = model.iter().map(|p| map * p + Vector3::new(3.0, -1.0, 0.5)).collect();
@@ -174,30 +174,8 @@ proptest! {
 }
 
 #[test]
-fn single_precision_gives_the_same_answer() {
-    let model = scattered::<f64, 3>(50, 1);
-    let target = bend(&model, 0.05);
-    let single = |points: &[Point3<f64>]| {
-        points
-            .iter()
-            .map(|p| p.map(|c| c as f32))
-            .collect::<Vec<_>>()
-    };
-    let double = drift(CoherentPointDrift::default(), &model, &target);
-    let found = CoherentPointDrift::default()
-        .match_points(&single(&model), &single(&target))
-        .unwrap();
-    assert_eq!(found.assignment, double.assignment);
-    let widened: Vec<_> = found.warped.iter().map(|p| p.map(f64::from)).collect();
-    assert!(
-        largest_step(&widened, &double.warped) < 1e-5,
-        "rounding of the input to f32"
-    );
-}
-
-#[test]
 fn a_low_rank_kernel_is_close() {
-    let model = scattered::<f64, 2>(100, 2);
+    let model = scattered::<2>(100, 2);
     let target = bend(&model, 0.05);
     let motion = |rank| Motion::NonRigid {
         beta: 2.0,
@@ -223,7 +201,7 @@ fn a_low_rank_kernel_is_close() {
 
 #[test]
 fn outliers_are_left_without_a_partner() {
-    let model = scattered::<f64, 2>(60, 3);
+    let model = scattered::<2>(60, 3);
     let mut target = bend(&model, 0.03);
     let mut stream = Stream::new(4);
     target.extend((0..15).map(|_| Point2::new(1.5 + stream.next(), 3.0 * stream.next())));
@@ -248,8 +226,8 @@ fn a_workspace_forgets_the_last_match() {
         .into_iter()
         .map(|(n, seed)| {
             (
-                scattered::<f64, 3>(n, seed),
-                bend(&scattered::<f64, 3>(n, seed), 0.05),
+                scattered::<3>(n, seed),
+                bend(&scattered::<3>(n, seed), 0.05),
             )
         })
         .collect();
@@ -264,7 +242,7 @@ fn a_workspace_forgets_the_last_match() {
 
 #[test]
 fn the_warp_takes_the_model_along_and_its_jacobian_is_its_derivative() {
-    let model = scattered::<f64, 3>(40, 9);
+    let model = scattered::<3>(40, 9);
     let target = bend(&model, 0.05);
     let mut workspace = DriftWorkspace::default();
     for motion in [
@@ -323,7 +301,7 @@ fn options_out_of_range_are_typed_errors() {
 
 #[test]
 fn the_report_says_why_it_stopped() {
-    let model = scattered::<f64, 2>(20, 8);
+    let model = scattered::<2>(20, 8);
     let target = bend(&model, 0.05);
     let few = CoherentPointDrift::default()
         .with_max_iterations(2)

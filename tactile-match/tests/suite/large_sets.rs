@@ -19,7 +19,7 @@ struct Scene<const D: usize> {
 impl<const D: usize> Scene<D> {
     fn new(noise: f64, outliers: usize) -> Self {
         let mut stream = Stream::new(31);
-        let model = scattered::<f64, D>(POINTS, 32);
+        let model = scattered::<D>(POINTS, 32);
         let truth = bend(&model, 0.08);
         let order = stream.permutation(POINTS);
         let mut deviate = || (0..12).map(|_| stream.next()).sum::<f64>() - 6.0;
@@ -96,9 +96,9 @@ fn a_caller_who_stops_has_an_answer_for_every_point() {
             ControlFlow::Break(())
         })
         .expect("good points");
-    assert_eq!(found.report.stop, StopReason::Callback);
+    assert_eq!(found.report.stop, StopReason::Cancelled);
     assert_eq!(found.assignment.len(), POINTS);
-    assert!(found.warped::<f64>().all(|p| p.coords.norm() < 10.0));
+    assert!(found.warped().all(|p| p.coords.norm() < 10.0));
 }
 
 #[test]

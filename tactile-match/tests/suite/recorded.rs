@@ -28,7 +28,7 @@ fn deviate(stream: &mut Stream) -> f64 {
 /// The scenes that every matcher is recorded on.
 fn scenes<const D: usize>() -> Vec<Scene<D>> {
     let mut stream = Stream::new(11);
-    let model = scattered::<f64, D>(50, 12);
+    let model = scattered::<D>(50, 12);
     let bent = bend(&model, 0.06);
     let order = stream.permutation(50);
     let clean = reordered(&bent, &order);
@@ -40,7 +40,7 @@ fn scenes<const D: usize>() -> Vec<Scene<D>> {
     outliers
         .extend((0..8).map(|_| Point::from(SVector::from_fn(|_, _| 1.2 * stream.next() - 0.1))));
     let occluded = clean[..40].to_vec();
-    let turn = rotation::<f64, D>(2.0);
+    let turn = rotation::<D>(2.0);
     let turned = clean.iter().map(|p| turn * p).collect();
     [
         ("clean", clean),
@@ -67,7 +67,7 @@ fn dense_scene() -> Scene<2> {
             Point2::new(r * angle.cos() + jitter(), r * angle.sin() + jitter())
         })
         .collect();
-    let turn = rotation::<f64, 2>(0.12);
+    let turn = rotation::<2>(0.12);
     let target = bend(&model, 0.03).iter().map(|p| turn * p).collect();
     Scene {
         name: "dense set",
@@ -78,7 +78,7 @@ fn dense_scene() -> Scene<2> {
 
 /// Numbers that change when anything in an answer does: the counts and the report as they are, of the arrays their sums with weights
 /// that tell the rows apart.
-fn digest<const D: usize>(name: &str, found: &Matching<f64, D>) -> String {
+fn digest<const D: usize>(name: &str, found: &Matching<D>) -> String {
     let weight = |i: usize| (1.0 + i as f64).sin();
     let sum = |values: &mut dyn Iterator<Item = f64>| -> f64 {
         values.enumerate().map(|(i, v)| weight(i) * v).sum()
@@ -135,7 +135,7 @@ fn of_dimension<const D: usize>(lines: &mut Vec<String>) {
     let dense = few;
     let sparse = few.with_candidates(10).expect("candidates");
     let share = options.with_outlier_ratio(0.2).expect("valid share");
-    let matchers: [(&str, Box<dyn PointMatcher<f64, D>>); 12] = [
+    let matchers: [(&str, Box<dyn PointMatcher<D>>); 12] = [
         ("default", fast(options)),
         ("near", fast(options.with_search(Search::Near))),
         ("any rotation", fast(options.with_rotation(Rotation::Any))),

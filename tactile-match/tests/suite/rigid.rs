@@ -21,12 +21,12 @@ struct Scene<const D: usize> {
 impl<const D: usize> Scene<D> {
     fn new(transformation: Transformation, noise: f64, outliers: usize, seed: u64) -> Self {
         let mut stream = Stream::new(seed);
-        let model = scattered::<f64, D>(POINTS, 41);
+        let model = scattered::<D>(POINTS, 41);
         let scale = match transformation {
             Transformation::Similarity => SCALE,
             _ => 1.0,
         };
-        let linear = rotation::<f64, D>(TURN) * scale;
+        let linear = rotation::<D>(TURN) * scale;
         let truth: Vec<_> = model
             .iter()
             .map(|p| Point::from(linear * p.coords + SVector::repeat(3.0)))
@@ -49,7 +49,7 @@ impl<const D: usize> Scene<D> {
         }
     }
 
-    fn matched(&self) -> Matching<f64, D> {
+    fn matched(&self) -> Matching<D> {
         let options = AnnealedSoftassign::default().with_transformation(self.transformation);
         options
             .match_points(&self.model, &self.target)
@@ -134,7 +134,7 @@ fn covariances_are_those_of_the_motion() {
 /// What no rigid motion explains stays in the residuals; the shape does not change.
 #[test]
 fn shapes_are_kept() {
-    let model = scattered::<f64, 2>(POINTS, 43);
+    let model = scattered::<2>(POINTS, 43);
     let target: Vec<_> = model
         .iter()
         .map(|p| Point::from([1.05 * p.x, p.y]))

@@ -1,5 +1,4 @@
 //! Matches that begin where the last one ended find what a match made anew finds.
-use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
 use tactile_match::{
@@ -38,7 +37,7 @@ fn near() -> AnnealedSoftassign {
     AnnealedSoftassign::default().with_search(Search::Near)
 }
 
-fn agree(one: &Matching<f64, 3>, other: &Matching<f64, 3>, tolerance: f64) {
+fn agree(one: &Matching<3>, other: &Matching<3>, tolerance: f64) {
     assert_eq!(one.assignment, other.assignment);
     for (a, b) in one.warped.iter().zip(&other.warped) {
         assert!((a - b).norm() < tolerance, "{}", (a - b).norm());
@@ -151,12 +150,12 @@ fn an_error_leaves_the_state_as_it_was() {
 /// Counts the matches of a series.
 struct Counting;
 
-impl PointMatcher<f64, 2> for Counting {
+impl PointMatcher<2> for Counting {
     fn match_points(
         &self,
         model: &[Point2<f64>],
         target: &[Point2<f64>],
-    ) -> Result<Matching<f64, 2>, MatchError> {
+    ) -> Result<Matching<2>, MatchError> {
         LinearAssignment::default().match_points(model, target)
     }
 
@@ -165,7 +164,7 @@ impl PointMatcher<f64, 2> for Counting {
         warm: &mut WarmStart,
         model: &[Point2<f64>],
         target: &[Point2<f64>],
-    ) -> Result<Matching<f64, 2>, MatchError> {
+    ) -> Result<Matching<2>, MatchError> {
         *warm.state::<usize>() += 1;
         self.match_points(model, target)
     }
@@ -175,15 +174,14 @@ impl PointMatcher<f64, 2> for Counting {
 fn every_matcher_keeps_its_own_state() {
     let model: Vec<Point2<f64>> = dome(40).iter().map(|p| Point2::new(p.x, p.y)).collect();
     let target: Vec<_> = model.iter().map(|p| Point2::new(1.02 * p.x, p.y)).collect();
-    let boxed: Box<dyn PointMatcher<f64, 2> + Send + Sync> = Box::new(Counting);
-    let shared: Arc<dyn PointMatcher<f64, 2> + Send + Sync> = Arc::new(boxed);
+    let boxed: Box<dyn PointMatcher<2> + Send + Sync> = Box::new(Counting);
     let mut warm = WarmStart::default();
     for _ in 0..3 {
-        shared.match_next(&mut warm, &model, &target).unwrap();
+        boxed.match_next(&mut warm, &model, &target).unwrap();
     }
     assert_eq!(*warm.state::<usize>(), 3);
     // Matchers without a state match anew and leave the other's alone.
-    let matchers: [&dyn PointMatcher<f64, 2>; 2] =
+    let matchers: [&dyn PointMatcher<2>; 2] =
         [&LinearAssignment::default(), &CoherentPointDrift::default()];
     for matcher in matchers {
         let next = matcher.match_next(&mut warm, &model, &target).unwrap();

@@ -22,7 +22,7 @@ impl<const D: usize> Scene<D> {
     /// `n` points bent; the deviations of the targets, in spacings, are drawn from `choices`.
     fn new(n: usize, choices: &[f64], seed: u64) -> Self {
         let mut stream = Stream::new(seed + 500);
-        let model = scattered::<f64, D>(n, seed);
+        let model = scattered::<D>(n, seed);
         let truth = bend(&model, 0.06);
         let order = stream.permutation(n);
         let spacing = (n as f64).powf(-1.0 / D as f64);
@@ -43,26 +43,26 @@ impl<const D: usize> Scene<D> {
         }
     }
 
-    fn weighted(&self) -> Matching<f64, D> {
+    fn weighted(&self) -> Matching<D> {
         AnnealedSoftassign::default()
             .match_with_target_errors(&self.model, &self.target, &self.deviations)
             .expect("good points and deviations")
     }
 
-    fn plain(&self) -> Matching<f64, D> {
+    fn plain(&self) -> Matching<D> {
         AnnealedSoftassign::default()
             .match_points(&self.model, &self.target)
             .expect("good points")
     }
 
     /// Root mean square distance of the warped points from the truth.
-    fn error(&self, found: &Matching<f64, D>) -> f64 {
+    fn error(&self, found: &Matching<D>) -> f64 {
         let pairs = found.warped.iter().zip(&self.truth);
         let squares: f64 = pairs.map(|(w, t)| (w - t).norm_squared()).sum();
         (squares / self.model.len() as f64).sqrt()
     }
 
-    fn right(&self, found: &Matching<f64, D>) -> usize {
+    fn right(&self, found: &Matching<D>) -> usize {
         let rows = found.assignment.iter().enumerate();
         rows.filter(|&(i, partner)| partner.is_some_and(|j| self.order[j] == i))
             .count()

@@ -38,7 +38,7 @@ impl<const D: usize> Scene<D> {
         }
     }
 
-    fn matched(&self) -> Matching<f64, D> {
+    fn matched(&self) -> Matching<D> {
         AnnealedSoftassign::default()
             .match_points(&self.model, &self.target)
             .expect("good points")
@@ -49,7 +49,7 @@ impl<const D: usize> Scene<D> {
     }
 
     /// Share of the points in sight that have their own partner.
-    fn right(&self, found: &Matching<f64, D>) -> f64 {
+    fn right(&self, found: &Matching<D>) -> f64 {
         let right = (0..self.model.len())
             .filter(|&i| found.assignment[i].is_some_and(|j| self.is_right(i, j)));
         right.count() as f64 / self.order.len() as f64
@@ -63,7 +63,7 @@ fn deviate(stream: &mut Stream) -> f64 {
 
 /// 105 points, bent, with noise of a fifth of their distance.
 fn noisy<const D: usize>(seed: u64, outliers: f64) -> Scene<D> {
-    let model = scattered::<f64, D>(105, seed);
+    let model = scattered::<D>(105, seed);
     let truth = bend(&model, 0.06);
     let noise = 0.15 * 105_f64.powf(-1.0 / D as f64);
     Scene::new(model, truth, |_| true, (noise, outliers), seed + 1000)
@@ -139,7 +139,7 @@ fn standard_deviations_and_confidences_are_honest_in_space() {
 
 /// A set stretched along x and seen through its old window.
 fn stretched<const D: usize>(n: usize, stretch: f64, outliers: f64, seed: u64) -> Scene<D> {
-    let model = scattered::<f64, D>(n, seed);
+    let model = scattered::<D>(n, seed);
     let truth: Vec<_> = model
         .iter()
         .map(|p| {
@@ -178,8 +178,8 @@ fn stretched_and_cropped_sets_are_matched() {
 #[test]
 fn wrong_answers_are_doubted() {
     for seed in [5, 6] {
-        let model = scattered::<f64, 2>(150, seed);
-        let turn = rotation::<f64, 2>(std::f64::consts::FRAC_PI_2);
+        let model = scattered::<2>(150, seed);
+        let turn = rotation::<2>(std::f64::consts::FRAC_PI_2);
         let truth: Vec<_> = model.iter().map(|p| turn * p).collect();
         let scene = Scene::new(model, truth, |_| true, (0.001, 0.0), seed);
         let other = Scene {

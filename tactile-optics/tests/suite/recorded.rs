@@ -3,8 +3,7 @@
 //! `tests/recorded/answers.txt` holds a line for every name. After a change that is meant to alter answers, write it
 //! anew with `RECORD_ANSWERS=1 cargo test -p tactile-optics --test suite recorded` and read the difference before committing.
 
-#[path = "../../../tests/support/recorded.rs"]
-mod record;
+use test_support as record;
 
 use tactile_optics::surface::{Dimple, Flat, TopSurface, Touched, TouchingObject};
 use tactile_optics::trace::{LightBudget, Slab, SlabLayer, TraceOptions, path, trace};

@@ -1,8 +1,7 @@
 //! Angles at every scale and within a few units in the last place of the edges, against 80-digit numbers.
 #![allow(clippy::print_stdout)]
 
-#[path = "../../../evidence/worst.rs"]
-mod worst;
+use test_support as worst;
 
 use tactile_optics::{Angle, acceptance_angle, critical_angle};
 use worst::{Worst, cases};

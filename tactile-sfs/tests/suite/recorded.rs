@@ -2,8 +2,7 @@
 //!
 //! `RECORD_ANSWERS=1 cargo test -p tactile-sfs --test suite recorded` writes the record anew; the commit says why numbers moved.
 
-#[path = "../../../tests/support/recorded.rs"]
-mod record;
+use test_support as record;
 
 use ndarray::Array2;
 use tactile_sfs::{

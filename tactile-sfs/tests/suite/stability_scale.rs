@@ -1,8 +1,7 @@
 //! Heights in every unit and both precisions; saturated, black and constant images.
 #![allow(clippy::print_stdout)]
 
-#[path = "../../../evidence/worst.rs"]
-mod worst;
+use test_support as worst;
 
 use crate::common::{Sampled, gaussian, sphere};
 use ndarray::Array2;

@@ -2,8 +2,7 @@
 //! singular systems: every error in units of what rounding the inputs alone does to the exact spline.
 #![allow(clippy::print_stdout)]
 
-#[path = "../../../evidence/worst.rs"]
-mod worst;
+use test_support as worst;
 
 use crate::common::{Uniform, bend, options};
 use nalgebra::{Point, SVector};

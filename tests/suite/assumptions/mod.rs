@@ -7,9 +7,9 @@ mod worlds;
 
 use std::collections::BTreeSet;
 use tactile_imaging::Object;
-use tactile_imaging::elasticity::fem::Interface;
+use tactile_imaging::fem::Interface;
 use tactile_imaging::pipeline::{EstimatorChoice, Flag};
-use tactile_imaging::simulate::Camera;
+use tactile_simulate::Camera;
 use worlds::{MODULUS_PA, RADIUS_M, Sample, Stated, World};
 
 /// Departures that leave no trace in two frames of one ball: nothing but a standard error that the user states can hold the truth.

@@ -1,11 +1,10 @@
 //! A sensor and a press as they are, and as the user states them.
 use nalgebra::DMatrix;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
-use tactile_imaging::elasticity::fem::{self, Guide, Interface, Material, Press};
-use tactile_imaging::pipeline::{
-    EstimatorChoice, Measurement, Object, Pipeline, StagesConfig, Trial,
-};
-use tactile_imaging::simulate::{
+use tactile_imaging::fem::{self, Guide, Interface, Material, Press};
+use tactile_imaging::pipeline::{EstimatorChoice, Measurement, Object, Pipeline, StagesConfig};
+use tactile_simulate::Trial;
+use tactile_simulate::{
     CalibrationOptions, Camera, ContactLaw, ContactState, Illumination, Load, PressOptions,
     Response,
 };
@@ -175,7 +174,7 @@ impl World {
 impl Stated {
     fn pipeline(&self, trial: &Trial) -> Pipeline {
         let layers = &trial.scene.options().waveguide.layers;
-        let layer = |l: &tactile_imaging::simulate::WaveguideLayer| Layer {
+        let layer = |l: &tactile_simulate::WaveguideLayer| Layer {
             thickness_m: l.thickness_m,
             youngs_modulus_pa: self.layer_moduli * l.material.youngs_modulus_pa,
             poisson_ratio: l.material.poisson_ratio,

@@ -4,9 +4,9 @@ use super::{Ball, Guide, Layer};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use tactile_imaging::elasticity::contact::{ContactTable, TableOptions};
-use tactile_imaging::elasticity::fem::{self, Load, Material, Object, Press};
-use tactile_imaging::simulate::ContactState;
+use tactile_imaging::elasticity::contact::ContactTable;
+use tactile_imaging::fem::{self, Load, Material, Object, Press, TableOptions};
+use tactile_simulate::ContactState;
 
 /// A ball's radius and the layers (thickness, modulus) that it is pressed on; none is a rigid flat.
 type Sensor = (f64, &'static [(f64, f64)]);
@@ -41,7 +41,7 @@ pub(super) fn table((radius_m, layers): &Sensor) -> Arc<ContactTable> {
         layers => Guide::new(layers.iter().map(layer).collect()).unwrap(),
     };
     let options = TableOptions::default();
-    let table = ContactTable::solve(*radius_m, 0.5, &guide, &options, |_| {
+    let table = fem::solve_contact_table(*radius_m, 0.5, &guide, &options, |_| {
         ControlFlow::Continue(())
     });
     Arc::new(table.unwrap())

@@ -13,9 +13,7 @@ use tactile_imaging::force::{
     ForceOptions, ForceWorkspace, LinearCalibration, ReferenceFrame, ShearCalibration, ShearPair,
     ShearTracker, StressCalibration, measure_force,
 };
-use tactile_imaging::simulate::{
-    Camera, Gain, Illumination, Load, PressOptions, PressScene, PressTruth,
-};
+use tactile_simulate::{Camera, Gain, Illumination, Load, PressOptions, PressScene, PressTruth};
 
 /// A quarter of the default resolution, so that a thousand frames take seconds.
 fn camera() -> Camera {
@@ -35,7 +33,7 @@ fn press(camera: Camera) -> PressOptions {
 }
 
 /// The sensor's true calibration, with its error left out: what is tested is the frames' share of the error.
-fn calibration(scene: &PressScene) -> LinearCalibration<f64> {
+fn calibration(scene: &PressScene) -> LinearCalibration {
     let camera = scene.options().camera;
     let newton_per_grey =
         camera.pixel_size_m.iter().product::<f64>() / scene.truth(0).grey_per_pascal;
@@ -231,7 +229,7 @@ fn shear_follows_the_centroid() {
     let scene = PressScene::new(options).unwrap();
     let calibration = calibration(&scene);
     let made = scene.simulate();
-    let pairs: Vec<ShearPair<f64>> = (1..6)
+    let pairs: Vec<ShearPair> = (1..6)
         .map(|k| f64::from(k) * 1e-5)
         .map(|u| ShearPair {
             centroid_step_m: [u, 2.0 * u],
@@ -272,8 +270,8 @@ fn measure(
     frame: ArrayView2<'_, u8>,
     reference: ArrayView2<'_, u8>,
     pixel_size_m: [f64; 2],
-    calibration: &dyn StressCalibration<f64>,
-) -> Result<ForceMeasurement<f64>, ForceError> {
+    calibration: &dyn StressCalibration,
+) -> Result<ForceMeasurement, ForceError> {
     measure_force(
         frame,
         reference,
@@ -301,7 +299,7 @@ fn hostile_scenes_end_civilly() {
     }
 }
 
-fn describe(result: &Result<ForceMeasurement<f64>, ForceError>) -> String {
+fn describe(result: &Result<ForceMeasurement, ForceError>) -> String {
     match result {
         Err(error) => error.to_string(),
         Ok(m) => match m.contact {
@@ -317,7 +315,7 @@ fn describe(result: &Result<ForceMeasurement<f64>, ForceError>) -> String {
     }
 }
 
-fn check(kind: Hostile, result: &Result<ForceMeasurement<f64>, ForceError>, truth: &[PressTruth]) {
+fn check(kind: Hostile, result: &Result<ForceMeasurement, ForceError>, truth: &[PressTruth]) {
     let contact = result.as_ref().ok().and_then(|m| m.contact);
     match kind {
         Hostile::NoiseOnly

@@ -2,7 +2,7 @@
 
 use super::{calibration, dark};
 use tactile_imaging::force::{Estimate, ForceMeter, ForceOptions, ForceWorkspace, ReferenceFrame};
-use tactile_imaging::simulate::PressScene;
+use tactile_simulate::PressScene;
 
 /// Errors of one quantity over many seeds.
 pub(super) struct Errors {
@@ -20,7 +20,7 @@ impl Errors {
         }
     }
 
-    fn add(&mut self, found: Estimate<f64>, truth: f64, unit: f64) {
+    fn add(&mut self, found: Estimate, truth: f64, unit: f64) {
         self.errors.push((found.value - truth) / unit);
         self.stated.push(found.standard_error / unit);
     }

@@ -10,8 +10,7 @@ use tactile_imaging::elasticity::curve::{
     CurveOptions, IndentationCurve, Indenter, Model, select_model,
 };
 use tactile_imaging::force::{
-    CalibrationOptions, CalibrationPair, LinearCalibration, MonotoneCalibration,
-    PolynomialCalibration, StressCalibration,
+    CalibrationOptions, CalibrationPair, LinearCalibration, StressCalibration,
 };
 use tactile_imaging::io::{
     Grey, read_cases, read_columns, read_grey_image, read_grid, read_points, write_grey_image,
@@ -194,19 +193,13 @@ proptest! {
         answer(measured, &folder.path().file_name().unwrap().to_string_lossy());
     }
 
-    /// A table from a file goes into every calibration; one that is made gives no NaN within its range.
+    /// A table from a file goes into a calibration, which gives no NaN within its range.
     #[test]
     fn calibration_tables(edits in edits()) {
         let Some([values, forces]) = columns(&mutated(TABLE, &edits), PAIRS) else { return Ok(()) };
         let pairs: Vec<_> = values.iter().zip(&forces).map(|(&v, &f)| CalibrationPair::loading(v, f)).collect();
-        let options = CalibrationOptions::default();
-        let fitted: [Option<Box<dyn StressCalibration<f64>>>; 3] = [
-            LinearCalibration::fit(&pairs, &options).ok().map(|c| Box::new(c) as _),
-            PolynomialCalibration::fit(&pairs, 2, &options).ok().map(|c| Box::new(c) as _),
-            MonotoneCalibration::fit(&pairs, &options).ok().map(|c| Box::new(c) as _),
-        ];
-        for calibration in fitted.into_iter().flatten() {
-            prop_assert!(!calibration.force_n(calibration.range()[0]).is_nan());
+        if let Ok(line) = LinearCalibration::fit(&pairs, &CalibrationOptions::default()) {
+            prop_assert!(!line.force_n(line.range()[0]).is_nan());
         }
     }
 

@@ -12,7 +12,7 @@ use tactile_imaging::elasticity::modulus::{
 use tactile_imaging::elasticity::strain::GreenLagrange;
 use tactile_imaging::force::{ForceMeter, ForceOptions, ForceWorkspace};
 use tactile_imaging::matching::AnnealedSoftassign;
-use tactile_imaging::simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
+use tactile_simulate::{Camera, Elastic, UniaxialOptions, UniaxialScene};
 
 /// Side of the undeformed face.
 const FACE_M: f64 = 12e-3;

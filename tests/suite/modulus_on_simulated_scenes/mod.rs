@@ -100,7 +100,7 @@ fn verbose() -> bool {
 }
 
 /// Integrated pixel value as if it were newtons: a calibration of slope one.
-fn unit_calibration() -> LinearCalibration<f64> {
+fn unit_calibration() -> LinearCalibration {
     let pairs: Vec<_> = (0..5)
         .map(|k| f64::from(k) * 1e6)
         .map(|v| CalibrationPair::loading(v, v))
@@ -110,11 +110,11 @@ fn unit_calibration() -> LinearCalibration<f64> {
 
 /// Fits the calibration to frames of known loads and a noisy gauge.
 fn calibrate(
-    meter: &ForceMeter<f64>,
+    meter: &ForceMeter,
     reference: &ReferenceFrame,
     frames: impl Iterator<Item = (f64, Array2<u8>)>,
     rng: &mut ChaCha8Rng,
-) -> LinearCalibration<f64> {
+) -> LinearCalibration {
     let (unit, mut workspace) = (unit_calibration(), ForceWorkspace::default());
     let measured: Vec<(f64, f64)> = frames
         .map(|(force, frame)| {
@@ -135,12 +135,12 @@ fn calibrate(
     LinearCalibration::fit(&pairs, &options).unwrap()
 }
 
-fn estimate(e: tactile_imaging::force::Estimate<f64>) -> Estimate<f64> {
+fn estimate(e: tactile_imaging::force::Estimate) -> Estimate<f64> {
     Estimate::new(e.value, e.standard_error)
 }
 
 /// The force with the calibration's degrees of freedom.
-fn force(measured: &ForceMeasurement<f64>) -> Estimate<f64> {
+fn force(measured: &ForceMeasurement) -> Estimate<f64> {
     let degrees_of_freedom = measured.reading.and_then(|r| r.degrees_of_freedom);
     Estimate {
         degrees_of_freedom,
@@ -150,8 +150,8 @@ fn force(measured: &ForceMeasurement<f64>) -> Estimate<f64> {
 
 /// Covariance of forces that share one calibration.
 fn force_covariance(
-    calibration: &LinearCalibration<f64>,
-    measured: &[ForceMeasurement<f64>],
+    calibration: &LinearCalibration,
+    measured: &[ForceMeasurement],
 ) -> DMatrix<f64> {
     let values: Vec<_> = measured
         .iter()

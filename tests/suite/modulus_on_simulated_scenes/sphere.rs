@@ -11,19 +11,19 @@ use tactile_imaging::elasticity::modulus::{
     Evidence, HertzSphere, LoadSeries, LoadState, ModulusEstimate, ModulusEstimator,
 };
 use tactile_imaging::force::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace};
-use tactile_imaging::simulate::{Camera, Elastic, Gain, Load, PressOptions, PressScene, Sphere};
+use tactile_simulate::{Camera, Elastic, Gain, Load, PressOptions, PressScene, Sphere};
 
 /// Loads of the sphere, and of the ball that calibrates.
 const LOADS: u32 = 12;
 const GAUGE_LOADS: u32 = 20;
 
 fn waveguide() -> Waveguide<f64> {
-    let layer = |l: &tactile_imaging::simulate::WaveguideLayer| Layer {
+    let layer = |l: &tactile_simulate::WaveguideLayer| Layer {
         thickness_m: l.thickness_m,
         youngs_modulus_pa: l.material.youngs_modulus_pa,
         poisson_ratio: l.material.poisson_ratio,
     };
-    let layers = tactile_imaging::simulate::Waveguide::default()
+    let layers = tactile_simulate::Waveguide::default()
         .layers
         .iter()
         .map(layer)
@@ -99,7 +99,7 @@ impl Presses {
 
     fn report(
         &self,
-        measured: &ForceMeasurement<f64>,
+        measured: &ForceMeasurement,
         load: &LoadState<f64>,
         found: &ModulusEstimate<f64>,
     ) {

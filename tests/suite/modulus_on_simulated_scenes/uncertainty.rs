@@ -28,7 +28,7 @@ struct Experiment {
     spread: Vec<Matrix3<f64>>,
     spline: Factorization<f64, 3>,
     samples: Vec<Point3<f64>>,
-    pairs: Vec<CalibrationPair<f64>>,
+    pairs: Vec<CalibrationPair>,
 }
 
 impl Experiment {
@@ -84,22 +84,17 @@ impl Experiment {
             .mean[(2, 2)]
     }
 
-    fn calibrate(&self, pairs: &[CalibrationPair<f64>]) -> LinearCalibration<f64> {
+    fn calibrate(&self, pairs: &[CalibrationPair]) -> LinearCalibration {
         LinearCalibration::fit(pairs, &Default::default()).unwrap()
     }
 
     /// Everything by propagation.
     fn propagate(&self, share: Shares) -> Result<ModulusEstimate<f64>, ElasticityError> {
         let calibration = self.calibrate(&self.pairs);
-        let light = LIGHT.map(|(value, noise)| force::Estimate {
-            value,
-            standard_error: noise * share[1],
-        });
+        let light = LIGHT.map(|(value, noise)| force::Estimate::new(value, noise * share[1]));
         let all = calibration.force_covariance_n2(&light);
-        let quiet = calibration.force_covariance_n2(&LIGHT.map(|(value, _)| force::Estimate {
-            value,
-            standard_error: 0.0,
-        }));
+        let quiet = calibration
+            .force_covariance_n2(&LIGHT.map(|(value, _)| force::Estimate::new(value, 0.0)));
         let covariance = DMatrix::from_fn(2, 2, |i, j| {
             share[0].powi(2) * quiet[[i, j]] + all[[i, j]] - quiet[[i, j]]
         });

@@ -1,8 +1,9 @@
 //! Surfaces over blocks of pixels, as large as the control points allow, are those over single pixels.
 #![allow(clippy::print_stdout)]
 use nalgebra::Matrix3;
-use tactile_imaging::pipeline::{Binning, ContactSurface, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+use tactile_imaging::pipeline::{Binning, ContactSurface};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
 
 /// Half the paper's resolution: contacts of some 80 pixels' radius, whose blocks for 60 points are 4 × 4.
 fn trial() -> Trial {

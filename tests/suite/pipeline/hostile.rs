@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use tactile_imaging::Pipeline;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::{Flag, Measurement, Object, Session};
-use tactile_imaging::simulate::{Camera, PressOptions};
+use tactile_simulate::{Camera, PressOptions};
 
 const SHAPE: [usize; 2] = [36, 44];
 const SEEDS: usize = 24;
@@ -37,9 +37,7 @@ fn simulate(kind: usize, seed: u64) -> [Array2<u8>; 2] {
     };
     let made = match Hostile::ALL.get(kind) {
         Some(hostile) => hostile.simulate(&base).unwrap(),
-        None => tactile_imaging::simulate::PressScene::new(base)
-            .unwrap()
-            .simulate(),
+        None => tactile_simulate::PressScene::new(base).unwrap().simulate(),
     };
     [made.reference, made.frames[0].clone()]
 }

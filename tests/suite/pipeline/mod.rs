@@ -16,11 +16,10 @@ use ndarray::ArrayView2;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::strain::Hencky;
 use tactile_imaging::force::CalibrationPair;
-use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Skips, Stage, Trial};
+use tactile_imaging::pipeline::{Object, PipelineError, Press, SkipReason, Skips, Stage};
 use tactile_imaging::sfs::{ControlPointSampler, Domain, EquallySpaced, SfsError};
-use tactile_imaging::simulate::{
-    CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene,
-};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, Elastic, Load, PressOptions, PressScene};
 
 /// A press seen by a camera of 348 × 260 pixels: a sixteenth of the default's, to be quick.
 fn trial(forces: &[f64], seed: u64) -> Trial {

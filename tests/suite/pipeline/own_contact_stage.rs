@@ -18,7 +18,7 @@ impl ContactStage for Spoiled {
         workspace: &mut ForceWorkspace,
         frame: ArrayView2<'_, u8>,
         reference: &ReferenceFrame,
-        gauge: Option<Estimate<f64>>,
+        gauge: Option<Estimate>,
         contact: &mut FrameContact,
     ) -> Result<(), ForceError> {
         self.light

@@ -16,7 +16,7 @@ fn everything_can_cross_threads() {
     crosses::<Update>();
     crosses::<Report>();
     crosses::<ImageFolder>();
-    crosses::<tactile_imaging::simulate::FrameStream>();
+    crosses::<tactile_simulate::FrameStream>();
 }
 
 /// The sentence of a result; it must be writable as JSON.

@@ -1,8 +1,9 @@
 //! The strain's stated error holds in frames of every size, or the result is flagged.
 #![allow(clippy::print_stdout)]
 use std::collections::BTreeMap;
-use tactile_imaging::pipeline::{Flag, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, PressOptions};
+use tactile_imaging::pipeline::Flag;
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, PressOptions};
 
 /// Widths and heights of frames that show the same 30 mm × 22.5 mm.
 const SIZES: [[usize; 2]; 5] = [[174, 130], [348, 260], [464, 347], [696, 521], [1392, 1042]];

@@ -8,8 +8,8 @@ use tactile_imaging::elasticity::modulus::{
 };
 use tactile_imaging::pipeline::{
     EstimatorChoice, Pipeline, PipelineError, Session, SkipReason, Skips, Stage, StagesConfig,
-    Trial,
 };
+use tactile_simulate::Trial;
 
 fn session(trial: &Trial, pipeline: &Pipeline) -> Session {
     Session::new(pipeline, &[trial.simulation.reference.view()]).unwrap()

@@ -3,8 +3,9 @@
 use super::trial;
 use ndarray::Array2;
 use tactile_imaging::force::{Estimate, ShearCalibration};
-use tactile_imaging::pipeline::{FrameSource, Session, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, LoadCycle, PressOptions};
+use tactile_imaging::pipeline::{FrameSource, Session};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, Gain, Load, LoadCycle, PressOptions};
 
 #[test]
 fn a_session_refines_the_modulus_and_agrees_with_a_press() {
@@ -61,10 +62,7 @@ fn shear_is_the_way_of_the_centroid_since_contact_began() {
     let stiffness = options.shear_stiffness_n_per_m;
     let trial = Trial::new(options, &CalibrationOptions::default()).unwrap();
     let calibration = ShearCalibration {
-        stiffness_n_per_m: stiffness.map(|value| Estimate {
-            value,
-            standard_error: 0.0,
-        }),
+        stiffness_n_per_m: stiffness.map(|value| Estimate::new(value, 0.0)),
         residual_sd_n: [0.0; 2],
     };
     let pipeline = trial.pipeline().unwrap();

@@ -4,10 +4,9 @@ use super::trial;
 use ndarray::Array2;
 use tactile_imaging::elasticity::relaxation::{StandardLinearSolid, TimeDependence};
 use tactile_imaging::force::Estimate;
-use tactile_imaging::pipeline::{Flag, Measurement, PipelineError, Trial};
-use tactile_imaging::simulate::{
-    ContactLaw, Elastic, Gain, Load, PressOptions, PressScene, Sphere,
-};
+use tactile_imaging::pipeline::{Flag, Measurement, PipelineError};
+use tactile_simulate::Trial;
+use tactile_simulate::{ContactLaw, Elastic, Gain, Load, PressOptions, PressScene, Sphere};
 
 const TIMES_S: [f64; 8] = [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 
@@ -42,10 +41,7 @@ fn measured(trial: &Trial, frames: &[Array2<u8>], gauge_n: Option<f64>) -> Measu
     let pipeline = trial.pipeline().unwrap().with_control_points(60);
     let mut press = pipeline.press(trial.simulation.reference.view()).unwrap();
     for (frame, time_s) in frames.iter().zip(TIMES_S) {
-        let gauge = gauge_n.map(|value| Estimate {
-            value,
-            standard_error: 1e-3 * value,
-        });
+        let gauge = gauge_n.map(|value| Estimate::new(value, 1e-3 * value));
         let added = press.add_gauged_frame(frame.view(), gauge);
         press.set_time_s(added, time_s).unwrap();
     }

@@ -4,8 +4,7 @@
 //! anew: `RECORD_ANSWERS=1 cargo test --test suite recorded_answers`, and the difference of the text file says what moved.
 
 mod readings;
-#[path = "../../support/recorded.rs"]
-mod record;
+use test_support as record;
 mod scenes;
 
 /// Largest difference from a recorded number, relative to the largest number of its line: sums taken in another order differ by some

@@ -6,10 +6,11 @@ use tactile_imaging::elasticity::modulus::{FlatPunch, HertzSphere, PaperRatio, S
 use tactile_imaging::force::{CalibrationPair, Estimate};
 use tactile_imaging::pipeline::{
     DarkContact, EstimatorChoice, MatcherChoice, Object, Pipeline, ReconstructionChoice,
-    SamplerChoice, Session, StagesConfig, StrainChoice, SurfaceInput, Trial, WarpChoice,
+    SamplerChoice, Session, StagesConfig, StrainChoice, SurfaceInput, WarpChoice,
 };
 use tactile_imaging::scene::Scene;
-use tactile_imaging::simulate::{
+use tactile_simulate::Trial;
+use tactile_simulate::{
     CalibrationOptions, Camera, Elastic, Gain, Load, PressOptions, PressScene, Sphere,
     UniaxialOptions, UniaxialScene, write_folder,
 };
@@ -90,11 +91,8 @@ fn block() -> Vec<Answer> {
     answers.all
 }
 
-fn exactly(value: f64) -> Estimate<f64> {
-    Estimate {
-        value,
-        standard_error: 0.0,
-    }
+fn exactly(value: f64) -> Estimate {
+    Estimate::new(value, 0.0)
 }
 
 /// A sensor that darkens with depth, forces from a gauge.

@@ -13,10 +13,10 @@ use tactile_imaging::io::write_grey_image;
 use tactile_imaging::pipeline::{Measurement, PipelineError};
 use tactile_imaging::scene::{LoadedCalibration, Scene};
 use tactile_imaging::sfs::CurvatureAdaptive;
-use tactile_imaging::simulate::{
+use tactile_imaging::tps::AffineModel;
+use tactile_simulate::{
     CalibrationOptions, Camera, Elastic, PressOptions, PressScene, Sphere, write_folder,
 };
-use tactile_imaging::tps::AffineModel;
 
 /// The paper's error: ±5.38 % on both polymers.
 const PAPER_ERROR: f64 = 0.0538;

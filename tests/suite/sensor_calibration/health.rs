@@ -2,7 +2,7 @@
 use super::sensors::{Effects, SAMPLE_RADIUS_M, Simulated};
 use tactile_imaging::force::{ChartState, HealthOptions};
 use tactile_imaging::pipeline::{LightContact, Object, Pipeline, Session};
-use tactile_imaging::simulate::Camera;
+use tactile_simulate::Camera;
 
 const BASELINE: usize = 100;
 

@@ -11,7 +11,7 @@ use sensors::{
 use tactile_imaging::force::{ContactOptions, DriftCorrection, ForceOptions};
 use tactile_imaging::pipeline::{Object, Pipeline};
 use tactile_imaging::sensor::{Indenter, Sensor, SensorCalibration, SensorError};
-use tactile_imaging::simulate::Camera;
+use tactile_simulate::Camera;
 
 /// Changes of the illumination are divided out where they can be told, as a sensor's own pipeline does.
 fn drift_corrected() -> ForceOptions {

@@ -13,7 +13,7 @@ use tactile_imaging::elasticity::modulus::{
 use tactile_imaging::force::Branch;
 use tactile_imaging::scene::SceneLayer;
 use tactile_imaging::sensor::{Indenter, LayerInput, SensorCalibration, SensorPress};
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     Camera, ContactLaw, ContactState, Elastic, Illumination, Load, PressOptions, PressScene,
     Response, Sphere,
 };

@@ -8,7 +8,7 @@ use tactile_imaging::elasticity::modulus::ModulusEstimate;
 use tactile_imaging::force::{CalibrationPair, ForceOptions};
 use tactile_imaging::pipeline::{Flag, LightContact, Object, Pipeline};
 use tactile_imaging::sensor::{Sensor, SensorCalibration, SensorError};
-use tactile_imaging::simulate::Camera;
+use tactile_simulate::Camera;
 
 /// What is left out of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,7 +94,7 @@ fn object() -> Object {
 }
 
 /// Sums of the frames of the largest ball, as a line is fitted to.
-fn pairs(calibration: &SensorCalibration) -> Vec<CalibrationPair<f64>> {
+fn pairs(calibration: &SensorCalibration) -> Vec<CalibrationPair> {
     let mut pairs = vec![CalibrationPair::loading(0.0, 0.0)];
     let reference = calibration.references[0].mapv(f64::from);
     for given in calibration.presses.iter().skip(30) {

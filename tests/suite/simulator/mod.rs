@@ -3,7 +3,7 @@ mod noise;
 mod tabulated;
 
 use ndarray::Array2;
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     CalibrationOptions, Camera, ContactLaw, Elastic, Gain, Illumination, Load, PressOptions,
     PressScene, Response, SimulateError, Sphere,
 };
@@ -332,6 +332,6 @@ fn every_meaningless_value_is_named() {
 }
 
 /// The contact's centre (x, y) in metres from the first pixel's centre.
-fn centre_m(truth: &tactile_imaging::simulate::PressTruth) -> [f64; 2] {
+fn centre_m(truth: &tactile_simulate::PressTruth) -> [f64; 2] {
     std::array::from_fn(|k| truth.centre_px[k] * truth.pixel_size_m[k])
 }

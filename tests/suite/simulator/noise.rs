@@ -1,7 +1,7 @@
 //! The camera's noise has the moments it states, and is the same for the same seed.
 use super::{relative, small};
 use ndarray::Array2;
-use tactile_imaging::simulate::{Camera, PressOptions, PressScene};
+use tactile_simulate::{Camera, PressOptions, PressScene};
 
 #[test]
 fn noise_has_the_stated_mean_and_variance() {

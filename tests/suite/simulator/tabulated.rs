@@ -1,6 +1,6 @@
 //! Contacts given as tables over the radius.
 use super::{relative, small};
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     ContactLaw, ContactState, Load, LoadCycle, PressOptions, PressScene, SimulateError,
 };
 

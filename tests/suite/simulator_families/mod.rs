@@ -5,7 +5,7 @@ mod uniaxial;
 use crate::hostile::Hostile;
 use proptest::prelude::*;
 use tactile_imaging::force::Branch;
-use tactile_imaging::simulate::{
+use tactile_simulate::{
     CalibrationOptions, Camera, Elastic, Gain, LoadCycle, PressOptions, PressScene, Response,
     SimulateError, Sphere, write_folder,
 };
@@ -240,7 +240,7 @@ proptest! {
         let material = Elastic { youngs_modulus_pa: modulus, poisson_ratio: 0.4 };
         let scene = PressScene::new(PressOptions {
             object: Sphere { radius_m: radius, material },
-            loads: vec![tactile_imaging::simulate::Load::normal(force)],
+            loads: vec![tactile_simulate::Load::normal(force)],
             centre_px: Some([centre.0, centre.1]),
             camera,
             seed,

@@ -1,9 +1,7 @@
 //! Uniaxial compression: the law of its states, its frames and its limits.
 
 use super::{camera, relative};
-use tactile_imaging::simulate::{
-    Elastic, SimulateError, SurfacePattern, UniaxialOptions, UniaxialScene,
-};
+use tactile_simulate::{Elastic, SimulateError, SurfacePattern, UniaxialOptions, UniaxialScene};
 
 #[test]
 fn uniaxial_states_obey_their_law_and_balance_the_force() {

@@ -4,7 +4,8 @@ use super::table::{EXACT, Table};
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::ElasticityError;
 use tactile_imaging::elasticity::modulus::ModulusEstimate;
-use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, Session, StagesConfig, Trial};
+use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, Session, StagesConfig};
+use tactile_simulate::Trial;
 
 /// Rising by 35 mN from 0.2 N: the last within the calibration.
 fn steps(loads: usize) -> Vec<f64> {

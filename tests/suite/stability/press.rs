@@ -5,8 +5,9 @@ use std::sync::Arc;
 use tactile_imaging::Pipeline;
 use tactile_imaging::elasticity::contact::{Layer, Waveguide};
 use tactile_imaging::force::{CalibrationPair, ReferenceFrame};
-use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig, Trial};
-use tactile_imaging::simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
+use tactile_imaging::pipeline::{EstimatorChoice, Object, StagesConfig};
+use tactile_simulate::Trial;
+use tactile_simulate::{CalibrationOptions, Camera, Gain, Load, PressOptions};
 
 /// 348 × 260 pixels on 15 mm: the contact is as large in pixels as a camera of 696 × 520 sees it, for 200 control points enough.
 pub(crate) fn camera() -> Camera {
@@ -64,7 +65,7 @@ pub(crate) fn pipeline(trial: &Trial, units: Units) -> Pipeline {
             / (units.length * units.length),
         poisson_ratio: l.material.poisson_ratio,
     });
-    let scaled = |p: &CalibrationPair<f64>| CalibrationPair {
+    let scaled = |p: &CalibrationPair| CalibrationPair {
         integrated_pixel_value: p.integrated_pixel_value * units.grey,
         force_n: p.force_n * units.force,
         ..*p

@@ -4,7 +4,7 @@ use super::press::{
 };
 use super::table::{EXACT, STRAIN, Table};
 use super::{loads, steps, symmetry};
-use tactile_imaging::pipeline::Trial;
+use tactile_simulate::Trial;
 
 #[test]
 fn the_pipeline_keeps_its_numbers() {

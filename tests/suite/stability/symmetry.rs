@@ -3,7 +3,7 @@ use super::press::{Answer, Images, SI, answer, pipeline, relative};
 use super::table::{EXACT, STRAIN, Table};
 use nalgebra::Matrix3;
 use ndarray::{Array2, Axis};
-use tactile_imaging::pipeline::Trial;
+use tactile_simulate::Trial;
 
 /// The contact's threshold allows for false alarms among the pixels of the tiles around it, and those are others: a few faint pixels of
 /// the rim come and go, some 10⁻⁶ of the light. In this order for force, radius (of a fit that hardly looks at the rim) and

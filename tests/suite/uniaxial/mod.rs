@@ -11,8 +11,8 @@ use scenes::{Face, measured, plain, speckled};
 use tactile_imaging::elasticity::modulus::EstimatorKind;
 use tactile_imaging::pipeline::PipelineError;
 use tactile_imaging::pipeline::Session;
-use tactile_imaging::simulate::FaceOutline::{Ellipse, Rectangle};
 use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::FaceOutline::{Ellipse, Rectangle};
 
 /// What was seen to go wrong: 5 to 13 kPa for 103 kPa, and squeezed material said to stretch.
 #[test]
@@ -94,7 +94,7 @@ fn the_regression_is_the_default_and_the_ratio_stands_beside_it() {
 
 #[test]
 fn a_ball_said_to_be_a_block_or_of_unknown_shape_is_refused_with_what_to_say() {
-    use tactile_imaging::pipeline::Trial;
+    use tactile_simulate::Trial;
     let trial = Trial::new(Default::default(), &Default::default()).unwrap();
     for object in [
         Object::Unknown { poisson_ratio: 0.5 },

@@ -4,8 +4,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use std::f64::consts::TAU;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::PipelineError;
-use tactile_imaging::simulate::Camera;
 use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::Camera;
 
 const SIDE: usize = 280;
 const PIXEL_M: f64 = 60e-6;

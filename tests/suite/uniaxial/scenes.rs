@@ -2,10 +2,10 @@
 use ndarray::Array2;
 use tactile_imaging::force::CalibrationPair;
 use tactile_imaging::pipeline::Measurement;
-use tactile_imaging::simulate::{
+use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::{
     Camera, Elastic, FaceOutline, SurfacePattern, UniaxialOptions, UniaxialScene,
 };
-use tactile_imaging::{Object, Pipeline};
 
 /// A face of one brightness.
 pub(super) fn plain() -> SurfacePattern {
@@ -90,7 +90,7 @@ impl Face {
 }
 
 /// A calibration without errors, `per_grey` newtons a grey level.
-pub(super) fn exact_pairs(per_grey: f64) -> Vec<CalibrationPair<f64>> {
+pub(super) fn exact_pairs(per_grey: f64) -> Vec<CalibrationPair> {
     let values = [0.0, 5e6, 10e6, 15e6, 20e6, 25e6];
     values
         .map(|v| CalibrationPair::loading(v, per_grey * v))

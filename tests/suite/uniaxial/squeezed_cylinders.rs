@@ -1,12 +1,12 @@
 //! Cylinders solved by finite elements, their faces sliding or sticking: what the pipeline says of them.
 use super::scenes::exact_pairs;
-use tactile_imaging::elasticity::fem::Interface;
 use tactile_imaging::elasticity::strain::Hencky;
+use tactile_imaging::fem::Interface;
 use tactile_imaging::pipeline::{Flag, Measurement};
-use tactile_imaging::simulate::{
+use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::{
     Camera, ContactLaw, ContactState, Elastic, Gain, Load, PressOptions, PressScene,
 };
-use tactile_imaging::{Object, Pipeline};
 
 const RADIUS_M: f64 = 6e-3;
 

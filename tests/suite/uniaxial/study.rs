@@ -5,8 +5,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 use tactile_imaging::force::{Estimate, ForceOptions};
 use tactile_imaging::pipeline::LightContact;
-use tactile_imaging::simulate::{Camera, FaceOutline};
 use tactile_imaging::{Object, Pipeline};
+use tactile_simulate::{Camera, FaceOutline};
 
 /// Relative error that all readings of a gauge share: what a pipeline assumes unless told otherwise (`Settings::force_scale_error`).
 const GAUGE_SCALE: f64 = 1e-3;
@@ -73,13 +73,7 @@ fn trial(seed: u64) -> Outcome {
     let mut press = pipeline.press(reference.view()).unwrap();
     for (frame, force) in frames.iter().zip(&scene.options().forces_n) {
         let value = scale * force + noise_n * normal();
-        press.add_gauged_frame(
-            frame.view(),
-            Some(Estimate {
-                value,
-                standard_error: noise_n,
-            }),
-        );
+        press.add_gauged_frame(frame.view(), Some(Estimate::new(value, noise_n)));
     }
     let found = press.modulus().unwrap();
     let signs_right = (1..loads).all(|load| {

@@ -4,9 +4,6 @@ use super::surface::Sample;
 use super::{at_least, growing, log_hertz};
 use crate::error::{ElasticityError, Quantity, positive};
 
-/// Fewest contacts of a curve.
-pub(super) const FEWEST_CONTACTS: usize = 4;
-
 /// The contacts of one ball under growing loads, of [`ContactTable`](super::ContactTable)'s example: columns of equal length.
 ///
 /// ```
@@ -32,11 +29,14 @@ pub struct ContactCurve {
 }
 
 impl ContactCurve {
+    /// Fewest contacts of a curve.
+    pub const FEWEST_CONTACTS: usize = 4;
+
     pub(super) fn check(&self) -> Result<(), ElasticityError> {
         positive(self.youngs_modulus_pa, Quantity::YoungsModulus)?;
         at_least(
             self.contact_radius_m.len(),
-            FEWEST_CONTACTS,
+            Self::FEWEST_CONTACTS,
             Quantity::ContactRadius,
         )?;
         if self.force_n.len() != self.contact_radius_m.len() {

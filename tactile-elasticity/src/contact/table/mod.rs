@@ -1,13 +1,9 @@
 //! Contacts of a soft ball with one guide, computed once and interpolated.
 
 mod curve;
-#[cfg(feature = "fem")]
-mod solve;
 mod surface;
 
 pub use curve::ContactCurve;
-#[cfg(feature = "fem")]
-pub use solve::{TableOptions, TableProgress};
 
 use super::{Layer, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson, positive};

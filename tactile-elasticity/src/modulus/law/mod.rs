@@ -12,20 +12,23 @@ mod waveguide;
 pub(crate) use half_space::{ConeLaw, Punch, Sphere};
 pub(crate) use layer::LayerLaw;
 pub use layer::LayerTheory;
-pub(crate) use no_slip::NoSlipLaw;
+pub use no_slip::NoSlipLaw;
 pub(crate) use tatara::TataraLaw;
 pub(crate) use tip_on_ball::TipOnBallLaw;
 pub(crate) use two_contacts::TwoContactsLaw;
-pub(crate) use waveguide::WaveguideLaw;
+pub use waveguide::WaveguideLaw;
 
 use crate::modulus::EstimatorKind;
 
 /// ln f = ln(F/E*) at one x, with its slopes in ln x and in the logarithm of the indenter's size.
 #[derive(Debug, Clone, Copy)]
 pub struct LogForce {
-    pub(crate) value: f64,
-    pub(crate) slope: f64,
-    pub(crate) size_slope: f64,
+    /// ln f.
+    pub value: f64,
+    /// d ln f / d ln x.
+    pub slope: f64,
+    /// d ln f / d ln R, R the size of the indenter.
+    pub size_slope: f64,
 }
 
 /// A law F = E* f(x), implemented by this crate's indenters.

@@ -20,7 +20,7 @@ use crate::modulus::EstimatorKind;
 
 /// A law of contact without friction, with the factors by which sticking changes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct NoSlipLaw<L> {
+pub struct NoSlipLaw<L> {
     frictionless: L,
     kind: EstimatorKind,
     /// ln of the force's factor at one contact radius.
@@ -32,7 +32,11 @@ pub(crate) struct NoSlipLaw<L> {
 }
 
 impl NoSlipLaw<Sphere> {
-    pub(crate) fn sphere(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
+    /// Of a sphere of radius R (m) on a half-space of Poisson ratio ν.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`].
+    pub fn sphere(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
         // δ I = a²/2R: at one indentation a² grows as 2I.
         let integral = 2.0 * parabola_integral(theta(nu));
         Ok(Self {
@@ -46,7 +50,11 @@ impl NoSlipLaw<Sphere> {
 }
 
 impl NoSlipLaw<Punch> {
-    pub(crate) fn punch(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
+    /// Of a flat punch of radius a (m).
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`].
+    pub fn punch(radius_m: f64, nu: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
             frictionless: Punch::new(radius_m)?,
             kind: EstimatorKind::FlatPunchWithoutSlip,
@@ -58,7 +66,11 @@ impl NoSlipLaw<Punch> {
 }
 
 impl NoSlipLaw<ConeLaw> {
-    pub(crate) fn cone(half_angle_tangent: f64, nu: f64) -> Result<Self, ElasticityError> {
+    /// Of a cone, by the tangent of its half angle.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`].
+    pub fn cone(half_angle_tangent: f64, nu: f64) -> Result<Self, ElasticityError> {
         // δ I = (π/2) a cot α: at one indentation a grows as I.
         let integral = cone_integral(theta(nu));
         Ok(Self {

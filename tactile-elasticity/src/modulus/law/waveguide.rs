@@ -26,7 +26,11 @@ const TABULATED: (f64, f64) = (0.02, 1.6);
 const LARGEST_INDENTATION: f64 = 0.8;
 
 impl WaveguideLaw {
-    pub(crate) fn new<T: RealField + Copy>(
+    /// Of a ball of radius R (m) and Poisson ratio ν on the layers of a guide.
+    ///
+    /// # Errors
+    /// Those of the layers' contact: [`ElasticityError`].
+    pub fn new<T: RealField + Copy>(
         radius_m: T,
         poisson_ratio: T,
         waveguide: &Waveguide<T>,

@@ -61,7 +61,7 @@ fn rows(value: &Value) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn matrix(value: &Value) -> MatchMatrix<f64> {
+fn matrix(value: &Value) -> MatchMatrix {
     let entries = rows(value);
     MatchMatrix::from_fn(entries.len() - 1, entries[0].len() - 1, |i, j| {
         entries[i][j]
@@ -182,7 +182,7 @@ fn number(value: &Value) -> f64 {
 fn check_graphs<const D: usize>(
     id: &str,
     expected: &Value,
-    graphs: [(&str, &NeighbourGraph<f64, D>); 2],
+    graphs: [(&str, &NeighbourGraph<D>); 2],
     table: &mut Table,
 ) {
     for (set, graph) in graphs {
@@ -209,8 +209,8 @@ fn check_graphs<const D: usize>(
 fn check_edge_pairs<const D: usize>(
     id: &str,
     expected: &Value,
-    model: &NeighbourGraph<f64, D>,
-    target: &NeighbourGraph<f64, D>,
+    model: &NeighbourGraph<D>,
+    target: &NeighbourGraph<D>,
     table: &mut Table,
 ) {
     let longest = model.longest().max(target.longest());
@@ -237,9 +237,9 @@ fn check_edge_pairs<const D: usize>(
 fn check_support<const D: usize>(
     id: &str,
     expected: &Value,
-    m: &MatchMatrix<f64>,
-    model: &NeighbourGraph<f64, D>,
-    target: &NeighbourGraph<f64, D>,
+    m: &MatchMatrix,
+    model: &NeighbourGraph<D>,
+    target: &NeighbourGraph<D>,
     table: &mut Table,
 ) {
     let longest = Some(model.longest().max(target.longest()));
@@ -275,9 +275,9 @@ fn check_relaxation<const D: usize>(
     id: &str,
     name: &str,
     expected: &Value,
-    (mut m, s, slack_gain): (MatchMatrix<f64>, &[f64], f64),
+    (mut m, s, slack_gain): (MatchMatrix, &[f64], f64),
     lost: impl Fn(usize, usize) -> f64,
-    (model, target): (&NeighbourGraph<f64, D>, &NeighbourGraph<f64, D>),
+    (model, target): (&NeighbourGraph<D>, &NeighbourGraph<D>),
     table: &mut Table,
 ) {
     let zero_rows = update(&mut m, s, slack_gain);
@@ -327,7 +327,7 @@ fn check_relaxation<const D: usize>(
 fn compare(
     quantity: &str,
     id: &str,
-    m: &MatchMatrix<f64>,
+    m: &MatchMatrix,
     expected: &Value,
     lost: &impl Fn(usize, usize) -> f64,
     table: &mut Table,

@@ -7,14 +7,14 @@ use proptest::prelude::*;
 
 /// A model and a bent copy of it in another order, with points of their own on either side.
 fn scene<const D: usize>(rows: usize, columns: usize, seed: u64) -> [Vec<Point<f64, D>>; 2] {
-    let all = scattered::<f64, D>(rows.max(columns), seed);
+    let all = scattered::<D>(rows.max(columns), seed);
     let target = reordered(&bend(&all, 0.3), &Stream::new(seed).permutation(all.len()));
     [all[..rows].to_vec(), target[..columns].to_vec()]
 }
 
 /// Largest difference of the soft matches of two answers.
-fn difference<const D: usize>(a: &Matching<f64, D>, b: &Matching<f64, D>, columns: usize) -> f64 {
-    let entry = |m: &Matching<f64, D>, i, j| m.soft.row(i).find(|e| e.0 == j).map_or(0.0, |e| e.1);
+fn difference<const D: usize>(a: &Matching<D>, b: &Matching<D>, columns: usize) -> f64 {
+    let entry = |m: &Matching<D>, i, j| m.soft.row(i).find(|e| e.0 == j).map_or(0.0, |e| e.1);
     let pairs = (0..a.warped.len()).flat_map(|i| (0..columns).map(move |j| (i, j)));
     pairs
         .map(|(i, j)| (entry(a, i, j) - entry(b, i, j)).abs())

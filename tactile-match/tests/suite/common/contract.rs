@@ -8,10 +8,10 @@ use tactile_match::{
 };
 use tactile_tps::Scalar;
 
-pub(crate) type Matchers<T, const D: usize> = Vec<(&'static str, Box<dyn PointMatcher<T, D>>)>;
+pub(crate) type Matchers<const D: usize> = Vec<(&'static str, Box<dyn PointMatcher<D>>)>;
 
 /// The matchers that every test file runs; a new one is added here and nowhere else.
-pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
+pub(crate) fn matchers<const D: usize>() -> Matchers<D> {
     let drift = |motion| {
         let options = CoherentPointDrift::default().with_motion(motion);
         options.expect("a valid motion")
@@ -52,11 +52,11 @@ pub(crate) fn matchers<T: Scalar, const D: usize>() -> Matchers<T, D> {
 }
 
 /// What holds of every [`Matching`], whatever it was made from.
-pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
+pub(crate) fn assert_consistent<const D: usize>(
     name: &str,
-    model: &[Point<T, D>],
-    target: &[Point<T, D>],
-    matching: &Matching<T, D>,
+    model: &[Point<f64, D>],
+    target: &[Point<f64, D>],
+    matching: &Matching<D>,
 ) {
     let (rows, columns) = (model.len(), target.len());
     let lengths = [
@@ -72,14 +72,14 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
         "{name}: one covariance per model point"
     );
     assert_partition(name, columns, matching);
-    let probability = |p: T| p >= T::zero() && p <= T::one() + nalgebra::convert(1e-5);
+    let probability = |p: f64| p >= 0.0 && p <= 1.0 + (1e-5);
     assert!(
         matching.confidence.iter().all(|&p| probability(p)),
         "{name}: confidence {:?}",
         matching.confidence
     );
     for i in 0..rows {
-        let sum = matching.soft.row(i).fold(T::zero(), |sum, (j, p)| {
+        let sum = matching.soft.row(i).fold(0.0, |sum, (j, p)| {
             assert!(
                 j < columns && probability(p),
                 "{name}: soft match ({i}, {j}) = {p}"
@@ -88,7 +88,7 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
         });
         assert!(probability(sum), "{name}: soft row {i} sums to {sum}");
     }
-    let finite = |p: &Point<T, D>| p.iter().all(|c| c.is_finite());
+    let finite = |p: &Point<f64, D>| p.iter().all(|c| c.is_finite());
     assert!(
         matching.warped.iter().all(finite),
         "{name}: warped points {:?}",
@@ -100,11 +100,11 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
             .iter()
             .chain(&matching.warped)
             .chain([point])
-            .fold(T::zero(), |m, p| m.max(p.coords.amax()));
+            .fold(0.0_f64, |m, p| m.max(p.coords.amax()));
         let step = (matching.warp.apply(point) - warped).norm();
-        let tolerance: T = nalgebra::convert(1e10 * T::UNIT_ROUNDOFF);
+        let tolerance: f64 = 1e10 * f64::UNIT_ROUNDOFF;
         assert!(
-            step <= tolerance.min(nalgebra::convert(1e-3)) * size,
+            step <= tolerance.min(1e-3) * size,
             "{name}: the warp takes point {i} {step} astray"
         );
     }
@@ -114,7 +114,7 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
             "{name}: covariance {covariance}"
         );
         assert!(
-            (0..D).all(|d| covariance[(d, d)] >= T::zero()),
+            (0..D).all(|d| covariance[(d, d)] >= 0.0),
             "{name}: covariance {covariance}"
         );
     }
@@ -131,11 +131,7 @@ pub(crate) fn assert_consistent<T: Scalar, const D: usize>(
 }
 
 /// No target twice; matched and unmatched rows together are all rows.
-fn assert_partition<T: Scalar, const D: usize>(
-    name: &str,
-    columns: usize,
-    matching: &Matching<T, D>,
-) {
+fn assert_partition<const D: usize>(name: &str, columns: usize, matching: &Matching<D>) {
     let mut seen = vec![false; columns];
     for &j in matching
         .assignment

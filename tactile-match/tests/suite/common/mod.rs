@@ -4,15 +4,14 @@ pub(crate) mod contract;
 
 #[allow(unused_imports)] // the tests inside the crate share the point sets alone
 pub(crate) use contract::{assert_consistent, matchers};
-use nalgebra::{Point, RealField, SMatrix, SVector};
+use nalgebra::{Point, SMatrix, SVector};
 use proptest::prelude::*;
-use tactile_tps::Scalar;
 
 /// Largest distance of two points of the same row.
-pub(crate) fn largest_step<T: Scalar, const D: usize>(a: &[Point<T, D>], b: &[Point<T, D>]) -> f64 {
+pub(crate) fn largest_step<const D: usize>(a: &[Point<f64, D>], b: &[Point<f64, D>]) -> f64 {
     a.iter()
         .zip(b)
-        .map(|(a, b)| nalgebra::convert_unchecked::<T, f64>((a - b).norm()))
+        .map(|(a, b)| (a - b).norm())
         .fold(0.0, f64::max)
 }
 
@@ -44,10 +43,7 @@ impl Stream {
 }
 
 /// `n` points, no two closer than about half the spacing of a regular arrangement: a jittered lattice of the unit cube.
-pub(crate) fn scattered<T: RealField + Copy, const D: usize>(
-    n: usize,
-    seed: u64,
-) -> Vec<Point<T, D>> {
+pub(crate) fn scattered<const D: usize>(n: usize, seed: u64) -> Vec<Point<f64, D>> {
     let side = (n as f64).powf(1.0 / D as f64).ceil() as usize;
     let mut stream = Stream::new(seed);
     let cells = stream.permutation(side.pow(D as u32));
@@ -56,30 +52,27 @@ pub(crate) fn scattered<T: RealField + Copy, const D: usize>(
         .map(|&cell| {
             let at = |d: usize| (cell / side.pow(d as u32) % side) as f64;
             Point::from(SVector::from_fn(|d, _| {
-                nalgebra::convert((at(d) + 0.5 + 0.5 * (stream.next() - 0.5)) / side as f64)
+                (at(d) + 0.5 + 0.5 * (stream.next() - 0.5)) / side as f64
             }))
         })
         .collect()
 }
 
 /// A regular grid of `side`^D points.
-pub(crate) fn grid<T: RealField + Copy, const D: usize>(side: usize) -> Vec<Point<T, D>> {
+pub(crate) fn grid<const D: usize>(side: usize) -> Vec<Point<f64, D>> {
     (0..side.pow(D as u32))
         .map(|cell| {
             Point::from(SVector::from_fn(|d, _| {
-                nalgebra::convert((cell / side.pow(d as u32) % side) as f64)
+                (cell / side.pow(d as u32) % side) as f64
             }))
         })
         .collect()
 }
 
 /// A smooth, fold-free deformation of the unit cube; `size` is the largest displacement.
-pub(crate) fn bend<T: RealField + Copy, const D: usize>(
-    points: &[Point<T, D>],
-    size: f64,
-) -> Vec<Point<T, D>> {
-    let size: T = nalgebra::convert(size);
-    let wave = |x: T, phase: f64| (x * nalgebra::convert(2.1) + nalgebra::convert(phase)).sin();
+pub(crate) fn bend<const D: usize>(points: &[Point<f64, D>], size: f64) -> Vec<Point<f64, D>> {
+    let size: f64 = size;
+    let wave = |x: f64, phase: f64| (x * 2.1 + phase).sin();
     points
         .iter()
         .map(|p| {
@@ -96,11 +89,8 @@ pub(crate) fn reordered<P: Copy>(points: &[P], order: &[usize]) -> Vec<P> {
 }
 
 /// A rotation by `angle` in the plane of the first two axes.
-pub(crate) fn rotation<T: RealField + Copy, const D: usize>(angle: f64) -> SMatrix<T, D, D> {
-    let (sin, cos): (T, T) = (
-        nalgebra::convert(angle.sin()),
-        nalgebra::convert(angle.cos()),
-    );
+pub(crate) fn rotation<const D: usize>(angle: f64) -> SMatrix<f64, D, D> {
+    let (sin, cos): (f64, f64) = (angle.sin(), angle.cos());
     let mut r = SMatrix::identity();
     (r[(0, 0)], r[(0, 1)], r[(1, 0)], r[(1, 1)]) = (cos, -sin, sin, cos);
     r

@@ -5,7 +5,6 @@
 use super::contract::{assert_consistent, matchers};
 use nalgebra::{Point, SVector};
 use tactile_match::MatchError;
-use tactile_tps::Scalar;
 
 /// Largest number of points of a set: enough for every stage of the matchers, few enough for a thousand inputs a minute.
 const MOST: usize = 24;
@@ -26,7 +25,7 @@ const EXTREMES: [f64; 12] = [
     f64::NAN,
 ];
 
-/// Reads two sets of points and gives them to every matcher, in both precisions.
+/// Reads two sets of points and gives them to every matcher.
 ///
 /// The first byte says whether the points lie in the plane or in space and whether the target is the model moved; the second and third
 /// how many there are. Then come coordinates: a byte below 200 is a multiple of a tenth, above it an extreme value, and 255 stands before the eight
@@ -42,13 +41,13 @@ pub(crate) fn matcher(bytes: &[u8]) {
         byte => EXTREMES[usize::from(byte) % EXTREMES.len()],
     };
     if kind & 1 == 0 {
-        both_precisions::<2>(kind, counts, &mut coordinate);
+        either_dimension::<2>(kind, counts, &mut coordinate);
     } else {
-        both_precisions::<3>(kind, counts, &mut coordinate);
+        either_dimension::<3>(kind, counts, &mut coordinate);
     }
 }
 
-fn both_precisions<const D: usize>(
+fn either_dimension<const D: usize>(
     kind: u8,
     counts: [usize; 2],
     coordinate: &mut impl FnMut() -> f64,
@@ -62,19 +61,15 @@ fn both_precisions<const D: usize>(
         model.iter().rev().map(|p| p + step.coords).collect()
     };
     every_matcher(&model, &target);
-    let single = |points: &[Point<f64, D>]| -> Vec<Point<f32, D>> {
-        points.iter().map(|p| p.map(|c| c as f32)).collect()
-    };
-    every_matcher(&single(&model), &single(&target));
 }
 
 /// Every matcher gives a consistent answer, or says that a coordinate cannot be used where one cannot.
-fn every_matcher<T: Scalar, const D: usize>(model: &[Point<T, D>], target: &[Point<T, D>]) {
+fn every_matcher<const D: usize>(model: &[Point<f64, D>], target: &[Point<f64, D>]) {
     // A coordinate is usable where the square of a difference of two such is finite.
-    let sixteen = nalgebra::convert(16.0);
-    let usable = |p: &Point<T, D>| p.iter().all(|&c| (c * c * sixteen).is_finite());
+    let sixteen = 16.0;
+    let usable = |p: &Point<f64, D>| p.iter().all(|&c| (c * c * sixteen).is_finite());
     let all_usable = model.iter().chain(target).all(usable);
-    for (name, matcher) in matchers::<T, D>() {
+    for (name, matcher) in matchers::<D>() {
         match matcher.match_points(model, target) {
             Ok(matching) => {
                 assert!(all_usable, "{name}: an answer to {model:?} and {target:?}");

@@ -49,7 +49,7 @@ fn noise_below_the_spacing_rarely_takes_a_second_start() {
     let mut of_one_start = 0;
     for seed in 0..8 {
         let mut stream = common::Stream::new(seed);
-        let model = common::scattered::<f64, 3>(105, seed);
+        let model = common::scattered::<3>(105, seed);
         let truth = common::bend(&model, 0.06);
         let order = stream.permutation(105);
         let mut noisy = |p: &Point3<f64>| p.map(|x| x + NOISE * (2.0 * stream.next() - 1.0));
@@ -150,18 +150,6 @@ fn outliers_stay_without_partner() {
         .unwrap();
     assert_pairs(&found.assignment, &partner, "");
     assert_eq!(found.unmatched_target, [61, 62, 63]);
-}
-
-#[test]
-fn single_precision_gives_the_same_matches() {
-    let model = cloud::<2>(52);
-    let (target, partner) = shuffled(&model);
-    let narrow =
-        |points: &[Point2<f64>]| points.iter().map(|p| p.cast::<f32>()).collect::<Vec<_>>();
-    let found = AnnealedSoftassign::default()
-        .match_points(&narrow(&model), &narrow(&target))
-        .unwrap();
-    assert_pairs(&found.assignment, &partner, "");
 }
 
 /// Where no outliers are expected every point gets a partner; where they are, a far point is left without.

@@ -119,7 +119,7 @@ fn the_callback_hears_every_iteration_and_stops_the_search() {
         .unwrap();
     assert_eq!(
         (heard, found.report.stop, found.report.iterations),
-        (4, StopReason::Callback, 4)
+        (4, StopReason::Cancelled, 4)
     );
 }
 
@@ -137,7 +137,7 @@ fn a_used_workspace_gives_the_same_bits() {
         .match_points_with(&mut workspace, &a, &target_a, go)
         .unwrap();
     let fresh = matcher.match_points(&a, &target_a).unwrap();
-    assert_eq!(again.warped::<f64>().collect::<Vec<_>>(), fresh.warped);
+    assert_eq!(again.warped().collect::<Vec<_>>(), fresh.warped);
     assert_eq!(again.assignment, fresh.assignment);
 }
 
@@ -163,7 +163,7 @@ fn a_batch_gives_the_bits_of_single_matches() {
         .map(|(m, t)| (&m[..], &t[..]))
         .collect();
     let matcher = AnnealedSoftassign::default();
-    let check = |batch: Vec<Result<tactile_match::Matching<f64, 2>, MatchError>>| {
+    let check = |batch: Vec<Result<tactile_match::Matching<2>, MatchError>>| {
         assert_eq!(batch.len(), pairs.len());
         for (found, (model, target)) in batch.into_iter().zip(&pairs) {
             match (found, matcher.match_points(model, target)) {

@@ -1,5 +1,0 @@
-//! The program `tactile`; it is in the library so that what both compute is compiled once.
-
-fn main() -> std::process::ExitCode {
-    tactile_imaging::cli::run()
-}

@@ -1,8 +1,0 @@
-//! Presses of the simulator that stand in for a user's own.
-use tactile_imaging::pipeline::Trial;
-use tactile_imaging::simulate::{CalibrationOptions, PressOptions, SimulateError};
-
-/// A press with the default calibration of its sensor.
-pub fn trial(options: PressOptions) -> Result<Trial, SimulateError> {
-    Trial::new(options, &CalibrationOptions::default())
-}

@@ -1,0 +1,120 @@
+//! The command line.
+use crate::context::Context;
+use crate::failure::{Exit, Failure};
+use crate::{
+    calibrate, depth, force, inclusion, indent, integrate, light, match_points, measure, numbers,
+    reconstruct, strain, stream, table, warp,
+};
+use clap::error::ErrorKind;
+use clap::{Parser, Subcommand};
+use std::io::Write;
+
+/// Force, shape, strain and Young's modulus from the frames of an optical tactile sensor.
+///
+/// Every subcommand prints its results as text, or as one JSON object with --json, and writes files (tables as CSV, plots
+/// as SVG) to the folder given by --out and nowhere else. The examples in the help run as they stand in a copy of the
+/// repository.
+#[derive(Parser)]
+#[command(name = "tactile", version, after_help = AFTER_HELP, arg_required_else_help = true)]
+pub struct Program {
+    #[command(subcommand)]
+    pub command: Command,
+    /// Print one JSON object on standard output instead of text; each stage is a value or its error.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Refuse a job that needs more memory than this, in GB.
+    #[arg(long, global = true, value_name = "GB", default_value = "4", value_parser = numbers::positive)]
+    pub memory_gb: f64,
+}
+
+const AFTER_HELP: &str = "\
+Examples, one for each subcommand:
+  tactile measure examples/data/press/scene.toml
+  tactile force --reference examples/data/press/reference.png --pairs examples/data/press/calibration.csv --pixel-um 40 examples/data/press/frame_1.png
+  tactile calibrate examples/data/sensor/calibration.toml
+  tactile match examples/data/cases.txt
+  tactile warp examples/data/sources.csv examples/data/targets.csv examples/data/queries.csv
+  tactile strain examples/data/before.csv examples/data/after.csv
+  tactile reconstruct examples/data/ball.pgm --light 0,0,1 --mask examples/data/ball.pgm
+  tactile integrate examples/data/slope_x.csv examples/data/slope_y.csv
+  tactile depth --reference examples/data/dark_reference.pgm --table examples/data/depth_table.csv --pixel-um 100 examples/data/dark_frame.pgm
+  tactile inclusion --design examples/data/inclusion/scene.toml
+  tactile indent examples/data/curve.csv --shape sphere --radius 5e-3
+  tactile stream --rate 20 --period 1 --allowed-late 100
+  tactile light --rays 2000
+  tactile table examples/data/press/scene.toml --moduli 2 --largest-ratio 0.5
+
+Exit codes:
+  0    all that was asked for is there
+  1    results were printed, but a stage has no answer; it is printed with its reason
+  2    an argument or a file cannot be used; nothing was computed
+  3    a result could not be written
+  130  stopped by Ctrl-C; what was there was printed";
+
+#[derive(Subcommand)]
+pub enum Command {
+    Measure(measure::Arguments),
+    Force(force::Arguments),
+    Calibrate(calibrate::Arguments),
+    Match(match_points::Arguments),
+    Warp(warp::Arguments),
+    Strain(strain::Arguments),
+    Reconstruct(reconstruct::Arguments),
+    Integrate(integrate::Arguments),
+    Depth(depth::Arguments),
+    Inclusion(inclusion::Arguments),
+    Indent(indent::Arguments),
+    Stream(stream::Arguments),
+    Light(light::Arguments),
+    Table(table::Arguments),
+}
+
+impl Command {
+    pub fn run(&self, context: &mut Context) -> Result<Exit, Failure> {
+        match self {
+            Self::Measure(arguments) => measure::run(arguments, context),
+            Self::Force(arguments) => force::run(arguments, context),
+            Self::Calibrate(arguments) => calibrate::run(arguments, context),
+            Self::Match(arguments) => match_points::run(arguments, context),
+            Self::Warp(arguments) => warp::run(arguments, context),
+            Self::Strain(arguments) => strain::run(arguments, context),
+            Self::Reconstruct(arguments) => reconstruct::run(arguments, context),
+            Self::Integrate(arguments) => integrate::run(arguments, context),
+            Self::Depth(arguments) => depth::run(arguments, context),
+            Self::Inclusion(arguments) => inclusion::run(arguments, context),
+            Self::Indent(arguments) => indent::run(arguments, context),
+            Self::Stream(arguments) => stream::run(arguments, context),
+            Self::Light(arguments) => light::run(arguments, context),
+            Self::Table(arguments) => table::run(arguments, context),
+        }
+    }
+}
+
+/// Prints the help where it was asked for, else what is wrong with the arguments as one sentence.
+pub fn explain(error: &clap::Error) -> Exit {
+    let text = error.render().to_string();
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            match std::io::stdout().write_all(text.as_bytes()) {
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Exit::Output,
+                _ => Exit::Complete,
+            }
+        }
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            let _ = std::io::stderr().write_all(text.as_bytes());
+            Exit::Input
+        }
+        _ => {
+            // The first paragraph says what is wrong; usage and tips follow.
+            let first = text.split("\n\n").next().unwrap_or_default();
+            let words: Vec<&str> = first.split_whitespace().collect();
+            let sentence = words.join(" ");
+            let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
+            let _ = writeln!(
+                std::io::stderr(),
+                "tactile: {sentence}; --help lists the arguments"
+            );
+            Exit::Input
+        }
+    }
+}

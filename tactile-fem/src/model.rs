@@ -1,0 +1,298 @@
+//! Bodies, materials, supports and contacts: what is to be solved.
+
+use super::contact::{ContactNode, ContactSegment, Opposite, contact_segments};
+use super::curve::SurfaceCurve;
+use super::element::Geometry;
+use super::interface::BondedInterface;
+use super::material::{Kinematics, Material};
+use super::mesh::{Boundary, Mesh};
+use super::rigid::RigidShape;
+use crate::error::Quantity;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tactile_elasticity::ElasticityError;
+
+/// A body of a [`Model`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Body(usize);
+
+/// How a boundary is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Support {
+    /// No displacement but the support's own: glued to glass or to a stage.
+    Bonded,
+    /// Free to slide along r: a lubricated stage, or a plane of symmetry.
+    Sliding,
+}
+
+/// What a displacement component does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Motion {
+    Free,
+    Zero,
+    /// Moves by the approach times this.
+    Driven(f64),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    pub(crate) regions: core::ops::Range<usize>,
+    pub(crate) boundaries: BTreeMap<Boundary, Vec<[usize; 3]>>,
+}
+
+/// An axisymmetric problem: bodies with their materials, supports and contacts.
+///
+/// The approach δ, one number, moves every boundary that is [driven](Self::drive) by δ along +z.
+/// SI units; the axis of revolution is r = 0; guides lie below z = 0 and objects above.
+#[derive(Debug, Clone)]
+pub(crate) struct Model {
+    pub(crate) kinematics: Kinematics,
+    pub(crate) nodes: Vec<[f64; 2]>,
+    pub(crate) elements: Vec<[usize; 9]>,
+    /// Material of each element, an index of `materials`.
+    pub(crate) regions: Vec<usize>,
+    /// Shared by the scenes on one mesh whose nodes are moved elsewhere only.
+    pub(crate) geometry: Vec<Arc<Geometry>>,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) parts: Vec<Part>,
+    /// Of each displacement component, 2 node + (0 for r, 1 for z).
+    pub(crate) motion: Vec<Motion>,
+    pub(crate) opposites: Vec<Opposite>,
+    pub(crate) segments: Vec<ContactSegment>,
+    pub(crate) contact_nodes: Vec<ContactNode>,
+    /// Whether contacts stick.
+    pub(crate) sticks: bool,
+    /// A bonded interface whose pressure is wanted.
+    pub(crate) interface: Option<BondedInterface>,
+    /// The node whose axial displacement a node shares.
+    pub(crate) partners: Vec<Option<usize>>,
+    /// External forces on displacement components, for tests by manufactured solutions.
+    pub(crate) external: Vec<f64>,
+}
+
+impl Model {
+    /// An empty model.
+    pub(crate) fn new(kinematics: Kinematics) -> Self {
+        Self {
+            kinematics,
+            nodes: Vec::new(),
+            elements: Vec::new(),
+            regions: Vec::new(),
+            geometry: Vec::new(),
+            materials: Vec::new(),
+            parts: Vec::new(),
+            motion: Vec::new(),
+            opposites: Vec::new(),
+            segments: Vec::new(),
+            contact_nodes: Vec::new(),
+            sticks: false,
+            interface: None,
+            partners: Vec::new(),
+            external: Vec::new(),
+        }
+    }
+
+    /// Adds a body with one material a region.
+    ///
+    /// # Errors
+    /// Materials that are not one a region; an element that is degenerate or turned inside out.
+    pub(crate) fn add(
+        &mut self,
+        mesh: &Mesh,
+        materials: &[Material],
+    ) -> Result<Body, ElasticityError> {
+        if materials.len() != mesh.region_count() {
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::Layers,
+                expected: mesh.region_count(),
+                found: materials.len(),
+            });
+        }
+        let mut geometry = Vec::with_capacity(mesh.elements.len());
+        for (index, element) in mesh.elements.iter().enumerate() {
+            let element = Geometry::new(&element.map(|node| mesh.nodes[node]));
+            let element = element.ok_or(ElasticityError::DegenerateElement { element: index })?;
+            geometry.push(Arc::new(element));
+        }
+        let (first, region) = (self.nodes.len(), self.materials.len());
+        self.nodes.extend(&mesh.nodes);
+        self.elements
+            .extend(mesh.elements.iter().map(|e| e.map(|node| node + first)));
+        self.regions.extend(mesh.regions.iter().map(|r| r + region));
+        self.geometry.extend(geometry);
+        self.materials.extend(materials);
+        for node in &mesh.nodes {
+            let radial = if node[0] == 0.0 {
+                Motion::Zero
+            } else {
+                Motion::Free
+            };
+            self.motion.extend([radial, Motion::Free]);
+            self.external.extend([0.0; 2]);
+            self.partners.push(None);
+        }
+        let shifted = mesh.boundaries.iter().map(|(name, edges)| {
+            (
+                *name,
+                edges
+                    .iter()
+                    .map(|edge| edge.map(|node| node + first))
+                    .collect(),
+            )
+        });
+        self.parts.push(Part {
+            regions: region..self.materials.len(),
+            boundaries: shifted.collect(),
+        });
+        Ok(Body(self.parts.len() - 1))
+    }
+
+    /// Number of elements of all bodies.
+    pub(crate) fn element_count(&self) -> usize {
+        self.elements.len()
+    }
+
+    /// Materials of a body, by region.
+    pub(crate) fn materials(&self, body: Body) -> &[Material] {
+        &self.materials[self.parts[body.0].regions.clone()]
+    }
+
+    /// Edges of a body's boundary, by the model's node numbers.
+    pub(crate) fn edges(&self, body: Body, boundary: Boundary) -> &[[usize; 3]] {
+        self.parts[body.0]
+            .boundaries
+            .get(&boundary)
+            .map_or(&[], Vec::as_slice)
+    }
+
+    /// Regions of a body among the model's.
+    pub(crate) fn body_regions(&self, body: Body) -> core::ops::Range<usize> {
+        self.parts[body.0].regions.clone()
+    }
+
+    /// Holds a boundary in its place.
+    pub(crate) fn hold(&mut self, body: Body, boundary: Boundary, support: Support) {
+        self.support(body, boundary, support, Motion::Zero);
+    }
+
+    /// Moves a boundary by the approach along +z.
+    pub(crate) fn drive(&mut self, body: Body, boundary: Boundary, support: Support) {
+        self.support(body, boundary, support, Motion::Driven(1.0));
+    }
+
+    fn support(&mut self, body: Body, boundary: Boundary, support: Support, axial: Motion) {
+        for edge in self.edges(body, boundary).to_vec() {
+            for node in edge {
+                self.motion[2 * node + 1] = axial;
+                if support == Support::Bonded {
+                    self.motion[2 * node] = Motion::Zero;
+                }
+            }
+        }
+    }
+
+    /// Lets two bodies' [`Boundary::Contact`] touch without friction, as
+    /// [`Scene::ball_on_guide`](super::Scene::ball_on_guide) does.
+    ///
+    /// Gaps are measured from `first`, which had better be the one with the finer mesh or the more
+    /// convex of the two.
+    pub(crate) fn contact(&mut self, first: Body, second: Body) {
+        let curve = SurfaceCurve::new(self.edges(second, Boundary::Contact), &self.nodes);
+        let softer = self.softest(first).min(self.softest(second));
+        self.add_points(first, Opposite::Surface(curve), softer);
+    }
+
+    /// Lets two surfaces that touch from the start slide on each other without friction: nodes at the same
+    /// place share their axial displacement. The pressure on the second body's surface, above the first,
+    /// becomes the pressure of the states.
+    ///
+    /// The nodes of one place do not stay at one radius: where the second body spreads more, the first
+    /// feels its pressure somewhat further in, which matters little where the first is the stiffer.
+    /// The surfaces are not let part.
+    pub(crate) fn slide(&mut self, first: Body, second: Body) {
+        let nodes: Vec<usize> = self
+            .edges(first, Boundary::Contact)
+            .iter()
+            .flatten()
+            .copied()
+            .collect();
+        let mut shared = Vec::new();
+        for edge in self.edges(second, Boundary::Contact).to_vec() {
+            for other in edge {
+                let [s, w] = self.nodes[other];
+                let near = |node: &usize| {
+                    let [r, z] = self.nodes[*node];
+                    // Meshes built on the same lines: rounding alone parts their nodes.
+                    (r - s).abs() + (z - w).abs() < 1e-9 * (1.0 + r)
+                };
+                self.partners[other] = nodes.iter().copied().find(near);
+            }
+            if edge.iter().all(|&node| self.partners[node].is_some()) {
+                shared.push(edge);
+            }
+        }
+        let regions = self.body_regions(second);
+        let is_upper = |index: usize| regions.contains(&self.regions[index]);
+        self.interface = Some(BondedInterface::new(&shared, &self.elements, is_upper, 1.0));
+    }
+
+    /// Lets a body's [`Boundary::Contact`] touch a rigid body above it without friction, whose pole is
+    /// at `height_m` and does not move.
+    #[cfg(test)]
+    pub(crate) fn contact_rigid_above(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+        let opposite = Opposite::Rigid {
+            shape,
+            side: 1.0,
+            height: height_m,
+            driven: false,
+        };
+        let softer = self.softest(body);
+        self.add_points(body, opposite, softer);
+    }
+
+    /// Lets a body's [`Boundary::Contact`] touch a rigid body below it without friction, whose pole
+    /// starts at `height_m` and moves by the approach, as
+    /// [`Scene::ball_on_flat`](super::Scene::ball_on_flat) does.
+    pub(crate) fn contact_rigid_below(&mut self, body: Body, shape: RigidShape, height_m: f64) {
+        let opposite = Opposite::Rigid {
+            shape,
+            side: -1.0,
+            height: height_m,
+            driven: true,
+        };
+        let softer = self.softest(body);
+        self.add_points(body, opposite, softer);
+    }
+
+    /// Forbids slip in all contacts of the model, as with unlimited friction: what touches stays where it first touched until it parts.
+    ///
+    /// Loads are then followed in steps that let the approach grow by a tenth: forces hold to a thousandth and contact radii to two,
+    /// whatever loads are asked for on the way. At ν near 0 the radius is up to 1.5 % low: the pressure near the rim is not that of sliding.
+    pub(crate) fn forbid_slip(&mut self) {
+        self.sticks = true;
+    }
+
+    /// Makes the pressure on a body's [`Boundary::Interface`], above its first `lower` regions, the
+    /// pressure of the states.
+    pub(crate) fn bond(&mut self, body: Body, lower: usize) {
+        let first = self.body_regions(body).start;
+        let edges = self.edges(body, Boundary::Interface);
+        let is_lower = |index: usize| (first..first + lower).contains(&self.regions[index]);
+        self.interface = Some(BondedInterface::new(edges, &self.elements, is_lower, -1.0));
+    }
+
+    fn add_points(&mut self, body: Body, opposite: Opposite, softer: f64) {
+        let edges = self.edges(body, Boundary::Contact).to_vec();
+        let pair = self.opposites.len();
+        self.opposites.push(opposite);
+        let first = self.contact_nodes.len();
+        let (segments, nodes) = contact_segments(pair, first, &edges, &self.nodes, softer);
+        self.segments.extend(segments);
+        self.contact_nodes.extend(nodes);
+    }
+
+    fn softest(&self, body: Body) -> f64 {
+        let moduli = self.materials(body).iter().map(Material::youngs_modulus_pa);
+        moduli.fold(f64::INFINITY, f64::min)
+    }
+}

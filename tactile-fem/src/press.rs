@@ -1,0 +1,370 @@
+//! Objects pressed on a guide or on a rigid flat.
+
+use super::bodies::{ContactMesh, contact_lines};
+use super::guide::Guide;
+use super::material::{Kinematics, Material};
+use super::mesh::{Boundary, Mesh, graded};
+use super::model::{Model, Support};
+use super::rigid::RigidShape;
+use super::scene::{Interface, Scene};
+use crate::error::{Quantity, positive};
+use tactile_elasticity::ElasticityError;
+
+/// A soft body of revolution that a sensor presses: its lowest point touches, its far side does not move.
+///
+/// ```
+/// use tactile_fem::{Load, Material, Object, Press};
+///
+/// let force = |object| {
+///     let scene = Press::new(object, Material::new(100e3, 0.495)?)?.scene()?;
+///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[Load::Approach(0.2e-3)]).states[0].force_n())
+/// };
+/// let ball = force(Object::Ball { radius_m: 3e-3 })?;
+/// let half_ball = force(Object::HalfBall { radius_m: 3e-3 })?;
+/// let cylinder = force(Object::Cylinder { radius_m: 3e-3, height_m: 5e-3 })?;
+/// let cone = force(Object::Cone { half_angle_rad: 1.2, height_m: 2e-3 })?;
+/// assert!(half_ball > ball, "glued to its stage it cannot spread");
+/// assert!(cone < ball && ball < cylinder);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Object {
+    /// The half of a ball next to the contact. Its equator spreads freely in its plane, as where the ball is pressed the same way from both
+    /// sides.
+    Ball {
+        /// Its radius, in metres.
+        radius_m: f64,
+    },
+    /// Half a ball whose flat side is glued to a stage.
+    HalfBall {
+        /// Its radius, in metres.
+        radius_m: f64,
+    },
+    /// A cylinder whose far end is glued to a stage; wider than the guide, a flat plate.
+    Cylinder {
+        /// Its radius, in metres.
+        radius_m: f64,
+        /// Its height, in metres.
+        height_m: f64,
+    },
+    /// A cone, its tip towards the sensor, whose base is glued to a stage. On a soft guide one sharper than about 1.1 rad ends early
+    /// with [`Outcome::Stopped`](super::Outcome::Stopped): the strain at its tip has no bound.
+    Cone {
+        /// Between its axis and its surface, in radians.
+        half_angle_rad: f64,
+        /// From its tip to its base, in metres.
+        height_m: f64,
+    },
+}
+
+/// An [`Object`] pressed on a rigid flat or on a [`Guide`], without friction unless asked for, with the fineness of its mesh.
+///
+/// ```
+/// use tactile_fem::{Guide, Layer, Load, Material, Object, Press};
+///
+/// let gel = Material::new(80e3, 0.495)?;
+/// let guide = Guide::new(vec![Layer { thickness_m: 6e-3, material: gel }], 16e-3)?;
+/// let press = Press::new(Object::HalfBall { radius_m: 3e-3 }, Material::new(60e3, 0.495)?)?.on_guide(guide)?;
+/// let coarse = press.clone().with_fineness(4)?.scene()?;
+/// let fine = press.with_fineness(8)?.scene()?;
+/// assert!(fine.element_count() > 2 * coarse.element_count());
+/// let force = |scene: &tactile_fem::Scene| scene.solve(&[Load::Approach(0.5e-3)]).states[0].force_n();
+/// // Both meshes are fine enough for half a percent of the force.
+/// assert!((force(&coarse) / force(&fine) - 1.0).abs() < 5e-3);
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Press {
+    object: Object,
+    material: Material,
+    guide: Option<Guide>,
+    interface: Interface,
+    fineness: usize,
+}
+
+/// Elements across the core of a contact, 0.06 radii of a ball: with five the contact radius of a ball on a flat is within
+/// 0.2 % from a/R = 0.15 on, with ten the time is four times as long (`cargo bench -p tactile-benches --features fem --bench finite_elements`).
+const FINENESS: usize = 5;
+
+impl Press {
+    /// An object of one material on a rigid flat.
+    ///
+    /// # Errors
+    /// Lengths that are not positive; a cone's angle not between 0 and π/2.
+    pub fn new(object: Object, material: Material) -> Result<Self, ElasticityError> {
+        object.check()?;
+        Ok(Self {
+            object,
+            material,
+            guide: None,
+            interface: Interface::Frictionless,
+            fineness: FINENESS,
+        })
+    }
+
+    /// On this guide instead of a rigid flat. Contact radii reach 1.3 ball radii and more, until the ball's equator or the guide's thickness ends
+    /// what the bodies take: the solution then ends with [`Outcome::Stopped`](super::Outcome::Stopped).
+    ///
+    /// ```
+    /// use tactile_fem::{Guide, Layer, Load, Material, Object, Press};
+    ///
+    /// # fn main() -> Result<(), tactile_elasticity::ElasticityError> {
+    /// let layer = Layer { thickness_m: 10e-3, material: Material::new(80e3, 0.495)? };
+    /// let guide = Guide::new(vec![layer], 25e-3)?;
+    /// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495)?)?.on_guide(guide)?;
+    /// let state = &press.scene()?.solve(&[Load::Approach(1e-3)]).states[0];
+    /// // Softer than a rigid flat: less force, at the same approach, than six tenths of Hertz's.
+    /// let hertz = 4.0 / 3.0 * 103e3 / (1.0 - 0.495 * 0.495) * 3e-3_f64.sqrt() * 1e-3_f64.powf(1.5);
+    /// assert!(state.force_n() > 0.0 && state.force_n() < 0.6 * hertz);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`ElasticityError::OutOfRange`] for a guide that is not wider than the object, unless this is a cylinder.
+    pub fn on_guide(mut self, guide: Guide) -> Result<Self, ElasticityError> {
+        let radius = self.object.radius_m();
+        let may_cover = matches!(self.object, Object::Cylinder { .. });
+        if guide.radius_m() <= radius && !may_cover {
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::Radius,
+                found: radius,
+                limit: guide.radius_m(),
+            });
+        }
+        self.guide = Some(guide);
+        Ok(self)
+    }
+
+    /// Whether what touches slides, as it does by default, or sticks ([`Interface::Bonded`]): points that have come into contact stay
+    /// opposite to each other until they part. The time grows several times, as loads are followed in short steps.
+    ///
+    /// ```
+    /// use tactile_fem::{Interface, Load, Material, Object, Press};
+    ///
+    /// let press = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.3)?)?;
+    /// let force = |interface| {
+    ///     let scene = press.clone().with_interface(interface).scene()?;
+    ///     Ok::<_, tactile_elasticity::ElasticityError>(scene.solve(&[Load::Approach(0.1e-3)]).states[0].force_n())
+    /// };
+    /// // Without slip a ball on a rigid flat is stiffer by a few per cent, the more the smaller ν.
+    /// let ratio = force(Interface::Bonded)? / force(Interface::Frictionless)?;
+    /// assert!(1.01 < ratio && ratio < 1.05, "{ratio}");
+    /// # Ok::<(), tactile_elasticity::ElasticityError>(())
+    /// ```
+    pub fn with_interface(mut self, interface: Interface) -> Self {
+        self.interface = interface;
+        self
+    }
+
+    /// The number of elements across the middle of the contact (default 5); elements elsewhere follow. Time grows with its square.
+    ///
+    /// # Errors
+    /// [`ElasticityError::OutOfRange`] below 2.
+    pub fn with_fineness(mut self, elements: usize) -> Result<Self, ElasticityError> {
+        const FEWEST: usize = 2;
+        if elements < FEWEST {
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::Elements,
+                found: elements as f64,
+                limit: FEWEST as f64,
+            });
+        }
+        self.fineness = elements;
+        Ok(self)
+    }
+
+    /// The model of it: the object's far side stays, the glass or the flat moves by the approach.
+    ///
+    /// # Errors
+    /// [`ElasticityError::DegenerateElement`] where the proportions leave an element without area.
+    pub fn scene(&self) -> Result<Scene, ElasticityError> {
+        let mut model = Model::new(Kinematics::Finite);
+        let object = model.add(&self.object_mesh(), &[self.material])?;
+        let far_side = match self.object {
+            Object::Ball { .. } => Support::Sliding,
+            _ => Support::Bonded,
+        };
+        model.hold(object, Boundary::Base, far_side);
+        match &self.guide {
+            None => model.contact_rigid_below(object, RigidShape::Flat, 0.0),
+            Some(guide) => {
+                let disc = model.add(&self.guide_mesh(guide), &guide.materials())?;
+                model.drive(disc, Boundary::Base, Support::Bonded);
+                // Every point that gaps are measured from must have something opposite to it.
+                if guide.radius_m() > self.object.radius_m() {
+                    model.contact(object, disc);
+                } else {
+                    model.contact(disc, object);
+                }
+            }
+        }
+        if self.interface == Interface::Bonded {
+            model.forbid_slip();
+        }
+        Ok(Scene { model })
+    }
+
+    fn size(&self) -> ContactMesh {
+        let radius = match self.object {
+            Object::Cone { .. } => self.object.side_m(),
+            _ => self.object.radius_m(),
+        };
+        ContactMesh {
+            inner: 0.06 * radius,
+            count: self.fineness,
+            growth: self.growth(1.12),
+        }
+    }
+
+    /// Growth from element to element that is `growth` at the default fineness: over the same length it is the same at any.
+    fn growth(&self, growth: f64) -> f64 {
+        growth.powf(FINENESS as f64 / self.fineness as f64)
+    }
+
+    pub(super) fn object_mesh(&self) -> Mesh {
+        match self.object {
+            Object::Ball { radius_m } | Object::HalfBall { radius_m } => {
+                Mesh::half_ball(radius_m, self.size())
+            }
+            Object::Cylinder { radius_m, height_m } => {
+                let first = self.at_rim(radius_m.min(height_m));
+                Mesh::cylinder(
+                    &self.rim_lines(radius_m),
+                    &graded(0.0, height_m, first, self.growth(1.4)),
+                )
+            }
+            Object::Cone {
+                half_angle_rad,
+                height_m,
+            } => Mesh::cone(half_angle_rad, height_m, self.size()),
+        }
+    }
+
+    /// Element at a cylinder's rim, where the pressure is singular, over a length.
+    fn at_rim(&self, length: f64) -> f64 {
+        0.1 * length / self.fineness as f64
+    }
+
+    /// Lines from the axis to a cylinder's rim, densest there.
+    fn rim_lines(&self, radius: f64) -> Vec<f64> {
+        let mut lines = graded(radius, 0.0, self.at_rim(radius), self.growth(1.25));
+        lines.reverse();
+        lines
+    }
+
+    fn guide_mesh(&self, guide: &Guide) -> Mesh {
+        let thickness: f64 = guide.thicknesses().iter().sum();
+        let (mut lines, first) = match self.object {
+            Object::Cylinder { radius_m, .. } => {
+                let inside = self.rim_lines(radius_m.min(guide.radius_m()));
+                (inside, 2.0 * self.at_rim(radius_m.min(thickness)))
+            }
+            _ => {
+                let size = self.size();
+                let radius = self.object.radius_m();
+                let largest = 0.15 * radius * FINENESS as f64 / self.fineness as f64;
+                // The contact may grow to about the ball's own radius; beyond, elements grow freely.
+                let end = (1.3 * radius).min(0.5 * (radius + guide.radius_m()));
+                let lines = contact_lines(size.inner, size.count, size.growth, largest, end);
+                (lines, 2.0 * size.inner / size.count as f64)
+            }
+        };
+        let last = lines[lines.len() - 1];
+        let left = guide.radius_m() - last;
+        if left > 0.0 {
+            let (step, growth) = match self.object {
+                Object::Cylinder { radius_m, .. } => (self.at_rim(radius_m), self.growth(1.25)),
+                object => (
+                    0.2 * object.radius_m() * FINENESS as f64 / self.fineness as f64,
+                    self.growth(1.4),
+                ),
+            };
+            let outer = contact_lines(step, 1, growth, 0.5 * thickness, left);
+            lines.extend(outer.iter().skip(1).map(|r| last + r));
+        }
+        Mesh::layered_disc(&guide.thicknesses(), &lines, first, self.growth(1.35))
+    }
+}
+
+impl Object {
+    fn check(&self) -> Result<(), ElasticityError> {
+        match *self {
+            Self::Ball { radius_m } | Self::HalfBall { radius_m } => {
+                positive(radius_m, Quantity::Radius)?;
+            }
+            Self::Cylinder { radius_m, height_m } => {
+                positive(radius_m, Quantity::Radius)?;
+                positive(height_m, Quantity::Thickness)?;
+            }
+            Self::Cone {
+                half_angle_rad,
+                height_m,
+            } => {
+                positive(half_angle_rad, Quantity::HalfAngle)?;
+                positive(height_m, Quantity::Thickness)?;
+                let limit = core::f64::consts::FRAC_PI_2;
+                if half_angle_rad >= limit {
+                    return Err(ElasticityError::OutOfRange {
+                        quantity: Quantity::HalfAngle,
+                        found: half_angle_rad,
+                        limit,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Largest radius.
+    fn radius_m(&self) -> f64 {
+        match *self {
+            Self::Ball { radius_m }
+            | Self::HalfBall { radius_m }
+            | Self::Cylinder { radius_m, .. } => radius_m,
+            Self::Cone {
+                half_angle_rad,
+                height_m,
+            } => height_m * half_angle_rad.tan(),
+        }
+    }
+
+    /// Length of a cone's side; the radius of anything else.
+    fn side_m(&self) -> f64 {
+        match *self {
+            Self::Cone {
+                half_angle_rad,
+                height_m,
+            } => height_m / half_angle_rad.cos(),
+            _ => self.radius_m(),
+        }
+    }
+}
+
+impl Scene {
+    /// The half of a ball next to its contact with a rigid flat; its equator slides freely, as it
+    /// does where the ball is pressed the same way from both sides. [`Press`] has other objects.
+    ///
+    /// # Errors
+    /// A radius that is not positive.
+    pub(crate) fn ball_on_flat(radius_m: f64, material: Material) -> Result<Self, ElasticityError> {
+        Press::new(Object::Ball { radius_m }, material)?.scene()
+    }
+
+    /// The half of a ball on a guide, without friction; the ball's equator slides freely at its
+    /// height, the glass moves by the approach. [`Press`] has other objects.
+    ///
+    /// # Errors
+    /// A radius that is not positive; a guide that is not wider than the ball.
+    pub(crate) fn ball_on_guide(
+        radius_m: f64,
+        material: Material,
+        guide: &Guide,
+    ) -> Result<Self, ElasticityError> {
+        Press::new(Object::Ball { radius_m }, material)?
+            .on_guide(guide.clone())?
+            .scene()
+    }
+}

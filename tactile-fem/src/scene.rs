@@ -1,0 +1,249 @@
+//! Ready models of what a sensor meets.
+
+use super::block::BlockMesh;
+use super::bodies::Inclusion;
+use super::guide::Guide;
+use super::layout::Layout;
+use super::load::{Load, Solution};
+use super::material::{Kinematics, Material};
+use super::mesh::Boundary;
+use super::model::{Model, Support};
+use super::state::State;
+use super::stress::Stress;
+use crate::error::{Quantity, positive};
+use tactile_elasticity::ElasticityError;
+
+/// Whether two surfaces that are pressed together slide.
+///
+/// ```
+/// use tactile_fem::{Block, Guide, Interface, Layer, Load, Material, Scene};
+///
+/// let material = Material::new(1e4, 0.49).unwrap();
+/// let block = Block { height_m: 20e-3, radius_m: 30e-3, material, lump: None };
+/// let guide = Guide::new(vec![Layer { thickness_m: 5e-3, material }], 10e-3).unwrap();
+/// let force = |interface| {
+///     let scene = Scene::block_under_guide(&block, &guide, interface).unwrap();
+///     scene.solve(&[Load::Approach(0.2e-3)]).states[0].force_n()
+/// };
+/// assert!(force(Interface::Bonded) > force(Interface::Frictionless));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Interface {
+    /// The two move together, from the start or from where they first touch.
+    Bonded,
+    /// They slide on each other. A guide and a block are not let part: the pressure is positive where they press.
+    Frictionless,
+}
+
+/// A sphere of another material within a block, on its axis.
+///
+/// ```
+/// use tactile_fem::{Block, Lump, Material};
+///
+/// let material = |modulus| Material::new(modulus, 0.495).unwrap();
+/// let lump = Lump { diameter_m: 8e-3, depth_m: 5e-3, material: material(40e3) };
+/// let block = Block { height_m: 30e-3, radius_m: 40e-3, material: material(4e3), lump: Some(lump) };
+/// assert!(block.lump.is_some_and(|lump| lump.depth_m + lump.diameter_m < block.height_m));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Lump {
+    /// Its diameter, in metres.
+    pub diameter_m: f64,
+    /// From the block's surface to its top, in metres.
+    pub depth_m: f64,
+    /// What it is made of.
+    pub material: Material,
+}
+
+/// A cylindrical block of tissue whose far side is held.
+///
+/// ```
+/// use tactile_fem::{Block, Guide, Interface, Layer, Load, Lump, Material, Scene};
+///
+/// let soft = Material::new(5e3, 0.495).unwrap();
+/// let stiff = Material::new(5e4, 0.495).unwrap();
+/// let lump = Lump { diameter_m: 10e-3, depth_m: 6e-3, material: stiff };
+/// let block = Block { height_m: 30e-3, radius_m: 40e-3, material: soft, lump: Some(lump) };
+/// let layer = Layer { thickness_m: 10e-3, material: stiff };
+/// let guide = Guide::new(vec![layer], 16e-3).unwrap();
+/// let scene = Scene::block_under_guide(&block, &guide, Interface::Bonded).unwrap();
+/// let plain = Scene::block_under_guide(&Block { lump: None, ..block }, &guide, Interface::Bonded).unwrap();
+/// let force = |scene: &Scene| scene.solve(&[Load::Approach(1e-3)]).states[0].force_n();
+/// assert!(force(&scene) > force(&plain));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Block {
+    /// Its height, in metres.
+    pub height_m: f64,
+    /// Its radius, in metres, greater than the guide's.
+    pub radius_m: f64,
+    /// What it is made of.
+    pub material: Material,
+    /// An inclusion, if it has one.
+    pub lump: Option<Lump>,
+}
+
+/// Mesh fineness where nothing else is asked: elements along an eighth of an inclusion's circumference.
+const BLOCK_FINENESS: usize = 5;
+
+/// A model ready to be solved, with the pressure between guide and object as its result.
+///
+/// ```
+/// use tactile_fem::{Load, Material, Object, Press};
+///
+/// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(103e3, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+/// let solution = scene.solve(&[Load::Force(0.2)]);
+/// let radius = solution.states[0].contact_radius().unwrap();
+/// assert!((radius.radius_m - 1.51e-3).abs() < 0.02e-3);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Scene {
+    pub(super) model: Model,
+}
+
+impl Scene {
+    /// A block with or without an inclusion under a guide's face; the block's far side is held, the
+    /// guide's glass moves by the approach. [`Block`] and [`Interface`] have examples.
+    ///
+    /// # Errors
+    /// Lengths that are not positive; a block no wider than the guide; an inclusion that is not
+    /// inside the block or not narrower than the guide.
+    pub fn block_under_guide(
+        block: &Block,
+        guide: &Guide,
+        interface: Interface,
+    ) -> Result<Self, ElasticityError> {
+        Self::block_with_mesh(block, guide, interface, BLOCK_FINENESS, Kinematics::Finite)
+    }
+
+    /// [`Self::block_under_guide`] on a mesh with `fineness` elements along an eighth of the
+    /// inclusion's circumference, at finite or small strain.
+    pub fn block_with_mesh(
+        block: &Block,
+        guide: &Guide,
+        interface: Interface,
+        fineness: usize,
+        kinematics: Kinematics,
+    ) -> Result<Self, ElasticityError> {
+        positive(block.height_m, Quantity::Thickness)?;
+        positive(block.radius_m, Quantity::Radius)?;
+        let out_of_range = |quantity, found, limit| ElasticityError::OutOfRange {
+            quantity,
+            found,
+            limit,
+        };
+        if block.radius_m <= guide.radius_m() {
+            return Err(out_of_range(
+                Quantity::Radius,
+                guide.radius_m(),
+                block.radius_m,
+            ));
+        }
+        if let Some(lump) = block.lump {
+            positive(lump.diameter_m, Quantity::Radius)?;
+            positive(lump.depth_m, Quantity::Thickness)?;
+            let bottom = lump.depth_m + lump.diameter_m;
+            if bottom >= block.height_m {
+                return Err(out_of_range(Quantity::Thickness, bottom, block.height_m));
+            }
+            if lump.diameter_m >= 2.0 * guide.radius_m() {
+                return Err(out_of_range(
+                    Quantity::Radius,
+                    lump.diameter_m,
+                    2.0 * guide.radius_m(),
+                ));
+            }
+        }
+        let bonded = interface == Interface::Bonded;
+        let meshes = BlockMesh {
+            block_height: block.height_m,
+            block_radius: block.radius_m,
+            disc_radius: guide.radius_m(),
+            layers: guide.thicknesses(),
+            inclusion: block.lump.map(|lump| Inclusion {
+                radius: 0.5 * lump.diameter_m,
+                depth: lump.depth_m,
+            }),
+            bonded,
+            fineness,
+        }
+        .build();
+        let mut tissue = vec![block.material];
+        tissue.extend(block.lump.map(|lump| lump.material));
+        let mut model = Model::new(kinematics);
+        match meshes.block {
+            None => {
+                let materials = [guide.materials(), tissue].concat();
+                let both = model.add(&meshes.guide, &materials)?;
+                model.drive(both, Boundary::Base, Support::Bonded);
+                model.hold(both, Boundary::Stage, Support::Bonded);
+                model.bond(both, guide.layers().len());
+            }
+            Some(mesh) => {
+                let disc = model.add(&meshes.guide, &guide.materials())?;
+                let tissue = model.add(&mesh, &tissue)?;
+                model.drive(disc, Boundary::Base, Support::Bonded);
+                model.hold(tissue, Boundary::Stage, Support::Bonded);
+                model.slide(disc, tissue);
+            }
+        }
+        Ok(Self { model })
+    }
+
+    /// Solves for the loads in order.
+    pub fn solve(&self, loads: &[Load]) -> Solution {
+        self.model.solve(loads)
+    }
+
+    /// [`Self::solve`] from the states of another scene at about these approaches, where its mesh has the
+    /// same elements.
+    pub fn solve_near(
+        &self,
+        layout: &mut Layout,
+        loads: &[Load],
+        near: Option<(&Self, &[State])>,
+    ) -> Solution {
+        let near = near.filter(|(scene, _)| scene.model.elements == self.model.elements);
+        let guesses = near.map_or(&[][..], |(_, states)| states);
+        self.model.solve_near(layout, loads, guesses)
+    }
+
+    pub(crate) fn from_model(model: Model) -> Self {
+        Self { model }
+    }
+
+    pub(crate) fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Number of elements of all bodies.
+    ///
+    /// ```
+    /// # use tactile_fem::{Material, Object, Press};
+    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// assert!(scene.element_count() > 100);
+    /// ```
+    pub fn element_count(&self) -> usize {
+        self.model.element_count()
+    }
+
+    /// Cauchy stress at the material point with reference coordinates (r, z) in metres. `None` outside the bodies, or for a state of
+    /// another scene.
+    ///
+    /// From the derivatives of quadratic displacements: second order in the elements' size, discontinuous
+    /// between elements. O(elements).
+    ///
+    /// ```
+    /// # use tactile_fem::{Load, Material, Object, Press};
+    /// let scene = Press::new(Object::Ball { radius_m: 3e-3 }, Material::new(1e5, 0.495).unwrap()).and_then(|press| press.scene()).unwrap();
+    /// let state = &scene.solve(&[Load::Approach(0.3e-3)]).states[0];
+    /// // Pressed along the axis.
+    /// assert!(scene.stress(state, [0.1e-3, 1e-3]).unwrap().zz_pa < 0.0);
+    /// ```
+    pub fn stress(&self, state: &State, point: [f64; 2]) -> Option<Stress> {
+        self.model.stress(state, point)
+    }
+}

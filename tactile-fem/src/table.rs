@@ -1,0 +1,285 @@
+//! Contact tables by finite elements.
+
+use crate::error::{Quantity, positive};
+use crate::{Guide, Layer, Load, Material, Scene, State};
+use core::ops::ControlFlow;
+use tactile_elasticity::ElasticityError;
+use tactile_elasticity::contact::{Bond, ContactCurve, ContactTable, Waveguide};
+use tactile_elasticity::modulus::{ContactLaw, WaveguideLaw};
+
+/// What a table is to cover.
+///
+/// ```
+/// use tactile_fem::TableOptions;
+///
+/// let options = TableOptions::default().with_moduli_pa(20e3, 400e3, 10)?;
+/// assert!(TableOptions::default().with_moduli_pa(400e3, 20e3, 10).is_err());
+/// # let _ = options;
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableOptions {
+    lowest_pa: f64,
+    highest_pa: f64,
+    moduli: usize,
+    largest_ratio: f64,
+}
+
+impl Default for TableOptions {
+    /// Seven moduli from 25 to 400 kPa, contact radii up to 1.25 ball radii.
+    ///
+    /// Seven moduli leave less in the interpolation than the elements' own scatter of the contact radius does
+    /// (`cargo bench -p tactile-benches --features fem --bench finite_elements` prints both).
+    fn default() -> Self {
+        Self {
+            lowest_pa: 25e3,
+            highest_pa: 400e3,
+            moduli: 7,
+            largest_ratio: 1.25,
+        }
+    }
+}
+
+impl TableOptions {
+    /// The smallest and the largest modulus of the ball (Pa), and how many in equal ratios. A rigid flat needs one and takes no other.
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`]; [`ElasticityError::OutOfRange`] where the second is not above the first;
+    /// [`ElasticityError::LengthMismatch`] for fewer than two.
+    pub fn with_moduli_pa(
+        mut self,
+        lowest_pa: f64,
+        highest_pa: f64,
+        count: usize,
+    ) -> Result<Self, ElasticityError> {
+        positive(lowest_pa, Quantity::YoungsModulus)?;
+        positive(highest_pa, Quantity::YoungsModulus)?;
+        if highest_pa <= lowest_pa {
+            return Err(ElasticityError::OutOfRange {
+                quantity: Quantity::YoungsModulus,
+                found: highest_pa,
+                limit: lowest_pa,
+            });
+        }
+        if count < 2 {
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::YoungsModulus,
+                expected: 2,
+                found: count,
+            });
+        }
+        (self.lowest_pa, self.highest_pa, self.moduli) = (lowest_pa, highest_pa, count);
+        Ok(self)
+    }
+
+    /// The largest contact radius over the ball's (default 1.25).
+    ///
+    /// ```
+    /// use tactile_fem::TableOptions;
+    ///
+    /// assert!(TableOptions::default().with_largest_ratio(0.6).is_ok());
+    /// assert!(TableOptions::default().with_largest_ratio(f64::NAN).is_err());
+    /// ```
+    ///
+    /// # Errors
+    /// [`ElasticityError::NotPositive`].
+    pub fn with_largest_ratio(mut self, ratio: f64) -> Result<Self, ElasticityError> {
+        self.largest_ratio = positive(ratio, Quantity::ContactRadius)?;
+        Ok(self)
+    }
+
+    fn moduli(&self, rigid: bool) -> Vec<f64> {
+        if rigid {
+            // Forces are in proportion to the modulus: any one will do.
+            return vec![(self.lowest_pa * self.highest_pa).sqrt()];
+        }
+        let last = (self.moduli - 1) as f64;
+        let growth = (self.highest_pa / self.lowest_pa).ln();
+        (0..self.moduli)
+            .map(|k| self.lowest_pa * (growth * k as f64 / last).exp())
+            .collect()
+    }
+}
+
+/// How far [`solve_contact_table`] is.
+///
+/// ```
+/// use tactile_fem::TableProgress;
+/// let progress = TableProgress { done: 3, total: 7 };
+/// assert!(progress.done < progress.total);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableProgress {
+    /// Moduli done.
+    pub done: usize,
+    /// Moduli in all.
+    pub total: usize,
+}
+
+/// Contacts a modulus.
+const CONTACTS: usize = 16;
+/// The smallest a/R that is computed: at 0.1 the elements leave 0.5 % of the contact radius.
+const SMALLEST_RATIO: f64 = 0.15;
+/// A contact radius less certain than this is left out: it would miss the force by three times as much.
+const LARGEST_UNCERTAINTY: f64 = 5e-3;
+/// A contact whose force has grown with a higher power of the radius than this since the one before is the last of its curve: the ball has
+/// sunk in to its equator, and polynomials that follow the bend there miss 2 % of the force everywhere instead of 0.6 %.
+const STEEPEST: f64 = 6.0;
+/// Radius of the guide over the ball's and over its own thickness: beyond, its rim is not felt at the contact
+/// (`the_rim_of_the_guide_is_not_felt`).
+const GUIDE_RADIUS: [f64; 2] = [4.0, 2.5];
+/// The elements' largest Poisson ratio, taken for ν = ½. It takes 0.1 to 0.2 % off the force at a given radius, less than the elements' own
+/// error; at 0.4999 the first contact of a ball of 25 kPa on a stiffer guide does not converge.
+const LARGEST_POISSON_RATIO: f64 = 0.499;
+
+/// By finite elements at finite strain, without friction, for a neo-Hookean ball of radius R (m) and Poisson ratio ν on neo-Hookean
+/// layers bonded to rigid glass, or on a rigid flat. ν above 0.499 is computed as 0.499.
+///
+/// `progress` is called before each modulus and after the last, and ends the computation with [`ControlFlow::Break`]. Contacts that the
+/// solver does not reach are left out: [`ContactTable::force_n`] gives None there.
+///
+/// ```
+/// use core::ops::ControlFlow;
+/// use tactile_elasticity::contact::Waveguide;
+/// use tactile_fem::{TableOptions, solve_contact_table};
+///
+/// let options = TableOptions::default().with_largest_ratio(0.5)?;
+/// let mut steps = 0;
+/// let table = solve_contact_table(3e-3, 0.495, &Waveguide::rigid(), &options, |progress| {
+///     steps = progress.total;
+///     ControlFlow::Continue(())
+/// })?;
+/// // On a rigid flat one modulus is enough; at a/R = 0.4 finite strain takes some 3 % off Hertz's force.
+/// assert_eq!(steps, 1);
+/// let hertz_n = 4.0 / 3.0 * 103e3 / (1.0 - 0.495_f64.powi(2)) * 1.2e-3_f64.powi(3) / 3e-3;
+/// let ratio = table.force_n(1.2e-3, 103e3).unwrap() / hertz_n;
+/// assert!((0.95..0.98).contains(&ratio), "{ratio}");
+/// let cancelled = solve_contact_table(3e-3, 0.495, &Waveguide::rigid(), &options, |_| ControlFlow::Break(()));
+/// assert!(cancelled.is_err());
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+///
+/// # Errors
+/// [`ElasticityError::Cancelled`]; [`ElasticityError::NotReached`] where a modulus has fewer than four contacts; those of
+/// [`ContactTable::new`].
+pub fn solve_contact_table(
+    radius_m: f64,
+    poisson_ratio: f64,
+    guide: &Waveguide<f64>,
+    options: &TableOptions,
+    mut progress: impl FnMut(TableProgress) -> ControlFlow<()>,
+) -> Result<ContactTable, ElasticityError> {
+    let law = WaveguideLaw::new(radius_m, poisson_ratio, guide, Bond::Bonded)?;
+    let moduli = options.moduli(guide.layers().is_empty());
+    let mut report = |done| match progress(TableProgress {
+        done,
+        total: moduli.len(),
+    }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(ElasticityError::Cancelled),
+    };
+    let mut curves = Vec::with_capacity(moduli.len());
+    for (k, &youngs_modulus_pa) in moduli.iter().enumerate() {
+        report(k)?;
+        let ball = Ball {
+            radius_m,
+            poisson_ratio,
+            youngs_modulus_pa,
+        };
+        curves.push(ball.curve(guide, &law, options)?);
+    }
+    report(moduli.len())?;
+    ContactTable::new(radius_m, poisson_ratio, guide, curves)
+}
+
+#[derive(Clone, Copy)]
+struct Ball {
+    radius_m: f64,
+    poisson_ratio: f64,
+    youngs_modulus_pa: f64,
+}
+
+impl Ball {
+    fn curve(
+        &self,
+        guide: &Waveguide<f64>,
+        law: &WaveguideLaw,
+        options: &TableOptions,
+    ) -> Result<ContactCurve, ElasticityError> {
+        let solution = self.scene(guide)?.solve(&self.loads(guide, law, options));
+        let mut curve = ContactCurve {
+            youngs_modulus_pa: self.youngs_modulus_pa,
+            contact_radius_m: Vec::new(),
+            force_n: Vec::new(),
+        };
+        for state in &solution.states {
+            let Some(radius) = certain_radius(state) else {
+                continue;
+            };
+            let force = state.force_n();
+            if let (Some(before), Some(smaller)) =
+                (curve.force_n.last(), curve.contact_radius_m.last())
+                && (force / before).ln() > STEEPEST * (radius / smaller).ln()
+            {
+                break;
+            }
+            curve.contact_radius_m.push(radius);
+            curve.force_n.push(force);
+        }
+        if curve.force_n.len() < ContactCurve::FEWEST_CONTACTS {
+            return Err(ElasticityError::NotReached {
+                youngs_modulus_pa: self.youngs_modulus_pa,
+                force_n: solution.states.last().map_or(0.0, State::force_n),
+            });
+        }
+        Ok(curve)
+    }
+
+    fn scene(&self, guide: &Waveguide<f64>) -> Result<Scene, ElasticityError> {
+        let material = |e, nu: f64| Material::new(e, nu.min(LARGEST_POISSON_RATIO));
+        let ball = material(self.youngs_modulus_pa, self.poisson_ratio)?;
+        if guide.layers().is_empty() {
+            return Scene::ball_on_flat(self.radius_m, ball);
+        }
+        let present = guide.layers().iter().filter(|l| l.thickness_m > 0.0);
+        let layers: Result<Vec<_>, _> = present
+            .map(|l| {
+                Ok::<_, ElasticityError>(Layer {
+                    thickness_m: l.thickness_m,
+                    material: material(l.youngs_modulus_pa, l.poisson_ratio)?,
+                })
+            })
+            .collect();
+        let radius = (GUIDE_RADIUS[0] * self.radius_m).max(GUIDE_RADIUS[1] * guide.thickness_m());
+        Scene::ball_on_guide(self.radius_m, ball, &Guide::new(layers?, radius)?)
+    }
+
+    /// Forces at which the layered law expects contact radii in equal steps.
+    fn loads(
+        &self,
+        guide: &Waveguide<f64>,
+        law: &WaveguideLaw,
+        options: &TableOptions,
+    ) -> Vec<Load> {
+        let compliance = |e: f64, nu: f64| (1.0 - nu * nu) / e;
+        let own = compliance(self.youngs_modulus_pa, self.poisson_ratio);
+        let touched = guide.layers().iter().find(|l| l.thickness_m > 0.0);
+        let other = touched.map_or(0.0, |l| compliance(l.youngs_modulus_pa, l.poisson_ratio));
+        let reduced = 1.0 / (own + other);
+        let last = (CONTACTS - 1) as f64;
+        (0..CONTACTS)
+            .map(|k| {
+                let step = (options.largest_ratio - SMALLEST_RATIO) * k as f64 / last;
+                (SMALLEST_RATIO + step) * self.radius_m
+            })
+            .filter_map(|a| law.of_contact_radius(a, other * reduced))
+            .map(|force| Load::Force(reduced * force.value.exp()))
+            .collect()
+    }
+}
+
+/// The contact radius, if the mesh tells it well enough.
+fn certain_radius(state: &State) -> Option<f64> {
+    let radius = state.contact_radius()?;
+    (radius.uncertainty_m <= LARGEST_UNCERTAINTY * radius.radius_m).then_some(radius.radius_m)
+}

@@ -1,0 +1,220 @@
+//! Contact against Hertz's theory, and its derivatives against differences.
+
+use crate::bodies::contact_lines;
+use crate::mesh::graded;
+use crate::*;
+
+/// A half space of four hundred contact radii of 0.1, of modulus 1 and ν = 0.45, with its E/(1 − ν²). `lines` resolve the contact.
+fn half_space(lines: &[f64], first: f64, shape: RigidShape) -> (Model, f64) {
+    let model = half_space_of(0.45, lines, first, shape);
+    (model, 1.0 / (1.0 - 0.45 * 0.45))
+}
+
+/// The displacement at its end is 2e-3 of the approach, and so is what the approach lacks.
+pub(super) fn half_space_of(
+    poisson_ratio: f64,
+    lines: &[f64],
+    first: f64,
+    shape: RigidShape,
+) -> Model {
+    let inner = lines[lines.len() - 1];
+    let mut lines = lines.to_vec();
+    lines.extend(
+        contact_lines(0.01, 1, 1.4, 1e9, 40.0 - inner)
+            .iter()
+            .skip(1)
+            .map(|r| inner + r),
+    );
+    let mesh = Mesh::layered_disc(&[40.0], &lines, first, 1.4);
+    let mut model = Model::new(Kinematics::Linear);
+    let material = Material::new(1.0, poisson_ratio).unwrap();
+    let half_space = model.add(&mesh, &[material]).unwrap();
+    model.drive(half_space, Boundary::Base, Support::Bonded);
+    model.contact_rigid_above(half_space, shape, 0.0);
+    model
+}
+
+#[test]
+fn a_rigid_paraboloid_on_a_half_space_follows_hertz() {
+    let radius = 1.0;
+    let lines = contact_lines(0.03, 8, 1.05, 1e9, 0.14);
+    let shape = RigidShape::Paraboloid { radius_m: radius };
+    let (model, modulus) = half_space(&lines, 0.005, shape);
+    let loads = [0.05_f64, 0.07, 0.1].map(|a| Load::Approach(a * a / radius));
+    let solution = model.solve(&loads);
+    assert_eq!(solution.report.outcome, Outcome::Solved);
+    for state in &solution.states {
+        let a = state.contact_radius().unwrap();
+        let hertz = 4.0 / 3.0 * modulus * state.approach_m().powf(1.5);
+        let by_radius = a.radius_m / (state.approach_m() * radius).sqrt();
+        let by_force = state.force_n() / hertz;
+        // What some fifteen elements across the contact resolve, and the half space's end.
+        assert!((by_force - 1.0).abs() < 3e-3, "{by_force}");
+        assert!((by_radius - 1.0).abs() < 3e-3, "{by_radius} {a:?}");
+    }
+}
+
+/// Lines densest at a punch's rim, where the pressure is singular.
+pub(super) fn punch_lines(radius: f64, first: f64) -> Vec<f64> {
+    let mut lines: Vec<f64> = graded(radius, 0.0, first, 1.3);
+    lines.reverse();
+    lines.extend(graded(radius, 0.15, first, 1.3).iter().skip(1));
+    lines
+}
+
+#[test]
+fn a_flat_punch_on_a_half_space_follows_sneddon() {
+    let radius = 0.1;
+    let lines = punch_lines(radius, 1e-4);
+    let (model, modulus) = half_space(&lines, 2e-4, RigidShape::Punch { radius_m: radius });
+    let state = &model.solve(&[Load::Approach(1e-3)]).states[0];
+    let sneddon = 2.0 * radius * modulus * 1e-3;
+    // The end of the half space takes 0.15 % of the approach, the rim's elements the rest.
+    let ratio = state.force_n() / sneddon;
+    assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
+}
+
+#[test]
+fn a_cone_on_a_half_space_follows_sneddon() {
+    let half_angle_rad = 1.3_f64;
+    let lines = contact_lines(0.03, 12, 1.05, 1e9, 0.14);
+    let (model, modulus) = half_space(&lines, 2e-3, RigidShape::Cone { half_angle_rad });
+    // Contact radius 2 δ tan α / π = 0.1.
+    let approach = 0.05 * core::f64::consts::PI / half_angle_rad.tan();
+    let state = &model.solve(&[Load::Approach(approach)]).states[0];
+    let sneddon = 2.0 / core::f64::consts::PI * modulus * approach.powi(2) * half_angle_rad.tan();
+    let ratio = state.force_n() / sneddon;
+    assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
+}
+
+#[test]
+fn a_ball_on_a_bonded_layer_follows_the_linear_theory() {
+    const NU: f64 = 0.4999;
+    let (radius, modulus) = (10.0, 1.0);
+    let equation = tactile_elasticity::contact::LayerEquation::new(
+        tactile_elasticity::contact::Bond::Bonded,
+        NU,
+    )
+    .unwrap();
+    let lines = {
+        // Contact radii up to 0.5 layer thicknesses.
+        let mut lines = contact_lines(0.15, 8, 1.06, 0.05, 0.8);
+        lines.extend(
+            contact_lines(0.05, 1, 1.3, 0.7, 9.2)
+                .iter()
+                .skip(1)
+                .map(|r| 0.8 + r),
+        );
+        lines
+    };
+    let mesh = Mesh::layered_disc(&[1.0], &lines, 0.02, 1.25);
+    let mut model = Model::new(Kinematics::Linear);
+    let layer = model
+        .add(&mesh, &[Material::new(modulus, NU).unwrap()])
+        .unwrap();
+    model.drive(layer, Boundary::Base, Support::Bonded);
+    model.contact_rigid_above(layer, RigidShape::Paraboloid { radius_m: radius }, 0.0);
+    let ratios = [0.2_f64, 0.35, 0.5];
+    let solution = model.solve(&ratios.map(|x| Load::Approach(x * x / radius)));
+    assert_eq!(solution.report.outcome, Outcome::Solved);
+    for (state, x) in solution.states.iter().zip(ratios) {
+        // The exact linear contact at the elements' own Poisson ratio, by its integral equation, at the contact radius of this approach.
+        let radius_of = |a: f64| {
+            let layer = equation.solve(a).unwrap();
+            (layer.indentation_ratio * a * a / radius, layer)
+        };
+        let (mut low, mut high) = (0.5 * x, 2.0 * x);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if radius_of(middle).0 < state.approach_m() {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let (_, layer) = radius_of(low);
+        let hertz = 4.0 / 3.0 * modulus / (1.0 - NU * NU) * low.powi(3) / radius;
+        let ratio = state.force_n() / (hertz * layer.force_ratio_same_radius);
+        // What ten to twenty elements across the contact leave of the force.
+        assert!((ratio - 1.0).abs() < 3e-3, "{x} {ratio}");
+        let by_radius = state.contact_radius().unwrap().radius_m / low;
+        assert!((by_radius - 1.0).abs() < 3e-3, "{x} {by_radius}");
+        // Dimitriadis et al., Biophys. J. 82 (2002) 2798, with the corrected coefficients at ν = 1/2; a series in x, short of 1.2 % at its
+        // end, and ν = 0.4999 takes its part.
+        let series = 1.0 + 1.127 * x + 1.482 * x.powi(2) + 1.470 * x.powi(3) + 1.005 * x.powi(4);
+        let half_space = 16.0 / 9.0 * modulus * radius.sqrt() * state.approach_m().powf(1.5);
+        let ratio = state.force_n() / (half_space * series);
+        assert!(
+            (ratio - 1.0).abs() < if x < 0.5 { 1e-2 } else { 1.5e-2 },
+            "{x} {ratio}"
+        );
+    }
+}
+
+#[test]
+fn gaps_and_their_derivatives_agree_with_differences() {
+    use crate::gap::DRIVER;
+    let scene = Scene::ball_on_guide(
+        1.0,
+        Material::new(1.0, 0.45).unwrap(),
+        &Guide::new(
+            vec![Layer {
+                thickness_m: 1.0,
+                material: Material::new(1.0, 0.45).unwrap(),
+            }],
+            4.0,
+        )
+        .unwrap(),
+    )
+    .unwrap();
+    let model = scene.model();
+    let mut fields = crate::fields::Fields::zero(model);
+    for (k, u) in fields.displacement.iter_mut().enumerate() {
+        let [r, z] = model.nodes[k / 2];
+        // Smooth, curved and zero on the axis.
+        *u = if k % 2 == 0 {
+            0.05 * r * (1.0 + z)
+        } else {
+            0.1 * (2.0 * r + z).sin() - 0.02
+        };
+    }
+    let mut checked = 0;
+    for point in model.contact_points(&fields).iter().step_by(7) {
+        let opposite = &model.opposites[point.pair];
+        let Some(gap) = model.placement(&fields).gap(point, opposite) else {
+            continue;
+        };
+        let count = gap.dofs.len();
+        for (i, &dof) in gap.dofs.iter().enumerate() {
+            assert_ne!(dof, DRIVER);
+            let step = 1e-6;
+            let mut shifted = |sign: f64| {
+                let kept = fields.displacement[dof];
+                fields.displacement[dof] = kept + sign * step;
+                let found = model.placement(&fields).gap(point, opposite).unwrap();
+                fields.displacement[dof] = kept;
+                found
+            };
+            let (plus, minus) = (shifted(1.0), shifted(-1.0));
+            let first = (plus.value - minus.value) / (2.0 * step);
+            // Differences of step 1e-6: rounding 1e-10, curvature some hundreds times 1e-12.
+            assert!(
+                (first - gap.first[i]).abs() < 1e-7,
+                "{first} {}",
+                gap.first[i]
+            );
+            if plus.dofs != gap.dofs || minus.dofs != gap.dofs {
+                // The closest point went to another segment.
+                continue;
+            }
+            for j in 0..count {
+                let second = (plus.first[j] - minus.first[j]) / (2.0 * step);
+                let exact = gap.second[count * i + j];
+                // Second derivatives go with the inverse of an element's length, here up to 1e2.
+                assert!((second - exact).abs() < 1e-4, "{second} {exact}");
+            }
+        }
+        checked += 1;
+    }
+    assert!(checked > 10);
+}

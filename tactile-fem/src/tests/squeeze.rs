@@ -1,0 +1,121 @@
+//! Cylinders between plates against homogeneous strain and the stiffness of thin bonded discs.
+
+use crate::{Interface, Load, Material, Scene, State};
+use approx::assert_relative_eq;
+use core::f64::consts::PI;
+use tactile_elasticity::ElasticityError;
+
+const RADIUS_M: f64 = 6e-3;
+
+fn squeezed(aspect: f64, material: Material, faces: Interface, squeeze: f64) -> State {
+    let height_m = 2.0 * RADIUS_M * aspect;
+    let scene = Scene::cylinder_between_plates(RADIUS_M, height_m, material, faces).unwrap();
+    let solution = scene.solve(&[Load::Approach(0.5 * squeeze * height_m)]);
+    solution.states.into_iter().next().unwrap()
+}
+
+/// Lateral stretch and pressure of the material at an axial stretch, its sides free: σ_t = 0 solved by bisection, with
+/// σ = μ J^{−5/3} dev B + κ (J − 1).
+fn homogeneous(material: Material, axial: f64) -> (f64, f64) {
+    let (mu, kappa) = (material.shear_modulus(), {
+        let [e, nu] = [material.youngs_modulus_pa(), material.poisson_ratio()];
+        e / (3.0 * (1.0 - 2.0 * nu))
+    });
+    let stresses = |lateral: f64| {
+        let volume = lateral * lateral * axial;
+        let mean = (2.0 * lateral * lateral + axial * axial) / 3.0;
+        let of = |stretch: f64| {
+            mu * volume.powf(-5.0 / 3.0) * (stretch * stretch - mean) + kappa * (volume - 1.0)
+        };
+        (of(lateral), of(axial))
+    };
+    let (mut low, mut high) = (1.0, 2.0);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        match stresses(middle).0 > 0.0 {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    (low, -stresses(low).1)
+}
+
+#[test]
+fn faces_that_slide_give_the_homogeneous_state() {
+    for nu in [0.3, 0.495] {
+        let material = Material::new(103e3, nu).unwrap();
+        for aspect in [0.4, 1.0, 2.5] {
+            for squeeze in [0.02, 0.15] {
+                let state = squeezed(aspect, material, Interface::Frictionless, squeeze);
+                let (lateral, pressure) = homogeneous(material, 1.0 - squeeze);
+                let area = PI * (lateral * RADIUS_M).powi(2);
+                // Newton's tolerance.
+                assert_relative_eq!(state.force_n(), area * pressure, max_relative = 1e-7);
+                for point in state.pressure() {
+                    assert_relative_eq!(point.pressure_pa, pressure, max_relative = 1e-6);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn thin_discs_that_stick_are_as_stiff_as_gent_and_lindley_say() {
+    // E(1 + 2S²) with S = R/2H, for incompressible material and S well above one; the bulk modulus, 1,667 E, adds 1/κ to the compliance.
+    let material = Material::new(1e5, 0.4999).unwrap();
+    for shape in [2.0_f64, 4.0] {
+        let aspect = 1.0 / (4.0 * shape);
+        let state = squeezed(aspect, material, Interface::Bonded, 1e-3);
+        let apparent = state.force_n() / (PI * RADIUS_M * RADIUS_M * 1e-3);
+        let incompressible = 1e5 * (1.0 + 2.0 * shape * shape);
+        let kappa = 1e5 / (3.0 * (1.0 - 2.0 * 0.4999));
+        let expected = 1.0 / (1.0 / incompressible + 1.0 / kappa);
+        // Their parabola of pressure is the leading order in the thickness; the squeeze adds some tenths of a percent.
+        assert_relative_eq!(apparent, expected, max_relative = 0.05);
+        let [first, last] = [
+            state.pressure()[0],
+            state.pressure()[state.pressure().len() / 2],
+        ];
+        // Between: p = p₀ (1 − r²/R²).
+        let parabola = 1.0 - (last.r_m / RADIUS_M).powi(2);
+        assert_relative_eq!(
+            last.pressure_pa / first.pressure_pa,
+            parabola,
+            max_relative = 0.1
+        );
+    }
+}
+
+#[test]
+fn the_pressure_carries_the_force() {
+    let material = Material::new(1e5, 0.495).unwrap();
+    for faces in [Interface::Bonded, Interface::Frictionless] {
+        let state = squeezed(0.8, material, faces, 0.08);
+        let points = state.pressure();
+        let ends = points.windows(2).map(|pair| {
+            let ring = PI * (pair[1].r_m.powi(2) - pair[0].r_m.powi(2));
+            0.5 * ring * (pair[0].pressure_pa + pair[1].pressure_pa)
+        });
+        let middle = PI * points[0].r_m.powi(2) * points[0].pressure_pa;
+        let last = points[points.len() - 1];
+        let edge_m = match faces {
+            Interface::Bonded => RADIUS_M,
+            Interface::Frictionless => homogeneous(material, 0.92).0 * RADIUS_M,
+        };
+        let rim = PI * (edge_m.powi(2) - last.r_m.powi(2)) * last.pressure_pa;
+        let carried = ends.sum::<f64>() + middle + rim;
+        // The rule of trapezoids at a singular rim.
+        assert_relative_eq!(carried, state.force_n(), max_relative = 0.02);
+    }
+}
+
+#[test]
+fn a_cylinder_without_size_is_refused() {
+    let material = Material::new(1e5, 0.495).unwrap();
+    for bad in [0.0, -1e-3, f64::NAN] {
+        for [radius, height] in [[bad, 1e-2], [1e-2, bad]] {
+            let scene = Scene::cylinder_between_plates(radius, height, material, Interface::Bonded);
+            assert!(matches!(scene, Err(ElasticityError::NotPositive { .. })));
+        }
+    }
+}

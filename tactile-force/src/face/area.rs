@@ -1,0 +1,428 @@
+//! The area within a contact's outline, from the light of the pixels that the outline cuts.
+
+use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, Zip};
+use tactile_core::{BoundingBox, Estimate, Polarity};
+
+use super::FaceReading;
+
+/// Pixels either side of the outline whose light is summed. Blur of 0.8 pixels carries 1 % further,
+/// which is missing as much inside, where pixels are counted as whole, as it is outside.
+const BAND: u8 = 2;
+/// Pixels from there inwards over which the light is averaged: more is quieter, fewer follow a
+/// texture more closely.
+const RING: u8 = 4;
+/// Depth of the ring's middle, where pixels beside the outline have the depth 1.
+const RING_MIDDLE: f64 = BAND as f64 + 0.5 * (RING as f64 + 1.0);
+/// Greatest distance from the outline that is computed.
+const FARTHEST: u8 = 12;
+/// Pixels around the contact's box that are looked at: the band, and the background beyond it.
+const MARGIN: usize = 10;
+/// Side of the tiles in which the ring's light is averaged. A mean is over three by three of them.
+const TILE: usize = 8;
+/// Fewest pixels of a mean: fewer are as noisy as the pixels themselves.
+const FEWEST: f64 = 8.0;
+
+/// Sums of the ring's light in one tile.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tile {
+    count: f64,
+    light: f64,
+    /// Σ of the depth t below the ring's middle, of t², and of t times the light.
+    depth: f64,
+    depth_squared: f64,
+    depth_light: f64,
+    /// Change of the light with the depth, where it is more than noise.
+    slope: f64,
+    /// Mean light at the ring's middle in this tile and those around it, and the pixels in it.
+    mean: f64,
+    pixels: f64,
+    /// Σ s/P of the outline's pixels here: the weight of the mean's error.
+    covered: f64,
+}
+
+/// Sums for moments: of one, x, y and x² + y².
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    one: f64,
+    x: f64,
+    y: f64,
+    square: f64,
+}
+
+impl Moments {
+    fn add(&mut self, weight: f64, x: f64, y: f64) {
+        self.one += weight;
+        self.x += weight * x;
+        self.y += weight * y;
+        self.square += weight * (x * x + y * y);
+    }
+
+    /// Adds a row's sums of the weights, and of the weights times the column and its square.
+    fn add_row(&mut self, [one, column, square]: [f64; 3], hx: f64, y: f64) {
+        self.one += one;
+        self.x += column * hx;
+        self.y += one * y;
+        self.square += square * hx * hx + one * y * y;
+    }
+
+    /// Σ w r² about (x, y), over Σ w.
+    fn about(&self, x: f64, y: f64) -> f64 {
+        (self.square - 2.0 * (x * self.x + y * self.y)) / self.one + x * x + y * y
+    }
+}
+
+/// Measures flat faces, with buffers that are kept from frame to frame.
+///
+/// See [`FaceReading`] for an example.
+#[derive(Debug, Default)]
+pub struct FaceWorkspace {
+    /// Frame minus reference around the contact, positive where it touches.
+    signal: Array2<f32>,
+    inside: Array2<bool>,
+    distance: Array2<u8>,
+    /// The pixels nearer to the outline than `FARTHEST`.
+    near: Vec<[usize; 2]>,
+    tiles: Array2<Tile>,
+}
+
+impl FaceWorkspace {
+    /// The face in a contact, from a frame and its reference, the contact's box and its pixels within
+    /// the box. `None` where the contact is too small or too irregular to have an inside.
+    ///
+    /// O(pixels of the box).
+    pub fn measure(
+        &mut self,
+        [frame, reference]: [ArrayView2<'_, u8>; 2],
+        region: BoundingBox,
+        mask: ArrayView2<'_, bool>,
+        polarity: Polarity,
+        pixel_size_m: [f64; 2],
+    ) -> Option<FaceReading> {
+        let window = region.grown(MARGIN, frame.dim());
+        let shape = (window.rows(), window.columns());
+        let sign = polarity.sign() as f32;
+        resize(&mut self.signal, shape);
+        Zip::from(&mut self.signal)
+            .and(window.of(frame))
+            .and(window.of(reference))
+            .for_each(|s, &f, &r| *s = sign * (f32::from(f) - f32::from(r)));
+        let part = BoundingBox {
+            row_start: region.row_start - window.row_start,
+            row_end: region.row_end - window.row_start,
+            column_start: region.column_start - window.column_start,
+            column_end: region.column_end - window.column_start,
+        };
+        self.threshold(part, mask)?;
+        resize(&mut self.distance, shape);
+        distance_to_outline(&self.inside, &mut self.distance);
+        self.near.clear();
+        for (row, distances) in self.distance.rows().into_iter().enumerate() {
+            let near = distances.iter().enumerate().filter(|(_, d)| **d < FARTHEST);
+            self.near.extend(near.map(|(column, _)| [row, column]));
+        }
+        let background = self.background();
+        self.signal.mapv_inplace(|s| s - background as f32);
+        let variance = self.noise_variance();
+        self.average_ring(variance)?;
+        self.sum(pixel_size_m, variance)
+    }
+
+    /// Which pixels are inside: brighter than half the lower quartile of the contact's light, which
+    /// is half the light of a plain face.
+    fn threshold(&mut self, part: BoundingBox, mask: ArrayView2<'_, bool>) -> Option<()> {
+        let signal = part.of(self.signal.view());
+        let mut counts = [0_usize; 511];
+        Zip::from(mask).and(signal).for_each(|inside, &signal| {
+            counts[(signal as i32 + 255) as usize] += usize::from(*inside);
+        });
+        let quarter = counts.iter().sum::<usize>() / 4;
+        let mut below = 0;
+        let quartile = counts.iter().position(|pixels| {
+            below += pixels;
+            below > quarter
+        })?;
+        let level = 0.5 * (quartile as f32 - 255.0);
+        if level <= 0.0 {
+            return None;
+        }
+        resize(&mut self.inside, self.signal.dim());
+        self.inside.fill(false);
+        let mut inside = self.inside.view_mut();
+        inside.slice_axis_inplace(Axis(0), (part.row_start..part.row_end).into());
+        inside.slice_axis_inplace(Axis(1), (part.column_start..part.column_end).into());
+        Zip::from(inside)
+            .and(mask)
+            .and(signal)
+            .for_each(|inside, mask, &signal| *inside = *mask && signal > level);
+        Some(())
+    }
+
+    /// Mean light a few pixels outside the outline, which the reference does not have.
+    fn background(&self) -> f64 {
+        let beyond = BAND + 2..=MARGIN as u8 - 1;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for &at in &self.near {
+            if !self.inside[at] && beyond.contains(&self.distance[at]) {
+                sum += f64::from(self.signal[at]);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
+    }
+
+    /// Variance of a pixel's noise some way inside, from second differences along rows, which have
+    /// six times that variance. They leave out what is linear, a texture too.
+    fn noise_variance(&self) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0_f64);
+        for &at in &self.near {
+            let [row, column] = at;
+            let is_deep = self.inside[at] && self.distance[at] >= BAND + 2;
+            if !is_deep || column == 0 || column + 1 == self.signal.ncols() {
+                continue;
+            }
+            let beside = self.signal[[row, column - 1]] + self.signal[[row, column + 1]];
+            let bend = f64::from(beside - 2.0 * self.signal[at]);
+            sum += bend * bend;
+            count += 1.0;
+        }
+        sum / (6.0 * count.max(1.0))
+    }
+
+    /// The light just inside the outline, around every tile.
+    fn average_ring(&mut self, variance: f64) -> Option<()> {
+        let (rows, columns) = self.signal.dim();
+        resize(
+            &mut self.tiles,
+            (rows.div_ceil(TILE), columns.div_ceil(TILE)),
+        );
+        self.tiles.fill(Tile::default());
+        let (mut all, mut count) = (0.0, 0.0);
+        for &at in &self.near {
+            let distance = self.distance[at];
+            if self.inside[at] && (BAND + 1..=BAND + RING).contains(&distance) {
+                let tile = &mut self.tiles[at.map(|k| k / TILE)];
+                let light = f64::from(self.signal[at]);
+                let depth = f64::from(distance) - RING_MIDDLE;
+                tile.count += 1.0;
+                tile.light += light;
+                tile.depth += depth;
+                tile.depth_squared += depth * depth;
+                tile.depth_light += depth * light;
+                all += light;
+                count += 1.0;
+            }
+        }
+        if count < FEWEST || all <= 0.0 {
+            return None;
+        }
+        for (row, column) in ndarray::indices(self.tiles.dim()) {
+            let mut sums = Tile::default();
+            for tile in around(&self.tiles, row, column) {
+                sums.count += tile.count;
+                sums.light += tile.light;
+                sums.depth += tile.depth;
+                sums.depth_squared += tile.depth_squared;
+                sums.depth_light += tile.depth_light;
+            }
+            let tile = &mut self.tiles[[row, column]];
+            if sums.count < FEWEST || sums.light <= 0.0 {
+                (tile.slope, tile.mean, tile.pixels) = (0.0, all / count, count);
+                continue;
+            }
+            let spread = sums.depth_squared - sums.depth * sums.depth / sums.count;
+            let slope = (sums.depth_light - sums.depth * sums.light / sums.count) / spread;
+            // Below three standard errors extrapolating the noise would make the area of plain faces
+            // ten times as noisy.
+            let is_clear = spread > 0.0 && slope * slope * spread > 9.0 * variance;
+            tile.slope = if is_clear { slope } else { 0.0 };
+            tile.mean = (sums.light - tile.slope * sums.depth) / sums.count;
+            tile.pixels = sums.count;
+        }
+        Some(())
+    }
+
+    /// Area, moments and errors.
+    fn sum(&mut self, [hx, hy]: [f64; 2], variance: f64) -> Option<FaceReading> {
+        let [mut area, mut light] = self.deep_moments([hx, hy]);
+        // Light 4 to 5 and 8 to 9 pixels inside with the number of pixels, and the outline's length.
+        let (mut near, mut far, mut outline) = ([0.0; 2], [0.0; 2], 0.0);
+        let mut of_pixels = 0.0;
+        for &at in &self.near {
+            let [row, column] = at;
+            let (inside, distance) = (self.inside[at], self.distance[at]);
+            let signal = f64::from(self.signal[at]);
+            let (x, y) = (column as f64 * hx, row as f64 * hy);
+            if distance > BAND {
+                if inside {
+                    area.add(1.0, x, y);
+                    light.add(signal, x, y);
+                    match distance {
+                        4..=5 => near = [near[0] + signal, near[1] + 1.0],
+                        8..=9 => far = [far[0] + signal, far[1] + 1.0],
+                        _ => {}
+                    }
+                }
+                continue;
+            }
+            let tile = &mut self.tiles[[row / TILE, column / TILE]];
+            let depth = if inside { f64::from(distance) } else { 0.5 };
+            let level = tile.mean + tile.slope * (depth - RING_MIDDLE);
+            if level <= 0.0 {
+                return None;
+            }
+            let share = signal / level;
+            tile.covered += share;
+            of_pixels += tile.mean.powi(-2);
+            area.add(share, x, y);
+            light.add(signal, x, y);
+            outline += f64::from(inside && distance == 1);
+        }
+        if far[1] < FEWEST || area.one <= 0.0 || light.one <= 0.0 {
+            return None;
+        }
+        // Of the outline's mean place sampling, rounding to grey levels and the slope of a texture
+        // leave 5e-4 pixels.
+        let noise = variance * (of_pixels + self.weights_squared());
+        let error = noise.sqrt().hypot(5e-4 * outline);
+        let centre = [area.x / area.one, area.y / area.one];
+        let [of_area, of_light] = [area, light].map(|m| m.about(centre[0], centre[1]));
+        let pixel = hx * hy;
+        Some(FaceReading {
+            area_m2: Estimate::new(area.one * pixel, error * pixel),
+            edge_ratio: near[0] * far[1] / (near[1] * far[0]),
+            outline_moment: 2.0 * std::f64::consts::PI * of_area / (area.one * pixel),
+            light_moment: of_light / of_area,
+        })
+    }
+
+    /// Moments of the area and of the light over the pixels beyond `FARTHEST` from the outline, which
+    /// are nearly all: row by row, since a column's place is common to them.
+    fn deep_moments(&self, [hx, hy]: [f64; 2]) -> [Moments; 2] {
+        let [mut area, mut light] = [Moments::default(); 2];
+        let rows = self.signal.rows().into_iter();
+        let rows = rows.zip(self.inside.rows()).zip(self.distance.rows());
+        for (row, ((signal, inside), distance)) in rows.enumerate() {
+            let (mut ones, mut signals) = ([0_u64; 3], [0.0; 3]);
+            let pixels = pixels_of(signal).iter().zip(pixels_of(inside));
+            let pixels = pixels.zip(pixels_of(distance)).enumerate();
+            for (column, ((&signal, &inside), &distance)) in pixels {
+                if inside && distance == FARTHEST {
+                    let column = column as u64;
+                    let (x, signal) = (column as f64, f64::from(signal));
+                    ones = [ones[0] + 1, ones[1] + column, ones[2] + column * column];
+                    signals[0] += signal;
+                    signals[1] += signal * x;
+                    signals[2] += signal * x * x;
+                }
+            }
+            let y = row as f64 * hy;
+            area.add_row(ones.map(|sum| sum as f64), hx, y);
+            light.add_row(signals, hx, y);
+        }
+        [area, light]
+    }
+
+    /// Σ w² over the ring's pixels, w the change of the area by a grey level of one of them.
+    fn weights_squared(&self) -> f64 {
+        let mut sum = 0.0;
+        for ((row, column), tile) in self.tiles.indexed_iter() {
+            if tile.count > 0.0 {
+                let near = around(&self.tiles, row, column);
+                let weight: f64 = near.map(|t| t.covered / (t.pixels * t.mean)).sum();
+                sum += tile.count * weight * weight;
+            }
+        }
+        sum
+    }
+}
+
+/// Gives a buffer another shape, in its memory where that is enough.
+fn resize<T: Clone + Default>(array: &mut Array2<T>, shape: (usize, usize)) {
+    if array.dim() != shape {
+        let (mut memory, _) = std::mem::take(array).into_raw_vec_and_offset();
+        memory.resize(shape.0 * shape.1, T::default());
+        *array = Array2::from_shape_vec(shape, memory).unwrap_or_default();
+    }
+}
+
+/// A row's pixels, side by side as they lie in the buffers.
+fn pixels_of<T>(row: ArrayView1<'_, T>) -> &[T] {
+    row.to_slice().unwrap_or_default()
+}
+
+/// The tile and its eight neighbours, where they exist.
+fn around(tiles: &Array2<Tile>, row: usize, column: usize) -> impl Iterator<Item = &Tile> {
+    let (rows, columns) = tiles.dim();
+    let columns = column.saturating_sub(1)..(column + 2).min(columns);
+    let rows = row.saturating_sub(1)..(row + 2).min(rows);
+    rows.flat_map(move |row| columns.clone().map(move |column| &tiles[[row, column]]))
+}
+
+/// For every pixel the chessboard distance to the nearest pixel on the other side of the outline, at
+/// most `FARTHEST`: 1 beside the outline. Beyond the image its last pixels go on. O(pixels).
+fn distance_to_outline(inside: &Array2<bool>, distance: &mut Array2<u8>) {
+    let [from_outside, from_inside] = [false, true].map(|side| distance_to_side(inside, side));
+    // One of the two is zero.
+    Zip::from(distance)
+        .and(&from_outside)
+        .and(&from_inside)
+        .for_each(|distance, outside, inside| *distance = outside + inside);
+}
+
+/// The chessboard distance to the nearest pixel on a side, at most `FARTHEST`. With g the distance
+/// within the column, it is the least of max(|k|, g(x + k)) over the columns x + k near by.
+fn distance_to_side(inside: &Array2<bool>, side: bool) -> Array2<u8> {
+    let (rows, columns) = inside.dim();
+    let mut distance = inside.mapv(|pixel| if pixel == side { 0 } else { FARTHEST });
+    for row in 1..rows {
+        let (above, mut below) = distance.view_mut().split_at(Axis(0), row);
+        come_closer(below.row_mut(0), above.row(row - 1));
+    }
+    for row in (1..rows).rev() {
+        let (mut above, below) = distance.view_mut().split_at(Axis(0), row);
+        come_closer(above.row_mut(row - 1), below.row(0));
+    }
+    let reach = usize::from(FARTHEST) - 1;
+    let mut line = vec![FARTHEST; columns + 2 * reach];
+    let lines = distance.as_slice_mut().unwrap_or_default();
+    for row in lines.chunks_exact_mut(columns.max(1)) {
+        line[reach..reach + columns].copy_from_slice(row);
+        for k in 1..=reach {
+            let (left, right) = (&line[reach - k..], &line[reach + k..]);
+            for ((own, left), right) in row.iter_mut().zip(left).zip(right) {
+                *own = (*own).min((*left).min(*right).max(k as u8));
+            }
+        }
+    }
+    distance
+}
+
+/// Lowers the distances of a row to one more than those of a row beside it.
+fn come_closer(row: ArrayViewMut1<'_, u8>, beside: ArrayView1<'_, u8>) {
+    Zip::from(row)
+        .and(beside)
+        .for_each(|own, beside| *own = (*own).min(*beside + 1));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_those_of_a_search_over_all_pixels() {
+        let inside = Array2::from_shape_fn((30, 40), |(r, c)| {
+            let (y, x) = (r as f64 - 14.0, c as f64 - 19.0);
+            x.hypot(y) < 11.0 && !(x.abs() < 2.0 && y.abs() < 2.0)
+        });
+        let mut found = Array2::zeros(inside.dim());
+        distance_to_outline(&inside, &mut found);
+        for ((r, c), &side) in inside.indexed_iter() {
+            let others = inside.indexed_iter().filter(|(_, other)| **other != side);
+            let nearest = others
+                .map(|((y, x), _)| y.abs_diff(r).max(x.abs_diff(c)))
+                .min();
+            let expected = nearest.map_or(FARTHEST, |d| d.min(usize::from(FARTHEST)) as u8);
+            assert_eq!(found[[r, c]], expected, "{r} {c}");
+        }
+    }
+}

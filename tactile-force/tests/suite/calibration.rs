@@ -1,0 +1,254 @@
+//! Calibrations: what they recover, how sure they say they are, what they refuse.
+
+use proptest::prelude::*;
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::{Distribution, Normal};
+use tactile_force::{
+    CalibrationOptions, CalibrationPair, Estimate, ForceError, LinearCalibration, Robustness,
+    StopReason, StressCalibration,
+};
+
+type Pairs = Vec<CalibrationPair>;
+
+/// Loading to two newtons in `steps` steps and back, along a curve, with noise in the force.
+fn cycle(steps: usize, noise: f64, seed: u64, curve: impl Fn(f64) -> f64) -> Pairs {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let normal = Normal::new(0.0, noise).unwrap();
+    let value = |k: usize| 4e6 * k as f64 / steps as f64;
+    let mut pairs: Pairs = (0..=steps)
+        .map(|k| CalibrationPair::loading(value(k), curve(value(k)) + normal.sample(&mut rng)))
+        .collect();
+    let down = (0..steps).rev().map(value);
+    pairs.extend(down.map(|v| CalibrationPair::unloading(v, curve(v) + normal.sample(&mut rng))));
+    pairs
+}
+
+fn line(v: f64) -> f64 {
+    0.01 + 5e-7 * v
+}
+
+fn bent(v: f64) -> f64 {
+    4e-7 * v + 2.5e-14 * v * v
+}
+
+fn options(through_origin: bool, robustness: Robustness) -> CalibrationOptions {
+    let options = CalibrationOptions::default().with_robustness(robustness);
+    if through_origin {
+        options.with_zero_at_origin()
+    } else {
+        options
+    }
+}
+
+fn fitted(pairs: &[CalibrationPair]) -> LinearCalibration {
+    LinearCalibration::fit(pairs, &CalibrationOptions::default()).unwrap()
+}
+
+fn fitted_with(pairs: &[CalibrationPair], o: &CalibrationOptions) -> LinearCalibration {
+    LinearCalibration::fit(pairs, o).unwrap()
+}
+
+#[test]
+fn exact_data_are_recovered_to_rounding() {
+    let pairs = cycle(10, 0.0, 1, line);
+    let c = fitted(&pairs);
+    for v in [0.0, 1.3e5, 2.7e6, 4e6] {
+        assert!((c.force_n(v) - line(v)).abs() < 1e-14, "{v}");
+        assert!((c.sensitivity_n(v) - 5e-7).abs() < 1e-19, "{v}");
+    }
+    let r = c.report();
+    assert!(
+        r.residual_sd_n < 1e-14 && r.linearity_error < 1e-13 && r.monotone,
+        "{r:?}"
+    );
+    assert!((r.r_squared - 1.0).abs() < 1e-14);
+    assert!(r.hysteresis.unwrap().greatest_n.abs() < 1e-14);
+    assert_eq!(c.range(), [0.0, 4e6]);
+}
+
+#[test]
+fn hysteresis_is_measured_with_its_sign() {
+    let mut pairs = cycle(40, 1e-4, 3, line);
+    for p in pairs
+        .iter_mut()
+        .filter(|p| p.branch == tactile_force::Branch::Unloading)
+    {
+        let x = p.integrated_pixel_value / 4e6;
+        p.force_n -= 0.08 * x * (1.0 - x);
+    }
+    let h = fitted(&pairs).report().hysteresis.unwrap();
+    // Greatest difference 0.02 N at half range, up to three times the noise of a difference; mean 0.08/6.
+    assert!((h.greatest_n - 0.02).abs() < 5e-4, "{h:?}");
+    assert!((h.mean_n.value - 0.08 / 6.0).abs() < 5e-4, "{h:?}");
+    assert!((h.share_of_full_scale - 0.01).abs() < 3e-4, "{h:?}");
+    // The curves lie between the branches: what they state of one force holds half of the difference, and of two it is common.
+    assert!((h.width_n / (0.04 / 6.0) - 1.0).abs() < 0.05, "{h:?}");
+    let (curve, low, high) = (fitted(&pairs), 0.8e6, 2.4e6);
+    assert!(curve.standard_error_n(low) >= h.width_n);
+    assert!(curve.error_covariance_n2(low, high) >= 0.9 * h.width_n.powi(2));
+}
+
+#[test]
+fn outliers_lose_their_pull_on_request() {
+    let mut pairs = cycle(20, 2e-3, 5, line);
+    pairs[7].force_n += 1.0;
+    pairs[30].force_n -= 0.8;
+    let error = |r: Robustness| {
+        let c = fitted_with(&pairs, &options(false, r));
+        (c.force_n(1.4e6) - line(1.4e6)).abs()
+    };
+    let (plain, huber, tukey) = (
+        error(Robustness::None),
+        error(Robustness::Huber),
+        error(Robustness::Tukey),
+    );
+    // Tukey: as if the two were not there, within six standard errors of the clean fit, 2 mN/√40.
+    assert!(plain > 5e-3 && tukey < 2e-3, "{plain} {tukey}");
+    assert!(huber < 0.5 * plain, "{huber}");
+    let report = fitted_with(&pairs, &options(false, Robustness::Tukey))
+        .report()
+        .clone();
+    assert_eq!((report.weights[7], report.weights[30]), (0.0, 0.0));
+    assert_eq!(report.stop, StopReason::Converged);
+    assert!((report.residual_sd_n / 2e-3 - 1.0).abs() < 0.5);
+}
+
+#[test]
+fn the_origin_can_be_forced() {
+    let pairs = cycle(20, 5e-3, 9, line);
+    let c = fitted_with(&pairs, &options(true, Robustness::None));
+    assert_eq!(c.force_n(0.0), 0.0);
+}
+
+#[test]
+fn stress_over_the_contact_is_the_force() {
+    let c = fitted(&cycle(20, 5e-3, 2, bent));
+    let differences = [3.0, 100.0, 20.0, 0.0, 77.0];
+    let (v, area) = (differences.iter().sum::<f64>() * 1e4, 4e-10);
+    let step = c.stress_per_grey_level_pa(v, area);
+    let force: f64 = differences.iter().map(|d| step * d * area * 1e4).sum();
+    assert!((force / c.force_n(v) - 1.0).abs() < 1e-14);
+    let limit = c.stress_per_grey_level_pa(0.0, area);
+    assert!((limit * area / c.sensitivity_n(0.0) - 1.0).abs() < 1e-14);
+}
+
+#[test]
+fn bad_pairs_are_refused() {
+    let fit =
+        |pairs: &[CalibrationPair]| LinearCalibration::fit(pairs, &CalibrationOptions::default());
+    let good = cycle(5, 0.0, 1, line);
+    let mut nan = good.clone();
+    nan[3].force_n = f64::NAN;
+    assert_eq!(fit(&nan), Err(ForceError::NonFinitePair { index: 3 }));
+    let few = ForceError::TooFewPairs {
+        required: 3,
+        found: 2,
+    };
+    assert_eq!(fit(&good[..2]), Err(few));
+    let still = vec![good[2]; 6];
+    assert!(matches!(
+        fit(&still),
+        Err(ForceError::DegeneratePairs { .. })
+    ));
+}
+
+proptest! {
+    #[test]
+    fn units_do_not_matter(scale in 1e-12_f64..1e12, seed in 0_u64..50) {
+        // Forces and pixel values in other units: the same curve in those units.
+        let pairs = cycle(10, 5e-3, seed, bent);
+        let scaled: Pairs = pairs.iter().map(|p| CalibrationPair {
+            integrated_pixel_value: p.integrated_pixel_value * scale, force_n: p.force_n / scale, branch: p.branch
+        }).collect();
+        let (a, b) = (fitted(&pairs), fitted(&scaled));
+        let (fa, fb) = (a.force_n(1.3e6), b.force_n(1.3e6 * scale) * scale);
+        prop_assert!((fa / fb - 1.0).abs() < 1e-11, "{fa} {fb}");
+    }
+}
+
+/// Share of seeds for which the truth lies within one standard error, at a pixel value.
+fn coverage(o: &CalibrationOptions, at: f64) -> f64 {
+    let seeds = 1000;
+    let inside = (0..seeds)
+        .filter(|seed| {
+            let c = fitted_with(&cycle(20, 5e-3, *seed, line), o);
+            (c.force_n(at) - line(at)).abs() < c.standard_error_n(at)
+        })
+        .count();
+    inside as f64 / seeds as f64
+}
+
+#[test]
+fn stated_errors_are_right() {
+    let plain = CalibrationOptions::default();
+    let huber = options(false, Robustness::Huber);
+    // 68.3 % ± 1.5 % (binomial, 1000 seeds); Student's t with 38 degrees takes 0.5 % off.
+    for at in [0.0, 1.7e6, 3.9e6] {
+        let linear = coverage(&plain, at);
+        assert!((0.64..0.72).contains(&linear), "line at {at}: {linear}");
+        let robust = coverage(&huber, at);
+        assert!((0.62..0.73).contains(&robust), "robust at {at}: {robust}");
+    }
+}
+
+#[test]
+fn confidence_intervals_cover_nineteen_in_twenty() {
+    let inside = (0..1000)
+        .filter(|seed| {
+            let c = fitted(&cycle(4, 5e-3, *seed, line));
+            let [low, high] = c.report().intervals_95[1];
+            low < 5e-7 && 5e-7 < high
+        })
+        .count();
+    // 95 % ± 0.7 %: three standard deviations. Seven degrees of freedom: with the normal's 1.96 it would be 91 %.
+    assert!((929..=971).contains(&inside), "{inside}");
+}
+
+#[test]
+fn errors_of_two_forces_go_together_as_stated() {
+    let at = [3e5, 3.2e6];
+    let (mut seen, mut stated, mut size) = (0.0, 0.0, 0.0);
+    for seed in 0..1000 {
+        let c = fitted(&cycle(20, 5e-3, seed, line));
+        let error = at.map(|v| c.force_n(v) - line(v));
+        seen += error[0] * error[1];
+        stated += c.error_covariance_n2(at[0], at[1]);
+        size += c.standard_error_n(at[0]) * c.standard_error_n(at[1]);
+    }
+    // The mean of a thousand products of two errors is uncertain by √2/√1000 of their size at most; three of that.
+    assert!(
+        (seen - stated).abs() < 0.13 * size,
+        "{seen} {stated} {size}"
+    );
+}
+
+#[test]
+fn forces_of_one_calibration_share_its_error() {
+    let c = fitted(&cycle(20, 5e-3, 2, line));
+    let values = [2e5, 2e6, 3.9e6].map(|value| Estimate::new(value, 4e3));
+    let covariance = c.force_covariance_n2(&values);
+    for (i, v) in values.iter().enumerate() {
+        let reading = c.read(*v);
+        // One rounding per operation.
+        assert!((covariance[[i, i]].sqrt() / reading.force_n.standard_error - 1.0).abs() < 1e-12);
+        for (j, w) in values.iter().enumerate().filter(|(j, _)| *j != i) {
+            assert_eq!(covariance[[i, j]], covariance[[j, i]]);
+            assert!(covariance[[i, j]].abs() <= reading.calibration_n * c.read(*w).calibration_n);
+        }
+    }
+}
+
+#[test]
+fn reading_adds_both_errors_and_flags_extrapolation() {
+    let c = fitted(&cycle(20, 5e-3, 2, line));
+    let inside = c.read(Estimate::new(2e6, 1e4));
+    assert!((inside.noise_n / 5e-3 - 1.0).abs() < 0.01 && inside.calibration_n > 0.0);
+    assert_eq!(
+        inside.force_n.standard_error,
+        inside.noise_n.hypot(inside.calibration_n)
+    );
+    assert!(!inside.out_of_range);
+    for value in [-1.0, 4.1e6, f64::NAN] {
+        assert!(c.read(Estimate::new(value, 0.0)).out_of_range, "{value}");
+    }
+}

@@ -1,0 +1,227 @@
+//! Errors of the inclusion search over a folder of solved scenes, against the Cramér–Rao bound.
+//!
+//! ```text
+//! cargo run --release -p tactile-elasticity --features fem --example inclusion_study -- FOLDER [SEEDS] [NAMES]
+//! ```
+//!
+//! FOLDER holds `scenes.csv` (scene, D_m, depth_m, E1_pa, E0_pa, block_height_m, block_radius_m, disc_radius_m,
+//! nu, contact, approach_1_m …, force_1_n …; D_m = 0 for a plain block, cells of loads that a scene has not are empty) and
+//! for every scene a file `NAME.csv` (load_index, r_m, pressure_pa), solved by another program: `evidence/inclusion_scenes.py`
+//! makes such folders with CalculiX. Every scene is searched with
+//! SEEDS (default 1) draws of the sensor's errors: white noise of pixels, smooth errors of the calibration,
+//! force, and of what is known of the block: its height and the approaches' zero; Poisson's ratio is said to be
+//! 0.495 ± 0.005 whatever it is. NAMES keeps the scenes whose names begin with one of them, separated by commas.
+#![allow(clippy::print_stdout)]
+
+mod scenes;
+mod tally;
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use rand_distr::StandardNormal;
+use scenes::{SolvedScene, scenes};
+use std::error::Error;
+use std::path::Path;
+use tactile_fem::{Guide, Layer, Material};
+use tactile_inclusion::{
+    AssumedInclusion, ExpectedErrors, InclusionSearch, PressureProfile, SensorErrors, Specimen,
+};
+use tally::{Tally, parameters};
+
+/// A camera's pixel in metres, and its noise over the largest pressure.
+const PIXEL_M: f64 = 86e-6;
+const PIXEL_NOISE: f64 = 7.5e-3;
+/// Scenes after which the figures so far are printed.
+const SUMMARY_EVERY: usize = 10;
+
+/// The sensor's guide in all scenes.
+fn guide(radius_m: f64) -> Result<Guide, Box<dyn Error>> {
+    let layer = |thickness_m, modulus| -> Result<Layer, Box<dyn Error>> {
+        Ok(Layer {
+            thickness_m,
+            material: Material::new(modulus, 0.495)?,
+        })
+    };
+    let layers = vec![layer(2e-3, 136e3)?, layer(3e-3, 80e3)?, layer(5e-3, 34e3)?];
+    Ok(Guide::new(layers, radius_m)?)
+}
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    rng.sample(StandardNormal)
+}
+
+/// Ring means of a smooth random field in the plane of unit variance with Matérn's kernel of order 3/2:
+/// a sum of waves whose wave vectors follow the kernel's spectrum, Student's t with three degrees
+/// of freedom.
+fn smooth_field(radii_m: &[f64], length_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    const WAVES: usize = 400;
+    const ANGLES: usize = 32;
+    let mut means = vec![0.0; radii_m.len()];
+    for _ in 0..WAVES {
+        let chi_squared: f64 = (0..3).map(|_| normal(rng).powi(2)).sum();
+        let scale = (3.0 / chi_squared).sqrt() / length_m;
+        let wave_number = scale * normal(rng).hypot(normal(rng));
+        let phase = core::f64::consts::TAU * rng.random::<f64>();
+        for (mean, radius) in means.iter_mut().zip(radii_m) {
+            let around: f64 = (0..ANGLES)
+                .map(|k| {
+                    let angle = core::f64::consts::PI * (k as f64 + 0.5) / ANGLES as f64;
+                    (wave_number * radius * angle.cos()).cos()
+                })
+                .sum();
+            // The sine's part vanishes around the ring.
+            *mean += (2.0 / WAVES as f64).sqrt() * phase.cos() * around / ANGLES as f64;
+        }
+    }
+    means
+}
+
+/// White errors of the rings' means.
+fn white_errors(scene: &SolvedScene) -> Vec<f64> {
+    let width = scene.radii_m[1] - scene.radii_m[0];
+    let inner = scene.pressures_pa.iter().flat_map(|frame| {
+        let within = frame.iter().zip(&scene.radii_m);
+        within
+            .filter(|(_, r)| **r < 0.75 * scene.face_radius_m)
+            .map(|(p, _)| *p)
+    });
+    let full_scale = inner.fold(0.0, f64::max);
+    let errors = scene.radii_m.iter().map(|radius| {
+        let pixels = core::f64::consts::TAU * radius * width / PIXEL_M.powi(2);
+        PIXEL_NOISE * full_scale / pixels.sqrt()
+    });
+    errors.collect()
+}
+
+/// A scene as it is measured: frames with errors, and what is said of the block.
+fn measured(
+    scene: &SolvedScene,
+    seed: u64,
+) -> Result<(Specimen, Vec<PressureProfile>), Box<dyn Error>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let sensor = SensorErrors::default();
+    let said_height = scene.height_m * (0.02 * normal(&mut rng)).exp();
+    let zero = 20e-6 * normal(&mut rng);
+    let specimen = Specimen::new(said_height, scene.radius_m)?;
+    let common = smooth_field(&scene.radii_m, sensor.correlation_m, &mut rng);
+    let white = white_errors(scene);
+    let mut frames = Vec::new();
+    for (load, pressures) in scene.pressures_pa.iter().enumerate() {
+        let own = smooth_field(&scene.radii_m, sensor.correlation_m, &mut rng);
+        let mut read = Vec::new();
+        for (k, pressure) in pressures.iter().enumerate() {
+            let smooth = sensor.common * common[k] + sensor.each_frame * own[k];
+            read.push(pressure * (1.0 + smooth) + white[k] * normal(&mut rng));
+        }
+        frames.push(PressureProfile {
+            approach_m: scene.approaches_m[load] - zero,
+            force_n: Some(scene.forces_n[load] * (1.0 + sensor.force * normal(&mut rng))),
+            pressure_pa: read,
+            standard_error_pa: white.clone(),
+        });
+    }
+    Ok((specimen, frames))
+}
+
+/// Cramér–Rao bounds of ln D, ln d and ln E₁ at the truth, of the sensor's errors alone.
+fn bounds(scene: &SolvedScene, lump: [f64; 3]) -> Result<ExpectedErrors, Box<dyn Error>> {
+    let specimen = Specimen::new(scene.height_m, scene.radius_m)?.with_interface(scene.interface);
+    let errors = SensorErrors {
+        model: 0.0,
+        ..SensorErrors::default()
+    };
+    let search =
+        InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?.with_sensor_errors(errors)?;
+    let assumed = AssumedInclusion {
+        diameter_m: lump[0],
+        depth_m: lump[1],
+        youngs_modulus_pa: lump[2],
+        block_modulus_pa: scene.block_modulus_pa,
+    };
+    let white = white_errors(scene);
+    Ok(search.expected_errors(&assumed, &scene.approaches_m, &scene.radii_m, &white)?)
+}
+
+/// The processor's time where Linux tells it, else the clock's.
+fn seconds() -> f64 {
+    let told = std::fs::read_to_string("/proc/self/schedstat").ok();
+    let nanoseconds = told.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
+    let clock = || std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
+    nanoseconds.map_or_else(|| clock().as_secs_f64(), |n| 1e-9 * n)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().ok_or("usage: FOLDER [SEEDS] [NAMES]")?;
+    let seeds: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let names = arguments.next().unwrap_or_default();
+    let mut tally = Tally::default();
+    let mut searched = 0;
+    for (index, scene) in scenes(Path::new(&folder))?.iter().enumerate() {
+        if !names.split(',').any(|name| scene.name.starts_with(name)) {
+            continue;
+        }
+        let bounds = match scene.lump {
+            Some(lump) => {
+                let begun = seconds();
+                let bounds = bounds(scene, lump)?;
+                tally.model_seconds.push(seconds() - begun);
+                [bounds.diameter, bounds.depth, bounds.youngs_modulus]
+            }
+            None => [f64::INFINITY; 3],
+        };
+        for seed in 0..seeds {
+            let (specimen, frames) = measured(scene, seed * 1000 + index as u64)?;
+            let search = InclusionSearch::new(specimen, guide(scene.face_radius_m)?)?;
+            let begun = seconds();
+            let estimate = search.search(&scene.radii_m, &frames)?;
+            let seconds = seconds() - begun;
+            tally.search_seconds.push(seconds);
+            print!(
+                "{} {seed} {:?}: {seconds:.1} s, p {:.3}, {:?}, misfit {:.2}",
+                scene.name,
+                scene.interface,
+                estimate.probability,
+                estimate.interface,
+                estimate.misfit
+            );
+            match scene.lump {
+                Some(lump) => tally.add(lump, bounds, &estimate),
+                None => tally.add_plain(&estimate),
+            }
+            if let (Some(lump), Some(inclusion)) = (scene.lump, &estimate.inclusion) {
+                for ((name, told), (truth, bound)) in ["D", "d", "E1"]
+                    .iter()
+                    .zip(parameters(inclusion))
+                    .zip(lump.iter().zip(bounds))
+                {
+                    let estimated = told.estimate();
+                    let error = (estimated.value / truth).ln();
+                    let reach = estimated.interval.map(|end| 100.0 * (end / truth).ln());
+                    print!(
+                        "; {name} {}{:+.1} [{:+.1} {:+.1}] % (bound {:.1}, z {:+.2})",
+                        if told.value().is_some() { "" } else { "open " },
+                        100.0 * error,
+                        reach[0],
+                        reach[1],
+                        100.0 * bound,
+                        error / estimated.relative_error()
+                    );
+                }
+            } else if let Some(inclusion) = &estimate.inclusion {
+                for (name, told) in ["D", "d", "E1"].iter().zip(parameters(inclusion)) {
+                    print!("; {name} {:.3e}", told.estimate().value);
+                }
+                print!("; found where there is none");
+            } else {
+                print!("; none");
+            }
+            println!("; {:?}", estimate.warnings);
+        }
+        searched += 1;
+        if searched % SUMMARY_EVERY == 0 {
+            tally.print();
+        }
+    }
+    tally.print();
+    Ok(())
+}

@@ -1,0 +1,275 @@
+//! Blocks that are not as the model assumes: an answer with its flag, never a confident wrong one.
+
+use super::forward::Forward;
+use super::parameters::{LumpParameters, Parameters};
+use super::{
+    InclusionEstimate, InclusionSearch, InclusionWarning, PressureProfile, Specimen, Told,
+};
+use core::ops::ControlFlow;
+use tactile_fem::{Guide, Interface, Kinematics, Layer, Material};
+
+const RINGS: usize = 24;
+const APPROACHES_M: [f64; 2] = [1.5e-3, 3e-3];
+
+fn guide() -> Guide {
+    let layer = |thickness_m, modulus: f64| Layer {
+        thickness_m,
+        material: Material::new(modulus, 0.495).unwrap(),
+    };
+    Guide::new(vec![layer(4e-3, 120e3), layer(6e-3, 40e3)], 16e-3).unwrap()
+}
+
+fn lump(diameter_m: f64, depth_m: f64, youngs_modulus_pa: f64) -> LumpParameters {
+    LumpParameters {
+        diameter_m,
+        depth_m,
+        youngs_modulus_pa,
+    }
+}
+
+/// Pressures of the frames at `radii_m`, one frame after the other, then the forces.
+fn solved(lump: Option<LumpParameters>, radii_m: &[f64]) -> Vec<f64> {
+    solved_with(Interface::Bonded, lump, radii_m)
+}
+
+fn solved_with(interface: Interface, lump: Option<LumpParameters>, radii_m: &[f64]) -> Vec<f64> {
+    let forward = Forward {
+        guide: guide(),
+        block_radius_m: 40e-3,
+        interface,
+        approaches_m: APPROACHES_M.to_vec(),
+        radii_m: radii_m.to_vec(),
+        fineness: 5,
+        kinematics: Kinematics::Finite,
+    };
+    let block = Parameters {
+        block_modulus_pa: 5e3,
+        lump,
+        zero_m: 0.0,
+        height_m: 30e-3,
+        poisson_ratio: 0.495,
+    };
+    forward.predict(&block).unwrap().values
+}
+
+fn ring_radii() -> Vec<f64> {
+    (0..RINGS).map(|k| (k as f64 + 0.5) * 0.5e-3).collect()
+}
+
+/// Frames with these values and the noise of pixels of 86 µm, 0.75 % each, which is not drawn: what is
+/// left of a fit is the departure alone.
+fn frames(values: &[f64]) -> Vec<PressureProfile> {
+    let forces = &values[2 * RINGS..];
+    let rings = values[..2 * RINGS].chunks(RINGS);
+    let largest = values[..2 * RINGS].iter().fold(0.0f64, |m, p| m.max(*p));
+    let noise = |radius: f64| {
+        let pixels = core::f64::consts::TAU * radius * 0.5e-3 / 86e-6f64.powi(2);
+        7.5e-3 * largest / pixels.sqrt()
+    };
+    let frames = rings.zip(forces).zip(APPROACHES_M);
+    frames
+        .map(|((pressures, &force), approach_m)| PressureProfile {
+            approach_m,
+            force_n: Some(force),
+            pressure_pa: pressures.to_vec(),
+            standard_error_pa: ring_radii().into_iter().map(noise).collect(),
+        })
+        .collect()
+}
+
+fn searched(frames: &[PressureProfile]) -> InclusionEstimate {
+    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+    searched_in(&specimen.with_interface(Interface::Bonded), frames)
+}
+
+fn searched_in(specimen: &Specimen, frames: &[PressureProfile]) -> InclusionEstimate {
+    let search = InclusionSearch::new(*specimen, guide()).unwrap();
+    search.search(&ring_radii(), frames).unwrap()
+}
+
+fn is_poor(estimate: &InclusionEstimate) -> bool {
+    let poor = |warning: &InclusionWarning| matches!(warning, InclusionWarning::PoorFit { .. });
+    estimate.warnings.iter().any(poor)
+}
+
+/// Each parameter that is told holds its truth.
+fn told_is_right(estimate: &InclusionEstimate, truth: LumpParameters) -> bool {
+    let Some(inclusion) = &estimate.inclusion else {
+        return true;
+    };
+    let pairs = [
+        (inclusion.diameter_m, truth.diameter_m),
+        (inclusion.depth_m, truth.depth_m),
+        (inclusion.youngs_modulus_pa, truth.youngs_modulus_pa),
+    ];
+    pairs.into_iter().all(|(told, truth)| match told {
+        Told::Yes(estimated) => (estimated.interval[0]..=estimated.interval[1]).contains(&truth),
+        Told::No(_) => true,
+    })
+}
+
+/// Ring means of the pressure that a lump adds, moved sideways by `aside_m`, on that of the plain block.
+fn moved_aside(lumps: LumpParameters, aside_m: f64, times: f64) -> Vec<f64> {
+    let fine: Vec<f64> = (0..72).map(|k| (f64::from(k) + 0.5) * 0.25e-3).collect();
+    let with = solved(Some(lumps), &fine);
+    let without = solved(None, &fine);
+    let plain = solved(None, &ring_radii());
+    let added = |frame: usize, radius: f64| {
+        let at = ((radius / 0.25e-3) as usize).min(fine.len() - 1) + frame * fine.len();
+        with[at] - without[at]
+    };
+    let mut values = plain.clone();
+    for frame in 0..2 {
+        for (k, radius) in ring_radii().into_iter().enumerate() {
+            let around = (0..64).map(|step| {
+                let angle = core::f64::consts::TAU * f64::from(step) / 64.0;
+                let distance = (radius * angle.cos() - aside_m).hypot(radius * angle.sin());
+                added(frame, distance)
+            });
+            values[frame * RINGS + k] += times * around.sum::<f64>() / 64.0;
+        }
+        let force = 2 * fine.len() + frame;
+        values[2 * RINGS + frame] += times * (with[force] - without[force]);
+    }
+    values
+}
+
+#[test]
+fn as_assumed_the_told_is_right() {
+    let truth = lump(10e-3, 4e-3, 40e3);
+    let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
+    assert!(estimate.found && !is_poor(&estimate));
+    assert!(told_is_right(&estimate, truth), "{estimate:?}");
+}
+
+/// A search of a plain block fits no inclusion: the grid's 27 solutions and a plain block's few.
+#[test]
+fn a_plain_block_is_plain_after_a_few_solutions() {
+    let frames = frames(&solved(None, &ring_radii()));
+    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+    let specimen = specimen.with_interface(Interface::Bonded);
+    let search = InclusionSearch::new(specimen, guide()).unwrap();
+    let mut solutions = 0;
+    let estimate = search
+        .search_with_progress(&ring_radii(), &frames, &mut |progress| {
+            solutions = progress.done;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    assert!(!estimate.found && estimate.probability < 0.01);
+    assert!(solutions < 40, "{solutions}");
+}
+
+/// The test that ends a plain block's search lets a small one of twice the tissue's modulus pass.
+#[test]
+fn a_faint_inclusion_is_found() {
+    let truth = lump(5e-3, 8e-3, 10e3);
+    let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
+    assert!(estimate.found, "{estimate:?}");
+    assert!(told_is_right(&estimate, truth), "{estimate:?}");
+}
+
+/// One frame on soft tissue hardly tells a face that sticks from one that slides, and an inclusion is larger and softer
+/// under the wrong assumption.
+#[test]
+fn where_a_face_may_stick_or_slide_the_intervals_hold_the_truth() {
+    let truth = lump(9e-3, 4.5e-3, 50e3);
+    let frames = &frames(&solved_with(
+        Interface::Frictionless,
+        Some(truth),
+        &ring_radii(),
+    ))[..1];
+    let specimen = Specimen::new(30e-3, 40e-3).unwrap();
+    let estimate = searched_in(&specimen, frames);
+    assert!((estimate.warnings).contains(&InclusionWarning::UncertainInterface));
+    let assumed = [Interface::Bonded, Interface::Frictionless]
+        .map(|assumed| searched_in(&specimen.with_interface(assumed), frames));
+    let intervals = |estimate: &InclusionEstimate| {
+        let found = estimate.inclusion.unwrap();
+        [found.diameter_m, found.depth_m, found.youngs_modulus_pa]
+            .map(|told| told.estimate().interval)
+    };
+    let truth = [truth.diameter_m, truth.depth_m, truth.youngs_modulus_pa];
+    for (k, ([low, high], truth)) in intervals(&estimate).into_iter().zip(truth).enumerate() {
+        assert!((low..=high).contains(&truth), "{low} {high}");
+        // Of the same fits, but for where they start: within 2 %.
+        for assumed in &assumed {
+            let [lower, upper] = intervals(assumed)[k];
+            assert!(low < 1.02 * lower && high > upper / 1.02);
+        }
+    }
+}
+
+#[test]
+fn an_inclusion_off_the_axis_is_not_told_confidently() {
+    let truth = lump(8e-3, 3e-3, 40e3);
+    let estimate = searched(&frames(&moved_aside(truth, 5e-3, 1.0)));
+    assert!(
+        is_poor(&estimate) || told_is_right(&estimate, truth),
+        "{estimate:?}"
+    );
+}
+
+/// The search goes on longest where nothing fits.
+#[test]
+#[ignore = "a quarter of a minute: run by the step `studies` of the checks"]
+fn study_two_inclusions_beside_the_axis_fit_poorly() {
+    let one = lump(7e-3, 3e-3, 40e3);
+    let estimate = searched(&frames(&moved_aside(one, 6e-3, 2.0)));
+    assert!(is_poor(&estimate) || !estimate.found, "{estimate:?}");
+}
+
+#[test]
+fn forces_that_contradict_the_approaches_fit_poorly() {
+    let truth = lump(10e-3, 4e-3, 40e3);
+    let mut values = solved(Some(truth), &ring_radii());
+    // By nine times the errors of sensor and model, one way at the first frame and the other at the second.
+    values[2 * RINGS] *= 1.06;
+    values[2 * RINGS + 1] *= 0.94;
+    let estimate = searched(&frames(&values));
+    assert!(is_poor(&estimate), "{estimate:?}");
+}
+
+#[test]
+fn of_one_frame_what_is_told_is_right_and_flagged() {
+    let truth = lump(10e-3, 4e-3, 40e3);
+    let both = frames(&solved(Some(truth), &ring_radii()));
+    let estimate = searched(&both[1..]);
+    assert!(estimate.warnings.contains(&InclusionWarning::OneFrame));
+    assert!(told_is_right(&estimate, truth), "{estimate:?}");
+}
+
+#[test]
+fn an_inclusion_at_the_surface_is_flagged_or_right() {
+    let truth = lump(10e-3, 0.3e-3, 40e3);
+    let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
+    assert!(estimate.found);
+    assert!(
+        !estimate.warnings.is_empty() || told_is_right(&estimate, truth),
+        "{estimate:?}"
+    );
+}
+
+#[test]
+fn of_an_inclusion_that_touches_the_surface_nothing_is_told() {
+    let truth = lump(10e-3, 0.1e-3, 40e3);
+    let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
+    assert!(estimate.found);
+    assert!(
+        (estimate.warnings).contains(&InclusionWarning::AtBoundary),
+        "{estimate:?}"
+    );
+    let found = estimate.inclusion.unwrap();
+    let told = [found.diameter_m, found.depth_m, found.youngs_modulus_pa];
+    assert!(told.iter().all(|told| told.value().is_none()), "{told:?}");
+}
+
+#[test]
+fn an_inclusion_on_the_base_is_flagged_or_right() {
+    let truth = lump(16e-3, 13.5e-3, 40e3);
+    let estimate = searched(&frames(&solved(Some(truth), &ring_radii())));
+    assert!(
+        !estimate.warnings.is_empty() || told_is_right(&estimate, truth),
+        "{estimate:?}"
+    );
+}

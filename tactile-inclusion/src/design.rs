@@ -1,0 +1,135 @@
+//! What a scan can tell before it is made.
+
+use super::covariance::{Observed, Resolution};
+use super::fit::Problem;
+use super::parameters::LumpParameters;
+use super::profiles::check_approaches;
+use super::search::InclusionSearch;
+use crate::error::{Quantity, positive};
+use tactile_elasticity::ElasticityError;
+
+/// An inclusion assumed for planning a scan.
+///
+/// ```
+/// use tactile_inclusion::AssumedInclusion;
+///
+/// let lump = AssumedInclusion {
+///     diameter_m: 10e-3,
+///     depth_m: 4e-3,
+///     youngs_modulus_pa: 40e3,
+///     block_modulus_pa: 5e3,
+/// };
+/// assert_eq!(lump.youngs_modulus_pa / lump.block_modulus_pa, 8.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AssumedInclusion {
+    /// Diameter D, in metres.
+    pub diameter_m: f64,
+    /// Depth of its top d, in metres.
+    pub depth_m: f64,
+    /// Young's modulus E₁, in pascals.
+    pub youngs_modulus_pa: f64,
+    /// The tissue's Young's modulus E₀, in pascals.
+    pub block_modulus_pa: f64,
+}
+
+/// Relative standard errors that a scan would leave.
+///
+/// ```
+/// use tactile_inclusion::ExpectedErrors;
+///
+/// let errors = ExpectedErrors { diameter: 0.02, depth: 0.04, youngs_modulus: 0.4 };
+/// assert!(errors.youngs_modulus > 0.3, "a modulus that could not be told");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ExpectedErrors {
+    /// Of the diameter.
+    pub diameter: f64,
+    /// Of the depth.
+    pub depth: f64,
+    /// Of the inclusion's modulus.
+    pub youngs_modulus: f64,
+}
+
+/// Elements along an eighth of the inclusion's circumference: errors within 2 % of those of a mesh twice as fine; of three
+/// elements, the errors of a small shallow inclusion came out at half.
+const FINENESS: usize = 5;
+
+impl InclusionSearch {
+    /// Standard errors of ln D, ln d and ln E₁ that frames at `approaches_m` would leave, were the
+    /// assumed inclusion there: the Cramér–Rao bound
+    ///
+    /// $$ (J^T C^{-1} J + P^{-1})^{-1} $$
+    ///
+    /// with what is known of block and sensor. `white_pa` is the white error of each ring's mean: a pixel's over
+    /// the root of the ring's pixels, larger near the axis. The face counts as bonded unless the specimen says
+    /// otherwise. One solution with derivatives.
+    ///
+    /// # Errors
+    /// A length, modulus or error that is not positive; approaches that do not grow; not one error for each
+    /// ring; fewer than eight rings within reach; [`ElasticityError::NoSolution`].
+    pub fn expected_errors(
+        &self,
+        assumed: &AssumedInclusion,
+        approaches_m: &[f64],
+        radii_m: &[f64],
+        white_pa: &[f64],
+    ) -> Result<ExpectedErrors, ElasticityError> {
+        positive(assumed.diameter_m, Quantity::Radius)?;
+        positive(assumed.depth_m, Quantity::Distance)?;
+        positive(assumed.youngs_modulus_pa, Quantity::YoungsModulus)?;
+        positive(assumed.block_modulus_pa, Quantity::YoungsModulus)?;
+        if white_pa.len() != radii_m.len() {
+            return Err(ElasticityError::LengthMismatch {
+                quantity: Quantity::StandardError,
+                expected: radii_m.len(),
+                found: white_pa.len(),
+            });
+        }
+        for &white in white_pa {
+            positive(white, Quantity::StandardError)?;
+        }
+        check_approaches(approaches_m.iter().copied())?;
+        let used = self.rings_within_reach(radii_m)?;
+        let mut observed = Observed {
+            radii_m: used.iter().map(|&k| radii_m[k]).collect(),
+            values: Vec::new(),
+            white: Vec::new(),
+            frames: approaches_m.len(),
+        };
+        let interface = self.specimen().interfaces()[0];
+        let mut parameters = self.plain_block(assumed.block_modulus_pa);
+        parameters.lump = Some(LumpParameters {
+            diameter_m: assumed.diameter_m,
+            depth_m: assumed.depth_m,
+            youngs_modulus_pa: assumed.youngs_modulus_pa,
+        });
+        let forward = self.forward(&observed, approaches_m, interface, FINENESS);
+        let predicted = (forward.predict(&parameters)).ok_or(ElasticityError::NoSolution)?;
+        observed.white = (0..observed.frames)
+            .flat_map(|_| used.iter().map(|&ring| white_pa[ring]))
+            .collect();
+        // Forces have no noise of pixels.
+        observed.white.resize(predicted.values.len(), 0.0);
+        observed.values = predicted.values;
+        let covariance = observed.covariance(self.sensor(), interface, Resolution::Answer);
+        let mut priors = self.block_priors(assumed.block_modulus_pa);
+        priors.extend(self.lump_priors(assumed.block_modulus_pa));
+        let problem = Problem {
+            forward,
+            measured: observed.values,
+            factor: covariance.cholesky().ok_or(ElasticityError::NoSolution)?,
+            priors,
+        };
+        let errors = (problem.errors(&parameters)).ok_or(ElasticityError::NoSolution)?;
+        let [.., diameter, depth, youngs_modulus] = errors[..] else {
+            return Err(ElasticityError::NoSolution);
+        };
+        Ok(ExpectedErrors {
+            diameter,
+            depth,
+            youngs_modulus,
+        })
+    }
+}

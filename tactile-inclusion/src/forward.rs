@@ -1,0 +1,304 @@
+//! Interface pressure of a block with an inclusion under a guide, and its derivatives.
+
+use super::motion::{Motion, sizes};
+use super::parameters::{Coordinate, Parameters};
+use std::sync::Arc;
+use tactile_fem::{
+    Block, Found, Guide, Interface, Kinematics, Layout, Load, Lump, Material, Outcome,
+    PressurePoint, Relaxation, Scene, State, pressure_at,
+};
+
+/// A block of given size under a guide, and where its pressure is wanted.
+#[derive(Debug, Clone)]
+pub(crate) struct Forward {
+    pub(crate) guide: Guide,
+    pub(crate) block_radius_m: f64,
+    pub(crate) interface: Interface,
+    /// Approaches as read, in metres, growing.
+    pub(crate) approaches_m: Vec<f64>,
+    /// Where each frame's pressure is wanted, in metres from the axis.
+    pub(crate) radii_m: Vec<f64>,
+    /// Elements along an eighth of the inclusion's circumference.
+    pub(crate) fineness: usize,
+    /// Small strain is solved in one iteration: good enough to sort starts.
+    pub(crate) kinematics: Kinematics,
+}
+
+/// Pressures of all frames, one frame after the other, then their forces.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Prediction {
+    pub(crate) values: Vec<f64>,
+}
+
+/// A solved scene, from which scenes nearby are solved in fewer iterations.
+#[derive(Debug, Clone)]
+pub(crate) struct Solved {
+    meshed: Arc<Meshed>,
+    /// One for all frames; where surfaces slide, one a frame.
+    scenes: Vec<Scene>,
+    states: Vec<State>,
+}
+
+impl Solved {
+    fn scene(&self, frame: usize) -> &Scene {
+        &self.scenes[frame.min(self.scenes.len() - 1)]
+    }
+}
+
+/// A scene as it was meshed, before its mesh is moved to other parameters or along the interface.
+///
+/// The number of elements depends on the parameters in jumps, and with it the mesh's error: a fit compares
+/// solutions on one mesh, moved.
+#[derive(Debug, Clone)]
+struct Meshed {
+    scene: Scene,
+    parameters: Parameters,
+    /// Of this mesh's equations, however it is moved.
+    layout: Layout,
+}
+
+impl Meshed {
+    /// Whether its mesh still has good elements where it is moved to these parameters.
+    fn reaches(&self, parameters: &Parameters) -> bool {
+        let lumps = match (self.parameters.lump, parameters.lump) {
+            (None, None) => true,
+            (Some(from), Some(to)) => {
+                let pairs = sizes(from).into_iter().zip(sizes(to));
+                pairs.into_iter().all(|(from, to)| is_near(from, to))
+            }
+            _ => false,
+        };
+        lumps && is_near(self.parameters.height_m, parameters.height_m)
+    }
+}
+
+/// Depth down to which a sliding face moves the block's mesh: the inclusion's stays where it is.
+fn sliding_depth(parameters: &Parameters) -> f64 {
+    (parameters.lump).map_or(0.4 * parameters.height_m, |lump| lump.depth_m)
+}
+
+/// Rounds in which the faces of slightly changed blocks are made to meet again: each leaves a tenth of the
+/// distance before.
+const SLIDING_ROUNDS: usize = 2;
+
+fn is_near(from: f64, to: f64) -> bool {
+    (to / from).ln().abs() < REACH
+}
+
+/// Largest change of the logarithm of a length by which a mesh is moved.
+const REACH: f64 = 0.3;
+
+impl Forward {
+    pub(crate) fn observations(&self) -> usize {
+        self.approaches_m.len() * (self.radii_m.len() + 1)
+    }
+
+    /// Whether the mesh follows the face's sliding.
+    fn slides(&self) -> bool {
+        self.interface == Interface::Frictionless && self.kinematics == Kinematics::Finite
+    }
+
+    fn scene(&self, parameters: &Parameters) -> Option<Scene> {
+        let material = |modulus| Material::new(modulus, parameters.poisson_ratio).ok();
+        let lump = match parameters.lump {
+            None => None,
+            Some(lump) => Some(Lump {
+                diameter_m: lump.diameter_m,
+                depth_m: lump.depth_m,
+                material: material(lump.youngs_modulus_pa)?,
+            }),
+        };
+        let block = Block {
+            height_m: parameters.height_m,
+            radius_m: self.block_radius_m,
+            material: material(parameters.block_modulus_pa)?,
+            lump,
+        };
+        Scene::block_with_mesh(
+            &block,
+            &self.guide,
+            self.interface,
+            self.fineness,
+            self.kinematics,
+        )
+        .ok()
+    }
+
+    /// The frames' pressures and forces; `None` where the block cannot be meshed or solved.
+    pub(crate) fn predict(&self, parameters: &Parameters) -> Option<Prediction> {
+        Some(self.predict_near(parameters, None)?.0)
+    }
+
+    /// As [`Self::predict`], from a scene solved nearby; and this one, solved.
+    pub(crate) fn predict_near(
+        &self,
+        parameters: &Parameters,
+        near: Option<&Solved>,
+    ) -> Option<(Prediction, Solved)> {
+        let meshed = match near {
+            Some(near) if near.meshed.reaches(parameters) => Arc::clone(&near.meshed),
+            _ => {
+                let scene = self.scene(parameters)?;
+                Arc::new(Meshed {
+                    layout: scene.layout()?,
+                    scene,
+                    parameters: *parameters,
+                })
+            }
+        };
+        let scene = self.changed(&meshed.scene, &meshed.parameters, parameters)?;
+        let approaches: Vec<f64> = (self.approaches_m.iter())
+            .map(|approach| approach + parameters.zero_m)
+            .collect();
+        let solved = if self.slides() {
+            self.solve_sliding(meshed, &scene, parameters, &approaches, near)?
+        } else {
+            let loads: Vec<Load> = approaches.into_iter().map(Load::Approach).collect();
+            let near = near.map(|near| (near.scene(0), near.states.as_slice()));
+            let solution = scene.solve_near(&mut meshed.layout.clone(), &loads, near);
+            if solution.report.outcome != Outcome::Solved {
+                return None;
+            }
+            Solved {
+                meshed,
+                scenes: vec![scene],
+                states: solution.states,
+            }
+        };
+        let frames = (solved.states.iter()).map(|state| (state.pressure(), state.force_n()));
+        Some((self.collect(frames), solved))
+    }
+
+    /// Frame by frame, each from the same frame of a solution nearby or from the frame before.
+    fn solve_sliding(
+        &self,
+        meshed: Arc<Meshed>,
+        scene: &Scene,
+        parameters: &Parameters,
+        approaches_m: &[f64],
+        near: Option<&Solved>,
+    ) -> Option<Solved> {
+        let depth_m = sliding_depth(parameters);
+        let mut layout = meshed.layout.clone();
+        let mut solved = Solved {
+            meshed,
+            scenes: Vec::with_capacity(approaches_m.len()),
+            states: Vec::with_capacity(approaches_m.len()),
+        };
+        for (frame, &approach) in approaches_m.iter().enumerate() {
+            let before = || solved.scenes.last().zip(solved.states.last());
+            let near = near.map(|near| (near.scene(frame), &near.states[frame]));
+            let near = near.or_else(before);
+            let (scene, state) = scene.slid(&mut layout, approach, depth_m, near)?;
+            solved.scenes.push(scene);
+            solved.states.push(state);
+        }
+        Some(solved)
+    }
+
+    /// The scene of parameters near those of `scene`, on its mesh.
+    fn changed(&self, scene: &Scene, from: &Parameters, to: &Parameters) -> Option<Scene> {
+        let tissue = self.guide.layers().len();
+        let material = |modulus| Material::new(modulus, to.poisson_ratio).ok();
+        let mut materials = vec![(tissue, material(to.block_modulus_pa)?)];
+        if let Some(lump) = to.lump {
+            materials.push((tissue + 1, material(lump.youngs_modulus_pa)?));
+        }
+        let motion = Motion::new(from, to, self.guide.radius_m());
+        let moved = |node: [f64; 2]| motion.moved(node);
+        let is_moved = (from.lump.map(sizes), from.height_m) != (to.lump.map(sizes), to.height_m);
+        let moved: Option<&dyn Fn([f64; 2]) -> [f64; 2]> =
+            if is_moved { Some(&moved) } else { None };
+        scene.changed(&materials, moved).ok()
+    }
+
+    fn collect<'a>(&self, frames: impl Iterator<Item = (&'a [PressurePoint], f64)>) -> Prediction {
+        let mut values = Vec::with_capacity(self.observations());
+        let mut forces = Vec::with_capacity(self.approaches_m.len());
+        for (points, force) in frames {
+            values.extend(self.radii_m.iter().map(|&r| pressure_at(points, r)));
+            forces.push(force);
+        }
+        values.extend(forces);
+        Prediction { values }
+    }
+
+    /// The derivatives of a solved scene's prediction, one column a coordinate.
+    ///
+    /// A derivative is the difference of one iteration on the slightly changed block and one on the block
+    /// itself, both from the solution with its tangent: one factorisation a frame, one residual for each
+    /// coordinate and frame. The iteration on the block itself takes out what the solution leaves unbalanced.
+    pub(crate) fn derivatives(
+        &self,
+        parameters: &Parameters,
+        coordinates: &[Coordinate],
+        solved: &Solved,
+    ) -> Option<Vec<Vec<f64>>> {
+        let moved: Vec<Parameters> = (coordinates.iter())
+            .map(|&coordinate| parameters.moved(coordinate, parameters.small_step(coordinate)))
+            .collect();
+        let changed = |scene: &Scene| -> Option<Vec<Scene>> {
+            (moved.iter())
+                .map(|moved| self.changed(scene, parameters, moved))
+                .collect()
+        };
+        let mut layout = solved.meshed.layout.clone();
+        let mut nearby = Vec::new();
+        // Of each coordinate, the interface's answer frame by frame.
+        let mut answers = vec![Vec::with_capacity(solved.states.len()); coordinates.len()];
+        let mut here = Vec::with_capacity(solved.states.len());
+        for (frame, state) in solved.states.iter().enumerate() {
+            if frame < solved.scenes.len() {
+                nearby = changed(solved.scene(frame))?;
+            }
+            let scene = solved.scene(frame);
+            let neighbourhood = scene.neighbourhood(&mut layout, state)?;
+            let approach = |parameters: &Parameters| self.approaches_m[frame] + parameters.zero_m;
+            let solve = |nearby: &[Scene]| {
+                let mut at: Vec<(&Scene, f64)> = (nearby.iter().zip(&moved))
+                    .map(|(scene, moved)| (scene, approach(moved)))
+                    .collect();
+                at.push((scene, approach(parameters)));
+                neighbourhood.solve(&at)
+            };
+            let mut found = solve(&nearby)?;
+            if self.slides() {
+                let depth_m = sliding_depth(parameters);
+                let mut relaxations = vec![Relaxation::default(); nearby.len()];
+                for _ in 0..SLIDING_ROUNDS {
+                    let met = scene.distances(&found[nearby.len()].displacement);
+                    for ((nearby, found), relaxation) in
+                        nearby.iter_mut().zip(&found).zip(&mut relaxations)
+                    {
+                        let apart = nearby.distances(&found.displacement);
+                        let mut apart: Vec<f64> =
+                            apart.iter().zip(&met).map(|(a, b)| a - b).collect();
+                        let parts = relaxation.next(apart.iter().copied());
+                        apart.iter_mut().zip(parts).for_each(|(a, part)| *a *= part);
+                        *nearby = nearby.moved_back(&apart, depth_m)?;
+                    }
+                    found = solve(&nearby)?;
+                }
+            }
+            here.extend(found.pop());
+            for (answers, found) in answers.iter_mut().zip(found) {
+                answers.push(found);
+            }
+        }
+        let frames = |answers: &[Found]| {
+            let frames = answers.iter();
+            self.collect(frames.map(|found| (found.pressure.as_slice(), found.force_n)))
+        };
+        let here = frames(&here);
+        let mut columns = Vec::with_capacity(coordinates.len());
+        for (answers, coordinate) in answers.iter().zip(coordinates) {
+            let there = frames(answers);
+            let step = parameters.small_step(*coordinate);
+            let column = (there.values.iter().zip(&here.values))
+                .map(|(there, here)| (there - here) / step)
+                .collect();
+            columns.push(column);
+        }
+        Some(columns)
+    }
+}

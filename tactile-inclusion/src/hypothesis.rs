@@ -1,0 +1,224 @@
+//! What the fits under one assumption about the face say.
+
+use super::covariance::Observed;
+use super::estimate::{
+    Estimated, Inclusion, InclusionEstimate, InclusionWarning, TWO_SIDED_95, Told,
+};
+use super::fit::{Fit, Problem};
+use super::marginal::Marginal;
+use super::parameters::Coordinate;
+use super::score::Score;
+use tactile_fem::Interface;
+
+/// Least fall of χ² for an inclusion to count as found, that of six standard errors: what finite elements err by brings it to 25 in
+/// one of 38 plain blocks by CalculiX, 161 of 162 inclusions there to 60 or more and the last, hardly to be found, to 33 (`inclusion_study`).
+const LEAST_FALL: f64 = 36.0;
+/// Least probability for that.
+const LEAST_PROBABILITY: f64 = 0.99;
+/// Fall of the objective without which an inclusion is not that probable, 2 ln(p / (1 − p)): the parameters it adds are
+/// known better afterwards than before, which lowers the evidence further.
+pub(super) const LEAST_GAIN: f64 = 9.2;
+/// Least contrast either way, E₁/E₀ or E₀/E₁: an inclusion nearer to the tissue explains no more than what
+/// its mesh differs by from a plain block's (a contrast of 1.02 to 1.04 in plain blocks by CalculiX).
+const LEAST_CONTRAST: f64 = 1.2;
+/// Standard deviations by which χ² may exceed its mean: above, 1 chance in 1000, a fit counts as poor.
+const POOR: f64 = 3.1;
+
+/// Whether a fit leaves more than the errors explain.
+pub(super) fn is_poor(misfit: f64, observed: &Observed) -> bool {
+    let freedom = observed.values.len() as f64;
+    misfit > freedom + POOR * (2.0 * freedom).sqrt()
+}
+
+/// The coordinates as they are fitted: those of the block first.
+const COORDINATES: [Coordinate; 7] = [
+    Coordinate::BlockModulus,
+    Coordinate::Zero,
+    Coordinate::Height,
+    Coordinate::PoissonRatio,
+    Coordinate::Diameter,
+    Coordinate::Depth,
+    Coordinate::LumpModulus,
+];
+pub(super) const BLOCK_COORDINATES: usize = 4;
+
+/// The best fits under one assumption about the face.
+pub(super) struct Hypothesis {
+    pub(super) problem: Problem,
+    pub(super) interface: Interface,
+    pub(super) plain: Fit,
+    /// What inclusions promise, where none was fitted.
+    pub(super) score: Option<Score>,
+    pub(super) lump: Option<Fit>,
+    /// Posteriors of the fit with an inclusion, once its ridge is followed.
+    pub(super) marginal: Option<Marginal>,
+}
+
+impl Hypothesis {
+    /// Follows the ridge of the fit with an inclusion, where there is more for one than against.
+    pub(super) fn follow(&mut self, go_on: impl FnMut() -> bool) {
+        if let Some(fit) = self
+            .lump
+            .as_ref()
+            .filter(|fit| fit.evidence > self.plain.evidence)
+        {
+            let ridge = self.problem.ridge(fit, go_on);
+            self.marginal = ridge.as_ref().and_then(Marginal::new);
+        }
+    }
+
+    pub(super) fn evidence(&self) -> f64 {
+        self.plain.evidence.max(self.evidence_with())
+    }
+
+    /// χ² over its degrees of freedom, where that is more than one: what differences of log evidence are too large by.
+    pub(super) fn inflation(&self, observed: &Observed) -> f64 {
+        let best = match &self.lump {
+            Some(lump) if lump.evidence > self.plain.evidence => lump,
+            _ => &self.plain,
+        };
+        (best.misfit / observed.values.len() as f64).max(1.0)
+    }
+
+    /// Log evidence with an inclusion: that of the grid where none was fitted.
+    fn evidence_with(&self) -> f64 {
+        match (&self.lump, &self.score) {
+            (Some(fit), _) => fit.evidence + self.marginal.as_ref().map_or(0.0, |m| m.gain),
+            (None, Some(score)) => self.plain.evidence + score.log_odds,
+            (None, None) => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Logarithm of the odds that there is an inclusion, whichever way the face touches.
+    fn log_odds(&self, rival: Option<&Self>) -> f64 {
+        let both = || [self].into_iter().chain(rival);
+        let with = both().map(Self::evidence_with);
+        let without = both().map(|one| one.plain.evidence);
+        with.fold(f64::NEG_INFINITY, f64::max) - without.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The fit with an inclusion, where it counts as found at these odds.
+    fn found(&self, log_odds: f64) -> Option<&Fit> {
+        self.lump.as_ref().filter(|fit| {
+            let modulus = |coordinate| fit.parameters.get(coordinate);
+            let contrast = modulus(Coordinate::LumpModulus) - modulus(Coordinate::BlockModulus);
+            probability(log_odds) > LEAST_PROBABILITY
+                && self.plain.misfit - fit.misfit > LEAST_FALL
+                && contrast.abs() > LEAST_CONTRAST.ln()
+        })
+    }
+
+    /// Value and 95 % interval of a coordinate, errors widened by a factor.
+    ///
+    /// Of a skewed posterior the optimum lies at an end of the interval: D and d are its medians. E₁'s upper tail
+    /// is the prior's, and so would be its median: the optimum depends on it less.
+    fn posterior(&self, fit: &Fit, coordinate: usize, widened: f64) -> (f64, [f64; 2]) {
+        let best = fit.parameters.get(COORDINATES[coordinate]);
+        let is_lump = fit.covariance.nrows() > BLOCK_COORDINATES;
+        let (at, [low, high]) = match self.marginal.as_ref().filter(|_| is_lump) {
+            Some(marginal) => {
+                let is_modulus = COORDINATES[coordinate] == Coordinate::LumpModulus;
+                let median = marginal.median(coordinate);
+                let at = if is_modulus { best } else { median };
+                (at, marginal.interval(coordinate))
+            }
+            None => {
+                let reach = TWO_SIDED_95 * fit.covariance[(coordinate, coordinate)].sqrt();
+                (best, [best - reach, best + reach])
+            }
+        };
+        let (down, up) = ((at - low).max(0.0), (high - at).max(0.0));
+        (at, [at - widened * down, at + widened * up])
+    }
+
+    /// Correlations of ln D, ln d and ln E₁.
+    fn correlation(&self, fit: &Fit) -> [[f64; 3]; 3] {
+        let marginal = self.marginal.as_ref().map(Marginal::covariance);
+        let c = marginal.as_ref().unwrap_or(&fit.covariance);
+        let at = |k: usize| BLOCK_COORDINATES + k;
+        core::array::from_fn(|i| {
+            core::array::from_fn(|k| {
+                let variances = c[(at(i), at(i))] * c[(at(k), at(k))];
+                c[(at(i), at(k))] / variances.sqrt()
+            })
+        })
+    }
+
+    /// The answer; `rival` explains the frames about as well, `is_unsolved` that one could not be solved which may have.
+    pub(super) fn estimate(
+        self,
+        observed: &Observed,
+        rival: Option<&Self>,
+        is_unsolved: bool,
+    ) -> InclusionEstimate {
+        let log_odds = self.log_odds(rival);
+        let found = self.found(log_odds);
+        let chosen = found.unwrap_or(&self.plain);
+        let misfit = chosen.misfit / observed.values.len() as f64;
+        let is_poor = is_poor(chosen.misfit, observed);
+        let widened = if is_poor { misfit.sqrt() } else { 1.0 };
+        let mut warnings = Vec::new();
+        if is_poor {
+            warnings.push(InclusionWarning::PoorFit { excess: misfit });
+        }
+        if observed.frames == 1 {
+            warnings.push(InclusionWarning::OneFrame);
+        }
+        if !chosen.converged {
+            warnings.push(InclusionWarning::NotConverged);
+        }
+        if rival.is_some() || is_unsolved {
+            warnings.push(InclusionWarning::UncertainInterface);
+        }
+        let is_at_boundary = chosen.parameters.is_at_boundary();
+        if is_at_boundary {
+            warnings.push(InclusionWarning::AtBoundary);
+        }
+        let is_reliable = chosen.converged && !is_poor && !is_unsolved && !is_at_boundary;
+        let estimated = |coordinate: usize| {
+            let (at, interval) = self.posterior(chosen, coordinate, widened);
+            let other = rival.map(|rival| {
+                let lump = rival.lump.as_ref().filter(|_| found.is_some());
+                rival
+                    .posterior(lump.unwrap_or(&rival.plain), coordinate, widened)
+                    .1
+            });
+            Estimated::within(at, other.map_or(interval, |other| hull(interval, other)))
+        };
+        let inclusion = found.map(|fit| {
+            let told = |k: usize| Told::new(estimated(BLOCK_COORDINATES + k), is_reliable);
+            Inclusion {
+                diameter_m: told(0),
+                depth_m: told(1),
+                youngs_modulus_pa: told(2),
+                correlation: self.correlation(fit),
+            }
+        });
+        let rings = observed.radii_m.len();
+        let split = |values: &[f64]| -> Vec<Vec<f64>> {
+            let pressures = values[..observed.frames * rings].chunks(rings);
+            pressures.map(<[f64]>::to_vec).collect()
+        };
+        InclusionEstimate {
+            probability: probability(log_odds),
+            found: found.is_some(),
+            block_modulus_pa: estimated(0),
+            inclusion,
+            interface: self.interface,
+            misfit,
+            warnings,
+            radii_m: observed.radii_m.clone(),
+            fitted_pa: split(&chosen.predicted),
+            plain_pa: split(&self.plain.predicted),
+        }
+    }
+}
+
+fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
+
+/// The least interval that holds two.
+fn hull(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}

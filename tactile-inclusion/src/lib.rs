@@ -1,0 +1,59 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # Method
+//! The unknowns are the diameter D, the depth d of the top, the inclusion's modulus E₁ and the block's
+//! E₀; the block's height, Poisson's ratio and the zero of the approaches are known with errors. The
+//! model is [`Scene::block_under_guide`](tactile_fem::Scene::block_under_guide) at finite strain: how the
+//! pressure grows with the approach is what tells size from stiffness, which linear elasticity hardly
+//! can.
+//!
+//! With y the measured ring means and forces, m(φ) the model's, C the covariance of the sensor's and
+//! the model's errors and a Gaussian prior of mean φ₀ and covariance P,
+//!
+//! $$ -2 \ln p(\varphi | y) = (y - m)^T C^{-1} (y - m) + (\varphi - \varphi_0)^T P^{-1} (\varphi - \varphi_0) + c $$
+//!
+//! is minimised over φ = (ln E₀, zero, ln H, ν, ln D, ln d, ln E₁). Its second derivative there gives
+//! errors and correlations, its determinant the evidence (Laplace), whose ratio with and without
+//! inclusion is the odds that there is one. The intervals of D, d and E₁ follow the posterior along ln E₁,
+//! for it is far from Gaussian: beyond some contrast a stiffer inclusion changes the pressure no
+//! more, and a small stiff one is hardly told from a large one that is little stiffer than the tissue. Where bonded and frictionless
+//! faces explain the frames about equally well the intervals hold those of both.
+//!
+//! # References
+//! V. Egorov & A. P. Sarvazyan, IEEE Trans. Med. Imaging 27 (2008) 1275. J.-H. Lee & C.-H. Won, IEEE Sensors
+//! J. 13 (2013). A. Tarantola, *Inverse Problem Theory* (2005). R. E. Kass & A. E. Raftery, J. Am. Stat.
+//! Assoc. 90 (1995) 773. H. Rue, S. Martino & N. Chopin, J. R. Stat. Soc. B 71 (2009) 319.
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+mod against_calculix;
+mod covariance;
+#[cfg(test)]
+mod departures;
+mod design;
+mod drafts;
+mod error;
+mod estimate;
+mod fit;
+mod forward;
+mod hypothesis;
+mod marginal;
+mod motion;
+mod parameters;
+mod plain;
+mod profiles;
+mod progress;
+mod ridge;
+mod score;
+mod search;
+mod specimen;
+mod starts;
+#[cfg(test)]
+mod tests;
+
+pub use design::{AssumedInclusion, ExpectedErrors};
+pub use estimate::{Estimated, Inclusion, InclusionEstimate, InclusionWarning, Told};
+pub use profiles::PressureProfile;
+pub use progress::SearchProgress;
+pub use search::InclusionSearch;
+pub use specimen::{SensorErrors, Specimen};

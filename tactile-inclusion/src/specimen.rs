@@ -1,0 +1,190 @@
+//! What is known of a block before it is pressed.
+
+use crate::error::{Quantity, not_negative, positive};
+use tactile_elasticity::ElasticityError;
+use tactile_fem::{Interface, Material};
+
+/// A cylindrical block of tissue on a rigid stage: what is known of it before it is pressed, each with
+/// its standard error.
+///
+/// ```
+/// use tactile_fem::Interface;
+/// use tactile_inclusion::Specimen;
+///
+/// let block = Specimen::new(30e-3, 40e-3)?
+///     .with_height_error_m(0.3e-3)?
+///     .with_poisson_ratio(0.49, 0.005)?
+///     .with_youngs_modulus(5e3, 1e3)?
+///     .with_approach_error_m(10e-6)?
+///     .with_interface(Interface::Bonded);
+/// assert_eq!((block.height_m(), block.radius_m()), (30e-3, 40e-3));
+/// assert!(Specimen::new(f64::NAN, 40e-3).is_err());
+/// # Ok::<(), tactile_elasticity::ElasticityError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Specimen {
+    height_m: f64,
+    height_error_m: f64,
+    radius_m: f64,
+    poisson_ratio: f64,
+    poisson_ratio_error: f64,
+    approach_error_m: f64,
+    /// ln E₀ and its standard error.
+    block_modulus: Option<(f64, f64)>,
+    interface: Option<Interface>,
+}
+
+impl Specimen {
+    /// Height and radius in metres. The height's standard error is 2 %, Poisson's ratio
+    /// 0.495 ± 0.005, the zero of the approaches known to 20 µm, and whether the face sticks or slides
+    /// is not known, until set.
+    ///
+    /// # Errors
+    /// A length that is not positive.
+    pub fn new(height_m: f64, radius_m: f64) -> Result<Self, ElasticityError> {
+        positive(height_m, Quantity::Thickness)?;
+        positive(radius_m, Quantity::Radius)?;
+        Ok(Self {
+            height_m,
+            height_error_m: 0.02 * height_m,
+            radius_m,
+            poisson_ratio: 0.495,
+            poisson_ratio_error: 0.005,
+            approach_error_m: 20e-6,
+            block_modulus: None,
+            interface: None,
+        })
+    }
+
+    /// Sets the height's standard error, in metres.
+    ///
+    /// # Errors
+    /// Not positive.
+    pub fn with_height_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
+        self.height_error_m = positive(error_m, Quantity::StandardError)?;
+        Ok(self)
+    }
+
+    /// Sets Poisson's ratio of tissue and inclusion, at most 0.4999, and its standard error.
+    ///
+    /// # Errors
+    /// A ratio that finite elements do not take; an error that is not positive.
+    pub fn with_poisson_ratio(mut self, value: f64, error: f64) -> Result<Self, ElasticityError> {
+        Material::new(1.0, value)?;
+        self.poisson_ratio = value;
+        self.poisson_ratio_error = positive(error, Quantity::StandardError)?;
+        Ok(self)
+    }
+
+    /// Sets the standard error of the zero of all approaches, in metres.
+    ///
+    /// # Errors
+    /// Not positive.
+    pub fn with_approach_error_m(mut self, error_m: f64) -> Result<Self, ElasticityError> {
+        self.approach_error_m = positive(error_m, Quantity::StandardError)?;
+        Ok(self)
+    }
+
+    /// Sets the tissue's Young's modulus and its standard error, in pascals; both are fitted from
+    /// scratch where it is not set.
+    ///
+    /// # Errors
+    /// Not positive.
+    pub fn with_youngs_modulus(
+        mut self,
+        value_pa: f64,
+        error_pa: f64,
+    ) -> Result<Self, ElasticityError> {
+        positive(value_pa, Quantity::YoungsModulus)?;
+        positive(error_pa, Quantity::StandardError)?;
+        self.block_modulus = Some((value_pa.ln(), error_pa / value_pa));
+        Ok(self)
+    }
+
+    /// Says whether the guide's face sticks to the block or slides on it.
+    pub fn with_interface(mut self, interface: Interface) -> Self {
+        self.interface = Some(interface);
+        self
+    }
+
+    /// The height, in metres.
+    pub fn height_m(&self) -> f64 {
+        self.height_m
+    }
+
+    /// The radius, in metres.
+    pub fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    pub(crate) fn poisson_ratio(&self) -> f64 {
+        self.poisson_ratio
+    }
+
+    pub(crate) fn block_modulus(&self) -> Option<(f64, f64)> {
+        self.block_modulus
+    }
+
+    pub(crate) fn interfaces(&self) -> Vec<Interface> {
+        match self.interface {
+            Some(interface) => vec![interface],
+            None => vec![Interface::Bonded, Interface::Frictionless],
+        }
+    }
+
+    /// Means and standard errors of ln H, the approach's zero and ν.
+    pub(crate) fn known(&self) -> [(f64, f64); 3] {
+        [
+            (self.height_m.ln(), self.height_error_m / self.height_m),
+            (0.0, self.approach_error_m),
+            (self.poisson_ratio, self.poisson_ratio_error),
+        ]
+    }
+}
+
+/// Errors of a sensor's pressure that are smooth over its face, and of its force.
+///
+/// ```
+/// use tactile_inclusion::SensorErrors;
+///
+/// let errors = SensorErrors::default();
+/// assert!(errors.common > errors.each_frame);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensorErrors {
+    /// Relative standard error of the pressure that all frames share: the calibration's.
+    pub common: f64,
+    /// Relative standard error that each frame has of its own.
+    pub each_frame: f64,
+    /// Length over which both are correlated, in metres (Matérn's kernel of order 3/2).
+    pub correlation_m: f64,
+    /// Relative standard error of the force.
+    pub force: f64,
+    /// Part of the finite elements' own error (how far another code's pressures are off) that counts: 1; 0 for
+    /// what the sensor alone would leave open, as in published bounds.
+    pub model: f64,
+}
+
+impl Default for SensorErrors {
+    /// 0.3 % in common and 0.1 % of each frame, correlated over 3 mm; 0.1 % of the force; and the model's error.
+    fn default() -> Self {
+        Self {
+            common: 3e-3,
+            each_frame: 1e-3,
+            correlation_m: 3e-3,
+            force: 1e-3,
+            model: 1.0,
+        }
+    }
+}
+
+impl SensorErrors {
+    pub(crate) fn checked(self) -> Result<Self, ElasticityError> {
+        not_negative(self.common, Quantity::StandardError)?;
+        not_negative(self.each_frame, Quantity::StandardError)?;
+        positive(self.correlation_m, Quantity::Distance)?;
+        positive(self.force, Quantity::StandardError)?;
+        not_negative(self.model, Quantity::StandardError)?;
+        Ok(self)
+    }
+}

@@ -1,0 +1,124 @@
+//! The fit and its ridge.
+
+use super::super::SensorErrors;
+use super::super::covariance::{Observed, Resolution};
+use super::super::fit::{Prior, Problem, SETTLED};
+use super::super::parameters::{Coordinate, LARGEST_POISSON_RATIO, LumpParameters, Parameters};
+use super::{block, forward};
+use tactile_fem::Interface;
+
+/// Values without noise from a finer mesh than the fit's, with the errors of a first fit.
+fn problem_of(truth: &Parameters, resolution: Resolution) -> Problem {
+    let values = forward(5, 1.0).predict(truth).unwrap().values;
+    let observed = Observed {
+        radii_m: forward(5, 1.0).radii_m,
+        white: values.iter().map(|p| 1e-3 * p).collect(),
+        values,
+        frames: 2,
+    };
+    let covariance = observed.covariance(&SensorErrors::default(), Interface::Bonded, resolution);
+    let prior = |coordinate, mean, error| Prior::new(coordinate, (mean, error));
+    Problem {
+        forward: forward(3, 1.0),
+        measured: observed.values,
+        factor: covariance.cholesky().unwrap(),
+        priors: vec![
+            prior(Coordinate::BlockModulus, 5e3f64.ln(), 1.0),
+            prior(Coordinate::Zero, 0.0, 20e-6),
+            prior(Coordinate::Height, 30e-3f64.ln(), 0.02),
+            prior(Coordinate::PoissonRatio, 0.49, 0.005),
+            prior(Coordinate::Diameter, 10e-3f64.ln(), 0.6),
+            prior(Coordinate::Depth, 5e-3f64.ln(), 0.8),
+            prior(Coordinate::LumpModulus, 20e3f64.ln(), 1.2),
+        ],
+    }
+}
+
+fn problem() -> (Problem, Parameters) {
+    let truth = block(1.0);
+    (problem_of(&truth, Resolution::FirstFits), truth)
+}
+
+#[test]
+fn a_fit_from_afar_ends_at_the_truth_within_its_errors() {
+    let (problem, truth) = problem();
+    let mut start = truth;
+    start.block_modulus_pa *= 1.2;
+    start.lump = Some(LumpParameters {
+        diameter_m: 9e-3,
+        depth_m: 6e-3,
+        youngs_modulus_pa: 15e3,
+    });
+    let fit = problem.fit(start, SETTLED, || true).unwrap();
+    assert!(fit.converged);
+    for (k, coordinate) in problem.coordinates().into_iter().enumerate() {
+        let error = fit.covariance[(k, k)].sqrt();
+        let z = (fit.parameters.get(coordinate) - truth.get(coordinate)) / error;
+        // Without noise the coarse mesh and the priors pull, whose means are not the truth.
+        assert!(z.abs() < 0.7, "{coordinate:?}: {z}");
+    }
+    // The covariance has the coarse mesh's error in it.
+    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
+}
+
+#[test]
+fn a_fit_goes_on_along_the_limit_of_poissons_ratio() {
+    let (problem, truth) = problem();
+    // From the limit itself and far from the truth in all else: ν's prior and the data pull it back,
+    // but first steps go beyond the limit.
+    let mut start = truth;
+    start.poisson_ratio = LARGEST_POISSON_RATIO;
+    start.block_modulus_pa *= 0.8;
+    start.lump = Some(LumpParameters {
+        diameter_m: 14e-3,
+        depth_m: 3e-3,
+        youngs_modulus_pa: 60e3,
+    });
+    let fit = problem.fit(start, SETTLED, || true).unwrap();
+    assert!(fit.converged);
+    // As of the fit from afar.
+    assert!(fit.misfit < fit.predicted.len() as f64, "{}", fit.misfit);
+}
+
+#[test]
+fn a_step_that_may_not_go_on_ends_the_fit() {
+    let (problem, mut start) = problem();
+    start.block_modulus_pa *= 1.5;
+    let fit = problem.fit(start, SETTLED, || false).unwrap();
+    assert!(!fit.converged);
+}
+
+/// A small deep inclusion that is little stiffer than the tissue: its ridge bends.
+#[test]
+fn points_of_a_ridge_are_on_it() {
+    let truth = Parameters {
+        lump: Some(LumpParameters {
+            diameter_m: 7e-3,
+            depth_m: 8e-3,
+            youngs_modulus_pa: 8.5e3,
+        }),
+        ..block(1.0)
+    };
+    let problem = problem_of(&truth, Resolution::Answer);
+    let fit = problem.fit(truth, SETTLED, || true).unwrap();
+    let ridge = problem.ridge(&fit, || true).unwrap();
+    assert!(ridge.nodes.len() > 4, "{}", ridge.nodes.len());
+    for node in &ridge.nodes {
+        let coordinates = problem.coordinates().into_iter().zip(node.at.iter());
+        let at = coordinates.fold(truth, |at, (coordinate, &value)| {
+            at.moved(coordinate, value - at.get(coordinate))
+        });
+        let normal = problem.normal(&at, None).unwrap();
+        let left = problem.step(&at, &normal, 0.0, Some(ridge.index)).unwrap();
+        // What the last step, shorter than one standard error, and a mesh of its own leave; up to 4 after a single step.
+        assert!(left.size < 0.5, "{}", left.size);
+    }
+}
+
+#[test]
+fn a_covariance_is_one() {
+    let (problem, _) = problem();
+    // Cholesky's factor exists and the values' own errors are not below the stated ones.
+    let white = 1e-3 * problem.measured[0];
+    assert!(problem.factor.l_dirty()[(0, 0)] > white);
+}

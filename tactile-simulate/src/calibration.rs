@@ -1,0 +1,233 @@
+//! The calibration of the sensor: integrated pixel value against the force of a gauge, loading and unloading (Fig. 9).
+
+use ndarray::Array2;
+use rand_distr::{Distribution, StandardNormal};
+
+use tactile_imaging::force::{Branch, CalibrationPair};
+
+use super::contact_law::ContactLaw;
+use super::error::{SimulateError, not_negative, positive, within};
+use super::light::Illumination;
+use super::material::{Elastic, Sphere};
+use super::press::PressScene;
+use super::press_options::Load;
+use super::random::{Purpose, row_stream};
+
+/// How a calibration is run.
+///
+/// ```
+/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16);
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let options = CalibrationOptions { largest_force_n: 1.0, steps: 4, ..CalibrationOptions::default() };
+/// let forces = scene.calibrate(&options)?.true_forces_n;
+/// assert_eq!(forces, [0.0, 0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0]);
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CalibrationOptions {
+    /// What is pressed on the sensor.
+    pub indenter: Sphere,
+    /// The largest force in newton.
+    pub largest_force_n: f64,
+    /// Equal steps from 0 to the largest force; the way back takes as many.
+    pub steps: usize,
+    /// Standard deviation of the gauge's reading in newton.
+    pub gauge_noise_n: f64,
+    /// On the way back the light is that of a larger force F + 4·h·F_max·x(1 − x), x = F/F_max: h is the largest
+    /// difference between the branches as a share of the range. The paper saw none.
+    pub hysteresis: f64,
+}
+
+impl Default for CalibrationOptions {
+    /// A rigid sphere of 10 mm radius, 0 to 2 N in 20 steps and back, 2 mN of gauge noise, no hysteresis.
+    fn default() -> Self {
+        let indenter = Sphere {
+            radius_m: 10e-3,
+            material: Elastic::RIGID,
+        };
+        Self {
+            indenter,
+            largest_force_n: 2.0,
+            steps: 20,
+            gauge_noise_n: 2e-3,
+            hysteresis: 0.0,
+        }
+    }
+}
+
+/// A whole calibration.
+///
+/// ```
+/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16);
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
+/// let (light, force) = series.pairs.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.integrated_pixel_value, sum.1 + p.force_n));
+/// let lens = 1.0 - camera.vignetting; // the most that the corners lose
+/// let slope = force / light / series.newton_per_grey;
+/// assert!((0.99..1.01 / lens).contains(&slope));
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct CalibrationSeries {
+    /// Sum over the pixels of frame minus reference in 8-bit grey levels, and the gauge's reading with its noise, in the order they were taken: up
+    /// and down again.
+    pub pairs: Vec<CalibrationPair>,
+    /// The force itself of every pair, in newton.
+    pub true_forces_n: Vec<f64>,
+    /// Force over integrated pixel value in newton, without noise: exact for a linear response.
+    pub newton_per_grey: f64,
+}
+
+/// The camera's largest grey level.
+const BRIGHTEST: f64 = 255.0;
+/// An indenter is doubled so many times at most: sixteen times the radius is a sixth of the pressure.
+const DOUBLINGS: usize = 4;
+
+impl PressScene {
+    /// Calibrates the scene's sensor (waveguide, camera, light and gain) with another indenter; every reading is the sum
+    /// over a simulated frame. The reference frame is exposed once.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// use tactile_imaging::{Object, Pipeline};
+    /// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene};
+    /// let camera = Camera::default().coarser(16);
+    /// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+    /// let series = scene.calibrate(&CalibrationOptions { steps: 8, ..CalibrationOptions::default() })?;
+    /// let pipeline = Pipeline::from_pairs(&series.pairs, camera.pixel_size_m, Object::sphere(3e-3))?;
+    /// let (reference, frame) = (scene.reference(0), scene.frame(0, 0));
+    /// let mut press = pipeline.press(reference.view())?;
+    /// press.add_frame(frame.view());
+    /// let force = press.contact(0)?.and_then(|contact| contact.force_n);
+    /// assert!(force.is_some_and(|f| (f.value / 0.7 - 1.0).abs() < 0.03));
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// [`SimulateError::OutOfRange`] for an option without meaning; [`SimulateError::CalibrationSaturates`] where a pixel's light is beyond the
+    /// camera's range.
+    pub fn calibrate(
+        &self,
+        options: &CalibrationOptions,
+    ) -> Result<CalibrationSeries, SimulateError> {
+        options.validate()?;
+        let (camera, seed) = (self.options().camera, self.options().seed);
+        let dark = camera.compose(&[], &Illumination::default());
+        let exposure = |light: ndarray::ArrayView2<'_, f64>, k: usize| -> f64 {
+            let frame = camera.expose_for(Purpose::CalibrationFrames, light, seed, k as u64);
+            frame.iter().map(|&v| u64::from(v)).sum::<u64>() as f64
+        };
+        let reference = exposure(dark.view(), 0);
+        let mut gauge = row_stream(seed, Purpose::Gauge, 0, 0);
+        let mut pairs = Vec::with_capacity(2 * options.steps + 1);
+        let mut true_forces_n = Vec::with_capacity(2 * options.steps + 1);
+        for (k, (branch, true_force_n)) in options.forces().enumerate() {
+            let lit = options.lit_force_n(branch, true_force_n);
+            let light = self.calibration_light(options.indenter, lit)?;
+            if is_beyond_range(&light) {
+                let force_n = true_force_n;
+                return Err(SimulateError::CalibrationSaturates { force_n });
+            }
+            let sum = exposure(light.view(), k + 1);
+            let normal: f64 = StandardNormal.sample(&mut gauge);
+            let force_n = true_force_n + options.gauge_noise_n * normal;
+            pairs.push(CalibrationPair {
+                integrated_pixel_value: sum - reference,
+                force_n,
+                branch,
+            });
+            true_forces_n.push(true_force_n);
+        }
+        Ok(CalibrationSeries {
+            pairs,
+            true_forces_n,
+            newton_per_grey: camera.pixel_area_m2() / self.grey_per_pascal(),
+        })
+    }
+
+    /// The calibration with an indenter of two, four, eight or sixteen times the radius where the given one saturates the camera: a gain that
+    /// suits the low pressure of a large or soft object is too high for a small rigid ball.
+    ///
+    /// ```
+    /// use tactile_simulate::{CalibrationOptions, Camera, Elastic, PressOptions, PressScene, Sphere};
+    /// let camera = Camera::default().coarser(16);
+    /// let object = Sphere { radius_m: 20e-3, material: Elastic::CL2003X };
+    /// let scene = PressScene::new(PressOptions { camera, object, ..PressOptions::default() })?;
+    /// let given = CalibrationOptions::default();
+    /// assert!(scene.calibrate(&given).is_err());
+    /// assert!(scene.calibrate(&scene.unsaturated(given)?).is_ok());
+    /// # Ok::<(), tactile_simulate::SimulateError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`SimulateError::OutOfRange`] for an option without meaning; [`SimulateError::CalibrationSaturates`] where the largest of these
+    /// saturates too.
+    pub fn unsaturated(
+        &self,
+        mut options: CalibrationOptions,
+    ) -> Result<CalibrationOptions, SimulateError> {
+        options.validate()?;
+        // Light grows with the force on both branches.
+        let force_n = options.largest_force_n;
+        for _ in 0..=DOUBLINGS {
+            if !is_beyond_range(&self.calibration_light(options.indenter, force_n)?) {
+                return Ok(options);
+            }
+            options.indenter.radius_m *= 2.0;
+        }
+        Err(SimulateError::CalibrationSaturates { force_n })
+    }
+
+    /// The light of an indenter at a normal force.
+    fn calibration_light(
+        &self,
+        indenter: Sphere,
+        force_n: f64,
+    ) -> Result<Array2<f64>, SimulateError> {
+        // A table belongs to the scene's own object.
+        let law = match &self.options().law {
+            ContactLaw::Tabulated(_) | ContactLaw::FiniteElements => ContactLaw::Hertz,
+            closed_form => closed_form.clone(),
+        };
+        let press = self.with_press(indenter, law, Load::normal(force_n))?;
+        Ok(press.expected_frame(0))
+    }
+}
+
+fn is_beyond_range(light: &Array2<f64>) -> bool {
+    light.iter().any(|&grey| grey > BRIGHTEST)
+}
+
+impl CalibrationOptions {
+    /// Up in equal steps from zero, and down again to zero.
+    fn forces(&self) -> impl Iterator<Item = (Branch, f64)> {
+        let (steps, largest) = (self.steps, self.largest_force_n);
+        let force = move |k: usize| largest * k as f64 / steps as f64;
+        let up = (0..=steps).map(move |k| (Branch::Loading, force(k)));
+        up.chain((0..steps).rev().map(move |k| (Branch::Unloading, force(k))))
+    }
+
+    /// The force whose light is seen.
+    fn lit_force_n(&self, branch: Branch, force_n: f64) -> f64 {
+        let x = force_n / self.largest_force_n;
+        match branch {
+            Branch::Loading => force_n,
+            Branch::Unloading => {
+                force_n + 4.0 * self.hysteresis * self.largest_force_n * x * (1.0 - x)
+            }
+        }
+    }
+
+    fn validate(&self) -> Result<(), SimulateError> {
+        self.indenter.validate()?;
+        positive("largest_force_n", self.largest_force_n)?;
+        within("steps", self.steps as f64, 1.0, 1e6)?;
+        not_negative("gauge_noise_n", self.gauge_noise_n)?;
+        // Beyond 1/4 the unloading branch would not be monotone.
+        within("hysteresis", self.hysteresis, 0.0, 0.25)
+    }
+}

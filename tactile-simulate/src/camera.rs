@@ -1,0 +1,334 @@
+//! From light to an 8-bit frame: blur, vignetting, photon and read noise, quantisation and saturation.
+
+use ndarray::{Array2, ArrayView2, Axis};
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, Poisson, StandardNormal};
+
+use super::error::{SimulateError, at_least, not_negative, positive, within};
+use super::light::Illumination;
+use super::pixel_average::{Patch, Plane};
+use super::random::{Purpose, row_stream};
+
+/// From this many electrons on, Poisson noise is drawn from the normal law (skewness 1/√256 = 0.06).
+const NORMAL_FROM_ELECTRONS: f64 = 256.0;
+
+/// The camera's noise in grey levels.
+#[derive(Debug, Clone, Copy)]
+struct NoiseLaw {
+    /// Photon noise: variance over expected grey level, one over the electrons of a grey level.
+    variance_per_grey: f64,
+    read_variance: f64,
+    /// From here on the normal law stands for Poisson's.
+    normal_from_grey: f64,
+}
+
+/// Camera, lens and stray light.
+///
+/// ```
+/// use tactile_simulate::Camera;
+/// let camera = Camera { shape: [200, 300], ..Camera::default() };
+/// assert!((camera.pixel_size_m[0] - 21.55e-6).abs() < 1e-8);
+/// // 15 000 electrons at 255 grey levels: photon noise √(200/58.8), read noise 0.5, rounding; together 1.93.
+/// let light = ndarray::Array2::from_elem((200, 300), 200.0);
+/// let mean = |camera: Camera| camera.expose(light.view(), 1, 0).mapv(f64::from).mean();
+/// assert_eq!(mean(camera.ideal()), Some(200.0));
+/// assert!(mean(camera).is_some_and(|m| m != 200.0 && (m - 200.0).abs() < 5.0 * 1.93 / 60e3_f64.sqrt()));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Camera {
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Size of a pixel on the sensing surface in metres, x and y.
+    pub pixel_size_m: [f64; 2],
+    /// Stray light without contact, in grey levels.
+    pub background_grey: f64,
+    /// Barrel distortion about the frame's middle: the share by which the corners appear too close to it. A place at the distance
+    /// d from the middle is seen at the distance e with d = e (1 + barrel (e/e_corner)²); below 0 a pincushion.
+    pub barrel: f64,
+    /// Share of the light lost in the frame's corners; it grows with the squared distance from the middle.
+    pub vignetting: f64,
+    /// Standard deviation of the Gaussian point-spread function in pixels; 0 for none.
+    pub blur_sigma_px: f64,
+    /// Electrons at grey level 255, which set the photon noise; infinite for none.
+    pub full_well_electrons: f64,
+    /// Standard deviation of the read noise in grey levels; 0 for none.
+    pub read_noise_grey: f64,
+}
+
+impl Default for Camera {
+    /// The paper's 1392×1042 pixels over 30 mm, 15 grey levels of stray light, 3 % vignetting, 0.8 px blur, a full well
+    /// of 15 000 electrons (a scientific CCD of that pitch) and half a grey level of read noise.
+    fn default() -> Self {
+        Self {
+            shape: [1042, 1392],
+            pixel_size_m: [30e-3 / 1392.0; 2],
+            background_grey: 15.0,
+            barrel: 0.0,
+            vignetting: 0.03,
+            blur_sigma_px: 0.8,
+            full_well_electrons: 15e3,
+            read_noise_grey: 0.5,
+        }
+    }
+}
+
+impl Camera {
+    /// The same field of view, lens and noise of a pixel on pixels that are `factor` times as wide and high; 0 is taken as 1. What
+    /// needs no fine frame is drawn `factor²` times as fast.
+    ///
+    /// ```
+    /// use tactile_simulate::Camera;
+    /// let camera = Camera::default().coarser(4);
+    /// assert_eq!(camera.shape, [260, 348]);
+    /// assert!((camera.pixel_size_m[0] * 348.0 / 30e-3 - 1.0).abs() < 1e-12);
+    /// ```
+    pub fn coarser(self, factor: usize) -> Self {
+        let factor = factor.max(1);
+        Self {
+            shape: self.shape.map(|pixels| pixels / factor),
+            pixel_size_m: self.pixel_size_m.map(|size| size * factor as f64),
+            ..self
+        }
+    }
+
+    /// The same camera without blur, vignetting and noise: what is left is rounding to grey levels.
+    pub fn ideal(self) -> Self {
+        Self {
+            vignetting: 0.0,
+            blur_sigma_px: 0.0,
+            full_well_electrons: f64::INFINITY,
+            read_noise_grey: 0.0,
+            ..self
+        }
+    }
+
+    /// Area of a pixel on the sensing surface in square metres.
+    pub(super) fn pixel_area_m2(&self) -> f64 {
+        self.pixel_size_m[0] * self.pixel_size_m[1]
+    }
+
+    /// The coordinates (x, y) of the frame's middle in pixels.
+    pub(super) fn middle_px(&self) -> [f64; 2] {
+        [
+            (self.shape[1] as f64 - 1.0) / 2.0,
+            (self.shape[0] as f64 - 1.0) / 2.0,
+        ]
+    }
+
+    /// Lens and pixels, as the image plane of a contact.
+    pub(super) fn plane(&self) -> Plane {
+        let middle = self.middle_px();
+        let [width, height] = self.pixel_size_m;
+        let corner = (middle[0] * width).hypot(middle[1] * height);
+        Plane {
+            middle_px: middle,
+            pixel_size_m: self.pixel_size_m,
+            bend: self.barrel / (corner * corner).max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// The centre asked for, or the frame's middle.
+    pub(super) fn centre_px(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
+        asked.unwrap_or_else(|| self.middle_px())
+    }
+
+    /// Turns expected grey levels into an exposure: noise, rounding, and clipping at 0 and 255. Each (`seed`, `frame`)
+    /// has its own noise. A caller may pass any image; O(pixels).
+    pub fn expose(&self, expected_grey: ArrayView2<'_, f64>, seed: u64, frame: u64) -> Array2<u8> {
+        self.expose_for(Purpose::Frames, expected_grey, seed, frame)
+    }
+
+    /// [`expose`](Self::expose) with the streams of another purpose.
+    pub(super) fn expose_for(
+        &self,
+        purpose: Purpose,
+        expected_grey: ArrayView2<'_, f64>,
+        seed: u64,
+        frame: u64,
+    ) -> Array2<u8> {
+        let mut image = Array2::zeros(expected_grey.dim());
+        let law = self.noise_law();
+        for (row, (mut out, light)) in image
+            .rows_mut()
+            .into_iter()
+            .zip(expected_grey.rows())
+            .enumerate()
+        {
+            let mut rng = row_stream(seed, purpose, frame, row);
+            for (pixel, &grey) in out.iter_mut().zip(light) {
+                // `as` cuts towards zero and saturates at 0 and 255.
+                *pixel = (self.noisy(grey, &law, &mut rng) + 0.5) as u8;
+            }
+        }
+        image
+    }
+
+    fn electrons_per_grey(&self) -> f64 {
+        self.full_well_electrons / 255.0
+    }
+
+    fn noisy(&self, grey: f64, law: &NoiseLaw, rng: &mut ChaCha8Rng) -> f64 {
+        let normal: f64 = StandardNormal.sample(rng);
+        if grey >= law.normal_from_grey {
+            return grey + (grey * law.variance_per_grey + law.read_variance).sqrt() * normal;
+        }
+        let photons = match Poisson::new(grey / law.variance_per_grey) {
+            Ok(law) => law.sample(rng),
+            Err(_) => 0.0, // no light
+        };
+        photons * law.variance_per_grey + self.read_noise_grey * normal
+    }
+
+    fn noise_law(&self) -> NoiseLaw {
+        NoiseLaw {
+            variance_per_grey: self.electrons_per_grey().recip(),
+            read_variance: self.read_noise_grey * self.read_noise_grey,
+            normal_from_grey: NORMAL_FROM_ELECTRONS / self.electrons_per_grey(),
+        }
+    }
+
+    /// Pixels that a patch must reach beyond the contact so that the blur has all its light.
+    pub(super) fn blur_reach(&self) -> usize {
+        (4.0 * self.blur_sigma_px).ceil() as usize
+    }
+
+    /// Blurs a patch in place; light that leaves the patch is lost.
+    pub(super) fn blur(&self, patch: &mut Patch) {
+        let reach = self.blur_reach();
+        if reach == 0 {
+            return;
+        }
+        let weight = |k: usize| (-0.5 * (k as f64 / self.blur_sigma_px).powi(2)).exp();
+        let total = 1.0 + 2.0 * (1..=reach).map(weight).sum::<f64>();
+        let kernel: Vec<f64> = (0..=reach).map(|k| weight(k) / total).collect();
+        for axis in [Axis(0), Axis(1)] {
+            let source = patch.values.clone();
+            patch.values.map_inplace(|v| *v *= kernel[0]);
+            let length = source.len_of(axis);
+            for (k, &w) in kernel
+                .iter()
+                .enumerate()
+                .skip(1)
+                .filter(|(k, _)| *k < length)
+            {
+                let head = ndarray::Slice::from(..length - k);
+                let tail = ndarray::Slice::from(k..);
+                patch
+                    .values
+                    .slice_axis_mut(axis, tail)
+                    .scaled_add(w, &source.slice_axis(axis, head));
+                patch
+                    .values
+                    .slice_axis_mut(axis, head)
+                    .scaled_add(w, &source.slice_axis(axis, tail));
+            }
+        }
+    }
+
+    /// Expected grey levels: background plus the patches of leaked light, times illumination and lens.
+    pub(super) fn compose(
+        &self,
+        leaked_grey: &[Patch],
+        illumination: &Illumination,
+    ) -> Array2<f64> {
+        let [rows, cols] = self.shape;
+        let mut frame = Array2::from_elem((rows, cols), self.background_grey);
+        for patch in leaked_grey {
+            patch.add_to(&mut frame);
+        }
+        let [cx, cy] = self.middle_px();
+        let fall = self.vignetting / (cx * cx + cy * cy).max(f64::MIN_POSITIVE);
+        let tilt = [
+            illumination.tilt[0] / (2.0 * cx).max(1.0),
+            illumination.tilt[1] / (2.0 * cy).max(1.0),
+        ];
+        for (r, mut line) in frame.rows_mut().into_iter().enumerate() {
+            let dy = r as f64 - cy;
+            for (c, value) in line.iter_mut().enumerate() {
+                let dx = c as f64 - cx;
+                let lens = 1.0 - fall * (dx * dx + dy * dy);
+                *value *= lens * (illumination.level + tilt[0] * dx + tilt[1] * dy).max(0.0);
+            }
+        }
+        frame
+    }
+
+    /// An exposure of a target instead of the sensing surface: bright dots of a third of the pitch (in metres) in diameter on a
+    /// square grid, 180 grey levels above the background, through the same lens, blur, vignetting and noise.
+    ///
+    /// ```
+    /// use tactile_simulate::Camera;
+    /// let camera = Camera::default().coarser(4);
+    /// let target = camera.dot_target(2e-3, 7);
+    /// let bright = target.iter().filter(|v| **v > 100).count() as f64 / target.len() as f64;
+    /// // π/4 of a ninth of the area.
+    /// assert!((bright - 0.0873).abs() < 0.01, "{bright}");
+    /// ```
+    pub fn dot_target(&self, pitch_m: f64, seed: u64) -> Array2<u8> {
+        const LIGHT_GREY: f64 = 180.0;
+        const STEPS: i32 = 4;
+        let plane = self.plane();
+        let lit = |pixel: [f64; 2]| {
+            // The middle of the frame lies between dots, as it would by chance.
+            let place = plane.to_metres(pixel).map(|p| p / pitch_m + 0.3);
+            let from_dot = place.map(|p| p - p.round());
+            f64::from(from_dot[0].hypot(from_dot[1]) < 1.0 / 6.0)
+        };
+        let [rows, cols] = self.shape;
+        let offset = |k: i32| (f64::from(k) + 0.5) / f64::from(STEPS) - 0.5;
+        let share = |(r, c): (usize, usize)| {
+            let parts = (0..STEPS * STEPS)
+                .map(|k| lit([c as f64 + offset(k % STEPS), r as f64 + offset(k / STEPS)]));
+            parts.sum::<f64>() / f64::from(STEPS * STEPS)
+        };
+        let mut patch = Patch {
+            origin: [0, 0],
+            values: Array2::from_shape_fn((rows, cols), |at| LIGHT_GREY * share(at)),
+        };
+        self.blur(&mut patch);
+        let light = self.compose(&[patch], &Illumination::default());
+        self.expose_for(Purpose::CalibrationFrames, light.view(), seed, 1 << 40)
+    }
+
+    /// An exposure without contact; each `repeat` has its own noise.
+    pub(super) fn expose_reference(&self, seed: u64, repeat: u32) -> Array2<u8> {
+        let dark = self.compose(&[], &Illumination::default());
+        self.expose(dark.view(), seed, u64::from(repeat) << 16)
+    }
+
+    /// An exposure of the light of load `load`; each `repeat` has its own noise.
+    pub(super) fn expose_load(
+        &self,
+        light: ArrayView2<'_, f64>,
+        seed: u64,
+        load: usize,
+        repeat: u32,
+    ) -> Array2<u8> {
+        self.expose(light, seed, u64::from(repeat) << 16 | (load as u64 + 1))
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+        at_least("shape", self.shape[0].min(self.shape[1]), 1)?;
+        within(
+            "shape",
+            self.shape[0].max(self.shape[1]) as f64,
+            1.0,
+            65535.0,
+        )?;
+        positive("pixel_size_m", self.pixel_size_m[0])?;
+        positive("pixel_size_m", self.pixel_size_m[1])?;
+        not_negative("background_grey", self.background_grey)?;
+        // Beyond, the image folds over in the corners.
+        within("barrel", self.barrel, -0.3, 0.3)?;
+        within("vignetting", self.vignetting, 0.0, 1.0)?;
+        within("blur_sigma_px", self.blur_sigma_px, 0.0, 1000.0)?;
+        within(
+            "full_well_electrons",
+            self.full_well_electrons,
+            1.0,
+            f64::INFINITY,
+        )?;
+        not_negative("read_noise_grey", self.read_noise_grey)
+    }
+}

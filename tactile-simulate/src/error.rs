@@ -1,0 +1,142 @@
+//! What can be wrong with the description of a scene.
+use std::fmt;
+
+/// A scene's description was rejected.
+///
+/// ```
+/// use tactile_simulate::{PressOptions, PressScene, SimulateError, UniaxialOptions, UniaxialScene};
+/// let none = PressScene::new(PressOptions { loads: vec![], ..PressOptions::default() }).unwrap_err();
+/// assert_eq!(none, SimulateError::TooFew { field: "loads", expected: 1, found: 0 });
+/// let crushed = UniaxialOptions { forces_n: vec![5.0], ..UniaxialOptions::default() };
+/// let Err(SimulateError::Overload { limit_n, .. }) = UniaxialScene::new(crushed) else { unreachable!() };
+/// assert!((limit_n - 103e3 * 144e-6 / 27f64.sqrt()).abs() < 1e-9, "E A₀/(3√3)");
+/// ```
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulateError {
+    /// A value lies outside the range that has a meaning (NaN always does).
+    #[error("{field} is {}, expected a number in {} to {}", Short(*found), Short(six_digits(*minimum)), Short(six_digits(*maximum)))]
+    OutOfRange {
+        /// The field's name.
+        field: &'static str,
+        /// Smallest value allowed.
+        minimum: f64,
+        /// Largest value allowed.
+        maximum: f64,
+        /// The value given.
+        found: f64,
+    },
+    /// Finite-element contacts of a ball or a waveguide that the crate has none of.
+    #[error(
+        "finite-element contacts are there for balls of 3 mm radius of CL2000X or CL2003X on the default waveguide: give others as tabulated states"
+    )]
+    NoFiniteElements,
+    /// A list has fewer entries than needed.
+    #[error("{field} has {found} entries, expected at least {expected}")]
+    TooFew {
+        /// The field's name.
+        field: &'static str,
+        /// Entries needed.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
+    /// A column has another length than the column it belongs to.
+    #[error("{field} has {found} entries, expected {expected}")]
+    LengthMismatch {
+        /// The field's name.
+        field: &'static str,
+        /// Entries of the other columns.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
+    /// A frame of the calibration is too bright for the camera: its sum would not be in proportion to the force.
+    #[error(
+        "at {force_n} N the calibration's indenter lights pixels beyond the camera's range: take a larger indenter, or a smaller force"
+    )]
+    CalibrationSaturates {
+        /// The smallest force of the calibration at which pixels saturate.
+        force_n: f64,
+    },
+    /// A load is too great for the law to have an equilibrium.
+    #[error("the force {force_n} N exceeds {limit_n} N, the largest the material law can carry")]
+    Overload {
+        /// The force asked for.
+        force_n: f64,
+        /// The largest force in equilibrium.
+        limit_n: f64,
+    },
+}
+
+/// Smallest value called positive: far below any length, modulus or count in use.
+const TINY: f64 = f64::MIN_POSITIVE;
+
+/// A limit to six significant digits: more say nothing to a reader.
+fn six_digits(limit: f64) -> f64 {
+    format!("{limit:.5e}").parse().unwrap_or(limit)
+}
+
+/// A number as it is given, but not with hundreds of zeros.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0 == 0.0 || (1e-6..1e9).contains(&self.0.abs()) {
+            write!(f, "{}", self.0)
+        } else {
+            write!(f, "{:e}", self.0)
+        }
+    }
+}
+
+/// `found` if it lies in `minimum..=maximum`.
+pub(super) fn within(
+    field: &'static str,
+    found: f64,
+    minimum: f64,
+    maximum: f64,
+) -> Result<(), SimulateError> {
+    if found >= minimum && found <= maximum {
+        Ok(())
+    } else {
+        Err(SimulateError::OutOfRange {
+            field,
+            minimum,
+            maximum,
+            found,
+        })
+    }
+}
+
+/// Positive and finite.
+pub(super) fn positive(field: &'static str, found: f64) -> Result<(), SimulateError> {
+    within(field, found, TINY, f64::MAX)
+}
+
+/// Zero or positive, and finite.
+pub(super) fn not_negative(field: &'static str, found: f64) -> Result<(), SimulateError> {
+    within(field, found, 0.0, f64::MAX)
+}
+
+/// Any finite number.
+pub(super) fn finite(field: &'static str, found: f64) -> Result<(), SimulateError> {
+    within(field, found, f64::MIN, f64::MAX)
+}
+
+/// At least `expected` entries.
+pub(super) fn at_least(
+    field: &'static str,
+    found: usize,
+    expected: usize,
+) -> Result<(), SimulateError> {
+    if found >= expected {
+        Ok(())
+    } else {
+        Err(SimulateError::TooFew {
+            field,
+            expected,
+            found,
+        })
+    }
+}

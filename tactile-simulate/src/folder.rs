@@ -1,0 +1,119 @@
+//! A scene written as the files that the command line reads: images, calibration table and scene description.
+
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use super::calibration::CalibrationSeries;
+use super::contact_law::ContactLaw;
+use super::press::PressScene;
+use tactile_imaging::io::{ReadError, write_bytes, write_grey_image};
+
+/// Writes a scene and a calibration of its sensor as files: `reference.png`, `frame_1.png` …, `calibration.csv` (columns `integrated_pixel_value,force_N`) and `scene.toml`
+/// to `folder`, which is made if need be. Returns the path of `scene.toml`.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use tactile_imaging::scene::Scene;
+/// use tactile_simulate::{CalibrationOptions, Camera, PressOptions, PressScene, write_folder};
+/// let camera = Camera::default().coarser(16);
+/// let scene = PressScene::new(PressOptions { camera, ..PressOptions::default() })?;
+/// let folder = tempfile::tempdir()?;
+/// let calibration = scene.calibrate(&CalibrationOptions { steps: 4, ..CalibrationOptions::default() })?;
+/// let path = write_folder(&scene, &calibration, folder.path())?;
+/// let (read, data) = (Scene::read(&path)?, Scene::read(&path)?.load()?);
+/// assert_eq!(read.frames[1].force_n, Some(1.2));
+/// assert_eq!(data.frames[1], scene.frame(1, 0));
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// [`ReadError::Write`] and [`ReadError::Image`], naming the file that could not be written.
+pub fn write_folder(
+    scene: &PressScene,
+    calibration: &CalibrationSeries,
+    folder: &Path,
+) -> Result<PathBuf, ReadError> {
+    let made = scene.simulate();
+    write_grey_image(folder.join("reference.png"), made.reference.view())?;
+    for (k, frame) in made.frames.iter().enumerate() {
+        write_grey_image(folder.join(format!("frame_{}.png", k + 1)), frame.view())?;
+    }
+    let mut table = String::from("integrated_pixel_value,force_N\n");
+    for pair in &calibration.pairs {
+        table.push_str(&format!(
+            "{},{}\n",
+            pair.integrated_pixel_value, pair.force_n
+        ));
+    }
+    write_bytes(&folder.join("calibration.csv"), table.as_bytes())?;
+    let path = folder.join("scene.toml");
+    write_bytes(&path, description(scene).to_string().as_bytes())?;
+    Ok(path)
+}
+
+/// The scene's description as the command line reads it.
+fn description(scene: &PressScene) -> Table {
+    let options = scene.options();
+    let size = Value::Array(options.camera.pixel_size_m.map(Value::Float).to_vec());
+    let frame = |(k, load): (usize, &super::Load)| {
+        let image = Value::String(format!("frame_{}.png", k + 1));
+        Value::Table(table([
+            ("image", image),
+            ("force_N", Value::Float(load.force_n)),
+        ]))
+    };
+    let object = table([
+        ("shape", Value::String("sphere".to_owned())),
+        ("radius_m", Value::Float(options.object.radius_m)),
+        (
+            "poisson_ratio",
+            Value::Float(options.object.material.poisson_ratio),
+        ),
+    ]);
+    let layers = Value::Array(options.waveguide.layers.iter().map(layer).collect());
+    // A closed form is read by its own law; contacts from elsewhere by the default one.
+    let estimator = match options.law {
+        ContactLaw::Hertz | ContactLaw::Tatara => "sphere",
+        _ => "best",
+    };
+    let stages = table([("estimator", Value::String(estimator.to_owned()))]);
+    table([
+        ("reference", Value::String("reference.png".to_owned())),
+        ("pixel_size_m", size),
+        (
+            "calibration",
+            Value::Table(table([(
+                "pairs",
+                Value::String("calibration.csv".to_owned()),
+            )])),
+        ),
+        (
+            "frames",
+            Value::Array(options.loads.iter().enumerate().map(frame).collect()),
+        ),
+        ("object", Value::Table(object)),
+        ("waveguide", Value::Table(table([("layers", layers)]))),
+        ("stages", Value::Table(stages)),
+    ])
+}
+
+fn table<const N: usize>(entries: [(&str, Value); N]) -> Table {
+    entries
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
+}
+
+/// A layer of the waveguide.
+fn layer(l: &super::material::WaveguideLayer) -> Value {
+    Value::Table(table([
+        ("refractive_index", Value::Float(l.refractive_index)),
+        ("thickness_m", Value::Float(l.thickness_m)),
+        (
+            "youngs_modulus_pa",
+            Value::Float(l.material.youngs_modulus_pa),
+        ),
+        ("poisson_ratio", Value::Float(l.material.poisson_ratio)),
+    ]))
+}

@@ -1,0 +1,85 @@
+#![doc = include_str!("../README.md")]
+//!
+//! # Overview
+//! A scene goes forward only: force → contact pressure → light → photons → 8-bit frame. But for finite elements it shares no code with the
+//! measuring crates, so that a measurement of a simulated frame is a test and not a tautology.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`material`](Elastic) | the pressed sphere, the waveguide's layers |
+//! | [`contact`](Contact) | sphere on waveguide: pressure, radius, indentation, surface displacement |
+//! | [`contact_state`](ContactState) | contacts computed elsewhere, as tables over the radius |
+//! | `solved_states` | balls and cylinders between plates by the finite elements of `tactile-elasticity` (feature `fem`) |
+//! | `pixel_average` | exact averages of the contact pressure over pixels |
+//! | [`light`](Response) | pressure → grey levels |
+//! | [`camera`](Camera) | blur, vignetting, photon and read noise, quantisation |
+//! | [`press`](PressScene) | one sphere pressed at several loads: frames and [`PressTruth`] |
+//! | [`calibration`](CalibrationSeries) | light against gauge force, loading and unloading |
+//! | [`stream`](FrameStream) | frames of loading cycles at camera rate, with drifting illumination |
+//! | [`uniaxial`](UniaxialScene) | a patterned block squeezed between plates: stress over strain is the modulus exactly |
+//! | `folder` | a scene written as files (feature `scene`) |
+//!
+//! # Conventions
+//! Images are `[row, column]`; x is the column, y the row, z points from the sensor to the object. The centre of the
+//! first pixel is (0, 0). SI units, except where a name ends in `_px` or `_grey`.
+//!
+//! # Scale of the default frame
+//! The paper gives a pixel of 4.65 µm and a sensing side of 30 mm seen by 1392 pixels; both cannot hold on the
+//! sensing surface (30 mm / 4.65 µm = 6452). They do hold together when 4.65 µm is the pitch on the camera chip and
+//! the lens reduces 30 mm to the chip's 6.47 mm (magnification 0.216). The pixel on the *surface* is then
+//! 30 mm / 1392 = 21.55 µm, which is [`Camera::default`]'s.
+//!
+//! # Reproducibility
+//! Random numbers come from ChaCha8 (a published algorithm whose stream is fixed by its definition, unlike `StdRng`
+//! and `SmallRng`, which may change with any release of `rand`), turned into normal deviates by the ziggurat of
+//! `rand_distr`. Each row of each frame has its own stream, so frames can be made in any order, alone or in
+//! parallel, with the same bits.
+#![forbid(unsafe_code)]
+
+mod calibration;
+mod camera;
+mod contact;
+mod contact_law;
+mod contact_state;
+mod error;
+mod finite_elements;
+#[cfg(feature = "scene")]
+mod folder;
+mod leak;
+mod light;
+mod material;
+mod pixel_average;
+mod press;
+mod press_options;
+mod random;
+mod relief;
+mod simulation;
+#[cfg(feature = "fem")]
+mod solved_states;
+mod stream;
+mod trial;
+mod truth;
+mod uniaxial;
+mod uniaxial_options;
+mod uniaxial_state;
+
+pub use calibration::{CalibrationOptions, CalibrationSeries};
+pub use camera::Camera;
+pub use contact::Contact;
+pub use contact_law::ContactLaw;
+pub use contact_state::ContactState;
+pub use error::SimulateError;
+#[cfg(feature = "scene")]
+pub use folder::write_folder;
+pub use light::{Illumination, Response};
+pub use material::{Elastic, Sphere, Waveguide, WaveguideLayer};
+pub use press::PressScene;
+pub use press_options::{Gain, Load, PressOptions};
+pub use relief::{FaceOutline, SurfacePattern};
+pub use simulation::PressSimulation;
+pub use stream::{FrameStream, LoadCycle, StreamedFrame};
+pub use trial::Trial;
+pub use truth::{PressTruth, SurfaceScaling};
+pub use uniaxial::UniaxialScene;
+pub use uniaxial_options::UniaxialOptions;
+pub use uniaxial_state::UniaxialState;

@@ -1,0 +1,109 @@
+//! Pressure to light: how much brighter a pressed pixel is.
+
+use super::error::{SimulateError, finite, not_negative, within};
+
+/// Light that leaks under pressure p, relative to the gain g in grey levels per pascal. All are monotone up to the
+/// largest peak pressure p_max of the scene. Hertz's pressure under the first two is averaged over pixels exactly, everything
+/// else by quadrature (1e-4 of the light).
+///
+/// ```
+/// use tactile_simulate::{Camera, PressOptions, PressScene, Response};
+/// let camera = Camera::default().coarser(16);
+/// // The light at 1.2 N over that at 0.7 N.
+/// let ratio = |response| {
+///     let scene = PressScene::new(PressOptions { camera, response, ..PressOptions::default() })?;
+///     Ok::<_, tactile_simulate::SimulateError>(
+///         scene.truth(1).integrated_pixel_value / scene.truth(0).integrated_pixel_value,
+///     )
+/// };
+/// assert!((ratio(Response::Linear)? - 1.2 / 0.7).abs() < 1e-9);
+/// assert!(ratio(Response::Quadratic { droop: 0.3 })? < 1.2 / 0.7);
+/// // Hertz: a² goes as F^⅔ and pⁿ as F^(n/3).
+/// let power = (1.2_f64 / 0.7).powf((2.0 + 0.9) / 3.0);
+/// assert!((ratio(Response::Power { exponent: 0.9 })? / power - 1.0).abs() < 1e-3);
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Response {
+    /// g·p: the frame's sum is proportional to the force.
+    #[default]
+    Linear,
+    /// g·p·(1 − κ p/p_max): bends down as fewer trapped rays are left to leak. κ in 0 to 0.5.
+    Quadratic {
+        /// κ, the share of light lost at p_max.
+        droop: f64,
+    },
+    /// g·p_max·(p/p_max)ⁿ, n in 0.25 to 4: light that is no longer in proportion to the pressure, so that the frame's sum depends
+    /// on how the force is spread.
+    Power {
+        /// n, 1 for [`Linear`](Self::Linear).
+        exponent: f64,
+    },
+}
+
+impl Response {
+    /// κ of g·p·(1 − κ p/p_max).
+    pub(super) fn droop(&self) -> f64 {
+        match *self {
+            Self::Linear | Self::Power { .. } => 0.0,
+            Self::Quadratic { droop } => droop,
+        }
+    }
+
+    /// Light over g·p_max at the pressure `share`·p_max.
+    pub(super) fn light(&self, share: f64) -> f64 {
+        match *self {
+            Self::Linear => share,
+            Self::Quadratic { droop } => share * (1.0 - droop * share),
+            Self::Power { exponent } => share.powf(exponent),
+        }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+        if let Self::Power { exponent } = *self {
+            return within("exponent", exponent, 0.25, 4.0);
+        }
+        within("droop", self.droop(), 0.0, 0.5)
+    }
+}
+
+/// Illumination of one frame, relative to the reference frame: it scales background and leaked light alike.
+///
+/// ```
+/// use tactile_simulate::{Camera, Illumination, Load, PressOptions, PressScene};
+/// let camera = Camera::default().coarser(16).ideal();
+/// let illumination = Illumination { level: 1.2, tilt: [0.1, 0.0] };
+/// let loads = vec![Load { illumination, ..Load::normal(0.0) }];
+/// let light = PressScene::new(PressOptions { camera, loads, ..PressOptions::default() })?.expected_frame(0);
+/// for (column, share) in [(0, 1.15), (43, 1.2), (86, 1.25)] {
+///     assert!((light[[0, column]] - share * camera.background_grey).abs() < 1e-9);
+/// }
+/// # Ok::<(), tactile_simulate::SimulateError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Illumination {
+    /// Brightness, 1 for unchanged.
+    pub level: f64,
+    /// Relative change of brightness from the frame's first to its last column (x) and row (y); 0 for unchanged.
+    pub tilt: [f64; 2],
+}
+
+impl Default for Illumination {
+    fn default() -> Self {
+        Self {
+            level: 1.0,
+            tilt: [0.0; 2],
+        }
+    }
+}
+
+impl Illumination {
+    pub(super) fn validate(&self) -> Result<(), SimulateError> {
+        not_negative("level", self.level)?;
+        finite("tilt", self.tilt[0])?;
+        finite("tilt", self.tilt[1])
+    }
+}

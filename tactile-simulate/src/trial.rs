@@ -1,0 +1,98 @@
+//! A simulated press, measured blindly and laid beside its truth.
+use crate::{
+    CalibrationOptions, ContactLaw, PressOptions, PressScene, PressSimulation, SimulateError,
+    WaveguideLayer,
+};
+use tactile_imaging::elasticity::contact::{Layer, Waveguide};
+use tactile_imaging::force::CalibrationPair;
+use tactile_imaging::pipeline::{EstimatorChoice, PipelineError, StagesConfig};
+use tactile_imaging::{Object, Pipeline, Press};
+
+/// A simulated press with the calibration of its sensor: the frames to measure and the truth to compare with.
+///
+/// ```
+/// use tactile_simulate::{Trial, CalibrationOptions, Camera, PressOptions};
+/// // A coarse camera: 174 × 130 pixels on 30 mm.
+/// let camera = Camera::default().coarser(8);
+/// let trial = Trial::new(PressOptions { camera, ..PressOptions::default() }, &CalibrationOptions::default())?;
+/// let pipeline = trial.pipeline()?;
+/// let modulus = trial.press(&pipeline)?.modulus()?;
+/// assert!((modulus.youngs_modulus_pa / trial.simulation.youngs_modulus_pa - 1.0).abs() < 0.0538);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// The scene.
+    pub scene: PressScene,
+    /// Its frames and their truth.
+    pub simulation: PressSimulation,
+    /// What the calibration of this sensor with a gauge gave.
+    pub pairs: Vec<CalibrationPair>,
+}
+
+impl Trial {
+    /// Simulates a calibration series and the press itself. Where the calibration's ball saturates the camera, one of two, four, eight or sixteen times
+    /// its radius takes its place: a gain that suits the low pressure of a large or soft object is too high for a small rigid ball.
+    ///
+    /// # Errors
+    /// [`SimulateError`] for options that have no meaning.
+    pub fn new(
+        options: PressOptions,
+        calibration: &CalibrationOptions,
+    ) -> Result<Self, SimulateError> {
+        let scene = PressScene::new(options)?;
+        let calibration = scene.unsaturated(*calibration)?;
+        let pairs = scene.calibrate(&calibration)?.pairs;
+        let simulation = scene.simulate();
+        Ok(Self {
+            scene,
+            simulation,
+            pairs,
+        })
+    }
+
+    /// The default pipeline for the simulated sensor: it knows the calibration, the pixel size, the ball's radius and the
+    /// waveguide, and nothing of the truth. Where the scene obeys a closed form (Hertz, Tatara), the estimator is Hertz's with the layers in series
+    /// ([`EstimatorChoice::Sphere`]), whose law the truth shares; where its contacts come from elsewhere, the default.
+    ///
+    /// # Errors
+    /// [`PipelineError`].
+    pub fn pipeline(&self) -> Result<Pipeline, PipelineError> {
+        let options = self.scene.options();
+        let layer = |l: &WaveguideLayer| Layer {
+            thickness_m: l.thickness_m,
+            youngs_modulus_pa: l.material.youngs_modulus_pa,
+            poisson_ratio: l.material.poisson_ratio,
+        };
+        let layers = options.waveguide.layers.iter().map(layer).collect();
+        let waveguide = Waveguide::new(layers).map_err(PipelineError::Material)?;
+        let ball = options.object;
+        let object = Object::Sphere {
+            radius_m: ball.radius_m,
+            poisson_ratio: ball.material.poisson_ratio,
+        };
+        let pipeline = Pipeline::from_pairs(&self.pairs, self.simulation.pixel_size_m, object)?;
+        let config = StagesConfig {
+            estimator: match options.law {
+                ContactLaw::Hertz | ContactLaw::Tatara => EstimatorChoice::Sphere,
+                _ => EstimatorChoice::default(),
+            },
+            ..StagesConfig::default()
+        };
+        pipeline
+            .with_settings(|settings| settings.waveguide = Some(waveguide))?
+            .with_stages(&config)
+    }
+
+    /// The frames on a pipeline.
+    ///
+    /// # Errors
+    /// [`PipelineError`].
+    pub fn press(&self, pipeline: &Pipeline) -> Result<Press<'_>, PipelineError> {
+        let mut press = pipeline.press(self.simulation.reference.view())?;
+        for frame in &self.simulation.frames {
+            press.add_frame(frame.view());
+        }
+        Ok(press)
+    }
+}
