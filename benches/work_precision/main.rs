@@ -33,7 +33,7 @@ const WITHIN: f64 = 1.2;
 /// A name and what fills the study of that name.
 type Filler = (&'static str, fn(&mut Study));
 
-const STUDIES: [Filler; 12] = [
+const STUDIES: [Filler; 11] = [
     ("splines", tps::clean),
     ("splines_noise", tps::noisy),
     ("matching", matching::noisy),
@@ -41,7 +41,6 @@ const STUDIES: [Filler; 12] = [
     ("surfaces", sfs::surfaces),
     ("slopes", sfs::slopes),
     ("force", force::frame),
-    ("bootstrap", elasticity::bootstrap),
     ("ball_laws", elasticity::laws),
     ("rays_section", optics::section),
     ("rays_volume", optics::volume),

@@ -74,15 +74,12 @@ pub struct ErrorShare {
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// By how much the squared standard error falls without each input's error, the largest part first.
-pub(super) fn of(
-    estimator: &dyn ModulusEstimator<f64>,
-    series: &LoadSeries<f64>,
-) -> Vec<ErrorShare> {
+pub(super) fn of(estimator: &dyn ModulusEstimator, series: &LoadSeries) -> Vec<ErrorShare> {
     let Some(all) = relative_variance(estimator, series) else {
         return Vec::new();
     };
     let shared = *series.shared_errors();
-    let without = |shared: SharedErrors<f64>| series.clone().with_shared_errors(shared).ok();
+    let without = |shared: SharedErrors| series.clone().with_shared_errors(shared).ok();
     let quiet = LoadSeries::new(series.loads().iter().map(quiet).collect::<Vec<_>>())
         .with_shared_errors(shared)
         .ok();
@@ -143,10 +140,7 @@ pub(super) fn of(
     shares
 }
 
-fn relative_variance(
-    estimator: &dyn ModulusEstimator<f64>,
-    series: &LoadSeries<f64>,
-) -> Option<f64> {
+fn relative_variance(estimator: &dyn ModulusEstimator, series: &LoadSeries) -> Option<f64> {
     let estimate = estimator.estimate(series).ok()?;
     let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
     relative.is_finite().then_some(relative * relative)

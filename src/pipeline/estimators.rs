@@ -11,7 +11,7 @@ use crate::elasticity::modulus::{
 use std::sync::{Arc, OnceLock};
 
 /// An estimator that pipelines and their clones share.
-pub(super) type SharedEstimator = Arc<dyn ModulusEstimator<f64> + Send + Sync>;
+pub(super) type SharedEstimator = Arc<dyn ModulusEstimator + Send + Sync>;
 
 /// The estimator where none is chosen. This is the place to change the default.
 ///
@@ -19,7 +19,7 @@ pub(super) type SharedEstimator = Arc<dyn ModulusEstimator<f64> + Send + Sync>;
 /// stress over strain, equation (31); of a flat face regressed over all loads.
 fn default_of(
     object: Object,
-    waveguide: Option<&Waveguide<f64>>,
+    waveguide: Option<&Waveguide>,
 ) -> Result<SharedEstimator, ElasticityError> {
     match object {
         Object::Sphere {
@@ -45,7 +45,7 @@ fn default_of(
 /// Estimators to lay beside the chosen one, the paper's ratio first; for a ball Hertz with the layers in series.
 pub(super) fn that_fit(
     object: Object,
-    waveguide: Option<&Waveguide<f64>>,
+    waveguide: Option<&Waveguide>,
 ) -> Result<Vec<SharedEstimator>, PipelineError> {
     let build = || {
         let mut estimators = vec![shared(paper_ratio(object)?)?];
@@ -79,7 +79,7 @@ pub(super) fn that_fit(
 fn named(
     choice: EstimatorChoice,
     object: Object,
-    waveguide: Option<&Waveguide<f64>>,
+    waveguide: Option<&Waveguide>,
 ) -> Result<SharedEstimator, PipelineError> {
     let needs = |needs| PipelineError::WrongEstimator {
         estimator: choice,
@@ -143,7 +143,7 @@ fn named(
 /// The object's contact laws, of which Akaike's criterion chooses.
 fn least_akaike(
     object: Object,
-    waveguide: Option<&Waveguide<f64>>,
+    waveguide: Option<&Waveguide>,
     wrong_object: PipelineError,
 ) -> Result<SharedEstimator, PipelineError> {
     let build = match (object, waveguide) {
@@ -174,7 +174,7 @@ fn least_akaike(
     build.and_then(shared).map_err(PipelineError::Material)
 }
 
-fn sphere_on_rigid_flat(radius_m: f64, poisson_ratio: f64) -> Result<BestOf<f64>, ElasticityError> {
+fn sphere_on_rigid_flat(radius_m: f64, poisson_ratio: f64) -> Result<BestOf, ElasticityError> {
     Ok(BestOf::new(TataraSphere::new(radius_m, poisson_ratio)?)
         .or(SphereBetweenPlates::new(radius_m, poisson_ratio)?)
         .or(HertzSphere::new(radius_m, poisson_ratio)?))
@@ -199,7 +199,7 @@ fn layer(
 fn on_waveguide(
     radius_m: f64,
     poisson_ratio: f64,
-    waveguide: Option<&Waveguide<f64>>,
+    waveguide: Option<&Waveguide>,
 ) -> Result<SphereOnWaveguide, ElasticityError> {
     let rigid = Waveguide::rigid();
     let guide = waveguide.unwrap_or(&rigid);
@@ -216,12 +216,12 @@ fn paper_ratio(object: Object) -> Result<PaperRatio, ElasticityError> {
 }
 
 /// What the sample is pressed on: the waveguide's layers in series, rigid without layers.
-fn pressed_on(waveguide: Option<&Waveguide<f64>>) -> Body<f64> {
+fn pressed_on(waveguide: Option<&Waveguide>) -> Body {
     waveguide.map_or_else(Body::rigid, Waveguide::as_body)
 }
 
 fn shared(
-    estimator: impl ModulusEstimator<f64> + Send + Sync + 'static,
+    estimator: impl ModulusEstimator + Send + Sync + 'static,
 ) -> Result<SharedEstimator, ElasticityError> {
     Ok(Arc::new(estimator))
 }
@@ -255,7 +255,7 @@ impl EstimatorStage {
     pub(super) fn get(
         &self,
         object: Object,
-        waveguide: Option<&Waveguide<f64>>,
+        waveguide: Option<&Waveguide>,
     ) -> Result<SharedEstimator, PipelineError> {
         match self {
             Self::Given(estimator) => Ok(Arc::clone(estimator)),

@@ -161,7 +161,7 @@ pub enum Flag {
     Assumption {
         /// Which.
         #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::text"))]
-        warning: Warning<f64>,
+        warning: Warning,
     },
 }
 

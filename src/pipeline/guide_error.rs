@@ -10,7 +10,7 @@ const STEP: f64 = 1e-3;
 
 /// ln of the stiffness E_g of the guide under a ball's contact of radius a, F = 4/3 E_g a³/R; `None` where the layer equation
 /// cannot be solved.
-pub(crate) fn log_stiffness(layers: &[Layer<f64>], radius_m: f64) -> Option<f64> {
+pub(crate) fn log_stiffness(layers: &[Layer], radius_m: f64) -> Option<f64> {
     let guide = Waveguide::new(layers.to_vec()).ok()?;
     let equation = LayerEquation::of_layers(&guide, Bond::Bonded).ok()?;
     let contact = equation.solve(radius_m / guide.thickness_m()).ok()?;
@@ -20,9 +20,9 @@ pub(crate) fn log_stiffness(layers: &[Layer<f64>], radius_m: f64) -> Option<f64>
 }
 
 /// Layers with their parameters moved: ln E of all layers, then ln h, then ν.
-pub(crate) fn moved(layers: &[Layer<f64>], step: &DVector<f64>) -> Vec<Layer<f64>> {
+pub(crate) fn moved(layers: &[Layer], step: &DVector<f64>) -> Vec<Layer> {
     let n = layers.len();
-    let layer = |(i, layer): (usize, &Layer<f64>)| Layer {
+    let layer = |(i, layer): (usize, &Layer)| Layer {
         youngs_modulus_pa: layer.youngs_modulus_pa * step[i].exp(),
         thickness_m: layer.thickness_m * step[n + i].exp(),
         poisson_ratio: (layer.poisson_ratio + step[2 * n + i]).min(0.5),
@@ -31,7 +31,7 @@ pub(crate) fn moved(layers: &[Layer<f64>], step: &DVector<f64>) -> Vec<Layer<f64
 }
 
 /// Derivatives of [`log_stiffness`] by ln E, ln h and ν of the layers, in this order.
-pub(crate) fn gradient(layers: &[Layer<f64>], radius_m: f64) -> Option<DVector<f64>> {
+pub(crate) fn gradient(layers: &[Layer], radius_m: f64) -> Option<DVector<f64>> {
     let count = LAYER_PARAMETERS * layers.len();
     let mut slopes = DVector::zeros(count);
     for k in 0..count {
@@ -49,7 +49,7 @@ pub(crate) fn gradient(layers: &[Layer<f64>], radius_m: f64) -> Option<DVector<f
 
 /// Relative standard error of the guide's compliance under a contact of radius a.
 pub(super) fn relative_error(
-    layers: &[Layer<f64>],
+    layers: &[Layer],
     covariance: &DMatrix<f64>,
     radius_m: f64,
 ) -> Option<f64> {
@@ -62,7 +62,7 @@ pub(super) fn relative_error(
 mod tests {
     use super::*;
 
-    fn paper() -> Vec<Layer<f64>> {
+    fn paper() -> Vec<Layer> {
         let layer = |thickness_m, youngs_modulus_pa| Layer {
             thickness_m,
             youngs_modulus_pa,

@@ -14,19 +14,19 @@ pub(super) struct LoadReading {
     pub noise_n: f64,
     /// Error of the force from the calibration.
     pub calibration_n: f64,
-    pub radius_m: Option<Estimate<f64>>,
-    pub indentation_m: Option<Estimate<f64>>,
+    pub radius_m: Option<Estimate>,
+    pub indentation_m: Option<Estimate>,
     /// Area of a flat face.
-    pub face_m2: Option<Estimate<f64>>,
+    pub face_m2: Option<Estimate>,
     /// Strain since the first load.
-    pub mean_strain: Option<Estimate<f64>>,
+    pub mean_strain: Option<Estimate>,
 }
 
 impl LoadReading {
     /// What a contact says of its load; `None` where its force is not known.
     pub(super) fn of(
         contact: &ContactReading,
-        mean_strain: Option<Estimate<f64>>,
+        mean_strain: Option<Estimate>,
         pixel_size_m: [f64; 2],
     ) -> Option<Self> {
         let radius = contact.contact_radius_m;
@@ -64,7 +64,7 @@ pub(super) fn radius_with_floor(
     value: f64,
     standard_error: f64,
     pixel_size_m: [f64; 2],
-) -> Estimate<f64> {
+) -> Estimate {
     let floor = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
     Estimate::new(value, standard_error.hypot(floor))
 }
@@ -72,11 +72,7 @@ pub(super) fn radius_with_floor(
 /// The area of a face with what no outline can know better: a hundredth of a pixel all around it, by which speckles at the rim, blur
 /// and rounding shift the outline from one load to the next. Without it 88 % of the 95 % intervals hold, with it 97 % (`SCENES=400
 /// cargo test --release --test suite moduli_of_blocks -- --nocapture`).
-pub(super) fn area_with_floor(
-    value: f64,
-    standard_error: f64,
-    pixel_size_m: [f64; 2],
-) -> Estimate<f64> {
+pub(super) fn area_with_floor(value: f64, standard_error: f64, pixel_size_m: [f64; 2]) -> Estimate {
     let shift_m = 0.01 * (pixel_size_m[0] * pixel_size_m[1]).sqrt();
     let outline_m = 2.0 * (std::f64::consts::PI * value).sqrt();
     Estimate::new(value, standard_error.hypot(shift_m * outline_m))
@@ -87,7 +83,7 @@ pub(super) fn area_with_floor(
 pub(super) fn series(
     readings: impl Iterator<Item = LoadReading> + Clone,
     settings: &Settings,
-) -> Result<LoadSeries<f64>, PipelineError> {
+) -> Result<LoadSeries, PipelineError> {
     let relative = |r: &LoadReading| (r.calibration_n / r.force_n).abs();
     let common = readings
         .clone()

@@ -35,11 +35,11 @@ pub struct ModulusResult {
     pub estimator: EstimatorKind,
     /// Where the estimator's assumptions fail.
     #[cfg_attr(feature = "serde", serde(serialize_with = "super::outcome::texts"))]
-    pub warnings: Vec<Warning<f64>>,
+    pub warnings: Vec<Warning>,
 }
 
-impl From<&ModulusEstimate<f64>> for ModulusResult {
-    fn from(estimate: &ModulusEstimate<f64>) -> Self {
+impl From<&ModulusEstimate> for ModulusResult {
+    fn from(estimate: &ModulusEstimate) -> Self {
         Self {
             value: estimate.youngs_modulus_pa,
             standard_error: estimate.standard_error_pa,

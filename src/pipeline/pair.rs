@@ -34,9 +34,9 @@ pub struct PairStrain {
     /// Name of the measure.
     pub measure: &'static str,
     /// Strain at every control point of the first frame.
-    pub field: StrainField<f64>,
+    pub field: StrainField,
     /// Mean, spread and standard error.
-    pub summary: StrainSummary<f64>,
+    pub summary: StrainSummary,
 }
 
 impl PairStrain {
@@ -53,7 +53,7 @@ impl PairStrain {
     /// The apparent strain of a ball's load for equation (31). The surface that its pressure is read as swells where the load rises, in all directions,
     /// so that (31) takes the size of the mean e_zz, with the sign of `force_step_n`, the step of the load from the first frame to the second.
     /// (Specimens with a flat face have signed strains, from [`of_faces`].)
-    pub(super) fn of_load(&self, force_step_n: f64) -> Estimate<f64> {
+    pub(super) fn of_load(&self, force_step_n: f64) -> Estimate {
         let size = self.summary.mean[(2, 2)].abs();
         let error = self.summary.standard_error[(2, 2)];
         Estimate::new(size.copysign(force_step_n), error)

@@ -318,7 +318,7 @@ impl StageRunner {
         &self,
         readings: impl Iterator<Item = LoadReading> + Clone,
         poisson_ratio: f64,
-    ) -> Result<LoadSeries<f64>, PipelineError> {
+    ) -> Result<LoadSeries, PipelineError> {
         let series = self.load_series(readings)?;
         let measure = self.pipeline.strain();
         let uniaxial = UniaxialLoads::new(&series, poisson_ratio, measure);
@@ -329,16 +329,16 @@ impl StageRunner {
     pub(super) fn load_series(
         &self,
         readings: impl Iterator<Item = LoadReading> + Clone,
-    ) -> Result<LoadSeries<f64>, PipelineError> {
+    ) -> Result<LoadSeries, PipelineError> {
         load_reading::series(readings, self.pipeline.settings())
     }
 
     /// Estimates the modulus. An estimate that fails is timed too: it has looked at the data.
     pub(super) fn modulus(
         &mut self,
-        estimator: &dyn ModulusEstimator<f64>,
-        loads: &LoadSeries<f64>,
-    ) -> Result<ModulusEstimate<f64>, PipelineError> {
+        estimator: &dyn ModulusEstimator,
+        loads: &LoadSeries,
+    ) -> Result<ModulusEstimate, PipelineError> {
         let start = Instant::now();
         let estimate = estimator.estimate(loads).map_err(PipelineError::Modulus);
         self.report.ran(Stage::Modulus, start.elapsed());

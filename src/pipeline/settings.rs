@@ -92,7 +92,7 @@ pub struct Settings {
     /// What is pressed.
     pub object: Object,
     /// The sensor's layers; `None`: rigid beside the object.
-    pub waveguide: Option<Waveguide<f64>>,
+    pub waveguide: Option<Waveguide>,
     /// Number of control points on each surface; the paper's 200 by default.
     pub control_points: usize,
     /// What of the frame the surface stage looks at.

@@ -77,7 +77,7 @@ impl Display for TimeResult {
 }
 
 /// A value with its unit and its 95 % interval.
-fn within(value: f64, interval: Interval<f64>, scale: f64, unit: &str) -> String {
+fn within(value: f64, interval: Interval, scale: f64, unit: &str) -> String {
     let half_width = interval.upper.map_or(value, |upper| upper - interval.lower) * 0.5;
     // Two digits of the interval's half width.
     let decimals = (1.0 - (half_width * scale).log10().floor()).clamp(0.0, 9.0) as usize;
@@ -103,8 +103,8 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// What the moduli of single loads say of time. `times_s` has a place for each load; what has no time or alone gives no modulus is left out, and None is
 /// returned where fewer than two are left.
 pub(super) fn of_moduli(
-    estimator: &dyn ModulusEstimator<f64>,
-    series: &LoadSeries<f64>,
+    estimator: &dyn ModulusEstimator,
+    series: &LoadSeries,
     times_s: &[Option<f64>],
 ) -> Option<TimeResult> {
     let mut moduli = Vec::with_capacity(times_s.len());
@@ -128,10 +128,10 @@ pub(super) fn of_moduli(
 }
 
 /// What forces by the light over those by a gauge say of the sensor's gain.
-pub(super) fn of_gains(forces: &[(f64, Estimate<f64>, Estimate<f64>)]) -> Option<TimeResult> {
+pub(super) fn of_gains(forces: &[(f64, Estimate, Estimate)]) -> Option<TimeResult> {
     let ratios: Vec<TimedModulus> = (forces.iter())
         .map(|&(time_s, light, gauge)| {
-            let relative = |force: Estimate<f64>| force.standard_error / force.value;
+            let relative = |force: Estimate| force.standard_error / force.value;
             let ratio = light.value / gauge.value;
             let error = ratio * relative(light).hypot(relative(gauge));
             TimedModulus {
@@ -161,7 +161,7 @@ fn result(moduli: &[TimedModulus], scale_error: f64, law_error: f64) -> Option<T
 /// What one load alone says, and where its error comes from.
 struct SingleLoad {
     /// The modulus with the load's own error.
-    modulus_pa: Estimate<f64>,
+    modulus_pa: Estimate,
     /// Relative error of the law.
     law_error: f64,
     /// Relative error that is common to all loads, the law's among it.
@@ -170,15 +170,15 @@ struct SingleLoad {
 
 impl SingleLoad {
     fn of(
-        estimator: &dyn ModulusEstimator<f64>,
-        load: &LoadState<f64>,
-        shared: &SharedErrors<f64>,
+        estimator: &dyn ModulusEstimator,
+        load: &LoadState,
+        shared: &SharedErrors,
     ) -> Option<Self> {
         let none = SharedErrors {
             force_scale: NEGLIGIBLE,
             ..SharedErrors::default()
         };
-        let with = |load: LoadState<f64>, shared: &SharedErrors<f64>| {
+        let with = |load: LoadState, shared: &SharedErrors| {
             let series = LoadSeries::new([load]).with_shared_errors(*shared).ok()?;
             let estimate = estimator.estimate(&series).ok()?;
             let relative = estimate.standard_error_pa / estimate.youngs_modulus_pa;
@@ -200,8 +200,8 @@ impl SingleLoad {
 }
 
 /// The load without errors of its own.
-pub(super) fn quiet(load: &LoadState<f64>) -> LoadState<f64> {
-    let quiet = |e: Estimate<f64>| Estimate::new(e.value, NEGLIGIBLE * e.value.abs());
+pub(super) fn quiet(load: &LoadState) -> LoadState {
+    let quiet = |e: Estimate| Estimate::new(e.value, NEGLIGIBLE * e.value.abs());
     LoadState {
         force_n: quiet(load.force_n),
         contact_radius_m: load.contact_radius_m.map(quiet),

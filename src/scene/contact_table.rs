@@ -100,7 +100,7 @@ pub fn solve_contact_table(
         };
         return Err(failed("object.shape", error));
     };
-    let solved = |guide: Waveguide<f64>| -> Result<_, ElasticityError> {
+    let solved = |guide: Waveguide| -> Result<_, ElasticityError> {
         solve_by_elements(radius_m, poisson_ratio, &guide, options, progress)
     };
     guide(&layers)
@@ -109,7 +109,7 @@ pub fn solve_contact_table(
 }
 
 /// The layers of a scene as a waveguide, rigid without any.
-pub(super) fn guide(layers: &[SceneLayer]) -> Result<Waveguide<f64>, ElasticityError> {
+pub(super) fn guide(layers: &[SceneLayer]) -> Result<Waveguide, ElasticityError> {
     if layers.is_empty() {
         return Ok(Waveguide::rigid());
     }

@@ -146,14 +146,14 @@ impl Sensor {
     }
 
     /// The guide; rigid without layers.
-    pub fn waveguide(&self) -> Result<Waveguide<f64>, PipelineError> {
+    pub fn waveguide(&self) -> Result<Waveguide, PipelineError> {
         if self.layers.is_empty() {
             return Ok(Waveguide::rigid());
         }
         Waveguide::new(self.elastic_layers()).map_err(PipelineError::Material)
     }
 
-    pub(super) fn elastic_layers(&self) -> Vec<Layer<f64>> {
+    pub(super) fn elastic_layers(&self) -> Vec<Layer> {
         let layer = |l: &SceneLayer| Layer {
             thickness_m: l.thickness_m,
             youngs_modulus_pa: l.youngs_modulus_pa,

@@ -32,7 +32,7 @@ pub(super) struct Ball {
 
 #[derive(Clone, Debug)]
 pub(super) struct LayerFit {
-    pub(super) layers: Vec<Layer<f64>>,
+    pub(super) layers: Vec<Layer>,
     /// Of ln E, ln h and ν of all layers.
     pub(super) covariance: DMatrix<f64>,
     /// Force of the fitted law at every contact's radius.
@@ -57,7 +57,7 @@ pub(super) fn fit(
     balls: &[Ball],
     contacts: &[BallContact],
 ) -> Result<Option<LayerFit>, SensorError> {
-    let layers: Vec<Layer<f64>> = stated.iter().map(elastic).collect();
+    let layers: Vec<Layer> = stated.iter().map(elastic).collect();
     let near: Vec<BallContact> = contacts
         .iter()
         .filter(|c| c.radius_m <= LARGEST_CONTACT_RATIO * balls[c.ball].radius_m)
@@ -94,7 +94,7 @@ pub(super) fn fit(
     }))
 }
 
-pub(super) fn elastic(input: &LayerInput) -> Layer<f64> {
+pub(super) fn elastic(input: &LayerInput) -> Layer {
     Layer {
         thickness_m: input.layer.thickness_m,
         youngs_modulus_pa: input.layer.youngs_modulus_pa,
@@ -109,7 +109,7 @@ struct Stiffness {
 }
 
 impl Stiffness {
-    fn new(layers: &[Layer<f64>], contacts: &[BallContact]) -> Option<Self> {
+    fn new(layers: &[Layer], contacts: &[BallContact]) -> Option<Self> {
         let logs = || contacts.iter().map(|c| c.radius_m.ln());
         let (low, high) = (
             logs().fold(f64::INFINITY, f64::min),
@@ -185,7 +185,7 @@ impl<'a> Problem<'a> {
     }
 
     /// ln F of every contact by the law.
-    fn predicted(&self, layers: &[Layer<f64>], parameters: &DVector<f64>) -> Option<Vec<f64>> {
+    fn predicted(&self, layers: &[Layer], parameters: &DVector<f64>) -> Option<Vec<f64>> {
         let n = self.layer_parameters;
         let step = parameters.rows(0, n).into_owned();
         let stiffness = Stiffness::new(&moved(layers, &step), self.contacts)?;
@@ -211,7 +211,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Gauss and Newton's steps on residuals and priors.
-    fn solve(&self, layers: &[Layer<f64>]) -> Option<Solution> {
+    fn solve(&self, layers: &[Layer]) -> Option<Solution> {
         let count = self.prior.len();
         let mut parameters = DVector::zeros(count);
         let mut covariance = DMatrix::zeros(count, count);
@@ -242,7 +242,7 @@ impl<'a> Problem<'a> {
 
     fn slopes(
         &self,
-        layers: &[Layer<f64>],
+        layers: &[Layer],
         parameters: &DVector<f64>,
         here: &[f64],
     ) -> Option<DMatrix<f64>> {

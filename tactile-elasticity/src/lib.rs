@@ -1,8 +1,7 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Conventions
-//! SI units; tensors are `nalgebra::Matrix3`; x = column, y = row, z towards the object. Strain measures are generic over
-//! `f32` and `f64`; statistics and contact laws on a handful of numbers are computed in `f64` and rounded once.
+//! SI units; tensors are `nalgebra::Matrix3`; x = column, y = row, z towards the object. Everything is computed in `f64`.
 //!
 //! # References
 //! K. L. Johnson, *Contact Mechanics* (1985). I. N. Sneddon, Int. J. Eng. Sci. 3 (1965) 47. E. K. Dimitriadis et al., Biophys. J.
@@ -32,7 +31,6 @@ pub mod field;
 mod golden_section;
 pub mod modulus;
 pub mod relaxation;
-mod scalar;
 mod selection;
 pub mod strain;
 pub mod stress;

@@ -4,9 +4,8 @@
 //! components of one pair: the second Piola–Kirchhoff stress by Green–Lagrange strain.
 
 use crate::error::{ElasticityError, Quantity, poisson, positive};
-use crate::scalar::widen;
 use crate::strain::{Biot, Deformation, StrainMeasure, deviator, scaled_norm, upright};
-use nalgebra::{Matrix3, RealField};
+use nalgebra::Matrix3;
 
 /// A measure of stress: force over area, each of the deformed or the undeformed state.
 ///
@@ -72,12 +71,12 @@ pub enum StressMeasure {
 ///
 /// # Errors
 /// [`ElasticityError::SingularDeformation`] or [`ElasticityError::InvertedDeformation`] unless det F > 0.
-pub fn convert_stress<T: RealField + Copy>(
-    stress_pa: &Matrix3<T>,
+pub fn convert_stress(
+    stress_pa: &Matrix3<f64>,
     from: StressMeasure,
     to: StressMeasure,
-    deformation: &Deformation<T>,
-) -> Result<Matrix3<T>, ElasticityError> {
+    deformation: &Deformation,
+) -> Result<Matrix3<f64>, ElasticityError> {
     upright(deformation)?;
     let (f, j) = (deformation.deformation_gradient(), deformation.jacobian());
     let kirchhoff = match from {
@@ -111,8 +110,8 @@ pub fn convert_stress<T: RealField + Copy>(
 /// let cauchy = Matrix3::from_partial_diagonal(&[1e5]);
 /// assert!((tactile_elasticity::stress::von_mises_stress(&cauchy) - 1e5_f64).abs() < 1e-9);
 /// ```
-pub fn von_mises_stress<T: RealField + Copy>(cauchy: &Matrix3<T>) -> T {
-    scaled_norm(&deviator(cauchy), nalgebra::convert(1.5))
+pub fn von_mises_stress(cauchy: &Matrix3<f64>) -> f64 {
+    scaled_norm(&deviator(cauchy), 1.5)
 }
 
 /// S = λ tr(E) I + 2μE in Pa of an isotropic (St. Venant–Kirchhoff) solid under a Green–Lagrange strain E. Incompressible solids have no
@@ -130,17 +129,17 @@ pub fn von_mises_stress<T: RealField + Copy>(cauchy: &Matrix3<T>) -> T {
 /// assert!((stress_pa[(0, 0)] - 60e3 / 0.5 * 0.01).abs() < 1e-9);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn saint_venant_kirchhoff<T: RealField + Copy>(
-    green_lagrange: &Matrix3<T>,
-    youngs_modulus_pa: T,
-    poisson_ratio: T,
-) -> Result<Matrix3<T>, ElasticityError> {
-    positive(widen(youngs_modulus_pa), Quantity::YoungsModulus)?;
-    let found = poisson(widen(poisson_ratio))?;
+pub fn saint_venant_kirchhoff(
+    green_lagrange: &Matrix3<f64>,
+    youngs_modulus_pa: f64,
+    poisson_ratio: f64,
+) -> Result<Matrix3<f64>, ElasticityError> {
+    positive(youngs_modulus_pa, Quantity::YoungsModulus)?;
+    let found = poisson(poisson_ratio)?;
     if found == 0.5 {
         return Err(ElasticityError::PoissonRatio { found });
     }
-    let (nu, one) = (poisson_ratio, T::one());
+    let (nu, one) = (poisson_ratio, 1.0);
     let twice_mu = youngs_modulus_pa / (one + nu);
     let lambda = twice_mu * nu / (one - nu - nu);
     let volumetric = Matrix3::from_diagonal_element(lambda * green_lagrange.trace());
@@ -148,26 +147,24 @@ pub fn saint_venant_kirchhoff<T: RealField + Copy>(
 }
 
 /// The right stretch U.
-fn stretch<T: RealField + Copy>(
-    deformation: &Deformation<T>,
-) -> Result<Matrix3<T>, ElasticityError> {
+fn stretch(deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
     Ok(Biot.of(deformation)? + Matrix3::identity())
 }
 
 /// S with sym(US) = `biot`.
-fn second_of_biot<T: RealField + Copy>(biot: &Matrix3<T>, stretch: &Matrix3<T>) -> Matrix3<T> {
+fn second_of_biot(biot: &Matrix3<f64>, stretch: &Matrix3<f64>) -> Matrix3<f64> {
     let principal = stretch.symmetric_eigen();
     let (axes, stretches) = (principal.eigenvectors, principal.eigenvalues);
     let mut second = axes.transpose() * biot * axes;
     for row in 0..3 {
         for column in 0..3 {
-            let mean = (stretches[row] + stretches[column]) * nalgebra::convert::<f64, T>(0.5);
+            let mean = (stretches[row] + stretches[column]) * 0.5;
             second[(row, column)] /= mean;
         }
     }
     axes * second * axes.transpose()
 }
 
-fn symmetric<T: RealField + Copy>(m: &Matrix3<T>) -> Matrix3<T> {
-    (m + m.transpose()) * nalgebra::convert::<f64, T>(0.5)
+fn symmetric(m: &Matrix3<f64>) -> Matrix3<f64> {
+    (m + m.transpose()) * 0.5
 }

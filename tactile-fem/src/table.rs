@@ -165,7 +165,7 @@ const LARGEST_POISSON_RATIO: f64 = 0.499;
 pub fn solve_contact_table(
     radius_m: f64,
     poisson_ratio: f64,
-    guide: &Waveguide<f64>,
+    guide: &Waveguide,
     options: &TableOptions,
     mut progress: impl FnMut(TableProgress) -> ControlFlow<()>,
 ) -> Result<ContactTable, ElasticityError> {
@@ -202,7 +202,7 @@ struct Ball {
 impl Ball {
     fn curve(
         &self,
-        guide: &Waveguide<f64>,
+        guide: &Waveguide,
         law: &WaveguideLaw,
         options: &TableOptions,
     ) -> Result<ContactCurve, ElasticityError> {
@@ -235,7 +235,7 @@ impl Ball {
         Ok(curve)
     }
 
-    fn scene(&self, guide: &Waveguide<f64>) -> Result<Scene, ElasticityError> {
+    fn scene(&self, guide: &Waveguide) -> Result<Scene, ElasticityError> {
         let material = |e, nu: f64| Material::new(e, nu.min(LARGEST_POISSON_RATIO));
         let ball = material(self.youngs_modulus_pa, self.poisson_ratio)?;
         if guide.layers().is_empty() {
@@ -255,12 +255,7 @@ impl Ball {
     }
 
     /// Forces at which the layered law expects contact radii in equal steps.
-    fn loads(
-        &self,
-        guide: &Waveguide<f64>,
-        law: &WaveguideLaw,
-        options: &TableOptions,
-    ) -> Vec<Load> {
+    fn loads(&self, guide: &Waveguide, law: &WaveguideLaw, options: &TableOptions) -> Vec<Load> {
         let compliance = |e: f64, nu: f64| (1.0 - nu * nu) / e;
         let own = compliance(self.youngs_modulus_pa, self.poisson_ratio);
         let touched = guide.layers().iter().find(|l| l.thickness_m > 0.0);

@@ -77,8 +77,8 @@ struct Reading {
     ball: String,
     largest_ratio: f64,
     truth_pa: f64,
-    layered: ModulusEstimate<f64>,
-    tabulated: Option<ModulusEstimate<f64>>,
+    layered: ModulusEstimate,
+    tabulated: Option<ModulusEstimate>,
     series: Option<f64>,
     /// Relative errors of the two contact radii.
     radius_errors: [f64; 2],
@@ -211,7 +211,7 @@ impl Ball {
     }
 }
 
-fn error(estimate: &ModulusEstimate<f64>, truth_pa: f64) -> f64 {
+fn error(estimate: &ModulusEstimate, truth_pa: f64) -> f64 {
     estimate.youngs_modulus_pa / truth_pa - 1.0
 }
 
@@ -225,7 +225,7 @@ struct Summary {
 }
 
 impl Summary {
-    fn of<'a>(all: impl Iterator<Item = (&'a ModulusEstimate<f64>, f64)>) -> Self {
+    fn of<'a>(all: impl Iterator<Item = (&'a ModulusEstimate, f64)>) -> Self {
         let all: Vec<_> = all.collect();
         if all.is_empty() {
             let [median, worst, held] = [f64::NAN; 3];
@@ -270,7 +270,7 @@ impl Summary {
 #[allow(clippy::print_stdout)]
 fn summaries(readings: &[Reading]) -> [Summary; 2] {
     for r in readings {
-        let interval = |m: &ModulusEstimate<f64>| {
+        let interval = |m: &ModulusEstimate| {
             let held = m.interval_95.contains(r.truth_pa);
             format!(
                 "{:+.2} % ± {:.2} {}",

@@ -62,7 +62,7 @@ pub struct Pipeline {
     sampler: Option<Arc<dyn ControlPointSampler<f64> + Send + Sync>>,
     matcher: Arc<dyn PointMatcher<3> + Send + Sync>,
     warp: Arc<dyn WarpModel<f64, 3> + Send + Sync>,
-    strain: Arc<dyn StrainMeasure<f64> + Send + Sync>,
+    strain: Arc<dyn StrainMeasure + Send + Sync>,
     estimator: EstimatorStage,
     settings: Settings,
 }
@@ -123,7 +123,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// [`PipelineError::WrongEstimator`] where the chosen one does not fit the object.
-    pub fn estimator(&self) -> Result<Arc<dyn ModulusEstimator<f64> + Send + Sync>, PipelineError> {
+    pub fn estimator(&self) -> Result<Arc<dyn ModulusEstimator + Send + Sync>, PipelineError> {
         let settings = &self.settings;
         self.estimator
             .get(settings.object, settings.waveguide.as_ref())
@@ -150,7 +150,7 @@ impl Pipeline {
         self.warp.as_ref()
     }
 
-    pub(super) fn strain(&self) -> &dyn StrainMeasure<f64> {
+    pub(super) fn strain(&self) -> &dyn StrainMeasure {
         self.strain.as_ref()
     }
 

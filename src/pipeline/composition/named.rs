@@ -96,7 +96,7 @@ pub(super) fn warp(
     })
 }
 
-pub(super) fn strain(choice: StrainChoice) -> Arc<dyn StrainMeasure<f64> + Send + Sync> {
+pub(super) fn strain(choice: StrainChoice) -> Arc<dyn StrainMeasure + Send + Sync> {
     match choice {
         StrainChoice::GreenLagrange => Arc::new(GreenLagrange),
         StrainChoice::EulerAlmansi => Arc::new(EulerAlmansi),

@@ -35,7 +35,7 @@ impl Pipeline {
     /// let mut press = trial.press(&pipeline)?;
     /// assert!((press.surface(0)?.pixel_size_m[0] / camera.pixel_size_m[0] - 2.0).abs() < 1e-12);
     /// // E is proportional to the radius, but for the guide's share of the compliance and the correction for finite strain.
-    /// let relative = |m: &tactile_imaging::elasticity::modulus::ModulusEstimate<f64>| m.standard_error_pa / m.youngs_modulus_pa;
+    /// let relative = |m: &tactile_imaging::elasticity::modulus::ModulusEstimate| m.standard_error_pa / m.youngs_modulus_pa;
     /// let of_the_radius = relative(&press.modulus()?).powi(2) - relative(&trial.press(&exact)?.modulus()?).powi(2);
     /// assert!(of_the_radius.sqrt() > 0.03);
     /// // On a rigid flat instead of the layered guide the ball would be softer for the same contact.

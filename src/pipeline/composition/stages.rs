@@ -154,7 +154,7 @@ impl Pipeline {
     #[must_use]
     pub fn with_estimator(
         mut self,
-        estimator: impl ModulusEstimator<f64> + Send + Sync + 'static,
+        estimator: impl ModulusEstimator + Send + Sync + 'static,
     ) -> Self {
         self.estimator = EstimatorStage::Given(Arc::new(estimator));
         self
@@ -221,7 +221,7 @@ impl Pipeline {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_strain(mut self, strain: impl StrainMeasure<f64> + Send + Sync + 'static) -> Self {
+    pub fn with_strain(mut self, strain: impl StrainMeasure + Send + Sync + 'static) -> Self {
         self.strain = Arc::new(strain);
         self
     }

@@ -17,7 +17,7 @@ impl Press<'_> {
     ///
     /// # Errors
     /// [`PipelineError::Modulus`], [`PipelineError::NoForce`], and those of the stages it needs.
-    pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
+    pub fn modulus(&mut self) -> Result<ModulusEstimate, PipelineError> {
         let estimator = self.pipeline().estimator()?;
         let loads = self.loads(estimator.needs_strain())?;
         self.runner.modulus(estimator.as_ref(), &loads)
@@ -43,7 +43,7 @@ impl Press<'_> {
     ///
     /// # Errors
     /// [`PipelineError::NoForce`], and those of the contacts and of [`strain`](Self::strain).
-    pub fn load_series(&mut self) -> Result<LoadSeries<f64>, PipelineError> {
+    pub fn load_series(&mut self) -> Result<LoadSeries, PipelineError> {
         self.loads(true)
     }
 
@@ -75,7 +75,7 @@ impl Press<'_> {
     ///
     /// # Errors
     /// Those of the contacts; what an estimator cannot do is left out.
-    pub fn estimates(&mut self) -> Result<Vec<ModulusEstimate<f64>>, PipelineError> {
+    pub fn estimates(&mut self) -> Result<Vec<ModulusEstimate>, PipelineError> {
         let loads = match self.loads(true) {
             Ok(loads) => loads,
             Err(_) => self.loads(false)?,
@@ -94,7 +94,7 @@ impl Press<'_> {
     }
 
     /// What every frame says of its load, and the relative errors that all share.
-    pub(super) fn loads(&mut self, with_strain: bool) -> Result<LoadSeries<f64>, PipelineError> {
+    pub(super) fn loads(&mut self, with_strain: bool) -> Result<LoadSeries, PipelineError> {
         let mut readings: Vec<LoadReading> = Vec::with_capacity(self.frames.len());
         // Contacts that the frame's edge cuts.
         let mut cut = Vec::with_capacity(self.frames.len());

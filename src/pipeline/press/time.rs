@@ -89,7 +89,7 @@ impl Press<'_> {
     }
 
     /// The loads with the gauge's forces, where all frames with a time have one.
-    fn gauged_loads(&self, series: &LoadSeries<f64>) -> Option<LoadSeries<f64>> {
+    fn gauged_loads(&self, series: &LoadSeries) -> Option<LoadSeries> {
         let mut loads = series.loads().to_vec();
         for (load, frame) in loads.iter_mut().zip(&self.frames) {
             if frame.time_s.is_some() {

@@ -15,13 +15,13 @@ struct MergedLoad {
     force_variance: f64,
     radius_variance: f64,
     calibration: f64,
-    indentation_m: Option<Estimate<f64>>,
-    face_m2: Option<Estimate<f64>>,
-    mean_strain: Option<Estimate<f64>>,
+    indentation_m: Option<Estimate>,
+    face_m2: Option<Estimate>,
+    mean_strain: Option<Estimate>,
 }
 
 impl MergedLoad {
-    fn of(reading: &ContactReading, mean_strain: Option<Estimate<f64>>) -> Option<Self> {
+    fn of(reading: &ContactReading, mean_strain: Option<Estimate>) -> Option<Self> {
         let force = reading.force_n?;
         Some(Self {
             frames: 1.0,
@@ -44,7 +44,7 @@ impl MergedLoad {
     fn merged(self, other: Self) -> Self {
         let frames = self.frames + other.frames;
         let (a, b) = (self.frames / frames, other.frames / frames);
-        let mean = |one: Option<Estimate<f64>>, two: Option<Estimate<f64>>| {
+        let mean = |one: Option<Estimate>, two: Option<Estimate>| {
             one.zip(two).map(|(s, o)| {
                 let error = (a * s.standard_error).hypot(b * o.standard_error);
                 Estimate::new(a * s.value + b * o.value, error)
@@ -104,7 +104,7 @@ impl SeenLoads {
     }
 
     /// Takes a contact that can be trusted: alone, whole, unsaturated, inside the calibration, its profile fitted.
-    pub(super) fn learn(&mut self, reading: &ContactReading, strain: Option<Estimate<f64>>) {
+    pub(super) fn learn(&mut self, reading: &ContactReading, strain: Option<Estimate>) {
         let whole = !reading.touches_edge && reading.other_contacts == 0;
         // A flat face is not read by the fit of a profile.
         let read = reading.converged || reading.face.is_some();

@@ -74,7 +74,7 @@ impl Session {
     ///
     /// # Errors
     /// [`PipelineError::Modulus`]; [`PipelineError::NotUniaxial`] where the last contact is not that of a flat face.
-    pub fn modulus(&mut self) -> Result<ModulusEstimate<f64>, PipelineError> {
+    pub fn modulus(&mut self) -> Result<ModulusEstimate, PipelineError> {
         let estimator = self.runner.pipeline().estimator()?;
         let size = self.runner.pipeline().contact().pixel_size_m();
         let flat = self.runner.pipeline().settings().object.flat_face();

@@ -21,7 +21,7 @@ pub struct Strain<const D: usize> {
     pub strains: Vec<Matrix3<f64>>,
     /// Standard error of the strain at every matched point, as that of the mean.
     pub standard_errors: Vec<Matrix3<f64>>,
-    pub summary: StrainSummary<f64>,
+    pub summary: StrainSummary,
     /// Standard error of the mean: the jackknife over the spline's parts, and the response of the spline's weights.
     pub standard_error: Matrix3<f64>,
     /// Of the standard error: parts less one.
@@ -40,7 +40,7 @@ pub fn strain_between<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
     matcher: &dyn PointMatcher<D>,
-    measure: &dyn StrainMeasure<f64>,
+    measure: &dyn StrainMeasure,
 ) -> Result<Strain<D>, Box<dyn Error>> {
     let matching = matcher.match_points(before, after)?;
     strain_of(before, after, &assigned(&matching.assignment), measure)
@@ -57,7 +57,7 @@ pub fn strain_of<const D: usize>(
     before: &[Point<f64, D>],
     after: &[Point<f64, D>],
     matched: &[(usize, usize)],
-    measure: &dyn StrainMeasure<f64>,
+    measure: &dyn StrainMeasure,
 ) -> Result<Strain<D>, Box<dyn Error>> {
     if matched.len() < FEWEST_PAIRS {
         let found = matched.len();

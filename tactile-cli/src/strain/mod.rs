@@ -54,7 +54,7 @@ enum Measure {
 }
 
 impl Measure {
-    fn strain(self) -> &'static dyn StrainMeasure<f64> {
+    fn strain(self) -> &'static dyn StrainMeasure {
         match self {
             Self::GreenLagrange => &GreenLagrange,
             Self::EulerAlmansi => &EulerAlmansi,

@@ -129,7 +129,7 @@ impl Live {
     }
 }
 
-pub fn in_kpa(modulus: &ModulusEstimate<f64>) -> String {
+pub fn in_kpa(modulus: &ModulusEstimate) -> String {
     let value = with_error(modulus.youngs_modulus_pa, modulus.standard_error_pa, 1e-3);
     format!("{value} kPa")
 }

@@ -1,8 +1,6 @@
 //! The two bodies of a contact: their moduli and curvatures as one.
 
 use crate::error::{ElasticityError, Quantity, finite, poisson, positive};
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// An isotropic elastic body, or a rigid one.
 ///
@@ -11,42 +9,41 @@ use nalgebra::RealField;
 ///
 /// let rubber = Body::elastic(1e6_f64, 0.5)?;
 /// assert_eq!(rubber.compliance_per_pa(), 0.75e-6);
-/// assert_eq!(Body::<f64>::rigid().compliance_per_pa(), 0.0);
+/// assert_eq!(Body::rigid().compliance_per_pa(), 0.0);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Body<T> {
-    compliance_per_pa: T,
+pub struct Body {
+    compliance_per_pa: f64,
 }
 
-impl<T: RealField + Copy> Body<T> {
+impl Body {
     /// From Young's modulus (Pa) and Poisson's ratio.
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn elastic(youngs_modulus_pa: T, poisson_ratio: T) -> Result<Self, ElasticityError> {
-        positive(widen(youngs_modulus_pa), Quantity::YoungsModulus)?;
-        poisson(widen(poisson_ratio))?;
+    pub fn elastic(youngs_modulus_pa: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
+        positive(youngs_modulus_pa, Quantity::YoungsModulus)?;
+        poisson(poisson_ratio)?;
         Ok(Self {
-            compliance_per_pa: (T::one() - poisson_ratio) * (T::one() + poisson_ratio)
-                / youngs_modulus_pa,
+            compliance_per_pa: (1.0 - poisson_ratio) * (1.0 + poisson_ratio) / youngs_modulus_pa,
         })
     }
 
-    pub(crate) fn from_compliance(compliance_per_pa: T) -> Self {
+    pub(crate) fn from_compliance(compliance_per_pa: f64) -> Self {
         Self { compliance_per_pa }
     }
 
     /// A rigid body, without compliance.
     pub fn rigid() -> Self {
         Self {
-            compliance_per_pa: T::zero(),
+            compliance_per_pa: 0.0,
         }
     }
 
     /// (1 − ν²)/E in 1/Pa, the inverse of the plane-strain modulus.
-    pub fn compliance_per_pa(&self) -> T {
+    pub fn compliance_per_pa(&self) -> f64 {
         self.compliance_per_pa
     }
 }
@@ -62,13 +59,10 @@ impl<T: RealField + Copy> Body<T> {
 /// assert!((reduced_modulus_pa(Body::rigid(), gel)? - 20_000.0f64 / 0.75).abs() < 1e-9);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn reduced_modulus_pa<T: RealField + Copy>(
-    one: Body<T>,
-    other: Body<T>,
-) -> Result<T, ElasticityError> {
+pub fn reduced_modulus_pa(one: Body, other: Body) -> Result<f64, ElasticityError> {
     let compliance = one.compliance_per_pa + other.compliance_per_pa;
-    positive(widen(compliance), Quantity::ReducedModulus)?;
-    Ok(T::one() / compliance)
+    positive(compliance, Quantity::ReducedModulus)?;
+    Ok(1.0 / compliance)
 }
 
 /// R of two surfaces, 1/R = 1/R₁ + 1/R₂, in m; `None` is a flat surface, a negative radius a hollow one.
@@ -83,12 +77,9 @@ pub fn reduced_modulus_pa<T: RealField + Copy>(
 /// assert!(matches!(relative_radius_m(Some(0.01), Some(-0.01)), Err(ElasticityError::Conforming { .. })));
 /// # Ok::<(), ElasticityError>(())
 /// ```
-pub fn relative_radius_m<T: RealField + Copy>(
-    one: Option<T>,
-    other: Option<T>,
-) -> Result<T, ElasticityError> {
+pub fn relative_radius_m(one: Option<f64>, other: Option<f64>) -> Result<f64, ElasticityError> {
     for radius in [one, other].into_iter().flatten() {
-        let radius = finite(widen(radius), Quantity::Radius)?;
+        let radius = finite(radius, Quantity::Radius)?;
         if radius == 0.0 {
             return Err(ElasticityError::NotPositive {
                 quantity: Quantity::Radius,
@@ -100,9 +91,9 @@ pub fn relative_radius_m<T: RealField + Copy>(
         (Some(a), Some(b)) => {
             // The sum of the radii is exact where they nearly cancel; that of the curvatures is not.
             let curvature = (a + b) / a / b;
-            if curvature <= T::zero() {
+            if curvature <= 0.0 {
                 return Err(ElasticityError::Conforming {
-                    curvature_per_m: widen(curvature),
+                    curvature_per_m: curvature,
                 });
             }
             a / (a + b) * b
@@ -114,11 +105,11 @@ pub fn relative_radius_m<T: RealField + Copy>(
             });
         }
     };
-    if radius > T::zero() {
+    if radius > 0.0 {
         Ok(radius)
     } else {
         Err(ElasticityError::Conforming {
-            curvature_per_m: 1.0 / widen(radius),
+            curvature_per_m: 1.0 / radius,
         })
     }
 }
@@ -137,19 +128,19 @@ pub fn relative_radius_m<T: RealField + Copy>(
 /// assert!(matches!(sample_modulus_pa(150e3, 0.48, waveguide), Err(ElasticityError::StifferThanResolvable { .. })));
 /// # Ok::<(), ElasticityError>(())
 /// ```
-pub fn sample_modulus_pa<T: RealField + Copy>(
-    reduced_modulus_pa: T,
-    poisson_ratio: T,
-    other: Body<T>,
-) -> Result<T, ElasticityError> {
-    positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
-    poisson(widen(poisson_ratio))?;
+pub fn sample_modulus_pa(
+    reduced_modulus_pa: f64,
+    poisson_ratio: f64,
+    other: Body,
+) -> Result<f64, ElasticityError> {
+    positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
+    poisson(poisson_ratio)?;
     // 1/E* − C = (1 − C E*)/E*, the product rounded once.
-    let left = (-other.compliance_per_pa).mul_add(reduced_modulus_pa, T::one());
-    if left <= T::zero() {
+    let left = (-other.compliance_per_pa).mul_add(reduced_modulus_pa, 1.0);
+    if left <= 0.0 {
         return Err(ElasticityError::StifferThanResolvable {
             lower_bound_pa: None,
         });
     }
-    Ok((T::one() - poisson_ratio) * (T::one() + poisson_ratio) * reduced_modulus_pa / left)
+    Ok((1.0 - poisson_ratio) * (1.0 + poisson_ratio) * reduced_modulus_pa / left)
 }

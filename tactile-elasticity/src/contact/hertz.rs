@@ -1,8 +1,6 @@
 //! Hertz's contact of two elastic bodies with spherical surfaces.
 
 use crate::error::{ElasticityError, Quantity, not_negative, positive};
-use crate::scalar::{narrow, widen};
-use nalgebra::RealField;
 
 /// A sphere pressed with a known force (Johnson 1985, *Contact Mechanics*, §4.2).
 ///
@@ -17,44 +15,44 @@ use nalgebra::RealField;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct HertzContact<T> {
+pub struct HertzContact {
     /// F.
-    pub force_n: T,
+    pub force_n: f64,
     /// R, the relative radius of curvature.
-    pub radius_m: T,
+    pub radius_m: f64,
     /// E*.
-    pub reduced_modulus_pa: T,
+    pub reduced_modulus_pa: f64,
     /// a.
-    pub contact_radius_m: T,
+    pub contact_radius_m: f64,
     /// δ, by which far points of the bodies approach.
-    pub indentation_m: T,
+    pub indentation_m: f64,
     /// p₀, in the centre.
-    pub peak_pressure_pa: T,
+    pub peak_pressure_pa: f64,
     /// F/(πa²) = ⅔ p₀.
-    pub mean_pressure_pa: T,
+    pub mean_pressure_pa: f64,
     /// dF/dδ = 2 E* a.
-    pub stiffness_n_per_m: T,
+    pub stiffness_n_per_m: f64,
 }
 
-impl<T: RealField + Copy> HertzContact<T> {
+impl HertzContact {
     /// From force (N, zero allowed), relative radius (m) and reduced modulus (Pa).
     ///
     /// # Errors
     /// [`ElasticityError::Negative`] force, [`ElasticityError::NotPositive`] radius or modulus.
     pub fn from_force(
-        force_n: T,
-        radius_m: T,
-        reduced_modulus_pa: T,
+        force_n: f64,
+        radius_m: f64,
+        reduced_modulus_pa: f64,
     ) -> Result<Self, ElasticityError> {
-        not_negative(widen(force_n), Quantity::Force)?;
-        positive(widen(radius_m), Quantity::Radius)?;
-        positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
-        let three_quarters: T = narrow(0.75);
+        not_negative(force_n, Quantity::Force)?;
+        positive(radius_m, Quantity::Radius)?;
+        positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
+        let three_quarters: f64 = 0.75;
         let a = (three_quarters * force_n / reduced_modulus_pa * radius_m).cbrt();
-        let mean = if a > T::zero() {
-            force_n / a / a / T::pi()
+        let mean = if a > 0.0 {
+            force_n / a / a / std::f64::consts::PI
         } else {
-            T::zero()
+            0.0
         };
         Ok(Self {
             force_n,
@@ -62,9 +60,9 @@ impl<T: RealField + Copy> HertzContact<T> {
             reduced_modulus_pa,
             contact_radius_m: a,
             indentation_m: a / radius_m * a,
-            peak_pressure_pa: mean * narrow(1.5),
+            peak_pressure_pa: mean * 1.5,
             mean_pressure_pa: mean,
-            stiffness_n_per_m: reduced_modulus_pa * a * narrow(2.0),
+            stiffness_n_per_m: reduced_modulus_pa * a * 2.0,
         })
     }
 
@@ -78,12 +76,12 @@ impl<T: RealField + Copy> HertzContact<T> {
     /// assert_eq!(contact.pressure_pa(1.01 * contact.contact_radius_m), 0.0);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn pressure_pa(&self, r: T) -> T {
+    pub fn pressure_pa(&self, r: f64) -> f64 {
         let a = self.contact_radius_m;
         if r.abs() < a {
-            self.peak_pressure_pa * ((T::one() - r / a) * (T::one() + r / a)).sqrt()
+            self.peak_pressure_pa * ((1.0 - r / a) * (1.0 + r / a)).sqrt()
         } else {
-            T::zero()
+            0.0
         }
     }
 }
@@ -104,44 +102,44 @@ impl<T: RealField + Copy> HertzContact<T> {
 /// assert!((depth(0.0) - 1.0).abs() < 1e-14 && (depth(c.contact_radius_m) - 0.5).abs() < 1e-14);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn hertz_surface_displacement_m<T: RealField + Copy>(
-    r: T,
-    a: T,
-    peak_pressure_pa: T,
-    reduced_modulus_pa: T,
-) -> T {
+pub fn hertz_surface_displacement_m(
+    r: f64,
+    a: f64,
+    peak_pressure_pa: f64,
+    reduced_modulus_pa: f64,
+) -> f64 {
     let r = r.abs();
-    if a <= T::zero() {
-        return T::zero();
+    if a <= 0.0 {
+        return 0.0;
     }
     let unit = peak_pressure_pa * a / reduced_modulus_pa;
-    let two: T = narrow(2.0);
+    let two: f64 = 2.0;
     if r <= a {
         let x = r / a;
-        return unit * T::frac_pi_4() * (two - x * x);
+        return unit * std::f64::consts::FRAC_PI_4 * (two - x * x);
     }
-    let half: T = narrow(0.5);
+    let half: f64 = 0.5;
     let x = a / r;
     if x > half {
         let y = r / a;
         let chord = ((r - a) / a * ((r + a) / a)).sqrt();
         // asin(a/r) through its tangent: near the rim a/r has lost what r − a keeps.
-        return unit * half * ((two - y * y) * T::one().atan2(chord) + chord);
+        return unit * half * ((two - y * y) * 1f64.atan2(chord) + chord);
     }
     unit * half * far_series(x)
 }
 
-fn far_series<T: RealField + Copy>(x: T) -> T {
-    let (mut power, mut b, mut sum) = (x, T::one(), T::zero());
+fn far_series(x: f64) -> f64 {
+    let (mut power, mut b, mut sum) = (x, 1.0, 0.0);
     for k in 0..40 {
-        let k: T = narrow(f64::from(k));
-        let odd = k + k + T::one();
-        let term = b * power * narrow(4.0) / (odd * (odd + narrow(2.0)));
+        let k: f64 = f64::from(k);
+        let odd = k + k + 1.0;
+        let term = b * power * 4.0 / (odd * (odd + 2.0));
         sum += term;
-        if term <= sum * T::default_epsilon() {
+        if term <= sum * f64::EPSILON {
             break;
         }
-        b *= odd / (odd + T::one());
+        b *= odd / (odd + 1.0);
         power *= x * x;
     }
     sum
@@ -160,16 +158,16 @@ fn far_series<T: RealField + Copy>(x: T) -> T {
 /// assert!((back - 50e3).abs() < 1e-9);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn reduced_modulus_from_contact_radius<T: RealField + Copy>(
-    force_n: T,
-    radius_m: T,
-    contact_radius_m: T,
-) -> Result<T, ElasticityError> {
-    positive(widen(force_n), Quantity::Force)?;
-    positive(widen(radius_m), Quantity::Radius)?;
-    positive(widen(contact_radius_m), Quantity::ContactRadius)?;
+pub fn reduced_modulus_from_contact_radius(
+    force_n: f64,
+    radius_m: f64,
+    contact_radius_m: f64,
+) -> Result<f64, ElasticityError> {
+    positive(force_n, Quantity::Force)?;
+    positive(radius_m, Quantity::Radius)?;
+    positive(contact_radius_m, Quantity::ContactRadius)?;
     let a = contact_radius_m;
-    Ok(narrow::<T>(0.75) * (force_n / a) / a * (radius_m / a))
+    Ok(0.75 * (force_n / a) / a * (radius_m / a))
 }
 
 /// E* = 3F/(4√R δ^{3⁄2}) from a force (N) and the indentation (m) it makes.
@@ -185,13 +183,13 @@ pub fn reduced_modulus_from_contact_radius<T: RealField + Copy>(
 /// assert!((back - 50e3).abs() < 1e-9);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn reduced_modulus_from_indentation<T: RealField + Copy>(
-    force_n: T,
-    radius_m: T,
-    indentation_m: T,
-) -> Result<T, ElasticityError> {
-    positive(widen(force_n), Quantity::Force)?;
-    positive(widen(radius_m), Quantity::Radius)?;
-    positive(widen(indentation_m), Quantity::Indentation)?;
-    Ok(narrow::<T>(0.75) * (force_n / indentation_m) / (radius_m * indentation_m).sqrt())
+pub fn reduced_modulus_from_indentation(
+    force_n: f64,
+    radius_m: f64,
+    indentation_m: f64,
+) -> Result<f64, ElasticityError> {
+    positive(force_n, Quantity::Force)?;
+    positive(radius_m, Quantity::Radius)?;
+    positive(indentation_m, Quantity::Indentation)?;
+    Ok(0.75 * (force_n / indentation_m) / (radius_m * indentation_m).sqrt())
 }

@@ -13,7 +13,7 @@ use super::layer_kernel::{Bond, LayerKernel};
 use super::quadrature::gauss_legendre;
 use super::waveguide::Waveguide;
 use crate::error::{ElasticityError, Quantity, positive};
-use nalgebra::{DMatrix, DVector, RealField};
+use nalgebra::{DMatrix, DVector};
 use std::f64::consts::FRAC_2_PI;
 
 /// The contact of a sphere with layers at one ratio of contact radius to their thickness.
@@ -69,7 +69,7 @@ impl LayerEquation {
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(bond: Bond, poisson_ratio: T) -> Result<Self, ElasticityError> {
+    pub fn new(bond: Bond, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
             kernel: LayerKernel::new(bond, poisson_ratio)?,
             share: 1.0,
@@ -81,10 +81,7 @@ impl LayerEquation {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
-    pub fn of_layers<T: RealField + Copy>(
-        waveguide: &Waveguide<T>,
-        bond: Bond,
-    ) -> Result<Self, ElasticityError> {
+    pub fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
         Ok(Self {
             kernel: LayerKernel::of_layers(waveguide, bond)?,
             share: 1.0,

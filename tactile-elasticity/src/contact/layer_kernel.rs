@@ -7,8 +7,6 @@ use super::quadrature::{gauss_panels, panel_edges};
 use super::stack::{Stack, StackLayer};
 use super::waveguide::Waveguide;
 use crate::error::{ElasticityError, Quantity, poisson, positive};
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// How the layer sits on its rigid base.
 ///
@@ -41,14 +39,11 @@ impl LayerKernel {
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
-    pub(crate) fn new<T: RealField + Copy>(
-        bond: Bond,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
+    pub(crate) fn new(bond: Bond, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         let layer = StackLayer {
             thickness: 1.0,
             shear_modulus: 1.0,
-            poisson_ratio: poisson(widen(poisson_ratio))?,
+            poisson_ratio: poisson(poisson_ratio)?,
         };
         Ok(Self {
             stack: Stack::new(vec![layer], bond),
@@ -59,19 +54,15 @@ impl LayerKernel {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`] thickness: a rigid waveguide has no layers.
-    pub(crate) fn of_layers<T: RealField + Copy>(
-        waveguide: &Waveguide<T>,
-        bond: Bond,
-    ) -> Result<Self, ElasticityError> {
-        let total = positive(widen(waveguide.thickness_m()), Quantity::Thickness)?;
+    pub(crate) fn of_layers(waveguide: &Waveguide, bond: Bond) -> Result<Self, ElasticityError> {
+        let total = positive(waveguide.thickness_m(), Quantity::Thickness)?;
         let layers: Vec<_> = waveguide
             .layers()
             .iter()
             .map(|layer| StackLayer {
-                thickness: widen(layer.thickness_m) / total,
-                shear_modulus: 0.5 * widen(layer.youngs_modulus_pa)
-                    / (1.0 + widen(layer.poisson_ratio)),
-                poisson_ratio: widen(layer.poisson_ratio),
+                thickness: layer.thickness_m / total,
+                shear_modulus: 0.5 * layer.youngs_modulus_pa / (1.0 + layer.poisson_ratio),
+                poisson_ratio: layer.poisson_ratio,
             })
             .filter(|layer| layer.thickness > 0.0)
             .collect();

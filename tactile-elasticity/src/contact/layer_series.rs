@@ -2,8 +2,6 @@
 
 use super::layer_kernel::{Bond, LayerKernel};
 use crate::error::{ElasticityError, poisson};
-use crate::scalar::widen;
-use nalgebra::RealField;
 use std::f64::consts::PI;
 
 /// F/F_Hertz = Σ cₖ χᵏ, k = 0..4.
@@ -25,11 +23,8 @@ impl LayerSeries {
     ///
     /// # Errors
     /// [`ElasticityError::PoissonRatio`].
-    pub fn published<T: RealField + Copy>(
-        bond: Bond,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
-        let nu = poisson(widen(poisson_ratio))?;
+    pub fn published(bond: Bond, poisson_ratio: f64) -> Result<Self, ElasticityError> {
+        let nu = poisson(poisson_ratio)?;
         let (alpha, beta) = match bond {
             Bond::Bonded => (
                 -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu),
@@ -66,11 +61,7 @@ impl LayerSeries {
     /// assert!((series / exact.force_ratio - 1.0_f64).abs() < 0.01);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn corrected<T: RealField + Copy>(
-        bond: Bond,
-        poisson_ratio: T,
-        share: f64,
-    ) -> Result<Self, ElasticityError> {
+    pub fn corrected(bond: Bond, poisson_ratio: f64, share: f64) -> Result<Self, ElasticityError> {
         Ok(Self::of_kernel(
             &LayerKernel::new(bond, poisson_ratio)?,
             share,

@@ -1,8 +1,6 @@
 //! Rigid flat punch and cone on a half-space (Sneddon 1965).
 
 use crate::error::{ElasticityError, Quantity, not_negative, positive};
-use crate::scalar::{narrow, widen};
-use nalgebra::RealField;
 
 /// A flat circular punch: F = 2E*aδ.
 ///
@@ -15,11 +13,11 @@ use nalgebra::RealField;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct PunchContact<T> {
+pub struct PunchContact {
     /// F.
-    pub force_n: T,
+    pub force_n: f64,
     /// F/(πa²); the pressure at the edge is infinite.
-    pub mean_pressure_pa: T,
+    pub mean_pressure_pa: f64,
 }
 
 /// Of reduced modulus E* (Pa), punch radius a (m) and indentation δ (m, zero allowed).
@@ -32,18 +30,18 @@ pub struct PunchContact<T> {
 /// assert!((contact.force_n - 0.4f64).abs() < 1e-15);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn flat_punch<T: RealField + Copy>(
-    reduced_modulus_pa: T,
-    radius_m: T,
-    indentation_m: T,
-) -> Result<PunchContact<T>, ElasticityError> {
-    positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
-    positive(widen(radius_m), Quantity::Radius)?;
-    not_negative(widen(indentation_m), Quantity::Indentation)?;
-    let force_n = narrow::<T>(2.0) * reduced_modulus_pa * radius_m * indentation_m;
+pub fn flat_punch(
+    reduced_modulus_pa: f64,
+    radius_m: f64,
+    indentation_m: f64,
+) -> Result<PunchContact, ElasticityError> {
+    positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
+    positive(radius_m, Quantity::Radius)?;
+    not_negative(indentation_m, Quantity::Indentation)?;
+    let force_n = 2.0 * reduced_modulus_pa * radius_m * indentation_m;
     Ok(PunchContact {
         force_n,
-        mean_pressure_pa: force_n / radius_m / radius_m / T::pi(),
+        mean_pressure_pa: force_n / radius_m / radius_m / std::f64::consts::PI,
     })
 }
 
@@ -60,13 +58,13 @@ pub fn flat_punch<T: RealField + Copy>(
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct ConeContact<T> {
+pub struct ConeContact {
     /// F.
-    pub force_n: T,
+    pub force_n: f64,
     /// a = (2/π)δ tan α.
-    pub contact_radius_m: T,
+    pub contact_radius_m: f64,
     /// E*/(2 tan α), whatever the load.
-    pub mean_pressure_pa: T,
+    pub mean_pressure_pa: f64,
 }
 
 /// Of reduced modulus E* (Pa), tangent of the half opening angle α from the axis, and indentation δ (m, zero allowed).
@@ -82,19 +80,19 @@ pub struct ConeContact<T> {
 /// assert!((contact.mean_pressure_pa - 0.5f64).abs() < 1e-15);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn cone<T: RealField + Copy>(
-    reduced_modulus_pa: T,
-    half_angle_tangent: T,
-    indentation_m: T,
-) -> Result<ConeContact<T>, ElasticityError> {
-    positive(widen(reduced_modulus_pa), Quantity::ReducedModulus)?;
-    positive(widen(half_angle_tangent), Quantity::HalfAngle)?;
-    not_negative(widen(indentation_m), Quantity::Indentation)?;
-    let slope = half_angle_tangent * indentation_m * T::frac_2_pi();
+pub fn cone(
+    reduced_modulus_pa: f64,
+    half_angle_tangent: f64,
+    indentation_m: f64,
+) -> Result<ConeContact, ElasticityError> {
+    positive(reduced_modulus_pa, Quantity::ReducedModulus)?;
+    positive(half_angle_tangent, Quantity::HalfAngle)?;
+    not_negative(indentation_m, Quantity::Indentation)?;
+    let slope = half_angle_tangent * indentation_m * std::f64::consts::FRAC_2_PI;
     Ok(ConeContact {
         force_n: reduced_modulus_pa * slope * indentation_m,
         contact_radius_m: slope,
-        mean_pressure_pa: reduced_modulus_pa / half_angle_tangent * narrow(0.5),
+        mean_pressure_pa: reduced_modulus_pa / half_angle_tangent * 0.5,
     })
 }
 
@@ -112,9 +110,9 @@ pub fn cone<T: RealField + Copy>(
 /// assert!(tangent_of_degrees(90.0_f64).is_err());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn tangent_of_degrees<T: RealField + Copy>(degrees: T) -> Result<T, ElasticityError> {
-    let found = positive(widen(degrees), Quantity::HalfAngle)?;
-    let right: T = narrow(90.0);
+pub fn tangent_of_degrees(degrees: f64) -> Result<f64, ElasticityError> {
+    let found = positive(degrees, Quantity::HalfAngle)?;
+    let right: f64 = 90.0;
     if degrees >= right {
         return Err(ElasticityError::OutOfRange {
             quantity: Quantity::HalfAngle,
@@ -122,12 +120,12 @@ pub fn tangent_of_degrees<T: RealField + Copy>(degrees: T) -> Result<T, Elastici
             limit: 90.0,
         });
     }
-    let radian = T::pi() / narrow(180.0);
-    let half: T = narrow(45.0);
+    let radian = std::f64::consts::PI / 180.0;
+    let half: f64 = 45.0;
     // 90° − α is exact from 45° on.
     Ok(if degrees <= half {
         (degrees * radian).tan()
     } else {
-        T::one() / ((right - degrees) * radian).tan()
+        1.0 / ((right - degrees) * radian).tan()
     })
 }

@@ -9,8 +9,6 @@
 //! free surface and the stiffening of rubber are not included.
 
 use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
-use crate::scalar::{narrow, widen};
-use nalgebra::RealField;
 use std::f64::consts::PI;
 
 /// δ (m) of one contact with contact radius a (m) of a sphere of radius R (m) and Poisson ratio ν between rigid plates.
@@ -23,18 +21,18 @@ use std::f64::consts::PI;
 /// let ratio = |a: f64| tactile_elasticity::contact::tatara_indentation_m(a, 1.0, 0.5).unwrap() / (a * a);
 /// assert!((ratio(0.1) - 0.958).abs() < 1e-3 && (ratio(0.5) - 0.800).abs() < 1e-3);
 /// ```
-pub fn tatara_indentation_m<T: RealField + Copy>(
-    contact_radius_m: T,
-    radius_m: T,
-    poisson_ratio: T,
-) -> Result<T, ElasticityError> {
-    let a = not_negative(widen(contact_radius_m), Quantity::ContactRadius)?;
+pub fn tatara_indentation_m(
+    contact_radius_m: f64,
+    radius_m: f64,
+    poisson_ratio: f64,
+) -> Result<f64, ElasticityError> {
+    let a = not_negative(contact_radius_m, Quantity::ContactRadius)?;
     let squeeze = Squeeze::new(
-        positive(widen(radius_m), Quantity::Radius)?,
-        poisson(widen(poisson_ratio))?,
+        positive(radius_m, Quantity::Radius)?,
+        poisson(poisson_ratio)?,
         1.0,
     );
-    Ok(narrow(squeeze.indentation(a)))
+    Ok(squeeze.indentation(a))
 }
 
 /// The law in units of R: the far side counts with the sphere's share of the compliance.

@@ -2,8 +2,6 @@
 
 use super::Body;
 use crate::error::{ElasticityError, Quantity, not_negative, poisson, positive};
-use crate::scalar::{narrow, widen};
-use nalgebra::RealField;
 
 /// One elastic layer of the waveguide.
 ///
@@ -16,13 +14,13 @@ use nalgebra::RealField;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Layer<T> {
+pub struct Layer {
     /// Thickness in m; zero is allowed and counts for nothing.
-    pub thickness_m: T,
+    pub thickness_m: f64,
     /// Young's modulus in Pa.
-    pub youngs_modulus_pa: T,
+    pub youngs_modulus_pa: f64,
     /// Poisson's ratio in (−1, ½].
-    pub poisson_ratio: T,
+    pub poisson_ratio: f64,
 }
 
 /// Elastic layers on a rigid base, the touched one first.
@@ -38,23 +36,23 @@ pub struct Layer<T> {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Waveguide<T> {
-    layers: Vec<Layer<T>>,
+pub struct Waveguide {
+    layers: Vec<Layer>,
 }
 
-impl<T: RealField + Copy> Waveguide<T> {
+impl Waveguide {
     /// From the touched layer down.
     ///
     /// # Errors
     /// No layers or no thickness at all, a negative thickness, a modulus that is not above zero, a Poisson ratio out of range.
-    pub fn new(layers: Vec<Layer<T>>) -> Result<Self, ElasticityError> {
+    pub fn new(layers: Vec<Layer>) -> Result<Self, ElasticityError> {
         for layer in &layers {
-            not_negative(widen(layer.thickness_m), Quantity::Thickness)?;
-            positive(widen(layer.youngs_modulus_pa), Quantity::YoungsModulus)?;
-            poisson(widen(layer.poisson_ratio))?;
+            not_negative(layer.thickness_m, Quantity::Thickness)?;
+            positive(layer.youngs_modulus_pa, Quantity::YoungsModulus)?;
+            poisson(layer.poisson_ratio)?;
         }
         let waveguide = Self { layers };
-        positive(widen(waveguide.thickness_m()), Quantity::Thickness)?;
+        positive(waveguide.thickness_m(), Quantity::Thickness)?;
         Ok(waveguide)
     }
 
@@ -63,7 +61,7 @@ impl<T: RealField + Copy> Waveguide<T> {
     /// ```
     /// use tactile_elasticity::contact::Waveguide;
     ///
-    /// let flat = Waveguide::<f64>::rigid();
+    /// let flat = Waveguide::rigid();
     /// assert!(flat.layers().is_empty() && flat.as_body().compliance_per_pa() == 0.0);
     /// ```
     pub fn rigid() -> Self {
@@ -86,52 +84,51 @@ impl<T: RealField + Copy> Waveguide<T> {
     /// assert!((waveguide.as_body().compliance_per_pa() / plane_strain - 1.0).abs() < 1e-14);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn layers(&self) -> &[Layer<T>] {
+    pub fn layers(&self) -> &[Layer] {
         &self.layers
     }
 
     /// Σ h in m.
-    pub fn thickness_m(&self) -> T {
-        self.sum(|_| T::one())
+    pub fn thickness_m(&self) -> f64 {
+        self.sum(|_| 1.0)
     }
 
     /// Σh/Σ(h/E): the layers carry the same stress one after the other and are free to spread sideways (Reuss).
-    pub fn series_modulus_pa(&self) -> T {
-        self.thickness_m() / self.sum(|l| T::one() / l.youngs_modulus_pa)
+    pub fn series_modulus_pa(&self) -> f64 {
+        self.thickness_m() / self.sum(|l| 1.0 / l.youngs_modulus_pa)
     }
 
     /// Σh/Σ(h (1+ν)(1−2ν)/(E(1−ν))): in series and held sideways, as under a wide punch; infinite where every layer
     /// is incompressible.
-    pub fn confined_modulus_pa(&self) -> T {
+    pub fn confined_modulus_pa(&self) -> f64 {
         let compliance = self.sum(|l| {
             let nu = l.poisson_ratio;
-            let (one, two) = (T::one(), narrow::<T>(2.0));
+            let (one, two) = (1.0, 2.0);
             (one + nu) * (one - two * nu) / (l.youngs_modulus_pa * (one - nu))
         });
         self.thickness_m() / compliance
     }
 
     /// Poisson's ratio averaged over the thickness.
-    pub fn poisson_ratio(&self) -> T {
+    pub fn poisson_ratio(&self) -> f64 {
         self.sum(|l| l.poisson_ratio) / self.thickness_m()
     }
 
     /// The waveguide as one deep body: (1 − ν²)/E of the layers in series, Σ(h(1 − ν²)/E)/Σh in 1/Pa.
     ///
     /// True while the contact is small beside every layer's thickness and the layers are alike.
-    pub fn as_body(&self) -> Body<T> {
+    pub fn as_body(&self) -> Body {
         if self.layers.is_empty() {
             return Body::rigid();
         }
-        let compliance = self.sum(|l| {
-            (T::one() - l.poisson_ratio) * (T::one() + l.poisson_ratio) / l.youngs_modulus_pa
-        });
+        let compliance =
+            self.sum(|l| (1.0 - l.poisson_ratio) * (1.0 + l.poisson_ratio) / l.youngs_modulus_pa);
         Body::from_compliance(compliance / self.thickness_m())
     }
 
-    fn sum(&self, density: impl Fn(&Layer<T>) -> T) -> T {
+    fn sum(&self, density: impl Fn(&Layer) -> f64) -> f64 {
         self.layers
             .iter()
-            .fold(T::zero(), |sum, l| sum + l.thickness_m * density(l))
+            .fold(0.0, |sum, l| sum + l.thickness_m * density(l))
     }
 }

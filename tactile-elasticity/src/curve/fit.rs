@@ -3,7 +3,8 @@
 use super::profile::{Problem, Profile};
 use super::{IndentationCurve, Indenter};
 use crate::error::{ElasticityError, Quantity, finite, poisson};
-use crate::modulus::{ContactLaw, EstimatorKind, FitStatistics, Interval, Warning, quantile_95};
+use crate::modulus::{ContactLaw, EstimatorKind, FitStatistics, Warning};
+use tactile_core::{Interval, statistics::quantile_95};
 
 /// Whether the force before contact is zero.
 ///
@@ -93,7 +94,7 @@ pub struct CurveFit {
     /// Its standard error, from the 95 % interval's width.
     pub standard_error_pa: f64,
     /// 95 % interval by profile likelihood, and by the error that finite strain makes in the law.
-    pub interval_95: Interval<f64>,
+    pub interval_95: Interval,
     /// Relative standard error of the law itself, which is part of the interval.
     pub model_error: f64,
     /// Position where contact begins.
@@ -109,9 +110,9 @@ pub struct CurveFit {
     /// Largest a/R, for spheres.
     pub contact_ratio: Option<f64>,
     /// Information criteria.
-    pub statistics: FitStatistics<f64>,
+    pub statistics: FitStatistics,
     /// Where the law's assumptions fail; their load is the curve's last point.
-    pub warnings: Vec<Warning<f64>>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Fits one law of a rigid `indenter` on a sample with Poisson ratio `nu`.
@@ -229,10 +230,7 @@ fn report(
         model: law.kind(),
         youngs_modulus_pa: best.modulus * to_modulus,
         standard_error_pa: (upper - lower) / (2.0 * quantile_95(Some(degrees as f64))),
-        interval_95: Interval {
-            lower,
-            upper: Some(upper),
-        },
+        interval_95: Interval::new(lower, Some(upper)),
         model_error,
         contact_point_m: best.contact_m,
         offset_n: best.offset,
@@ -324,12 +322,7 @@ fn reach_of(inside: impl Fn(f64) -> bool) -> f64 {
     0.5 * (low + high)
 }
 
-fn warnings(
-    law: &dyn ContactLaw,
-    depth: f64,
-    ratio: Option<f64>,
-    load: usize,
-) -> Vec<Warning<f64>> {
+fn warnings(law: &dyn ContactLaw, depth: f64, ratio: Option<f64>, load: usize) -> Vec<Warning> {
     let limit = law.contact_ratio_limit();
     let mut all = Vec::new();
     if let Some(ratio) = ratio.filter(|&r| r > limit) {

@@ -18,8 +18,6 @@ pub use indenter::{Indenter, Model};
 pub use select::{CurveSelection, SelectionReason, select_model};
 
 use crate::error::{ElasticityError, Quantity};
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// Forces over positions, widened to f64.
 ///
@@ -46,10 +44,7 @@ impl IndentationCurve {
     /// # Errors
     /// [`ElasticityError::LengthMismatch`], [`ElasticityError::TooFewLoads`] below six points,
     /// [`ElasticityError::NotFinite`], and [`ElasticityError::EqualLoads`] where all forces or all positions are equal.
-    pub fn new<T: RealField + Copy>(
-        position_m: &[T],
-        force_n: &[T],
-    ) -> Result<Self, ElasticityError> {
+    pub fn new(position_m: &[f64], force_n: &[f64]) -> Result<Self, ElasticityError> {
         let (expected, found) = (position_m.len(), force_n.len());
         if expected != found {
             return Err(ElasticityError::LengthMismatch {
@@ -65,7 +60,7 @@ impl IndentationCurve {
             });
         }
         let [position_m, force_n] =
-            [position_m, force_n].map(|v| v.iter().map(|&x| widen(x)).collect::<Vec<_>>());
+            [position_m, force_n].map(|v| v.iter().map(|&x| x).collect::<Vec<_>>());
         for (values, quantity) in [
             (&position_m, Quantity::Indentation),
             (&force_n, Quantity::Force),

@@ -4,7 +4,7 @@
 //! To first order dE = sym(Fᵀ dH), so that the mean is linear in the data too, and its covariance a sum over the points.
 
 use crate::error::{ElasticityError, Quantity};
-use nalgebra::{Matrix3, Matrix6, RealField, SMatrix, Vector3};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
 /// Order of the components in covariances of strain: xx, yy, zz, xy, xz, yz.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
@@ -19,17 +19,14 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 
 /// let covariance = strain_covariance(&Matrix3::zeros(), &(SMatrix::<f64, 9, 9>::identity() * 1e-8));
 /// assert_eq!((covariance[(0, 0)], covariance[(3, 3)]), (1e-8, 0.5e-8));
 /// ```
-pub fn strain_covariance<T: RealField + Copy>(
-    gradient: &Matrix3<T>,
-    covariance: &SMatrix<T, 9, 9>,
-) -> Matrix6<T> {
+pub fn strain_covariance(gradient: &Matrix3<f64>, covariance: &SMatrix<f64, 9, 9>) -> Matrix6<f64> {
     let f = gradient + Matrix3::identity();
-    let half: T = nalgebra::convert(0.5);
+    let half: f64 = 0.5;
     // ∂E_ab/∂H_kl = ½(δ_bl F_ka + δ_al F_kb)
-    let jacobian = SMatrix::<T, 6, 9>::from_fn(|row, column| {
+    let jacobian = SMatrix::<f64, 6, 9>::from_fn(|row, column| {
         let ((a, b), (k, l)) = (PAIRS[row], (column % 3, column / 3));
-        let first = if b == l { f[(k, a)] } else { T::zero() };
-        let second = if a == l { f[(k, b)] } else { T::zero() };
+        let first = if b == l { f[(k, a)] } else { 0.0 };
+        let second = if a == l { f[(k, b)] } else { 0.0 };
         (first + second) * half
     });
     jacobian * covariance * jacobian.transpose()
@@ -54,12 +51,12 @@ pub fn strain_covariance<T: RealField + Copy>(
 /// assert!((covariance[(0, 0)] - 2e-8_f64).abs() < 1e-22);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn mean_strain_covariance<T: RealField + Copy>(
-    gradients: &[Matrix3<T>],
-    weights: &[T],
-    influence: impl Fn(usize, usize) -> Vector3<T>,
-    displacement_covariance: &[Matrix3<T>],
-) -> Result<Matrix6<T>, ElasticityError> {
+pub fn mean_strain_covariance(
+    gradients: &[Matrix3<f64>],
+    weights: &[f64],
+    influence: impl Fn(usize, usize) -> Vector3<f64>,
+    displacement_covariance: &[Matrix3<f64>],
+) -> Result<Matrix6<f64>, ElasticityError> {
     if weights.len() != gradients.len() {
         let (expected, found) = (gradients.len(), weights.len());
         return Err(ElasticityError::LengthMismatch {
@@ -68,13 +65,13 @@ pub fn mean_strain_covariance<T: RealField + Copy>(
             found,
         });
     }
-    let total = weights.iter().fold(T::zero(), |s, &w| s + w);
-    crate::error::positive(crate::scalar::widen(total), Quantity::Weight)?;
-    let half: T = nalgebra::convert(0.5);
+    let total = weights.iter().fold(0.0, |s, &w| s + w);
+    crate::error::positive(total, Quantity::Weight)?;
+    let half: f64 = 0.5;
     let mut sum = Matrix6::zeros();
     for (j, sigma) in displacement_covariance.iter().enumerate() {
         // Row ab: what a displacement of point j adds to the mean E_ab.
-        let mut response = SMatrix::<T, 6, 3>::zeros();
+        let mut response = SMatrix::<f64, 6, 3>::zeros();
         for (i, h) in gradients.iter().enumerate() {
             let (f, a) = (
                 h + Matrix3::identity(),

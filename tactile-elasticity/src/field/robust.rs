@@ -1,7 +1,5 @@
 //! Averages that are robust against outliers.
 
-use nalgebra::RealField;
-
 /// How a field is averaged.
 ///
 /// ```
@@ -36,18 +34,16 @@ const MAD: f64 = 0.674_489_750_196_081_7;
 const K: f64 = 1.345;
 
 /// The value below which half of the weight lies.
-pub(crate) fn weighted_median<T: RealField + Copy>(values: &[T], weights: &[T]) -> T {
-    let mut order: Vec<usize> = (0..values.len())
-        .filter(|&i| weights[i] > T::zero())
-        .collect();
+pub(crate) fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
+    let mut order: Vec<usize> = (0..values.len()).filter(|&i| weights[i] > 0.0).collect();
     order.sort_by(|&i, &j| {
         values[i]
             .partial_cmp(&values[j])
             .unwrap_or(core::cmp::Ordering::Equal)
     });
-    let total = order.iter().fold(T::zero(), |s, &i| s + weights[i]);
-    let half = total * nalgebra::convert(0.5);
-    let mut below = T::zero();
+    let total = order.iter().fold(0.0, |s, &i| s + weights[i]);
+    let half = total * 0.5;
+    let mut below = 0.0;
     for (k, &i) in order.iter().enumerate() {
         below += weights[i];
         if below > half {
@@ -55,28 +51,24 @@ pub(crate) fn weighted_median<T: RealField + Copy>(values: &[T], weights: &[T]) 
         }
         if below == half {
             let next = order.get(k + 1).map_or(values[i], |&j| values[j]);
-            return (values[i] + next) * nalgebra::convert(0.5);
+            return (values[i] + next) * 0.5;
         }
     }
-    T::zero()
+    0.0
 }
 
 /// Centre and spread of one component.
-pub(crate) fn centre_and_spread<T: RealField + Copy>(
-    values: &[T],
-    weights: &[T],
-    how: Averaging,
-) -> (T, T) {
+pub(crate) fn centre_and_spread(values: &[f64], weights: &[f64], how: Averaging) -> (f64, f64) {
     let median = weighted_median(values, weights);
-    let deviations: Vec<T> = values.iter().map(|&v| (v - median).abs()).collect();
-    let spread = weighted_median(&deviations, weights) / nalgebra::convert(MAD);
-    if how == Averaging::Median || spread == T::zero() {
+    let deviations: Vec<f64> = values.iter().map(|&v| (v - median).abs()).collect();
+    let spread = weighted_median(&deviations, weights) / MAD;
+    if how == Averaging::Median || spread == 0.0 {
         return (median, spread);
     }
-    let limit = spread * nalgebra::convert(K);
+    let limit = spread * K;
     let mut centre = median;
     for _ in 0..50 {
-        let (mut sum, mut total) = (T::zero(), T::zero());
+        let (mut sum, mut total) = (0.0, 0.0);
         for (&v, &w) in values.iter().zip(weights) {
             let away = (v - centre).abs();
             let w = if away > limit { w * limit / away } else { w };
@@ -85,7 +77,7 @@ pub(crate) fn centre_and_spread<T: RealField + Copy>(
         }
         let step = sum / total;
         centre += step;
-        if step.abs() <= spread * nalgebra::convert(1e-7) {
+        if step.abs() <= spread * 1e-7 {
             break;
         }
     }

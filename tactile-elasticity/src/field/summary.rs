@@ -3,7 +3,7 @@
 use super::robust::{Averaging, centre_and_spread};
 use crate::error::{ElasticityError, Quantity};
 use crate::strain::{Deformation, StrainMeasure};
-use nalgebra::{Matrix3, RealField};
+use nalgebra::Matrix3;
 
 /// Averages of a strain field, component by component.
 ///
@@ -20,17 +20,13 @@ use nalgebra::{Matrix3, RealField};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize"))
-)]
-pub struct StrainSummary<T> {
+pub struct StrainSummary {
     /// Weighted mean.
-    pub mean: Matrix3<T>,
+    pub mean: Matrix3<f64>,
     /// Weighted standard deviation over the field.
-    pub spread: Matrix3<T>,
+    pub spread: Matrix3<f64>,
     /// Standard error of the mean, as if the points were independent: spread/√n_eff, n_eff = (Σw)²/Σw².
-    pub standard_error: Matrix3<T>,
+    pub standard_error: Matrix3<f64>,
     /// Points that count.
     pub used: usize,
     /// Indices of the points where det F ≤ 0, left out of the averages.
@@ -40,16 +36,16 @@ pub struct StrainSummary<T> {
 /// Strain at points, with the weight (area, volume) of each.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
-pub struct StrainField<T> {
+pub struct StrainField {
     /// The strain at every point; zero where the deformation folds.
-    pub strains: Vec<Matrix3<T>>,
+    pub strains: Vec<Matrix3<f64>>,
     /// The weight of every point; zero where the deformation folds.
-    pub weights: Vec<T>,
+    pub weights: Vec<f64>,
     /// The points at which the deformation folds, det F ≤ 0.
     pub folded: Vec<usize>,
 }
 
-impl<T: RealField + Copy> StrainField<T> {
+impl StrainField {
     /// Strain of every displacement gradient, equal weights.
     ///
     /// # Errors
@@ -67,9 +63,9 @@ impl<T: RealField + Copy> StrainField<T> {
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn from_gradients(
-        gradients: &[Matrix3<T>],
-        weights: Option<&[T]>,
-        measure: &dyn StrainMeasure<T>,
+        gradients: &[Matrix3<f64>],
+        weights: Option<&[f64]>,
+        measure: &dyn StrainMeasure,
     ) -> Result<Self, ElasticityError> {
         let mut field = Self {
             strains: Vec::new(),
@@ -96,9 +92,9 @@ impl<T: RealField + Copy> StrainField<T> {
     /// As [`from_gradients`](Self::from_gradients); the field is then empty.
     pub fn set_gradients(
         &mut self,
-        gradients: &[Matrix3<T>],
-        weights: Option<&[T]>,
-        measure: &dyn StrainMeasure<T>,
+        gradients: &[Matrix3<f64>],
+        weights: Option<&[f64]>,
+        measure: &dyn StrainMeasure,
     ) -> Result<(), ElasticityError> {
         self.clear();
         let taken = self.take(gradients, weights, measure);
@@ -116,12 +112,12 @@ impl<T: RealField + Copy> StrainField<T> {
 
     fn take(
         &mut self,
-        gradients: &[Matrix3<T>],
-        weights: Option<&[T]>,
-        measure: &dyn StrainMeasure<T>,
+        gradients: &[Matrix3<f64>],
+        weights: Option<&[f64]>,
+        measure: &dyn StrainMeasure,
     ) -> Result<(), ElasticityError> {
         match weights {
-            None => self.weights.resize(gradients.len(), T::one()),
+            None => self.weights.resize(gradients.len(), 1.0),
             Some(weights) => {
                 check_weights(gradients.len(), weights)?;
                 self.weights.extend_from_slice(weights);
@@ -129,10 +125,10 @@ impl<T: RealField + Copy> StrainField<T> {
         }
         for (i, h) in gradients.iter().enumerate() {
             let deformation = Deformation::from_displacement_gradient(*h);
-            if deformation.is_finite() && deformation.jacobian() <= T::zero() {
+            if deformation.is_finite() && deformation.jacobian() <= 0.0 {
                 self.folded.push(i);
                 self.strains.push(Matrix3::zeros());
-                self.weights[i] = T::zero();
+                self.weights[i] = 0.0;
             } else {
                 self.strains.push(measure.of(&deformation)?);
             }
@@ -155,39 +151,39 @@ impl<T: RealField + Copy> StrainField<T> {
     /// assert_eq!(field.summary_with(Averaging::Median).mean[(0, 0)], 0.02);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
-    pub fn summary_with(&self, averaging: Averaging) -> StrainSummary<T> {
+    pub fn summary_with(&self, averaging: Averaging) -> StrainSummary {
         let mut summary = self.summary();
         let loss: f64 = match averaging {
             Averaging::Mean => return summary,
             Averaging::Huber => 1.0 / 0.95f64.sqrt(),
             Averaging::Median => std::f64::consts::FRAC_PI_2.sqrt(),
         };
-        let total = self.weights.iter().fold(T::zero(), |s, &w| s + w);
-        let squares = self.weights.iter().fold(T::zero(), |s, &w| s + w * w);
-        if squares == T::zero() {
+        let total = self.weights.iter().fold(0.0, |s, &w| s + w);
+        let squares = self.weights.iter().fold(0.0, |s, &w| s + w * w);
+        if squares == 0.0 {
             return summary;
         }
         let root = total / squares.sqrt();
         for i in 0..3 {
             for j in 0..3 {
-                let values: Vec<T> = self.strains.iter().map(|e| e[(i, j)]).collect();
+                let values: Vec<f64> = self.strains.iter().map(|e| e[(i, j)]).collect();
                 let (centre, spread) = centre_and_spread(&values, &self.weights, averaging);
                 summary.mean[(i, j)] = centre;
                 summary.spread[(i, j)] = spread;
-                summary.standard_error[(i, j)] = spread / root * nalgebra::convert(loss);
+                summary.standard_error[(i, j)] = spread / root * loss;
             }
         }
         summary
     }
 
     /// Weighted mean, spread and standard error.
-    pub fn summary(&self) -> StrainSummary<T> {
-        let mut total = T::zero();
-        let (mut squares, mut mean) = (T::zero(), Matrix3::zeros());
+    pub fn summary(&self) -> StrainSummary {
+        let mut total = 0.0;
+        let (mut squares, mut mean) = (0.0, Matrix3::zeros());
         for (e, &w) in self.strains.iter().zip(&self.weights) {
             total += w;
             squares += w * w;
-            if total > T::zero() {
+            if total > 0.0 {
                 mean += (e - mean) * (w / total);
             }
         }
@@ -196,13 +192,13 @@ impl<T: RealField + Copy> StrainField<T> {
             let d = e - mean;
             variance += d.component_mul(&d) * w;
         }
-        let effective = if squares > T::zero() {
+        let effective = if squares > 0.0 {
             total * total / squares
         } else {
-            T::zero()
+            0.0
         };
-        let (spread, standard_error) = if effective > T::one() {
-            let unbiased = effective / (effective - T::one());
+        let (spread, standard_error) = if effective > 1.0 {
+            let unbiased = effective / (effective - 1.0);
             let variance = variance * (unbiased / total);
             (
                 variance.map(|v| v.sqrt()),
@@ -211,7 +207,7 @@ impl<T: RealField + Copy> StrainField<T> {
         } else {
             (Matrix3::zeros(), Matrix3::zeros())
         };
-        let used = self.weights.iter().filter(|&&w| w > T::zero()).count();
+        let used = self.weights.iter().filter(|&&w| w > 0.0).count();
         StrainSummary {
             mean,
             spread,
@@ -222,7 +218,7 @@ impl<T: RealField + Copy> StrainField<T> {
     }
 }
 
-fn check_weights<T: RealField + Copy>(n: usize, weights: &[T]) -> Result<(), ElasticityError> {
+fn check_weights(n: usize, weights: &[f64]) -> Result<(), ElasticityError> {
     if weights.len() != n {
         return Err(ElasticityError::LengthMismatch {
             quantity: Quantity::Weight,
@@ -231,7 +227,7 @@ fn check_weights<T: RealField + Copy>(n: usize, weights: &[T]) -> Result<(), Ela
         });
     }
     for &w in weights {
-        crate::error::not_negative(crate::scalar::widen(w), Quantity::Weight)?;
+        crate::error::not_negative(w, Quantity::Weight)?;
     }
     Ok(())
 }

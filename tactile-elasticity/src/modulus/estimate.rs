@@ -3,9 +3,8 @@
 use super::warning::Warning;
 use crate::error::ElasticityError;
 use crate::modulus::LoadSeries;
-use crate::scalar::narrow;
-use nalgebra::RealField;
 use std::sync::Arc;
+use tactile_core::Interval;
 
 /// Estimates Young's modulus from a series of loads.
 ///
@@ -21,25 +20,25 @@ use std::sync::Arc;
 ///         LoadState { contact_radius_m: Some(Estimate::new(a, 1e-6)), ..LoadState::new(Estimate::new(f, 1e-4)) }
 ///     })
 ///     .to_vec();
-/// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(HertzSphere::new(0.005, 0.5)?);
+/// let estimator: Box<dyn ModulusEstimator> = Box::new(HertzSphere::new(0.005, 0.5)?);
 /// let modulus = estimator.estimate(&LoadSeries::new(loads))?;
 /// assert!((modulus.youngs_modulus_pa - 30e3).abs() < 1e-6);
 /// assert!(modulus.interval_95.contains(30e3));
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub trait ModulusEstimator<T: RealField + Copy> {
+pub trait ModulusEstimator {
     /// Young's modulus of the sample with its error.
     ///
     /// # Errors
     /// [`ElasticityError`] where the loads do not determine it.
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError>;
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError>;
 
     /// Which estimator this is.
     ///
     /// ```
     /// use tactile_elasticity::modulus::{EstimatorKind, ModulusEstimator, PaperRatio};
     ///
-    /// let estimator: Box<dyn ModulusEstimator<f64>> = Box::new(PaperRatio::default());
+    /// let estimator: Box<dyn ModulusEstimator> = Box::new(PaperRatio::default());
     /// assert_eq!(estimator.kind(), EstimatorKind::PaperRatio);
     /// ```
     fn kind(&self) -> EstimatorKind;
@@ -49,7 +48,7 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     /// ```
     /// use tactile_elasticity::modulus::{HertzSphere, ModulusEstimator, PaperRatio};
     ///
-    /// let estimators: [Box<dyn ModulusEstimator<f64>>; 2] = [Box::new(PaperRatio::default()), Box::new(HertzSphere::new(3e-3, 0.5)?)];
+    /// let estimators: [Box<dyn ModulusEstimator>; 2] = [Box::new(PaperRatio::default()), Box::new(HertzSphere::new(3e-3, 0.5)?)];
     /// assert_eq!(estimators.map(|e| e.needs_strain()), [true, false]);
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
@@ -58,8 +57,8 @@ pub trait ModulusEstimator<T: RealField + Copy> {
     }
 }
 
-impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> for Box<E> {
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+impl<E: ModulusEstimator + ?Sized> ModulusEstimator for Box<E> {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         (**self).estimate(series)
     }
 
@@ -72,8 +71,8 @@ impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> f
     }
 }
 
-impl<T: RealField + Copy, E: ModulusEstimator<T> + ?Sized> ModulusEstimator<T> for Arc<E> {
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+impl<E: ModulusEstimator + ?Sized> ModulusEstimator for Arc<E> {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         (**self).estimate(series)
     }
 
@@ -152,30 +151,6 @@ impl core::fmt::Display for EstimatorKind {
     }
 }
 
-/// A range that holds the truth with a stated probability.
-///
-/// ```
-/// use tactile_elasticity::modulus::Interval;
-///
-/// let at_least = Interval { lower: 20e3_f64, upper: None };
-/// assert!(at_least.contains(1e9) && !at_least.contains(19e3));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Interval<T> {
-    /// Lower limit.
-    pub lower: T,
-    /// Upper limit; None where the data cannot tell the sample from a rigid one.
-    pub upper: Option<T>,
-}
-
-impl<T: RealField + Copy> Interval<T> {
-    /// True when `x` lies within.
-    pub fn contains(&self, x: T) -> bool {
-        x >= self.lower && self.upper.is_none_or(|upper| x <= upper)
-    }
-}
-
 /// Young's modulus with its error, its fit and its warnings.
 ///
 /// ```
@@ -187,7 +162,7 @@ impl<T: RealField + Copy> Interval<T> {
 ///     contact_radius_m: Some(Estimate::new(contact.contact_radius_m, 1e-6)),
 ///     ..LoadState::new(Estimate::new(0.05, 1e-4))
 /// };
-/// let modulus: ModulusEstimate<f64> = HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
+/// let modulus: ModulusEstimate = HertzSphere::new(3e-3, 0.5)?.estimate(&LoadSeries::new([load]))?;
 /// assert!(modulus.interval_95.contains(30e3));
 /// // The number stands, with the warning that a/R = 0.47 is much.
 /// assert!(matches!(modulus.warnings[0], Warning::LargeContact { load: 0, ratio, .. } if ratio > 0.4));
@@ -195,21 +170,21 @@ impl<T: RealField + Copy> Interval<T> {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct ModulusEstimate<T> {
+pub struct ModulusEstimate {
     /// E of the sample.
-    pub youngs_modulus_pa: T,
+    pub youngs_modulus_pa: f64,
     /// Its standard error, to first order.
-    pub standard_error_pa: T,
+    pub standard_error_pa: f64,
     /// 95 % confidence interval, not symmetric where E depends on the data non-linearly.
-    pub interval_95: Interval<T>,
+    pub interval_95: Interval,
     /// Which estimator.
     pub estimator: EstimatorKind,
     /// Per load, in the order given.
-    pub loads: Vec<LoadDiagnostics<T>>,
+    pub loads: Vec<LoadDiagnostics>,
     /// How the data agree with the law.
-    pub fit: FitStatistics<T>,
+    pub fit: FitStatistics,
     /// Where the estimator's assumptions fail.
-    pub warnings: Vec<Warning<T>>,
+    pub warnings: Vec<Warning>,
 }
 
 /// What one load contributed.
@@ -228,18 +203,18 @@ pub struct ModulusEstimate<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct LoadDiagnostics<T> {
+pub struct LoadDiagnostics {
     /// True when the load carried what the estimator needs.
     pub used: bool,
     /// a/R, measured, or by the law from what was measured.
-    pub contact_ratio: Option<T>,
+    pub contact_ratio: Option<f64>,
     /// The modulus this load alone would give.
-    pub youngs_modulus_pa: Option<T>,
+    pub youngs_modulus_pa: Option<f64>,
     /// Residual over its standard deviation.
-    pub standardized_residual: Option<T>,
+    pub standardized_residual: Option<f64>,
 }
 
-impl<T: RealField + Copy> LoadDiagnostics<T> {
+impl LoadDiagnostics {
     pub(crate) fn unused() -> Self {
         Self {
             used: false,
@@ -256,7 +231,7 @@ impl<T: RealField + Copy> LoadDiagnostics<T> {
 /// use tactile_elasticity::contact::HertzContact;
 /// use tactile_elasticity::modulus::{Estimate, HertzSphere, LoadSeries, LoadState, ModulusEstimator};
 ///
-/// let loads: Vec<LoadState<f64>> = [1e-3, 2e-3, 4e-3]
+/// let loads: Vec<LoadState> = [1e-3, 2e-3, 4e-3]
 ///     .into_iter()
 ///     .map(|force| {
 ///         let contact = HertzContact::from_force(force, 5e-3, 40e3)?;
@@ -271,20 +246,20 @@ impl<T: RealField + Copy> LoadDiagnostics<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct FitStatistics<T> {
+pub struct FitStatistics {
     /// Number of observations.
     pub observations: usize,
     /// Number of fitted parameters.
     pub parameters: usize,
     /// Σ (residual/σ)², or the residuals' own sum where no σ was given.
-    pub chi_squared: T,
+    pub chi_squared: f64,
     /// Akaike's criterion with the small-sample correction; infinite with too few observations.
-    pub aicc: T,
+    pub aicc: f64,
     /// Schwarz's criterion.
-    pub bic: T,
+    pub bic: f64,
 }
 
-impl<T: RealField + Copy> FitStatistics<T> {
+impl FitStatistics {
     pub(crate) fn new(
         observations: usize,
         parameters: usize,
@@ -300,9 +275,9 @@ impl<T: RealField + Copy> FitStatistics<T> {
         Self {
             observations,
             parameters,
-            chi_squared: narrow(chi_squared),
-            aicc: narrow(minus_two_log_likelihood + 2.0 * k + correction),
-            bic: narrow(minus_two_log_likelihood + k * n.ln()),
+            chi_squared: chi_squared,
+            aicc: (minus_two_log_likelihood + 2.0 * k + correction),
+            bic: (minus_two_log_likelihood + k * n.ln()),
         }
     }
 }

@@ -1,6 +1,5 @@
 //! Young's modulus from what was measured at one or more loads.
 
-mod bootstrap;
 mod contact;
 mod covariance;
 mod estimate;
@@ -16,22 +15,21 @@ mod tabulated;
 mod uniaxial;
 mod warning;
 
-pub use bootstrap::{Bootstrap, BootstrapSummary};
 pub use contact::{
     BondedLayer, Cone, ContactEstimator, Evidence, FlatPunch, HertzSphere, SphereBetweenPlates,
     SphereOnWaveguide, TataraSphere,
 };
 pub use estimate::{
-    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 pub(crate) use law::{ConeLaw, LayerLaw, Punch, Sphere, TataraLaw, TipOnBallLaw};
 pub use law::{ContactLaw, LayerTheory, LogForce, NoSlipLaw, WaveguideLaw};
-pub use load::{Estimate, LoadState};
+pub use load::LoadState;
 pub use ratio::{PaperRatio, StrainReference};
 pub use regression::StressStrainRegression;
 pub use select::{BestOf, ModulusSelection};
 pub use series::{LoadSeries, SharedErrors};
-pub(crate) use statistics::quantile_95;
 pub use tabulated::TabulatedContact;
+pub use tactile_core::{Estimate, Interval};
 pub use uniaxial::UniaxialLoads;
 pub use warning::Warning;

@@ -2,16 +2,16 @@
 
 use super::covariance::Covariance;
 use super::estimate::{
-    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-use super::load::{Estimate, LoadState};
+use super::load::{LoadState, validated};
 use super::series::LoadSeries;
 use super::source::{LogErrors, total};
-use super::statistics::{CommonMean, common_mean, effective_degrees, fewest, quantile_95};
+use super::statistics::{CommonMean, common_mean, fewest};
 use super::warning::Warning;
 use crate::error::{ElasticityError, Quantity, positive};
-use crate::scalar::{narrow, widen};
-use nalgebra::RealField;
+use tactile_core::statistics::{effective_degrees_of_freedom, quantile_95};
+use tactile_core::{Estimate, Interval};
 
 /// Strain beyond which one modulus no longer describes a rubber.
 pub(crate) const LINEAR_STRAIN: f64 = 0.1;
@@ -93,23 +93,20 @@ impl PaperRatio {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`].
-    pub fn with_sphere_radius<T: RealField + Copy>(
-        mut self,
-        radius_m: T,
-    ) -> Result<Self, ElasticityError> {
-        self.sphere_radius_m = Some(positive(widen(radius_m), Quantity::Radius)?);
+    pub fn with_sphere_radius(mut self, radius_m: f64) -> Result<Self, ElasticityError> {
+        self.sphere_radius_m = Some(positive(radius_m, Quantity::Radius)?);
         Ok(self)
     }
 
     /// The first load's own strain, where strains are counted from an earlier state but the ratio from the first load.
-    fn first_strain(&self, loads: &[LoadState<f64>]) -> Estimate<f64> {
+    fn first_strain(&self, loads: &[LoadState]) -> Estimate {
         let first = loads.first().and_then(|load| load.mean_strain);
         first
             .filter(|_| self.reference == StrainReference::FirstLoad)
             .unwrap_or(Estimate::exact(0.0))
     }
 
-    fn ratios(&self, loads: &[LoadState<f64>]) -> Result<Vec<Ratio>, ElasticityError> {
+    fn ratios(&self, loads: &[LoadState]) -> Result<Vec<Ratio>, ElasticityError> {
         let mut ratios = Vec::new();
         let from_first = self.reference == StrainReference::FirstLoad;
         let base = if from_first {
@@ -122,7 +119,7 @@ impl PaperRatio {
             let Some(strain) = state.mean_strain else {
                 continue;
             };
-            let strain = strain.validated(Quantity::Strain)?.value - first_strain.value;
+            let strain = validated(strain, Quantity::Strain)?.value - first_strain.value;
             let stress_pa = stress(load, state)?.value - base.map_or(0.0, |b| b.value);
             if stress_pa == 0.0 && from_first {
                 return Err(ElasticityError::EqualLoads);
@@ -152,7 +149,7 @@ impl PaperRatio {
     /// Covariances of the ln E, from forces, areas, strains and the scale of all stresses, each with its degrees of freedom.
     ///
     /// d ln E = (dS_i − dS_0)/(S_i − S_0) − de_i/e_i with dS = dF/A − S dA/A. What the first load's stress errs by, all ratios share.
-    fn sources(&self, series: &LoadSeries<f64>, ratios: &[Ratio]) -> [LogErrors; 4] {
+    fn sources(&self, series: &LoadSeries, ratios: &[Ratio]) -> [LogErrors; 4] {
         let loads = series.loads();
         let areas: Vec<_> = loads.iter().map(LoadState::area).collect();
         let area_of = |k: usize| areas[k].map_or(1.0, |a| a.value);
@@ -189,13 +186,15 @@ impl PaperRatio {
                 }
             }
         };
+        // The scale of the forces comes from the calibration that their own errors come from.
+        let forces = forces.with_shared(|_| series.shared_errors().force_scale);
         let mut of_areas = none
             .clone()
             .with_own(|i| by_area(i, own(i)) * area_error(own(i)));
         if from_first {
             of_areas = of_areas.with_shared(|i| by_area(i, 0) * area_error(0));
         }
-        let scale = none.clone().with_shared(|_| series.stress_scale_error());
+        let scale = none.clone().with_shared(|_| series.size_scale_error());
         let strains = match series.strain_covariance() {
             Some(given) => none
                 .with_given(|i, j| given[(own(i), own(j))] / (ratios[i].strain * ratios[j].strain)),
@@ -207,7 +206,7 @@ impl PaperRatio {
                 .with_shared(|i| first / ratios[i].strain)
             }
         };
-        let degrees = |of: &dyn Fn(usize) -> Option<Estimate<f64>>| {
+        let degrees = |of: &dyn Fn(usize) -> Option<Estimate>| {
             let estimates = (0..loads.len()).filter_map(of);
             fewest(estimates.map(|e| e.degrees_of_freedom))
         };
@@ -219,14 +218,14 @@ impl PaperRatio {
         ]
     }
 
-    fn warnings<T: RealField + Copy>(
+    fn warnings(
         &self,
-        loads: &[LoadState<f64>],
-        diagnostics: &[LoadDiagnostics<T>],
+        loads: &[LoadState],
+        diagnostics: &[LoadDiagnostics],
         mean: &CommonMean,
-    ) -> Vec<Warning<T>> {
+    ) -> Vec<Warning> {
         let mut warnings = strain_warnings(loads);
-        let on_sphere = |(load, d): (usize, &LoadDiagnostics<T>)| {
+        let on_sphere = |(load, d): (usize, &LoadDiagnostics)| {
             Some(Warning::RatioOnSphere {
                 load,
                 ratio: d.contact_ratio?,
@@ -234,7 +233,7 @@ impl PaperRatio {
         };
         warnings.extend(diagnostics.iter().enumerate().filter_map(on_sphere));
         warnings.extend(mean.excess.map(|x| Warning::ExcessScatter {
-            reduced_chi_squared: narrow(x),
+            reduced_chi_squared: x,
         }));
         if mean.standard_error.is_infinite() {
             warnings.push(Warning::NoErrorEstimate);
@@ -242,24 +241,24 @@ impl PaperRatio {
         warnings
     }
 
-    fn diagnose<T: RealField + Copy>(
+    fn diagnose(
         &self,
-        loads: &[LoadState<f64>],
+        loads: &[LoadState],
         ratios: &[Ratio],
         mean: &CommonMean,
-    ) -> Vec<LoadDiagnostics<T>> {
+    ) -> Vec<LoadDiagnostics> {
         let mut diagnostics = vec![LoadDiagnostics::unused(); loads.len()];
         for (d, state) in diagnostics.iter_mut().zip(loads) {
             let ratio = self
                 .sphere_radius_m
                 .zip(state.contact_radius_m)
                 .map(|(radius, a)| a.value / radius);
-            d.contact_ratio = ratio.map(narrow);
+            d.contact_ratio = ratio;
         }
         for (r, &residual) in ratios.iter().zip(&mean.standardized_residuals) {
             diagnostics[r.load].used = true;
-            diagnostics[r.load].youngs_modulus_pa = Some(narrow(r.log().exp()));
-            diagnostics[r.load].standardized_residual = Some(narrow(residual));
+            diagnostics[r.load].youngs_modulus_pa = Some(r.log().exp());
+            diagnostics[r.load].standardized_residual = Some(residual);
         }
         diagnostics
     }
@@ -278,11 +277,8 @@ impl Ratio {
 }
 
 /// Mean stress of a load with its error; the area must be above zero.
-pub(crate) fn stress(
-    load: usize,
-    state: &LoadState<f64>,
-) -> Result<Estimate<f64>, ElasticityError> {
-    let force = state.force_n.validated(Quantity::Force)?;
+pub(crate) fn stress(load: usize, state: &LoadState) -> Result<Estimate, ElasticityError> {
+    let force = validated(state.force_n, Quantity::Force)?;
     let quantity = if state.contact_area_m2.is_some() {
         Quantity::ContactArea
     } else {
@@ -298,21 +294,18 @@ pub(crate) fn stress(
         load,
         quantity: Quantity::ContactArea,
     };
-    let area = state.area().ok_or(missing)?.validated(quantity)?;
+    let area = validated(state.area().ok_or(missing)?, quantity)?;
     positive(area.value, quantity)?;
     let value = force.value / area.value;
     let standard_error = (force.standard_error / area.value).hypot(value * area.relative_error());
     let parts = [force, area].map(|e| (e.relative_error().powi(2), e.degrees_of_freedom));
-    Ok(Estimate {
-        value,
-        standard_error,
-        degrees_of_freedom: effective_degrees(&parts),
-    })
+    let mut stress = Estimate::new(value, standard_error);
+    stress.degrees_of_freedom = effective_degrees_of_freedom(&parts);
+    Ok(stress)
 }
 
-impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
-        let series = series.widened();
+impl ModulusEstimator for PaperRatio {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let loads = series.loads();
         let ratios = self.ratios(loads)?;
         let sources = self.sources(&series, &ratios);
@@ -322,12 +315,12 @@ impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
         let modulus = mean.mean.exp();
         let diagnostics = self.diagnose(loads, &ratios, &mean);
         Ok(ModulusEstimate {
-            youngs_modulus_pa: narrow(modulus),
-            standard_error_pa: narrow(modulus * mean.standard_error),
-            interval_95: Interval {
-                lower: narrow((mean.mean - reach).exp()),
-                upper: reach.is_finite().then(|| narrow((mean.mean + reach).exp())),
-            },
+            youngs_modulus_pa: modulus,
+            standard_error_pa: (modulus * mean.standard_error),
+            interval_95: Interval::new(
+                (mean.mean - reach).exp(),
+                reach.is_finite().then(|| (mean.mean + reach).exp()),
+            ),
             estimator: EstimatorKind::PaperRatio,
             warnings: self.warnings(loads, &diagnostics, &mean),
             loads: diagnostics,
@@ -346,14 +339,14 @@ impl<T: RealField + Copy> ModulusEstimator<T> for PaperRatio {
 }
 
 /// Loads whose strain is beyond the linear law.
-pub(crate) fn strain_warnings<T: RealField + Copy>(loads: &[LoadState<f64>]) -> Vec<Warning<T>> {
+pub(crate) fn strain_warnings(loads: &[LoadState]) -> Vec<Warning> {
     (loads.iter().enumerate())
         .filter_map(|(load, state)| state.mean_strain.map(|e| (load, e.value)))
         .filter(|(_, strain)| strain.abs() > LINEAR_STRAIN)
         .map(|(load, strain)| Warning::LargeStrain {
             load,
-            strain: narrow(strain),
-            limit: narrow(LINEAR_STRAIN),
+            strain: strain,
+            limit: LINEAR_STRAIN,
         })
         .collect()
 }

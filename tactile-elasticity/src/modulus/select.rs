@@ -6,9 +6,7 @@ use super::{
 };
 use crate::contact::{Bond, Waveguide};
 use crate::error::ElasticityError;
-use crate::scalar::widen;
 use crate::selection::{SelectionReason, akaike_weights, in_order, rank};
-use nalgebra::RealField;
 use std::sync::Arc;
 
 /// All estimators tried on the same loads, the best first.
@@ -24,16 +22,16 @@ use std::sync::Arc;
 ///     ..LoadState::new(Estimate::new(1e-3, 1e-5))
 /// };
 /// let candidates = BestOf::new(TataraSphere::new(5e-3, 0.5)?).or(HertzSphere::new(5e-3, 0.5)?);
-/// let selection: ModulusSelection<f64> = candidates.select(&LoadSeries::new([load]))?;
+/// let selection: ModulusSelection = candidates.select(&LoadSeries::new([load]))?;
 /// assert_eq!(selection.chosen().estimator, EstimatorKind::TataraSphere);
 /// assert!(selection.left_out.is_empty());
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct ModulusSelection<T> {
+pub struct ModulusSelection {
     /// Estimates; the first is the chosen one, the others follow by their criterion. Each carries its warnings.
-    pub estimates: Vec<ModulusEstimate<T>>,
+    pub estimates: Vec<ModulusEstimate>,
     /// Akaike weights of the estimates, in their order.
     pub weights: Vec<f64>,
     /// Why the first was chosen.
@@ -42,9 +40,9 @@ pub struct ModulusSelection<T> {
     pub left_out: Vec<EstimatorKind>,
 }
 
-impl<T> ModulusSelection<T> {
+impl ModulusSelection {
     /// The chosen estimate.
-    pub fn chosen(&self) -> &ModulusEstimate<T> {
+    pub fn chosen(&self) -> &ModulusEstimate {
         &self.estimates[0]
     }
 }
@@ -73,29 +71,29 @@ impl<T> ModulusSelection<T> {
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Clone)]
-pub struct BestOf<T: RealField + Copy> {
-    candidates: Vec<Candidate<T>>,
+pub struct BestOf {
+    candidates: Vec<Candidate>,
 }
 
-type Candidate<T> = Arc<dyn ModulusEstimator<T> + Send + Sync>;
+type Candidate = Arc<dyn ModulusEstimator + Send + Sync>;
 
-impl<T: RealField + Copy> core::fmt::Debug for BestOf<T> {
+impl core::fmt::Debug for BestOf {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let kinds = self.candidates.iter().map(|c| c.kind());
         f.debug_list().entries(kinds).finish()
     }
 }
 
-impl<T: RealField + Copy> BestOf<T> {
+impl BestOf {
     /// One candidate, the most general.
-    pub fn new(candidate: impl ModulusEstimator<T> + Send + Sync + 'static) -> Self {
+    pub fn new(candidate: impl ModulusEstimator + Send + Sync + 'static) -> Self {
         Self {
             candidates: vec![Arc::new(candidate)],
         }
     }
 
     /// Another candidate, less general than those before.
-    pub fn or(mut self, candidate: impl ModulusEstimator<T> + Send + Sync + 'static) -> Self {
+    pub fn or(mut self, candidate: impl ModulusEstimator + Send + Sync + 'static) -> Self {
         self.candidates.push(Arc::new(candidate));
         self
     }
@@ -106,9 +104,9 @@ impl<T: RealField + Copy> BestOf<T> {
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
     pub fn sphere_on_sample(
-        radius_m: T,
-        poisson_ratio: T,
-        thickness_m: Option<T>,
+        radius_m: f64,
+        poisson_ratio: f64,
+        thickness_m: Option<f64>,
     ) -> Result<Self, ElasticityError> {
         let half_space = HertzSphere::new(radius_m, poisson_ratio)?;
         let Some(thickness_m) = thickness_m else {
@@ -144,9 +142,9 @@ impl<T: RealField + Copy> BestOf<T> {
     /// # Ok::<(), tactile_elasticity::ElasticityError>(())
     /// ```
     pub fn sphere_as_sample(
-        radius_m: T,
-        poisson_ratio: T,
-        waveguide: &Waveguide<T>,
+        radius_m: f64,
+        poisson_ratio: f64,
+        waveguide: &Waveguide,
     ) -> Result<Self, ElasticityError> {
         let layered = SphereOnWaveguide::new(radius_m, poisson_ratio, waveguide, Bond::Bonded)?;
         let tatara = TataraSphere::new(radius_m, poisson_ratio)?;
@@ -162,7 +160,7 @@ impl<T: RealField + Copy> BestOf<T> {
     ///
     /// # Errors
     /// The first candidate's, where none has an answer.
-    pub fn select(&self, series: &LoadSeries<T>) -> Result<ModulusSelection<T>, ElasticityError> {
+    pub fn select(&self, series: &LoadSeries) -> Result<ModulusSelection, ElasticityError> {
         let (mut estimates, mut left_out, mut first_error) = (Vec::new(), Vec::new(), None);
         for candidate in &self.candidates {
             match candidate.estimate(series) {
@@ -195,8 +193,8 @@ impl<T: RealField + Copy> BestOf<T> {
     }
 }
 
-impl<T: RealField + Copy> ModulusEstimator<T> for BestOf<T> {
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
+impl ModulusEstimator for BestOf {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         // The chosen estimate is the first.
         Ok(self.select(series)?.estimates.swap_remove(0))
     }
@@ -211,12 +209,12 @@ impl<T: RealField + Copy> ModulusEstimator<T> for BestOf<T> {
 }
 
 /// AICc; where the loads are too few for it, AIC from χ², which differs by a constant between laws of the same loads.
-fn criterion<T: RealField + Copy>(estimate: &ModulusEstimate<T>) -> f64 {
+fn criterion(estimate: &ModulusEstimate) -> f64 {
     let fit = &estimate.fit;
-    let corrected = widen(fit.aicc);
+    let corrected = fit.aicc;
     if corrected.is_finite() {
         corrected
     } else {
-        widen(fit.chi_squared) + 2.0 * fit.parameters as f64
+        fit.chi_squared + 2.0 * fit.parameters as f64
     }
 }

@@ -3,8 +3,7 @@
 use super::load::LoadState;
 use super::source::{checked, finite};
 use crate::error::{ElasticityError, Quantity, not_negative};
-use crate::scalar::widen;
-use nalgebra::{DMatrix, RealField};
+use nalgebra::DMatrix;
 
 /// Standard errors that all loads of a series have in common: averaging over loads does not reduce them. Zero where negligible or unknown.
 ///
@@ -26,32 +25,23 @@ use nalgebra::{DMatrix, RealField};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct SharedErrors<T> {
-    /// Relative error of all forces: the slope of one calibration.
-    pub force_scale: T,
+pub struct SharedErrors {
+    /// Relative error of all forces: the slope of one calibration. Its degrees of freedom are the fewest that
+    /// the forces of the loads have.
+    pub force_scale: f64,
     /// Relative error of all lengths: the size of a pixel.
-    pub length_scale: T,
+    pub length_scale: f64,
     /// Relative error of the indenter's size: radius, or tangent of the half angle.
-    pub size: T,
+    pub size: f64,
     /// Error of the sample's Poisson ratio.
-    pub poisson_ratio: T,
+    pub poisson_ratio: f64,
     /// Relative error of the other body's compliance: the moduli of a waveguide's layers, all by one factor.
-    pub other_body: T,
+    pub other_body: f64,
 }
 
-impl<T: RealField + Copy> SharedErrors<T> {
-    fn map<U>(self, f: impl Fn(T) -> U) -> SharedErrors<U> {
-        SharedErrors {
-            force_scale: f(self.force_scale),
-            length_scale: f(self.length_scale),
-            size: f(self.size),
-            poisson_ratio: f(self.poisson_ratio),
-            other_body: f(self.other_body),
-        }
-    }
-
+impl SharedErrors {
     fn validated(self) -> Result<Self, ElasticityError> {
-        let errors = self.map(widen);
+        let errors = self;
         for error in [
             errors.force_scale,
             errors.length_scale,
@@ -82,27 +72,21 @@ impl<T: RealField + Copy> SharedErrors<T> {
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct LoadSeries<T: RealField> {
-    loads: Vec<LoadState<T>>,
-    shared: SharedErrors<T>,
-    force_covariance: Option<DMatrix<T>>,
-    strain_covariance: Option<DMatrix<T>>,
+pub struct LoadSeries {
+    loads: Vec<LoadState>,
+    shared: SharedErrors,
+    force_covariance: Option<DMatrix<f64>>,
+    strain_covariance: Option<DMatrix<f64>>,
     /// Poisson's ratio, where the strains were derived from lateral stretches by it: all are in inverse proportion to it.
-    strained_by: Option<T>,
+    strained_by: Option<f64>,
 }
 
-impl<T: RealField + Copy> LoadSeries<T> {
+impl LoadSeries {
     /// Loads whose errors are independent: a vector, an array or a slice of them.
-    pub fn new(loads: impl Into<Vec<LoadState<T>>>) -> Self {
+    pub fn new(loads: impl Into<Vec<LoadState>>) -> Self {
         Self {
             loads: loads.into(),
-            shared: SharedErrors {
-                force_scale: T::zero(),
-                length_scale: T::zero(),
-                size: T::zero(),
-                poisson_ratio: T::zero(),
-                other_body: T::zero(),
-            },
+            shared: SharedErrors::default(),
             force_covariance: None,
             strain_covariance: None,
             strained_by: None,
@@ -113,7 +97,7 @@ impl<T: RealField + Copy> LoadSeries<T> {
     ///
     /// # Errors
     /// [`ElasticityError::Negative`].
-    pub fn with_shared_errors(mut self, shared: SharedErrors<T>) -> Result<Self, ElasticityError> {
+    pub fn with_shared_errors(mut self, shared: SharedErrors) -> Result<Self, ElasticityError> {
         self.shared = shared.validated()?;
         Ok(self)
     }
@@ -124,7 +108,7 @@ impl<T: RealField + Copy> LoadSeries<T> {
     /// [`ElasticityError::NotFinite`], [`ElasticityError::LengthMismatch`].
     pub fn with_force_covariance(
         mut self,
-        covariance: &DMatrix<T>,
+        covariance: &DMatrix<f64>,
     ) -> Result<Self, ElasticityError> {
         self.force_covariance = Some(self.accepted(covariance, Quantity::Force)?);
         Ok(self)
@@ -148,7 +132,7 @@ impl<T: RealField + Copy> LoadSeries<T> {
     /// ```
     pub fn with_strain_covariance(
         mut self,
-        covariance: &DMatrix<T>,
+        covariance: &DMatrix<f64>,
     ) -> Result<Self, ElasticityError> {
         self.strain_covariance = Some(self.accepted(covariance, Quantity::Strain)?);
         Ok(self)
@@ -156,47 +140,35 @@ impl<T: RealField + Copy> LoadSeries<T> {
 
     fn accepted(
         &self,
-        covariance: &DMatrix<T>,
+        covariance: &DMatrix<f64>,
         quantity: Quantity,
-    ) -> Result<DMatrix<T>, ElasticityError> {
+    ) -> Result<DMatrix<f64>, ElasticityError> {
         finite(covariance, quantity)?;
         Ok(checked(covariance, self.loads.len(), quantity)?.clone())
     }
 
     /// The loads, in the order given.
-    pub fn loads(&self) -> &[LoadState<T>] {
+    pub fn loads(&self) -> &[LoadState] {
         &self.loads
     }
 
     /// The errors that all loads share.
-    pub fn shared_errors(&self) -> &SharedErrors<T> {
+    pub fn shared_errors(&self) -> &SharedErrors {
         &self.shared
     }
 
     /// The covariance of the forces, where one was given.
-    pub(crate) fn force_covariance(&self) -> Option<&DMatrix<T>> {
+    pub(crate) fn force_covariance(&self) -> Option<&DMatrix<f64>> {
         self.force_covariance.as_ref()
     }
 
     /// The covariance of the mean strains, where one was given.
-    pub(crate) fn strain_covariance(&self) -> Option<&DMatrix<T>> {
+    pub(crate) fn strain_covariance(&self) -> Option<&DMatrix<f64>> {
         self.strain_covariance.as_ref()
     }
 
-    /// The same series in f64, in which estimators work.
-    pub(crate) fn widened(&self) -> LoadSeries<f64> {
-        let matrix = |m: &DMatrix<T>| m.map(widen);
-        LoadSeries {
-            loads: self.loads.iter().map(LoadState::widened).collect(),
-            shared: self.shared.map(widen),
-            force_covariance: self.force_covariance.as_ref().map(matrix),
-            strain_covariance: self.strain_covariance.as_ref().map(matrix),
-            strained_by: self.strained_by.map(widen),
-        }
-    }
-
     /// The series with loads whose strains were derived by a Poisson ratio.
-    pub(crate) fn uniaxial(&self, loads: Vec<LoadState<T>>, poisson_ratio: T) -> Self {
+    pub(crate) fn uniaxial(&self, loads: Vec<LoadState>, poisson_ratio: f64) -> Self {
         Self {
             loads,
             strained_by: Some(poisson_ratio),
@@ -205,7 +177,7 @@ impl<T: RealField + Copy> LoadSeries<T> {
     }
 
     /// The series with other loads.
-    pub(crate) fn with_loads(&self, loads: Vec<LoadState<T>>) -> Self {
+    pub(crate) fn with_loads(&self, loads: Vec<LoadState>) -> Self {
         Self {
             loads,
             ..self.clone()
@@ -213,14 +185,11 @@ impl<T: RealField + Copy> LoadSeries<T> {
     }
 }
 
-impl LoadSeries<f64> {
-    /// Relative error that all ratios of stress to strain share: areas go as the square of lengths, strains derived from lateral stretches
-    /// as one over Poisson's ratio.
-    pub(crate) fn stress_scale_error(&self) -> f64 {
+impl LoadSeries {
+    /// Relative error that all ratios of stress to strain share beside that of the forces. Areas go as the
+    /// square of lengths, strains derived from lateral stretches as one over Poisson's ratio.
+    pub(crate) fn size_scale_error(&self) -> f64 {
         let of_strains = (self.strained_by).map_or(0.0, |ratio| self.shared.poisson_ratio / ratio);
-        self.shared
-            .force_scale
-            .hypot(2.0 * self.shared.length_scale)
-            .hypot(of_strains)
+        (2.0 * self.shared.length_scale).hypot(of_strains)
     }
 }

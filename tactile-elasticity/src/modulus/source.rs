@@ -2,7 +2,7 @@
 
 use super::covariance::Covariance;
 use crate::error::{ElasticityError, Quantity};
-use nalgebra::{DMatrix, RealField};
+use nalgebra::DMatrix;
 
 /// The covariance of logarithms of moduli from one source of error, and its degrees of freedom: those of the least known error, for
 /// repetition does not improve a standard error that all loads take from one calibration.
@@ -18,10 +18,7 @@ pub(super) fn total(sources: &[LogErrors]) -> Covariance {
 }
 
 /// Refuses a covariance with an entry that is not a number.
-pub(super) fn finite<T: RealField + Copy>(
-    covariance: &DMatrix<T>,
-    quantity: Quantity,
-) -> Result<(), ElasticityError> {
+pub(super) fn finite(covariance: &DMatrix<f64>, quantity: Quantity) -> Result<(), ElasticityError> {
     if covariance.iter().all(|x| x.is_finite()) {
         Ok(())
     } else {
@@ -30,11 +27,11 @@ pub(super) fn finite<T: RealField + Copy>(
 }
 
 /// The covariance, if it has a row and a column for every load.
-pub(super) fn checked<T: RealField + Copy>(
-    covariance: &DMatrix<T>,
+pub(super) fn checked(
+    covariance: &DMatrix<f64>,
     loads: usize,
     quantity: Quantity,
-) -> Result<&DMatrix<T>, ElasticityError> {
+) -> Result<&DMatrix<f64>, ElasticityError> {
     match [covariance.nrows(), covariance.ncols()]
         .into_iter()
         .find(|&n| n != loads)

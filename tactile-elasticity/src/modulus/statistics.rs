@@ -4,27 +4,8 @@ use super::covariance::{Covariance, Factor};
 use super::source::LogErrors;
 use crate::error::{ElasticityError, Quantity};
 use nalgebra::{Cholesky, DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
-
-/// Two-sided 95 % quantile of Student's t; of the normal distribution where `degrees` is None.
-pub(crate) fn quantile_95(degrees: Option<f64>) -> f64 {
-    const P: f64 = 0.975;
-    match degrees.and_then(|n| StudentsT::new(0.0, 1.0, n).ok()) {
-        Some(t) => t.inverse_cdf(P),
-        None => Normal::standard().inverse_cdf(P),
-    }
-}
-
-/// ν = (Σ vᵢ)²/Σ (vᵢ²/νᵢ) of a sum of variances vᵢ, each estimated with νᵢ degrees of freedom (Welch 1947, Satterthwaite 1946); None
-/// where all are known.
-pub(crate) fn effective_degrees(parts: &[(f64, Option<f64>)]) -> Option<f64> {
-    let total: f64 = parts.iter().map(|p| p.0).sum();
-    let learnt: f64 = parts
-        .iter()
-        .filter_map(|(v, degrees)| Some(v * v / (*degrees)?))
-        .sum();
-    (learnt > 0.0).then(|| total * total / learnt)
-}
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use tactile_core::statistics::effective_degrees_of_freedom;
 
 /// The smallest of the degrees of freedom that are not infinite.
 pub(crate) fn fewest(degrees: impl Iterator<Item = Option<f64>>) -> Option<f64> {
@@ -68,7 +49,8 @@ impl CommonMean {
             .iter()
             .map(|(covariance, degrees)| (covariance.variance_of_sum(&self.weights), *degrees))
             .collect();
-        self.degrees.or_else(|| effective_degrees(&parts))
+        self.degrees
+            .or_else(|| effective_degrees_of_freedom(&parts))
     }
 }
 
@@ -167,25 +149,6 @@ fn minus_two_log_likelihood(chi_squared: f64, n: usize, known: bool) -> f64 {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-
-    #[test]
-    fn quantiles_are_those_of_the_tables() {
-        assert_relative_eq!(
-            quantile_95(None),
-            1.959_963_984_540_054,
-            max_relative = 1e-9
-        );
-        assert_relative_eq!(
-            quantile_95(Some(1.0)),
-            12.706_204_736_174_7,
-            max_relative = 1e-7
-        );
-        assert_relative_eq!(
-            quantile_95(Some(10.0)),
-            2.228_138_851_964_94,
-            max_relative = 1e-7
-        );
-    }
 
     #[test]
     fn a_shared_error_is_not_averaged_away() {

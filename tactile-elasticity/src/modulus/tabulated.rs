@@ -2,18 +2,17 @@
 
 use super::covariance::Covariance;
 use super::estimate::{
-    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-use super::load::{Estimate, LoadState};
+use super::load::{LoadState, validated};
 use super::series::LoadSeries;
 use super::source::{LogErrors, total};
-use super::statistics::{CommonMean, common_mean, fewest, quantile_95};
+use super::statistics::{CommonMean, common_mean, fewest};
 use super::warning::Warning;
 use crate::contact::{ContactTable, TabulatedForce, Waveguide};
 use crate::error::{ElasticityError, Quantity, positive};
-use crate::scalar::{narrow, widen};
-use nalgebra::RealField;
 use std::sync::Arc;
+use tactile_core::{Estimate, Interval, statistics::quantile_95};
 
 /// A soft ball on the guide, or the rigid flat, of a [`ContactTable`]: the E at which the tabulated forces at the measured contact radii fit the
 /// measured forces best, all loads at once.
@@ -60,7 +59,7 @@ impl TabulatedContact {
         table: impl Into<Arc<ContactTable>>,
         radius_m: f64,
         poisson_ratio: f64,
-        guide: &Waveguide<f64>,
+        guide: &Waveguide,
     ) -> Result<Self, ElasticityError> {
         let table = table.into();
         table.check_made_for(radius_m, poisson_ratio, guide)?;
@@ -68,14 +67,14 @@ impl TabulatedContact {
     }
 
     /// The loads with a contact radius.
-    fn contacts(&self, loads: &[LoadState<f64>]) -> Result<Vec<Contact>, ElasticityError> {
+    fn contacts(&self, loads: &[LoadState]) -> Result<Vec<Contact>, ElasticityError> {
         let mut contacts = Vec::with_capacity(loads.len());
         for (load, state) in loads.iter().enumerate() {
-            let force = state.force_n.validated(Quantity::Force)?;
+            let force = validated(state.force_n, Quantity::Force)?;
             let Some(radius) = state.contact_radius_m else {
                 continue;
             };
-            let radius = radius.validated(Quantity::ContactRadius)?;
+            let radius = validated(radius, Quantity::ContactRadius)?;
             positive(radius.value, Quantity::ContactRadius)?;
             positive(force.value, Quantity::Force)?;
             contacts.push(Contact {
@@ -91,7 +90,7 @@ impl TabulatedContact {
     fn fit_covered(
         &self,
         mut contacts: Vec<Contact>,
-        series: &LoadSeries<f64>,
+        series: &LoadSeries,
     ) -> Result<(Vec<Contact>, Fit), ElasticityError> {
         loop {
             if contacts.is_empty() {
@@ -121,7 +120,7 @@ impl TabulatedContact {
     }
 
     /// ln E at which the tabulated forces fit best, started in the table's middle.
-    fn fit(&self, contacts: &[Contact], series: &LoadSeries<f64>) -> Result<Fit, ElasticityError> {
+    fn fit(&self, contacts: &[Contact], series: &LoadSeries) -> Result<Fit, ElasticityError> {
         let [lowest, highest] = self.table.log_moduli();
         let mut log_modulus = if lowest.is_finite() {
             0.5 * (lowest + highest)
@@ -168,7 +167,7 @@ impl TabulatedContact {
         &self,
         contacts: &[Contact],
         forces: &[TabulatedForce],
-        series: &LoadSeries<f64>,
+        series: &LoadSeries,
     ) -> [LogErrors; 3] {
         let shared = series.shared_errors();
         let none = Covariance::none(contacts.iter().map(|c| c.load));
@@ -184,6 +183,8 @@ impl TabulatedContact {
                 .clone()
                 .with_own(|i| over(i, contacts[i].force.relative_error())),
         };
+        // The scale of the forces comes from the calibration that their own errors come from.
+        let of_forces = of_forces.with_shared(|i| over(i, shared.force_scale));
         let of_radii = none.clone().with_own(|i| {
             over(
                 i,
@@ -194,7 +195,6 @@ impl TabulatedContact {
         let nu = self.table.poisson_ratio();
         let of_poisson_ratio = 2.0 * nu / (1.0 - nu * nu) * shared.poisson_ratio;
         let of_all = none
-            .with_shared(|i| over(i, shared.force_scale))
             .with_shared(|i| over(i, forces[i].radius_slope * shared.length_scale))
             // F has the dimension E R²: what does not follow a follows R, what does not follow E follows the guide's moduli.
             .with_shared(|i| over(i, (2.0 - forces[i].radius_slope) * shared.size))
@@ -243,46 +243,40 @@ impl TabulatedContact {
         None
     }
 
-    fn diagnose<T: RealField + Copy>(
+    fn diagnose(
         &self,
-        loads: &[LoadState<f64>],
+        loads: &[LoadState],
         contacts: &[Contact],
         fit: &Fit,
-    ) -> Vec<LoadDiagnostics<T>> {
-        let mut all: Vec<LoadDiagnostics<T>> = (loads.iter())
+    ) -> Vec<LoadDiagnostics> {
+        let mut all: Vec<LoadDiagnostics> = (loads.iter())
             .map(|l| LoadDiagnostics {
-                contact_ratio: (l.contact_radius_m)
-                    .map(|a| narrow(a.value / self.table.radius_m())),
+                contact_ratio: (l.contact_radius_m).map(|a| a.value / self.table.radius_m()),
                 ..LoadDiagnostics::unused()
             })
             .collect();
         for (k, contact) in contacts.iter().enumerate() {
             let own = &mut all[contact.load];
             own.used = true;
-            own.youngs_modulus_pa = Some(narrow(fit.own[k].exp()));
-            own.standardized_residual = Some(narrow(fit.mean.standardized_residuals[k]));
+            own.youngs_modulus_pa = Some(fit.own[k].exp());
+            own.standardized_residual = Some(fit.mean.standardized_residuals[k]);
         }
         all
     }
 
-    fn warnings<T: RealField + Copy>(
-        &self,
-        loads: &[LoadDiagnostics<T>],
-        fit: &Fit,
-        bounded: bool,
-    ) -> Vec<Warning<T>> {
+    fn warnings(&self, loads: &[LoadDiagnostics], fit: &Fit, bounded: bool) -> Vec<Warning> {
         let limit = self.table.contact_ratios(fit.log_modulus)[1];
-        let mut warnings: Vec<Warning<T>> = (loads.iter().enumerate())
+        let mut warnings: Vec<Warning> = (loads.iter().enumerate())
             .filter_map(|(load, d)| Some((load, d.contact_ratio?)))
-            .filter(|&(_, ratio)| widen(ratio) > limit)
+            .filter(|&(_, ratio)| ratio > limit)
             .map(|(load, ratio)| Warning::LargeContact {
                 load,
                 ratio,
-                limit: narrow(limit),
+                limit: limit,
             })
             .collect();
         warnings.extend(fit.mean.excess.map(|x| Warning::ExcessScatter {
-            reduced_chi_squared: narrow(x),
+            reduced_chi_squared: x,
         }));
         if fit.mean.standard_error.is_infinite() {
             warnings.push(Warning::NoErrorEstimate);
@@ -301,8 +295,8 @@ fn sensitivity(force: &TabulatedForce) -> f64 {
 /// A load with a contact radius.
 struct Contact {
     load: usize,
-    force: Estimate<f64>,
-    radius: Estimate<f64>,
+    force: Estimate,
+    radius: Estimate,
 }
 
 struct Fit {
@@ -317,9 +311,8 @@ struct Fit {
     below: bool,
 }
 
-impl<T: RealField + Copy> ModulusEstimator<T> for TabulatedContact {
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
-        let series = series.widened();
+impl ModulusEstimator for TabulatedContact {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let contacts = self.contacts(series.loads())?;
         let (contacts, fit) = self.fit_covered(contacts, &series)?;
         let known = fit.mean.standard_error.is_finite();
@@ -350,12 +343,9 @@ impl<T: RealField + Copy> ModulusEstimator<T> for TabulatedContact {
         let loads = self.diagnose(series.loads(), &contacts, &fit);
         let warnings = self.warnings(&loads, &fit, upper.is_some());
         Ok(ModulusEstimate {
-            youngs_modulus_pa: narrow(modulus),
-            standard_error_pa: narrow(modulus * fit.mean.standard_error),
-            interval_95: Interval {
-                lower: narrow(lower.map_or(0.0, f64::exp)),
-                upper: upper.map(|u| narrow(u.exp())),
-            },
+            youngs_modulus_pa: modulus,
+            standard_error_pa: (modulus * fit.mean.standard_error),
+            interval_95: Interval::new(lower.map_or(0.0, f64::exp), upper.map(|u| u.exp())),
             estimator: EstimatorKind::TabulatedContact,
             loads,
             fit: FitStatistics::new(

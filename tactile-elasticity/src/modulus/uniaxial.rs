@@ -16,14 +16,14 @@
 //!
 //! Range: no friction. A face that sticks to the plate stretches less than the material above it, and E comes out too large.
 
-use super::load::{Estimate, LoadState};
+use super::load::{LoadState, derived, validated};
 use super::ratio::LINEAR_STRAIN;
 use super::regression::StressStrainRegression;
 use super::series::LoadSeries;
 use crate::error::{ElasticityError, Quantity, positive};
-use crate::scalar::{narrow, widen};
 use crate::strain::StrainMeasure;
-use nalgebra::{Matrix3, RealField};
+use nalgebra::Matrix3;
+use tactile_core::Estimate;
 
 /// Steps to the unloaded area: the error falls by about the strain each time, to rounding for strains up to a third.
 const AREA_STEPS: usize = 60;
@@ -55,16 +55,16 @@ const STRETCHES: [f64; 2] = [0.05, 4.0];
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct UniaxialLoads<T: RealField> {
+pub struct UniaxialLoads {
     /// The loads with their strains, for a [`StressStrainRegression`].
-    pub series: LoadSeries<T>,
+    pub series: LoadSeries,
     /// Stretches of the face in its plane and across it, λ_t and λ_z, of every load.
-    pub stretches: Vec<[T; 2]>,
+    pub stretches: Vec<[f64; 2]>,
     /// Area of the unloaded face in m².
-    pub unloaded_area_m2: T,
+    pub unloaded_area_m2: f64,
 }
 
-impl<T: RealField + Copy> UniaxialLoads<T> {
+impl UniaxialLoads {
     /// Finds A₀ and the state of every load that has a contact area; the others have a force alone. O(loads).
     ///
     /// # Errors
@@ -72,27 +72,26 @@ impl<T: RealField + Copy> UniaxialLoads<T> {
     /// [`ElasticityError::TooFewLoads`] for fewer than two areas, [`ElasticityError::EqualLoads`] and [`ElasticityError::ZeroStrain`] where they
     /// are all one, [`ElasticityError::OppositeSigns`] where the face does not grow with the force.
     pub fn new(
-        series: &LoadSeries<T>,
-        poisson_ratio: T,
-        measure: &dyn StrainMeasure<f64>,
+        series: &LoadSeries,
+        poisson_ratio: f64,
+        measure: &dyn StrainMeasure,
     ) -> Result<Self, ElasticityError> {
-        let wide = series.widened();
         let law = LateralLaw {
-            poisson_ratio: positive(widen(poisson_ratio), Quantity::PoissonRatio)?,
+            poisson_ratio: positive(poisson_ratio, Quantity::PoissonRatio)?,
             measure,
         };
-        let faces = wide.loads().iter().filter_map(|l| l.contact_area_m2);
+        let faces = series.loads().iter().filter_map(|l| l.contact_area_m2);
         let mut unloaded = f64::INFINITY;
         for face in faces {
             let area = positive(
-                face.validated(Quantity::ContactArea)?.value,
+                validated(face, Quantity::ContactArea)?.value,
                 Quantity::ContactArea,
             )?;
             unloaded = unloaded.min(area);
         }
         let regression = StressStrainRegression::default();
         for _ in 0..AREA_STEPS {
-            let strained = law.strained(&wide, unloaded)?;
+            let strained = law.strained(series, unloaded)?;
             let (slope, intercept) = regression.line_through(&strained.series)?;
             // The strain at which the line has no stress is that of the unloaded face.
             let strain = -intercept / slope;
@@ -104,27 +103,24 @@ impl<T: RealField + Copy> UniaxialLoads<T> {
                 break;
             }
         }
-        let found = law.strained(&wide, unloaded)?;
+        let found = law.strained(series, unloaded)?;
         Ok(Self {
-            series: series.uniaxial(
-                found.series.loads().iter().map(narrowed).collect(),
-                poisson_ratio,
-            ),
-            stretches: found.stretches.iter().map(|s| s.map(narrow)).collect(),
-            unloaded_area_m2: narrow(unloaded),
+            series: series.uniaxial(found.series.loads().to_vec(), poisson_ratio),
+            stretches: found.stretches,
+            unloaded_area_m2: unloaded,
         })
     }
 }
 
 struct Strained {
-    series: LoadSeries<f64>,
+    series: LoadSeries,
     stretches: Vec<[f64; 2]>,
 }
 
 /// f(λ_t) = −ν f(λ_z).
 struct LateralLaw<'a> {
     poisson_ratio: f64,
-    measure: &'a dyn StrainMeasure<f64>,
+    measure: &'a dyn StrainMeasure,
 }
 
 impl LateralLaw<'_> {
@@ -161,11 +157,7 @@ impl LateralLaw<'_> {
         Ok(0.5 * (low + high))
     }
 
-    fn strained(
-        &self,
-        series: &LoadSeries<f64>,
-        unloaded_m2: f64,
-    ) -> Result<Strained, ElasticityError> {
+    fn strained(&self, series: &LoadSeries, unloaded_m2: f64) -> Result<Strained, ElasticityError> {
         let mut loads = Vec::with_capacity(series.loads().len());
         let mut stretches = Vec::with_capacity(series.loads().len());
         for state in series.loads() {
@@ -186,11 +178,11 @@ impl LateralLaw<'_> {
             loads.push(LoadState {
                 contact_area_m2: Some(Estimate::exact(unloaded_m2 * axial_slope)),
                 contact_radius_m: None,
-                mean_strain: Some(Estimate {
-                    value: -self.strain(axial)?,
-                    standard_error: per_relative_area * face.relative_error(),
-                    ..face
-                }),
+                mean_strain: Some(derived(
+                    face,
+                    -self.strain(axial)?,
+                    per_relative_area * face.relative_error(),
+                )),
                 ..*state
             });
             stretches.push([lateral, axial]);
@@ -199,20 +191,5 @@ impl LateralLaw<'_> {
             series: series.with_loads(loads),
             stretches,
         })
-    }
-}
-
-fn narrowed<T: RealField + Copy>(load: &LoadState<f64>) -> LoadState<T> {
-    let one = |e: Estimate<f64>| Estimate {
-        value: narrow(e.value),
-        standard_error: narrow(e.standard_error),
-        degrees_of_freedom: e.degrees_of_freedom.map(narrow),
-    };
-    LoadState {
-        force_n: one(load.force_n),
-        contact_radius_m: load.contact_radius_m.map(one),
-        contact_area_m2: load.contact_area_m2.map(one),
-        indentation_m: load.indentation_m.map(one),
-        mean_strain: load.mean_strain.map(one),
     }
 }

@@ -11,47 +11,47 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
-pub enum Warning<T> {
+pub enum Warning {
     /// a/R is beyond the reach of small-contact theory.
     LargeContact {
         /// Index of the load.
         load: usize,
         /// a/R.
-        ratio: T,
+        ratio: f64,
         /// The limit of the law.
-        limit: T,
+        limit: f64,
     },
     /// The layer is thin beside the contact for this law.
     ThinLayer {
         /// Index of the load.
         load: usize,
         /// χ = √(Rδ)/h, or a/h.
-        ratio: T,
+        ratio: f64,
         /// The limit of the law.
-        limit: T,
+        limit: f64,
     },
     /// The strain is too large for a linear law.
     LargeStrain {
         /// Index of the load.
         load: usize,
         /// The strain.
-        strain: T,
+        strain: f64,
         /// The limit.
-        limit: T,
+        limit: f64,
     },
     /// The residuals are larger than the standard errors say; these were scaled up by the square root of this.
     ExcessScatter {
         /// χ² over degrees of freedom.
-        reduced_chi_squared: T,
+        reduced_chi_squared: f64,
     },
     /// The data do not bound the modulus from above.
     UnboundedAbove,
     /// The intercept of the regression differs from zero at the 95 % level.
     Intercept {
         /// Stress at zero strain, Pa.
-        intercept_pa: T,
+        intercept_pa: f64,
         /// Its probability under a zero intercept.
-        p_value: T,
+        p_value: f64,
     },
     /// One load and no standard errors: the interval is not known.
     NoErrorEstimate,
@@ -60,11 +60,11 @@ pub enum Warning<T> {
         /// Index of the load.
         load: usize,
         /// a/R.
-        ratio: T,
+        ratio: f64,
     },
 }
 
-impl<T: core::fmt::Display> core::fmt::Display for Warning<T> {
+impl core::fmt::Display for Warning {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::LargeContact { load, ratio, limit } => {

@@ -130,7 +130,7 @@ fn checked_times(moduli: &[TimedModulus]) -> Result<usize, ElasticityError> {
 }
 
 /// Relative slope of E at time 0.
-fn relative_slope(series: &Series, trend: &Line) -> Estimate<f64> {
+fn relative_slope(series: &Series, trend: &Line) -> Estimate {
     let (slope, error) = trend.combination(0.0, 1.0);
     let sign = match series.form {
         Form::Relaxation => 1.0,

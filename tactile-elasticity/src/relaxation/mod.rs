@@ -45,7 +45,7 @@ pub struct TimedModulus {
     /// Normal force.
     pub force_n: f64,
     /// What this load alone says, with the part of its error that no other load has.
-    pub youngs_modulus_pa: Estimate<f64>,
+    pub youngs_modulus_pa: Estimate,
 }
 
 /// What a series of moduli says of time.
@@ -86,7 +86,7 @@ pub enum TimeDependence {
     /// The sensor's gain rises, in proportion to time.
     Drifts {
         /// Relative change of the gain in a second.
-        per_s: Estimate<f64>,
+        per_s: Estimate,
     },
     /// The moduli change with time and either may be the reason: too few loads, a fall in proportion to time (a falling gain, or a time constant
     /// longer than the loads last), or a change that neither explains.
@@ -119,13 +119,13 @@ pub struct StandardLinearSolid {
     /// E₀, that of a load too fast to relax.
     pub instantaneous_pa: f64,
     /// Interval of E₀.
-    pub instantaneous_95_pa: Interval<f64>,
+    pub instantaneous_95_pa: Interval,
     /// E∞, that of a load held for ever.
     pub equilibrium_pa: f64,
     /// Interval of E∞.
-    pub equilibrium_95_pa: Interval<f64>,
+    pub equilibrium_95_pa: Interval,
     /// τ, of the relaxation under a held approach; under a held force it creeps with τ E₀/E∞.
     pub time_constant_s: f64,
     /// Interval of τ.
-    pub time_constant_95_s: Interval<f64>,
+    pub time_constant_95_s: Interval,
 }

@@ -3,7 +3,7 @@
 use super::StandardLinearSolid;
 use super::fit::{Form, Line, Series};
 use crate::golden_section::golden_section;
-use crate::modulus::{Interval, quantile_95};
+use tactile_core::{Interval, statistics::quantile_95};
 
 /// Time constants tried, from a tenth of the shortest interval to ten times the whole, in logarithmic steps.
 const STEPS: usize = 200;
@@ -109,10 +109,10 @@ impl<'a> Profile<'a> {
         let widened = |value: f64, range: Range| {
             let common = quantile_95(None) * scale_error;
             let factor = |limit: f64| (limit / value).ln().abs().hypot(common).exp();
-            Interval {
-                lower: value / factor(range.lower.max(0.0)),
-                upper: Some(value * factor(range.upper)).filter(|limit| limit.is_finite()),
-            }
+            Interval::new(
+                value / factor(range.lower.max(0.0)),
+                Some(value * factor(range.upper)).filter(|limit| limit.is_finite()),
+            )
         };
         let ([instantaneous_pa, equilibrium_pa], [instantaneous, equilibrium]) =
             match self.series.form {
@@ -129,10 +129,10 @@ impl<'a> Profile<'a> {
             equilibrium_pa,
             equilibrium_95_pa: widened(equilibrium_pa, equilibrium),
             time_constant_s: time_constant,
-            time_constant_95_s: Interval {
-                lower: lower.map_or(0.0, |_| relaxation.lower.max(0.0)),
-                upper: Some(relaxation.upper),
-            },
+            time_constant_95_s: Interval::new(
+                lower.map_or(0.0, |_| relaxation.lower.max(0.0)),
+                Some(relaxation.upper),
+            ),
         })
     }
 

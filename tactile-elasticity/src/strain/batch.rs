@@ -3,7 +3,7 @@
 use super::deformation::{cancels, green_lagrange_plain};
 use super::{GreenLagrange, StrainMeasure};
 use crate::error::{ElasticityError, Quantity};
-use nalgebra::{Matrix3, RealField};
+use nalgebra::Matrix3;
 
 /// The Green–Lagrange strain of every displacement gradient, written to `strains`; allocates nothing.
 ///
@@ -22,9 +22,9 @@ use nalgebra::{Matrix3, RealField};
 /// assert!((strains[99][(0, 0)] - 0.105f64).abs() < 1e-16);
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
-pub fn green_lagrange_into<T: RealField + Copy>(
-    gradients: &[Matrix3<T>],
-    strains: &mut [Matrix3<T>],
+pub fn green_lagrange_into(
+    gradients: &[Matrix3<f64>],
+    strains: &mut [Matrix3<f64>],
 ) -> Result<(), ElasticityError> {
     same_length(gradients, strains)?;
     fill(gradients, strains);
@@ -48,9 +48,9 @@ pub fn green_lagrange_into<T: RealField + Copy>(
 /// # Ok::<(), tactile_elasticity::ElasticityError>(())
 /// ```
 #[cfg(feature = "rayon")]
-pub fn green_lagrange_par_into<T: RealField + Copy>(
-    gradients: &[Matrix3<T>],
-    strains: &mut [Matrix3<T>],
+pub fn green_lagrange_par_into(
+    gradients: &[Matrix3<f64>],
+    strains: &mut [Matrix3<f64>],
 ) -> Result<(), ElasticityError> {
     use rayon::prelude::*;
     const CHUNK: usize = 4096;
@@ -74,7 +74,7 @@ fn same_length<A, B>(gradients: &[A], strains: &[B]) -> Result<(), ElasticityErr
     })
 }
 
-fn fill<T: RealField + Copy>(gradients: &[Matrix3<T>], strains: &mut [Matrix3<T>]) {
+fn fill(gradients: &[Matrix3<f64>], strains: &mut [Matrix3<f64>]) {
     for (h, strain) in gradients.iter().zip(strains) {
         let plain = green_lagrange_plain(h);
         *strain = if cancels(h, &plain) {
@@ -86,8 +86,8 @@ fn fill<T: RealField + Copy>(gradients: &[Matrix3<T>], strains: &mut [Matrix3<T>
 }
 
 #[cold]
-fn careful<T: RealField + Copy>(h: &Matrix3<T>) -> Matrix3<T> {
+fn careful(h: &Matrix3<f64>) -> Matrix3<f64> {
     GreenLagrange
         .strain(h)
-        .unwrap_or_else(|_| Matrix3::repeat(nalgebra::convert(f64::NAN)))
+        .unwrap_or_else(|_| Matrix3::repeat(f64::NAN))
 }

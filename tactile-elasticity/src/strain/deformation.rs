@@ -1,7 +1,7 @@
 //! The deformation gradient F = I + H, kept in the form in which it was given so that no digits are lost.
 
 use super::double_double::DoubleDouble;
-use nalgebra::{Matrix3, RealField};
+use nalgebra::Matrix3;
 
 /// F = I + H at a point, given by either, and the other rounded.
 ///
@@ -15,9 +15,9 @@ use nalgebra::{Matrix3, RealField};
 /// assert!((stretch.volume_change() / 3e-20f64 - 1.0).abs() < 1e-15);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Deformation<T> {
-    f: Matrix3<T>,
-    h: Matrix3<T>,
+pub struct Deformation {
+    f: Matrix3<f64>,
+    h: Matrix3<f64>,
     given: Given,
 }
 
@@ -28,9 +28,9 @@ enum Given {
     H,
 }
 
-impl<T: RealField + Copy> Deformation<T> {
+impl Deformation {
     /// From H = ∂u/∂X, row = component of u, column = direction of the derivative.
-    pub fn from_displacement_gradient(h: Matrix3<T>) -> Self {
+    pub fn from_displacement_gradient(h: Matrix3<f64>) -> Self {
         Self {
             f: h + Matrix3::identity(),
             h,
@@ -49,7 +49,7 @@ impl<T: RealField + Copy> Deformation<T> {
     /// assert_eq!(twice.displacement_gradient(), Matrix3::identity());
     /// assert_eq!(twice.deformation_gradient()[(2, 2)], 2.0);
     /// ```
-    pub fn from_deformation_gradient(f: Matrix3<T>) -> Self {
+    pub fn from_deformation_gradient(f: Matrix3<f64>) -> Self {
         Self {
             f,
             h: f - Matrix3::identity(),
@@ -58,12 +58,12 @@ impl<T: RealField + Copy> Deformation<T> {
     }
 
     /// F.
-    pub fn deformation_gradient(&self) -> Matrix3<T> {
+    pub fn deformation_gradient(&self) -> Matrix3<f64> {
         self.f
     }
 
     /// H = F − I.
-    pub fn displacement_gradient(&self) -> Matrix3<T> {
+    pub fn displacement_gradient(&self) -> Matrix3<f64> {
         self.h
     }
 
@@ -73,22 +73,22 @@ impl<T: RealField + Copy> Deformation<T> {
     }
 
     /// J − 1 = tr H + II(H) + det H, the relative change of volume, without cancellation.
-    pub fn volume_change(&self) -> T {
+    pub fn volume_change(&self) -> f64 {
         match self.given {
-            Given::F => determinant(&self.f).add(-T::one()).value(),
+            Given::F => determinant(&self.f).add(-1.0).value(),
             Given::H => self.volume_change_from_h(),
         }
     }
 
     /// J = det F; negative where the material is turned inside out.
-    pub fn jacobian(&self) -> T {
+    pub fn jacobian(&self) -> f64 {
         match self.given {
             Given::F => determinant(&self.f).value(),
-            Given::H => T::one() + self.volume_change_from_h(),
+            Given::H => 1.0 + self.volume_change_from_h(),
         }
     }
 
-    fn volume_change_from_h(&self) -> T {
+    fn volume_change_from_h(&self) -> f64 {
         let h = &self.h;
         let mut sum = determinant(h);
         for i in 0..3 {
@@ -101,10 +101,10 @@ impl<T: RealField + Copy> Deformation<T> {
     }
 
     /// F⁻¹ by cofactors whose differences of products are summed in double-double; None where det F = 0.
-    pub(crate) fn inverse(&self) -> Option<Matrix3<T>> {
+    pub(crate) fn inverse(&self) -> Option<Matrix3<f64>> {
         let f = &self.f;
         let det = determinant(f).value();
-        if det == T::zero() {
+        if det == 0.0 {
             return None;
         }
         Some(Matrix3::from_fn(|i, j| {
@@ -116,7 +116,7 @@ impl<T: RealField + Copy> Deformation<T> {
     }
 
     /// E = ½(H + Hᵀ + HᵀH), summed in double-double where the terms cancel (large rotation, little strain).
-    pub(crate) fn green_lagrange(&self) -> Matrix3<T> {
+    pub(crate) fn green_lagrange(&self) -> Matrix3<f64> {
         let plain = green_lagrange_plain(&self.h);
         if cancels(&self.h, &plain) {
             self.green_lagrange_double_double()
@@ -125,8 +125,8 @@ impl<T: RealField + Copy> Deformation<T> {
         }
     }
 
-    fn green_lagrange_double_double(&self) -> Matrix3<T> {
-        let half: T = nalgebra::convert(0.5);
+    fn green_lagrange_double_double(&self) -> Matrix3<f64> {
+        let half: f64 = 0.5;
         let mut e = Matrix3::zeros();
         for i in 0..3 {
             for j in i..3 {
@@ -141,7 +141,7 @@ impl<T: RealField + Copy> Deformation<T> {
                 }
                 sum = match self.given {
                     Given::H => sum.add(m[(i, j)]).add(m[(j, i)]),
-                    Given::F if i == j => sum.add(-T::one()),
+                    Given::F if i == j => sum.add(-1.0),
                     Given::F => sum,
                 };
                 e[(i, j)] = half * sum.value();
@@ -154,8 +154,8 @@ impl<T: RealField + Copy> Deformation<T> {
 
 /// ½(H + Hᵀ + HᵀH) in working precision.
 #[inline(always)]
-pub(crate) fn green_lagrange_plain<T: RealField + Copy>(h: &Matrix3<T>) -> Matrix3<T> {
-    let half: T = nalgebra::convert(0.5);
+pub(crate) fn green_lagrange_plain(h: &Matrix3<f64>) -> Matrix3<f64> {
+    let half: f64 = 0.5;
     let term = |i: usize, j: usize| {
         let product = h[(0, i)] * h[(0, j)] + h[(1, i)] * h[(1, j)] + h[(2, i)] * h[(2, j)];
         half * ((h[(i, j)] + h[(j, i)]) + product)
@@ -167,18 +167,18 @@ pub(crate) fn green_lagrange_plain<T: RealField + Copy>(h: &Matrix3<T>) -> Matri
 
 /// Whether E is so much smaller than what it was summed from that more than two digits are gone.
 #[inline(always)]
-pub(crate) fn cancels<T: RealField + Copy>(h: &Matrix3<T>, e: &Matrix3<T>) -> bool {
+pub(crate) fn cancels(h: &Matrix3<f64>, e: &Matrix3<f64>) -> bool {
     // Summed as trees: a chain of additions would take longer than the strain itself.
     let of_h = ((h[(0, 0)].abs() + h[(1, 1)].abs()) + (h[(2, 2)].abs() + h[(0, 1)].abs()))
         + ((h[(1, 0)].abs() + h[(0, 2)].abs())
             + (h[(2, 0)].abs() + (h[(1, 2)].abs() + h[(2, 1)].abs())));
     let diagonal = (e[(0, 0)].abs() + e[(1, 1)].abs()) + e[(2, 2)].abs();
     let shear = (e[(0, 1)].abs() + e[(0, 2)].abs()) + e[(1, 2)].abs();
-    let many: T = nalgebra::convert(128.0);
+    let many: f64 = 128.0;
     (diagonal + shear) * many < of_h
 }
 
-fn determinant<T: RealField + Copy>(m: &Matrix3<T>) -> DoubleDouble<T> {
+fn determinant(m: &Matrix3<f64>) -> DoubleDouble {
     let mut sum = DoubleDouble::zero();
     for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);

@@ -2,17 +2,15 @@
 //!
 //! Knuth's two-sum and the fused two-product (Ogita, Rump & Oishi 2005, "Accurate sum and dot product").
 
-use nalgebra::RealField;
-
 /// An unevaluated sum `hi + lo`, |lo| no more than half an ulp of `hi`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct DoubleDouble<T> {
-    pub(crate) hi: T,
-    pub(crate) lo: T,
+pub(crate) struct DoubleDouble {
+    pub(crate) hi: f64,
+    pub(crate) lo: f64,
 }
 
 /// a + b exactly.
-fn two_sum<T: RealField + Copy>(a: T, b: T) -> DoubleDouble<T> {
+fn two_sum(a: f64, b: f64) -> DoubleDouble {
     let hi = a + b;
     let of_b = hi - a;
     DoubleDouble {
@@ -22,7 +20,7 @@ fn two_sum<T: RealField + Copy>(a: T, b: T) -> DoubleDouble<T> {
 }
 
 /// a · b exactly (unless it underflows).
-fn two_product<T: RealField + Copy>(a: T, b: T) -> DoubleDouble<T> {
+fn two_product(a: f64, b: f64) -> DoubleDouble {
     let hi = a * b;
     DoubleDouble {
         hi,
@@ -30,15 +28,12 @@ fn two_product<T: RealField + Copy>(a: T, b: T) -> DoubleDouble<T> {
     }
 }
 
-impl<T: RealField + Copy> DoubleDouble<T> {
+impl DoubleDouble {
     pub(crate) fn zero() -> Self {
-        Self {
-            hi: T::zero(),
-            lo: T::zero(),
-        }
+        Self { hi: 0.0, lo: 0.0 }
     }
 
-    pub(crate) fn add(self, x: T) -> Self {
+    pub(crate) fn add(self, x: f64) -> Self {
         let sum = two_sum(self.hi, x);
         let low = self.lo + sum.lo;
         let hi = sum.hi + low;
@@ -53,17 +48,17 @@ impl<T: RealField + Copy> DoubleDouble<T> {
     }
 
     /// self + a·b.
-    pub(crate) fn add_product(self, a: T, b: T) -> Self {
+    pub(crate) fn add_product(self, a: f64, b: f64) -> Self {
         self.add_sum(two_product(a, b))
     }
 
     /// self + a·b·c.
-    pub(crate) fn add_triple(self, a: T, b: T, c: T) -> Self {
+    pub(crate) fn add_triple(self, a: f64, b: f64, c: f64) -> Self {
         let ab = two_product(a, b);
         self.add(ab.lo * c).add_product(ab.hi, c)
     }
 
-    pub(crate) fn value(self) -> T {
+    pub(crate) fn value(self) -> f64 {
         self.hi + self.lo
     }
 }
@@ -81,7 +76,7 @@ mod tests {
             .add(-1.0)
             .value();
         assert_eq!(difference, -u * u);
-        let triple = DoubleDouble::<f32>::zero()
+        let triple = DoubleDouble::zero()
             .add_triple(3.0, 5.0, 7.0)
             .add(-105.0)
             .value();

@@ -1,7 +1,7 @@
 //! Scalars of a symmetric tensor that do not depend on the axes.
 
 use super::stretch::symmetric_eigen;
-use nalgebra::{Matrix3, RealField};
+use nalgebra::Matrix3;
 
 /// Principal values, largest first, and their directions.
 ///
@@ -13,20 +13,16 @@ use nalgebra::{Matrix3, RealField};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize"))
-)]
-pub struct PrincipalValues<T> {
+pub struct PrincipalValues {
     /// The eigenvalues, largest first.
-    pub values: [T; 3],
+    pub values: [f64; 3],
     /// Column i is the direction of value i, of length 1.
-    pub directions: Matrix3<T>,
+    pub directions: Matrix3<f64>,
 }
 
-impl<T: RealField + Copy> From<&Matrix3<T>> for PrincipalValues<T> {
+impl From<&Matrix3<f64>> for PrincipalValues {
     /// Of a symmetric tensor.
-    fn from(tensor: &Matrix3<T>) -> Self {
+    fn from(tensor: &Matrix3<f64>) -> Self {
         let (values, directions) = symmetric_eigen(tensor);
         Self { values, directions }
     }
@@ -42,18 +38,18 @@ impl<T: RealField + Copy> From<&Matrix3<T>> for PrincipalValues<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Invariants<T> {
+pub struct Invariants {
     /// I₁, for a small strain the relative change of volume.
-    pub first: T,
+    pub first: f64,
     /// I₂.
-    pub second: T,
+    pub second: f64,
     /// I₃.
-    pub third: T,
+    pub third: f64,
 }
 
-impl<T: RealField + Copy> From<&Matrix3<T>> for Invariants<T> {
+impl From<&Matrix3<f64>> for Invariants {
     /// Of a tensor.
-    fn from(a: &Matrix3<T>) -> Self {
+    fn from(a: &Matrix3<f64>) -> Self {
         let minor = |i: usize, j: usize| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(j, i)];
         Self {
             first: a.trace(),
@@ -74,14 +70,14 @@ impl<T: RealField + Copy> From<&Matrix3<T>> for Invariants<T> {
 /// let isochoric = Matrix3::from_diagonal(&Vector3::new(0.02, -0.01, -0.01));
 /// assert!((von_mises_strain(&isochoric) - 0.02f64).abs() < 1e-17);
 /// ```
-pub fn von_mises_strain<T: RealField + Copy>(a: &Matrix3<T>) -> T {
-    scaled_norm(&deviator(a), nalgebra::convert(2.0 / 3.0))
+pub fn von_mises_strain(a: &Matrix3<f64>) -> f64 {
+    scaled_norm(&deviator(a), 2.0 / 3.0)
 }
 
 /// A − ⅓ tr A I.
-pub(crate) fn deviator<T: RealField + Copy>(a: &Matrix3<T>) -> Matrix3<T> {
+pub(crate) fn deviator(a: &Matrix3<f64>) -> Matrix3<f64> {
     // Differences of the diagonal: exact where its entries are close, and zero for c·I.
-    let third: T = nalgebra::convert(1.0 / 3.0);
+    let third: f64 = 1.0 / 3.0;
     let (x, y, z) = (a[(0, 0)], a[(1, 1)], a[(2, 2)]);
     let mut dev = *a;
     dev[(0, 0)] = ((x - y) + (x - z)) * third;
@@ -91,9 +87,9 @@ pub(crate) fn deviator<T: RealField + Copy>(a: &Matrix3<T>) -> Matrix3<T> {
 }
 
 /// √(factor · a:a), scaled so that squares neither underflow nor overflow.
-pub(crate) fn scaled_norm<T: RealField + Copy>(a: &Matrix3<T>, factor: T) -> T {
-    let scale = a.iter().fold(T::zero(), |m, x| m.max(x.abs()));
-    if scale == T::zero() {
+pub(crate) fn scaled_norm(a: &Matrix3<f64>, factor: f64) -> f64 {
+    let scale = a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if scale == 0.0 {
         return scale;
     }
     (a / scale).norm() * factor.sqrt() * scale

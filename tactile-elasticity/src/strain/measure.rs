@@ -2,7 +2,7 @@
 
 use super::{Deformation, PrincipalStretches};
 use crate::error::{ElasticityError, Quantity};
-use nalgebra::{Matrix3, RealField};
+use nalgebra::Matrix3;
 use std::sync::Arc;
 
 /// A way to measure strain: a symmetric tensor that vanishes when the material only moves and turns
@@ -16,12 +16,12 @@ use std::sync::Arc;
 /// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
 /// let mut h = Matrix3::zeros();
 /// h[(0, 0)] = 0.05; // 5 % stretch along x
-/// let measures: [&dyn StrainMeasure<f64>; 2] = [&GreenLagrange, &Hencky];
+/// let measures: [&dyn StrainMeasure; 2] = [&GreenLagrange, &Hencky];
 /// let exx = measures.map(|m| m.strain(&h).unwrap()[(0, 0)]);
 /// assert!((exx[0] - 0.05125).abs() < 1e-15);
 /// assert!((exx[1] - 1.05f64.ln()).abs() < 1e-15);
 /// ```
-pub trait StrainMeasure<T: RealField + Copy> {
+pub trait StrainMeasure {
     /// The strain of a deformation.
     ///
     /// # Errors
@@ -36,26 +36,26 @@ pub trait StrainMeasure<T: RealField + Copy> {
     /// let inverted = Deformation::from_deformation_gradient(Matrix3::from_diagonal_element(-1.0_f64));
     /// assert!(Hencky.of(&inverted).is_err());
     /// ```
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError>;
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError>;
 
     /// The measure's name, as the field writes it.
     ///
     /// ```
     /// use tactile_elasticity::strain::{GreenLagrange, Hencky, StrainMeasure};
     ///
-    /// let measures: [&dyn StrainMeasure<f64>; 2] = [&GreenLagrange, &Hencky];
+    /// let measures: [&dyn StrainMeasure; 2] = [&GreenLagrange, &Hencky];
     /// assert_eq!(measures.map(|m| m.name()), ["Green-Lagrange", "Hencky"]);
     /// ```
     fn name(&self) -> &'static str;
 
     /// The strain of a displacement gradient H (F = I + H). Errors as [`of`](Self::of).
-    fn strain(&self, h: &Matrix3<T>) -> Result<Matrix3<T>, ElasticityError> {
+    fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
         self.of(&Deformation::from_displacement_gradient(*h))
     }
 }
 
-impl<T: RealField + Copy, M: StrainMeasure<T> + ?Sized> StrainMeasure<T> for Box<M> {
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+impl<M: StrainMeasure + ?Sized> StrainMeasure for Box<M> {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).of(deformation)
     }
 
@@ -63,13 +63,13 @@ impl<T: RealField + Copy, M: StrainMeasure<T> + ?Sized> StrainMeasure<T> for Box
         (**self).name()
     }
 
-    fn strain(&self, h: &Matrix3<T>) -> Result<Matrix3<T>, ElasticityError> {
+    fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).strain(h)
     }
 }
 
-impl<T: RealField + Copy, M: StrainMeasure<T> + ?Sized> StrainMeasure<T> for Arc<M> {
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+impl<M: StrainMeasure + ?Sized> StrainMeasure for Arc<M> {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).of(deformation)
     }
 
@@ -77,7 +77,7 @@ impl<T: RealField + Copy, M: StrainMeasure<T> + ?Sized> StrainMeasure<T> for Arc
         (**self).name()
     }
 
-    fn strain(&self, h: &Matrix3<T>) -> Result<Matrix3<T>, ElasticityError> {
+    fn strain(&self, h: &Matrix3<f64>) -> Result<Matrix3<f64>, ElasticityError> {
         (**self).strain(h)
     }
 }
@@ -154,8 +154,8 @@ pub struct Biot;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Infinitesimal;
 
-impl<T: RealField + Copy> StrainMeasure<T> for GreenLagrange {
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+impl StrainMeasure for GreenLagrange {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         finite(deformation).map(Deformation::green_lagrange)
     }
 
@@ -164,16 +164,16 @@ impl<T: RealField + Copy> StrainMeasure<T> for GreenLagrange {
     }
 }
 
-impl<T: RealField + Copy> StrainMeasure<T> for EulerAlmansi {
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+impl StrainMeasure for EulerAlmansi {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         upright(deformation)?;
         let inverse = deformation
             .inverse()
             .ok_or(ElasticityError::SingularDeformation)?;
         let e = deformation.green_lagrange();
-        let quarter: T = nalgebra::convert(0.25);
+        let quarter: f64 = 0.25;
         let small = e.iter().all(|x| x.abs() < quarter);
-        let half: T = nalgebra::convert(0.5);
+        let half: f64 = 0.5;
         let strain = if small {
             inverse.transpose() * e * inverse
         } else {
@@ -187,8 +187,8 @@ impl<T: RealField + Copy> StrainMeasure<T> for EulerAlmansi {
     }
 }
 
-impl<T: RealField + Copy> StrainMeasure<T> for Hencky {
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+impl StrainMeasure for Hencky {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         upright(deformation)?;
         let principal = PrincipalStretches::from(deformation);
         Ok(principal.compose(principal.logarithms))
@@ -199,8 +199,8 @@ impl<T: RealField + Copy> StrainMeasure<T> for Hencky {
     }
 }
 
-impl<T: RealField + Copy> StrainMeasure<T> for Biot {
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+impl StrainMeasure for Biot {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         upright(deformation)?;
         let principal = PrincipalStretches::from(deformation);
         Ok(principal.compose(principal.elongations))
@@ -211,10 +211,10 @@ impl<T: RealField + Copy> StrainMeasure<T> for Biot {
     }
 }
 
-impl<T: RealField + Copy> StrainMeasure<T> for Infinitesimal {
-    fn of(&self, deformation: &Deformation<T>) -> Result<Matrix3<T>, ElasticityError> {
+impl StrainMeasure for Infinitesimal {
+    fn of(&self, deformation: &Deformation) -> Result<Matrix3<f64>, ElasticityError> {
         let h = finite(deformation)?.displacement_gradient();
-        Ok((h + h.transpose()) * nalgebra::convert::<f64, T>(0.5))
+        Ok((h + h.transpose()) * 0.5)
     }
 
     fn name(&self) -> &'static str {
@@ -222,9 +222,7 @@ impl<T: RealField + Copy> StrainMeasure<T> for Infinitesimal {
     }
 }
 
-fn finite<T: RealField + Copy>(
-    deformation: &Deformation<T>,
-) -> Result<&Deformation<T>, ElasticityError> {
+fn finite(deformation: &Deformation) -> Result<&Deformation, ElasticityError> {
     if deformation.is_finite() {
         Ok(deformation)
     } else {
@@ -235,10 +233,8 @@ fn finite<T: RealField + Copy>(
 }
 
 /// Refuses det F ≤ 0.
-pub(crate) fn upright<T: RealField + Copy>(
-    deformation: &Deformation<T>,
-) -> Result<(), ElasticityError> {
-    let determinant = crate::scalar::widen(finite(deformation)?.jacobian());
+pub(crate) fn upright(deformation: &Deformation) -> Result<(), ElasticityError> {
+    let determinant = finite(deformation)?.jacobian();
     if determinant > 0.0 {
         Ok(())
     } else if determinant == 0.0 {

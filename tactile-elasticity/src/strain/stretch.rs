@@ -1,7 +1,7 @@
 //! Principal stretches and their directions: F = R U, U = Σ λᵢ vᵢ vᵢᵀ.
 
 use super::deformation::Deformation;
-use nalgebra::{Matrix3, RealField, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// The right stretch U in its principal axes, largest stretch first.
 ///
@@ -17,32 +17,28 @@ use nalgebra::{Matrix3, RealField, Vector3};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(serialize = "T: nalgebra::Scalar + serde::Serialize"))
-)]
-pub struct PrincipalStretches<T> {
+pub struct PrincipalStretches {
     /// λᵢ, the singular values of F.
-    pub stretches: [T; 3],
+    pub stretches: [f64; 3],
     /// λᵢ − 1, without cancellation where the strain is small.
-    pub elongations: [T; 3],
+    pub elongations: [f64; 3],
     /// ln λᵢ, likewise; −∞ where λᵢ = 0.
-    pub logarithms: [T; 3],
+    pub logarithms: [f64; 3],
     /// Column i is the material direction vᵢ, of length 1.
-    pub directions: Matrix3<T>,
+    pub directions: Matrix3<f64>,
 }
 
-impl<T: RealField + Copy> From<&Deformation<T>> for PrincipalStretches<T> {
+impl From<&Deformation> for PrincipalStretches {
     /// Of a deformation; needs finite entries.
     ///
     /// Near the identity they come from the eigenvalues 2E of C − I, which keeps every digit of a tiny strain;
     /// elsewhere from the singular values of F by one-sided Jacobi, which keeps every digit of a tiny stretch.
-    fn from(deformation: &Deformation<T>) -> Self {
+    fn from(deformation: &Deformation) -> Self {
         let e = deformation.green_lagrange();
-        let quarter: T = nalgebra::convert(0.25);
-        let largest = e.iter().fold(T::zero(), |m, x| m.max(x.abs()));
+        let quarter: f64 = 0.25;
+        let largest = e.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         // |eigenvalue| ≤ 3 max |e|: within this bound C is between ½I and 3⁄2 I.
-        if largest * nalgebra::convert(3.0) <= quarter {
+        if largest * 3.0 <= quarter {
             Self::from_small_strain(&e)
         } else {
             Self::from_singular_values(deformation)
@@ -50,46 +46,40 @@ impl<T: RealField + Copy> From<&Deformation<T>> for PrincipalStretches<T> {
     }
 }
 
-impl<T: RealField + Copy> PrincipalStretches<T> {
-    fn from_small_strain(e: &Matrix3<T>) -> Self {
+impl PrincipalStretches {
+    fn from_small_strain(e: &Matrix3<f64>) -> Self {
         let (values, directions) = symmetric_eigen(e);
-        let two: T = nalgebra::convert(2.0);
-        let elongation = |x: T| two * x / (T::one() + (T::one() + two * x).sqrt());
+        let two: f64 = 2.0;
+        let elongation = |x: f64| two * x / (1.0 + (1.0 + two * x).sqrt());
         let elongations = values.map(elongation);
         Self {
-            stretches: elongations.map(|x| T::one() + x),
+            stretches: elongations.map(|x| 1.0 + x),
             elongations,
             logarithms: values.map(|x| (two * x).ln_1p() / two),
             directions,
         }
     }
 
-    fn from_singular_values(deformation: &Deformation<T>) -> Self {
+    fn from_singular_values(deformation: &Deformation) -> Self {
         let (mut s, directions) = one_sided_jacobi(&deformation.deformation_gradient());
-        let thousandth: T = nalgebra::convert(1e-3);
-        if s[2] < s[0] * thousandth && s[1] > T::zero() {
+        let thousandth: f64 = 1e-3;
+        if s[2] < s[0] * thousandth && s[1] > 0.0 {
             // λ₁λ₂λ₃ = |J|, and J is accurate to its last digit.
             s[2] = deformation.jacobian().abs() / s[0] / s[1];
         }
         Self {
             stretches: s,
-            elongations: s.map(|x| x - T::one()),
-            logarithms: s.map(|x| {
-                if x > T::zero() {
-                    x.ln()
-                } else {
-                    T::min_value().unwrap_or(-x)
-                }
-            }),
+            elongations: s.map(|x| x - 1.0),
+            logarithms: s.map(|x| if x > 0.0 { x.ln() } else { f64::MIN }),
             directions,
         }
     }
 
     /// Σ gᵢ vᵢ vᵢᵀ.
-    pub(crate) fn compose(&self, g: [T; 3]) -> Matrix3<T> {
+    pub(crate) fn compose(&self, g: [f64; 3]) -> Matrix3<f64> {
         let mut sum = Matrix3::zeros();
         for (i, &gi) in g.iter().enumerate() {
-            let v: Vector3<T> = self.directions.column(i).into();
+            let v: Vector3<f64> = self.directions.column(i).into();
             for r in 0..3 {
                 for c in r..3 {
                     sum[(r, c)] += gi * v[r] * v[c];
@@ -106,17 +96,17 @@ impl<T: RealField + Copy> PrincipalStretches<T> {
 }
 
 /// Rotation (c, s) that makes the off-diagonal of [[app, apq], [apq, aqq]] vanish.
-fn jacobi_rotation<T: RealField + Copy>(app: T, aqq: T, apq: T) -> (T, T, T) {
-    let two: T = nalgebra::convert(2.0);
+fn jacobi_rotation(app: f64, aqq: f64, apq: f64) -> (f64, f64, f64) {
+    let two: f64 = 2.0;
     let theta = (aqq - app) / (two * apq);
-    let t = T::one() / (theta.abs() + (theta * theta + T::one()).sqrt());
-    let t = if theta < T::zero() { -t } else { t };
-    let c = T::one() / (t * t + T::one()).sqrt();
+    let t = 1.0 / (theta.abs() + (theta * theta + 1.0).sqrt());
+    let t = if theta < 0.0 { -t } else { t };
+    let c = 1.0 / (t * t + 1.0).sqrt();
     (c, t * c, t)
 }
 
 /// Eigenvalues (largest first) and eigenvectors of a symmetric matrix by cyclic Jacobi rotations.
-pub(crate) fn symmetric_eigen<T: RealField + Copy>(m: &Matrix3<T>) -> ([T; 3], Matrix3<T>) {
+pub(crate) fn symmetric_eigen(m: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     let mut a = *m;
     let mut v = Matrix3::identity();
     for _ in 0..32 {
@@ -124,9 +114,7 @@ pub(crate) fn symmetric_eigen<T: RealField + Copy>(m: &Matrix3<T>) -> ([T; 3], M
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let apq = a[(p, q)];
             let scale = a[(p, p)].abs().max(a[(q, q)].abs());
-            if apq == T::zero()
-                || (scale + apq.abs() == scale && apq.abs() < scale * T::default_epsilon())
-            {
+            if apq == 0.0 || (scale + apq.abs() == scale && apq.abs() < scale * f64::EPSILON) {
                 continue;
             }
             done = false;
@@ -134,7 +122,7 @@ pub(crate) fn symmetric_eigen<T: RealField + Copy>(m: &Matrix3<T>) -> ([T; 3], M
             let r = 3 - p - q;
             a[(p, p)] -= t * apq;
             a[(q, q)] += t * apq;
-            (a[(p, q)], a[(q, p)]) = (T::zero(), T::zero());
+            (a[(p, q)], a[(q, p)]) = (0.0, 0.0);
             let (arp, arq) = (a[(r, p)], a[(r, q)]);
             (a[(r, p)], a[(r, q)]) = (c * arp - s * arq, s * arp + c * arq);
             (a[(p, r)], a[(q, r)]) = (a[(r, p)], a[(r, q)]);
@@ -148,10 +136,10 @@ pub(crate) fn symmetric_eigen<T: RealField + Copy>(m: &Matrix3<T>) -> ([T; 3], M
 }
 
 /// Singular values (largest first) and right singular vectors of `f` by one-sided Jacobi (Hestenes).
-fn one_sided_jacobi<T: RealField + Copy>(f: &Matrix3<T>) -> ([T; 3], Matrix3<T>) {
-    let scale = f.iter().fold(T::zero(), |m, x| m.max(x.abs()));
-    if scale == T::zero() {
-        return ([T::zero(); 3], Matrix3::identity());
+fn one_sided_jacobi(f: &Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
+    let scale = f.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if scale == 0.0 {
+        return ([0.0; 3], Matrix3::identity());
     }
     let mut w = f / scale;
     let mut v = Matrix3::identity();
@@ -160,7 +148,7 @@ fn one_sided_jacobi<T: RealField + Copy>(f: &Matrix3<T>) -> ([T; 3], Matrix3<T>)
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let (app, aqq) = (w.column(p).norm_squared(), w.column(q).norm_squared());
             let apq = w.column(p).dot(&w.column(q));
-            if apq.abs() <= T::default_epsilon() * (app * aqq).sqrt() {
+            if apq.abs() <= f64::EPSILON * (app * aqq).sqrt() {
                 continue;
             }
             done = false;
@@ -175,14 +163,14 @@ fn one_sided_jacobi<T: RealField + Copy>(f: &Matrix3<T>) -> ([T; 3], Matrix3<T>)
     sorted([0, 1, 2].map(|i| w.column(i).norm() * scale), v)
 }
 
-fn rotate_columns<T: RealField + Copy>(m: &mut Matrix3<T>, p: usize, q: usize, c: T, s: T) {
+fn rotate_columns(m: &mut Matrix3<f64>, p: usize, q: usize, c: f64, s: f64) {
     for r in 0..3 {
         let (a, b) = (m[(r, p)], m[(r, q)]);
         (m[(r, p)], m[(r, q)]) = (c * a - s * b, s * a + c * b);
     }
 }
 
-fn sorted<T: RealField + Copy>(values: [T; 3], v: Matrix3<T>) -> ([T; 3], Matrix3<T>) {
+fn sorted(values: [f64; 3], v: Matrix3<f64>) -> ([f64; 3], Matrix3<f64>) {
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| {
         values[j]

@@ -22,7 +22,7 @@ fn close(case: &Value, what: &str, found: f64, expected: f64, tolerance: f64) {
     );
 }
 
-fn body(modulus: &Value, nu: &Value) -> Body<f64> {
+fn body(modulus: &Value, nu: &Value) -> Body {
     modulus
         .as_f64()
         .map_or_else(Body::rigid, |e| Body::elastic(e, number(nu)).unwrap())

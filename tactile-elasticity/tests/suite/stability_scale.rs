@@ -22,7 +22,7 @@ const ALLOWED: f64 = 50.0;
 #[test]
 fn strains_have_all_their_digits() {
     let mut table = Worst::new("strain");
-    let measures: [(&str, &dyn StrainMeasure<f64>); 4] = [
+    let measures: [(&str, &dyn StrainMeasure); 4] = [
         ("green_lagrange", &GreenLagrange),
         ("almansi", &EulerAlmansi),
         ("biot", &Biot),

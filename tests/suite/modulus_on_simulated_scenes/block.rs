@@ -49,7 +49,7 @@ fn forces(
     dark: &[Array2<u8>],
     pressed: &[Vec<Array2<u8>>; 2],
     rng: &mut ChaCha8Rng,
-) -> ([Estimate<f64>; 2], DMatrix<f64>) {
+) -> ([Estimate; 2], DMatrix<f64>) {
     let options = ForceOptions::default().without_profile();
     let meter = ForceMeter::new(scene.options().camera.pixel_size_m, &options).unwrap();
     let reference = reference(dark);
@@ -70,7 +70,7 @@ fn forces(
 
 /// e_xx = e_yy = −ν e_zz, each counted from the first load and hence over its λ_t² = 1 − 2ν e_zz. Two errors of much the same size
 /// have twice the degrees of freedom of one.
-fn lateral(found: &Strain<2>) -> Estimate<f64> {
+fn lateral(found: &Strain<2>) -> Estimate {
     let (mean, error) = (found.summary.mean, found.standard_error);
     Estimate::new(
         0.5 * (mean[(0, 0)] + mean[(1, 1)]),
@@ -80,7 +80,7 @@ fn lateral(found: &Strain<2>) -> Estimate<f64> {
 }
 
 /// The two loads, the first squeezed by `first`.
-fn loads(first: f64, forces: &[Estimate<f64>; 2], lateral: Estimate<f64>) -> [LoadState<f64>; 2] {
+fn loads(first: f64, forces: &[Estimate; 2], lateral: Estimate) -> [LoadState; 2] {
     let squeeze = |e: f64| e * (1.0 + 2.0 * NU * first) / NU;
     let strains = [first, first + squeeze(lateral.value)];
     // Second Piola–Kirchhoff: force over λ_z A₀.
@@ -92,11 +92,8 @@ fn loads(first: f64, forces: &[Estimate<f64>; 2], lateral: Estimate<f64>) -> [Lo
         }
     };
     let (value, standard_error) = (squeeze(lateral.value), squeeze(lateral.standard_error));
-    let strain = Estimate {
-        value,
-        standard_error,
-        ..lateral
-    };
+    let mut strain = Estimate::new(value, standard_error);
+    strain.degrees_of_freedom = lateral.degrees_of_freedom;
     [
         load(0),
         LoadState {
@@ -107,11 +104,7 @@ fn loads(first: f64, forces: &[Estimate<f64>; 2], lateral: Estimate<f64>) -> [Lo
 }
 
 /// Stress over strain; the first load's own strain follows from the modulus found so far.
-fn ratio(
-    forces: &[Estimate<f64>; 2],
-    covariance: &DMatrix<f64>,
-    lateral: Estimate<f64>,
-) -> ModulusEstimate<f64> {
+fn ratio(forces: &[Estimate; 2], covariance: &DMatrix<f64>, lateral: Estimate) -> ModulusEstimate {
     let ratio = PaperRatio::default().with_reference(StrainReference::FirstLoad);
     let from_first_strain = |strain: f64| {
         let series = LoadSeries::new(loads(strain, forces, lateral));
@@ -130,8 +123,8 @@ fn report(
     scene: &UniaxialScene,
     bumps: usize,
     found: &Strain<2>,
-    last_force: Estimate<f64>,
-    answer: &ModulusEstimate<f64>,
+    last_force: Estimate,
+    answer: &ModulusEstimate,
 ) {
     let (options, [before, after]) = (scene.options(), STATES.map(|k| scene.states()[k]));
     let modulus = options.material.youngs_modulus_pa;
@@ -152,7 +145,7 @@ fn report(
 }
 
 /// Truth and estimate.
-pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
+pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed + 77);
     let modulus = log_uniform(&mut rng, 10e3, 500e3);
     let scene = squeezed(modulus, seed);

@@ -38,7 +38,7 @@ struct Study {
 }
 
 impl Study {
-    fn run(count: u64, name: &str, trial: impl Fn(u64) -> (f64, ModulusEstimate<f64>)) -> Self {
+    fn run(count: u64, name: &str, trial: impl Fn(u64) -> (f64, ModulusEstimate)) -> Self {
         let mut study = Self {
             errors: Vec::new(),
             covered: 0,
@@ -135,17 +135,11 @@ fn calibrate(
     LinearCalibration::fit(&pairs, &options).unwrap()
 }
 
-fn estimate(e: tactile_imaging::force::Estimate) -> Estimate<f64> {
-    Estimate::new(e.value, e.standard_error)
-}
-
 /// The force with the calibration's degrees of freedom.
-fn force(measured: &ForceMeasurement) -> Estimate<f64> {
-    let degrees_of_freedom = measured.reading.and_then(|r| r.degrees_of_freedom);
-    Estimate {
-        degrees_of_freedom,
-        ..estimate(measured.force_n)
-    }
+fn force(measured: &ForceMeasurement) -> Estimate {
+    let mut force = measured.force_n;
+    force.degrees_of_freedom = measured.reading.and_then(|r| r.degrees_of_freedom);
+    force
 }
 
 /// Covariance of forces that share one calibration.

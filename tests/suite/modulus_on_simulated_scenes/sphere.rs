@@ -17,7 +17,7 @@ use tactile_simulate::{Camera, Elastic, Gain, Load, PressOptions, PressScene, Sp
 const LOADS: u32 = 12;
 const GAUGE_LOADS: u32 = 20;
 
-fn waveguide() -> Waveguide<f64> {
+fn waveguide() -> Waveguide {
     let layer = |l: &tactile_simulate::WaveguideLayer| Layer {
         thickness_m: l.thickness_m,
         youngs_modulus_pa: l.material.youngs_modulus_pa,
@@ -97,12 +97,7 @@ impl Presses {
         }
     }
 
-    fn report(
-        &self,
-        measured: &ForceMeasurement,
-        load: &LoadState<f64>,
-        found: &ModulusEstimate<f64>,
-    ) {
+    fn report(&self, measured: &ForceMeasurement, load: &LoadState, found: &ModulusEstimate) {
         let (modulus, truth) = (self.modulus, self.sphere.truth(LOADS as usize - 1).contact);
         let radius = load.contact_radius_m.unwrap();
         println!(
@@ -130,7 +125,7 @@ fn contact_radius(scene: &PressScene, load: usize) -> f64 {
 }
 
 /// Truth and estimate.
-pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
+pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let presses = Presses::draw(seed, &mut rng);
     let (sphere, ball) = (&presses.sphere, &presses.ball);
@@ -158,7 +153,7 @@ pub(super) fn trial(seed: u64) -> (f64, ModulusEstimate<f64>) {
         .collect();
     let loads: Vec<_> = (measured.iter())
         .map(|m| LoadState {
-            contact_radius_m: Some(estimate(m.contact_radius_m.unwrap())),
+            contact_radius_m: m.contact_radius_m,
             ..LoadState::new(force(m))
         })
         .collect();

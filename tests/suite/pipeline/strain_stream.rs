@@ -240,8 +240,8 @@ fn an_estimator_can_be_chosen_and_a_wrong_one_says_what_it_needs() {
 /// An estimator of a user's own: the load over a length.
 struct Stiffness;
 
-impl ModulusEstimator<f64> for Stiffness {
-    fn estimate(&self, series: &LoadSeries<f64>) -> Result<ModulusEstimate<f64>, ElasticityError> {
+impl ModulusEstimator for Stiffness {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let mut estimate = HertzSphere::new(3e-3, 0.5)?.estimate(series)?;
         estimate.youngs_modulus_pa = series.loads()[0].force_n.value / 1e-6;
         estimate.estimator = self.kind();
@@ -260,7 +260,7 @@ impl ModulusEstimator<f64> for Stiffness {
 #[test]
 fn an_estimator_of_a_users_own_is_a_stage_boxed_too() {
     let trial = trial(&[0.7, 1.2], 8);
-    let boxed: Box<dyn ModulusEstimator<f64> + Send + Sync> = Box::new(Stiffness);
+    let boxed: Box<dyn ModulusEstimator + Send + Sync> = Box::new(Stiffness);
     for pipeline in [
         trial.pipeline().unwrap().with_estimator(Stiffness),
         trial.pipeline().unwrap().with_estimator(boxed),

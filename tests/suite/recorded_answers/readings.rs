@@ -35,7 +35,7 @@ pub(super) fn contact(answers: &mut Answers, name: &str, reading: &ContactReadin
     }
 }
 
-pub(super) fn modulus(answers: &mut Answers, name: &str, found: &ModulusEstimate<f64>) {
+pub(super) fn modulus(answers: &mut Answers, name: &str, found: &ModulusEstimate) {
     let interval = [Some(found.interval_95.lower), found.interval_95.upper];
     answers.add(name, [found.youngs_modulus_pa, found.standard_error_pa]);
     answers.add(format!("{name}/interval"), interval.into_iter().flatten());

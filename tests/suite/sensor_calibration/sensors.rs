@@ -77,7 +77,7 @@ pub(super) const LOADS_N: [f64; 3] = [0.05, 0.12, 0.25];
 /// A sensor as it is, and as its user states it.
 pub(super) struct Simulated {
     effects: Effects,
-    truth: Vec<Layer<f64>>,
+    truth: Vec<Layer>,
     stated: Vec<LayerInput>,
     gauge: f64,
     target: f64,
@@ -117,7 +117,7 @@ fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// States of a rigid ball on the layers.
-fn rigid_states(layers: &[Layer<f64>], radius_m: f64, forces: &[f64]) -> Vec<ContactState> {
+fn rigid_states(layers: &[Layer], radius_m: f64, forces: &[f64]) -> Vec<ContactState> {
     let guide = Waveguide::new(layers.to_vec()).unwrap();
     let equation = LayerEquation::of_layers(&guide, Bond::Bonded).unwrap();
     let top = layers[0].youngs_modulus_pa / (1.0 - layers[0].poisson_ratio.powi(2));
@@ -133,12 +133,7 @@ fn rigid_states(layers: &[Layer<f64>], radius_m: f64, forces: &[f64]) -> Vec<Con
 }
 
 /// States of a soft ball on the layers: those at which the estimator finds the ball's modulus.
-fn soft_states(
-    layers: &[Layer<f64>],
-    radius_m: f64,
-    poisson: f64,
-    forces: &[f64],
-) -> Vec<ContactState> {
+fn soft_states(layers: &[Layer], radius_m: f64, poisson: f64, forces: &[f64]) -> Vec<ContactState> {
     let guide = Waveguide::new(layers.to_vec()).unwrap();
     let estimator = estimator(radius_m, poisson, &guide);
     let above = |force: f64, a: f64| {
@@ -158,7 +153,7 @@ fn soft_states(
         .collect()
 }
 
-pub(super) fn estimator(radius_m: f64, poisson: f64, guide: &Waveguide<f64>) -> SphereOnWaveguide {
+pub(super) fn estimator(radius_m: f64, poisson: f64, guide: &Waveguide) -> SphereOnWaveguide {
     SphereOnWaveguide::new(radius_m, poisson, guide, Bond::Bonded)
         .unwrap()
         .without_finite_strain()

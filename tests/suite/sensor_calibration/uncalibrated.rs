@@ -84,7 +84,7 @@ const CASES: [(&str, Effects, LeftOut); 7] = [
 ];
 
 /// A modulus with its cautions, or the sentence by which the calibration refused.
-type Answer = Result<(ModulusEstimate<f64>, Vec<Flag>), SensorError>;
+type Answer = Result<(ModulusEstimate, Vec<Flag>), SensorError>;
 
 fn object() -> Object {
     Object::Sphere {

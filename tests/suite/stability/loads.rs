@@ -59,7 +59,7 @@ pub(crate) fn many(table: &mut Table) {
     }
 }
 
-fn streamed(trial: &Trial, pipeline: &Pipeline) -> ModulusEstimate<f64> {
+fn streamed(trial: &Trial, pipeline: &Pipeline) -> ModulusEstimate {
     let reference = trial.simulation.reference.view();
     let mut session = Session::new(pipeline, &[reference]).unwrap();
     for frame in &trial.simulation.frames {
@@ -126,10 +126,7 @@ fn equal_loads_have_no_ratio() {
     }
 }
 
-fn strained(
-    forces: &[f64],
-    choice: EstimatorChoice,
-) -> Result<ModulusEstimate<f64>, PipelineError> {
+fn strained(forces: &[f64], choice: EstimatorChoice) -> Result<ModulusEstimate, PipelineError> {
     let trial = trial(coarse_camera(), 200.0, forces);
     let config = StagesConfig {
         estimator: choice,

@@ -38,7 +38,7 @@ use surface::{Sample, Surface};
 pub struct ContactTable {
     radius_m: f64,
     poisson_ratio: f64,
-    layers: Vec<Layer<f64>>,
+    layers: Vec<Layer>,
     curves: Vec<ContactCurve>,
     surface: Surface,
     limits: Limits,
@@ -94,7 +94,7 @@ impl ContactTable {
     pub fn new(
         radius_m: f64,
         poisson_ratio: f64,
-        guide: &Waveguide<f64>,
+        guide: &Waveguide,
         curves: Vec<ContactCurve>,
     ) -> Result<Self, ElasticityError> {
         positive(radius_m, Quantity::Radius)?;
@@ -154,7 +154,7 @@ impl ContactTable {
     }
 
     /// The guide's layers, the touched one first; none on a rigid flat.
-    pub fn layers(&self) -> &[Layer<f64>] {
+    pub fn layers(&self) -> &[Layer] {
         &self.layers
     }
 
@@ -220,7 +220,7 @@ impl ContactTable {
         &self,
         radius_m: f64,
         poisson_ratio: f64,
-        guide: &Waveguide<f64>,
+        guide: &Waveguide,
     ) -> Result<(), ElasticityError> {
         let same = |found: f64, expected: f64, quantity| {
             // Numbers that went through a text file, or through millimetres, keep this.
@@ -322,7 +322,7 @@ struct TableFile {
     radius_m: f64,
     poisson_ratio: f64,
     #[serde(default)]
-    layers: Vec<Layer<f64>>,
+    layers: Vec<Layer>,
     curves: Vec<ContactCurve>,
 }
 

@@ -5,7 +5,7 @@ use crate::modulus::{
 
 const RADIUS: f64 = 3e-3;
 
-fn guide() -> Waveguide<f64> {
+fn guide() -> Waveguide {
     let layer = |thickness_m, youngs_modulus_pa| Layer {
         thickness_m,
         youngs_modulus_pa,
@@ -39,7 +39,7 @@ fn table() -> ContactTable {
     ContactTable::new(RADIUS, 0.495, &guide(), curves.collect()).unwrap()
 }
 
-fn load(a: f64, e: f64) -> LoadState<f64> {
+fn load(a: f64, e: f64) -> LoadState {
     let force = invented_force(a, e);
     LoadState {
         contact_radius_m: Some(Estimate::new(a, 1e-6)),
@@ -151,15 +151,11 @@ fn what_the_table_does_not_hold_is_not_answered() {
 
 #[test]
 fn another_ball_or_guide_is_refused() {
-    let refused = |radius, nu, guide: &Waveguide<f64>| match TabulatedContact::new(
-        table(),
-        radius,
-        nu,
-        guide,
-    ) {
-        Err(ElasticityError::TableMismatch { quantity, .. }) => Some(quantity),
-        _ => None,
-    };
+    let refused =
+        |radius, nu, guide: &Waveguide| match TabulatedContact::new(table(), radius, nu, guide) {
+            Err(ElasticityError::TableMismatch { quantity, .. }) => Some(quantity),
+            _ => None,
+        };
     assert_eq!(refused(RADIUS, 0.495, &guide()), None);
     assert_eq!(refused(3.01e-3, 0.495, &guide()), Some(Quantity::Radius));
     assert_eq!(refused(RADIUS, 0.5, &guide()), Some(Quantity::PoissonRatio));
@@ -167,7 +163,7 @@ fn another_ball_or_guide_is_refused() {
         refused(RADIUS, 0.495, &Waveguide::rigid()),
         Some(Quantity::Layers)
     );
-    let changed = |change: fn(&mut Layer<f64>)| {
+    let changed = |change: fn(&mut Layer)| {
         let mut layers = guide().layers().to_vec();
         change(&mut layers[1]);
         refused(RADIUS, 0.495, &Waveguide::new(layers).unwrap())

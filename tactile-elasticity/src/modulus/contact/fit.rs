@@ -4,27 +4,26 @@ use super::{ContactEstimator, Evidence};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::covariance::Covariance;
 use crate::modulus::estimate::{
-    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
 use crate::modulus::law::{ContactLaw, LogForce};
-use crate::modulus::load::{Estimate, LoadState};
+use crate::modulus::load::{LoadState, validated};
 use crate::modulus::series::LoadSeries;
 use crate::modulus::source::{LogErrors, total};
-use crate::modulus::statistics::{CommonMean, common_mean, fewest, quantile_95};
+use crate::modulus::statistics::{CommonMean, common_mean, fewest};
 use crate::modulus::warning::Warning;
-use crate::scalar::{narrow, widen};
-use nalgebra::RealField;
+use tactile_core::{Estimate, Interval, statistics::quantile_95};
 
 impl<L: ContactLaw> ContactEstimator<L> {
     fn observe(
         &self,
-        loads: &[LoadState<f64>],
+        loads: &[LoadState],
         share: f64,
     ) -> Result<Vec<Observation>, ElasticityError> {
         let mut all = Vec::new();
         for (load, state) in loads.iter().enumerate() {
-            let force = state.force_n.validated(Quantity::Force)?;
-            let mut push = |length: Option<Estimate<f64>>,
+            let force = validated(state.force_n, Quantity::Force)?;
+            let mut push = |length: Option<Estimate>,
                             wanted: bool,
                             quantity,
                             law: &dyn Fn(f64) -> Option<LogForce>,
@@ -32,7 +31,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
                 let Some(length) = length.filter(|_| wanted) else {
                     return Ok(());
                 };
-                let length = length.validated(quantity)?;
+                let length = validated(length, quantity)?;
                 positive(length.value, quantity)?;
                 positive(force.value, Quantity::Force)?;
                 if let Some(log_force) = law(length.value) {
@@ -81,7 +80,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
     }
 
     /// Covariances of the ln E*, with their degrees of freedom: of forces, of lengths, of what all have in common.
-    fn sources(&self, all: &[Observation], series: &LoadSeries<f64>) -> [LogErrors; 3] {
+    fn sources(&self, all: &[Observation], series: &LoadSeries) -> [LogErrors; 3] {
         let shared = series.shared_errors();
         let none = Covariance::none(all.iter().map(|o| o.load));
         let forces = match series.force_covariance() {
@@ -93,11 +92,12 @@ impl<L: ContactLaw> ContactEstimator<L> {
                 .clone()
                 .with_shared_in_load(|i| all[i].force.relative_error()),
         };
+        // The scale of the forces comes from the calibration that their own errors come from.
+        let forces = forces.with_shared(|_| shared.force_scale);
         let lengths = none
             .clone()
             .with_own(|i| all[i].log_force.slope * all[i].length.relative_error());
         let common = none
-            .with_shared(|_| shared.force_scale)
             .with_shared(|i| all[i].log_force.slope * shared.length_scale)
             .with_shared(|i| all[i].log_force.size_slope * shared.size)
             .with_model_errors(|i| all[i].model_error);
@@ -125,7 +125,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
     ///
     /// With p the sample's part of the compliance, 1 − C E* on a deep body, ln E moves by 1/p of ln F, by 1 − 1/p of ln C and by
     /// 2ν/(1 − ν²) of ν: beside ln E* an error of ln C counts 1 − p times, one of ν p·2ν/(1 − ν²) times.
-    fn standard_error(&self, series: &LoadSeries<f64>, mean: &CommonMean, sample_part: f64) -> f64 {
+    fn standard_error(&self, series: &LoadSeries, mean: &CommonMean, sample_part: f64) -> f64 {
         let shared = series.shared_errors();
         let nu_slope = 2.0 * self.poisson_ratio / (1.0 - self.poisson_ratio.powi(2));
         let of_other_body = (1.0 - sample_part) * shared.other_body;
@@ -145,7 +145,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// The mean at a given share of the other body.
     fn mean(
         &self,
-        series: &LoadSeries<f64>,
+        series: &LoadSeries,
         share: f64,
     ) -> Result<(Vec<Observation>, CommonMean), ElasticityError> {
         let all = self.observe(series.loads(), share)?;
@@ -159,11 +159,7 @@ impl<L: ContactLaw> ContactEstimator<L> {
     /// The mean at the share that belongs to the modulus it gives, `reach` standard errors away.
     ///
     /// The share moves ln E* by less than it is moved itself, so that the plain iteration converges.
-    fn consistent(
-        &self,
-        series: &LoadSeries<f64>,
-        reach: f64,
-    ) -> Result<Consistent, ElasticityError> {
+    fn consistent(&self, series: &LoadSeries, reach: f64) -> Result<Consistent, ElasticityError> {
         let share_at =
             |log_reduced: f64| (self.other_compliance_per_pa * log_reduced.exp()).clamp(0.0, 1.0);
         let mut share = self.law.first_share();
@@ -195,11 +191,11 @@ impl<L: ContactLaw> ContactEstimator<L> {
         })
     }
 
-    fn answer<T: RealField + Copy>(
+    fn answer(
         &self,
-        series: &LoadSeries<f64>,
+        series: &LoadSeries,
         centre: &Consistent,
-    ) -> Result<(f64, f64, Interval<T>), ElasticityError> {
+    ) -> Result<(f64, f64, Interval), ElasticityError> {
         let known = centre.mean.standard_error.is_finite();
         let limit = |reach: f64| -> Option<f64> {
             self.sample_modulus(self.consistent(series, reach).ok()?.log_reduced)
@@ -217,27 +213,20 @@ impl<L: ContactLaw> ContactEstimator<L> {
         let share = (self.other_compliance_per_pa * centre.log_reduced.exp()).clamp(0.0, 1.0);
         let part = self.sample_part(&centre.observations, share);
         let error = modulus / part * self.standard_error(series, &centre.mean, part);
-        Ok((
-            modulus,
-            error,
-            Interval {
-                lower: narrow(lower),
-                upper: upper.map(narrow),
-            },
-        ))
+        Ok((modulus, error, Interval::new(lower, upper)))
     }
 
-    fn diagnose<T: RealField + Copy>(
+    fn diagnose(
         &self,
-        loads: &[LoadState<f64>],
+        loads: &[LoadState],
         all: &[Observation],
         mean: &CommonMean,
-    ) -> Vec<LoadDiagnostics<T>> {
+    ) -> Vec<LoadDiagnostics> {
         // Observations come in the order of their loads.
         let mut observed = all.iter().zip(&mean.standardized_residuals).peekable();
         (0..loads.len())
             .map(|i| {
-                let value = |e: Option<Estimate<f64>>| e.map(|e| e.value);
+                let value = |e: Option<Estimate>| e.map(|e| e.value);
                 let ratio = self.law.contact_ratio(
                     value(loads[i].contact_radius_m),
                     value(loads[i].indentation_m),
@@ -259,16 +248,16 @@ impl<L: ContactLaw> ContactEstimator<L> {
                 let alone = (count > 0).then(|| log_sum / f64::from(count));
                 LoadDiagnostics {
                     used: count > 0,
-                    contact_ratio: ratio.map(narrow),
-                    youngs_modulus_pa: alone.and_then(|log| self.sample_modulus(log)).map(narrow),
-                    standardized_residual: worst.map(narrow),
+                    contact_ratio: ratio,
+                    youngs_modulus_pa: alone.and_then(|log| self.sample_modulus(log)),
+                    standardized_residual: worst,
                 }
             })
             .collect()
     }
 
-    fn layer_warnings<T: RealField + Copy>(&self, loads: &[LoadState<f64>]) -> Vec<Warning<T>> {
-        let value = |e: Option<Estimate<f64>>| e.map(|e| e.value);
+    fn layer_warnings(&self, loads: &[LoadState]) -> Vec<Warning> {
+        let value = |e: Option<Estimate>| e.map(|e| e.value);
         (loads.iter().enumerate())
             .filter_map(|(i, l)| {
                 Some((
@@ -280,30 +269,25 @@ impl<L: ContactLaw> ContactEstimator<L> {
             .filter(|(_, (ratio, limit))| ratio > limit)
             .map(|(load, (ratio, limit))| Warning::ThinLayer {
                 load,
-                ratio: narrow(ratio),
-                limit: narrow(limit),
+                ratio: ratio,
+                limit: limit,
             })
             .collect()
     }
 
-    fn warn<T: RealField + Copy>(
-        &self,
-        loads: &[LoadDiagnostics<T>],
-        mean: &CommonMean,
-        bounded: bool,
-    ) -> Vec<Warning<T>> {
+    fn warn(&self, loads: &[LoadDiagnostics], mean: &CommonMean, bounded: bool) -> Vec<Warning> {
         let limit = self.law.contact_ratio_limit();
-        let mut warnings: Vec<Warning<T>> = (loads.iter().enumerate())
+        let mut warnings: Vec<Warning> = (loads.iter().enumerate())
             .filter_map(|(load, d)| d.contact_ratio.map(|ratio| (load, ratio)))
-            .filter(|&(_, ratio)| widen(ratio) > limit)
+            .filter(|&(_, ratio)| ratio > limit)
             .map(|(load, ratio)| Warning::LargeContact {
                 load,
                 ratio,
-                limit: narrow(limit),
+                limit: limit,
             })
             .collect();
         warnings.extend(mean.excess.map(|x| Warning::ExcessScatter {
-            reduced_chi_squared: narrow(x),
+            reduced_chi_squared: x,
         }));
         if mean.standard_error.is_infinite() {
             warnings.push(Warning::NoErrorEstimate);
@@ -323,8 +307,8 @@ struct Consistent {
 
 struct Observation {
     load: usize,
-    force: Estimate<f64>,
-    length: Estimate<f64>,
+    force: Estimate,
+    length: Estimate,
     /// The length, where it is a contact radius.
     contact_radius: Option<f64>,
     log_force: LogForce,
@@ -333,9 +317,8 @@ struct Observation {
     model_error: f64,
 }
 
-impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimator<L> {
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
-        let series = series.widened();
+impl<L: ContactLaw> ModulusEstimator for ContactEstimator<L> {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let loads = series.loads();
         let centre = self.consistent(&series, 0.0)?;
         let (modulus, error, interval_95) = self.answer(&series, &centre)?;
@@ -348,8 +331,8 @@ impl<T: RealField + Copy, L: ContactLaw> ModulusEstimator<T> for ContactEstimato
         let mut warnings = self.warn(&diagnostics, mean, interval_95.upper.is_some());
         warnings.extend(self.layer_warnings(loads));
         Ok(ModulusEstimate {
-            youngs_modulus_pa: narrow(modulus),
-            standard_error_pa: narrow(error),
+            youngs_modulus_pa: modulus,
+            standard_error_pa: error,
             interval_95,
             estimator: self.law.kind(),
             loads: diagnostics,

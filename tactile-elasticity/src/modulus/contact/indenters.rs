@@ -6,8 +6,6 @@ use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::law::{
     ConeLaw, LayerLaw, LayerTheory, Punch, Sphere, TataraLaw, TwoContactsLaw, WaveguideLaw,
 };
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// Hertz's sphere: a = (3FR/4E*)^⅓, δ = a²/R. Right for a/R up to 0.3; beyond, the estimate carries a warning.
 ///
@@ -134,10 +132,7 @@ impl ContactEstimator<Sphere> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
+    pub fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         Self::from_law(Sphere::new(radius_m)?, poisson_ratio)
     }
 }
@@ -147,10 +142,7 @@ impl ContactEstimator<Punch> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
+    pub fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         Self::from_law(Punch::new(radius_m)?, poisson_ratio)
     }
 }
@@ -160,11 +152,8 @@ impl ContactEstimator<ConeLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::OutOfRange`] for an angle outside (0, π/2), [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        half_angle_rad: T,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
-        let (angle, limit) = (widen(half_angle_rad), std::f64::consts::FRAC_PI_2);
+    pub fn new(half_angle_rad: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
+        let (angle, limit) = (half_angle_rad, std::f64::consts::FRAC_PI_2);
         positive(angle, Quantity::HalfAngle)?;
         if angle >= limit {
             return Err(ElasticityError::OutOfRange {
@@ -182,10 +171,10 @@ impl ContactEstimator<LayerLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        thickness_m: T,
-        poisson_ratio: T,
+    pub fn new(
+        radius_m: f64,
+        thickness_m: f64,
+        poisson_ratio: f64,
         bond: Bond,
         theory: LayerTheory,
     ) -> Result<Self, ElasticityError> {
@@ -201,10 +190,7 @@ impl ContactEstimator<TataraLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
+    pub fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         Self::from_law(TataraLaw::new(radius_m, poisson_ratio)?, poisson_ratio)
     }
 }
@@ -214,10 +200,7 @@ impl ContactEstimator<TwoContactsLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
+    pub fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         Self::from_law(TwoContactsLaw::new(radius_m)?, poisson_ratio)
     }
 }
@@ -228,18 +211,14 @@ impl ContactEstimator<WaveguideLaw> {
     ///
     /// # Errors
     /// [`ElasticityError::NotPositive`], [`ElasticityError::PoissonRatio`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-        waveguide: &Waveguide<T>,
+    pub fn new(
+        radius_m: f64,
+        poisson_ratio: f64,
+        waveguide: &Waveguide,
         bond: Bond,
     ) -> Result<Self, ElasticityError> {
         let law = WaveguideLaw::new(radius_m, poisson_ratio, waveguide, bond)?;
-        let touched = match waveguide
-            .layers()
-            .iter()
-            .find(|l| l.thickness_m > T::zero())
-        {
+        let touched = match waveguide.layers().iter().find(|l| l.thickness_m > 0.0) {
             Some(top) => Body::elastic(top.youngs_modulus_pa, top.poisson_ratio)?,
             None => Body::rigid(),
         };

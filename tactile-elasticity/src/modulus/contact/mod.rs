@@ -16,8 +16,6 @@ pub use indenters::{
 use super::law::ContactLaw;
 use crate::contact::{Body, Waveguide};
 use crate::error::{ElasticityError, poisson};
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// Which of the observations a contact estimator uses.
 ///
@@ -85,28 +83,25 @@ pub struct ContactEstimator<L> {
 }
 
 impl<L: ContactLaw> ContactEstimator<L> {
-    pub(crate) fn from_law<T: RealField + Copy>(
-        law: L,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
+    pub(crate) fn from_law(law: L, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
             law,
-            poisson_ratio: poisson(widen(poisson_ratio))?,
+            poisson_ratio: poisson(poisson_ratio)?,
             other_compliance_per_pa: 0.0,
             evidence: Evidence::All,
         })
     }
 
     /// With the other body's compliance.
-    pub fn with_other_body<T: RealField + Copy>(mut self, body: Body<T>) -> Self {
-        self.other_compliance_per_pa = widen(body.compliance_per_pa());
+    pub fn with_other_body(mut self, body: Body) -> Self {
+        self.other_compliance_per_pa = body.compliance_per_pa();
         self
     }
 
     /// With a waveguide as the other body, its layers in series: one half-space of their mean compliance.
     ///
     /// Good for a contact that is small beside layers that are alike; [`SphereOnWaveguide`] solves the layers.
-    pub fn with_waveguide<T: RealField + Copy>(self, waveguide: &Waveguide<T>) -> Self {
+    pub fn with_waveguide(self, waveguide: &Waveguide) -> Self {
         self.with_other_body(waveguide.as_body())
     }
 

@@ -3,8 +3,6 @@
 use super::{ContactLaw, LogForce};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::EstimatorKind;
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// Hertz's sphere of (relative) radius R: F = 4E*a³/(3R) = 4⁄3 E*√R δ^{3⁄2}.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,9 +16,9 @@ impl Sphere {
     }
 
     /// From the relative radius in m.
-    pub(crate) fn new<T: RealField + Copy>(radius_m: T) -> Result<Self, ElasticityError> {
+    pub(crate) fn new(radius_m: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
-            radius_m: positive(widen(radius_m), Quantity::Radius)?,
+            radius_m: positive(radius_m, Quantity::Radius)?,
         })
     }
 }
@@ -66,9 +64,9 @@ pub struct Punch {
 }
 
 impl Punch {
-    pub(crate) fn new<T: RealField + Copy>(radius_m: T) -> Result<Self, ElasticityError> {
+    pub(crate) fn new(radius_m: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
-            radius_m: positive(widen(radius_m), Quantity::Radius)?,
+            radius_m: positive(radius_m, Quantity::Radius)?,
         })
     }
 }

@@ -4,8 +4,6 @@ use super::{ContactLaw, LogForce, Sphere};
 use crate::contact::{Bond, LayerContact, LayerEquation, LayerKernel, LayerSeries, LayerTable};
 use crate::error::{ElasticityError, Quantity, positive};
 use crate::modulus::EstimatorKind;
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// Which theory of the layer.
 ///
@@ -52,15 +50,15 @@ pub struct LayerLaw {
 }
 
 impl LayerLaw {
-    pub(crate) fn new<T: RealField + Copy>(
-        radius_m: T,
-        thickness_m: T,
-        poisson_ratio: T,
+    pub(crate) fn new(
+        radius_m: f64,
+        thickness_m: f64,
+        poisson_ratio: f64,
         bond: Bond,
         theory: LayerTheory,
     ) -> Result<Self, ElasticityError> {
-        let radius_m = positive(widen(radius_m), Quantity::Radius)?;
-        let thickness_m = positive(widen(thickness_m), Quantity::Thickness)?;
+        let radius_m = positive(radius_m, Quantity::Radius)?;
+        let thickness_m = positive(thickness_m, Quantity::Thickness)?;
         let kernel = LayerKernel::new(bond, poisson_ratio)?;
         let series = match theory {
             LayerTheory::PublishedSeries => LayerSeries::published(bond, poisson_ratio)?,

@@ -4,8 +4,6 @@ use super::{ContactLaw, LogForce, Sphere};
 use crate::contact::Squeeze;
 use crate::error::{ElasticityError, Quantity, poisson, positive};
 use crate::modulus::EstimatorKind;
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// Tatara's sphere: Hertz's radius, and an indentation lessened by the far contact; the sample is the sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,13 +14,10 @@ pub struct TataraLaw {
 }
 
 impl TataraLaw {
-    pub(crate) fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-    ) -> Result<Self, ElasticityError> {
+    pub(crate) fn new(radius_m: f64, poisson_ratio: f64) -> Result<Self, ElasticityError> {
         let (radius_m, poisson_ratio) = (
-            positive(widen(radius_m), Quantity::Radius)?,
-            poisson(widen(poisson_ratio))?,
+            positive(radius_m, Quantity::Radius)?,
+            poisson(poisson_ratio)?,
         );
         Ok(Self {
             sphere: Sphere::new(radius_m)?,

@@ -3,7 +3,6 @@
 use super::{ContactLaw, LogForce, Sphere};
 use crate::error::ElasticityError;
 use crate::modulus::EstimatorKind;
-use nalgebra::RealField;
 
 /// A soft sphere between the other body (the waveguide) and a rigid plate, Hertz at both contacts; the indentation is the
 /// approach of the plate, so that both flatten.
@@ -16,7 +15,7 @@ pub struct TwoContactsLaw {
 }
 
 impl TwoContactsLaw {
-    pub(crate) fn new<T: RealField + Copy>(radius_m: T) -> Result<Self, ElasticityError> {
+    pub(crate) fn new(radius_m: f64) -> Result<Self, ElasticityError> {
         Ok(Self {
             sphere: Sphere::new(radius_m)?,
         })

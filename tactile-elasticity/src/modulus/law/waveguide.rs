@@ -5,8 +5,6 @@ use super::{ContactLaw, LogForce, Sphere};
 use crate::contact::{Bond, LayerKernel, SharedLayerTable, Waveguide};
 use crate::error::{ElasticityError, Quantity, poisson, positive};
 use crate::modulus::EstimatorKind;
-use crate::scalar::widen;
-use nalgebra::RealField;
 
 /// F = E* f(a): the linear contact of a ball with bonded layers on a rigid base, solved by its integral equation and tabulated, with
 /// what finite strain adds. E* is that of the ball and the touched layer.
@@ -30,14 +28,14 @@ impl WaveguideLaw {
     ///
     /// # Errors
     /// Those of the layers' contact: [`ElasticityError`].
-    pub fn new<T: RealField + Copy>(
-        radius_m: T,
-        poisson_ratio: T,
-        waveguide: &Waveguide<T>,
+    pub fn new(
+        radius_m: f64,
+        poisson_ratio: f64,
+        waveguide: &Waveguide,
         bond: Bond,
     ) -> Result<Self, ElasticityError> {
-        let radius = positive(widen(radius_m), Quantity::Radius)?;
-        let thickness_m = widen(waveguide.thickness_m());
+        let radius = positive(radius_m, Quantity::Radius)?;
+        let thickness_m = waveguide.thickness_m();
         let layers = if waveguide.layers().is_empty() {
             None
         } else {
@@ -52,7 +50,7 @@ impl WaveguideLaw {
             sphere: Sphere::new(radius_m)?,
             thickness_m,
             layers,
-            finite_strain: Some(FiniteStrain::new(poisson(widen(poisson_ratio))?)),
+            finite_strain: Some(FiniteStrain::new(poisson(poisson_ratio)?)),
         })
     }
 

@@ -1,7 +1,7 @@
 //! A straight line through points with errors in both coordinates.
 
-use crate::modulus::load::Estimate;
 use crate::modulus::statistics::chi_squared_tail;
+use tactile_core::Estimate;
 
 /// A straight line with its errors.
 #[derive(Debug, Clone, Copy)]
@@ -18,8 +18,8 @@ pub(super) struct Line {
 
 pub(super) struct Point {
     pub(super) load: usize,
-    pub(super) strain: Estimate<f64>,
-    pub(super) stress: Estimate<f64>,
+    pub(super) strain: Estimate,
+    pub(super) stress: Estimate,
 }
 
 impl Line {

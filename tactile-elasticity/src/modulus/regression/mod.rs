@@ -4,16 +4,18 @@ mod line;
 
 use crate::error::{ElasticityError, Quantity};
 use crate::modulus::estimate::{
-    EstimatorKind, FitStatistics, Interval, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
+    EstimatorKind, FitStatistics, LoadDiagnostics, ModulusEstimate, ModulusEstimator,
 };
-use crate::modulus::load::LoadState;
+use crate::modulus::load::{LoadState, validated};
 use crate::modulus::ratio::{strain_warnings, stress};
 use crate::modulus::series::LoadSeries;
-use crate::modulus::statistics::{effective_degrees, fewest, quantile_95, t_tail};
+use crate::modulus::statistics::{fewest, t_tail};
 use crate::modulus::warning::Warning;
-use crate::scalar::narrow;
 use line::{Line, Point};
-use nalgebra::RealField;
+use tactile_core::{
+    Interval,
+    statistics::{effective_degrees_of_freedom, quantile_95},
+};
 
 /// S_i = S₀ + E e_i over many loads, with errors in both.
 ///
@@ -64,13 +66,13 @@ impl StressStrainRegression {
         self
     }
 
-    fn points(loads: &[LoadState<f64>]) -> Result<Vec<Point>, ElasticityError> {
+    fn points(loads: &[LoadState]) -> Result<Vec<Point>, ElasticityError> {
         let mut points = Vec::new();
         for (load, state) in loads.iter().enumerate() {
             if let Some(strain) = state.mean_strain {
                 points.push(Point {
                     load,
-                    strain: strain.validated(Quantity::Strain)?,
+                    strain: validated(strain, Quantity::Strain)?,
                     stress: stress(load, state)?,
                 });
             }
@@ -79,10 +81,7 @@ impl StressStrainRegression {
     }
 
     /// Slope and intercept of the line through all loads that have a strain.
-    pub(crate) fn line_through(
-        &self,
-        series: &LoadSeries<f64>,
-    ) -> Result<(f64, f64), ElasticityError> {
+    pub(crate) fn line_through(&self, series: &LoadSeries) -> Result<(f64, f64), ElasticityError> {
         let line = self.line(&Self::points(series.loads())?)?;
         Ok((line.slope, line.intercept))
     }
@@ -138,7 +137,8 @@ impl StressStrainRegression {
     }
 
     /// Degrees of freedom of the slope's error: those of the scatter, or of the sources, the stresses counted as one.
-    fn degrees(points: &[Point], line: &Line, scale_error: f64) -> Option<f64> {
+    /// `scales` are the variances that all stresses share, with their degrees of freedom.
+    fn degrees(points: &[Point], line: &Line, scales: [(f64, Option<f64>); 2]) -> Option<f64> {
         if line.learnt {
             return Some(line.degrees as f64);
         }
@@ -152,7 +152,7 @@ impl StressStrainRegression {
             .sum::<f64>();
         // What the slope's error has of either, in proportion.
         let unit = line.slope_error.powi(2) / (stress + strain);
-        effective_degrees(&[
+        effective_degrees_of_freedom(&[
             (
                 unit * stress,
                 fewest(points.iter().map(|p| p.stress.degrees_of_freedom)),
@@ -161,18 +161,15 @@ impl StressStrainRegression {
                 unit * strain,
                 fewest(points.iter().map(|p| p.strain.degrees_of_freedom)),
             ),
-            ((line.slope * scale_error).powi(2), None),
+            scales[0],
+            scales[1],
         ])
     }
 
-    fn warnings<T: RealField + Copy>(
-        &self,
-        loads: &[LoadState<f64>],
-        line: &Line,
-    ) -> Vec<Warning<T>> {
+    fn warnings(&self, loads: &[LoadState], line: &Line) -> Vec<Warning> {
         let mut warnings = strain_warnings(loads);
         warnings.extend(line.excess.map(|x| Warning::ExcessScatter {
-            reduced_chi_squared: narrow(x),
+            reduced_chi_squared: x,
         }));
         if line.intercept_error > 0.0 {
             let t = line.intercept / line.intercept_error;
@@ -186,8 +183,8 @@ impl StressStrainRegression {
             );
             if p_value < 0.05 {
                 warnings.push(Warning::Intercept {
-                    intercept_pa: narrow(line.intercept),
-                    p_value: narrow(p_value),
+                    intercept_pa: line.intercept,
+                    p_value: p_value,
                 });
             }
         }
@@ -196,12 +193,7 @@ impl StressStrainRegression {
 }
 
 /// Residuals over their standard errors; over the scatter where no errors are known.
-fn diagnostics<T: RealField + Copy>(
-    points: &[Point],
-    line: &Line,
-    known: bool,
-    loads: usize,
-) -> Vec<LoadDiagnostics<T>> {
+fn diagnostics(points: &[Point], line: &Line, known: bool, loads: usize) -> Vec<LoadDiagnostics> {
     let mut diagnostics = vec![LoadDiagnostics::unused(); loads];
     for p in points {
         let residual = p.stress.value - line.intercept - line.slope * p.strain.value;
@@ -213,17 +205,12 @@ fn diagnostics<T: RealField + Copy>(
             (line.chi_squared / line.degrees.max(1) as f64).sqrt()
         };
         diagnostics[p.load].used = true;
-        diagnostics[p.load].standardized_residual =
-            (spread > 0.0).then(|| narrow(residual / spread));
+        diagnostics[p.load].standardized_residual = (spread > 0.0).then(|| residual / spread);
     }
     diagnostics
 }
 
-fn fit_statistics<T: RealField + Copy>(
-    points: &[Point],
-    line: &Line,
-    known: bool,
-) -> FitStatistics<T> {
+fn fit_statistics(points: &[Point], line: &Line, known: bool) -> FitStatistics {
     let n = points.len() as f64;
     let minus_two_log = if known {
         line.chi_squared
@@ -238,23 +225,25 @@ fn fit_statistics<T: RealField + Copy>(
     )
 }
 
-impl<T: RealField + Copy> ModulusEstimator<T> for StressStrainRegression {
-    fn estimate(&self, series: &LoadSeries<T>) -> Result<ModulusEstimate<T>, ElasticityError> {
-        let series = series.widened();
+impl ModulusEstimator for StressStrainRegression {
+    fn estimate(&self, series: &LoadSeries) -> Result<ModulusEstimate, ElasticityError> {
         let loads = series.loads();
         let points = Self::points(loads)?;
         let known = Self::known(&points);
         let line = self.line(&points)?;
-        let scale_error = series.stress_scale_error();
-        let error = line.slope_error.hypot(line.slope * scale_error);
-        let reach = error * quantile_95(Self::degrees(&points, &line, scale_error));
+        // The scale of the forces comes from the calibration that their own errors come from.
+        let forces = fewest(loads.iter().map(|load| load.force_n.degrees_of_freedom));
+        let scales = [
+            (series.shared_errors().force_scale, forces),
+            (series.size_scale_error(), None),
+        ]
+        .map(|(relative, degrees)| ((line.slope * relative).powi(2), degrees));
+        let error = (line.slope_error.powi(2) + scales[0].0 + scales[1].0).sqrt();
+        let reach = error * quantile_95(Self::degrees(&points, &line, scales));
         Ok(ModulusEstimate {
-            youngs_modulus_pa: narrow(line.slope),
-            standard_error_pa: narrow(error),
-            interval_95: Interval {
-                lower: narrow((line.slope - reach).max(0.0)),
-                upper: Some(narrow(line.slope + reach)),
-            },
+            youngs_modulus_pa: line.slope,
+            standard_error_pa: error,
+            interval_95: Interval::new((line.slope - reach).max(0.0), Some(line.slope + reach)),
             estimator: EstimatorKind::StressStrainRegression,
             loads: diagnostics(&points, &line, known, loads.len()),
             fit: fit_statistics(&points, &line, known),

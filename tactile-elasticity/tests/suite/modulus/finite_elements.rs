@@ -12,8 +12,8 @@ struct Scene {
     youngs_modulus_pa: f64,
     poisson_ratio: f64,
     radius_m: f64,
-    guide: Waveguide<f64>,
-    loads: Vec<LoadState<f64>>,
+    guide: Waveguide,
+    loads: Vec<LoadState>,
 }
 
 /// The scenes of `fem_press/scenes.csv`; none with one printed line where the data are not there.

@@ -103,14 +103,14 @@ fn forces_that_share_an_error_cancel_in_their_ratio_not_in_their_mean() {
 /// Student's t with Welch and Satterthwaite's degrees of freedom, against quantiles from tables.
 #[test]
 fn errors_learnt_from_few_repetitions_widen_the_interval() {
-    let load = |force: Estimate<f64>, strain: Estimate<f64>| {
+    let load = |force: Estimate, strain: Estimate| {
         LoadSeries::new([LoadState {
             contact_area_m2: Some(exact(1e-4)),
             mean_strain: Some(strain),
             ..LoadState::new(force)
         }])
     };
-    let half_width = |loads: &LoadSeries<f64>| {
+    let half_width = |loads: &LoadSeries| {
         let found = PaperRatio::default().estimate(loads).unwrap();
         (found.interval_95.upper.unwrap() / found.interval_95.lower).ln() / 2.0
             * found.youngs_modulus_pa

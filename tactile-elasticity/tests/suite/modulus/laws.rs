@@ -69,7 +69,7 @@ fn layers_invert_themselves_thick_or_thin() {
     finds(&theory(LayerTheory::IntegralEquation), &loads);
     // The published series errs as its authors' readers found; the corrected one only where χ is large.
     let off = |t, i: usize| {
-        ModulusEstimator::<f64>::estimate(&theory(t), &LoadSeries::new(&loads[i..=i]))
+        ModulusEstimator::estimate(&theory(t), &LoadSeries::new(&loads[i..=i]))
             .unwrap()
             .youngs_modulus_pa
             / SAMPLE
@@ -78,7 +78,7 @@ fn layers_invert_themselves_thick_or_thin() {
     assert!(off(LayerTheory::CorrectedSeries, 0).abs() < 1e-5);
     assert!(off(LayerTheory::CorrectedSeries, 1).abs() < 5e-3);
     assert!(off(LayerTheory::PublishedSeries, 1) > 0.03);
-    let thin = ModulusEstimator::<f64>::estimate(
+    let thin = ModulusEstimator::estimate(
         &theory(LayerTheory::PublishedSeries),
         &LoadSeries::new(loads),
     )
@@ -91,7 +91,7 @@ fn layers_invert_themselves_thick_or_thin() {
 }
 
 /// Linear contacts of a 4 mm ball of the sample with the layers of `guide`.
-fn layered_loads(guide: &Waveguide<f64>, contact_radii_m: &[f64]) -> Vec<LoadState<f64>> {
+fn layered_loads(guide: &Waveguide, contact_radii_m: &[f64]) -> Vec<LoadState> {
     let (r, top) = (4e-3, guide.layers()[0]);
     let top = Body::elastic(top.youngs_modulus_pa, top.poisson_ratio).unwrap();
     let total = Body::elastic(SAMPLE, NU).unwrap().compliance_per_pa() + top.compliance_per_pa();
@@ -193,25 +193,6 @@ fn large_contacts_are_flagged_with_their_ratio() {
     assert!(
         matches!(found.warnings[0], Warning::LargeContact { load: 1, ratio, .. } if ratio > 0.5)
     );
-}
-
-#[test]
-fn f32_agrees_with_f64() {
-    let loads = hertz_loads(Body::rigid(), &[1e-3, 2e-3]);
-    let narrow = |e: Estimate<f64>| Estimate::new(e.value as f32, e.standard_error as f32);
-    let single: Vec<LoadState<f32>> = loads
-        .iter()
-        .map(|l| LoadState {
-            contact_radius_m: Some(narrow(l.contact_radius_m.unwrap())),
-            ..LoadState::new(narrow(l.force_n))
-        })
-        .collect();
-    let found = HertzSphere::new(4e-3f32, NU as f32)
-        .unwrap()
-        .estimate(&LoadSeries::new(single))
-        .unwrap();
-    // Three roundings of a at 6·10⁻⁸ each, cubed.
-    assert!((f64::from(found.youngs_modulus_pa) / SAMPLE - 1.0).abs() < 1e-6);
 }
 
 #[test]

@@ -19,11 +19,11 @@ use tactile_elasticity::{ElasticityError, Quantity};
 const SAMPLE: f64 = 60e3;
 const NU: f64 = 0.48;
 
-fn exact(x: f64) -> Estimate<f64> {
+fn exact(x: f64) -> Estimate {
     Estimate::exact(x)
 }
 
-fn waveguide() -> Waveguide<f64> {
+fn waveguide() -> Waveguide {
     let layer = |thickness_m, youngs_modulus_pa| Layer {
         thickness_m,
         youngs_modulus_pa,
@@ -42,7 +42,7 @@ fn reduced() -> f64 {
 }
 
 /// Hertz loads of a 4 mm sphere of the sample on `other`.
-fn hertz_loads(other: Body<f64>, forces: &[f64]) -> Vec<LoadState<f64>> {
+fn hertz_loads(other: Body, forces: &[f64]) -> Vec<LoadState> {
     let e = reduced_modulus_pa(other, Body::elastic(SAMPLE, NU).unwrap()).unwrap();
     (forces.iter())
         .map(|&f| {
@@ -57,7 +57,7 @@ fn hertz_loads(other: Body<f64>, forces: &[f64]) -> Vec<LoadState<f64>> {
 }
 
 /// The same, with the indentation that of both contacts: the waveguide's and a rigid plate's. Relative error as stated.
-fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState<f64>> {
+fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState> {
     let far = hertz_loads(Body::rigid(), forces);
     (hertz_loads(waveguide().as_body(), forces)
         .into_iter()
@@ -78,14 +78,14 @@ fn between_plates(forces: &[f64], relative: f64) -> Vec<LoadState<f64>> {
 }
 
 /// Only the forces' common scale is in doubt.
-fn force_scale(relative: f64) -> SharedErrors<f64> {
+fn force_scale(relative: f64) -> SharedErrors {
     SharedErrors {
         force_scale: relative,
         ..SharedErrors::default()
     }
 }
 
-fn finds(estimator: &dyn ModulusEstimator<f64>, loads: &[LoadState<f64>]) {
+fn finds(estimator: &dyn ModulusEstimator, loads: &[LoadState]) {
     let found = estimator.estimate(&LoadSeries::new(loads)).unwrap();
     let gap = (found.youngs_modulus_pa / SAMPLE - 1.0).abs();
     assert!(gap < 1e-9, "{}: off by {gap:e}", found.estimator);

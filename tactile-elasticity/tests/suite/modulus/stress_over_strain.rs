@@ -3,7 +3,7 @@
 use super::*;
 use tactile_elasticity::strain::GreenLagrange;
 
-fn strained(stress: f64, strain: f64) -> LoadState<f64> {
+fn strained(stress: f64, strain: f64) -> LoadState {
     LoadState {
         contact_area_m2: Some(exact(1e-4)),
         mean_strain: Some(exact(strain)),
@@ -73,7 +73,7 @@ fn strain_counted_from_the_first_load() {
 fn bad_input_is_named() {
     use ElasticityError as E;
     let ratio = PaperRatio::default();
-    let fail = |load: LoadState<f64>| ratio.estimate(&LoadSeries::new([load])).unwrap_err();
+    let fail = |load: LoadState| ratio.estimate(&LoadSeries::new([load])).unwrap_err();
     assert_eq!(fail(strained(100.0, 0.0)), E::ZeroStrain);
     assert_eq!(
         fail(strained(100.0, -0.1)),
@@ -155,7 +155,7 @@ fn bad_input_is_named() {
         ));
     }
     let sphere = HertzSphere::new(4e-3, NU).unwrap();
-    let empty: [LoadState<f64>; 0] = [];
+    let empty: [LoadState; 0] = [];
     assert_eq!(
         sphere.estimate(&LoadSeries::new(empty)).unwrap_err(),
         E::TooFewLoads {
