@@ -198,7 +198,7 @@ impl Ball {
         }
     }
 
-    fn guide(&self) -> Guide<f64> {
+    fn guide(&self) -> Guide {
         if self.layers.is_empty() {
             return Guide::rigid();
         }

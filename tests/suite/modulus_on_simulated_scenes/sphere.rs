@@ -1,8 +1,8 @@
 //! One sphere: its loads, its frames, and the modulus from force and contact radius.
 
 use super::{
-    GAUGE, NU, calibrate, estimate, force, force_covariance, log_uniform, reference,
-    unit_calibration, verbose,
+    GAUGE, NU, calibrate, force, force_covariance, log_uniform, reference, unit_calibration,
+    verbose,
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
