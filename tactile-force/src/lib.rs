@@ -14,8 +14,7 @@
 //! | `contact` | detection, mask, aperture, sums over the aperture |
 //! | `health` | changes of a sensor since its calibration: brightness, noise, stuck pixels |
 //! | `hertz` | the contact radius from the pressure profile |
-//! | `calibration` | pixel value to force and stress, (5) and (6) |
-//! | `pressure` | the local curve f of (5), fitted from frames |
+//! | `calibration` | pixel value to force and stress, (5) and (6): a line of frame sums, a local curve f |
 //! | `measure`, `batch` | the force of one frame; of many |
 //! | `shear` | (9) to (12) |
 //! | `lens` | pixels to metres: sizes along x and y, radial distortion, fit to a dot target |
@@ -42,13 +41,13 @@ mod health;
 mod hertz;
 mod lens;
 mod measure;
-mod pressure;
 mod shear;
 mod simd;
 
 pub use calibration::{
-    Branch, CalibrationOptions, CalibrationPair, CalibrationReport, ForceReading, GreyHistogram,
-    Hysteresis, LinearCalibration, LocalCalibration, Robustness, StressCalibration,
+    Branch, CalibrationFrame, CalibrationOptions, CalibrationPair, CalibrationReport,
+    CurveHysteresis, ForceReading, GreyHistogram, Hysteresis, LinearCalibration, LocalCalibration,
+    PressureCurve, PressureCurveOptions, PressureCurveReport, Robustness, StressCalibration,
 };
 pub use contact::{Contact, ContactDetector, ContactOptions, Detection, DetectorWorkspace};
 pub use drift::{
@@ -63,9 +62,6 @@ pub use health::{
 pub use hertz::{HertzFit, HertzFitOptions, ProfileShape};
 pub use lens::{DotPair, LensFit, LensGeometry};
 pub use measure::{ForceMeasurement, ForceMeter, ForceOptions, ForceWorkspace, measure_force};
-pub use pressure::{
-    CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
-};
 pub use shear::{ShearCalibration, ShearMeasurement, ShearPair, ShearTracker};
 pub use tactile_core::{BoundingBox, CustomError, Estimate, InvalidOption, Polarity, StopReason};
 pub use {nalgebra, ndarray};

@@ -113,8 +113,12 @@ pub fn value(line: &LinearCalibration) -> Value {
     let parameters: Vec<[f64; 2]> = (report.parameters.iter())
         .map(|e| [e.value, e.standard_error])
         .collect();
+    let intervals: Vec<_> = (report.parameters.iter())
+        .map(|e| e.interval_95())
+        .map(|interval| json!([interval.lower, interval.upper]))
+        .collect();
     json!({
-        "pairs": report.pairs, "parameters": parameters, "intervals_95": report.intervals_95,
+        "pairs": report.pairs, "parameters": parameters, "intervals_95": intervals,
         "r_squared": report.r_squared, "residual_sd_n": report.residual_sd_n,
         "linearity_error": report.linearity_error, "sensitivity_n_per_grey_level": report.sensitivity_n,
         "smallest_force_n": report.smallest_force_n, "full_scale_n": report.full_scale_n,

@@ -1,118 +1,157 @@
-//! From pixel values to force and stress: P = f(I), F_z = ∫P dS (equations (5) and (6)).
+//! From pixel values to force and stress: P = f(I), F_z = ∫P dS, equations (5) and (6).
 //!
-//! A calibration is fitted from pairs of integrated pixel value V = Σ (I − I_ref) over the contact and known force F,
-//! taken while loading and unloading. It gives F(V), its standard error and, shared out over the pixels in proportion
-//! to their grey level, the stress
+//! A line ([`LinearCalibration`]) is fitted to pairs of integrated pixel value V = Σ (I − I_ref) over
+//! the contact and known force F, taken while loading and unloading. It gives F(V), its standard
+//! error and, shared out over the pixels in proportion to their grey level, the stress
 //!
 //! ```text
 //! P_ij = (I_ij − I_ref,ij) F(V) / (V A),   A = area of a pixel,   so that  Σ P_ij A = F(V)  exactly.
 //! ```
+//!
+//! It holds for contacts shaped like those it was made with. A local curve ([`PressureCurve`]) of
+//! grey level to pressure holds for any contact.
 
-mod histogram;
-mod least_squares;
-mod linear;
-mod local;
-mod options;
-mod pair;
-mod report;
+mod curve;
+mod line;
 
-pub use histogram::GreyHistogram;
-pub use linear::LinearCalibration;
-pub use local::LocalCalibration;
-pub use options::{CalibrationOptions, Robustness};
-pub use pair::{Branch, CalibrationPair};
-pub use report::{CalibrationReport, Hysteresis};
+pub use curve::{
+    CalibrationFrame, CurveHysteresis, PressureCurve, PressureCurveOptions, PressureCurveReport,
+};
+pub use line::{CalibrationReport, Hysteresis, LinearCalibration};
 
 use ndarray::Array2;
-
 use tactile_core::Estimate;
+use tactile_core::statistics::effective_degrees_of_freedom;
+
+use crate::error::ForceError;
+use crate::frame::DifferenceNoise;
 
 /// A force read from a calibration.
 ///
 /// ```
 /// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
 ///
-/// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)].map(|(v, f)| CalibrationPair::loading(v, f));
+/// let pairs = [(0.0, 0.01), (1e5, 0.49), (2e5, 1.01), (3e5, 1.49)];
+/// let pairs = pairs.map(|(v, f)| CalibrationPair::loading(v, f));
 /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
-/// let reading = line.read(Estimate::new(2.5e5, 400.0));
+/// let reading = line.read(Estimate::new(2.5e5, 400.0))?;
 /// assert!(reading.noise_n < reading.calibration_n && !reading.out_of_range);
 /// let both = reading.noise_n.hypot(reading.calibration_n);
 /// assert!((reading.force_n.standard_error - both).abs() < 1e-15);
+/// // Four pairs less two parameters, and a little more for the noise that is known.
+/// assert!((2.0..3.0).contains(&reading.force_n.degrees_of_freedom.unwrap()));
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct ForceReading {
-    /// Force and its standard error from all sources, in newtons.
+    /// Force in newtons, its standard error from all sources and the degrees of freedom of that
+    /// error. The calibration's share was estimated from a few pairs, that of the frame is known
+    /// (Welch–Satterthwaite).
     pub force_n: Estimate,
-    /// The part of the standard error that comes from noise in the frames, in newtons.
+    /// The part of the standard error from noise in the frames, in newtons.
     pub noise_n: f64,
-    /// The part of the standard error that comes from the calibration's parameters, in newtons: it is the same for
-    /// every frame read with one calibration.
+    /// The part of the standard error from the calibration, in newtons: common to all frames that are
+    /// read with it.
     pub calibration_n: f64,
-    /// Degrees of freedom of the standard error, for Student's t: the calibration's share was estimated from the scatter of a
-    /// few pairs, the frame's is known (Welch–Satterthwaite); `None` where the calibration adds no error.
-    pub degrees_of_freedom: Option<f64>,
-    /// The pixel value lies outside the range the calibration was fitted on.
+    /// The pixel value lies outside the range of the calibration.
     pub out_of_range: bool,
+}
+
+impl ForceReading {
+    /// A force with the standard errors of the frame's noise and of the calibration, the latter
+    /// estimated with these degrees of freedom.
+    ///
+    /// ```
+    /// use tactile_force::ForceReading;
+    /// let reading = ForceReading::new(1.2, 3e-3, 4e-3, Some(4.0));
+    /// assert!((reading.force_n.standard_error - 5e-3).abs() < 1e-15 && !reading.out_of_range);
+    /// assert!((reading.force_n.degrees_of_freedom.unwrap() - 4.0 * (25.0_f64 / 16.0).powi(2)).abs() < 1e-12);
+    /// ```
+    #[must_use]
+    pub fn new(force_n: f64, noise_n: f64, calibration_n: f64, degrees: Option<f64>) -> Self {
+        let parts = [(noise_n.powi(2), None), (calibration_n.powi(2), degrees)];
+        let mut estimate = Estimate::new(force_n, noise_n.hypot(calibration_n));
+        estimate.degrees_of_freedom = effective_degrees_of_freedom(&parts);
+        Self {
+            force_n: estimate,
+            noise_n,
+            calibration_n,
+            out_of_range: false,
+        }
+    }
 }
 
 /// Pixel value to force and stress, equations (5) and (6).
 ///
-/// V is the integrated pixel value: the sum of the grey-level differences over the contact.
+/// V is the integrated pixel value: the sum of the grey-level differences over the contact. A
+/// calibration of one's own has to give F(V). The other methods have defaults, which suit a curve
+/// whose own error is negligible.
 ///
 /// ```
-/// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
+/// use tactile_force::{Estimate, StressCalibration};
 ///
-/// let pairs = [0.0, 1e5, 2e5, 3e5].map(|v| CalibrationPair::loading(v, 5e-6 * v));
-/// let line = LinearCalibration::fit(&pairs, &Default::default())?;
-/// assert!((line.force_n(1e5) - 0.5).abs() < 1e-12 && (line.sensitivity_n(1e5) - 5e-6_f64).abs() < 1e-15);
-/// assert_eq!(line.range(), [0.0, 3e5]);
-/// // Exact pairs leave the parameters no error, at one value or between two.
-/// assert!(line.standard_error_n(1e5) < 1e-12 && line.error_covariance_n2(1e5, 2e5).abs() < 1e-24);
-/// assert!((line.integrated_pixel_value(0.5).unwrap() - 1e5).abs() < 1e-6);
-/// assert!(line.report().r_squared > 0.999_999);
-/// // A line of frame sums holds for contacts of one shape; it has no curve that holds pixel by pixel.
-/// assert!(line.local().is_none());
+/// /// Light that grows as the square of the force.
+/// struct Root;
+///
+/// impl StressCalibration for Root {
+///     fn force_n(&self, integrated_pixel_value: f64) -> f64 {
+///         1e-3 * integrated_pixel_value.max(0.0).sqrt()
+///     }
+/// }
+///
+/// let reading = Root.read(Estimate::new(1e6, 2e3))?;
+/// assert_eq!((reading.force_n.value, reading.calibration_n), (1.0, 0.0));
+/// // dF/dV = ½ F/V.
+/// assert!((reading.noise_n - 1e-3).abs() < 1e-9);
 /// // Stress of one grey level on pixels of (20 µm)².
-/// let step = line.stress_per_grey_level_pa(1e5, 4e-10);
-/// assert!((step - 12_500.0).abs() < 1e-6);
-/// // Beyond the range: read, and flagged.
-/// assert!(line.read(Estimate::new(4e5, 0.0)).out_of_range);
+/// assert!((Root.stress_per_grey_level_pa(1e6, 4e-10) - 2500.0).abs() < 1e-9);
 /// # Ok::<(), tactile_force::ForceError>(())
 /// ```
 pub trait StressCalibration: Send + Sync {
     /// Force at an integrated pixel value, in newtons.
     fn force_n(&self, integrated_pixel_value: f64) -> f64;
 
-    /// dF/dV, in newtons per grey level.
-    fn sensitivity_n(&self, integrated_pixel_value: f64) -> f64;
+    /// dF/dV, in newtons per grey level. By default a central difference.
+    fn sensitivity_n(&self, integrated_pixel_value: f64) -> f64 {
+        let v = integrated_pixel_value;
+        // The cube root of the rounding error balances it against the third derivative.
+        let step = 1e-5 * v.abs().max(1.0);
+        (self.force_n(v + step) - self.force_n(v - step)) / (2.0 * step)
+    }
 
-    /// Standard error of the force due to the uncertainty of the calibration's own parameters and to the difference of its branches
-    /// ([`Hysteresis::width_n`]), in newtons.
-    fn standard_error_n(&self, integrated_pixel_value: f64) -> f64;
+    /// Standard error of the force due to the calibration itself, in newtons: the uncertainty of its
+    /// parameters, and the difference of its branches ([`Hysteresis::width_n`]). Zero by default.
+    fn standard_error_n(&self, _integrated_pixel_value: f64) -> f64 {
+        0.0
+    }
 
-    /// Covariance of the calibration's errors at two integrated pixel values, in N²; at one and the same it is the square of
-    /// [`standard_error_n`](Self::standard_error_n). By default errors at all pixel values are fully correlated.
+    /// Degrees of freedom of that standard error, pairs less parameters. By default the error is
+    /// known, and there are none.
+    fn degrees_of_freedom(&self) -> Option<f64> {
+        None
+    }
+
+    /// Covariance of the calibration's errors at two integrated pixel values, in N². By default errors
+    /// at all pixel values are fully correlated.
     fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
         self.standard_error_n(a) * self.standard_error_n(b)
     }
 
     /// Covariance matrix of forces read with this one calibration, in N²:
-    /// C_ij = cov_cal(V_i, V_j) + δ_ij (dF/dV)² σ_V². The noise of the frames is each force's own, the calibration's error is
-    /// shared. O(n²).
+    /// C_ij = cov_cal(V_i, V_j) + δ_ij (dF/dV)² σ_V².
+    ///
+    /// The noise of the frames is each force's own, the calibration's error is shared. O(n²).
     ///
     /// ```
     /// use tactile_force::{CalibrationPair, Estimate, LinearCalibration, StressCalibration};
-    /// let pairs: Vec<_> = [0.01, 0.48, 1.03, 1.5, 1.98]
-    ///     .iter()
-    ///     .zip(0..)
-    ///     .map(|(f, k)| CalibrationPair::loading(1e5 * f64::from(k), *f))
-    ///     .collect();
+    /// let pairs = [(0.0, 0.01), (1e5, 0.48), (2e5, 1.03), (3e5, 1.5), (4e5, 1.98)];
+    /// let pairs = pairs.map(|(v, f)| CalibrationPair::loading(v, f));
     /// let line = LinearCalibration::fit(&pairs, &Default::default())?;
     /// let values = [1e5, 3e5].map(|value| Estimate::new(value, 300.0));
     /// let covariance = line.force_covariance_n2(&values);
-    /// let alone = line.read(values[1]).force_n.standard_error;
+    /// let alone = line.read(values[1])?.force_n.standard_error;
     /// assert!((covariance[[1, 1]].sqrt() - alone).abs() < 1e-12);
     /// assert_eq!(covariance[[0, 1]], covariance[[1, 0]]);
     /// # Ok::<(), tactile_force::ForceError>(())
@@ -120,50 +159,42 @@ pub trait StressCalibration: Send + Sync {
     fn force_covariance_n2(&self, integrated_pixel_values: &[Estimate]) -> Array2<f64> {
         let n = integrated_pixel_values.len();
         Array2::from_shape_fn((n, n), |(i, j)| {
-            let (a, b) = (
-                integrated_pixel_values[i.min(j)],
-                integrated_pixel_values[i.max(j)],
-            );
+            let a = integrated_pixel_values[i.min(j)];
+            let b = integrated_pixel_values[i.max(j)];
             let shared = self.error_covariance_n2(a.value, b.value);
             let own = self.sensitivity_n(a.value) * a.standard_error;
             if i == j { shared + own * own } else { shared }
         })
     }
 
-    /// The integrated pixel value of a force, or `None` where the curve does not take it exactly once.
-    fn integrated_pixel_value(&self, force_n: f64) -> Option<f64>;
+    /// The least and the greatest integrated pixel value that the calibration holds for. By default
+    /// all.
+    fn range(&self) -> [f64; 2] {
+        [f64::NEG_INFINITY, f64::INFINITY]
+    }
 
-    /// The least and the greatest integrated pixel value of the fit.
-    fn range(&self) -> [f64; 2];
-
-    /// How well the calibration fits its pairs.
-    fn report(&self) -> &CalibrationReport;
-
-    /// The curve that holds pixel by pixel, if the calibration has one; by default it has none.
+    /// The curve that holds pixel by pixel. By default there is none.
     fn local(&self) -> Option<&dyn LocalCalibration> {
         None
     }
 
-    /// Force with its standard error: √((dF/dV)² σ_V² + σ_cal²).
-    fn read(&self, integrated_pixel_value: Estimate) -> ForceReading {
+    /// Force with its standard error √((dF/dV)² σ_V² + σ_cal²).
+    ///
+    /// # Errors
+    /// None by default. A calibration of one's own may refuse with [`ForceError::custom`].
+    fn read(&self, integrated_pixel_value: Estimate) -> Result<ForceReading, ForceError> {
         let v = integrated_pixel_value.value;
-        let noise_n = (self.sensitivity_n(v) * integrated_pixel_value.standard_error).abs();
-        let calibration_n = self.standard_error_n(v);
         let [low, high] = self.range();
-        let standard_error = noise_n.hypot(calibration_n);
-        let share = (calibration_n / standard_error).powi(4);
-        let degrees = self.report().degrees_of_freedom as f64;
-        ForceReading {
-            force_n: Estimate::new(self.force_n(v), standard_error),
-            noise_n,
-            calibration_n,
-            degrees_of_freedom: (share > 0.0).then(|| degrees / share),
+        let noise_n = (self.sensitivity_n(v) * integrated_pixel_value.standard_error).abs();
+        let (error, degrees) = (self.standard_error_n(v), self.degrees_of_freedom());
+        Ok(ForceReading {
             out_of_range: !(v >= low && v <= high),
-        }
+            ..ForceReading::new(self.force_n(v), noise_n, error, degrees)
+        })
     }
 
-    /// Stress per grey level of difference, in pascals, in a contact of the given integrated pixel value:
-    /// F(V)/(V A). Where V is zero, its limit along the curve, (dF/dV)/A.
+    /// Stress per grey level of difference, in pascals, in a contact of the given integrated pixel
+    /// value: F(V)/(V A). Where V is zero, its limit along the curve, (dF/dV)/A.
     fn stress_per_grey_level_pa(&self, integrated_pixel_value: f64, pixel_area_m2: f64) -> f64 {
         let v = integrated_pixel_value;
         let secant = if v == 0.0 {
@@ -172,5 +203,285 @@ pub trait StressCalibration: Send + Sync {
             self.force_n(v) / v
         };
         secant / pixel_area_m2
+    }
+}
+
+/// Grey level to pressure pixel by pixel: f of (5) itself, not only its integral over a contact.
+///
+/// A [`StressCalibration`] returns one from [`local`](StressCalibration::local). A
+/// [`ForceMeter`](crate::ForceMeter) then fits the contact's radius to the pressure instead of the
+/// light. A curve of one's own has to give the pressure of a grey level.
+///
+/// ```
+/// use tactile_force::{DifferenceNoise, Estimate, GreyHistogram, LocalCalibration};
+///
+/// /// Light exactly proportional to the pressure.
+/// struct Proportional {
+///     pa_per_grey: f64,
+/// }
+///
+/// impl LocalCalibration for Proportional {
+///     fn pressure_pa(&self, grey: f64) -> Estimate {
+///         Estimate::exact(self.pa_per_grey * grey)
+///     }
+/// }
+///
+/// let histogram = GreyHistogram::from_differences([50.0; 200].into_iter(), 4e-10);
+/// let reading = Proportional { pa_per_grey: 100.0 }.read(&histogram, &DifferenceNoise::white(2.0))?;
+/// assert!((reading.force_n.value - 4e-4).abs() < 1e-15);
+/// // 200 pixels with √2 grey levels of noise each.
+/// assert!((reading.noise_n - 100.0 * 4e-10 * 400_f64.sqrt()).abs() < 1e-15);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+pub trait LocalCalibration: Send + Sync {
+    /// Pressure in pascals of a grey-level difference, with its standard error. Rises with the grey
+    /// level and is zero at zero.
+    fn pressure_pa(&self, grey: f64) -> Estimate;
+
+    /// The value of [`pressure_pa`](Self::pressure_pa) alone, for tables.
+    fn value_pa(&self, grey: f64) -> f64 {
+        self.pressure_pa(grey).value
+    }
+
+    /// Force of a contact from its histogram, Σ A(g) f(g), with its errors. By default those of all
+    /// grey levels are fully correlated.
+    ///
+    /// # Errors
+    /// None by default. A curve of one's own may refuse with [`ForceError::custom`].
+    fn read(
+        &self,
+        histogram: &GreyHistogram,
+        noise: &DifferenceNoise,
+    ) -> Result<ForceReading, ForceError> {
+        let slope = |grey: f64| self.value_pa(grey + 0.5) - self.value_pa(grey - 0.5);
+        let noise_n = histogram.noise(noise, slope);
+        let error = histogram.integral(|grey| self.pressure_pa(grey).standard_error);
+        let force_n = histogram.integral(|grey| self.value_pa(grey));
+        let degrees = self.pressure_pa(histogram.greatest()).degrees_of_freedom;
+        Ok(ForceReading::new(force_n, noise_n, error, degrees))
+    }
+}
+
+/// The area of a contact by its grey-level difference from the reference, one bin a grey level.
+///
+/// A difference between two whole grey levels is shared out between them, so that area and integral
+/// of the differences are exact. The integral of a curve f over the contact is Σ A(g) f(g).
+///
+/// ```
+/// use ndarray::array;
+/// use tactile_force::GreyHistogram;
+///
+/// let differences = array![10.0, 10.0, 20.25];
+/// let histogram = GreyHistogram::from_differences(differences.iter().copied(), 1e-10);
+/// assert!((histogram.area_m2() - 3e-10).abs() < 1e-22);
+/// assert!((histogram.integral(|grey| grey) - 40.25e-10).abs() < 1e-20);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct GreyHistogram {
+    /// From −256 grey levels to 256.
+    area_m2: Vec<f64>,
+    pixel_area_m2: f64,
+}
+
+impl Default for GreyHistogram {
+    fn default() -> Self {
+        Self {
+            area_m2: vec![0.0; 513],
+            pixel_area_m2: 0.0,
+        }
+    }
+}
+
+impl GreyHistogram {
+    /// Sorts the differences of a contact's pixels, in grey levels, each covering `pixel_area_m2`.
+    /// Differences beyond ±255 count as ±255, NaN is left out.
+    pub fn from_differences(differences: impl Iterator<Item = f32>, pixel_area_m2: f64) -> Self {
+        let mut histogram = Self::default();
+        histogram.clear(pixel_area_m2);
+        differences
+            .filter(|d| !d.is_nan())
+            .for_each(|d| histogram.add_many(d, 1.0));
+        histogram
+    }
+
+    /// Area of the contact in square metres.
+    pub fn area_m2(&self) -> f64 {
+        self.area_m2.iter().sum()
+    }
+
+    /// ∫ f dS over the contact, Σ A(g) f(g), for a function of the grey-level difference.
+    pub fn integral(&self, mut f: impl FnMut(f64) -> f64) -> f64 {
+        self.bins().map(|(grey, area)| area * f(grey)).sum()
+    }
+
+    /// Empties the bins for a contact whose pixels cover this area each.
+    pub(crate) fn clear(&mut self, pixel_area_m2: f64) {
+        self.area_m2.fill(0.0);
+        self.pixel_area_m2 = pixel_area_m2;
+    }
+
+    /// Adds a number of pixels of one difference.
+    pub(crate) fn add_many(&mut self, difference: f32, pixels: f64) {
+        let place = f64::from(difference.clamp(-255.0, 255.0)) + 256.0;
+        let below = place as usize;
+        let (share, area) = (place - below as f64, pixels * self.pixel_area_m2);
+        self.area_m2[below] += (1.0 - share) * area;
+        self.area_m2[below + 1] += share * area;
+    }
+
+    /// Grey level and area of the bins that are not empty.
+    fn bins(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let bins = self.area_m2.iter().enumerate();
+        bins.filter(|(_, area)| **area != 0.0)
+            .map(|(bin, area)| (bin as f64 - 256.0, *area))
+    }
+
+    /// The greatest grey level of the contact.
+    fn greatest(&self) -> f64 {
+        self.bins().map(|(grey, _)| grey).fold(0.0, f64::max)
+    }
+
+    /// Standard error of ∫ f dS by the noise of the pixels, for a curve f of this slope: white noise
+    /// of each pixel, and the errors that all pixels share.
+    fn noise(&self, noise: &DifferenceNoise, slope: impl Fn(f64) -> f64) -> f64 {
+        let (mut white, mut common, mut scale) = (0.0, 0.0, 0.0);
+        for (grey, area) in self.bins() {
+            let slope = slope(grey);
+            white += area * slope * slope * (noise.background + noise.gain * grey.max(0.0));
+            common += area * slope;
+            scale += area * slope * grey;
+        }
+        let shared = common * noise.common.sqrt() + scale * noise.scale.sqrt();
+        (white * self.pixel_area_m2 + shared * shared + noise.flat_field * scale * scale).sqrt()
+    }
+}
+
+/// Whether the force was rising or falling when a pair was taken.
+///
+/// ```
+/// use tactile_force::{Branch, CalibrationPair};
+///
+/// assert_eq!(CalibrationPair::loading(1e5, 0.5).branch, Branch::Loading);
+/// assert_eq!(CalibrationPair::unloading(1e5, 0.5).branch, Branch::Unloading);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Branch {
+    /// The force was rising.
+    #[default]
+    Loading,
+    /// The force was falling.
+    Unloading,
+}
+
+/// One calibration measurement.
+///
+/// ```
+/// use tactile_force::CalibrationPair;
+///
+/// // A gauge's readings up and down again.
+/// let mut pairs = [(0.0, 0.0), (1.02e5, 0.5), (2.01e5, 1.0)].map(|(v, f)| CalibrationPair::loading(v, f)).to_vec();
+/// pairs.push(CalibrationPair::unloading(0.99e5, 0.5));
+/// assert_eq!(pairs[3].force_n, 0.5);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CalibrationPair {
+    /// Sum of the grey-level differences over the contact.
+    pub integrated_pixel_value: f64,
+    /// Force from a reference instrument, in newtons.
+    pub force_n: f64,
+    /// Whether the force was rising or falling.
+    pub branch: Branch,
+}
+
+impl CalibrationPair {
+    /// A pair taken while the force was rising.
+    pub fn loading(integrated_pixel_value: f64, force_n: f64) -> Self {
+        Self {
+            integrated_pixel_value,
+            force_n,
+            branch: Branch::Loading,
+        }
+    }
+
+    /// A pair taken while the force was falling.
+    pub fn unloading(integrated_pixel_value: f64, force_n: f64) -> Self {
+        Self {
+            branch: Branch::Unloading,
+            ..Self::loading(integrated_pixel_value, force_n)
+        }
+    }
+}
+
+/// The weight of pairs far from the line.
+///
+/// ```
+/// use tactile_force::{
+///     CalibrationOptions, CalibrationPair, LinearCalibration, Robustness, StressCalibration,
+/// };
+///
+/// // One reading in ten is grossly wrong.
+/// let pair = |k: i32| CalibrationPair::loading(f64::from(k), 2.0 * f64::from(k));
+/// let mut pairs: Vec<_> = (0..10).map(pair).collect();
+/// pairs[7].force_n = 40.0;
+/// let slope = |robustness| {
+///     let options = CalibrationOptions::default().with_robustness(robustness);
+///     LinearCalibration::fit(&pairs, &options).map(|line| line.sensitivity_n(0.0))
+/// };
+/// assert!((slope(Robustness::None)? - 2.0).abs() > 0.5);
+/// assert!((slope(Robustness::Tukey)? - 2.0).abs() < 1e-6);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Robustness {
+    /// Least squares: every pair has the same weight.
+    #[default]
+    None,
+    /// Huber's weights, min(1, k/|u|) with k = 1.345: 95 % efficient on normal errors.
+    Huber,
+    /// Tukey's biweight, (1 − u²/k²)² with k = 4.685, after Huber's: gross outliers have no weight.
+    Tukey,
+}
+
+/// The options of a calibration fit.
+///
+/// ```
+/// use tactile_force::{
+///     CalibrationOptions, CalibrationPair, LinearCalibration, Robustness, StressCalibration,
+/// };
+///
+/// let pairs = [1.0, 2.0, 3.0].map(|v| CalibrationPair::loading(v, 2.0 * v + 0.1));
+/// let options = CalibrationOptions::default()
+///     .with_zero_at_origin()
+///     .with_robustness(Robustness::None);
+/// let line = LinearCalibration::fit(&pairs, &options)?;
+/// assert_eq!(line.force_n(0.0), 0.0);
+/// assert!((line.sensitivity_n(1.0) - (2.0 + 0.1 * 6.0 / 14.0)).abs() < 1e-12);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CalibrationOptions {
+    through_origin: bool,
+    robustness: Robustness,
+}
+
+impl CalibrationOptions {
+    /// Forces the line through zero force at zero pixel value.
+    #[must_use]
+    pub fn with_zero_at_origin(mut self) -> Self {
+        self.through_origin = true;
+        self
+    }
+
+    /// Weights pairs far from the line in this way. By default all alike.
+    #[must_use]
+    pub fn with_robustness(mut self, robustness: Robustness) -> Self {
+        self.robustness = robustness;
+        self
     }
 }

@@ -38,7 +38,7 @@ pub struct NoiseModel {
 /// ```
 /// use tactile_force::DifferenceNoise;
 ///
-/// let noise = DifferenceNoise { background: 4.0, gain: 0.02, common: 0.0, scale: 0.0, flat_field: 0.0 };
+/// let noise = DifferenceNoise { gain: 0.02, ..DifferenceNoise::white(4.0) };
 /// // The variance of a pixel that contact has made 100 grey levels brighter.
 /// assert_eq!(noise.background + noise.gain * 100.0, 6.0);
 /// ```
@@ -55,6 +55,24 @@ pub struct DifferenceNoise {
     pub scale: f64,
     /// Variance of a relative error of the whole signal, from the correction for vignetting.
     pub flat_field: f64,
+}
+
+impl DifferenceNoise {
+    /// The same variance for every pixel, in squared grey levels, and no error in common.
+    ///
+    /// ```
+    /// assert_eq!(tactile_force::DifferenceNoise::white(4.0).gain, 0.0);
+    /// ```
+    #[must_use]
+    pub const fn white(background: f64) -> Self {
+        Self {
+            background,
+            gain: 0.0,
+            common: 0.0,
+            scale: 0.0,
+            flat_field: 0.0,
+        }
+    }
 }
 
 /// Variance of rounding to whole numbers.

@@ -2,9 +2,9 @@
 
 use crate::calibration::{ForceReading, GreyHistogram, LocalCalibration};
 use crate::contact::{Contact, Region};
+use crate::error::ForceError;
 use crate::frame::DifferenceNoise;
 use crate::hertz::{LEVELS, PixelVariance};
-use tactile_core::Estimate;
 
 /// Steps of a grey level at which the curve is tabulated and pixels are counted: rounding to a sixteenth adds 2 % to the smallest
 /// variance that a grey level can have, that of rounding to whole ones.
@@ -70,7 +70,7 @@ impl Local {
         contact: &Contact,
         noise: DifferenceNoise,
         pixel_area_m2: f64,
-    ) -> Stress {
+    ) -> Result<Stress, ForceError> {
         self.tabulate(curve);
         self.counts.clear();
         self.counts.resize(TABLE, 0);
@@ -94,14 +94,14 @@ impl Local {
             self.histogram
                 .add_many(grey_at(k) as f32, f64::from(*count));
         }
-        let reading = curve.read(&self.histogram, &noise);
+        let reading = curve.read(&self.histogram, &noise)?;
         let integral = contact.integrated_pixel_value.value;
         let per_grey_pa = reading.force_n.value / (integral * pixel_area_m2);
         self.converted = Some(self.variances(noise, contact.peak, per_grey_pa));
-        Stress {
-            reading: rounded(reading),
-            per_grey_pa: per_grey_pa,
-        }
+        Ok(Stress {
+            reading,
+            per_grey_pa,
+        })
     }
 
     /// f at every step, linear between whole grey levels as a histogram has it.
@@ -156,14 +156,4 @@ fn place_of(difference: f32) -> u32 {
 /// The grey level of a step.
 fn grey_at(place: usize) -> f64 {
     f64::from(LEAST) + place as f64 / STEPS as f64
-}
-
-fn rounded(reading: ForceReading) -> ForceReading {
-    ForceReading {
-        force_n: Estimate::new(reading.force_n.value, reading.force_n.standard_error),
-        noise_n: reading.noise_n,
-        calibration_n: reading.calibration_n,
-        degrees_of_freedom: reading.degrees_of_freedom,
-        out_of_range: reading.out_of_range,
-    }
 }

@@ -123,9 +123,9 @@ impl ForceMeter {
         let pixel = self.pixel_at(&contact);
         let region = &mut detector.region;
         let stress = match calibration.local() {
-            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area),
+            Some(curve) => local.convert(curve, region, &contact, noise, pixel.area)?,
             None => Stress {
-                reading: calibration.read(contact.integrated_pixel_value),
+                reading: calibration.read(contact.integrated_pixel_value)?,
                 per_grey_pa: calibration
                     .stress_per_grey_level_pa(contact.integrated_pixel_value.value, pixel.area),
             },

@@ -6,6 +6,7 @@ use crate::drift::IlluminationDrift;
 use crate::frame::{DifferenceNoise, FrameStatistics};
 use crate::hertz::HertzFit;
 use tactile_core::Estimate;
+use tactile_core::statistics::effective_degrees_of_freedom;
 
 /// Force, contact and stress measured in one frame.
 ///
@@ -84,8 +85,16 @@ pub(super) fn contact_radius(contact: &Contact, profile: Option<HertzFit>, side:
 /// F/(π a²) with its standard error.
 pub(super) fn mean_stress(force: Estimate, radius: Estimate) -> Estimate {
     let pi = std::f64::consts::PI;
-    let two = 1.0 + 1.0;
     let value = force.value / (pi * radius.value * radius.value);
-    let relative = |e: Estimate| e.standard_error / e.value;
-    Estimate::new(value, value * relative(force).hypot(two * relative(radius)))
+    let parts = [
+        (force.relative_error().powi(2), force.degrees_of_freedom),
+        (
+            4.0 * radius.relative_error().powi(2),
+            radius.degrees_of_freedom,
+        ),
+    ];
+    let variance = value * value * (parts[0].0 + parts[1].0);
+    let mut stress = Estimate::from_variance(value, variance);
+    stress.degrees_of_freedom = effective_degrees_of_freedom(&parts);
+    stress
 }

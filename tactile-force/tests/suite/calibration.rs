@@ -196,8 +196,7 @@ fn confidence_intervals_cover_nineteen_in_twenty() {
     let inside = (0..1000)
         .filter(|seed| {
             let c = fitted(&cycle(4, 5e-3, *seed, line));
-            let [low, high] = c.report().intervals_95[1];
-            low < 5e-7 && 5e-7 < high
+            c.report().parameters[1].interval_95().contains(5e-7)
         })
         .count();
     // 95 % ± 0.7 %: three standard deviations. Seven degrees of freedom: with the normal's 1.96 it would be 91 %.
@@ -228,12 +227,15 @@ fn forces_of_one_calibration_share_its_error() {
     let values = [2e5, 2e6, 3.9e6].map(|value| Estimate::new(value, 4e3));
     let covariance = c.force_covariance_n2(&values);
     for (i, v) in values.iter().enumerate() {
-        let reading = c.read(*v);
+        let reading = c.read(*v).unwrap();
         // One rounding per operation.
         assert!((covariance[[i, i]].sqrt() / reading.force_n.standard_error - 1.0).abs() < 1e-12);
         for (j, w) in values.iter().enumerate().filter(|(j, _)| *j != i) {
             assert_eq!(covariance[[i, j]], covariance[[j, i]]);
-            assert!(covariance[[i, j]].abs() <= reading.calibration_n * c.read(*w).calibration_n);
+            assert!(
+                covariance[[i, j]].abs()
+                    <= reading.calibration_n * c.read(*w).unwrap().calibration_n
+            );
         }
     }
 }
@@ -241,7 +243,7 @@ fn forces_of_one_calibration_share_its_error() {
 #[test]
 fn reading_adds_both_errors_and_flags_extrapolation() {
     let c = fitted(&cycle(20, 5e-3, 2, line));
-    let inside = c.read(Estimate::new(2e6, 1e4));
+    let inside = c.read(Estimate::new(2e6, 1e4)).unwrap();
     assert!((inside.noise_n / 5e-3 - 1.0).abs() < 0.01 && inside.calibration_n > 0.0);
     assert_eq!(
         inside.force_n.standard_error,
@@ -249,6 +251,34 @@ fn reading_adds_both_errors_and_flags_extrapolation() {
     );
     assert!(!inside.out_of_range);
     for value in [-1.0, 4.1e6, f64::NAN] {
-        assert!(c.read(Estimate::new(value, 0.0)).out_of_range, "{value}");
+        assert!(
+            c.read(Estimate::new(value, 0.0)).unwrap().out_of_range,
+            "{value}"
+        );
+    }
+}
+
+/// The few pairs of a calibration by hand: Student's t reaches the interval of every force.
+#[test]
+fn intervals_of_forces_hold_with_few_pairs() {
+    let gauge = Normal::new(0.0, 0.02).unwrap();
+    // What frames leave: 0.02 % of the force.
+    let noise_of_frame = Normal::new(0.0, 120.0).unwrap();
+    for count in [3, 4, 6] {
+        let mut rng = ChaCha8Rng::seed_from_u64(count);
+        let draws = 400;
+        let held = (0..draws).filter(|_| {
+            let pair = |k| {
+                let force = k as f64 / count as f64;
+                CalibrationPair::loading(1e6 * force, force + gauge.sample(&mut rng))
+            };
+            let line = fitted(&(1..=count).map(pair).collect::<Vec<_>>());
+            let seen = 6e5 + noise_of_frame.sample(&mut rng);
+            let reading = line.read(Estimate::new(seen, 120.0)).unwrap();
+            reading.force_n.interval_95().contains(0.6)
+        });
+        let share = held.count() as f64 / f64::from(draws);
+        // Three standard deviations of 400 draws, √(0.95 · 0.05/400) = 1.1 %.
+        assert!((0.917..0.983).contains(&share), "{count} pairs: {share}");
     }
 }

@@ -73,7 +73,7 @@ fn pairs() -> Vec<CalibrationPair> {
         .collect()
 }
 
-fn calibration(answers: &mut Answers, name: &str, c: &dyn StressCalibration) {
+fn calibration(answers: &mut Answers, name: &str, c: &LinearCalibration) {
     for v in [0.0, 1.3e5, 5.2e5, 7.5e5] {
         answers.add(&format!("{name}.force"), c.force_n(v));
         answers.add(&format!("{name}.sensitivity"), c.sensitivity_n(v));
@@ -94,9 +94,14 @@ fn calibration(answers: &mut Answers, name: &str, c: &dyn StressCalibration) {
         answers.estimate(&format!("{name}.parameter"), *p);
     }
     let plain = name.contains("plain");
-    for [low, high] in report.intervals_95.iter().filter(|_| plain) {
-        answers.add(&format!("{name}.low"), *low);
-        answers.add(&format!("{name}.high"), *high);
+    for interval in report
+        .parameters
+        .iter()
+        .filter(|_| plain)
+        .map(|p| p.interval_95())
+    {
+        answers.add(&format!("{name}.low"), interval.lower);
+        answers.add(&format!("{name}.high"), interval.upper.unwrap());
     }
     let h = report.hysteresis.unwrap();
     answers.add(&format!("{name}.hysteresis"), h.greatest_n);
@@ -173,7 +178,7 @@ fn measurement(answers: &mut Answers, name: &str, m: &ForceMeasurement) {
     );
     answers.add(
         &format!("{name}.reading.freedom"),
-        reading.degrees_of_freedom.unwrap(),
+        m.force_n.degrees_of_freedom.unwrap(),
     );
     answers.estimate(&format!("{name}.radius"), m.contact_radius_m.unwrap());
     answers.estimate(&format!("{name}.mean"), m.mean_stress_pa.unwrap());

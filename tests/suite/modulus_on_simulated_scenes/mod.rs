@@ -136,10 +136,7 @@ fn calibrate(
 }
 
 /// The force with the calibration's degrees of freedom.
-fn force(measured: &ForceMeasurement) -> Estimate {
-    let mut force = measured.force_n;
-    force.degrees_of_freedom = measured.reading.and_then(|r| r.degrees_of_freedom);
-    force
+    measured.force_n
 }
 
 /// Covariance of forces that share one calibration.

@@ -1,0 +1,719 @@
+//! The local light-to-pressure curve f of (5), fitted from frames: P = f(I), F_z = ∫ f(I) dS.
+//!
+//! The force is linear in the coefficients of the curve, with the grey histogram of the contact as
+//! the row of the design,
+//!
+//! F_i = Σ_g A_i(g) f(g), A_i(g) the area in m² whose difference from the reference is g grey levels in frame i.
+//!
+//! f rises, passes through the origin and is as smooth as cross-validation finds best.
+
+use nalgebra::{SMatrix, SVector};
+use tactile_core::statistics::effective_degrees_of_freedom;
+use tactile_core::{Estimate, Requirement};
+
+use super::{
+    Branch, CalibrationOptions, CalibrationPair, ForceReading, GreyHistogram, LinearCalibration,
+    LocalCalibration, StressCalibration,
+};
+use crate::error::ForceError;
+use crate::frame::DifferenceNoise;
+
+/// The grey histogram of a contact under a known force.
+///
+/// ```
+/// use tactile_force::{Branch, CalibrationFrame, GreyHistogram};
+///
+/// let histogram = GreyHistogram::from_differences([40.0; 500].into_iter(), 4e-10);
+/// assert!(CalibrationFrame::new(histogram.clone(), 0.31, Branch::Loading).is_ok());
+/// assert!(CalibrationFrame::new(histogram, f64::NAN, Branch::Loading).is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibrationFrame {
+    histogram: GreyHistogram,
+    force_n: f64,
+    branch: Branch,
+}
+
+impl CalibrationFrame {
+    /// A frame whose contact has this histogram while a gauge shows this force, rising or falling.
+    ///
+    /// # Errors
+    /// A force that is negative or not finite.
+    pub fn new(histogram: GreyHistogram, force_n: f64, branch: Branch) -> Result<Self, ForceError> {
+        Requirement::NonNegative.check("force_n", force_n)?;
+        Ok(Self {
+            histogram,
+            force_n,
+            branch,
+        })
+    }
+}
+
+/// The weights of the frames and the smoothness of the curve.
+///
+/// ```
+/// use tactile_force::PressureCurveOptions;
+///
+/// // A gauge good to 0.5 % of the force and 0.1 % of its range.
+/// let options = PressureCurveOptions::default().with_force_error(0.005, 0.001)?;
+/// // A curve as stiff as a straight line.
+/// assert!(options.with_smoothness(1e6).is_ok() && options.with_smoothness(f64::NAN).is_err());
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PressureCurveOptions {
+    relative_error: f64,
+    range_error: f64,
+    smoothness: Option<f64>,
+}
+
+impl Default for PressureCurveOptions {
+    /// Errors of 1 % of the force and 0.2 % of the largest force, smoothness by cross-validation.
+    fn default() -> Self {
+        Self {
+            relative_error: 0.01,
+            range_error: 0.002,
+            smoothness: None,
+        }
+    }
+}
+
+impl PressureCurveOptions {
+    /// Weights the frames as if their errors were this share of the force and this share of the
+    /// largest force, added in quadrature. Only the ratio matters: the size is estimated from the
+    /// residuals.
+    ///
+    /// # Errors
+    /// A share that is negative or not finite, or no error of the range, which frames without force
+    /// need.
+    pub fn with_force_error(mut self, of_force: f64, of_range: f64) -> Result<Self, ForceError> {
+        self.relative_error = Requirement::NonNegative.check("of_force", of_force)?;
+        self.range_error = Requirement::Positive.check("of_range", of_range)?;
+        Ok(self)
+    }
+
+    /// Weighs the second differences of the slopes by this factor, relative to the data, instead of
+    /// choosing it by cross-validation.
+    ///
+    /// # Errors
+    /// A factor that is not positive and finite.
+    pub fn with_smoothness(mut self, factor: f64) -> Result<Self, ForceError> {
+        self.smoothness = Some(Requirement::Positive.check("smoothness", factor)?);
+        Ok(self)
+    }
+}
+
+/// The difference between the curves of loading and unloading.
+///
+/// ```
+/// use tactile_force::{CurveHysteresis, Estimate};
+///
+/// let lag = CurveHysteresis::new(Estimate::new(0.02, 0.003));
+/// // Half of the difference beyond its error: the relative error of a force of unknown branch.
+/// assert!((lag.width - 0.5 * (0.02_f64.powi(2) - 0.003_f64.powi(2)).sqrt()).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct CurveHysteresis {
+    /// (f_loading − f_unloading)/f, each branch scaled to its own frames.
+    pub relative: Estimate,
+    /// Half of the difference beyond its own error, √(relative² − error²)/2 or zero: the relative
+    /// error of a force whose branch is unknown. Every reading includes it.
+    pub width: f64,
+}
+
+impl CurveHysteresis {
+    /// From the relative difference.
+    #[must_use]
+    pub fn new(relative: Estimate) -> Self {
+        let excess = relative.value.powi(2) - relative.standard_error.powi(2);
+        Self {
+            relative,
+            width: 0.5 * excess.max(0.0).sqrt(),
+        }
+    }
+}
+
+/// How well a curve fits its frames, and which grey levels these determine.
+///
+/// See [`PressureCurve`] for an example.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct PressureCurveReport {
+    /// Number of frames.
+    pub frames: usize,
+    /// Trace of the smoother: the number of parameters that the data determined.
+    pub effective_parameters: f64,
+    /// Standard deviation of the residuals relative to the frames' assumed errors of
+    /// [`PressureCurveOptions`]: 1 if these are right.
+    pub residual_sd: f64,
+    /// Residual of every frame, known force minus fitted, in newtons.
+    pub residuals_n: Vec<f64>,
+    /// The smoothness used.
+    pub smoothness: f64,
+    /// Root mean square error of forces that were left out of the fit, relative to the assumed
+    /// errors. `None` if the smoothness was given.
+    pub cross_validation_error: Option<f64>,
+    /// Least and greatest grey level between which f is known to 5 %. Zero to zero if nowhere.
+    pub identified_grey: [f64; 2],
+    /// Loading against unloading. `None` unless each has three frames.
+    pub hysteresis: Option<CurveHysteresis>,
+}
+
+/// The local light-to-pressure curve f of (5): pressure in pascals of a pixel's grey-level difference.
+///
+/// Fitted from frames of contacts under known forces by penalised least squares: f rises, f(0) = 0,
+/// smoothness by cross-validation. Standard errors come from the Bayesian covariance σ²(XᵀX + λP)⁻¹
+/// of the coefficients, which includes the bias of smoothing (G. Wahba, J. R. Statist. Soc. B 45
+/// (1983) 133–150). O(frames × grey levels).
+///
+/// As a [`StressCalibration`] it carries a line through the origin of the same frames' sums, for
+/// integrated pixel values without a frame. A [`ForceMeter`](crate::ForceMeter) uses the curve
+/// itself: force, centroid and profile are then those of the pressure.
+///
+/// ```
+/// use tactile_force::{
+///     Branch, CalibrationFrame, DifferenceNoise, GreyHistogram, LocalCalibration, PressureCurve,
+/// };
+///
+/// // Discs of even grey whose light goes as the pressure's square root.
+/// let disc = |k: i32| {
+///     let differences = std::iter::repeat_n(12.0 * k as f32, 1000);
+///     let histogram = GreyHistogram::from_differences(differences, 1e-9);
+///     CalibrationFrame::new(histogram, (12.0 * f64::from(k)).powi(2) * 1e-6, Branch::Loading)
+/// };
+/// let frames = (1..=12).map(disc).collect::<Result<Vec<_>, _>>()?;
+/// let curve = PressureCurve::fit(&frames, &Default::default())?;
+/// let pressure = curve.pressure_pa(100.0);
+/// assert!((pressure.value / 1e4 - 1.0).abs() < 0.01);
+/// assert_eq!(curve.pressure_pa(0.0).value, 0.0);
+/// let report = &curve.report;
+/// assert_eq!((report.frames, report.identified_grey[1], report.hysteresis), (12, 144.0, None));
+/// // Half of a contact at 40 grey levels, half at 120.
+/// let greys = (0..1000).map(|k| if k < 500 { 40.0 } else { 120.0 });
+/// let noise = DifferenceNoise::white(2.0);
+/// let reading = curve.read(&GreyHistogram::from_differences(greys, 1e-9), &noise)?;
+/// assert!((reading.force_n.value / 8e-3 - 1.0).abs() < 0.01 && !reading.out_of_range);
+/// # Ok::<(), tactile_force::ForceError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Unchecked")
+)]
+pub struct PressureCurve {
+    coefficients: Coefficients,
+    /// How well the curve fits its frames, and which grey levels these determine.
+    pub report: PressureCurveReport,
+    /// F(V) of the same frames.
+    sums: LinearCalibration,
+}
+
+/// A curve as a file has it.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Unchecked {
+    coefficients: Coefficients,
+    report: PressureCurveReport,
+    sums: LinearCalibration,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Unchecked> for PressureCurve {
+    type Error = ForceError;
+
+    /// Refuses what no fit gives: a curve that falls, or numbers that are not finite.
+    fn try_from(given: Unchecked) -> Result<Self, ForceError> {
+        let c = &given.coefficients;
+        Requirement::Positive.check("basis.top", c.basis.top)?;
+        Requirement::Positive.check("degrees_of_freedom", c.degrees_of_freedom)?;
+        for slope in c.slopes {
+            Requirement::NonNegative.check("slopes", slope)?;
+        }
+        Requirement::Positive.check("the greatest of slopes", Knots::from(c.slopes).max())?;
+        for (j, row) in c.covariance.iter().enumerate() {
+            row.iter()
+                .try_for_each(|c| Requirement::Finite.check("covariance", *c).map(drop))?;
+            Requirement::NonNegative.check("the diagonal of covariance", row[j])?;
+        }
+        Ok(Self {
+            coefficients: given.coefficients,
+            report: given.report,
+            sums: given.sums,
+        })
+    }
+}
+
+impl PressureCurve {
+    /// Fits the curve to frames under known forces, loading and unloading.
+    ///
+    /// # Errors
+    /// Fewer than five frames, no force or no light in any of them, or light that falls with the force.
+    pub fn fit(
+        frames: &[CalibrationFrame],
+        options: &PressureCurveOptions,
+    ) -> Result<Self, ForceError> {
+        let problem = Problem::new(frames, options)?;
+        let (smoothness, cross_validation_error) = match options.smoothness {
+            Some(given) => (given, None),
+            None => problem.cross_validated(),
+        };
+        let solution = problem.solve(smoothness, |_| true);
+        let residuals = (0..frames.len()).map(|i| problem.residual(i, &solution.slopes));
+        let squares: f64 = residuals.clone().map(|r| r * r).sum();
+        let degrees_of_freedom = (frames.len() as f64 - solution.effective).max(1.0);
+        let variance = squares / degrees_of_freedom;
+        let unit = problem.unit;
+        let coefficients = Coefficients {
+            basis: problem.basis,
+            slopes: (solution.slopes * unit).into(),
+            covariance: (solution.inverse * (variance * unit * unit)).into(),
+            degrees_of_freedom,
+        };
+        let report = PressureCurveReport {
+            frames: frames.len(),
+            effective_parameters: solution.effective,
+            residual_sd: variance.sqrt(),
+            residuals_n: residuals.zip(&problem.errors).map(|(r, e)| r * e).collect(),
+            smoothness,
+            cross_validation_error,
+            identified_grey: identified(&coefficients),
+            hysteresis: problem.hysteresis(frames, &solution.slopes),
+        };
+        let pair = |f: &CalibrationFrame| CalibrationPair {
+            integrated_pixel_value: f.histogram.integral(|grey| grey) / f.histogram.pixel_area_m2,
+            force_n: f.force_n,
+            branch: f.branch,
+        };
+        let pairs: Vec<_> = frames.iter().map(pair).collect();
+        let through_origin = CalibrationOptions::default().with_zero_at_origin();
+        Ok(Self {
+            coefficients,
+            report,
+            sums: LinearCalibration::fit(&pairs, &through_origin)?,
+        })
+    }
+}
+
+impl LocalCalibration for PressureCurve {
+    fn pressure_pa(&self, grey: f64) -> Estimate {
+        self.coefficients.pressure_pa(grey)
+    }
+
+    fn value_pa(&self, grey: f64) -> f64 {
+        let c = &self.coefficients;
+        c.basis.integrals(grey).dot(&c.slopes())
+    }
+
+    fn read(
+        &self,
+        histogram: &GreyHistogram,
+        noise: &DifferenceNoise,
+    ) -> Result<ForceReading, ForceError> {
+        let c = &self.coefficients;
+        let slopes = c.slopes();
+        let (mut row, mut force, mut beyond) = (Knots::zeros(), 0.0, 0.0);
+        for (grey, area) in histogram.bins() {
+            let integrals = c.basis.integrals(grey);
+            let pressure = integrals.dot(&slopes);
+            row += integrals * area;
+            force += area * pressure;
+            if grey > self.report.identified_grey[1] {
+                beyond += area * pressure;
+            }
+        }
+        let noise_n = histogram.noise(noise, |grey| c.basis.weights(grey).dot(&slopes));
+        let hysteresis = self.report.hysteresis.map_or(0.0, |h| h.width * force);
+        let error = c.variance(&row).max(0.0).sqrt().hypot(hysteresis);
+        Ok(ForceReading {
+            // A hundredth of the force from grey levels beyond those identified is within the
+            // stated error. More is a guess.
+            out_of_range: beyond > 0.01 * force.abs(),
+            ..ForceReading::new(force, noise_n, error, Some(c.degrees_of_freedom))
+        })
+    }
+}
+
+impl StressCalibration for PressureCurve {
+    fn force_n(&self, integrated_pixel_value: f64) -> f64 {
+        self.sums.force_n(integrated_pixel_value)
+    }
+
+    fn sensitivity_n(&self, integrated_pixel_value: f64) -> f64 {
+        self.sums.sensitivity_n(integrated_pixel_value)
+    }
+
+    fn standard_error_n(&self, integrated_pixel_value: f64) -> f64 {
+        self.sums.standard_error_n(integrated_pixel_value)
+    }
+
+    fn degrees_of_freedom(&self) -> Option<f64> {
+        self.sums.degrees_of_freedom()
+    }
+
+    fn error_covariance_n2(&self, a: f64, b: f64) -> f64 {
+        self.sums.error_covariance_n2(a, b)
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.sums.range()
+    }
+
+    fn local(&self) -> Option<&dyn LocalCalibration> {
+        Some(self)
+    }
+}
+
+/// Number of knots. Twelve intervals follow powers from 0.8 to 1.2 to 10⁻³ of the force. More cost
+/// nothing but are all prior.
+const KNOTS: usize = 13;
+
+/// One number a knot: slopes, or the integrals they are multiplied with.
+type Knots = SVector<f64, KNOTS>;
+type Normal = SMatrix<f64, KNOTS, KNOTS>;
+
+/// f(d) = ∫₀ᵈ s with s linear between its values at the knots; slopes that are not negative make f rise.
+///
+/// Knots lie at t_j = top (j/12)²: light that goes as a power of the pressure bends most near zero.
+/// Below zero f goes on with the slope at zero, so that noise about zero adds nothing. Beyond the top
+/// it goes on with the last slope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Basis {
+    top: f64,
+}
+
+impl Basis {
+    fn knot(&self, j: usize) -> f64 {
+        let share = j as f64 / (KNOTS - 1) as f64;
+        self.top * share * share
+    }
+
+    /// The interval that holds `d`, and its share from the interval's start.
+    fn place(&self, d: f64) -> (usize, f64) {
+        let intervals = (KNOTS - 1) as f64;
+        let at = (intervals * (d / self.top).max(0.0).sqrt()).min(intervals - 1.0) as usize;
+        let (from, to) = (self.knot(at), self.knot(at + 1));
+        (at, ((d - from) / (to - from)).clamp(0.0, 1.0))
+    }
+
+    /// The integral over each knot's slope: f(d) is the scalar product with the slopes.
+    fn integrals(&self, d: f64) -> Knots {
+        let mut row = Knots::zeros();
+        if d <= 0.0 {
+            row[0] = d;
+            return row;
+        }
+        let (at, x) = self.place(d);
+        for j in 0..=at {
+            let width = self.knot(j + 1) - self.knot(j);
+            let share = if j == at { x } else { 1.0 };
+            row[j] += width * share * (1.0 - 0.5 * share);
+            row[j + 1] += 0.5 * width * share * share;
+        }
+        row[KNOTS - 1] += (d - self.top).max(0.0);
+        row
+    }
+
+    /// The slope at `d` is the scalar product with the slopes at the knots.
+    fn weights(&self, d: f64) -> Knots {
+        let (at, x) = self.place(d);
+        let mut row = Knots::zeros();
+        row[at] = 1.0 - x;
+        row[at + 1] = x;
+        row
+    }
+}
+
+/// Slopes at the knots in Pa per grey level, and their covariance.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+struct Coefficients {
+    basis: Basis,
+    slopes: [f64; KNOTS],
+    /// Symmetric, column by column.
+    covariance: [[f64; KNOTS]; KNOTS],
+    degrees_of_freedom: f64,
+}
+
+impl Coefficients {
+    fn pressure_pa(&self, grey: f64) -> Estimate {
+        let row = self.basis.integrals(grey);
+        Estimate::from_variance(row.dot(&self.slopes()), self.variance(&row))
+            .with_degrees_of_freedom(self.degrees_of_freedom)
+    }
+
+    fn slopes(&self) -> Knots {
+        Knots::from(self.slopes)
+    }
+
+    /// Variance of a sum of slopes with these factors.
+    fn variance(&self, row: &Knots) -> f64 {
+        row.dot(&(Normal::from(self.covariance) * row))
+    }
+}
+
+/// Rows and forces, each divided by the frame's assumed error; slopes in units of their mean.
+struct Problem {
+    basis: Basis,
+    rows: Vec<Knots>,
+    forces: Vec<f64>,
+    errors: Vec<f64>,
+    /// Pascals per grey level that fit all frames best.
+    unit: f64,
+}
+
+struct Solution {
+    slopes: Knots,
+    /// Inverse of the penalised normal matrix, zero for slopes held at zero.
+    inverse: Normal,
+    /// Trace of the smoother.
+    effective: f64,
+}
+
+impl Problem {
+    fn new(
+        frames: &[CalibrationFrame],
+        options: &PressureCurveOptions,
+    ) -> Result<Self, ForceError> {
+        // Five forces leave degrees of freedom beside a curve of three.
+        if frames.len() < 5 {
+            return Err(ForceError::TooFewPairs {
+                required: 5,
+                found: frames.len(),
+            });
+        }
+        let largest = frames.iter().map(|f| f.force_n).fold(0.0, f64::max);
+        let top = frames
+            .iter()
+            .map(|f| f.histogram.greatest())
+            .fold(0.0, f64::max);
+        if largest == 0.0 || top < 1.0 {
+            return Err(ForceError::DegeneratePairs {
+                span: largest.min(top),
+            });
+        }
+        let basis = Basis { top };
+        let errors: Vec<f64> = frames
+            .iter()
+            .map(|f| (options.relative_error * f.force_n).hypot(options.range_error * largest))
+            .collect();
+        let (mut vv, mut vf) = (0.0, 0.0);
+        for (frame, error) in frames.iter().zip(&errors) {
+            let integral = frame.histogram.integral(|grey| grey) / error;
+            vv += integral * integral;
+            vf += integral * frame.force_n / error;
+        }
+        let unit = vf / vv;
+        if !(unit > 0.0 && unit.is_finite()) {
+            return Err(ForceError::NotMonotone { from: 0.0, to: top });
+        }
+        let row = |frame: &CalibrationFrame, error: f64| {
+            let mut row = Knots::zeros();
+            for (grey, area) in frame.histogram.bins() {
+                row += basis.integrals(grey) * area;
+            }
+            row * (unit / error)
+        };
+        Ok(Self {
+            basis,
+            rows: frames
+                .iter()
+                .zip(&errors)
+                .map(|(f, e)| row(f, *e))
+                .collect(),
+            forces: frames
+                .iter()
+                .zip(&errors)
+                .map(|(f, e)| f.force_n / e)
+                .collect(),
+            errors,
+            unit,
+        })
+    }
+
+    /// Known force minus fitted, in units of the assumed error.
+    fn residual(&self, frame: usize, slopes: &Knots) -> f64 {
+        self.forces[frame] - self.rows[frame].dot(slopes)
+    }
+
+    /// Penalised least squares over the frames that are kept.
+    fn solve(&self, smoothness: f64, keep: impl Fn(usize) -> bool) -> Solution {
+        let (mut data, mut right) = (Normal::zeros(), Knots::zeros());
+        for i in (0..self.rows.len()).filter(|i| keep(*i)) {
+            data += self.rows[i] * self.rows[i].transpose();
+            right += self.rows[i] * self.forces[i];
+        }
+        let weight = smoothness * data.trace() / KNOTS as f64;
+        // A trace of first differences keeps the matrix definite where the frames leave a straight slope undetermined.
+        let normal = data
+            + differences([1.0, -2.0, 1.0]) * weight
+            + differences([-1.0, 1.0]) * (1e-6 * weight);
+        let (slopes, free) = nonnegative(&normal, &right);
+        let mut inverse = bound(&normal, &free)
+            .cholesky()
+            .map_or(Normal::zeros(), |c| c.inverse());
+        for j in (0..KNOTS).filter(|j| !free[*j]) {
+            inverse[(j, j)] = 0.0;
+        }
+        Solution {
+            slopes,
+            inverse,
+            effective: (inverse * data).trace(),
+        }
+    }
+
+    /// The smoothness with the least error on frames left out, and that error.
+    fn cross_validated(&self) -> (f64, Option<f64>) {
+        let count = self.rows.len();
+        // Parts that are left out in turn: each frame alone where there are few.
+        let folds = count.min(10);
+        let error = |smoothness: f64| {
+            let mut squares = 0.0;
+            for fold in 0..folds {
+                let solution = self.solve(smoothness, |i| i % folds != fold);
+                for i in (fold..count).step_by(folds) {
+                    squares += self.residual(i, &solution.slopes).powi(2);
+                }
+            }
+            (squares / count as f64).sqrt()
+        };
+        // From a curve that follows every frame to one whose slope is a parabola in the grey level's
+        // root.
+        let mut best = (0.0, f64::INFINITY);
+        for smoothness in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0] {
+            let here = error(smoothness);
+            if here <= best.1 {
+                best = (smoothness, here);
+            }
+        }
+        (best.0, Some(best.1))
+    }
+
+    /// Each branch's own scale of the common curve, by least squares.
+    fn hysteresis(&self, frames: &[CalibrationFrame], slopes: &Knots) -> Option<CurveHysteresis> {
+        let scale = |branch: Branch| {
+            let of_branch = (0..frames.len()).filter(|i| frames[*i].branch == branch);
+            let (mut count, mut pp, mut pf, mut ff) = (0, 0.0, 0.0, 0.0);
+            for i in of_branch {
+                let (predicted, force) = (self.rows[i].dot(slopes), self.forces[i]);
+                count += 1;
+                pp += predicted * predicted;
+                pf += predicted * force;
+                ff += force * force;
+            }
+            let scale = pf / pp;
+            let variance = (ff - scale * pf).max(0.0) / f64::from(count - 1) / pp;
+            (count >= 3).then_some(
+                Estimate::from_variance(scale, variance)
+                    .with_degrees_of_freedom(f64::from(count - 1)),
+            )
+        };
+        let (loading, unloading) = (scale(Branch::Loading)?, scale(Branch::Unloading)?);
+        let parts = [loading, unloading];
+        let parts = parts.map(|e| (e.standard_error.powi(2), e.degrees_of_freedom));
+        let mut relative =
+            Estimate::from_variance(loading.value - unloading.value, parts[0].0 + parts[1].0);
+        relative.degrees_of_freedom = effective_degrees_of_freedom(&parts);
+        Some(CurveHysteresis::new(relative))
+    }
+}
+
+/// Σ of the products of rows of differences, each with these factors from one knot on.
+fn differences<const N: usize>(factors: [f64; N]) -> Normal {
+    let mut penalty = Normal::zeros();
+    for j in 0..=KNOTS - N {
+        let mut row = Knots::zeros();
+        row.fixed_rows_mut::<N>(j).copy_from_slice(&factors);
+        penalty += row * row.transpose();
+    }
+    penalty
+}
+
+/// The longest run of whole grey levels on which f is known well enough.
+fn identified(coefficients: &Coefficients) -> [f64; 2] {
+    let known = |grey: f64| {
+        let e = coefficients.pressure_pa(grey);
+        e.value > 0.0 && e.standard_error <= 0.05 * e.value
+    };
+    let greys = (1..=coefficients.basis.top as u32).map(f64::from);
+    let (mut best, mut run): ([f64; 2], Option<f64>) = ([0.0; 2], None);
+    for grey in greys {
+        run = known(grey).then(|| run.unwrap_or(grey));
+        if let Some(start) = run.filter(|start| grey - start >= best[1] - best[0]) {
+            best = [start, grey];
+        }
+    }
+    best
+}
+
+/// The minimiser of ½ xᵀHx − gᵀx over x ≥ 0, and which coefficients are free (C. Lawson and R.
+/// Hanson, *Solving Least Squares Problems*, 1974, chapter 23). H is positive definite.
+fn nonnegative(normal: &Normal, right: &Knots) -> (Knots, [bool; KNOTS]) {
+    let mut free = [false; KNOTS];
+    let mut x = Knots::zeros();
+    // Rounding of a gradient.
+    let tolerance = 1e-12 * right.amax();
+    // Each round frees one coefficient; in practice few are bound again.
+    for _ in 0..10 * KNOTS {
+        let gradient = right - normal * x;
+        let most = (0..KNOTS)
+            .filter(|&j| !free[j] && gradient[j] > tolerance)
+            .max_by(|&a, &b| gradient[a].total_cmp(&gradient[b]));
+        let Some(most) = most else {
+            break;
+        };
+        free[most] = true;
+        loop {
+            let target = unconstrained(normal, right, &free);
+            let leaving = (0..KNOTS).filter(|&j| free[j] && target[j] <= 0.0);
+            // The largest step towards the target that keeps every coefficient.
+            let step = leaving
+                .map(|j| x[j] / (x[j] - target[j]))
+                .fold(f64::INFINITY, f64::min);
+            if step == f64::INFINITY {
+                x = target;
+                break;
+            }
+            x += (target - x) * step;
+            for j in 0..KNOTS {
+                if free[j] && target[j] <= 0.0 && x[j] <= 1e-14 * x.amax() {
+                    free[j] = false;
+                    x[j] = 0.0;
+                }
+            }
+        }
+    }
+    (x, free)
+}
+
+/// The minimiser over the free coefficients, zero elsewhere.
+fn unconstrained(normal: &Normal, right: &Knots, free: &[bool; KNOTS]) -> Knots {
+    let (normal, right) = (
+        bound(normal, free),
+        Knots::from_fn(|j, _| if free[j] { right[j] } else { 0.0 }),
+    );
+    normal
+        .cholesky()
+        .map_or(Knots::zeros(), |c| c.solve(&right))
+}
+
+/// H with the rows and columns of bound coefficients replaced by those of the identity.
+fn bound(normal: &Normal, free: &[bool; KNOTS]) -> Normal {
+    Normal::from_fn(|i, j| match (free[i] && free[j], i == j) {
+        (true, _) => normal[(i, j)],
+        (false, true) => 1.0,
+        (false, false) => 0.0,
+    })
+}
+
+#[cfg(test)]
+mod tests;
